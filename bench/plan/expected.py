@@ -80,7 +80,7 @@ def expected(
 
 def near_frames(staged: Staged) -> list[int]:
     """The frames that make the truth."""
-    return TouchByClearance().near(
+    return TouchByClearance().frames_to_fit(
         dict(enumerate(staged.motor_rad.tolist())), dict(enumerate(staged.bend_rad))
     )
 
@@ -139,7 +139,7 @@ def state_of(problem: Problem, staged: Staged, frames: Sequence[int]) -> State:
 def _by_clearance(problem: Problem, staged: Staged, frames: Sequence[int]) -> tuple[Problem, State]:
     """The problem with the frames parted as the fit would know them to touch, and the state."""
     state = state_of(problem, staged, frames)
-    touching, free = TouchByClearance().parted(problem, state, _answer(problem, state))
+    touching, free = TouchByClearance().part_by_fit(problem, state, _answer(problem, state))
     problem = replace(problem, touching=touching, bent=~free)
     return problem, state_of(problem, staged, frames)
 
@@ -149,4 +149,4 @@ def _by_onset(problem: Problem, staged: Staged, frames: Sequence[int]) -> tuple[
     free = early(problem.motor_rad)
     problem = replace(problem, touching=problem.touching & ~free, bent=~free)
     state = state_of(problem, staged, frames)
-    return TouchByOnset().settled(problem, state, _answer(problem, state))
+    return TouchByOnset().with_touch(problem, state, _answer(problem, state))

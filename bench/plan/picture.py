@@ -13,7 +13,6 @@ from bench.plan.painted import Painter
 from bench.plan.sight import curves_of
 from bench.plan.staged import Staged
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.contact import outline_of_bar
 from vision.geometry.rotation import apply
 from vision.geometry.silhouette import normals
 
@@ -126,7 +125,7 @@ def _view(axis: Axes, camera: Camera, picture: np.ndarray, shown: Staged, name: 
     frame = last_frame(shown)
     wire = camera.project(curves_of(shown, [frame])[frame].points_mm)
     axis.plot(*wire.T, color="#e08214", lw=0.8)
-    middle, half = outline_of_bar(camera, shown.axis, shown.rods.bar.radius_mm)
+    middle, half = shown.axis.covering_discs(camera, shown.rods.bar.radius_mm)
     for side in (-1, 1):
         axis.plot(*(middle + side * half[:, None] * normals(middle)).T, color="#67a9cf", lw=0.8)
     axis.plot(*camera.project(shown.touch.point_mm[None])[0], "+", color="#b2182b", ms=9)

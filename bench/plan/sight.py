@@ -8,7 +8,7 @@ import numpy as np
 from bench.plan.staged import Staged
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves, one_curve
-from vision.geometry.contact import BarAxis, outline_of_bar
+from vision.geometry.contact import BarAxis
 from vision.geometry.rods import Rods
 from vision.geometry.silhouette import normals, outline
 from vision.geometry.vision_settings import VisionSettings
@@ -86,7 +86,7 @@ def sight_of(
     )
     every = every.select(every.place > NEAR_CLAMP_MM)
     inside = np.mean(every.weight > 0, axis=1) > _LEAST_IN_PICTURE
-    clear = clear_of_bar(every, *outline_of_bar(camera, axis, rods.bar.radius_mm), BESIDE_BAR_PX)
+    clear = clear_of_bar(every, *axis.covering_discs(camera, rods.bar.radius_mm), BESIDE_BAR_PX)
     points = _in_space(every, curves)
     hidden = hides(camera, points)
     count = max(len(every), 1)

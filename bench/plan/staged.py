@@ -16,7 +16,7 @@ from bench.rig.recording import Recording
 from bench.rig.stick_slip import Friction
 from vision.geometry import rods as seen_rods
 from vision.geometry.centreline import REST_POWERS
-from vision.geometry.contact import BarAxis, upward
+from vision.geometry.contact import BarAxis
 
 _STEP_RAD = math.radians(0.1)  # of the mechanics between frames
 _SLOW_HZ = 100.0  # of signals that nobody looks at
@@ -53,7 +53,7 @@ class Staged:
     @property
     def axis(self) -> BarAxis:
         """The bar's axis, its point opposite the first contact."""
-        return upward(BarAxis(self.foot_mm, self.whisk.bar.axis))
+        return BarAxis(self.foot_mm, self.whisk.bar.axis).upward()
 
 
 def of_run(protocol: Protocol, run: Run) -> Staged:

@@ -12,8 +12,9 @@ from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes, ways_back
 from bench.session.trial import Trial
 from bench.trials.still_scene import StillScene, still_scene
+from vision.geometry.forms import touched_object
 from vision.geometry.rods import Bar, Rods
-from vision.geometry.rounded import Form
+from vision.geometry.touched import StatedSizes, Touched
 from vision.pictures.others import RodLines
 from vision.truth.trial_pictures import TrialPictures
 
@@ -80,17 +81,18 @@ class Shown:
         return cls(times, frames, scene, places, back, pictures, rods)
 
 
-def touched(trial: Trial) -> Bar:
-    """What is touched, as vision takes it: a cone has no thickness of its own."""
+def touched(trial: Trial) -> Touched:
+    """Return what is touched, as vision takes it."""
+    thickness = StatedSizes(trial.bar_diameter_mm or 0.0, trial.bar_diameter_sigma_mm)
     given = trial.object
-    if trial.is_bar:
-        return Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm)
-    form = Form(
-        given.shape, given.ring_diameter_mm or 0.0, float(np.radians(given.half_angle_deg or 0.0))
+    if given is None:
+        return Bar.from_sizes(thickness)
+    stated = replace(
+        thickness,
+        ring_diameter_mm=given.ring_diameter_mm or 0.0,
+        half_angle_rad=float(np.radians(given.half_angle_deg or 0.0)),
     )
-    if given.shape == "cone":
-        return Bar(0.0, 0.0, replace(form, about_mm=trial.bar_diameter_mm or 0.0))
-    return Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm, form)
+    return touched_object(given.shape, stated)
 
 
 def _backwards(signals: Signals, times: FrameTimes, where: slice | None) -> slice | None:

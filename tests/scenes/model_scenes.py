@@ -9,7 +9,7 @@ from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import Curves, rotation_z
 from vision.geometry.contact import BarAxis, clearance
 from vision.geometry.rods import Bar, Rods, Wire
-from vision.geometry.rounded import Rounded
+from vision.geometry.rounded import RoundedAxis
 from vision.geometry.silhouette import normals, outline
 from vision.wire.points import LinePoints, Observed
 
@@ -69,7 +69,7 @@ def _bent_until_touching(problem, state, slope=0.35):
     return State(vector, arcs)
 
 
-def rounded_scene(form, thick_mm, stands):
+def rounded_scene(form, stands):
     """As `scene`, of an object that is no straight bar. stands: where it does, from the point (3,) that is touched, the
     way (3,) from the whisker into it and the direction (3,) of the bar that the contact sees."""
     turn, beta = rotation_z(np.radians(2.3)), np.radians(40.0)
@@ -78,9 +78,9 @@ def rounded_scene(form, thick_mm, stands):
         turn @ [0.0, np.sin(beta), np.cos(beta)],
     )
     spot = turn @ [60.0, 0.0, 0.0] + 0.5 * WIRE.diameter_mm * inwards
-    axis = Rounded(*stands(spot, inwards, along), form, spot)
+    axis = RoundedAxis(*stands(spot, inwards, along), form, spot)
     problem, state = scene()
-    problem = replace(problem, axis=axis, rods=Rods(WIRE, Bar(thick_mm, 0.0, form)))
+    problem = replace(problem, axis=axis, rods=Rods(WIRE, form))
     vector = np.zeros(problem.size)
     vector[4:12] = state.vector[4:12]
     return problem, _bent_until_touching(
@@ -93,7 +93,9 @@ def with_outline(problem, state, rng=None, sigma=0.05):
     axis, radius_mm = bar_axis(problem, state.vector), problem.rods.bar.radius_mm
     seen = [one for one in with_points(problem, state, rng, sigma).seen if one.frame >= 0]
     for number, view in enumerate(problem.cameras):
-        points, ways = (of.reshape(-1, 3) for of in axis.limb(view.centre_mm, radius_mm, 25.0, 12))
+        points, ways = (
+            of.reshape(-1, 3) for of in axis.silhouette(view.centre_mm, radius_mm, 25.0, 12)
+        )
         px, by_point, _ = view.project_with_jacobians(points)
         normal = np.einsum("nij,nj->ni", by_point, ways)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -118,7 +120,7 @@ def with_points(problem, state, rng=None, sigma=0.05):
             seen.append(
                 Observed(frame, number, _points(view.project(one.at(place)[0]), place, sigma, rng))
             )
-        if problem.is_rounded:
+        if not isinstance(problem.axis, BarAxis):
             continue
         place = np.linspace(-25.0, 25.0, 20)
         for frame in range(1 if problem.motion is None else len(problem.motor_rad)):

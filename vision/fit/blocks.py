@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.geometry.touched import Touched
 from vision.wire.points import SHARED
 
 # [mm, rad] Of the bar from where it was found: nothing is believed of it. Stated.
@@ -46,9 +47,6 @@ BAR_OFFSET_PX = 0.05
 BAR_TILT_PX = 0.025
 # [px] Sigmas of a bar's line, in the order of the parameters.
 BAR_MODES_PX = np.array([BAR_OFFSET_PX, BAR_TILT_PX])
-# [px] An outline is read too far out, or in, by so much as a whole: with the wrong transfer curve
-# 0.5, else 0.05; the object's size determines it. Study: rounded_seen.py.
-OUTWARD_PX = 0.3
 
 # [mm] Step of differences, about 1e-5 of what a length moves. Study: gradients.py.
 _STEP_MM = 1e-4
@@ -93,9 +91,9 @@ class Blocks:
     tip, four powers in y, then in z. reach: error of the distance from axis to centreline at the
     contact, mm. wire_offsets, bar_offsets: by camera, px by which its lines of wire and bar are off
     as a whole (of the wire the shapes of `wire_modes`, then what its points share). motion: of a
-    bar that does not stand still. shift_along: of a rounded object along its direction, mm.
-    outline_bias: by camera, px by which a rounded object's outline is read too far out. friction:
-    along the whisker, over the force across it. bends: rad, two of each frame that may bend.
+    bar that does not stand still. shift_along: of the object along its axis, mm. outline_bias: by
+    camera, px by which the object's outline is read too far out. friction: along the whisker, over
+    the force across it. bends: rad, two of each frame that may bend.
     """
 
     bar_axis: Block
@@ -116,7 +114,7 @@ class Blocks:
         reach_sigma_mm: float,
         offset_sigma_px: np.ndarray,
         motion_sigma: Sequence[float],
-        is_rounded: bool,
+        touched: Touched,
         bent_frames: int,
     ) -> "Blocks":
         """Return the blocks one behind the other. offset_sigma_px (cameras, 12): see
@@ -132,8 +130,7 @@ class Blocks:
         for sigma_px in offset_sigma_px:
             wire_offsets.append(layout.add("wire offset", sigma_px[:WIRE_OFFSETS]))
             bar_offsets.append(layout.add("bar offset", sigma_px[WIRE_OFFSETS:]))
-        shift_sigma = [BAR_PRIOR[0]] if is_rounded else []
-        outline_sigma = [OUTWARD_PX] * len(offset_sigma_px) if is_rounded else []
+        outline_sigma = touched.outline_sigma_px * len(offset_sigma_px)
         return cls(
             bar_axis=bar_axis,
             rest_shape=rest_shape,
@@ -141,7 +138,7 @@ class Blocks:
             wire_offsets=tuple(wire_offsets),
             bar_offsets=tuple(bar_offsets),
             motion=layout.add("motion", motion_sigma, _STEP_MM),
-            shift_along=layout.add("shift along", shift_sigma, _STEP_MM),
+            shift_along=layout.add("shift along", touched.along_sigma_mm, _STEP_MM),
             outline_bias=layout.add("outline bias", outline_sigma, _STEP_MM),
             friction=layout.add("friction", [PULL_PRIOR], _STEP_FRICTION),
             bends=layout.add("bends", [BEND_PRIOR_RAD] * (2 * bent_frames), _STEP_BEND_RAD),

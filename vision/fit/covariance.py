@@ -8,12 +8,11 @@ from functools import lru_cache
 import numpy as np
 from scipy.ndimage import correlate1d
 
-from vision.fit.problem import Problem, State, bar_axis, curves_of, point_rows, shifts_mm
+from vision.fit.object_rows import object_rows
+from vision.fit.problem import Problem, State, curves_of, point_rows
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights, weighted_jacobian
-from vision.geometry.camera import N_PARAMETERS, Camera
+from vision.geometry.camera import N_PARAMETERS
 from vision.geometry.centreline import Curves
-from vision.geometry.grazing import sights_beside
-from vision.geometry.silhouette import grazed
 from vision.wire.points import Observed
 
 # [points] Beyond, nothing is shared: at the highest correlation that `_MOST_ALIKE` allows, 7/9,
@@ -166,31 +165,10 @@ def _by_cameras(problem: Problem, seen: Observed, state: State, curves: Curves) 
 
 
 def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> list[np.ndarray]:
-    """Return points (n, 3) that line points are pictures of: of the wire's axis, the bar's edge, or
-    both its edges.
+    """Return points (n, 3) that line points are pictures of: of the wire's axis, or as the object's
+    form has them.
     """
-    if seen.frame >= 0:
-        points_mm, _ = curves.one(seen.frame).at(seen.points.place)
-        return [points_mm]
-    axis = bar_axis(problem, state.vector)
-    camera = problem.cameras.cameras[seen.camera]
-    if problem.is_rounded:
-        return [sights_beside(camera, axis, seen.points.px, seen.points.place).points_mm]
-    middle_mm = axis.point_mm + seen.points.place[:, None] * axis.direction
-    middle_mm = middle_mm + shifts_mm(problem, state.vector)[seen.bar_in]
-    directions = np.broadcast_to(axis.direction, middle_mm.shape)
-    edges = grazed(camera, middle_mm, directions, problem.rods.bar.radius_mm)
-    if not seen.side:
-        return list(edges)
-    offsets_px = [_along_normals(camera, middle_mm, edge, seen) for edge in edges]
-    return [edges[int(np.argmax(seen.side * np.array(offsets_px)))]]
-
-
-def _along_normals(
-    camera: Camera, middle_mm: np.ndarray, edge_mm: np.ndarray, seen: Observed
-) -> float:
-    """Return how far an edge (n, 3) lies from the middle (n, 3) along the line points' normals: a
-    sum over points.
-    """
-    offset_px = camera.project(edge_mm) - camera.project(middle_mm)
-    return float(np.sum(offset_px * seen.points.normal))
+    if seen.frame < 0:
+        return object_rows(problem).shown_mm(seen, state.vector)
+    points_mm, _ = curves.one(seen.frame).at(seen.points.place)
+    return [points_mm]

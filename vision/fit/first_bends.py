@@ -14,11 +14,12 @@ from vision.fit.problem import Problem, rest_shape, start
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines, one_curve
-from vision.geometry.contact import Axis, closest_arc, outline_of_bar
+from vision.geometry.contact import closest_arc
 from vision.geometry.newton import cauchy_weights
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.silhouette import outline
+from vision.geometry.touched import Axis
 from vision.pictures.view import View, median_of
 from vision.wire.coarse import Votes, likely_curve, votes
 from vision.wire.points import LinePoints, Observed
@@ -85,7 +86,7 @@ class SwingPictures:
         """
         places = np.unique(np.linspace(0, len(frames) - 1, _MEDIAN_OF).round().astype(int))
         still = median_of([view.frames[frames[k]] for k in places])
-        bar_px = outline_of_bar(view.camera, axis, bar_mm)
+        bar_px = axis.covering_discs(view.camera, bar_mm)
         return cls(view, rods, still, 0.5 * np.pi / len(places), bar_px)
 
     def votes(self, curves: Mapping[int, Curves], reach_px: int = _REACH_PX) -> Votes:

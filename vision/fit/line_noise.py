@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.fit.object_rows import object_rows
 from vision.fit.problem import Problem
 
 
@@ -47,8 +48,9 @@ def _wire_sigma_px(problem: Problem, camera: int) -> float:
 
 def _bar_sigmas_px(problem: Problem, camera: int) -> np.ndarray:
     """Return side and two sigmas (k, 3) of one camera's lines of the bar."""
+    rows = object_rows(problem)
     lines = []
     for one in problem.seen:
-        if one.camera == camera and one.frame < 0 and not problem.is_rounded:
-            lines.append([one.side, *one.points.sigma_px])
+        if one.camera == camera and one.frame < 0:
+            lines += rows.sigmas_px(one)
     return np.array(lines, dtype=float).reshape(-1, 3)

@@ -13,8 +13,9 @@ from vision.fit.blocks import BAR_MODES_PX, WIRE_MODES_PX, Blocks
 from vision.fit.motion import Motion, Yielding, between
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
-from vision.geometry.contact import Axis, axis_frame, closest_arc, shifted_axis
+from vision.geometry.contact import axis_frame, closest_arc
 from vision.geometry.rods import Rods, Wire
+from vision.geometry.touched import Axis
 from vision.wire.points import SHARED, Observed
 
 # [px] A line also wanders with what is behind it, by so much, over `WANDER_MM` of wire. Set by eye.
@@ -60,11 +61,6 @@ class Problem:
         """Return the whisker."""
         return self.rods.wire
 
-    @property
-    def is_rounded(self) -> bool:
-        """Return whether the object is no straight bar; it stands still then."""
-        return self.rods.bar.form is not None
-
     @cached_property
     def blocks(self) -> Blocks:
         """Return the blocks of the parameter vector."""
@@ -72,7 +68,7 @@ class Problem:
             reach_sigma_mm=self.rods.reach_sigma_mm,
             offset_sigma_px=self._offset_sigma_px(),
             motion_sigma=() if self.motion is None else self.motion.sigma,
-            is_rounded=self.is_rounded,
+            touched=self.rods.bar,
             bent_frames=int(np.sum(self.bent)),
         )
 
@@ -108,25 +104,39 @@ class Problem:
     def _offset_sigma_px(self) -> np.ndarray:
         """Return sigmas (cameras, 12) in px by which a camera's lines of wire and bar are off as a
         whole.
-
-        As the wire turns before the light, an offset changes by as much over a radian. Of a bar
-        they are what its points share, where these say so.
         """
-        usual = np.concatenate([WIRE_MODES_PX, np.ones(SHARED), BAR_MODES_PX])
-        sigma = np.tile(usual, (len(self.cameras), 1))
+        rows = []
+        for camera in range(len(self.cameras)):
+            own = [one for one in self.seen if one.camera == camera]
+            wire = [one.points.shared_px for one in own if one.frame >= 0]
+            bar = [one.points.shared_px for one in own if one.frame < 0]
+            rows.append([*self._wire_sigma_px(wire), *np.ones(SHARED), *_bar_sigma_px(bar)])
+        return np.array(rows)
+
+    def _wire_sigma_px(self, shared_px: Sequence[np.ndarray]) -> np.ndarray:
+        """Return sigmas (6,) in px by which one camera's lines of the wire are off as a whole.
+
+        As the wire turns before the light, an offset changes by as much over a radian. shared_px:
+        of each line (n, SHARED).
+        """
+        sigma = WIRE_MODES_PX.copy()
         half_swing_rad = 0.5 * float(np.ptp(self.motor_rad))
-        for camera, own in enumerate(sigma):
-            wire = [one.points for one in self.seen if one.camera == camera and one.frame >= 0]
-            shared = [row for points in wire for row in points.shared_px]
-            common = np.linalg.norm(np.mean(shared, axis=0)) if shared else 0.0
-            still = np.hypot(own[:2], [common, 0.0])
-            own[2:4] = np.hypot(own[2:4], half_swing_rad * still)
-            own[4:6] = np.hypot(own[4:6], 0.5 * half_swing_rad**2 * still)
-            bar = [one.points for one in self.seen if one.camera == camera and one.frame < 0]
-            bar_shared = [points.shared_px for points in bar]
-            if bar_shared and np.any(np.concatenate(bar_shared)):
-                own[-2:] = np.sqrt(np.mean(np.concatenate(bar_shared)[:, :2] ** 2, axis=0))
+        points = [row for line in shared_px for row in line]
+        common = np.linalg.norm(np.mean(points, axis=0)) if points else 0.0
+        still = np.hypot(sigma[:2], [common, 0.0])
+        sigma[2:4] = np.hypot(sigma[2:4], half_swing_rad * still)
+        sigma[4:6] = np.hypot(sigma[4:6], 0.5 * half_swing_rad**2 * still)
         return sigma
+
+
+def _bar_sigma_px(shared_px: Sequence[np.ndarray]) -> np.ndarray:
+    """Return sigmas (2,) in px by which one camera's lines of the bar are off as a whole.
+
+    They are what points share, where these say so. shared_px: of each line (n, SHARED).
+    """
+    if not shared_px or not np.any(np.concatenate(shared_px)):
+        return BAR_MODES_PX
+    return np.sqrt(np.mean(np.concatenate(shared_px)[:, :2] ** 2, axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,13 +150,12 @@ class State:
 
 
 def bar_axis(problem: Problem, vector: np.ndarray) -> Axis:
-    """Return the object's axis by parameters (…, size): shifted and tilted, and a rounded object
-    along itself, too.
+    """Return the object's axis by parameters (…, size): shifted and tilted, and shifted along
+    itself where the object has a parameter for that.
     """
-    axis = shifted_axis(problem.axis, axis_frame(problem.axis.direction), vector)
-    if not problem.is_rounded:
-        return axis
-    along_mm = vector[..., problem.blocks.shift_along.slice]  # (…, 1)
+    axis = problem.axis.shifted(axis_frame(problem.axis.direction), vector)
+    own = vector[..., problem.blocks.shift_along.slice]  # (…, 1), or (…, 0) of a bar
+    along_mm = np.sum(own, axis=-1, keepdims=True)
     return replace(axis, point_mm=axis.point_mm + along_mm * problem.axis.direction)
 
 

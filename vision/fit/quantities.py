@@ -22,7 +22,7 @@ from vision.fit.problem import (
 )
 from vision.fit.touch import FirstTouch, first_touch
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
-from vision.geometry.contact import BarAxis, bar_at, clearance, contact_frame_angles
+from vision.geometry.contact import BarAxis, clearance, contact_frame_angles
 
 # [rounds] Of Newton's method for the virtual point: the resting whisker is nearly straight.
 # Derived.
@@ -49,7 +49,7 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     each = bar_axes(problem, vector)
     curves, _ = curves_of(problem, vector, arcs_mm)
     _, arc, point = clearance(curves, each)
-    touched = bar_at(bar_axis(problem, vector), touch.point_mm)
+    touched = bar_axis(problem, vector).bar_at(touch.point_mm)
     beta, psi = contact_frame_angles(touched.direction, touch.motor_rad)
     whisk = {
         "touch": touch.motor_rad,
@@ -69,7 +69,7 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
         "d_z": d_z,
         "arc": arc,
         "phi": np.arctan2(d_z, d_y),
-        "alpha": _angle_to_normal(force, bar_at(each, point), point, beta),
+        "alpha": _angle_to_normal(force, each.bar_at(point), point, beta),
     }
     for k, name in enumerate("xyz"):
         whisk[name] = touch.point_mm[..., k]

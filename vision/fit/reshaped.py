@@ -11,7 +11,7 @@ import numpy as np
 
 from vision.fit.problem import CONTACT_SIGMA_MM, Problem, State, bar_axes
 from vision.geometry.centreline import Curves
-from vision.geometry.contact import bar_at, clearance
+from vision.geometry.contact import clearance
 from vision.wire.points import Observed
 
 
@@ -55,7 +55,7 @@ def by_contacts(
     )
     distance, _, contact = clearance(Curves(curves.arc_mm, points, tangents), each)
     by_change = (distance[1:] - distance[0]) / step / CONTACT_SIGMA_MM
-    along = bar_at(axis, contact[0, frame]).direction[0]
+    along = axis.bar_at(contact[0, frame]).direction[0]
     slip = (contact[1:, frame] - contact[0, frame]) @ along / step
     return by_change[:, problem.touching].T, slip
 

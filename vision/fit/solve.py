@@ -16,10 +16,10 @@ from itertools import groupby
 import numpy as np
 
 from vision.fit.bend_onset import Onset
-from vision.fit.blocks import BAR_MODES_PX, BAR_OFFSET_PX, Block, columns_of
+from vision.fit.blocks import columns_of
 from vision.fit.differences import Perturbation, perturbed
+from vision.fit.object_rows import Part, joined_points, object_rows, of_each_point, over_sigma
 from vision.fit.problem import (
-    BAR_TILT_ARM_MM,
     CONTACT_SIGMA_MM,
     Problem,
     State,
@@ -27,16 +27,12 @@ from vision.fit.problem import (
     bar_axis,
     curves_of,
     rest_shape,
-    shifts_mm,
     wire_modes,
 )
-from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves, centrelines
 from vision.geometry.contact import clearance
-from vision.geometry.grazing import sights_beside
 from vision.geometry.newton import cauchy_weights
-from vision.geometry.silhouette import edges
-from vision.wire.points import LinePoints, Observed
+from vision.wire.points import Observed
 
 # [sigma] Width of the Cauchy weights once the state is near: 95 % efficient on Gaussian noise at
 # 2.4, more at 4. Study: coverage.py points.
@@ -51,9 +47,6 @@ _STILL_SIGMA = 0.01
 _SCALES = (30.0, 10.0, *[LAST_SCALE] * 4)
 # [rad] Of bend in one step: the rod's shape is not linear beyond. Stated.
 _LONGEST_RAD = 0.3
-
-# Residuals (n,) and Jacobian rows (n, size) of some observations, over their sigma.
-_Part = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -81,12 +74,13 @@ def linearise(
     else:
         moved, moves = vector[None], []
     curves, arcs = curves_of(problem, moved, state.arcs_mm)
+    touched = object_rows(problem)
     parts = []
     for (camera, on_wire), group in groupby(problem.seen, key=_camera_and_rod):
         if on_wire:
             parts.append(_wire_part(problem, camera, list(group), curves, moves, vector))
         else:
-            parts.append(_bar_part(problem, camera, list(group), bool(moves), vector))
+            parts.append(touched.part(camera, list(group), bool(moves), vector))
     parts.append(_contact_part(problem, moved, curves, arcs, moves, vector))
     parts.append(_prior_part(problem, vector))
     if problem.onset is not None:
@@ -113,19 +107,6 @@ def linear_at(problem: Problem, state: State) -> Linear:
     return linearise(problem, state)[0]
 
 
-def _together(group: Sequence[Observed]) -> LinePoints:
-    """Return the line points of all observations of a group."""
-    points = [seen.points for seen in group]
-    names = LinePoints.__dataclass_fields__
-    fields = {name: np.concatenate([getattr(p, name) for p in points]) for name in names}
-    return LinePoints(**fields)
-
-
-def _of_each_point(group: Sequence[Observed], values: Sequence[int]) -> np.ndarray:
-    """Return one value of each observation (n,) for each of its points."""
-    return np.repeat(values, [len(seen.points) for seen in group])
-
-
 def _wire_part(
     problem: Problem,
     number: int,
@@ -133,10 +114,10 @@ def _wire_part(
     curves: Curves,
     moves: Sequence[Perturbation],
     vector: np.ndarray,
-) -> _Part:
+) -> Part:
     """Return residuals and Jacobian rows of one camera's points of the wire, all frames."""
-    points = _together(group)
-    frame = _of_each_point(group, [seen.frame for seen in group])
+    points = joined_points(group)
+    frame = of_each_point(group, [seen.frame for seen in group])
     positions = curves.at_one_each(frame, points.place)  # (copies, n, 3) mm
     camera = problem.cameras.cameras[number]
     px, by_point, _ = camera.project_with_jacobians(positions[0])
@@ -151,123 +132,7 @@ def _wire_part(
     swing_rad = problem.motor_rad
     modes = wire_modes(problem.wire.length_mm, points.place, swing_rad[frame], swing_rad)
     modes = np.hstack([modes, points.shared_px])
-    return _over_sigma(points, px, jacobian, problem.blocks.wire_offsets[number], modes, vector)
-
-
-def _over_sigma(
-    points: LinePoints,
-    px: np.ndarray,
-    jacobian: np.ndarray,
-    offsets: Block,
-    modes: np.ndarray,
-    vector: np.ndarray,
-) -> _Part:
-    """Return residuals of points predicted at px (n, 2), and their Jacobian, over sigma.
-
-    modes (n, k): shapes in which the whole line may be off, by the parameters of the block
-    `offsets`.
-    """
-    jacobian[:, offsets.slice] = modes
-    residual = np.sum(points.normal * (px - points.px), axis=1) + modes @ vector[offsets.slice]
-    return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
-
-
-def _bar_part(
-    problem: Problem,
-    number: int,
-    group: Sequence[Observed],
-    with_jacobian: bool,
-    vector: np.ndarray,
-) -> _Part:
-    """Return residuals and Jacobian rows of one camera's points of the bar: of its middle, or of an
-    edge.
-    """
-    points = _together(group)
-    if problem.is_rounded:
-        return _outline_part(problem, number, points, with_jacobian, vector)
-    side = _of_each_point(group, [seen.side for seen in group])
-    frame = _of_each_point(group, [seen.bar_in for seen in group])
-    blocks = problem.blocks
-    wider = [blocks.reach] if np.any(side) else []
-    moved_blocks = [blocks.bar_axis, *wider, blocks.motion] if with_jacobian else []
-    columns, moved = _moved_alone(problem, moved_blocks, vector)
-    camera = problem.cameras.cameras[number]
-    px = _bar_px(problem, camera, moved, points, side, frame)
-    jacobian = np.zeros((len(points), problem.size))
-    change_px = np.einsum("knj,nj->nk", px[1:] - px[0], points.normal)
-    jacobian[:, columns] = change_px / blocks.steps[columns]
-    modes = np.stack([np.ones(len(points)), points.place / BAR_TILT_ARM_MM], axis=1)
-    return _over_sigma(points, px[0], jacobian, blocks.bar_offsets[number], modes, vector)
-
-
-def _moved_alone(
-    problem: Problem, blocks: Sequence[Block], vector: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the columns (k,) of some blocks, and the vector (k + 1, size) as it is and with each
-    of them moved.
-    """
-    columns = columns_of(*blocks)
-    moved = np.tile(vector, (len(columns) + 1, 1))
-    moved[np.arange(1, len(moved)), columns] += problem.blocks.steps[columns]
-    return columns, moved
-
-
-def _bar_px(
-    problem: Problem,
-    camera: Camera,
-    vector: np.ndarray,
-    points: LinePoints,
-    side: np.ndarray,
-    frame: np.ndarray,
-) -> np.ndarray:
-    """Return where the outline's middle or edge (…, n, 2) is expected; of an edge the reach's error
-    widens the bar.
-
-    side, frame (n,): of each point, `Observed.side` and, of a bar that moves, the frame in which it
-    is seen.
-    """
-    axis = bar_axis(problem, vector)
-    direction = axis.direction[..., None, :]
-    middle_mm = axis.point_mm[..., None, :] + points.place[:, None] * direction
-    if problem.motion is not None:
-        middle_mm = middle_mm + shifts_mm(problem, vector)[..., frame, :]
-    shape = middle_mm.shape  # (…, n, 3)
-    directions = np.broadcast_to(direction, shape)
-    wider_mm = vector[..., problem.blocks.reach.slice] * (side != 0)
-    radius_mm = np.broadcast_to(problem.rods.bar.radius_mm + wider_mm, shape[:-1])
-    one, other = edges(
-        camera, middle_mm.reshape(-1, 3), directions.reshape(-1, 3), radius_mm.ravel()
-    )
-    one = one.reshape(*shape[:-1], 2)
-    other = other.reshape(*shape[:-1], 2)
-    half_px = 0.5 * np.abs(np.sum((one - other) * points.normal, axis=-1, keepdims=True))
-    return 0.5 * (one + other) + side[:, None] * half_px * points.normal
-
-
-def _outline_part(
-    problem: Problem, number: int, points: LinePoints, with_jacobian: bool, vector: np.ndarray
-) -> _Part:
-    """Return residuals and Jacobian rows of a rounded object's outline: how far its sights pass
-    outside of it.
-    """
-    blocks = problem.blocks
-    moved_blocks = [blocks.bar_axis, blocks.shift_along] if with_jacobian else []
-    columns, moved = _moved_alone(problem, moved_blocks, vector)
-    camera = problem.cameras.cameras[number]
-    reach = blocks.reach.start
-    grazing = sights_beside(camera, bar_axis(problem, moved), points.px, points.place)
-    px_per_mm = grazing.px_per_mm(camera, points.normal)
-    outside_mm = grazing.outside_mm - problem.rods.bar.radius_mm - vector[reach]
-    off_px = px_per_mm * outside_mm  # (copies, n)
-    outward = blocks.outline_bias.start + number
-    jacobian = np.zeros((len(points), problem.size))
-    jacobian[:, columns] = -(off_px[1:] - off_px[0]).T / blocks.steps[columns]
-    jacobian[:, reach] = px_per_mm
-    jacobian[:, outward] = 1.0
-    off_px[0] -= vector[outward]
-    px = points.px - off_px[0][:, None] * points.normal
-    modes = points.normal * (BAR_OFFSET_PX / BAR_MODES_PX)  # along rows and columns alike
-    return _over_sigma(points, px, jacobian, blocks.bar_offsets[number], modes, vector)
+    return over_sigma(points, px, jacobian, problem.blocks.wire_offsets[number], modes, vector)
 
 
 def _contact_part(
@@ -277,7 +142,7 @@ def _contact_part(
     arcs_mm: np.ndarray,
     moves: Sequence[Perturbation],
     vector: np.ndarray,
-) -> _Part:
+) -> Part:
     """Return residuals and Jacobian rows of touching frames: distance from axis to centreline is
     reach + its error.
     """
@@ -302,7 +167,7 @@ def _onset_part(
     moved: np.ndarray,
     moves: Sequence[Perturbation],
     vector: np.ndarray,
-) -> _Part:
+) -> Part:
     """Return residual and Jacobian row of the onset: the unbent whisker is then the reach away from
     the axis.
     """
@@ -334,7 +199,7 @@ def _later_rad(problem: Problem, vector: np.ndarray) -> np.ndarray | float:
     return np.radians(vector[..., problem.blocks.motion.start])
 
 
-def _prior_part(problem: Problem, vector: np.ndarray) -> _Part:
+def _prior_part(problem: Problem, vector: np.ndarray) -> Part:
     """Return residuals and Jacobian rows of the parameters' priors."""
     sigma = problem.blocks.prior_sigma
     return vector / sigma, np.diag(1.0 / sigma)

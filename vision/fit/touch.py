@@ -8,8 +8,7 @@ import numpy as np
 
 from vision.fit.problem import Problem, bar_axis, rest_shape, shift_at_mm
 from vision.geometry.centreline import centrelines
-from vision.geometry.contact import Axis, clearance
-from vision.geometry.rods import Rods
+from vision.geometry.contact import clearance
 
 # [frames] Before touch: one gives the rest shape, two show that it swings with the motor. Derived.
 FEWEST_FREE = 2
@@ -21,7 +20,7 @@ _SURE_BEND_RAD = np.radians(0.25)
 _STEP = 1e-5
 # [mm] Secant steps below this would divide rounding by rounding. Derived.
 _TOUCH_GAP_MM = 1e-10
-# [rad] Half a millimetre at the contact, when a rounded object's touch is searched for. Stated.
+# [rad] Half a millimetre at the contact, when touch is searched for. Stated.
 _SCAN_RAD = np.radians(0.5)
 # [1] Starts of the hinge that are tried between frames: finer than frames determine. Derived.
 _STARTS_PER_FRAME = 10
@@ -45,27 +44,13 @@ class FirstTouch:
 def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstTouch:
     """Find the motor angle at which axis and resting centreline are reach apart; batches allowed.
 
-    A secant search, from the ends of the swing or, of a rounded object, from about touch.
+    A secant search, from about where the first of a batch touches.
     """
-    axis = bar_axis(problem, vector)
-    rest = rest_shape(problem, vector)
-    wider_mm = vector[..., problem.blocks.reach.start]
-
-    def gap(motor_rad):
-        """Return `_gap` at motor angles (…)."""
-        shift_mm = shift_at_mm(problem, vector, motor_rad)
-        there = replace(axis, point_mm=axis.point_mm + shift_mm)
-        return _gap(rest, motor_rad, there, wider_mm, problem.rods)
-
-    if problem.is_rounded:
-        first, last = _about_touch(problem, vector)
-    else:
-        first = np.min(problem.motor_rad)
-        last = np.max(problem.motor_rad)
+    first, last = _about_touch(problem, vector.reshape(-1, vector.shape[-1])[0])
     low = np.full(vector.shape[:-1], first)
     high = np.full(vector.shape[:-1], last)
-    gap_low, _, _ = gap(low)
-    gap_high, arc, point = gap(high)
+    gap_low, _, _ = _gap(problem, vector, low)
+    gap_high, arc, point = _gap(problem, vector, high)
     for _ in range(rounds):
         is_open = np.abs(gap_high) > _TOUCH_GAP_MM
         slope = (gap_high - gap_low) / np.where(is_open, high - low, 1.0)
@@ -73,22 +58,21 @@ def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstT
         low = np.where(is_open, high, low)
         gap_low = np.where(is_open, gap_high, gap_low)
         high = new
-        gap_high, arc, point = gap(new)
+        gap_high, arc, point = _gap(problem, vector, new)
     return FirstTouch(high, point, arc)
 
 
 def _about_touch(problem: Problem, vector: np.ndarray) -> tuple[float, float]:
-    """Return two motor angles, rad, between which the resting whisker first comes to touch a
-    rounded object, which it may pass later: by the first of a batch; the whole swing where it does
-    not touch.
+    """Return two motor angles, rad, between which the resting whisker first comes to touch.
+
+    It may pass a small object later. vector (size,). Where the whisker does not touch they are the
+    ends of the swing.
     """
-    first = vector.reshape(-1, vector.shape[-1])[0]
     low = float(np.min(problem.motor_rad))
     high = float(np.max(problem.motor_rad))
     angles = np.linspace(low, high, 2 + int((high - low) / _SCAN_RAD))
-    wider_mm = first[problem.blocks.reach.start]
-    axis = bar_axis(problem, first)
-    gaps, _, _ = _gap(rest_shape(problem, first), angles, axis, wider_mm, problem.rods)
+    vectors = np.broadcast_to(vector, (len(angles), len(vector)))
+    gaps, _, _ = _gap(problem, vectors, angles)
     closes = np.flatnonzero((gaps[:-1] > 0.0) & (gaps[1:] <= 0.0))
     if not len(closes):
         return low, high
@@ -111,17 +95,21 @@ def touch_and_sigma(
 
 
 def _gap(
-    rest_mm: np.ndarray, motor_rad: np.ndarray, axis: Axis, wider_mm: np.ndarray, rods: Rods
+    problem: Problem, vector: np.ndarray, motor_rad: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return how far the resting whisker still is from touching, mm; contact arc and point.
 
-    wider_mm: the reach's error.
+    motor_rad (…): one for each vector (…, size).
     """
+    axis = bar_axis(problem, vector)
+    shift_mm = shift_at_mm(problem, vector, motor_rad)
+    there = replace(axis, point_mm=axis.point_mm + shift_mm)
     straight = np.zeros((*motor_rad.shape, 2))
-    middle = np.full(motor_rad.shape, rods.wire.length_mm / 2)
-    curves = centrelines(rest_mm, straight, middle, motor_rad, rods.wire)
-    distance, arc, point = clearance(curves, axis)
-    return distance - rods.reach_mm(arc) - wider_mm, arc, point
+    middle = np.full(motor_rad.shape, problem.wire.length_mm / 2)
+    curves = centrelines(rest_shape(problem, vector), straight, middle, motor_rad, problem.wire)
+    distance, arc, point = clearance(curves, there)
+    wider_mm = vector[..., problem.blocks.reach.start]
+    return distance - problem.rods.reach_mm(arc) - wider_mm, arc, point
 
 
 def frames_that_touch(motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

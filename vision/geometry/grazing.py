@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.geometry.camera import Camera
-from vision.geometry.rounded import Rounded
+from vision.geometry.rounded import RoundedAxis
 
 
 @dataclass(frozen=True)
 class Grazing:
     """Where sights come nearest to an object, or to a batch of objects.
 
-    outside_mm (..., n): distance from the object's middle, see `Rounded.outside_mm`. points_mm (n,
+    outside_mm (..., n): distance from the object's middle, see `RoundedAxis.outside_mm`. points_mm (n,
     3), normals (n, 3): the nearest points on the sights and the surface's normals there, of the
     first object of a batch.
     """
@@ -34,7 +34,7 @@ class Grazing:
         return np.einsum("ni,nij,nj->n", normals_px, by_point, self.normals)
 
 
-def sights_beside(camera: Camera, axis: Rounded, px: np.ndarray, far_mm: np.ndarray) -> Grazing:
+def sights_beside(camera: Camera, axis: RoundedAxis, px: np.ndarray, far_mm: np.ndarray) -> Grazing:
     """Compute where the sights through pixels (n, 2) come nearest to an object, or to a batch.
 
     far_mm (n,): about how far from the camera they graze it.
@@ -43,7 +43,7 @@ def sights_beside(camera: Camera, axis: Rounded, px: np.ndarray, far_mm: np.ndar
     shape = np.broadcast_shapes((*axis.point_mm.shape[:-1], 1), (len(px),))
     begin_mm = np.broadcast_to(far_mm, shape)
     nearest_mm = axis.nearest_on_lines(camera.centre_mm, rays, begin_mm)  # (..., n) from the camera
-    outside, normals, _ = axis.outside_mm(camera.centre_mm + nearest_mm[..., None] * rays)
+    outside, normals = axis.outside_mm(camera.centre_mm + nearest_mm[..., None] * rays)
     first = (0,) * (len(shape) - 1)
     points = camera.centre_mm + nearest_mm[first][:, None] * rays
     return Grazing(outside, points, normals[first])

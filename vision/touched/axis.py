@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.contact import BarAxis, axis_frame, shifted_axis, upward
+from vision.geometry.contact import BarAxis, axis_frame
 from vision.geometry.newton import cauchy_weights, gauss_newton
 from vision.geometry.silhouette import edges
 from vision.wire.points import LinePoints
@@ -48,7 +48,7 @@ def settle_axis(
             if len(points)
         ]
 
-    return upward(shifted_axis(axis, across, gauss_newton(rows_of, _PRIOR, _STEPS, rounds)))
+    return axis.shifted(across, gauss_newton(rows_of, _PRIOR, _STEPS, rounds)).upward()
 
 
 def _axis_rows(
@@ -62,10 +62,10 @@ def _axis_rows(
     """Compute weighted residuals (n,) of line points, and their Jacobian (n, 4).
 
     Residuals are in sigmas, with Cauchy weights. vector (4,): shifts and tilts of the axis, see
-    `vision.geometry.contact.shifted_axis`.
+    `Axis.shifted`.
     """
     steps = np.concatenate([np.zeros((1, 4)), np.diag(_STEPS)])
-    shifted = shifted_axis(axis, across, vector + steps)  # a batch of five axes
+    shifted = axis.shifted(across, vector + steps)  # a batch of five axes
     on_axis = shifted.point_mm[:, None] + points.place[:, None] * shifted.direction[:, None]
     directions = np.broadcast_to(shifted.direction[:, None], on_axis.shape)  # (5, n, 3)
     one, other = edges(camera, on_axis.reshape(-1, 3), directions.reshape(-1, 3), radius_mm)

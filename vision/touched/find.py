@@ -14,21 +14,22 @@ the bar is decided by its lines in `vision.touched.search`.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import rotation_z
-from vision.geometry.contact import BarAxis, upward
+from vision.geometry.contact import BarAxis
 from vision.geometry.rods import Rods
 from vision.pictures.change import HALF
 from vision.touched.edge_map import EdgeMap
 from vision.touched.grid_search import (
+    ObjectScore,
     SearchPass,
     coarse_to_fine,
     half_steps,
-    score_in_batches,
     touch_angles,
 )
 
@@ -100,8 +101,8 @@ def search_bars(
     for blur, kept in zip(_BLURS, _KEPT):
         is_last = blur == _BLURS[-1]
         score = EdgeScore(
+            objects_of=axes_of,
             edge_maps=[one.blurred(blur) for one in edge_maps],
-            axes_of=axes_of,
             radius_mm=radius_mm,
             weights=_WEIGHTS if is_last else np.maximum(_WEIGHTS, 0.0),
             along_mm=_ALONG_MM if is_last else _ALONG_MM[::2],
@@ -109,31 +110,27 @@ def search_bars(
         passes.append(SearchPass(score, blur / _BLURS[0], 1.0, kept))
     best = axes_of(coarse_to_fine(values, half_steps(values), passes, _SEPARATION, _STARTS))
     found = zip(best.point_mm, best.direction)
-    return [upward(BarAxis(point_mm, direction)) for point_mm, direction in found]
+    return [BarAxis(point_mm, direction).upward() for point_mm, direction in found]
 
 
 @dataclass(frozen=True)
-class EdgeScore:
-    """Score of hypothetical bars: the strength of both edges, mean over the cameras.
+class EdgeScore(ObjectScore):
+    """Score of hypothetical bars from 0 to 1: the strength of both edges, mean over the cameras.
 
-    axes_of: function of hypotheses (n, k) that returns their axes. weights: of edges at _OFFSETS.
-    along_mm (t,): places at which edges are read, from each axis's point.
+    weights: of edges at _OFFSETS. along_mm (t,): places at which edges are read, from each axis's
+    point.
     """
 
     edge_maps: Sequence[EdgeMap]
-    axes_of: Callable[[np.ndarray], BarAxis]
     radius_mm: float
     weights: np.ndarray
     along_mm: np.ndarray
 
-    def __call__(self, hypotheses: np.ndarray) -> np.ndarray:
-        """Return the scores (n,) of hypotheses (n, k), from 0 to 1."""
-        return score_in_batches(self._score, hypotheses, _BATCH)
+    batch: ClassVar[int] = _BATCH
 
-    def _score(self, hypotheses: np.ndarray) -> np.ndarray:
-        """Return the scores (n,) of a batch of hypotheses (n, k)."""
-        axes = self.axes_of(hypotheses)
-        strengths = [self.both_edges(axes, one) for one in self.edge_maps]
+    def of_objects(self, objects: BarAxis) -> np.ndarray:
+        """Return the scores (n,) of a batch of bars (n, 3)."""
+        strengths = [self.both_edges(objects, one) for one in self.edge_maps]
         return np.mean(strengths, axis=0)
 
     def both_edges(self, axes: BarAxis, edges: EdgeMap) -> np.ndarray:

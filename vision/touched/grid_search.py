@@ -10,8 +10,10 @@ rings, spheres and cones are all found this way: they differ in what the numbers
 score.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -130,11 +132,23 @@ def climb(
     return best, highest
 
 
-def score_in_batches(score: Score, hypotheses: np.ndarray, batch: int) -> np.ndarray:
-    """Return the scores (n,) of hypotheses (n, k), evaluated so many at a time.
+@dataclass(frozen=True)
+class ObjectScore(ABC):
+    """Score of hypothetical objects, evaluated in batches whose arrays fit the processor's cache.
 
-    A batch's arrays fit the processor's cache.
+    objects_of: function of hypotheses (n, k) that returns the objects. batch: how many at a time.
     """
-    batches = np.array_split(hypotheses, -(-len(hypotheses) // batch))
-    scores = [score(some) for some in batches]
-    return np.concatenate(scores)
+
+    objects_of: Callable[[np.ndarray], Any]
+
+    batch: ClassVar[int]
+
+    def __call__(self, hypotheses: np.ndarray) -> np.ndarray:
+        """Return the scores (n,) of hypotheses (n, k)."""
+        batches = np.array_split(hypotheses, -(-len(hypotheses) // self.batch))
+        scores = [self.of_objects(self.objects_of(some)) for some in batches]
+        return np.concatenate(scores)
+
+    @abstractmethod
+    def of_objects(self, objects: Any) -> np.ndarray:
+        """Return the scores (n,) of a batch of objects, the higher the better."""

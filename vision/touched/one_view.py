@@ -14,7 +14,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import resting_lines, rotation_z
-from vision.geometry.contact import BarAxis, upward
+from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.vision_settings import VisionSettings
@@ -137,4 +137,4 @@ def axis_from_edges(edges: Mapping[int, LinePoints], camera: Camera, radius_mm: 
     middle = np.sum(list(rays.values()), axis=(0, 1))
     away = middle - (middle @ direction) * direction
     point_mm = camera.centre_mm + distance_mm / np.linalg.norm(away) * middle
-    return upward(BarAxis(point_mm, direction))
+    return BarAxis(point_mm, direction).upward()

@@ -333,18 +333,8 @@ def _evaluate_lines(
     lines = window.grid()
     temperature = estimate_temperature(_best_of(evidences), profiles)
     shift_px = evidences[0].shift_px  # of the narrowest blur, which has the most positions
-    curves = []
-    for evidence in evidences:
-        curve = evidence.bar_deviance
-        if len(evidence.shift_px) != len(shift_px):
-            curve = CubicSpline(evidence.shift_px, curve, axis=1)(shift_px)
-        curves.append(curve)
-    deviance = np.stack(curves, axis=-1) / temperature[:, None, None, None]  # (k, g, r, b)
-    log_blurs = np.log(window.blurs_px)
-    if len(log_blurs) > 2 and np.max(np.diff(log_blurs)) < _LARGEST_SPLINE_STEP:
-        fine = np.linspace(log_blurs[0], log_blurs[-1], _BLURS)
-        deviance = CubicSpline(log_blurs, deviance, axis=-1)(fine)
-        log_blurs = fine
+    deviance = _at_shifts(evidences, shift_px) / temperature[:, None, None, None]  # (k, g, r, b)
+    log_blurs, deviance = _at_fine_blurs(np.log(window.blurs_px), deviance)
     shape = (len(lines), deviance.shape[2], len(log_blurs))
     deviance = deviance.reshape(len(profiles), len(shift_px), -1)  # (k, g, r b)
     least = deviance.min(axis=1)
@@ -357,6 +347,28 @@ def _evaluate_lines(
     line, other = np.unravel_index(np.argmin(total), total.shape)
     segment_deviance = temperature * (least[:, other] + excess[:, line, other])
     return _LineGrid(lines, log_blurs, total.reshape(shape), segment_deviance, temperature)
+
+
+def _at_shifts(evidences: Sequence[Evidence], shift_px: np.ndarray) -> np.ndarray:
+    """Return the deviance (k, g, r, b) of each blur's evidence at the same shifts (g,)."""
+    curves = []
+    for evidence in evidences:
+        curve = evidence.bar_deviance
+        if len(evidence.shift_px) != len(shift_px):
+            curve = CubicSpline(evidence.shift_px, curve, axis=1)(shift_px)
+        curves.append(curve)
+    return np.stack(curves, axis=-1)
+
+
+def _at_fine_blurs(log_blurs: np.ndarray, deviance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Interpolate a deviance (..., b) between log blurs (b,), where these lie near each other.
+
+    Returns the log blurs and the deviance at them.
+    """
+    if len(log_blurs) <= 2 or np.max(np.diff(log_blurs)) >= _LARGEST_SPLINE_STEP:
+        return log_blurs, deviance
+    fine = np.linspace(log_blurs[0], log_blurs[-1], _BLURS)
+    return fine, CubicSpline(log_blurs, deviance, axis=-1)(fine)
 
 
 def _interpolate(knots: np.ndarray, curves: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -7,21 +7,23 @@ clearly it is a bar (`vision.touched.line`); the axis through these lines is com
 (`vision.touched.axis`), and measured once more if it moved. The axis with the highest detection
 score over all cameras wins. Third, where not all cameras see it or their planes through it nearly
 coincide, each camera is evaluated alone as well, by the bar's width (`vision.touched.one_view`),
-and replaces the axis if it scores clearly higher. Rings, spheres and cones have their own search,
-`vision.touched.rounded_search`.
+and replaces the axis if it scores clearly higher. Rings, spheres and cones have their own searches,
+in `vision.touched.rounded_search`. Which search a form of object has is registered below.
 """
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import singledispatch
 
 import numpy as np
 
-from vision.geometry.camera import Cameras
-from vision.geometry.contact import Axis, BarAxis
+from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
-from vision.geometry.rods import Rods
-from vision.geometry.vision_settings import VisionSettings
+from vision.geometry.ring import Ring
+from vision.geometry.rods import Bar
+from vision.geometry.rounded import Rounded
+from vision.geometry.touched import Axis, Touched
 from vision.pictures.change import HALF
 from vision.pictures.view import View
 from vision.touched.axis import settle_axis
@@ -34,7 +36,7 @@ from vision.touched.one_view import (
     seen_from_one_side,
     widest_angle_rad,
 )
-from vision.touched.rounded_search import see_rounded
+from vision.touched.rounded_search import find_by_coverage, find_by_silhouette
 from vision.touched.search_scene import SearchScene, still_picture
 
 # [rad] Where the cameras' planes through the bar are nearer to each other than this, a small error
@@ -50,10 +52,6 @@ _CONVERGED_PX = 0.5
 # [log] By so much one camera's axis must score higher than one that edges in all cameras led to;
 # two measurements about the same axis differ by 0.5. Study: bar_scenes.py.
 _CLEARER = 1.0
-_NO_BAR = (
-    "no bar of diameter {:g} mm is seen near the whisker; "
-    "record with the bar in view of every camera"
-)
 
 
 @dataclass(frozen=True)
@@ -99,25 +97,42 @@ class SeenBar:
         return all(np.all(np.abs(line.line) < _CONVERGED_PX) for line in self.lines.values())
 
 
-def see_bar(
-    views: Sequence[View],
-    cameras: Cameras,
-    rods: Rods,
-    motor_rad: np.ndarray,
-    settings: VisionSettings,
-) -> SeenBar:
+def find_object(scene: SearchScene) -> SeenBar:
     """Find the touched object in the pictures of all frames, before any wire is known.
 
-    motor_rad (n,): motor angles of all frames. Raises Refused where nothing like it is seen.
+    Raises Refused where nothing like it is seen.
     """
-    if rods.bar.form is not None:
-        return SeenBar(see_rounded(views, cameras, rods, motor_rad, settings, still_picture), {})
-    search = BarSearch(SearchScene(views, cameras, rods, motor_rad, settings))
+    return _search(scene.rods.bar, scene)
+
+
+@singledispatch
+def _search(touched: Touched, scene: SearchScene) -> SeenBar:
+    """Find an object by the search that its form has."""
+    raise NotImplementedError(f"no search for a {touched.name}")
+
+
+@_search.register
+def _search_rounded(touched: Rounded, scene: SearchScene) -> SeenBar:
+    """Find an object by its silhouette, as any that is no straight bar."""
+    return SeenBar(find_by_silhouette(scene), {})
+
+
+@_search.register
+def _search_ring(touched: Ring, scene: SearchScene) -> SeenBar:
+    """Find a ring by what it covers: its edges are too much alike."""
+    return SeenBar(find_by_coverage(scene), {})
+
+
+@_search.register
+def _search_bar(touched: Bar, scene: SearchScene) -> SeenBar:
+    """Find a straight bar by its two edges."""
+    search = BarSearch(scene)
+    views = scene.views
     if len(views) == 1:
         return SeenBar(search.axis_of_one_camera(views[0]), {})
     by_all = search.best_by_all_cameras()
     sees_all = len(by_all.seen_by) == len(views)
-    if sees_all and widest_angle_rad(cameras, by_all.axis) > _NARROW_RAD:
+    if sees_all and widest_angle_rad(scene.cameras, by_all.axis) > _NARROW_RAD:
         return by_all
     return search.measured_finely(search.best_with_single_cameras(by_all))
 
@@ -162,7 +177,11 @@ class BarSearch:
                 if view.camera.name in alone.seen_by:
                     found.append(alone)
         if not found:
-            raise Refused(_NO_BAR.format(2.0 * self.scene.radius_mm), code="no_bar_seen")
+            raise Refused(
+                f"no {self.scene.rods.bar.label} is seen near the whisker; "
+                "record with the bar in view of every camera",
+                code="no_bar_seen",
+            )
         if len(found) > 1 and seen_from_one_side(self.scene.cameras, found[1].axis):
             found = found[1:]
         first = found[0]

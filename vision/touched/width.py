@@ -16,7 +16,8 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.view import View
 from vision.touched.posterior import estimate_log_width, move_to_line
-from vision.touched.search import SeenBar, see_bar
+from vision.touched.search import SeenBar, find_object
+from vision.touched.search_scene import SearchScene
 
 # [1] Sigma of the width of one trial by the light on the edges and by the axis: with it z is 0.75
 # RMS over 37 path-traced scenes, 2.4 at most. Study: bar_scenes.py.
@@ -53,7 +54,9 @@ def bar_diameter_mm(
         frames = pictures[camera.name]
         empty = np.asarray(background[camera.name], dtype=float)
         views.append(View(camera, dict(enumerate(frames)), empty, measure_noise(*frames[:2])))
-    seen = see_bar(views, used, Rods(wire, bar), np.array(motor_rad), VisionSettings())
+    motor = np.array(motor_rad)
+    scene = SearchScene(views, used, Rods(wire, bar), motor, VisionSettings())
+    seen = find_object(scene)
     widths = measure_relative_widths(seen)
     return bar.diameter_mm * combine_widths(widths)[0] if widths else np.nan
 

@@ -1,6 +1,6 @@
-"""The bar of a whisk through which it moves: its line read frame by frame, each in the one picture."""
+"""The bar of a whisk through which it moves: its line, read in one picture after the other."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -8,8 +8,7 @@ import numpy as np
 from vision.geometry.contact import BarAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
-from vision.truth.strategies import BarMiddles
-from vision.wire.points import LinePoints
+from vision.truth.readers import BarMiddles, ObjectReader, ReadLine, WhereAbout
 
 # [frames] Of a whisk, in which the line of a bar that moves is read: it is then known as well as
 # the wire is. Study: chosen.
@@ -17,46 +16,40 @@ _MOST_FRAMES = 12
 
 
 @dataclass
-class BarInFrames:
-    """The bar's middle in single frames of all views; each: what was measured in a frame before."""
+class BarInFrames(ObjectReader):
+    """A straight bar that moves, read by its middle in single frames of all views.
+
+    readers: by frame, with what they measured in the pass before.
+    """
 
     views: Sequence[View]
     radius_mm: float
     settings: VisionSettings
-    each: dict[int, BarMiddles] = field(default_factory=dict)
+    readers: dict[int, BarMiddles] = field(default_factory=dict)
 
-    def observed(
-        self,
-        axis: BarAxis,
-        came_mm: np.ndarray,
-        frames: Sequence[int],
-        wires_px: Mapping[str, Sequence[np.ndarray]],
-        *,
-        last: bool,
-    ) -> dict[str, list[tuple[int, int, LinePoints]]]:
-        """See `BarMiddles.observed`; in frame k the bar is came_mm[k] (f, 3) away from the axis."""
-        found: dict[str, list] = {}
-        for k in np.unique(
-            np.linspace(0, len(frames) - 1, _MOST_FRAMES).round().astype(int)
-        ).tolist():
-            there = BarAxis(axis.point_mm + came_mm[k], axis.direction)
-            wires = {name: [lines[k]] for name, lines in wires_px.items()}
-            for name, sides in self._in(frames[k]).points(there, wires, last=last).items():
-                found.setdefault(name, []).extend(
-                    (k, side, points) for side, points in sides.items()
-                )
+    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+        """Return by camera the middle of the bar in some frames."""
+        spread = np.linspace(0, len(about.frames) - 1, _MOST_FRAMES)
+        found: dict[str, list[ReadLine]] = {}
+        for k in np.unique(spread.round().astype(int)).tolist():
+            axis = BarAxis(about.axis.point_mm + about.came_mm[k], about.axis.direction)
+            wires_px = {name: [lines[k]] for name, lines in about.wires_px.items()}
+            there = replace(about, axis=axis, wires_px=wires_px)
+            for name, lines in self._reader(about.frames[k]).read(there, last=last).items():
+                own = found.setdefault(name, [])
+                own += [replace(line, frame=k) for line in lines]
         return found
 
-    def _in(self, frame: int) -> BarMiddles:
-        if frame not in self.each:
-            self.each[frame] = BarMiddles(
-                in_one_frame(self.views, frame), self.radius_mm, self.settings
-            )
-        return self.each[frame]
+    def _reader(self, frame: int) -> BarMiddles:
+        """Return the reader of one frame, as it was left in the pass before."""
+        if frame not in self.readers:
+            views = in_one_frame(self.views, frame)
+            self.readers[frame] = BarMiddles(views, self.radius_mm, self.settings)
+        return self.readers[frame]
 
 
 def in_one_frame(views: Sequence[View], frame: int) -> list[View]:
-    """What the views show in one frame alone."""
+    """Return the views that show a frame, with that frame alone."""
     return [
         replace(view, frames={frame: view.frames[frame]}) for view in views if frame in view.frames
     ]

@@ -1,4 +1,4 @@
-"""The whole truth of one trial, from its pictures alone.
+"""The truth of one trial, from its pictures alone.
 
     pictures → coarse bar → bar's line ┐
                                        ├→ one fit over cameras and frames → touch, contact, slip, with sigma
@@ -8,7 +8,7 @@ Nothing here knows of a gauge.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before, one_curve
-from vision.geometry.contact import drawn_as_bar
 from vision.geometry.counted import counted
 from vision.geometry.reasons import Reason, joined
 from vision.geometry.refusals import Misled, Refused, TooFewFrames
@@ -30,7 +29,8 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.others import RodLines
 from vision.pictures.pyramid import shrunk_cameras
 from vision.pictures.view import View
-from vision.touched.search import SeenBar, see_bar
+from vision.touched.search import SeenBar, find_object
+from vision.touched.search_scene import SearchScene
 from vision.touched.width import measure_relative_widths
 from vision.truth.moving_bar import in_one_frame
 from vision.truth.records import TrialTruth, WhiskTruth
@@ -60,19 +60,21 @@ def observe_trial(
     rods: Rods,
     settings: VisionSettings = _USUAL,
 ) -> TrialTruth:
-    """Truth of a trial: bar, first touch, contact and slip in each whisk.
+    """Measure the truth of a trial: object, first touch, contact and slip in each whisk.
 
-    whisks: slices of frame indices, one a forward stroke. What keeps a whisk from having a truth is its status; raises
-    Refused only for input that no trial could be seen with.
+    whisks: slices of frame indices, one a forward stroke. What keeps a whisk from having a truth is
+    its status; raises Refused only for input that no trial could be seen with.
     """
     try:
-        seen, bar_seen, _ = _whisks_of(pictures, whisks, cameras, rods, settings)
+        scene = _whisks_of(pictures, whisks, cameras, rods, settings)
     except Refused as reason:
         return _nothing(whisks, reason.reason)
-    rows = tuple(_see_whisk(whisk) for whisk in seen)
-    axis, light = drawn_as_bar(bar_seen.axis), [whisk.light for whisk in seen]
-    looks = measure_relative_widths(bar_seen)
-    bars = {name: Value(*share) for name, share in looks.items()}
+    rows = tuple(_see_whisk(whisk) for whisk in scene.whisks)
+    axis = scene.found.axis.as_bar()
+    light = [whisk.light for whisk in scene.whisks]
+    bars = {}
+    for name, width in measure_relative_widths(scene.found).items():
+        bars[name] = Value(*width)
     return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
 
 
@@ -83,26 +85,43 @@ def wire_lines(
     rods: Rods,
     settings: VisionSettings = _USUAL,
 ) -> dict[str, RodLines]:
-    """Where the wire is in the pictures of each camera, by a first look, to a pixel or two; straight, as the motor has
-    it, in whisks in which it is not seen. Arguments and errors as of `observe_trial`."""
-    seen, _, stands = _whisks_of(pictures, whisks, cameras, rods, settings)
-    curves = {
-        frame: curve
-        for whisk in seen
-        for frame, curve in _first_curves(whisk.without_gaps()).items()
-    }
-    return {view.camera.name: lines_of(view.camera, rods.wire, curves) for view in stands if curves}
+    """Return where the wire is in the pictures of each camera, coarsely: to a pixel or two.
+
+    It is straight, as the motor has it, in whisks in which it is not seen. Arguments and errors as
+    of `observe_trial`.
+    """
+    scene = _whisks_of(pictures, whisks, cameras, rods, settings)
+    curves: dict[int, Curves] = {}
+    for whisk in scene.whisks:
+        curves |= _coarse_curves(whisk.without_gaps())
+    if not curves:
+        return {}
+    return {view.camera.name: lines_of(view.camera, rods.wire, curves) for view in scene.still}
 
 
-def _first_curves(whisk: WhiskPictures) -> dict[int, Curves]:
-    """The wire's centreline in each frame by a first look."""
+def _coarse_curves(whisk: WhiskPictures) -> dict[int, Curves]:
+    """Return the wire's centreline in each frame, coarsely."""
+    axis = whisk.bar.axis
+    wire = whisk.rods.wire
     try:
         rest, bends = coarse_shapes(whisk)
     except Refused:
-        rest, bends = np.zeros((2, REST_POWERS)), dict.fromkeys(whisk.frames, np.zeros(2))
-    axis, wire = whisk.bar.axis, whisk.rods.wire
-    arcs = {f: contact_arc(rest, bends[f], motor, axis, wire) for f, motor in whisk.motor.items()}
-    return {f: one_curve(rest, bends[f], arcs[f], motor, wire) for f, motor in whisk.motor.items()}
+        rest = np.zeros((2, REST_POWERS))
+        bends = dict.fromkeys(whisk.frames, np.zeros(2))
+    curves = {}
+    for f, motor_rad in whisk.motor.items():
+        arc_mm = contact_arc(rest, bends[f], motor_rad, axis, wire)
+        curves[f] = one_curve(rest, bends[f], arc_mm, motor_rad, wire)
+    return curves
+
+
+@dataclass(frozen=True)
+class _TrialScene:
+    """A trial before any wire is known: its whisks, the object, and the views in which it stands."""
+
+    whisks: list[WhiskPictures]
+    found: SeenBar
+    still: Sequence[View]
 
 
 def _whisks_of(
@@ -111,111 +130,132 @@ def _whisks_of(
     cameras: Cameras,
     rods: Rods,
     settings: VisionSettings,
-) -> tuple[list[WhiskPictures], SeenBar, Sequence[View]]:
-    """The whisks with all that is known before a wire is looked for, the bar, and views in which it stands. Raises
-    Refused."""
-    pictures, cameras = (
-        pictures.shrunk(settings.picture_scale),
-        shrunk_cameras(cameras, settings.picture_scale),
-    )
-    time_s, motor_rad = (
-        np.asarray(values, dtype=float) for values in (pictures.time_s, pictures.motor_rad)
-    )
-    cameras, behind = _that_face_it(cameras, rods.wire, motor_rad)
+) -> _TrialScene:
+    """Return the whisks with all that is known before a wire is traced.
+
+    Raises Refused where the object is not found.
+    """
+    pictures = pictures.shrunk(settings.picture_scale)
+    cameras = shrunk_cameras(cameras, settings.picture_scale)
+    time_s = np.asarray(pictures.time_s, dtype=float)
+    motor_rad = np.asarray(pictures.motor_rad, dtype=float)
+    cameras, left_out = _facing(cameras, rods.wire, motor_rad)
     views = pictures.views(cameras)
     used = cameras.subset([view.camera.name for view in views])
     strokes = [range(*where.indices(len(time_s)))[:: settings.every_frame] for where in whisks]
-    told, stands = _told(pictures, strokes, views, rods.bar.form is not None)
-    bar_seen = see_bar(stands, used, rods, motor_rad, settings)
-    gives = Gives() if pictures.object_gives_way else None
-    return (
-        [
-            WhiskPictures(
-                number,
-                stroke,
-                time_s,
-                motor_rad,
-                views,
-                used,
-                rods,
-                bar_seen,
-                settings,
-                left_out=tuple(behind),
-                stated_velocity=told,
-                gives=gives,
-            )
-            for number, stroke in enumerate(strokes)
-        ],
-        bar_seen,
-        stands,
-    )
+    velocity, still = _stated_motion(pictures, strokes, views, rods)
+    found = find_object(SearchScene(still, used, rods, motor_rad, settings))
+    seen = []
+    for number, stroke in enumerate(strokes):
+        whisk = WhiskPictures(
+            number,
+            stroke,
+            time_s,
+            motor_rad,
+            views,
+            used,
+            rods,
+            found,
+            settings,
+            left_out=tuple(left_out),
+            stated_velocity=velocity,
+            gives=Gives() if pictures.object_gives_way else None,
+        )
+        seen.append(whisk)
+    return _TrialScene(seen, found, still)
 
 
-def _told(
-    pictures: TrialPictures, strokes, views: Sequence[View], is_rounded: bool
+def _stated_motion(
+    pictures: TrialPictures,
+    strokes: Sequence[Sequence[int]],
+    views: Sequence[View],
+    rods: Rods,
 ) -> tuple[StatedVelocity | None, Sequence[View]]:
-    """What is said of a bar that moves, counted from a frame in the middle of its whisk, and the views in which it
-    stands: of that frame alone. Raises Refused for what is not told of it."""
-    if is_rounded and (pictures.object_gives_way or pictures.object_velocity_mm_s is not None):
+    """Return the stated velocity of an object that moves, and the views in which it stands.
+
+    Its place is counted from a frame in the middle of its whisk; it stands in that frame alone.
+    Raises Refused where such an object cannot be evaluated.
+    """
+    velocity_mm_s = pictures.object_velocity_mm_s
+    moves = pictures.object_gives_way or velocity_mm_s is not None
+    if moves and not rods.bar.may_move:
         raise Refused(
             "an object that moves or gives way is seen where it is a straight bar; this one is none",
             code="moving_object_not_straight",
         )
     if pictures.object_gives_way:
         return None, _at_first(views, strokes)
-    if pictures.object_velocity_mm_s is None:
+    if velocity_mm_s is None:
         return None, views
     if len(strokes) != 1:
         raise Refused(
             "an object that moves is seen in recordings of one whisk; record each by itself",
             code="moving_object_many_whisks",
         )
-    both = [frame for frame in strokes[0] if all(frame in view.frames for view in views)]
-    if not both:
+    shared = [frame for frame in strokes[0] if all(frame in view.frames for view in views)]
+    if not shared:
         raise Refused("no frame is seen by every camera", code="no_shared_frame")
-    middle = both[len(both) // 2]
-    velocity, sigma = np.asarray(pictures.object_velocity_mm_s), pictures.object_velocity_sigma_mm_s
-    return StatedVelocity(velocity, sigma, float(pictures.time_s[middle])), in_one_frame(
-        views, middle
+    middle = shared[len(shared) // 2]
+    stated = StatedVelocity(
+        np.asarray(velocity_mm_s),
+        pictures.object_velocity_sigma_mm_s,
+        float(pictures.time_s[middle]),
     )
+    return stated, in_one_frame(views, middle)
 
 
 def _at_first(views: Sequence[View], strokes: Sequence[Sequence[int]]) -> list[View]:
-    """The views in the frame that a stroke begins with, before it touches. Raises Refused where there is none."""
-    for frame in (frame for stroke in strokes for frame in stroke[:1]):
-        if all(frame in view.frames for view in views):
-            return in_one_frame(views, frame)
+    """Return the views in the frame that a stroke begins with, before it touches.
+
+    Raises Refused where no such frame is seen by every camera.
+    """
+    for stroke in strokes:
+        for frame in stroke[:1]:
+            if all(frame in view.frames for view in views):
+                return in_one_frame(views, frame)
     raise Refused("no stroke's first frame is seen by every camera", code="no_shared_first_frame")
 
 
-def _nothing(whisks, reason: Reason) -> TrialTruth:
+def _nothing(whisks: Sequence[slice], reason: Reason) -> TrialTruth:
+    """Return the truth of a trial that is not seen, with the reason as each whisk's status."""
     rows = tuple(WhiskTruth(number, None, status=reason) for number in range(len(whisks)))
     return TrialTruth(np.full(3, np.nan), np.full(3, np.nan), rows)
 
 
-def _that_face_it(cameras: Cameras, wire: Wire, motor_rad) -> tuple[Cameras, list[Reason]]:
-    """The cameras that have the whisker before them, and lines on the others. Raises Refused where none has."""
-    faces = {camera.name: is_before(camera, wire, motor_rad) for camera in cameras}
-    lines = [
-        Reason(
-            "whisker_behind_camera",
-            f"camera {name} was left out: by its pose the whisker is behind it, check T_camera_rig",
+def _facing(cameras: Cameras, wire: Wire, motor_rad: np.ndarray) -> tuple[Cameras, list[Reason]]:
+    """Return the cameras that have the whisker before them, and a reason for each of the others.
+
+    Raises Refused where none has.
+    """
+    facing = []
+    left_out = []
+    for camera in cameras:
+        if is_before(camera, wire, motor_rad):
+            facing.append(camera.name)
+            continue
+        line = (
+            f"camera {camera.name} was left out: by its pose the whisker is behind it, "
+            "check T_camera_rig"
         )
-        for name, faced in faces.items()
-        if not faced
-    ]
-    if not any(faces.values()):
-        raise Refused("; ".join(lines), code="whisker_behind_camera")
-    return cameras.subset([name for name, faced in faces.items() if faced]), lines
+        left_out.append(Reason("whisker_behind_camera", line))
+    if not facing:
+        raise Refused("; ".join(left_out), code="whisker_behind_camera")
+    return cameras.subset(facing), left_out
 
 
 def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
-    """Truth of one whisk; its status where there is none. A camera that shows something else than the others is left
-    out, and the others are asked again."""
+    """Return the truth of one whisk, or its status where there is none.
+
+    A camera that shows something else than the others is left out, and the others are evaluated
+    again.
+    """
     while True:
         whisk = whisk.without_gaps()
         if len(whisk.frames) < _FEWEST_FRAMES:
-            few = f"{counted(len(whisk.frames), 'frame')} seen by every camera, {_FEWEST_FRAMES} are needed"
+            few = (
+                f"{counted(len(whisk.frames), 'frame')} seen by every camera, "
+                f"{_FEWEST_FRAMES} are needed"
+            )
             status = joined(Reason("too_few_frames", few), *whisk.left_out)
             return WhiskTruth(whisk.number, None, status=status)
         try:
@@ -235,6 +275,7 @@ def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
 
 
 def _refused(whisk: WhiskPictures, status: Reason) -> WhiskTruth:
+    """Return the row of a whisk without a truth."""
     return WhiskTruth(
         whisk.number,
         None,
@@ -245,40 +286,38 @@ def _refused(whisk: WhiskPictures, status: Reason) -> WhiskTruth:
 
 
 def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
-    """What a fit tells of its whisk, how it would look without a beam, and the whisker's base before touch."""
+    """Return the truth of a fitted whisk, with its checks and the whisker's base before touch."""
     whisk = whisk.yielding_as(fitted.problem, fitted.state)
-    truth, unexplained = (
-        to_whisk(whisk, fitted),
-        [Reason("light_unexplained", looks.doubt(name)) for name, looks in whisk.light.items()],
-    )
-    beam = _beam(fitted) if whisk.settings.check_beam else None
-    without = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
-    stroke = fitted.problem, fitted.state
+    truth = to_whisk(whisk, fitted)
+    light = [Reason("light_unexplained", one.doubt(name)) for name, one in whisk.light.items()]
+    checks_beam = whisk.settings.check_beam
+    beam = _check_beam(fitted) if checks_beam else None
+    # Before the free stroke is traced, which changes whisk.light.
+    refinements = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
+    is_first = whisk.number == 0
+    free = (fitted.problem, fitted.state)
     if len(fitted.frames) < len(whisk.frames):
-        stroke = free_stroke(whisk, fitted)
-    status = joined(
-        truth.status,
-        Reason("cameras_contradict", contradiction(fitted.one_less)),
-        Reason("no_beam", beam.alarm if beam else ""),
-        *unexplained,
-        *whisk.left_out,
+        free = free_stroke(whisk, fitted)
+    return replace(
+        truth,
+        refinements=refinements,
+        status=joined(
+            truth.status,
+            Reason("cameras_contradict", contradiction(fitted.one_less)),
+            Reason("no_beam", beam.alarm if beam else ""),
+            *light,
+            *whisk.left_out,
+        ),
+        turns=frame_turns(fitted.problem, fitted.state, fitted.frames),
+        base=base_lines(*free, fitted.uncertainty.lens),
+        ends=wire_ends(whisk, fitted),
+        looks=wire_widths(whisk, fitted) if checks_beam and is_first else {},
+        beam=beam,
     )
-    turns = frame_turns(fitted.problem, fitted.state, fitted.frames)
-    base, ends = base_lines(*stroke, fitted.uncertainty.lens), wire_ends(whisk, fitted)
-    looks = wire_widths(whisk, fitted) if whisk.settings.check_beam and whisk.number == 0 else {}
-    told = {
-        "base": base,
-        "beam": beam,
-        "turns": turns,
-        "refinements": without,
-        "ends": ends,
-        "looks": looks,
-    }
-    return replace(truth, **told, status=status)
 
 
 def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut]:
-    """What the truth would be without each; nothing where the fit does not tell."""
+    """Return what the truth would be without each refinement; nothing where that is unresolved."""
     fit = Fit(
         fitted.problem,
         fitted.state,
@@ -292,7 +331,8 @@ def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut
         return {}
 
 
-def _beam(fitted: FittedWhisk) -> BeamCheck:
+def _check_beam(fitted: FittedWhisk) -> BeamCheck:
+    """Compare the fit with one of a whisker that is no beam."""
     return check_beam(
         fitted.problem, fitted.state, fitted.covariance, fitted.measured, fitted.by_parameter
     )

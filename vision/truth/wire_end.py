@@ -13,7 +13,6 @@ import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
-from vision.geometry.contact import outline_of_bar
 from vision.pictures.view import View, median_of
 from vision.truth.value import Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
@@ -102,8 +101,8 @@ def _evidence_along(
     wire = replace(whisk.rods.wire, length_mm=visible_mm)
     still = median_of([view.frames[frame] for frame in curves])
     pieces = wire_pieces(view, curves, wire, _PIECE_PX, _FLANK_PX + _GAP_PX, still)
-    bar = outline_of_bar(view.camera, whisk.bar.axis, whisk.bar_swept_mm)
-    clear = clear_of_bar(pieces, *bar, _BAR_MARGIN_PX)
+    outline = whisk.bar.axis.covering_discs(view.camera, whisk.bar_swept_mm)
+    clear = clear_of_bar(pieces, *outline, _BAR_MARGIN_PX)
     return _bin_evidence(pieces.place[clear], _evidence(pieces.select(clear)))
 
 

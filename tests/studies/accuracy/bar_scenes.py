@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from vision.calibration.cameras_file import read_cameras
 from vision.fit.blocks import BAR_OFFSET_PX
 from vision.geometry.camera import Camera
-from vision.geometry.contact import BarAxis, upward
+from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.silhouette import outline
@@ -29,7 +29,8 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.view import View
 from vision.touched.find import axis_from_angles
-from vision.touched.search import SeenBar, see_bar
+from vision.touched.search import SeenBar, find_object
+from vision.touched.search_scene import SearchScene
 from vision.touched.width import combine_widths, measure_relative_widths
 
 FOUND_PX = 1.0
@@ -59,7 +60,7 @@ def read_scene(folder: Path) -> tuple[list[View], list[Camera], Rods, np.ndarray
         "motor_deg"
     ]
     axis = axis_from_angles(truth["d_x_mm"], *angles, rods.reach_mm(truth["d_x_mm"]))
-    return views, cameras, rods, np.radians(motor), upward(axis)
+    return views, cameras, rods, np.radians(motor), axis.upward()
 
 
 def off_px(camera: Camera, true: BarAxis, radius_mm: float, px, normal) -> np.ndarray:
@@ -90,7 +91,7 @@ def main() -> None:
     ):
         views, cameras, rods, motor, true = read_scene(folder)
         try:
-            seen = see_bar(views, cameras, rods, motor, VisionSettings())
+            seen = find_object(SearchScene(views, cameras, rods, motor, VisionSettings()))
         except Refused as reason:
             print(f"{folder.name:<6} {reason}", flush=True)
             worst.append(np.inf)

@@ -23,7 +23,8 @@ from vision.fit.solve import weighted_jacobian
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.vision_settings import VisionSettings
-from vision.touched.search import see_bar
+from vision.touched.search import find_object
+from vision.touched.search_scene import SearchScene
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.whisk_truth import fit_whisk
 
@@ -32,7 +33,7 @@ def fit_scene(folder: Path) -> tuple[FittedWhisk, BarAxis]:
     """The fit of a scene's whisk, and the true axis of its bar. Raises Refused where there is no fit."""
     views, cameras, rods, motor_rad, axis = read_scene(folder)
     settings, time_s = VisionSettings(), np.arange(len(motor_rad), dtype=float)
-    bar = see_bar(views, cameras, rods, motor_rad, settings)
+    bar = find_object(SearchScene(views, cameras, rods, motor_rad, settings))
     whisk = WhiskPictures(
         0, range(len(motor_rad)), time_s, motor_rad, tuple(views), cameras, rods, bar, settings
     )

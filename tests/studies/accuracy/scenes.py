@@ -33,7 +33,7 @@ from vision.calibration.views import BoardViews, MeasuredPose
 from vision.fit import problem as model
 from vision.fit.problem import Problem, State
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.contact import BarAxis, outline_of_bar
+from vision.geometry.contact import BarAxis
 from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.silhouette import normals, outline
 from vision.touched.edges import EDGE_PX
@@ -332,7 +332,7 @@ def line_points(scene: Scene, rng: np.random.Generator | None = None) -> list[Ob
 def _wire_points(scene: Scene, number: int, camera: Camera, not_round, rng) -> list[Observed]:
     length, sigma, seen = scene.wire.length_mm, scene.sigmas.wire_px, []
     off_by = _whole(rng, model.WIRE_MODES_PX)
-    bar = outline_of_bar(camera, scene.axis, scene.bar.radius_mm)
+    bar = scene.axis.covering_discs(camera, scene.bar.radius_mm)
     place = np.arange(FIRST_POINT_MM, length - 1.0, POINT_STEP_MM)
     for frame, more_mm in enumerate(not_round):
         px = camera.project(_centreline_mm(scene, frame, place, more_mm))

@@ -7,7 +7,9 @@ from tests.scenes.model_scenes import rounded_scene, with_outline
 from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import measure
 from vision.fit.solve import linear_at, solve
-from vision.geometry.rounded import Form
+from vision.geometry.cone import Cone
+from vision.geometry.ring import Ring
+from vision.geometry.sphere import Sphere
 
 
 def ring(spot, inwards, along):
@@ -23,9 +25,9 @@ def cone(spot, inwards, along):
 
 
 THINGS = {
-    "ring": (Form("ring", 60.0), 6.0, ring),
-    "sphere": (Form("sphere"), 30.0, sphere),
-    "cone": (Form("cone", half_angle_rad=0.3), 0.0, cone),
+    "ring": (Ring(6.0, 0.0, 60.0), ring),
+    "sphere": (Sphere(30.0), sphere),
+    "cone": (Cone(0.3), cone),
 }
 
 

@@ -8,11 +8,15 @@ from bench.rig.linear import rotate_about_z
 from bench.rig.round_objects import Cone, Ring, Sphere
 from tests.scenes.model_scenes import CAMERAS
 from vision.geometry.centreline import Curves
-from vision.geometry.contact import bar_at, clearance, closest_arc
+from vision.geometry.cone import Cone as SeenCone
+from vision.geometry.contact import clearance, closest_arc
+from vision.geometry.forms import FORMS, touched_object
 from vision.geometry.grazing import sights_beside
 from vision.geometry.refusals import Refused
-from vision.geometry.rods import Bar as Thick
-from vision.geometry.rounded import Form, Rounded
+from vision.geometry.ring import Ring as SeenRing
+from vision.geometry.rounded import RoundedAxis
+from vision.geometry.sphere import Sphere as SeenSphere
+from vision.geometry.touched import StatedSizes
 
 SPOT = rotate_about_z(np.array([60.0, 0.0, 0.0]), 0.04)
 
@@ -28,9 +32,9 @@ RING, SPHERE = (
 )
 CONE = Cone.from_bar(placed(6.0), SPOT, 0.3)
 THINGS = [
-    (RING, Rounded(RING.point_mm, RING.axis, Form("ring", 50.0), SPOT), 3.0),
-    (SPHERE, Rounded(SPHERE.point_mm, SPHERE.axis, Form("sphere"), SPOT), 15.0),
-    (CONE, Rounded(CONE.tip_mm, CONE.axis, Form("cone", half_angle_rad=0.3), SPOT), 0.0),
+    (RING, RoundedAxis(RING.point_mm, RING.axis, SeenRing(6.0, 0.0, 50.0), SPOT), 3.0),
+    (SPHERE, RoundedAxis(SPHERE.point_mm, SPHERE.axis, SeenSphere(30.0), SPOT), 15.0),
+    (CONE, RoundedAxis(CONE.tip_mm, CONE.axis, SeenCone(0.3), SPOT), 0.0),
 ]
 each = pytest.mark.parametrize(
     ("thing", "axis", "radius_mm"), THINGS, ids=["ring", "sphere", "cone"]
@@ -40,10 +44,10 @@ each = pytest.mark.parametrize(
 @each
 def test_distance_and_slope_are_those_of_the_rig(thing, axis, radius_mm):
     points = SPOT + np.random.default_rng(1).normal(size=(20, 3))
-    outside, _, _ = axis.outside_mm(points)
+    outside, _ = axis.outside_mm(points)
     np.testing.assert_allclose(outside - radius_mm, thing.outside_mm(points), atol=1e-10)
     np.testing.assert_allclose(
-        bar_at(axis, points).direction, [thing.axis_at(p) for p in points], atol=1e-12
+        axis.bar_at(points).direction, [thing.axis_at(p) for p in points], atol=1e-12
     )
 
 
@@ -51,7 +55,9 @@ def test_distance_and_slope_are_those_of_the_rig(thing, axis, radius_mm):
 def test_sights_graze_the_outline_and_nothing_else_is_as_near(thing, axis, radius_mm):
     """On the surface, at right angles to the normal; 0.1 mm farther out the sight passes by 0.1 mm."""
     camera = CAMERAS.cameras[0]
-    points, normals = (of.reshape(-1, 3) for of in axis.limb(camera.centre_mm, radius_mm, 15.0, 9))
+    points, normals = (
+        of.reshape(-1, 3) for of in axis.silhouette(camera.centre_mm, radius_mm, 15.0, 9)
+    )
     np.testing.assert_allclose(thing.outside_mm(points), 0.0, atol=1e-9)
     np.testing.assert_allclose(
         np.sum((points - camera.centre_mm) * normals, axis=1), 0.0, atol=1e-9
@@ -91,18 +97,30 @@ def test_a_ring_hides_its_far_side_and_a_sphere_nothing():
 
 def test_no_outline_from_before_the_tip():
     _, cone, _ = THINGS[2]
-    assert np.all(np.isnan(cone.limb(cone.point_mm + 200.0 * cone.direction, 0.0, 15.0, 5)[0]))
+    assert np.all(
+        np.isnan(cone.silhouette(cone.point_mm + 200.0 * cone.direction, 0.0, 15.0, 5)[0])
+    )
 
 
 @pytest.mark.parametrize(
-    ("thick_mm", "told"),
+    ("form", "stated"),
     [
-        (6.0, {"shape": "ring", "ring_diameter_mm": 5.0}),
-        (6.0, {"shape": "ring"}),
-        (0.0, {"shape": "sphere"}),
-        (0.0, {"shape": "cone", "half_angle_rad": 0.0}),
+        ("bar", StatedSizes(0.0)),
+        ("ring", StatedSizes(6.0, ring_diameter_mm=5.0)),
+        ("ring", StatedSizes(6.0)),
+        ("sphere", StatedSizes(0.0)),
+        ("cone", StatedSizes(half_angle_rad=0.0)),
     ],
 )
-def test_objects_that_cannot_be_are_refused(thick_mm, told):
+def test_objects_that_cannot_be_are_refused(form, stated):
     with pytest.raises(Refused):
-        Thick(thick_mm, 0.0, Form(**told))
+        touched_object(form, stated)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_an_object_has_the_sizes_that_are_stated(form):
+    """What a form does not take is not in its sizes, so that the same object is made of them."""
+    stated = StatedSizes(6.0, 0.1, ring_diameter_mm=50.0, half_angle_rad=0.3)
+    found = touched_object(form, stated)
+    assert touched_object(form, found.sizes) == found
+    assert found.name == form

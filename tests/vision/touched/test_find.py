@@ -22,7 +22,8 @@ from vision.pictures.view import View
 from vision.touched.edge_map import compute_edge_map, edge_strength_tensor
 from vision.touched.grid_search import climb
 from vision.touched.one_view import find_bars_alone
-from vision.touched.search import see_bar
+from vision.touched.search import find_object
+from vision.touched.search_scene import SearchScene
 
 
 def test_squares_of_the_board_in_a_soft_shadow_are_no_edges(rng):
@@ -74,14 +75,9 @@ def test_where_nothing_changed_no_bar_is_seen(rng):
             View(camera, frames, 90.0 + 2.0 * rng.standard_normal((240, 320)), Noise(4.0, 0.0))
         )
     rods = Rods(Wire("cylinder", 100.0, 0.5), Bar(6.0))
+    cameras = Cameras(tuple(view.camera for view in views))
     with pytest.raises(Refused, match="bar"):
-        see_bar(
-            views,
-            Cameras(tuple(view.camera for view in views)),
-            rods,
-            np.array([-0.1, 0.1]),
-            VisionSettings(),
-        )
+        find_object(SearchScene(views, cameras, rods, np.array([-0.1, 0.1]), VisionSettings()))
 
 
 def test_climbing_ends_on_the_top():

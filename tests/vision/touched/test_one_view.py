@@ -22,7 +22,7 @@ from vision.fit.quantities import jacobians
 from vision.fit.solve import linearise, solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
-from vision.geometry.contact import BarAxis, upward
+from vision.geometry.contact import BarAxis
 from vision.geometry.silhouette import grazed, normals
 from vision.geometry.vision_settings import VisionSettings
 from vision.touched.axis import settle_axis
@@ -190,5 +190,5 @@ def test_a_bar_is_counted_by_its_direction_with_positive_z():
     """Else slope and slip come out turned by 180 degrees: a search round the sight may end on either."""
     up = BarAxis(np.array([60.0, 5.0, 0.0]), np.array([0.0, 0.6, 0.8]))
     down = BarAxis(up.point_mm, -up.direction)
-    assert upward(up) is up and np.array_equal(upward(down).direction, up.direction)
+    assert up.upward() is up and np.array_equal(down.upward().direction, up.direction)
     assert np.allclose(settle_axis(down, Cameras(()), {}, 3.0).direction, up.direction)

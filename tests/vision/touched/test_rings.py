@@ -6,19 +6,19 @@ import pytest
 
 from tests.scenes.model_scenes import CAMERAS, WIRE
 from vision.geometry.refusals import Refused
-from vision.geometry.rods import Bar, Rods
-from vision.geometry.rounded import Form
+from vision.geometry.ring import Ring
+from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.change import HALF
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
-from vision.touched.rounded_places import touched_first
-from vision.touched.rounded_search import see_rounded
+from vision.touched.places import touched_first
+from vision.touched.rounded_search import find_by_coverage
+from vision.touched.search_scene import SearchScene
 
-FORM, RADIUS_MM = Form("ring", ring_diameter_mm=60.0), 3.0
-RODS, MOTOR_RAD = Rods(WIRE, Bar(2.0 * RADIUS_MM, 0.0, FORM)), np.radians(np.linspace(0.5, 4.5, 5))
+RADIUS_MM = 3.0
+RODS = Rods(WIRE, Ring(2.0 * RADIUS_MM, ring_diameter_mm=60.0))
+MOTOR_RAD = np.radians(np.linspace(0.5, 4.5, 5))
 STANDS = touched_first(
-    FORM,
     RODS,
     np.array([[57.3, np.radians(2.2), np.radians(23.0), np.radians(3.0), np.radians(-7.0)]]),
 )
@@ -61,14 +61,7 @@ def views_of(there):
 
 def find(views):
     """What is seen."""
-    return see_rounded(
-        views,
-        CAMERAS,
-        RODS,
-        MOTOR_RAD,
-        VisionSettings(),
-        lambda view: view.frames[0][::HALF, ::HALF],
-    )
+    return find_by_coverage(SearchScene(views, CAMERAS, RODS, MOTOR_RAD, VisionSettings()))
 
 
 def test_a_ring_is_found_where_it_is():

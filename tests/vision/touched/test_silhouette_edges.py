@@ -5,24 +5,26 @@ import pytest
 
 from tests.scenes.model_scenes import CAMERAS, WIRE
 from vision.geometry.grazing import sights_beside
-from vision.geometry.rods import Bar, Rods
-from vision.geometry.rounded import Form, Rounded
+from vision.geometry.rods import Rods
+from vision.geometry.rounded import RoundedAxis
+from vision.geometry.sphere import Sphere
 from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.change import HALF
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
-from vision.touched.rounded_search import see_rounded
+from vision.touched.rounded_search import find_by_silhouette
+from vision.touched.search_scene import SearchScene
 from vision.touched.silhouette_edges import measure_silhouette_edges
 
 RADIUS_MM, CENTRE = 8.0, np.array([58.0, 11.0, -1.5])
-SPHERE = Rounded(CENTRE, np.array([0.0, 0.0, 1.0]), Form("sphere"), CENTRE - [0.0, RADIUS_MM, 0.0])
+SPOT = CENTRE - [0.0, RADIUS_MM, 0.0]
+SPHERE = RoundedAxis(CENTRE, np.array([0.0, 0.0, 1.0]), Sphere(2.0 * RADIUS_MM), SPOT)
 
 
 def picture(camera, rng, there=True):
     """A sphere lit from above before an even wall, its edge blurred by a pixel and a half."""
     grey = np.full((720, 1280), 70.0)
     if there:
-        limb, _ = SPHERE.limb(camera.centre_mm, RADIUS_MM, 0.0, 300)
+        limb, _ = SPHERE.silhouette(camera.centre_mm, RADIUS_MM, 0.0, 300)
         limb = camera.project(limb.reshape(-1, 3))
         middle = limb.mean(axis=0)
         y, x = np.mgrid[:720, :1280]
@@ -58,7 +60,7 @@ def views():
 
 def test_edges_are_where_they_are(views):
     """To a tenth of a pixel, from an outline that is a millimetre off; and each to three of its sigmas."""
-    off = Rounded(
+    off = RoundedAxis(
         CENTRE + np.array([0.3, 0.2, -0.2]), SPHERE.direction, SPHERE.form, SPHERE.spot_mm
     )
     rough = measure_silhouette_edges(views, off, RADIUS_MM, {}, VisionSettings(), 4.0)
@@ -76,13 +78,7 @@ def test_edges_are_where_they_are(views):
 
 
 def test_an_object_is_found_where_it_is(views):
-    motor, wanted = (
-        np.radians(np.linspace(1.0, 5.0, 5)),
-        Rods(WIRE, Bar(2.0 * RADIUS_MM, 0.0, Form("sphere"))),
-    )
-
-    def still(view):
-        return view.frames[0][::HALF, ::HALF]
-
-    found = see_rounded(views, CAMERAS, wanted, motor, VisionSettings(), still)
+    motor_rad = np.radians(np.linspace(1.0, 5.0, 5))
+    rods = Rods(WIRE, SPHERE.form)
+    found = find_by_silhouette(SearchScene(views, CAMERAS, rods, motor_rad, VisionSettings()))
     np.testing.assert_allclose(found.point_mm, CENTRE, atol=0.1)

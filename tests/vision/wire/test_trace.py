@@ -20,7 +20,7 @@ from tests.studies.accuracy.lines import (
 )
 from vision.fit.first_bends import SwingPictures
 from vision.geometry.centreline import centrelines
-from vision.geometry.contact import BarAxis, outline_of_bar
+from vision.geometry.contact import BarAxis
 from vision.geometry.rods import Bar, Rods, Wire
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
@@ -115,7 +115,7 @@ def test_a_bar_that_passes_behind_the_camera_hides_no_more_than_what_is_before_i
     sight = view.camera.centre_mm - np.array([70.0, 0.0, 0.0])
     sight /= np.linalg.norm(sight)
     beside = view.camera.centre_mm - 30.0 * sight + [0.0, 8.0, 0.0]
-    middle, radius = outline_of_bar(view.camera, BarAxis(beside, sight), 3.0)
+    middle, radius = BarAxis(beside, sight).covering_discs(view.camera, 3.0)
     assert np.isnan(radius).any() and np.isfinite(radius).any()
     pieces = wire_pieces(view, curves, wire, 16, 7)
     clear = clear_of_bar(pieces, middle, radius, 4.0)

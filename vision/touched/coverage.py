@@ -1,34 +1,27 @@
 """Where a ring may be in space, before any wire is known: by what it covers in all cameras.
 
-The edges beside the contact determine neither the ring's plane nor its centre, and a tube has
+The edges near the contact determine neither the ring's plane nor its centre, and a tube has
 highlights and rims whose edges are as strong as its own. So the whole ring is used: a map of each
 camera says how surely every pixel differs from the picture without rods. Just within the ring's
 outer silhouette, which no part of it hides, the picture must differ, and just beyond it must not.
-The score of a ring is the difference of these, in the camera where it is lowest. The best of a grid
-of rings that the whisker would touch are refined from coarse to fine (`vision.touched.grid_search`)
-on maps that are blurred less and less.
+The score of a ring is the difference of these, in the camera where it is lowest. The search
+(`vision.touched.places`) reads maps that are blurred less and less.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from typing import ClassVar
 
 import cv2
 import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.rods import Rods
-from vision.geometry.rounded import Rounded
+from vision.geometry.rounded import RoundedAxis
 from vision.pictures.change import HALF, change_confidence
 from vision.pictures.view import View
-from vision.touched.grid_search import (
-    SearchPass,
-    coarse_to_fine,
-    half_steps,
-    score_in_batches,
-    touch_angles,
-)
-from vision.touched.rounded_places import touched_first
+from vision.touched.grid_search import ObjectScore, SearchPass
+from vision.touched.places import PlaceGrid, Places
 
 # [px] Blur of the maps, pass by pass. Set by eye. Study: rounded_seen.py.
 _BLURS_PX = (5.0, 2.5, 1.0)
@@ -42,16 +35,10 @@ _STARTS = 64
 _SEPARATION = 2.0
 # [rad] Slopes of the grid. Stated.
 _BETA_RAD = np.radians(np.arange(-70.0, 71.0, 10.0))
-# [rad] Tilts of the grid. Stated.
-_PSI_RAD = np.radians(np.arange(-16.0, 17.0, 8.0))
-# [rad] Turns of the grid about the ring's tangent where it is touched. Stated.
-_TURN_RAD = np.radians(np.arange(-20.0, 21.0, 20.0))
 # [mm] Step of the grid along the whisker: about the tube's radius. Stated.
 _X_MM = 3.0
 # [mm] Step of the grid along the arc of the whisker's middle: about the tube's radius. Stated.
 _TOUCH_MM = 4.0
-# [mm] Nearest contact to the whisker's base. Stated.
-_NEAREST_MM = 10.0
 # [radii] From a silhouette outwards, where the map is read: two places within it, two beyond. Set
 # by eye. Study: rounded_seen.py.
 _OUTWARDS = np.array([-1.2, -0.6, 0.35, 0.9])
@@ -95,89 +82,94 @@ class ChangeMap:
         """Return the map blurred by a Gaussian."""
         return ChangeMap(self.camera, cv2.GaussianBlur(self.field, (0, 0), blur_px))
 
+    def at(self, px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the field (...) at the nearest pixels to px (..., 2), and which lie within it."""
+        height, width = self.field.shape
+        last = np.array([width, height]) - 1.0
+        is_inside = np.all((px >= 0.0) & (px < last), axis=-1)
+        column = np.where(is_inside, px[..., 0] + 0.5, 0.0).astype(np.intp)
+        row = np.where(is_inside, px[..., 1] + 0.5, 0.0).astype(np.intp)
+        return self.field.ravel().take(row * width + column), is_inside
 
-def find_rings(
-    maps: Sequence[ChangeMap],
-    rods: Rods,
-    motor_rad: tuple[float, float],
-) -> list[Rounded]:
-    """Find rings that cover what differs and that the whisker would touch, the best first.
 
-    At most eight are found. motor_rad: lowest and highest motor angle, between which the whisker
-    touches. Numbers of a hypothesis (n, 5): see `vision.touched.rounded_places.touched_first`.
+def find_covering(
+    maps: Sequence[ChangeMap], rods: Rods, motor_rad: tuple[float, float]
+) -> list[RoundedAxis]:
+    """Find the places of a ring that cover best what differs, the best first; eight at most.
+
+    motor_rad: lowest and highest motor angle, between which the whisker touches.
     """
-    length_mm = rods.wire.length_mm
-    x_mm = np.arange(_NEAREST_MM, length_mm, _X_MM)
-    touch_rad = touch_angles(motor_rad, length_mm, _TOUCH_MM)
-    values = [x_mm, touch_rad, _BETA_RAD, _PSI_RAD, _TURN_RAD]
-    rings_of = partial(touched_first, rods.bar.form, rods)
-    passes = []
-    for blur_px, stations, kept in zip(_BLURS_PX, _STATIONS, _KEPT):
-        blurred = [one.blurred(blur_px) for one in maps]
-        score = CoverageScore(blurred, rings_of, rods.bar.radius_mm, stations)
-        share = blur_px / _BLURS_PX[0]
-        passes.append(SearchPass(score, share, share, kept))
-    best = coarse_to_fine(values, half_steps(values), passes, _SEPARATION, _STARTS)
-    return rings_of(best).each()
+
+    def passes_of(places_of: Places) -> list[SearchPass]:
+        """Return the passes, on maps that are blurred less and less."""
+        passes = []
+        for blur_px, stations, kept in zip(_BLURS_PX, _STATIONS, _KEPT):
+            blurred = [one.blurred(blur_px) for one in maps]
+            score = CoverageScore(places_of, blurred, rods.bar.radius_mm, stations)
+            share = blur_px / _BLURS_PX[0]
+            passes.append(SearchPass(score, share, share, kept))
+        return passes
+
+    grid = PlaceGrid(_X_MM, _TOUCH_MM, _BETA_RAD, _STARTS, _SEPARATION)
+    return grid.search(rods, motor_rad, passes_of)
 
 
-def coverage_score(maps: Sequence[ChangeMap], ring: Rounded, radius_mm: float) -> float:
+def coverage_score(maps: Sequence[ChangeMap], ring: RoundedAxis, radius_mm: float) -> float:
     """Compute how well a ring covers what differs, up to 1, in its worst camera."""
-    one_ring = Rounded(ring.point_mm[None], ring.direction[None], ring.form, ring.spot_mm[None])
     blurred = [one.blurred(_BLURS_PX[-1]) for one in maps]
-    return float(_lowest_coverage(blurred, one_ring, radius_mm, _STATIONS[-1])[0])
+    return float(_lowest_coverage(blurred, ring.batch(), radius_mm, _STATIONS[-1])[0])
 
 
 @dataclass(frozen=True)
-class CoverageScore:
-    """Score of hypothetical rings: how well they cover what differs.
+class CoverageScore(ObjectScore):
+    """Score of hypothetical rings, up to 1: how well they cover what differs.
 
     stations: points of a silhouette that are read.
     """
 
     maps: Sequence[ChangeMap]
-    rings_of: Callable[[np.ndarray], Rounded]
     radius_mm: float
     stations: int
 
-    def __call__(self, hypotheses: np.ndarray) -> np.ndarray:
-        """Return the scores (n,) of hypotheses (n, 5), up to 1."""
-        return score_in_batches(self._score, hypotheses, _BATCH)
+    batch: ClassVar[int] = _BATCH
 
-    def _score(self, hypotheses: np.ndarray) -> np.ndarray:
-        """Return the scores (n,) of a batch of hypotheses (n, 5)."""
-        rings = self.rings_of(hypotheses)
-        return _lowest_coverage(self.maps, rings, self.radius_mm, self.stations)
+    def of_objects(self, objects: RoundedAxis) -> np.ndarray:
+        """Return the scores (n,) of a batch of rings (n, 3)."""
+        return _lowest_coverage(self.maps, objects, self.radius_mm, self.stations)
 
 
 def _lowest_coverage(
-    maps: Sequence[ChangeMap], rings: Rounded, radius_mm: float, stations: int
+    maps: Sequence[ChangeMap], rings: RoundedAxis, radius_mm: float, stations: int
 ) -> np.ndarray:
     """Return the coverage (n,) of rings in the camera where it is lowest."""
     each = [_coverage(one, rings, radius_mm, stations) for one in maps]
     return np.min(each, axis=0)
 
 
-def _coverage(change: ChangeMap, rings: Rounded, radius_mm: float, stations: int) -> np.ndarray:
+def _coverage(change: ChangeMap, rings: RoundedAxis, radius_mm: float, stations: int) -> np.ndarray:
     """Compute how much more (n,) a picture differs within rings (n, 3) than beyond them."""
-    camera = change.camera
-    limb, normals = rings.limb(camera.centre_mm, radius_mm, np.inf, stations)  # (n, 2, stations, 3)
-    outwards = (limb - rings.point_mm[:, None, None]) * normals
-    outer = np.argmax(np.nansum(outwards, axis=(-1, -2)), axis=-1)  # of the two sides
-    rows = np.arange(len(limb))
-    silhouette = limb[rows, outer, :, None]
-    offsets_mm = radius_mm * _OUTWARDS[:, None] * normals[rows, outer, :, None]
-    places = silhouette + offsets_mm  # (n, stations, 4, 3)
-    px = camera.project(places.reshape(-1, 3)).reshape(*places.shape[:-1], 2) / HALF
-    height, width = change.field.shape
-    last = np.array([width, height]) - 1.0
-    is_inside = np.all((px >= 0.0) & (px < last), axis=-1)
-    column = np.where(is_inside, px[..., 0] + 0.5, 0.0).astype(np.intp)
-    row = np.where(is_inside, px[..., 1] + 0.5, 0.0).astype(np.intp)
-    field = change.field.ravel().take(row * width + column)
+    silhouette, normals = _outer_side(change.camera, rings, radius_mm, stations)
+    offsets_mm = radius_mm * _OUTWARDS[:, None] * normals[..., None, :]
+    places = silhouette[..., None, :] + offsets_mm  # (n, stations, 4, 3)
+    px = change.camera.project(places.reshape(-1, 3)).reshape(*places.shape[:-1], 2) / HALF
+    field, is_inside = change.at(px)  # (n, stations, 4)
     within = np.mean(field[..., :_WITHIN], axis=-1)
     beyond = np.mean(field[..., _WITHIN:], axis=-1)
     is_read = np.all(is_inside, axis=-1)  # (n, stations)
     difference = np.where(is_read, within - _BEYOND * beyond, 0.0)
     count = np.maximum(np.sum(is_read, axis=-1), _LEAST_SHARE * stations)
     return np.sum(difference, axis=-1) / count
+
+
+def _outer_side(
+    camera: Camera, rings: RoundedAxis, radius_mm: float, stations: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the outer one of the two sides of the silhouettes of rings (n, 3).
+
+    Returns points and normals (n, stations, 3).
+    """
+    sides, normals = rings.silhouette(camera.centre_mm, radius_mm, np.inf, stations)
+    outwards = (sides - rings.point_mm[:, None, None]) * normals  # (n, 2, stations, 3)
+    outer = np.argmax(np.nansum(outwards, axis=(-1, -2)), axis=-1)
+    rows = np.arange(len(sides))
+    return sides[rows, outer], normals[rows, outer]

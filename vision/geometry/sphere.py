@@ -1,0 +1,94 @@
+"""A sphere: a single ball."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vision.geometry.checks import require_length, require_sigma
+from vision.geometry.rounded import Balls, Local, Rounded, RoundedAxis, unit
+from vision.geometry.touched import StatedSizes
+
+# [—] A layout: the direction along which slopes count.
+_UP = np.array([0.0, 0.0, 1.0])
+# [1] Added to the upright, so that no sight is parallel to it. Stated.
+_SKEWED = 0.01
+
+
+@dataclass(frozen=True)
+class Sphere(Rounded):
+    """A sphere of so many mm. Refused where that is no length."""
+
+    diameter_mm: float
+    diameter_sigma_mm: float = 0.0
+
+    name: ClassVar[str] = "sphere"
+    search_reach_mm: ClassVar[float] = 30.0
+
+    def __post_init__(self):
+        """Raise Refused where there is no such sphere."""
+        require_length("bar", diameter_mm=self.diameter_mm)
+        require_sigma("bar", diameter_sigma_mm=self.diameter_sigma_mm)
+
+    @classmethod
+    def from_sizes(cls, stated: StatedSizes) -> "Sphere":
+        """Return the sphere of a stated diameter. Raises Refused where there is none."""
+        return cls(stated.diameter_mm, stated.diameter_sigma_mm)
+
+    @property
+    def sizes(self) -> StatedSizes:
+        """Return the sphere's diameter and its sigma."""
+        return StatedSizes(self.diameter_mm, self.diameter_sigma_mm)
+
+    @property
+    def label(self) -> str:
+        """Return the sphere with its diameter, for a message."""
+        return f"sphere of {self.diameter_mm:g} mm"
+
+    def near(self, at: RoundedAxis, points_mm: np.ndarray) -> Local:
+        """Return the sphere as a bar near points (..., k, 3): along the steepest way there."""
+        centre = np.asarray(at.point_mm)[..., None, :]
+        apart = points_mm - centre
+        normal = unit(apart)
+        upright = unit(_UP - normal[..., 2:] * normal)
+        return Local(np.broadcast_to(centre, apart.shape), upright, np.zeros(apart.shape[:-1]))
+
+    def follows(self, at: RoundedAxis, local: Local, away: np.ndarray) -> float:
+        """Return 0: the centre is nearest to all points."""
+        return 0.0
+
+    def balls(self, at: RoundedAxis, radius_mm: float, reach_mm: float, stations: int) -> Balls:
+        """Return the one ball."""
+        centre = np.asarray(at.point_mm)[..., None, :]
+        ahead = np.asarray(at.direction)[..., None, :]
+        return Balls(centre, ahead, np.full((*centre.shape[:-1], 1), radius_mm), 0.0)
+
+    def silhouette(
+        self,
+        at: RoundedAxis,
+        centre_mm: np.ndarray,
+        radius_mm: float,
+        reach_mm: float,
+        stations: int,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Compute where sights graze the sphere: a circle in two halves, whatever the reach."""
+        sight = np.asarray(at.point_mm) - centre_mm
+        distance = np.linalg.norm(sight, axis=-1, keepdims=True)[..., None]
+        ahead = unit(sight)[..., None, :]
+        right = unit(np.cross(ahead, _UP + _SKEWED))
+        turn = (np.arange(2 * stations) + 0.5) * np.pi / stations
+        ring = np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * np.cross(ahead, right)
+        cosine = radius_mm / distance
+        normals = -cosine * ahead + np.sqrt(1.0 - cosine**2) * ring
+        normals = normals.reshape(*normals.shape[:-2], 2, stations, 3)
+        return np.asarray(at.point_mm)[..., None, None, :] + radius_mm * normals, normals
+
+    def covering_discs(self, edges_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return one disc (1, 2), (1,) px for all of the silhouette (2, m, 2)."""
+        return super().covering_discs(edges_px.reshape(-1, 1, 2))
+
+    def at_contact(
+        self, spot_mm: np.ndarray, inwards: np.ndarray, along: np.ndarray, free: np.ndarray
+    ) -> RoundedAxis:
+        """Return where spheres stand that are touched at spots (n, 3); nothing is free."""
+        return RoundedAxis(spot_mm + self.radius_mm * inwards, along, self, spot_mm)

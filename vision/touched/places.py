@@ -1,0 +1,86 @@
+"""Hypotheses about where a ring, sphere or cone is, and the search among them.
+
+A hypothesis is where the straight whisker first touches the object: a distance along the whisker, a
+motor angle, the slope there, and the numbers that this leaves free (`Rounded.free_numbers`: of a
+cone its radius there and the side of its tip, of a ring its tilt and its turn about the tangent).
+The best of a grid of hypotheses are refined from coarse to fine (`vision.touched.grid_search`).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vision.geometry.centreline import rotation_z
+from vision.geometry.rods import Rods
+from vision.geometry.rounded import RoundedAxis
+from vision.touched.grid_search import SearchPass, coarse_to_fine, half_steps, touch_angles
+
+# [mm] Nearest contact to the whisker's base. Stated.
+_NEAREST_MM = 10.0
+
+Places = Callable[[np.ndarray], RoundedAxis]
+
+
+@dataclass(frozen=True)
+class PlaceGrid:
+    """The grid of hypotheses from which a search begins.
+
+    x_mm: its step along the whisker. touch_mm: its step along the arc of the whisker's middle.
+    beta_rad: its slopes. starts: number of hypotheses that go on. separation: least distance of
+    two of these, in half steps of the grid.
+    """
+
+    x_mm: float
+    touch_mm: float
+    beta_rad: np.ndarray
+    starts: int
+    separation: float
+
+    def values(self, rods: Rods, motor_rad: tuple[float, float]) -> list[np.ndarray]:
+        """Return the grid's values of each number of a hypothesis."""
+        length_mm = rods.wire.length_mm
+        x_mm = np.arange(_NEAREST_MM, length_mm, self.x_mm)
+        touch_rad = touch_angles(motor_rad, length_mm, self.touch_mm)
+        free = [number.values for number in rods.bar.free_numbers()]
+        return [x_mm, touch_rad, self.beta_rad, *free]
+
+    def search(
+        self,
+        rods: Rods,
+        motor_rad: tuple[float, float],
+        passes_of: Callable[[Places], Sequence[SearchPass]],
+    ) -> list[RoundedAxis]:
+        """Find the places with the highest scores, the best first.
+
+        motor_rad: lowest and highest motor angle, between which the whisker touches. passes_of:
+        function of a function of hypotheses (n, k) that returns the places; it returns the passes.
+        """
+        values = self.values(rods, motor_rad)
+        free_choices = [number.is_choice for number in rods.bar.free_numbers()]
+        is_choice = [False, False, False, *free_choices]
+        steps = np.where(is_choice, 0.0, half_steps(values))
+
+        def places_of(hypotheses: np.ndarray) -> RoundedAxis:
+            """Return the places (n, 3) of hypotheses (n, k)."""
+            return touched_first(rods, hypotheses)
+
+        passes = passes_of(places_of)
+        best = coarse_to_fine(values, steps, passes, self.separation, self.starts)
+        return places_of(best).each()
+
+
+def touched_first(rods: Rods, hypotheses: np.ndarray) -> RoundedAxis:
+    """Return where objects (n, 3) stand that a straight whisker first touches as hypotheses say.
+
+    hypotheses (n, k): x along the whisker, mm; motor angle and slope, rad; the object's free
+    numbers.
+    """
+    x, touch, beta = hypotheses[:, :3].T
+    zero = np.zeros_like(x)
+    along = np.stack([zero, np.sin(beta), np.cos(beta)], axis=-1)
+    inwards = np.stack([zero, np.cos(beta), -np.sin(beta)], axis=-1)
+    on_whisker = np.stack([x, zero, zero], axis=-1)
+    spot = on_whisker + rods.wire.radius_mm(x)[:, None] * inwards
+    place = rods.bar.at_contact(spot, inwards, along, hypotheses[:, 3:])
+    return place.turned(rotation_z(touch))

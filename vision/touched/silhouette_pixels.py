@@ -1,0 +1,257 @@
+"""The pixels near a predicted silhouette: its two sides, and pieces of them as rows of pixels.
+
+Only those parts count outside of which nothing else of the object lies, and that are clear of the
+wire.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from vision.geometry.rounded import RoundedAxis
+from vision.geometry.vision_settings import VisionSettings
+from vision.pictures.view import SATURATED, View
+from vision.touched.profiles import FULL_SCALE, OUTSIDE_PX
+from vision.wire.bands import Pieces
+
+# [px] Depth inside an edge that is read: that of a thick bar, and one pixel more. Stated.
+_INSIDE_PX = 9.0
+# [px] Least half width: what is thinner has both edges in one. Stated.
+_LEAST_HALF_PX = 5.0
+# [px] Largest half width in the model: the light of what is wider changes no faster near its
+# edge, and profiles grow no longer. Stated.
+_LARGEST_HALF_PX = 40.0
+# [px] Distance outside an edge within which nothing else of the object may lie: where the
+# background is read. Stated.
+_CLEAR_PX = 5.0
+# [points] Of each side of a silhouette: some pixels apart at most. A layout.
+_STATIONS = 400
+# [px] From a wire beyond half a piece, within which pixels may show it. Stated.
+_BESIDE_WIRE_PX = 5.0
+# [px] Between points of a wire's line, where pixels near it are searched for. A layout.
+_DENSE_PX = 2.0
+
+
+@dataclass(frozen=True)
+class OutlineSide:
+    """One side of a predicted outline as n stations, about a pixel apart.
+
+    px, normal (n, 2): in the picture, normals outwards. distance_mm (n,): from the camera. is_clear
+    (n,): whether only background lies outside. half_px (n,): half the object's width.
+    """
+
+    px: np.ndarray
+    normal: np.ndarray
+    distance_mm: np.ndarray
+    is_clear: np.ndarray
+    half_px: np.ndarray
+
+    @property
+    def arc_px(self) -> np.ndarray:
+        """Return the length (n,) along the side up to each station."""
+        steps = np.linalg.norm(np.diff(self.px, axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    def station_at(self, along_px: np.ndarray) -> np.ndarray:
+        """Return the stations (n,) at places (n,) along the side."""
+        arc_px = self.arc_px
+        return np.clip(np.searchsorted(arc_px, along_px), 0, len(arc_px) - 1)
+
+
+def predict_sides(
+    view: View, axis: RoundedAxis, radius_mm: float, settings: VisionSettings
+) -> list[OutlineSide]:
+    """Predict both sides of the outline, a station every pixel or so; none where a part is not
+    before the camera."""
+    camera = view.camera
+    points, normals = axis.silhouette(camera.centre_mm, radius_mm, settings.bar_reach_mm, _STATIONS)
+    px = camera.project(points.reshape(-1, 3)).reshape(2, -1, 2)
+    if not np.all(np.isfinite(px)):
+        return []
+    half_px = 0.5 * np.linalg.norm(px[0] - px[1], axis=1)
+    sides = []
+    for side_points, outwards, side_px in zip(points, normals, px):
+        jacobians = camera.project_with_jacobians(side_points)[1]
+        normal = np.einsum("nij,nj->ni", jacobians, outwards)
+        px_per_mm = np.linalg.norm(normal, axis=1)
+        outside = side_points + (_CLEAR_PX / px_per_mm)[:, None] * outwards
+        is_hidden = axis.hides_itself(camera.centre_mm, outside, radius_mm)
+        is_clear = (half_px > _LEAST_HALF_PX) & ~is_hidden
+        distance_mm = np.linalg.norm(side_points - camera.centre_mm, axis=1)
+        normal = normal / px_per_mm[:, None]
+        sides.append(OutlineSide(side_px, normal, distance_mm, is_clear, half_px))
+    return sides
+
+
+@dataclass(frozen=True)
+class _SidePixels:
+    """Pixels near one side of a silhouette.
+
+    pixels (n, 2): whole, x and y. station (n,): the nearest one. offset_px, along_px (n,): across
+    the side outwards, and along it.
+    """
+
+    pixels: np.ndarray
+    station: np.ndarray
+    offset_px: np.ndarray
+    along_px: np.ndarray
+
+    @classmethod
+    def of(cls, side: OutlineSide, pixels: np.ndarray) -> "_SidePixels":
+        """Return pixels (n, 2) with their places near a side."""
+        _, nearest = cKDTree(side.px).query(pixels)
+        displacement = pixels - side.px[nearest]
+        offset_px = np.sum(displacement * side.normal[nearest], axis=1)
+        tangent = np.stack([-side.normal[:, 1], side.normal[:, 0]], axis=1)
+        forward = np.sum(np.gradient(side.px, axis=0) * tangent, axis=1)
+        tangent *= np.sign(forward)[:, None]
+        along_px = side.arc_px[nearest] + np.sum(displacement * tangent[nearest], axis=1)
+        return cls(pixels, nearest, offset_px, along_px)
+
+    def select(self, keep: np.ndarray) -> "_SidePixels":
+        """Return the pixels where keep (n,) holds."""
+        return _SidePixels(
+            self.pixels[keep], self.station[keep], self.offset_px[keep], self.along_px[keep]
+        )
+
+
+def read_pieces(
+    view: View,
+    side: OutlineSide,
+    wires_px: Sequence[np.ndarray],
+    settings: VisionSettings,
+    reach_px: float,
+) -> Pieces:
+    """Read the pixels near one side that lie clear of the wires, as pieces along it."""
+    inside_px = reach_px + _INSIDE_PX
+    outside_px = reach_px + OUTSIDE_PX + 1.0
+    pixels = _pixels_near(view.mean.shape, side, inside_px, outside_px)
+    if not len(pixels):
+        return _no_pieces()
+    found = _SidePixels.of(side, pixels)
+    keep = side.is_clear[found.station] & (found.offset_px < outside_px)
+    keep &= found.offset_px > -np.minimum(inside_px, side.half_px[found.station])
+    keep &= (found.along_px >= 0.0) & (found.along_px <= side.arc_px[-1])
+    if len(wires_px) and view.itself is None:
+        wire = np.concatenate([_dense(line) for line in wires_px])
+        margin_px = settings.bar_piece_px / 2 + _BESIDE_WIRE_PX
+        distance, _ = cKDTree(wire).query(pixels, distance_upper_bound=margin_px)
+        keep &= ~np.isfinite(distance)
+    return _as_rows(view, side, found.select(keep), settings.bar_piece_px)
+
+
+def _dense(line: np.ndarray) -> np.ndarray:
+    """Return a line (m, 2) sampled every `_DENSE_PX`, without points that are not finite."""
+    line = line[np.all(np.isfinite(line), axis=1)]
+    if len(line) < 2:
+        return line
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    arc_px = np.concatenate([[0.0], np.cumsum(steps)])
+    at = np.arange(0.0, arc_px[-1], _DENSE_PX)
+    return np.stack([np.interp(at, arc_px, line[:, k]) for k in range(2)], axis=1)
+
+
+def _pixels_near(
+    shape: tuple[int, int], side: OutlineSide, inside_px: float, outside_px: float
+) -> np.ndarray:
+    """Return the whole pixels (n, 2), x and y, up to inside_px within and outside_px beyond the
+    stations."""
+    height, width = shape
+    steps = np.arange(-inside_px, outside_px + 0.5, 0.5)
+    near = np.round(side.px[:, None] + steps[:, None] * side.normal[:, None])
+    near = near.astype(int).reshape(-1, 2)
+    is_within = np.all((near >= 0) & (near < np.array([width, height])), axis=1)
+    index = np.unique(near[is_within, 1] * width + near[is_within, 0])
+    return np.stack([index % width, index // width], axis=1).astype(float)
+
+
+def _no_pieces() -> Pieces:
+    """Return pieces without any pixel."""
+    empty = np.zeros((0, 1))
+    none = np.zeros(0)
+    points = np.zeros((0, 2))
+    source = np.zeros(0, dtype=int)
+    return Pieces(empty, empty, empty, empty, empty, empty, none, none, points, points, source)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The order in which n pixels fill the rows of a table (pieces, pixels).
+
+    pieces (r,): the numbers of the pieces. order (n,): of the pixels, piece by piece. row, column
+    (n,): of each pixel in that order.
+    """
+
+    pieces: np.ndarray
+    order: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+
+    @classmethod
+    def of(cls, piece: np.ndarray) -> "_Rows":
+        """Return the rows of pixels that belong to pieces (n,) by number."""
+        order = np.argsort(piece, kind="stable")
+        pieces, first, count = np.unique(piece[order], return_index=True, return_counts=True)
+        row = np.repeat(np.arange(len(pieces)), count)
+        column = np.arange(len(order)) - np.repeat(first, count)
+        return cls(pieces, order, row, column)
+
+    def table(self, values: np.ndarray, empty: float) -> np.ndarray:
+        """Return the pixels' values (n,) as a table (pieces, pixels), filled up with `empty`."""
+        filled = np.full((len(self.pieces), int(self.column.max()) + 1), empty)
+        filled[self.row, self.column] = np.nan_to_num(values[self.order], nan=empty)
+        return filled
+
+
+def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) -> Pieces:
+    """Return pieces of length_px along the side, with their pixels as rows, filled up with pixels
+    of no weight.
+
+    `place` of a piece is along it, px; `source` is its station.
+    """
+    rows = _Rows.of((found.along_px // length_px).astype(int))
+    if not len(rows.pieces):
+        return _no_pieces()
+    column, row = found.pixels.astype(int).T
+    grey = view.mean[row, column]
+    background = view.background[row, column]
+    gradient = _gradient(view.background, row, column)
+    slope = np.sum(gradient * side.normal[side.station_at(found.along_px)], axis=1)
+    scale = FULL_SCALE / view.full_scale
+    half_px = min(float(np.median(side.half_px[side.is_clear])), _LARGEST_HALF_PX)
+    middle = (rows.pieces + 0.5) * length_px
+    station = side.station_at(middle)
+    slopes = rows.table(slope * scale, 0.0)
+    return Pieces(
+        offset_px=rows.table(found.offset_px + half_px, 0.0),
+        grey=rows.table(grey * scale, 1.0),
+        background=rows.table(background * scale, 1.0),
+        slope=slopes,
+        curvature=np.zeros_like(slopes),
+        weight=rows.table(_weights(view, grey, background) / scale, 0.0),
+        place=middle,
+        radius_px=np.full(len(rows.pieces), half_px),
+        foot_px=side.px[station],
+        normal=side.normal[station],
+        source=station,
+    )
+
+
+def _weights(view: View, grey: np.ndarray, background: np.ndarray) -> np.ndarray:
+    """Return one over the noise (n,) of grey values (n,), 0 where one of both is unknown or full."""
+    noise = view.noise.times(view.mean_share)
+    is_used = np.isfinite(grey) & np.isfinite(background)
+    is_used &= np.nan_to_num(grey) < SATURATED * view.full_scale
+    return np.where(is_used, 1.0 / noise.sigma(np.where(is_used, grey, 0.0)), 0.0)
+
+
+def _gradient(picture: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """Return the central differences (n, 2) of a picture by x and y at whole pixels."""
+    height, width = picture.shape
+    right = picture[row, np.minimum(column + 1, width - 1)]
+    left = picture[row, np.maximum(column - 1, 0)]
+    below = picture[np.minimum(row + 1, height - 1), column]
+    above = picture[np.maximum(row - 1, 0), column]
+    return 0.5 * np.stack([right - left, below - above], axis=1)

@@ -1,0 +1,110 @@
+"""Find where a sphere or a cone may be: places whose silhouettes stand out in all cameras at once.
+
+The score of a place is the mean edge strength along both sides of its silhouette (see
+`vision.touched.edge_map`), the geometric mean of both, averaged over the cameras.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vision.geometry.rods import Rods
+from vision.geometry.rounded import RoundedAxis
+from vision.pictures.change import HALF
+from vision.touched.edge_map import EdgeMap
+from vision.touched.grid_search import ObjectScore, SearchPass
+from vision.touched.places import PlaceGrid, Places
+
+# [half-widths] Blur of the edge maps, pass by pass. Set by eye. Study: rounded_seen.py.
+_BLURS = (0.5, 0.2, 0.08)
+# [places] That each pass keeps. Set by eye. Study: rounded_seen.py.
+_KEPT = (24, 20, 12)
+# [places] Of the grid that go on. Set by eye. Study: rounded_seen.py.
+_STARTS = 32
+# [steps] Least separation of two places of the grid. Study: rounded_seen.py.
+_SEPARATION = 4.0
+# [points] Of each side of a silhouette along which edges are read. Stated.
+_STATIONS = 8
+# [mm] From a silhouette outwards, to a point that gives its normal in the picture. Stated.
+_OUTWARDS_MM = 0.2
+# [1] Least edge strength of a camera in a geometric mean over cameras. Stated.
+_LEAST_STRENGTH = 1e-3
+# [rad] Slopes of the grid, as of a bar's. Stated.
+_BETA_RAD = np.radians(np.arange(-78.0, 79.0, 6.0))
+# [mm] Step of the grid along the whisker: less than the blur. Stated.
+_X_MM = 2.4
+# [mm] Step of the grid along the arc of the whisker's middle: less than the blur. Stated.
+_TOUCH_MM = 2.4
+# [places] Evaluated together: arrays that stay in the processor's cache. Not measured.
+_BATCH = 4000
+
+
+def find_silhouettes(
+    edge_maps: Sequence[EdgeMap], rods: Rods, motor_rad: tuple[float, float]
+) -> list[RoundedAxis]:
+    """Find the places whose silhouettes have the strongest edges, the best first.
+
+    motor_rad: lowest and highest motor angle, between which the whisker touches.
+    """
+
+    def passes_of(places_of: Places) -> list[SearchPass]:
+        """Return the passes, on edge maps that are blurred less and less."""
+        passes = []
+        for blur, kept in zip(_BLURS, _KEPT):
+            blurred = [one.blurred(blur) for one in edge_maps]
+            score = SilhouetteScore(places_of, blurred, rods.bar.radius_mm)
+            passes.append(SearchPass(score, blur / _BLURS[0], 1.0, kept))
+        return passes
+
+    grid = PlaceGrid(_X_MM, _TOUCH_MM, _BETA_RAD, _STARTS, _SEPARATION)
+    return grid.search(rods, motor_rad, passes_of)
+
+
+@dataclass(frozen=True)
+class SilhouetteScore(ObjectScore):
+    """Score of places from 0 to 1: edge strength along both sides of their silhouettes."""
+
+    edge_maps: Sequence[EdgeMap]
+    radius_mm: float
+
+    batch: ClassVar[int] = _BATCH
+
+    def of_objects(self, objects: RoundedAxis) -> np.ndarray:
+        """Return the scores (n,): means of cameras, geometric where one has no silhouette."""
+        strength = np.array([self.both_sides(objects, one) for one in self.edge_maps])
+        has_silhouette = np.isfinite(strength)  # (cameras, n)
+        if np.all(has_silhouette):
+            return np.mean(strength, axis=0)
+        logs = np.where(has_silhouette, np.log(np.maximum(strength, _LEAST_STRENGTH)), 0.0)
+        count = np.sum(has_silhouette, axis=0)
+        mean = np.sum(logs, axis=0) / np.maximum(count, 1)
+        return np.where(count > 0, np.exp(mean), 0.0)
+
+    def both_sides(self, objects: RoundedAxis, edges: EdgeMap) -> np.ndarray:
+        """Compute the strength (n,) of both sides in one camera.
+
+        It is their geometric mean, NaN where there is no silhouette.
+        """
+        centre_mm = edges.camera.centre_mm
+        reach_mm = objects.form.search_reach_mm
+        silhouette, normals = objects.silhouette(centre_mm, self.radius_mm, reach_mm, _STATIONS)
+        strength = _strength_along(edges, silhouette.reshape(-1, 3), normals.reshape(-1, 3))
+        strength = strength.reshape(silhouette.shape[:-1])  # (n, 2, stations)
+        strength[~np.isfinite(silhouette[..., 0])] = np.nan
+        sides = np.mean(strength, axis=-1)
+        return np.sqrt(np.prod(sides, axis=-1))
+
+
+def _strength_along(edges: EdgeMap, points_mm: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return the strength (m,) of edges through points (m, 3) of a surface with normals (m, 3)."""
+    outwards = points_mm + _OUTWARDS_MM * normals
+    both_mm = np.concatenate([points_mm, outwards])
+    px, outwards_px = np.split(edges.camera.project(both_mm) / HALF, 2)
+    normal_px = outwards_px - px
+    normal_px /= np.linalg.norm(normal_px, axis=1, keepdims=True)
+    x, y = np.nan_to_num(normal_px).T
+    column, row = np.nan_to_num(px).T
+    xx, xy, yy = edges.tensor_at(column, row).T
+    return x * x * xx + 2.0 * x * y * xy + y * y * yy

@@ -1,0 +1,163 @@
+"""How the edges of the touched object are read, pass by pass, in the pictures of one whisk.
+
+A reader keeps what it measured in the pass before: from that a fine measurement begins. A straight
+bar is read by its middle; by its two edges as well, where its distance is that at which it looks
+as wide as it is. Any other object is read by its silhouette. Which reader an object has is chosen
+in `vision.truth.strategies`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vision.geometry.refusals import Refused
+from vision.geometry.touched import Axis
+from vision.geometry.vision_settings import VisionSettings
+from vision.pictures.view import View
+from vision.touched.edges import measure_edges
+from vision.touched.line import BarLineEstimate, measure_bars
+from vision.touched.silhouette_edges import SilhouetteEdges, measure_silhouette_edges
+from vision.wire.points import LinePoints
+
+# [px] How far off a silhouette may be that was fitted to coarse edges. Stated.
+_OFF_PX = 3.0
+# [nats] How much more probable a silhouette's edges are than edges anywhere, in all cameras: a
+# wrong place said 2, true ones 3.8 to 7.9. Study: rounded_seen.py.
+_LEAST_EVIDENCE = 3.0
+# [segments] Of a silhouette: a camera in which so many were tried and none shows an edge
+# contradicts the others, as one did that had a cone upside down. Study: rounded_seen.py.
+_MANY_SEGMENTS = 4
+
+
+@dataclass(frozen=True)
+class ReadLine:
+    """Line points of the object in one camera.
+
+    side: see `vision.wire.points.Observed`. frame: of the fit, in which an object that moves was
+    read; else 0.
+    """
+
+    points: LinePoints
+    side: int
+    frame: int = 0
+
+
+@dataclass(frozen=True)
+class WhereAbout:
+    """Where object and wire are by the pass before.
+
+    axis: of the object. came_mm (f, 3): how far it is from there in each frame. frames: numbers of
+    the whisk's frames. wires_px: by camera, lines (m, 2) of the wire in each frame.
+    """
+
+    axis: Axis
+    came_mm: np.ndarray
+    frames: Sequence[int]
+    wires_px: Mapping[str, Sequence[np.ndarray]]
+
+
+class ObjectReader(ABC):
+    """What reads the touched object's edges in all views of a whisk."""
+
+    @abstractmethod
+    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+        """Return by camera the lines of the object.
+
+        last: no pass follows, so that even a first measurement is refined. Raises Refused where the
+        object is not seen clearly.
+        """
+
+
+@dataclass
+class BarMiddles(ObjectReader):
+    """A straight bar, read by its middle in each view.
+
+    lines: by camera, as measured in the pass before. are_fine: whether they were measured finely;
+    then they stay, as another measurement of the same pixels adds nothing.
+    """
+
+    views: Sequence[View]
+    radius_mm: float
+    settings: VisionSettings
+    lines: dict[str, BarLineEstimate] = field(default_factory=dict)
+    are_fine: bool = False
+
+    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+        """Return by camera the middle of the bar, where there is one."""
+        is_only = last and not self.lines
+        passes = 2 if is_only else 1
+        for _ in range(0 if self.are_fine else passes):
+            self.are_fine = bool(self.lines)
+            self.lines = measure_bars(
+                self.views, about.axis, self.radius_mm, about.wires_px, self.settings, self.lines
+            )
+        return {
+            name: [ReadLine(line.points, 0)] for name, line in self.lines.items() if line.is_bar
+        }
+
+
+class BarEdges(BarMiddles):
+    """A straight bar, read by its two edges; by its middle where they are not seen."""
+
+    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+        """Return by camera the two edges of the bar, sides -1 and 1, or its middle."""
+        found = super().read(about, last=last)
+        for view in self.views:
+            name = view.camera.name
+            wires_px = about.wires_px[name]
+            edges = measure_edges(view, about.axis, self.radius_mm, wires_px, self.settings)
+            if edges:
+                found[name] = [ReadLine(points, side) for side, points in edges.items()]
+        return found
+
+
+@dataclass
+class SilhouetteReader(ObjectReader):
+    """An object that is no straight bar, read by the edges of its silhouette in each view.
+
+    silhouettes: by camera, as measured in the pass before.
+    """
+
+    views: Sequence[View]
+    radius_mm: float
+    settings: VisionSettings
+    silhouettes: dict[str, SilhouetteEdges] = field(default_factory=dict)
+
+    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+        """Return by camera the edges of the silhouette, all on side 1.
+
+        Raises Refused where no silhouette is clear, or a camera contradicts the others.
+        """
+        is_only = last and not self.silhouettes
+        for _ in range(2 if is_only else 1):
+            self.silhouettes = measure_silhouette_edges(
+                self.views,
+                about.axis,
+                self.radius_mm,
+                about.wires_px,
+                self.settings,
+                _OFF_PX,
+                self.silhouettes,
+            )
+        self._require_clear()
+        found = {}
+        for name, silhouette in self.silhouettes.items():
+            if len(silhouette.points):
+                found[name] = [ReadLine(silhouette.points, 1)]
+        return found
+
+    def _require_clear(self) -> None:
+        """Raise Refused where no silhouette is clear, or a camera contradicts the others."""
+        for name, silhouette in self.silhouettes.items():
+            if silhouette.segments >= _MANY_SEGMENTS and not len(silhouette.points):
+                raise Refused(
+                    f"camera {name} shows no edge of the object where the other cameras have it",
+                    code="no_object_edge",
+                )
+        if sum(one.log_evidence for one in self.silhouettes.values()) < _LEAST_EVIDENCE:
+            raise Refused(
+                "no clear outline of the object is seen: too little of its edges stands out",
+                code="no_object_outline",
+            )
