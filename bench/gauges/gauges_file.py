@@ -15,16 +15,15 @@ from bench.session.session import Session
 from bench.session.strict_toml import Keys, as_keys, read_toml
 
 Rows4 = Annotated[
-    list[Annotated[list[float], msgspec.Meta(min_length=4, max_length=4)]],
+    list[manifest.Row4],
     msgspec.Meta(min_length=4, max_length=4),
 ]
-Matrix = Annotated[list[manifest.Pair], msgspec.Meta(min_length=2, max_length=2)]
 
 
-class WithoutKeys(Keys, kw_only=True):
+class WithoutKeys(Keys, kw_only=True, forbid_unknown_fields=True):
     """Coefficients without one trial; no matrix where the others do not fix it."""
 
-    matrix_Nmm_per_V: Matrix | None = None
+    matrix_Nmm_per_V: manifest.Matrix | None = None
     covariance: Rows4 | None = None
 
 

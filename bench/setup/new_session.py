@@ -9,8 +9,9 @@ import tomli_w
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.session.manifest import BarKeys, BoardKeys, WhiskerKeys
-from bench.session.plausible import Window
+from bench.session.plausible import PlausibleRange
 from bench.session.session import MANIFEST
+from bench.session.strict_toml import plausible_ranges
 
 FOLDERS = ("boards", "boards/rig", "trials")
 Ask = Callable[[str], str]
@@ -29,9 +30,9 @@ class Question:
     asked: str
 
     @property
-    def window(self) -> Window:
+    def window(self) -> PlausibleRange:
         """What is plausible."""
-        return _TABLES[self.table].windows[self.key]
+        return plausible_ranges(_TABLES[self.table])[self.key]
 
 
 QUESTIONS = (
