@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.base.doubts import Doubts
+from bench.base.doubts import Doubts, refused_as_bad_input
 from bench.base.errors import BadInput
 from bench.session import manifest
 from bench.session.daq import daq_file
@@ -19,7 +19,6 @@ from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker
 from vision.geometry.board import Board
 from vision.geometry.reasons import Reason
-from vision.geometry.refusals import Refused
 from vision.geometry.rotation import invert_transform, nearest_rotation
 from vision.pictures.files import natural_order
 
@@ -234,10 +233,8 @@ def _board(keys: manifest.BoardKeys | None) -> Board | None:
     """Return the board of [board]; None without that table. Raise BadInput for an impossible one."""
     if keys is None:
         return None
-    try:
+    with refused_as_bad_input(MANIFEST):
         return Board(**values(keys, leave_out=("marker_sigma_mm",)))
-    except Refused as problem:
-        raise BadInput(f"{problem}", file=MANIFEST) from None
 
 
 def _board_pose(rows: list[list[float]] | None) -> np.ndarray | None:

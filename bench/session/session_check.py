@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from bench.base.doubts import Doubts
+from bench.base.doubts import Doubts, refused_as_bad_input
 from bench.base.errors import BadInput
 from bench.base.results import hash_of_files
 from bench.base.statuses import reason
@@ -147,10 +147,8 @@ def _calibrated_sizes(session: Session) -> dict[str, Size]:
     """Return the picture sizes of cameras.toml; none without it. Raise BadInput where one is missing."""
     if session.cameras_toml is None:
         return {}
-    try:
+    with refused_as_bad_input("cameras.toml"):
         cameras = read_cameras(session.cameras_toml)
-    except Refused as problem:
-        raise BadInput(str(problem), file="cameras.toml") from None
     missing = [name for name in session.camera_names if name not in cameras.names]
     if missing:
         found = f"has no camera {missing[0]}; it has {', '.join(cameras.names)}"
