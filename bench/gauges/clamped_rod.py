@@ -21,8 +21,9 @@ _FORCE_ROUNDS = 3
 # [rad] The rounding of an angle near one.
 _CONVERGED_RAD = 1e-12
 
-# Chebyshev–Lobatto points on −1 … 1, and the matrix that turns values there into integrals from −1.
+# Chebyshev–Lobatto points on −1 … 1.
 _POINTS = -np.cos(np.pi * np.arange(_NODES) / (_NODES - 1))
+# The matrix that turns values at the points into integrals from −1.
 _INTEGRALS = chebyshev.chebvander(_POINTS, _NODES) @ chebyshev.chebint(
     np.linalg.inv(chebyshev.chebvander(_POINTS, _NODES - 1)), lbnd=-1
 )

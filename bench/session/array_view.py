@@ -59,19 +59,30 @@ def load_views(
     bases = [_base(whisker) for whisker in keys.whiskers]
     _check_names([base.name for base in bases])
     _check_distances(bases, keys.whiskers)
-    trials_of: dict[str, list[Trial]] = {base.name: [] for base in bases}
-    for trial in session.trials:
-        with doubts.guard():
-            channels = _channels_of_all(trial, keys.whiskers)
-            _check_motors(bases, channels)
-            _check_cone(bases, trial)
-            for base in bases:
-                trials_of[base.name].append(_trial_of(base, trial, channels[base.name]))
+    trials_of = _trials_of_all(session, keys.whiskers, bases, doubts)
     if session.has_pictures and session.T_rig_board is None and session.cameras_toml is None:
         cure = "measure it, or bring cameras.toml: of several wires it says which is whose"
         raise BadInput(f"[rig] T_rig_board is missing; {cure}", file=MANIFEST)
     whiskers = zip(keys.whiskers, bases)
     return tuple(_view(session, one, base, trials_of[base.name]) for one, base in whiskers)
+
+
+def _trials_of_all(
+    session: Session,
+    keys: Sequence[manifest.ArrayWhiskerKeys],
+    bases: Sequence[Base],
+    doubts: Doubts,
+) -> dict[str, list[Trial]]:
+    """Return the trials that can be read as each whisker would have recorded them, by its name."""
+    trials: dict[str, list[Trial]] = {base.name: [] for base in bases}
+    for trial in session.trials:
+        with doubts.guard():
+            channels = _channels_of_all(trial, keys)
+            _check_motors(bases, channels)
+            _check_cone(bases, trial)
+            for base in bases:
+                trials[base.name].append(_trial_of(base, trial, channels[base.name]))
+    return trials
 
 
 def _check_tables(session: Session, keys: manifest.SessionKeys) -> None:

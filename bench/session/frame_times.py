@@ -176,25 +176,18 @@ def merge_times(
     that have it. Returns time_s (n,), camera -> picture index or −1 (n,), and the largest spread
     within a frame, s.
     """
-    every = np.concatenate(list(times_s.values()))
-    order = np.argsort(every, kind="stable")
+    every = np.sort(np.concatenate(list(times_s.values())))
     usual_steps = [np.median(np.diff(times)) for times in times_s.values() if len(times) > 1]
-    gaps = np.diff(every[order], prepend=every[order[0]]) > min(usual_steps, default=np.inf) / 2
-    frame = np.empty(len(every), dtype=int)  # of each time, cameras one after another
-    frame[order] = np.cumsum(gaps)
-    count = int(frame.max()) + 1
+    gaps = np.diff(every) > min(usual_steps, default=np.inf) / 2
+    firsts = np.concatenate([[0], np.flatnonzero(gaps) + 1])  # of each frame, in `every`
+    lasts = np.concatenate([firsts[1:], [len(every)]]) - 1
     picture = {}
-    start = 0
     for name, times in times_s.items():
-        picture[name] = np.full(count, -1)
-        picture[name][frame[start : start + len(times)]] = np.arange(len(times))
-        start += len(times)
-    mean_s = np.bincount(frame[order], weights=every[order]) / np.bincount(frame)
-    earliest = np.full(count, np.inf)
-    latest = np.full(count, -np.inf)
-    np.minimum.at(earliest, frame, every)
-    np.maximum.at(latest, frame, every)
-    return mean_s, picture, float(np.max(latest - earliest))
+        frame = np.searchsorted(every[firsts], times, side="right") - 1
+        picture[name] = np.full(len(firsts), -1)
+        picture[name][frame] = np.arange(len(times))
+    mean_s = np.add.reduceat(every, firsts) / (lasts - firsts + 1)
+    return mean_s, picture, float(np.max(every[lasts] - every[firsts]))
 
 
 def _by_edges(trial: Trial, daq: DaqFile) -> FrameTimes:

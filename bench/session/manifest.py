@@ -12,8 +12,11 @@ import msgspec
 from bench.session import plausible
 from bench.session.strict_toml import Keys
 
+# Lists of so many numbers.
 _TWO = msgspec.Meta(min_length=2, max_length=2)
+# Lists of so many numbers.
 _THREE = msgspec.Meta(min_length=3, max_length=3)
+# Lists of so many numbers.
 _FOUR = msgspec.Meta(min_length=4, max_length=4)
 Pair = Annotated[list[float], _TWO]
 Matrix = Annotated[list[Pair], _TWO]

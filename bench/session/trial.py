@@ -163,14 +163,27 @@ def _stated_object(
     """
     if keys is None:
         return None
+    _check_object(keys, thickness_mm, shown)
+    is_placed = keys.point_mm is not None
+    return StatedObject(
+        shape=keys.shape,
+        point_mm=tuple(keys.point_mm) if is_placed else None,
+        point_sigma_mm=keys.point_sigma_mm,
+        axis=tuple(keys.axis or _UPRIGHT) if is_placed else None,
+        ring_diameter_mm=keys.ring_diameter_mm,
+        half_angle_deg=keys.half_angle_deg,
+    )
+
+
+def _check_object(keys: manifest.ObjectKeys, thickness_mm: float | None, shown: str) -> None:
+    """Raise BadInput for an impossible object. thickness_mm: bar_diameter_mm."""
     for key, shape in _SHAPE_OF_SIZE.items():
         if (keys.shape == shape) != (getattr(keys, key) is not None):
             found = f'{key} belongs to shape = "{shape}", and to no other shape'
             raise BadInput(f"[object] {found}", file=shown)
     if keys.axis is not None and not any(keys.axis):
         raise BadInput("[object] axis is a direction, not zero", file=shown)
-    is_placed = keys.point_mm is not None
-    if not is_placed and (keys.axis is not None or keys.point_sigma_mm):
+    if keys.point_mm is None and (keys.axis is not None or keys.point_sigma_mm):
         found = "says how it stands, and not where; point_mm is missing"
         raise BadInput(f"[object] {found}", file=shown)
     ring_mm = keys.ring_diameter_mm
@@ -180,14 +193,6 @@ def _stated_object(
         )
         meant = "it is the diameter along the bar's middle, and larger"
         raise BadInput(f"[object] {found}; {meant}", file=shown)
-    return StatedObject(
-        shape=keys.shape,
-        point_mm=tuple(keys.point_mm) if is_placed else None,
-        point_sigma_mm=keys.point_sigma_mm,
-        axis=tuple(keys.axis or _UPRIGHT) if is_placed else None,
-        ring_diameter_mm=ring_mm,
-        half_angle_deg=keys.half_angle_deg,
-    )
 
 
 def _bar_diameter(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float]:
