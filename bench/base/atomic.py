@@ -5,6 +5,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TextIO
 
 from bench.base.errors import BadInput
 
@@ -18,17 +19,20 @@ _UNFINISHED = ".unfinished-"  # begins the name of a file that is being written
 
 
 def write_whole(path: Path, data: str | bytes) -> None:
-    """The old file or the new one, never half of either, whatever stops the run. Makes folders as needed."""
+    """Write a file so that it is the old one or the new one, never half of either.
+
+    Makes folders as needed.
+    """
     with whole_file(path) as temporary:
         temporary.write_bytes(data.encode() if isinstance(data, str) else data)
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary path beside `path`, of the same suffix, for writers that want one.
+    """Give a temporary path in the folder of `path`, of the same suffix, for writers that want one.
 
-    It becomes `path` on leaving; where the block raises, nothing is left of it. Raises OSError, with `path`, where it
-    cannot be written.
+    It becomes `path` on leaving; where the block raises, nothing is left of it. Raises OSError, with
+    `path`, where it cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=_UNFINISHED, suffix=path.suffix)
@@ -40,15 +44,15 @@ def whole_file(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)
     except BaseException as problem:
         temporary.unlink(missing_ok=True)
-        if isinstance(problem, OSError) and problem.filename in (
-            None,
-            name,
-        ):  # a full disk names no file
-            problem.filename, problem.filename2 = str(path), None
+        # a full disk names no file
+        if isinstance(problem, OSError) and problem.filename in (None, name):
+            problem.filename = str(path)
+            problem.filename2 = None
         raise
 
 
 def _umask() -> int:
+    """Return the process's mask of a new file's permissions."""
     mask = os.umask(0)
     os.umask(mask)
     return mask
@@ -71,7 +75,8 @@ def lock_output(folder: Path) -> Iterator[None]:
         yield
 
 
-def _hold(lock, folder: Path) -> None:
+def _hold(lock: TextIO, folder: Path) -> None:
+    """Lock a folder by its lock file. Raise BadInput where another run holds it."""
     if fcntl is None:
         return
     try:
@@ -79,6 +84,5 @@ def _hold(lock, folder: Path) -> None:
     except BlockingIOError:
         lock.seek(0)
         pid = lock.read().strip() or "unknown"
-        raise BadInput(
-            f"another run (process {pid}) writes to this folder; wait for it", file=folder
-        ) from None
+        found = f"another run (process {pid}) writes to this folder; wait for it"
+        raise BadInput(found, file=folder) from None

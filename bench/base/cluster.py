@@ -21,13 +21,10 @@ from bench.base.results import hash_of_code
 from bench.base.workers import DIED, Workers, has_one_thread, pictures_by_one_thread
 
 _CODE = ("bench", "vision", "estimator")
-_LIBRARIES = (
-    "numpy",
-    "scipy",
-    "scikit-image",
-    "opencv-contrib-python-headless",
-)  # what results are computed by
-_LONG_ENOUGH_S = 10.0  # s, for a scheduler to answer. Set by eye
+# Libraries that results are computed by.
+_LIBRARIES = ("numpy", "scipy", "scikit-image", "opencv-contrib-python-headless")
+# [s] For a scheduler to answer. Set by eye.
+_LONG_ENOUGH_S = 10.0
 # of one task; Dask warns from 10 MB on, and a task holds the rig pictures of all cameras
 _LARGE = "1GB"
 _ONE_AT_A_TIME = threading.Lock()
@@ -41,16 +38,18 @@ class Cluster(Workers):
     """
 
     def __init__(self, address: str, out: Path, progress: bool = False):
+        """Connect to no scheduler yet."""
         super().__init__(0, progress)
-        self.address, self.out = address, out
+        self.address = address
+        self.out = out
 
     def __enter__(self) -> "Cluster":
+        """Connect to the scheduler. Raise BadInput where there is none."""
         try:
             from distributed import Client
         except ImportError:
-            raise BadInput(
-                "--dask needs distributed: pip install 'whisker-bench[cluster]'"
-            ) from None
+            fix = "--dask needs distributed: pip install 'whisker-bench[cluster]'"
+            raise BadInput(fix) from None
         try:
             self._client = Client(self.address, timeout=_LONG_ENOUGH_S, set_as_default=False)
         except (OSError, ValueError):
@@ -61,22 +60,26 @@ class Cluster(Workers):
         return self
 
     def _bad(self, reason: str) -> BadInput:
+        """Return the error of a cluster that cannot be worked with."""
         return BadInput(f"--dask {self.address}: {reason}")
 
-    def __exit__(self, kind, *_) -> None:
-        self._client.close()  # what is still under way has no one who waits for it, and is dropped
+    def __exit__(self, kind: type[BaseException] | None, *_) -> None:
+        """Close the connection. Unfinished tasks have no one who waits for them, and are dropped."""
+        self._client.close()
 
     def _finished(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
+        """Yield places and results as they come; DIED in place of a result."""
         import dask
         from distributed import as_completed
 
         lock = self.out / LOCK
         given = partial(_job, job, here=facts(), lock=(lock, lock.read_text()))
-        waiting, busy, done = deque(enumerate(tasks)), {}, as_completed(loop=self._client.loop)
+        waiting = deque(enumerate(tasks))
+        busy: dict[Any, int] = {}  # place of each task
+        done = as_completed(loop=self._client.loop)
         while waiting or busy:
-            while waiting and len(busy) < max(
-                len(self._client.nthreads()), 1
-            ):  # one each, few at the scheduler
+            # one a worker, few at the scheduler
+            while waiting and len(busy) < max(len(self._client.nthreads()), 1):
                 place, task = waiting.popleft()
                 with dask.config.set({"distributed.admin.large-graph-warning-threshold": _LARGE}):
                     future = self._client.submit(given, task, pure=False)
@@ -86,7 +89,10 @@ class Cluster(Workers):
             yield busy.pop(future), self._result(future)
 
     def _result(self, future: Any) -> object:
-        """Of a job that is done. Raises what the job raised, BadInput where the cluster was lost or is not ours."""
+        """Return the result of a finished job, DIED where its worker died.
+
+        Raises what the job raised, BadInput where the cluster was lost or is not ours.
+        """
         from distributed.scheduler import KilledWorker
 
         try:
@@ -101,31 +107,33 @@ class Cluster(Workers):
 
 @lru_cache
 def facts() -> dict[str, str]:
-    """What two processes must have alike to give the same bytes."""
+    """Return what two processes must have alike to give the same bytes."""
     libraries = {name: version(name) for name in _LIBRARIES}
     return {"whisker-bench": hash_of_code(_CODE), "Python": platform.python_version(), **libraries}
 
 
 def _job(job: Callable, task: Any, here: dict[str, str], lock: tuple[Path, str]) -> Any:
-    """The job, on a worker. Raises BadInput where it is not one of ours. lock: a file, and what it says."""
+    """Run a job on a worker. Raise BadInput where it is not one of ours.
+
+    here: `facts` of the process that sent it. lock: a file, and its text.
+    """
     _check_code(tuple(here.items()))
-    file, said = lock
-    if not file.is_file() or file.read_text() != said:
-        raise BadInput(
-            f"{_worker()} does not see {file.parent}: session and output must be there under the same paths"
-        )
+    file, text = lock
+    if not file.is_file() or file.read_text() != text:
+        rule = "session and output must be there under the same paths"
+        raise BadInput(f"{_worker()} does not see {file.parent}: {rule}")
     with _ONE_AT_A_TIME, pictures_by_one_thread():
         return job(task)
 
 
 @lru_cache
 def _check_code(here: tuple[tuple[str, str], ...]) -> None:
-    there = facts()
+    """Raise BadInput where a worker has other code or libraries, or computes with several threads."""
+    own = facts()
     for name, wanted in here:
-        if there[name] != wanted:
-            raise BadInput(
-                f"{_worker()} has {name} {there[name]}, here it is {wanted}: install the same on both"
-            )
+        if own[name] != wanted:
+            found = f"{_worker()} has {name} {own[name]}, here it is {wanted}"
+            raise BadInput(f"{found}: install the same on both")
     if not has_one_thread():
         raise BadInput(
             f"{_worker()} computes with several threads: start it with OMP_NUM_THREADS=1 "
@@ -134,4 +142,5 @@ def _check_code(here: tuple[tuple[str, str], ...]) -> None:
 
 
 def _worker() -> str:
+    """Return how messages name this worker."""
     return f"the worker on {platform.node()}"

@@ -1,4 +1,4 @@
-"""What is wrong or doubtful in the input: `evaluate` stops at the first refusal, `check` collects all."""
+"""Refusals and warnings on the input: `evaluate` stops at the first refusal, `check` collects all."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -7,6 +7,16 @@ from typing import Any
 
 from bench.base.errors import BadInput
 from vision.geometry.reasons import Reason, joined
+from vision.geometry.refusals import Refused
+
+
+@contextmanager
+def refused_as_bad_input(file: str) -> Iterator[None]:
+    """Raise BadInput, naming the file, in place of what vision refuses within the context."""
+    try:
+        yield
+    except Refused as problem:
+        raise BadInput(str(problem), file=file) from None
 
 
 def in_one_status(*said: str | None) -> Reason:
@@ -33,8 +43,12 @@ class Doubts:
             self.refusals.append(str(bad))
 
     def each(self, loaders: Iterable[Callable[[], Any]]) -> list:
-        """What each loader gives. Raises the first one's BadInput when all have been run, and what they refuse is kept."""
-        before, given = len(self.refusals), []
+        """Run all loaders and return what they give; what they refuse is kept.
+
+        Raises the first one's BadInput when all have been run.
+        """
+        before = len(self.refusals)
+        given = []
         for load in loaders:
             with self.guard():
                 given.append(load())

@@ -1,4 +1,4 @@
-"""What all figures share: look, colours, and files that are written whole with the hash of what they show."""
+"""Common style and colours of all figures, and files written whole with the hash of their content."""
 
 import io
 import re
@@ -83,35 +83,36 @@ SLOPES_DEG = np.linspace(0.0, 82.0, 329)  # at which curves over the slope are d
 
 
 def style() -> AbstractContextManager[None]:
-    """Context in which figures are made."""
+    """Return the context in which figures are made."""
     return _context(_STYLE)
 
 
 def paper_style() -> AbstractContextManager[None]:
-    """Context in which figures of a journal's column are made."""
+    """Return the context in which figures of a journal's column are made."""
     return _context(_STYLE | _PAPER)
 
 
 def _context(settings: dict) -> AbstractContextManager[None]:
+    """Return a context with these settings of Matplotlib."""
     from matplotlib import rc_context
 
     return rc_context(settings)
 
 
 def blank(width_in: float, height_in: float) -> "Figure":
-    """A figure of this size to draw in."""
+    """Return an empty figure of this size."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
 def colour_of(estimator: str, number: int = 0) -> str:
-    """The built-in estimators keep their colours; others take theirs by number."""
+    """Return the colour of an estimator: of a built-in one its own, of another by number."""
     return COLOURS.get(estimator, OTHER_COLOURS[number % len(OTHER_COLOURS)])
 
 
 def label_of(estimator: str) -> str:
-    """An estimator as the legend names it."""
+    """Return the name of an estimator in a legend."""
     return LABELS.get(estimator, estimator.partition(":")[2] or estimator)
 
 
@@ -164,20 +165,20 @@ def save(figure: "Figure", path: Path, stamp: str, dpi: int = 160) -> None:
 
 
 def save_picture(picture: np.ndarray, path: Path, stamp: str) -> None:
-    """The same of a picture (h, w, 3) that is painted, red first."""
+    """Write a picture (h, w, 3), red first, as a PNG, whole, with the hash of what it shows."""
     _, png = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), _PNG)
     png = png.tobytes()
     write_whole(path, png[:_HEADER_BYTES] + _text_chunk(_STAMP, stamp) + png[_HEADER_BYTES:])
 
 
 def _text_chunk(name: str, text: str) -> bytes:
-    """A line of text as PNG holds it: length, kind, name and text, checksum."""
+    """Return a line of text as PNG holds it: length, kind, name and text, checksum."""
     body = b"tEXt" + f"{name}\0{text}".encode("latin-1")
     return struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
 
 
 def _lay_out(figure: "Figure") -> None:
-    """Places all axes. Left to `savefig`, everything is drawn twice, its pictures too."""
+    """Place all axes. Left to `savefig`, everything is drawn twice, its pictures too."""
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
@@ -187,8 +188,10 @@ def _lay_out(figure: "Figure") -> None:
 def publish(
     figure: "Figure", stem: Path, formats: Sequence[str] = ("png", "svg"), dpi: int = 150
 ) -> list[Path]:
-    """Write <stem>.<format> of each of FORMATS that is asked for, whole; the same figure gives the same bytes. The
-    paths written."""
+    """Write <stem>.<format> in each format, whole, and return the paths.
+
+    The same figure gives the same bytes.
+    """
     paths = [stem.with_name(f"{stem.name}.{name}") for name in formats]
     _lay_out(figure)
     with _context({"svg.hashsalt": stem.name}):
@@ -214,7 +217,7 @@ def svg_of(figure: "Figure", name: str) -> str:
 
 
 def is_drawn(path: Path, stamp: str) -> bool:
-    """Does the file show what has this hash?"""
+    """Return whether the file shows what has this hash."""
     try:
         with Image.open(path) as picture:
             return getattr(picture, "text", {}).get(_STAMP) == stamp

@@ -1,4 +1,4 @@
-"""Whether results can be trusted in this Python environment: one OpenCV, new enough, and our own packages."""
+"""Check of the Python environment: one OpenCV, new enough, and our own packages."""
 
 import importlib
 import re
@@ -12,43 +12,40 @@ OLDEST_OPENCV = (4, 14)  # older ones put ChArUco corners 0.5 px off
 
 
 def check_environment() -> None:
-    """Raises BadInput, naming the commands that cure it, where results could be silently wrong."""
-    _check_packages()
+    """Raise BadInput, naming the commands that cure it, where results could be silently wrong."""
+    found = foreign_package()
+    if found:
+        raise BadInput(found)
     _check_opencv_distributions()
     _check_opencv()
 
 
 def versions() -> dict[str, str]:
-    """Version by distribution of what results depend on."""
+    """Return the versions of the distributions that results depend on."""
     names = ("whisker-bench", OPENCV, "numpy", "scipy", "scikit-image", "matplotlib")
     return {name: _version(name) for name in names}
 
 
 def _version(name: str) -> str:
+    """Return the version of a distribution."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return "not installed"
 
 
-def _check_packages() -> None:
-    """Other distributions have packages of our names too."""
-    found = foreign_package()
-    if found:
-        raise BadInput(found)
-
-
 def _check_opencv_distributions() -> None:
-    names = {
-        re.sub(r"[-_.]+", "-", d.metadata["Name"] or "").lower() for d in metadata.distributions()
-    }
-    found = sorted(name for name in names if name.startswith("opencv"))
+    """Raise BadInput where not exactly one distribution of OpenCV is installed."""
+    names = [each.metadata["Name"] or "" for each in metadata.distributions()]
+    normalised = {re.sub(r"[-_.]+", "-", name).lower() for name in names}
+    found = sorted(name for name in normalised if name.startswith("opencv"))
     if found != [OPENCV]:
         what = " and ".join(found) or "no OpenCV"
         raise BadInput(f"found {what} where exactly {OPENCV} is needed; {_cure(found)}")
 
 
 def _check_opencv() -> None:
+    """Raise BadInput where OpenCV is broken or too old."""
     try:
         cv2 = importlib.import_module("cv2")
     except Exception as problem:  # of two in one place any error comes
@@ -62,5 +59,6 @@ def _check_opencv() -> None:
 
 
 def _cure(found: list[str]) -> str:
+    """Return the commands that put our OpenCV in place of the distributions found."""
     remove = f"pip uninstall -y {' '.join(found)} && " if found else ""
     return f"cure: {remove}pip install --force-reinstall '{OPENCV}>=4.14,<6'"

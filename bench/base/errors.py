@@ -4,10 +4,10 @@ from pathlib import PurePath
 
 
 class BadInput(Exception):
-    """One clear line: file, row or frame, what was found, what is allowed. Ends with exit code 2.
+    """An error of the input, in one line: file, row or frame, what was found, what is allowed.
 
-    `file`, `row` (as an editor counts, the header being row 1) and `column` are kept apart as well, so that
-    `check` can list many.
+    The run ends with exit code 2. `file`, `row` (as an editor counts, the header being row 1) and
+    `column` are attributes as well, so that `check` can list many.
     """
 
     def __init__(
@@ -16,17 +16,14 @@ class BadInput(Exception):
         *,
         file: str | PurePath | None = None,
         row: int | None = None,
-        column=None,
+        column: str | None = None,
     ):
-        self.reason, self.file, self.row, self.column = reason, file, row, column
-        place = ", ".join(_places(file, row, column))
-        super().__init__(" ".join(f"{place}: {reason}".split()) if place else reason)
-
-
-def _places(file, row, column):
-    if file is not None:
-        yield str(file)
-    if row is not None:
-        yield f"row {row}"
-    if column is not None:
-        yield f"column {column}"
+        """Make the line from its reason and its place."""
+        self.reason = reason
+        self.file = file
+        self.row = row
+        self.column = column
+        labels = {"": file, "row ": row, "column ": column}
+        places = [f"{label}{value}" for label, value in labels.items() if value is not None]
+        line = " ".join(f"{', '.join(places)}: {reason}".split()) if places else reason
+        super().__init__(line)

@@ -1,5 +1,7 @@
-"""Whether bench, vision and estimator are ours: other distributions have packages of these names too. Imports none of
-them, for `whisker_bench.py` runs this file before any of them is imported."""
+"""Check that bench, vision and estimator are ours: other distributions have packages of these names too.
+
+It imports none of them, for `whisker_bench.py` runs this file before any of them is imported.
+"""
 
 import importlib.util
 from pathlib import Path
@@ -8,8 +10,10 @@ PACKAGES = ("bench", "vision", "estimator")
 
 
 def foreign_package() -> str:
-    """A sentence on the first package of these names that does not stand where this file does, with the cure; '' where
-    all do."""
+    """Return a sentence on the first package of these names that is not this file's, with the cure.
+
+    '' where all are.
+    """
     home = Path(__file__).resolve().parents[2]
     for name in PACKAGES:
         spec = importlib.util.find_spec(name)

@@ -50,22 +50,22 @@ _MANY = 1000  # values; larger arrays are hashed by their bytes
 
 
 def hash_of(*parts: object) -> str:
-    """Hash of plain values, in their order. Pictures count by their pixels, paths by their names: a session that was
-    moved is the same session."""
-    return hashlib.blake2b(
-        json.dumps(_hashable(parts), sort_keys=True).encode(), digest_size=16
-    ).hexdigest()
+    """Return the hash of plain values, in their order.
+
+    Pictures count by their pixels, paths by their names: a session in another folder is the same
+    session.
+    """
+    text = json.dumps(_hashable(parts), sort_keys=True)
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
-def _hashable(value):
+def _hashable(value: object) -> Any:
+    """Return a value as JSON has it, with paths by name and large arrays by the hash of their bytes."""
     if isinstance(value, Path):
         return value.name
     if isinstance(value, np.ndarray) and value.size > _MANY:
-        return [
-            value.shape,
-            str(value.dtype),
-            hashlib.blake2b(np.ascontiguousarray(value).tobytes()).hexdigest(),
-        ]
+        content = hashlib.blake2b(np.ascontiguousarray(value).tobytes())
+        return [value.shape, str(value.dtype), content.hexdigest()]
     if is_dataclass(value) and not isinstance(value, type):
         return {f.name: _hashable(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Mapping):
@@ -74,41 +74,47 @@ def _hashable(value):
 
 
 def content_hash(file: Path) -> bytes:
-    """Hash of a file's content."""
+    """Return the hash of a file's content."""
     with file.open("rb") as content:  # a video may be larger than the memory
         return hashlib.file_digest(content, hashlib.blake2b).digest()
 
 
 def hash_of_files(paths: Iterable[Path], digest_of: Callable[[Path], bytes] = content_hash) -> str:
-    """Hash of names and contents of files and of all files below folders; truth files do not count. digest_of: gives
-    the hash of a content."""
+    """Return the hash of names and contents of files and of all files below folders.
+
+    Truth files do not count. digest_of: gives the hash of a content.
+    """
     digest = hashlib.blake2b(digest_size=16)
-    places = ([path] if path.is_file() else sorted(_below(path)) for path in sorted(set(paths)))
-    files = [file for place in places for file in place if _counts(file.name)]
-    some = [files[k : k + _FILES_AT_ONCE] for k in range(0, len(files), _FILES_AT_ONCE)]
-    contents = chain.from_iterable(
-        in_threads(lambda batch: [digest_of(file) for file in batch], some)
-    )
-    for file, content in zip(files, contents):
+    files: list[Path] = []
+    for path in sorted(set(paths)):
+        below = [path] if path.is_file() else sorted(_below(path))
+        files += [file for file in below if _counts(file.name)]
+    batches = [files[k : k + _FILES_AT_ONCE] for k in range(0, len(files), _FILES_AT_ONCE)]
+    contents = in_threads(lambda batch: [digest_of(file) for file in batch], batches)
+    for file, content in zip(files, chain.from_iterable(contents)):
         digest.update(f"{file.name}\0{file.stat().st_size}\0".encode())
         digest.update(content)
     return digest.hexdigest()
 
 
 def _counts(name: str) -> bool:
+    """Return whether a file of this name is recorded, not the truth of a synthetic session."""
     return not _TRUTH_FILES.fullmatch(name) and not name.startswith(".")
 
 
 def _below(folder: Path) -> Iterator[Path]:
-    """All files, those in linked folders too."""
+    """Yield all files below a folder, those in linked folders too."""
     for place, _, names in os.walk(folder, followlinks=True):
-        yield from (file for file in (Path(place) / name for name in names) if file.is_file())
+        yield from filter(Path.is_file, (Path(place) / name for name in names))
 
 
 @lru_cache
 def hash_of_code(places: tuple[str, ...], root: Path = _ROOT) -> str:
-    """Hash of the sources in these folders, with all below them, and files: a new version never takes an old version's
-    results for its own. Raises FileNotFoundError where a place is none."""
+    """Return the hash of the sources in these folders, with all below them, and files.
+
+    A new version so never takes an old version's results for its own. Raises FileNotFoundError where
+    a place is none.
+    """
     digest = hashlib.blake2b(digest_size=16)
     for place in places:
         path = root / place
@@ -122,7 +128,7 @@ def hash_of_code(places: tuple[str, ...], root: Path = _ROOT) -> str:
 
 
 def plain(value: object) -> Any:
-    """The value as JSON has it: arrays as lists, NaN as null, dataclasses as tables."""
+    """Return the value as JSON has it: arrays as lists, NaN as null, dataclasses as tables."""
     if is_dataclass(value) and not isinstance(value, type):
         return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Mapping):
@@ -139,12 +145,12 @@ def plain(value: object) -> Any:
 
 
 def write_result(path: Path, result: dict) -> None:
-    """One trial's result, whole."""
+    """Write one trial's result, whole."""
     write_whole(path, json.dumps(plain(result), sort_keys=True) + "\n")
 
 
 def read_result(path: Path) -> dict | None:
-    """A result, or None where there is none that can be read."""
+    """Read a result; return None where there is none that can be read."""
     try:
         return json.loads(path.read_text())
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Pictures looked at side by side: OpenCV and numpy let other threads run while they work on one."""
+"""Work on pictures in parallel: OpenCV and NumPy let other threads run while they work on one."""
 
 import os
 from collections import deque
@@ -6,13 +6,15 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-Item, Result = TypeVar("Item"), TypeVar("Result")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
-_AHEAD = 2  # items waiting for each thread: enough to keep it busy, few enough that pictures do not fill the memory
+# [items] Waiting for each thread: enough to keep it busy, few enough that pictures do not fill the memory.
+_AHEAD = 2
 
 
 def in_threads(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """job(item) of every item, in their order; items are taken only as they are needed."""
+    """Yield job(item) of every item, in their order; items are taken only as they are needed."""
     count = os.cpu_count() or 1
     with ThreadPoolExecutor(count) as pool:
         waiting: deque = deque()

@@ -1,4 +1,4 @@
-"""Processes that work side by side, with the same results for any number of them.
+"""Processes that work in parallel, with the same results for any number of them.
 
 Every job runs with one thread, however many processes there are, because libraries sum in another order with other
 numbers of threads: in fresh processes, or here where one is asked for and this one has a single thread itself
@@ -22,7 +22,7 @@ from bench.base.errors import BadInput
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _PICTURES = "OPENCV_FOR_THREADS_NUM"  # OpenCV's own number, as it is loaded
-_LOOK_FOR_PARENT_S = 1.0  # s: so long a worker may outlive a run that was killed
+_PARENT_CHECK_S = 1.0  # s: so long a worker may outlive a run that was killed
 MOST_DEATHS = 3  # of processes at one task, which is then given up
 DIED = object()  # in place of the result of such a task
 KILLED = (
@@ -35,41 +35,40 @@ class Workers:
     """`count` processes; use as a context. Leaving it by an exception (Ctrl-C too) ends them at once."""
 
     def __init__(self, count: int, progress: bool = False):
-        self.count, self.progress = count, progress
-        self._processes: list[
-            ProcessPoolExecutor
-        ] = []  # one process each: a death is the death of one task
+        """Start no process yet."""
+        self.count = count
+        self.progress = progress
+        # one process each: a death is the death of one task
+        self._processes: list[ProcessPoolExecutor] = []
 
     def __enter__(self) -> "Workers":
+        """Return the workers."""
         return self
 
-    def __exit__(self, kind, *_) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_) -> None:
+        """End the processes, at once where there was an exception."""
         for process in self._processes:
             process.shutdown(wait=kind is None, cancel_futures=True)
         if kind is not None and self._processes:
             _end_children()
 
     def run(self, job: Callable, tasks: Sequence, name: str, lost: Callable | None = None) -> list:
-        """job(task) of every task, in their order; a bar over them where progress is wanted.
+        """Return job(task) of every task, in their order, with a bar where progress is wanted.
 
-        A task whose process dies is given to another, MOST_DEATHS times in all; then lost(task) stands for its result.
-        Raises BadInput where there is no `lost`.
+        A task whose process dies is given to another, MOST_DEATHS times in all; then lost(task) stands
+        for its result. Raises BadInput where there is no `lost`.
         """
         results = [None] * len(tasks)
-        for place, result in tqdm(
-            self._finished(job, tasks),
-            desc=name,
-            total=len(tasks),
-            leave=False,
-            disable=not self.progress,
-        ):
+        hidden = not self.progress
+        finished = self._finished(job, tasks)
+        for place, result in tqdm(finished, name, len(tasks), leave=False, disable=hidden):
             if result is DIED and lost is None:
                 raise BadInput(KILLED)
             results[place] = lost(tasks[place]) if result is DIED else result
         return results
 
     def _finished(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
-        """Places and results as they come; DIED in place of a result."""
+        """Yield places and results as they come; DIED in place of a result."""
         if self.count == 0 or (self.count == 1 and has_one_thread()):
             for place, task in enumerate(tasks):
                 with pictures_by_one_thread() if self.count else nullcontext():
@@ -79,17 +78,17 @@ class Workers:
             yield from self._by_processes(job, tasks)
 
     def _by_processes(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
+        """Yield places and results of tasks that other processes do."""
         while len(self._processes) < min(self.count, len(tasks)):
             self._processes.append(_process())
-        idle, waiting, deaths = (
-            list(range(len(self._processes))),
-            deque(range(len(tasks))),
-            Counter(),
-        )
-        busy: dict[Future, tuple[int, int]] = {}
+        idle = list(range(len(self._processes)))
+        waiting = deque(range(len(tasks)))
+        deaths: Counter[int] = Counter()
+        busy: dict[Future, tuple[int, int]] = {}  # process and place of each task
         while waiting or busy:
             while waiting and idle:
-                number, place = idle.pop(), waiting.popleft()
+                number = idle.pop()
+                place = waiting.popleft()
                 busy[self._submitted(number, job, tasks[place])] = number, place
             for future in wait(busy, return_when=FIRST_COMPLETED).done:
                 number, place = busy.pop(future)
@@ -102,7 +101,7 @@ class Workers:
                     yield place, DIED if died else future.result()
 
     def _submitted(self, number: int, job: Callable, task: object) -> Future:
-        """The task given to a process, which is started anew where it has died."""
+        """Return the task given to a process, which is started anew where it has died."""
         try:
             return self._processes[number].submit(job, task)
         except BrokenProcessPool:
@@ -111,7 +110,7 @@ class Workers:
 
 
 def _process() -> ProcessPoolExecutor:
-    """One process of one thread, which is being started."""
+    """Start a process of one thread."""
     context = multiprocessing.get_context("spawn")
     process = ProcessPoolExecutor(1, context, initializer=_begin, initargs=(os.getpid(),))
     with _single_threaded():
@@ -120,19 +119,22 @@ def _process() -> ProcessPoolExecutor:
 
 
 def single_thread() -> None:
-    """One thread for linear algebra in this process, unless another number was asked for. Before numpy is loaded."""
+    """Set one thread for linear algebra in this process, before NumPy is loaded.
+
+    Another number in the environment stays.
+    """
     for name in _THREADS:
         os.environ.setdefault(name, "1")
 
 
 def has_one_thread() -> bool:
-    """Whether linear algebra has one thread in this process."""
+    """Return whether linear algebra has one thread in this process."""
     return all(os.environ.get(name) == "1" for name in _THREADS)
 
 
 @contextmanager
 def pictures_by_one_thread() -> Iterator[None]:
-    """OpenCV keeps to one thread in here, as in a worker."""
+    """Keep OpenCV to one thread within the context, as in a worker."""
     import cv2
 
     before = cv2.getNumThreads()
@@ -145,32 +147,37 @@ def pictures_by_one_thread() -> Iterator[None]:
 
 @contextmanager
 def _single_threaded() -> Iterator[None]:
-    """Processes started in here inherit one thread; this one keeps what it has."""
+    """Let processes started within the context inherit one thread; this one keeps its own."""
     before = {name: os.environ.get(name) for name in (*_THREADS, _PICTURES)}
     os.environ.update(dict.fromkeys(before, "1"))
     try:
         yield
     finally:
         for name, value in before.items():
-            os.environ.pop(name, None) if value is None else os.environ.update({name: value})
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 def _begin(parent: int) -> None:
-    """Ctrl-C is the parent's to handle; a process whose parent was killed ends by itself."""
+    """Begin a process: it leaves Ctrl-C to its parent, and ends by itself where that was killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
 def _end_with(parent: int) -> None:
+    """Wait for the parent's end, and end the process then."""
     while os.getppid() == parent:
-        time.sleep(_LOOK_FOR_PARENT_S)
+        time.sleep(_PARENT_CHECK_S)
     os._exit(1)
 
 
 def _nothing() -> None:
-    """Makes the pool start a process."""
+    """Return nothing: a first task makes the pool start its process."""
 
 
 def _end_children() -> None:
+    """Stop all processes that this one started."""
     for child in multiprocessing.active_children():
         child.terminate()

@@ -1,4 +1,4 @@
-"""cameras.toml and cameras.npz are written whole."""
+"""Writer of cameras.toml and cameras.npz."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from vision.geometry.camera import Cameras
 
 
 def write_cameras(path: Path, cameras: Cameras) -> None:
-    """Writes `path` (TOML) and, beside it with the suffix .npz, the joint covariance.
+    """Write `path` (TOML) and, with the suffix .npz, the joint covariance, each whole.
 
     The covariance goes first, so that a run that dies between the two leaves no TOML pointing at nothing.
     """

@@ -1,11 +1,12 @@
-"""Where the rig is, where session.toml does not say: a first look at some trials' strokes."""
+"""The rig's place, where session.toml does not state it, from the strokes of some trials."""
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import TypeVar
 
 import numpy as np
 
-from bench.base.errors import BadInput
+from bench.base.doubts import refused_as_bad_input
 from bench.base.threads import in_threads
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import Session
@@ -15,52 +16,59 @@ from vision.calibration.hub_turning import FirstRig, first_rig
 from vision.calibration.moving_line import MovingLines, moving_lines
 from vision.calibration.place import Placement
 from vision.geometry.camera import Cameras
-from vision.geometry.refusals import Refused
 
 Item = TypeVar("Item")
 
-# Strokes of more trials say little more: what they share (light, lenses) no average makes smaller.
+# [trials] Strokes of more add little: what they share (light, lenses) no average makes smaller.
 MOST_TRIALS = 6
-_MOST_STROKES, _MOST_FRAMES = 3, 60  # of a trial, of a stroke
-# How far a first look may be off, wide enough that the strokes alone have the last word.
-_SIGMA_RAD, _SIGMA_MM = np.radians(5.0), 5.0
+# [strokes] Of a trial.
+_MOST_STROKES = 3
+# [frames] Of a stroke.
+_MOST_FRAMES = 60
+# [rad] Error of this first place, wide enough that the fit to the strokes decides.
+_SIGMA_RAD = np.radians(5.0)
+# [mm] Error of this first place, likewise.
+_SIGMA_MM = 5.0
 
 
 def spread(items: Sequence[Item], most: int = MOST_TRIALS) -> list[Item]:
-    """At most so many of the items, spread over all of them."""
-    return (
-        [items[k] for k in np.unique(np.linspace(0, len(items) - 1, most).astype(int))]
-        if len(items)
-        else []
-    )
+    """Return at most so many of the items, spread over all of them."""
+    if not len(items):
+        return []
+    chosen = np.unique(np.linspace(0, len(items) - 1, most).astype(int))
+    return [items[k] for k in chosen]
 
 
 def by_first_look() -> Placement:
-    """What a first look is worth."""
+    """Return the placement of a rig that is known by `first_look` alone: no step, and its covariance."""
     return Placement(np.zeros(6), np.diag(np.repeat([_SIGMA_RAD**2, _SIGMA_MM**2], 3)))
 
 
 def first_look(session: Session, cameras: Cameras) -> FirstRig:
-    """The rig in the cameras' frame, by what moves in the pictures. Raises BadInput where nothing turns."""
+    """Find the rig in the cameras' frame, by what moves in the pictures.
+
+    Raises BadInput where nothing turns.
+    """
     trials = spread([trial for trial in session.trials if trial.camera_sources])
-    lines = [
-        one for many in in_threads(lambda trial: _lines(trial, cameras), trials) for one in many
-    ]
-    try:
+    lines: list[MovingLines] = []
+    for of_trial in in_threads(lambda trial: _moving_lines(trial, cameras), trials):
+        lines += of_trial
+    with refused_as_bad_input("session.toml"):
         return first_rig(lines)
-    except Refused as reason:
-        raise BadInput(str(reason), file="session.toml") from None
 
 
-def _lines(trial: Trial, cameras: Cameras) -> list[MovingLines]:
-    """Of each stroke of a trial."""
-    signals, times = read_signals(trial), frame_times(trial)
-    motor = signals.motor_at(times.time_s)
-    strokes = [
-        range(*times.frames_in(signals, s).indices(len(motor))) for s in forward_strokes(signals)
-    ]
-    strokes = [spread(stroke, _MOST_FRAMES) for stroke in spread(strokes, _MOST_STROKES)]
-    frames = read_trial(trial, times, (f for stroke in strokes for f in stroke))
-    return [
-        moving_lines(frames, {f: float(motor[f]) for f in stroke}, cameras) for stroke in strokes
-    ]
+def _moving_lines(trial: Trial, cameras: Cameras) -> list[MovingLines]:
+    """Return the lines that move in each of some strokes of a trial."""
+    signals = read_signals(trial)
+    times = frame_times(trial)
+    motor_rad = signals.motor_at(times.time_s)
+    strokes = []
+    for stroke in spread(forward_strokes(signals), _MOST_STROKES):
+        taken = range(len(times))[times.frames_in(signals, stroke)]
+        strokes.append(spread(taken, _MOST_FRAMES))
+    frames = read_trial(trial, times, chain.from_iterable(strokes))
+    found = []
+    for stroke in strokes:
+        angles = {frame: float(motor_rad[frame]) for frame in stroke}
+        found.append(moving_lines(frames, angles, cameras))
+    return found

@@ -5,12 +5,12 @@ Kept in OUT/calibration with the hash of what it was made from, and made again o
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from bench.base.digests import Digests
+from bench.base.doubts import refused_as_bad_input
 from bench.base.errors import BadInput
 from bench.base.results import (
     SEEING,
@@ -38,19 +38,25 @@ from vision.geometry.reasons import NO_REASON, Reason
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import compose, invert_transform, log_rotation, skew
 
-# Sigmas, px: a camera whose board stands farther elsewhere than both was moved. Set by eye.
-_MOVED_SIGMAS, _MOVED_PX = 5.0, 0.3
-_FEWEST_FOR_MEDIAN, _MOST_FOR_MEDIAN = (
-    5,
-    9,
-)  # trials: in fewer the bar stands before a place too often
+# [sigmas] A camera whose board stands farther elsewhere than this, and than the next, was moved. Set by eye.
+_MOVED_SIGMAS = 5.0
+# [px] Set by eye.
+_MOVED_PX = 0.3
+# [trials] In fewer the bar stands before a place too often.
+_FEWEST_FOR_MEDIAN = 5
+# [trials] More do not change the median.
+_MOST_FOR_MEDIAN = 9
+_EXACT = Placement(np.zeros(6), np.zeros((6, 6)))
 
 
 @dataclass(frozen=True)
 class SessionCalibration:
-    """Cameras (None where the session has no pictures), the scene without whisker and bar by camera (None where there
-    is no such picture), a hash of both, lines that say what they rest on, and where the board on the rig stands in the
-    cameras' frame, (3, 4) mm, None where not told."""
+    """The cameras of a session and the scenes without whisker and bar.
+
+    cameras: None where the session has no pictures. background: the scene by camera, None where
+    there is no such picture. hash: of both. notes: lines on what they rest on. T_rig_board: where
+    the board on the rig stands in the cameras' frame, (3, 4) mm, None where not known.
+    """
 
     cameras: Cameras | None
     background: dict[str, np.ndarray | None]
@@ -59,158 +65,165 @@ class SessionCalibration:
     T_rig_board: np.ndarray | None = None
 
     def with_notes(self, *notes: str) -> "SessionCalibration":
-        """The same with more to say."""
+        """Return the calibration with more notes."""
         return replace(self, notes=(*self.notes, *notes))
 
 
 def calibrate_session(session: Session, out: Path) -> SessionCalibration:
-    """Cameras and backgrounds. Raises BadInput where the session cannot be calibrated, saying what to record."""
-    if not any(trial.camera_sources for trial in session.trials):
+    """Return cameras and backgrounds of a session.
+
+    Raises BadInput where the session cannot be calibrated, saying what to record.
+    """
+    if not session.has_pictures:
         return SessionCalibration(None, {}, hash_of("no pictures"))
-    made = _given(session) if session.cameras_toml else _made(session, out / "calibration")
-    cameras, notes, T_rig_board = made
+    if session.cameras_toml:
+        with refused_as_bad_input("cameras.toml"):
+            cameras = read_cameras(session.cameras_toml)
+        notes = ["cameras as given in cameras.toml"]
+        T_rig_board = session.T_rig_board
+    else:
+        cameras, notes, T_rig_board = _from_boards(session, out / "calibration")
     missing = [name for name in session.camera_names if name not in cameras]
     if missing:
-        raise BadInput(
-            f"has no camera {missing[0]}, which has frames; calibrate it", file="cameras.toml"
-        )
-    background = _backgrounds(session, cameras)
-    content = (
-        [[c, cameras.covariance, cameras.placement] for c in cameras.cameras],
-        list(background.values()),
-    )
-    return SessionCalibration(cameras, background, hash_of(*content), notes, T_rig_board)
+        found = f"has no camera {missing[0]}, which has frames; calibrate it"
+        raise BadInput(found, file="cameras.toml")
+    background = {name: _background(session, name) for name in cameras.names}
+    of_cameras = [[c, cameras.covariance, cameras.placement] for c in cameras.cameras]
+    made = hash_of(of_cameras, list(background.values()))
+    return SessionCalibration(cameras, background, made, tuple(notes), T_rig_board)
 
 
 def at_base(calibration: SessionCalibration, view: Session) -> SessionCalibration:
-    """An array's calibration in the base frame of the whisker whose view this is.
+    """Return an array's calibration in the base frame of the whisker whose view this is.
 
-    As well as the rig frame is known the base's is, and besides as well as the base: both by the sigmas of the view's
-    board (see `by_board`), or, of cameras that were brought along, by the sigmas of the base.
+    As well as the rig frame is known the base's is, and besides as well as the base: both by the
+    sigmas of the view's board (see `by_board`), or, of cameras that were brought along, by the
+    sigmas of the base.
     """
     if calibration.cameras is None:
         return calibration
-    there = _at_base(calibration.cameras, view)
     T_base_board = calibration.T_rig_board
     if T_base_board is not None:
         T_base_board = compose(view.base.T_base_rig, T_base_board)
-    made = hash_of(calibration.hash, view.base)
-    return replace(calibration, cameras=there, T_rig_board=T_base_board, hash=made)
+    return replace(
+        calibration,
+        cameras=_cameras_at_base(calibration.cameras, view),
+        T_rig_board=T_base_board,
+        hash=hash_of(calibration.hash, view.base),
+    )
 
 
-def _at_base(cameras: Cameras, view: Session) -> Cameras:
-    T_rig_base, whole, base = view.base.T_rig_base, view.whole, view.base
-    step = np.append(log_rotation(T_rig_base[:, :3]), T_rig_base[:, 3])
-    if whole.cameras_toml is not None:
+def _cameras_at_base(cameras: Cameras, view: Session) -> Cameras:
+    """Return an array's cameras in the base frame of the whisker whose view this is."""
+    T_rig_base = view.base.T_rig_base
+    if view.whole.cameras_toml is not None:
         before = np.zeros((6, 6)) if cameras.placement is None else cameras.placement
         lever = np.eye(6)
         lever[3:, :3] = -skew(T_rig_base[:, 3])
-        own = lever @ before @ lever.T + np.diag(
-            np.repeat([base.sigma_rad**2, base.sigma_mm**2], 3)
-        )
+        variances = np.repeat([view.base.sigma_rad**2, view.base.sigma_mm**2], 3)
+        after = lever @ before @ lever.T + np.diag(variances)
     else:
-        before = by_board(
-            whole.T_rig_board, whole.T_rig_board_sigma_mm, whole.T_rig_board_sigma_rad
-        ).covariance
-        board = by_board(
-            view.T_rig_board, view.T_rig_board_sigma_mm, view.T_rig_board_sigma_rad
-        ).covariance
-        turned = np.kron(np.eye(2), T_rig_base[:, :3])
-        own = turned @ board @ turned.T
-    return move_rig_frame(cameras, Placement(np.zeros(6), before), Placement(step, own))
+        before = _board_covariance(view.whole)
+        turn = np.kron(np.eye(2), T_rig_base[:, :3])
+        after = turn @ _board_covariance(view) @ turn.T
+    return move_rig_frame(cameras, replace(_EXACT, covariance=before), _step(T_rig_base, after))
 
 
-def _given(session: Session) -> tuple[Cameras, tuple[str, ...], np.ndarray | None]:
-    try:
-        return (
-            read_cameras(session.cameras_toml),
-            ("cameras as given in cameras.toml",),
-            session.T_rig_board,
-        )
-    except Refused as reason:
-        raise BadInput(str(reason), file="cameras.toml") from None
+def _board_covariance(session: Session) -> np.ndarray:
+    """Return the covariance (6, 6) of the rig frame as the board on the rig gives it."""
+    return by_board(
+        session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad
+    ).covariance
 
 
-def _made(session: Session, folder: Path) -> tuple[Cameras, tuple[str, ...], np.ndarray | None]:
-    """Cameras as kept in `folder`, or calibrated there, notes and where the board on the rig stands. What is used is
-    what the file holds, in every run."""
+def _step(T_from_to: np.ndarray, covariance: np.ndarray) -> Placement:
+    """Return the placement that goes from one frame to another, of this covariance (6, 6)."""
+    return Placement(np.append(log_rotation(T_from_to[:, :3]), T_from_to[:, 3]), covariance)
+
+
+def _from_boards(session: Session, folder: Path) -> tuple[Cameras, list[str], np.ndarray | None]:
+    """Return cameras kept in `folder`, or calibrated there, notes and where the rig's board stands.
+
+    The cameras are those that the file holds, in every run.
+    """
     digests = Digests(folder.parent)
-    key, kept = _key(session, digests), read_result(folder / "cameras.json")
+    key = _key(session, digests)
     digests.keep()
+    kept = read_result(folder / "cameras.json")
     if not (kept and kept.get("hash") == key and (folder / "cameras.toml").is_file()):
         views = read_board_views(session)
         made = calibrate_from(session, views)
-        cameras, T_rig_board, first = on_the_rig(
-            session, made.cameras, board_in_world(session, views)
-        )
-        lengths = check_scale(session, cameras)
+        board = board_in_world(session, views)
+        cameras, T_rig_board, note = on_the_rig(session, made.cameras, board)
+        lengths, warnings = check_scale(session, cameras)
         folder.mkdir(parents=True, exist_ok=True)
         write_cameras(folder / "cameras.toml", cameras)
-        notes = [*report_lines(made), *filter(None, [first]), *chain(*lengths)]
+        notes = [*report_lines(made), *([note] if note else []), *lengths, *warnings]
         kept = plain({"hash": key, "notes": notes, "T_rig_board": T_rig_board})
         write_result(folder / "cameras.json", kept)
     T_rig_board = None if kept["T_rig_board"] is None else np.array(kept["T_rig_board"])
-    return read_cameras(folder / "cameras.toml"), tuple(kept["notes"]), T_rig_board
+    return read_cameras(folder / "cameras.toml"), kept["notes"], T_rig_board
 
 
 def on_the_rig(
     session: Session, cameras: Cameras, T_world_board: np.ndarray | None
 ) -> tuple[Cameras, np.ndarray | None, str | None]:
-    """Cameras in the rig frame, T_rig_board (None where there is no such board) and a note, by a first look at the
-    free strokes where session.toml does not say where the rig is."""
+    """Return cameras in the rig frame, T_rig_board (None where there is no such board) and a note.
+
+    Where session.toml does not state where the rig is, the free strokes give it.
+    """
     if session.T_rig_board is not None:
         return cameras, session.T_rig_board, None
     first = first_look(session, cameras)
-    T_world_rig = invert_transform(first.T_rig_world)
-    there = replace(
-        by_first_look(), step=np.append(log_rotation(T_world_rig[:, :3]), T_world_rig[:, 3])
-    )
+    step = _step(invert_transform(first.T_rig_world), by_first_look().covariance)
     strokes = counted(first.strokes, "stroke")
     note = f"T_rig_board is missing: a first look at {strokes} says where whisker and motor are."
     T_rig_board = None if T_world_board is None else compose(first.T_rig_world, T_world_board)
-    return (
-        move_rig_frame(cameras, Placement(np.zeros(6), np.zeros((6, 6))), there),
-        T_rig_board,
-        note,
-    )
+    return move_rig_frame(cameras, _EXACT, step), T_rig_board, note
 
 
 def _key(session: Session, digests: Digests) -> str:
-    """Hash of all that the cameras are made from: boards, their givens, and the trials' frames (the rig board is in
-    them)."""
-    by_strokes = session.T_rig_board is None  # then motor angles count too
-    frames = [
-        p for t in session.trials for p in ([t.folder] if by_strokes else t.camera_sources.values())
-    ]
+    """Return a hash of all that the cameras are made from.
+
+    That is boards, their givens, and the trials' frames, which have the rig board in them.
+    """
+    paths = [session.path / "boards"]
+    for trial in session.trials:
+        # without T_rig_board motor angles count too
+        is_by_strokes = session.T_rig_board is None
+        paths += [trial.folder] if is_by_strokes else trial.camera_sources.values()
     given = [
         session.board,
         session.T_rig_board,
         session.T_rig_board_sigma_mm,
         session.T_rig_board_sigma_rad,
     ]
-    files = hash_of_files([session.path / "boards", *frames], digests.of)
+    files = hash_of_files(paths, digests.of)
     return hash_of(hash_of_code(SEEING), given, session.whisker, files)
 
 
-def _backgrounds(session: Session, cameras: Cameras) -> dict[str, np.ndarray | None]:
-    """The rig picture of each camera, in which neither whisker nor bar stands; without one, the trials' median."""
-    paths = {name: session.rig_pictures.get(name) for name in cameras.names}
-    return {
-        name: _median(session, name) if path is None else rig_picture(path)
-        for name, path in paths.items()
-    }
+def _background(session: Session, camera: str) -> np.ndarray | None:
+    """Return the rig picture of a camera, in which neither whisker nor bar stands.
+
+    Without one it is the trials' median, None of too few trials.
+    """
+    path = session.rig_pictures.get(camera)
+    return _median(session, camera) if path is None else rig_picture(path)
 
 
 def _median(session: Session, camera: str) -> np.ndarray | None:
-    """Median over trials whose bars stand elsewhere, of a frame early and one late in each; None of too few trials."""
-    sources = [
-        trial.camera_sources[camera] for trial in session.trials if camera in trial.camera_sources
-    ]
+    """Return the median picture of a frame early and one late in each of some trials.
+
+    The trials' bars stand in different places. None of too few trials.
+    """
+    sources = [t.camera_sources[camera] for t in session.trials if camera in t.camera_sources]
     if len(sources) < _FEWEST_FOR_MEDIAN:
         return None
-    chosen = np.unique(np.linspace(0, len(sources) - 1, _MOST_FOR_MEDIAN).round().astype(int))
-    frames = (read_frames(sources[k], {0, max(0, frame_count(sources[k]) - 1)}) for k in chosen)
-    pictures = [picture for read in frames for picture in read.values() if picture is not None]
+    pictures: list[np.ndarray] = []
+    for k in np.unique(np.linspace(0, len(sources) - 1, _MOST_FOR_MEDIAN).round().astype(int)):
+        last = max(0, frame_count(sources[k]) - 1)
+        read = read_frames(sources[k], {0, last})
+        pictures += [picture for picture in read.values() if picture is not None]
     return np.median(pictures, axis=0).astype(np.float32) if pictures else None
 
 
@@ -219,27 +232,31 @@ def moved_cameras(
     calibration: SessionCalibration,
     frames: Mapping[str, Mapping[int, np.ndarray]],
 ) -> dict[str, str]:
-    """Cameras that stand elsewhere in the first or last of these frames than when calibrated: name to what was seen.
+    """Return the cameras that moved since they were calibrated: name to a line on what is seen.
 
-    A camera that does not see the rig board is not checked.
+    A camera is compared in the first and the last of these frames; one that does not see the rig
+    board is not checked.
     """
-    moved = {}
+    moved: dict[str, str] = {}
     if session.board is None or calibration.T_rig_board is None:
         return moved
     for name, pictures in frames.items():
-        if pictures and calibration.background.get(name) is not None:
-            doubts = (
-                _moved(session, calibration, name, pictures[k])
-                for k in (min(pictures), max(pictures))
-            )
-            doubt = next(filter(None, doubts), "")
-            moved |= {name: doubt} if doubt else {}
+        if not pictures or calibration.background.get(name) is None:
+            continue
+        for k in (min(pictures), max(pictures)):
+            reason = _move_of(session, calibration, name, pictures[k])
+            if reason:
+                moved[name] = reason
+                break
     return moved
 
 
-def _moved(session: Session, calibration: SessionCalibration, name: str, grey) -> Reason:
+def _move_of(
+    session: Session, calibration: SessionCalibration, name: str, grey: np.ndarray
+) -> Reason:
     """Return what to say of a camera that moved; nothing where it did not."""
-    camera, T = calibration.cameras[name], calibration.T_rig_board
+    camera = calibration.cameras[name]
+    T = calibration.T_rig_board
     points = session.board.corners_mm @ T[:, :3].T + T[:, 3]
     corners = refine_corners(grey, camera.project(points), np.arange(len(points)), session.board)
     try:
@@ -248,5 +265,5 @@ def _moved(session: Session, calibration: SessionCalibration, name: str, grey) -
         return NO_REASON
     if shift_px <= max(_MOVED_PX, _MOVED_SIGMAS * sigma_px):
         return NO_REASON
-    off = f"the rig board is {shift_px:.2f} ± {sigma_px:.2f} px off"
-    return Reason("camera_moved", f"camera {name} moved and was left out: {off}")
+    shift = f"the rig board is {shift_px:.2f} ± {sigma_px:.2f} px off"
+    return Reason("camera_moved", f"camera {name} moved and was left out: {shift}")

@@ -11,7 +11,7 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.gauges.certificate import Certificate, page
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import FeltStroke
 from bench.gauges.gauges_file import write_gauges
 from bench.gauges.weights import scale_by_weights
 from bench.session.session import Session
@@ -96,7 +96,7 @@ def calibrate_gauges(
     )
 
 
-def zeros(strokes: tuple[Stroke, ...]) -> tuple[np.ndarray, np.ndarray]:
+def zeros(strokes: tuple[FeltStroke, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Mean zero (2,) of the free strokes and the scatter of one, in volts."""
     levels = np.array(
         [touch.offset for touch in (stroke.touch() for stroke in strokes) if not touch.status]

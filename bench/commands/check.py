@@ -11,7 +11,7 @@ from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.threads import in_threads
-from bench.gauges.felt import Stroke, strokes_of
+from bench.gauges.felt import FeltStroke, strokes_of
 from bench.gauges.fit import RECORD, in_two_directions
 from bench.gauges.gauge_faults import check_alive
 from bench.gauges.gauges_file import given_gauges
@@ -90,7 +90,7 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
         )
 
 
-def _pushes(strokes: Sequence[Stroke]) -> Iterator[np.ndarray]:
+def _pushes(strokes: Sequence[FeltStroke]) -> Iterator[np.ndarray]:
     """Volts (2,) that each stroke's push gives at the usual angle, where it gets there."""
     for stroke in strokes:
         touch = stroke.touch()
@@ -129,7 +129,7 @@ def _check_boards(session: Session, name: str) -> Iterator[str]:
         yield f"boards/rig/{picture.name}: {found}: focus on the whisker, or let the camera rest"
 
 
-def _of_gauges(signals: Signals, strokes: Sequence[Stroke]) -> Iterator[str]:
+def _of_gauges(signals: Signals, strokes: Sequence[FeltStroke]) -> Iterator[str]:
     """Channels that stand still or are at their rail."""
     try:
         check_alive(strokes)
@@ -143,7 +143,9 @@ def _of_gauges(signals: Signals, strokes: Sequence[Stroke]) -> Iterator[str]:
             yield f"channel {name} is at its rail for {share}: raise the amplifier's range"
 
 
-def _of_strokes(signals: Signals, strokes: Sequence[Stroke], times: FrameTimes) -> Iterator[str]:
+def _of_strokes(
+    signals: Signals, strokes: Sequence[FeltStroke], times: FrameTimes
+) -> Iterator[str]:
     """Whether each stroke has a free part, a touch that is felt, and reaches the usual pushing angle."""
     yield from dropped(
         times, [times.frames_in(signals, where) for where in forward_strokes(signals)]

@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from bench.analyses.alphas import seen_friction
 from bench.base.settings import Settings
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import FeltStroke
 from bench.records.trial_result import EstimateRow, SeenWhisk, TrialResult
 from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, forward_strokes, read_signals
@@ -133,7 +133,7 @@ def _of_whisk(
     time_s, motor = (
         values[where][:: converter.every] for values in (signals.time_s, signals.motor_rad)
     )
-    stroke = Stroke(time_s, motor, own, own)
+    stroke = FeltStroke(time_s, motor, own, own)
     rate_Hz = signals.rate_Hz / converter.every
     for push_deg in PUSHES_DEG:
         end_s = _time_at(stroke, seen.touch_rad.value + math.radians(push_deg)) + converter.delay_s
@@ -149,7 +149,7 @@ def _of_whisk(
         yield from _answers(task, readout, cut, theta_rad, seen, about)
 
 
-def _time_at(stroke: Stroke, motor_rad: float) -> float:
+def _time_at(stroke: FeltStroke, motor_rad: float) -> float:
     """When the motor is there; NaN where it does not come so far."""
     if not stroke.motor_rad[0] <= motor_rad <= stroke.motor_rad.max():
         return math.nan
@@ -163,7 +163,12 @@ def _theta_rad(push_rad: float, speed_rad_s: float) -> float:
 
 
 def _answers(
-    task: Task, readout: Readout, stroke: Stroke, theta_rad: float, seen: SeenWhisk, about: tuple
+    task: Task,
+    readout: Readout,
+    stroke: FeltStroke,
+    theta_rad: float,
+    seen: SeenWhisk,
+    about: tuple,
 ) -> Iterator[Answer]:
     settings, beam = task.unit.settings, task.unit.session.whisker.beam
     asked = estimators(settings.estimators)

@@ -1,4 +1,4 @@
-"""The certificate of a gauge calibration, in the manner of ISO 376: what was found with U95, and what was not."""
+"""The certificate of a gauge calibration, in the manner of ISO 376: results with U95, and what was not measured."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -6,101 +6,107 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import FeltStroke
 from bench.gauges.gauge_readings import Pairs
-from bench.gauges.matrix import GaugeMatrix, Gauges
+from bench.gauges.matrix import GaugeCalibration, GaugeMatrix
 from bench.gauges.reversal import Reversal, in_percent
-from bench.gauges.weights import Scale
+from bench.gauges.weights import NewtonScale
 from bench.session.whisker import Whisker
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-U95 = 1.96  # half an interval of 95 % of the normal distribution, in sigmas
+# [sigmas] Half an interval of 95 % of the normal distribution.
+U95 = 1.96
 NOT_MEASURED = "not measured"
 _MOST_NAMED = 6  # trials or whisks; more names than that have no room on the page
 _LEAST_POINTS = 4  # for a curvature beside a line, with something left over
+_MOMENTS = ("m_y", "m_z")
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """All that the certificate states. pairs and strokes: what the coefficients rest on; drift_rate (2,): V/s.
+    """The certificate of a gauge calibration.
 
-    roll_sigma_deg: how well the follicle's turn is known, the least well of the trials.
+    pairs and strokes: what the coefficients rest on; drift_rate (2,): V/s. roll_sigma_deg: how well
+    the follicle's turn is known, the least well of the trials.
     """
 
     session: str
     whisker: Whisker
-    gauges: Gauges
+    gauges: GaugeCalibration
     pairs: tuple[Pairs, ...]
-    strokes: tuple[Stroke, ...]
+    strokes: tuple[FeltStroke, ...]
     drift_rate: np.ndarray
     reversals: tuple[Reversal, ...] = ()
-    scale: Scale | None = None
+    scale: NewtonScale | None = None
     roll_sigma_deg: float = 0.0
 
-    def in_newtons_of(self, scale: Scale | None) -> "Certificate":
-        """The same, all moments in the newtons of the weights; as it is where there were none."""
+    def in_newtons_of(self, scale: NewtonScale | None) -> "Certificate":
+        """Return the certificate with all moments in the newtons of the weights; as it is without."""
         if scale is None:
             return self
-        f = scale.factor
-        pairs = tuple(
-            replace(p, moments=f * p.moments, moments_covariance=f**2 * p.moments_covariance)
-            for p in self.pairs
-        )
-        return replace(self, gauges=self.gauges.scaled(f), pairs=pairs, scale=scale)
+        pairs = []
+        for p in self.pairs:
+            covariance = scale.factor**2 * p.moments_covariance
+            moments = scale.factor * p.moments
+            pairs.append(replace(p, moments=moments, moments_covariance=covariance))
+        gauges = self.gauges.scaled(scale.factor)
+        return replace(self, gauges=gauges, pairs=tuple(pairs), scale=scale)
 
     @property
     def stiffness(self) -> tuple[float, float]:
-        """C, N·mm², in whose unit the coefficients are, and its sigma."""
+        """Return C, N·mm², in whose unit the coefficients are, and its sigma."""
         if self.scale is None:
             return self.whisker.C_Nmm2, self.whisker.C_sigma_Nmm2
-        return self.scale.of(self.whisker.C_Nmm2)
+        return self.scale.corrected(self.whisker.C_Nmm2)
 
     @property
     def moments(self) -> np.ndarray:
-        """Moments (n, 2) from the deflection seen, in the follicle's axes."""
+        """Return the moments (n, 2) from the deflection seen, in the follicle's axes."""
         return np.concatenate([p.moments for p in self.pairs])
 
     @property
     def residuals(self) -> np.ndarray:
-        """Moments from the gauges less those seen, (n, 2)."""
+        """Return the moments from the gauges less those seen, (n, 2)."""
         return np.concatenate([p.residuals(self.gauges.all.matrix) for p in self.pairs])
 
     def nonlinearity_percent(self, axis: int) -> tuple[float, float] | None:
-        """Largest departure of a parabola through the origin from its best line, % of full scale, with U95.
+        """Return the largest departure of a parabola from its best line, % of full scale, with U95.
 
-        Over the pairs in which this axis takes most of the moment; None where these are too few.
+        The parabola goes through the origin, over the pairs in which this axis takes most of the
+        moment; None where these are too few.
         """
         driven = np.abs(self.moments[:, axis]) > np.abs(self.moments[:, 1 - axis])
         if driven.sum() < _LEAST_POINTS:
             return None
-        share = self.moments[driven, axis] / self.gauges.full_scale_Nmm[axis]
-        off = self.residuals[driven, axis] / self.gauges.full_scale_Nmm[axis]
+        full_scale = self.gauges.full_scale_Nmm[axis]
+        share = self.moments[driven, axis] / full_scale
+        residual = self.residuals[driven, axis] / full_scale
         design = np.stack([share, share * np.abs(share)], axis=1)
-        coefficients, squares, *_ = np.linalg.lstsq(design, off, rcond=None)
-        scatter = np.sqrt(squares[0] / (len(off) - 2)) if len(squares) else 0.0
+        coefficients, squares, *_ = np.linalg.lstsq(design, residual, rcond=None)
+        scatter = np.sqrt(squares[0] / (len(residual) - 2)) if len(squares) else 0.0
         sigma = scatter * np.sqrt(np.linalg.inv(design.T @ design)[1, 1])
-        return 25.0 * abs(
-            coefficients[1]
-        ), 25.0 * U95 * sigma  # a parabola b s² is b/4 from its chord at half scale
+        # a parabola b s² is b/4 from its chord at half scale
+        return 25.0 * abs(coefficients[1]), 25.0 * U95 * sigma
 
     def repeatability_percent(self) -> float | None:
-        """Standard deviation, in %, of the gain over whisks in one position of the follicle; None without a second."""
+        """Return the scatter of the gain over whisks in one position of the follicle, % (one SD).
+
+        None without a second whisk in any position.
+        """
         gains: dict[float, list[float]] = {}
         for p in self.pairs:
             felt = p.volts @ self.gauges.all.matrix.T
-            gains.setdefault(p.roll_deg, []).append(
-                float(np.sum(felt * p.moments) / np.sum(p.moments**2))
-            )
-        groups = [np.array(values) for values in gains.values() if len(values) > 1]
-        if not groups:
-            return None
-        squares = sum(((g - g.mean()) ** 2).sum() for g in groups)
-        return 100.0 * float(np.sqrt(squares / sum(len(g) - 1 for g in groups)))
+            gain = float(np.sum(felt * p.moments) / np.sum(p.moments**2))
+            gains.setdefault(p.roll_deg, []).append(gain)
+        squares = sum(np.var(group) * len(group) for group in gains.values())
+        freedom = sum(len(group) - 1 for group in gains.values())
+        return 100.0 * float(np.sqrt(squares / freedom)) if freedom else None
 
     def lines(self) -> list[str]:
-        """The certificate as plain lines."""
+        """Return the certificate as plain lines."""
         return [
             f"Gauge calibration of the session {self.session!r}",
             "[m_y, m_z] in the follicle's axes = matrix · ([y_V, z_V] − zero of each free stroke); U95 = 1.96 sigma",
@@ -112,14 +118,16 @@ class Certificate:
         ]
 
     def _coefficients(self) -> Iterator[str]:
+        """Yield the lines on the coefficients."""
+        fitted = self.gauges.all
         yield "Coefficients, N·mm/V, one weighted regression over all touching frames:"
-        yield from matrix_lines(self.gauges.all)
-        answer = np.linalg.inv(self.gauges.all.matrix)
+        yield from matrix_lines(fitted)
         yield "Sensitivities, V per N·mm (rows: channel y, z; columns: m_y, m_z):"
-        yield from ("  " + "   ".join(f"{value:+.5f}" for value in row) for row in answer)
-        diagonal = np.diag(self.gauges.all.matrix)
-        cross = 100.0 * self.gauges.all.matrix / diagonal
-        u95 = 100.0 * U95 * self.gauges.all.sigma / diagonal
+        for row in np.linalg.inv(fitted.matrix):
+            yield "  " + "   ".join(f"{value:+.5f}" for value in row)
+        diagonal = np.diag(fitted.matrix)
+        cross = 100.0 * fitted.matrix / diagonal
+        u95 = 100.0 * U95 * fitted.sigma / diagonal
         yield (
             f"Cross-talk, % of the column's diagonal: y into m_z {cross[1, 0]:+.2f} ± {u95[1, 0]:.2f}, "
             f"z into m_y {cross[0, 1]:+.2f} ± {u95[0, 1]:.2f}"
@@ -132,45 +140,46 @@ class Certificate:
         yield ""
 
     def _quality(self) -> Iterator[str]:
-        for axis, name in enumerate(("m_y", "m_z")):
+        """Yield the lines on departures from a line: curvature, scatter, hysteresis, drift."""
+        for axis, name in enumerate(_MOMENTS):
             bow = self.nonlinearity_percent(axis)
-            said = NOT_MEASURED if bow is None else f"{bow[0]:.2f} ± {bow[1]:.2f} % of full scale"
-            yield f"Non-linearity of {name}: {said}"
-        again = self.repeatability_percent()
-        yield "Repeatability of the gain: " + (
-            f"{NOT_MEASURED} (no second whisk in one position)"
-            if again is None
-            else f"{again:.2f} % (one SD)"
-        )
-        hysteresis, returned = in_percent(
-            self.reversals, self.gauges.all.matrix, self.gauges.full_scale_Nmm
-        )
+            found = NOT_MEASURED if bow is None else f"{bow[0]:.2f} ± {bow[1]:.2f} % of full scale"
+            yield f"Non-linearity of {name}: {found}"
+        scatter = self.repeatability_percent()
+        found = f"{NOT_MEASURED} (no second whisk in one position)"
+        if scatter is not None:
+            found = f"{scatter:.2f} % (one SD)"
+        yield f"Repeatability of the gain: {found}"
+        full_scale = self.gauges.full_scale_Nmm
+        hysteresis, returned = in_percent(self.reversals, self.gauges.all.matrix, full_scale)
         yield f"Hysteresis, friction along the rod included: {_of_full_scale(hysteresis)}"
         yield f"Zero return: {_of_full_scale(returned)}"
         rms = np.sqrt(np.mean(self.residuals**2, axis=0))
-        share = 100.0 * rms / self.gauges.full_scale_Nmm
+        share = 100.0 * rms / full_scale
         yield f"Residuals, RMS: m_y {rms[0]:.4f} N·mm ({share[0]:.2f} %), m_z {rms[1]:.4f} N·mm ({share[1]:.2f} %)"
         drift = 1e3 * self.drift_rate
         yield f"Drift allowed for, from the free strokes: y {drift[0]:.2g}, z {drift[1]:.2g} mV/s"
         yield ""
 
     def _basis(self) -> Iterator[str]:
+        """Yield the lines on what the coefficients rest on."""
         most = self.gauges.full_scale_Nmm
+        without = self.gauges.without
         yield f"Range of validity: |m_y| up to {most[0]:.2f} N·mm, |m_z| up to {most[1]:.2f} N·mm (full scale)"
         yield f"Points used: {len(self.moments)} frames of {len(self.pairs)} whisks"
         yield f"Saturated samples left out: {sum(stroke.saturated for stroke in self.strokes)}"
-        missing = [name for name, rest in self.gauges.without.items() if rest is None]
-        yield f"Trials used: {len(self.gauges.without)}, each judged by coefficients fitted without it"
+        yield f"Trials used: {len(without)}, each judged by coefficients fitted without it"
+        missing = [name for name, rest in without.items() if rest is None]
         if missing:
-            yield f"Not known without one of these, so that they are not judged: {_named(missing)}"
+            named = ", ".join(missing) if len(missing) <= _MOST_NAMED else f"{len(missing)} of them"
+            yield f"Not known without one of these, so that they are not judged: {named}"
         yield ""
 
     def _assumed(self) -> Iterator[str]:
-        turn = (
-            f"± {U95 * self.roll_sigma_deg:.2f}°, which is in U95"
-            if self.roll_sigma_deg
-            else "taken as exact"
-        )
+        """Yield the lines on what was assumed and not measured."""
+        turn = "taken as exact"
+        if self.roll_sigma_deg:
+            turn = f"± {U95 * self.roll_sigma_deg:.2f}°, which is in U95"
         yield f"The follicle's turn: {turn}; 1° of it would look like 1.75 points of cross-talk."
         if self.scale is not None:
             yield from self._by_weights(self.scale)
@@ -181,11 +190,11 @@ class Certificate:
         yield "estimate: an error of E moves these newtons, never a distance. The rod is held by one"
         yield "force; friction along it is anything from 0 to 0.4 of the normal force. Temperature was not recorded."
 
-    def _by_weights(self, scale: Scale) -> Iterator[str]:
-        """The absolute scale, and the stiffness that it amounts to."""
-        C, C_sigma = scale.of(self.whisker.C_Nmm2)
+    def _by_weights(self, scale: NewtonScale) -> Iterator[str]:
+        """Yield the lines on the absolute scale, and the stiffness that it amounts to."""
+        C, C_sigma = scale.corrected(self.whisker.C_Nmm2)
         by_diameter = 4.0 * self.whisker.diameter_sigma_mm / self.whisker.diameter_mm
-        E, E_sigma = scale.of(self.whisker.implied_modulus_GPa, by_diameter)
+        E, E_sigma = scale.corrected(self.whisker.implied_modulus_GPa, by_diameter)
         yield f"Absolute scale, by weights ({', '.join(scale.trials)}): {scale.factor:.4f} ± {U95 * scale.sigma:.4f} of"
         yield "what the stated stiffness gives; all coefficients are in these newtons. So C = 3EI ="
         yield f"{C:.1f} ± {U95 * C_sigma:.1f} N·mm², E = {E:.2f} ± {U95 * E_sigma:.2f} GPa. C cancels between"
@@ -193,57 +202,47 @@ class Certificate:
         yield "friction along it is anything from 0 to 0.4 of the normal force."
 
 
-def _named(names: Sequence[str]) -> str:
-    return ", ".join(names) if len(names) <= _MOST_NAMED else f"{len(names)} of them"
-
-
-def _of_full_scale(percent) -> str:
-    """Largest values (2,) of m_y and m_z."""
+def _of_full_scale(percent: np.ndarray | None) -> str:
+    """Return the largest values (2,) of m_y and m_z in words."""
     if percent is None:
         return f"{NOT_MEASURED} (no back stroke)"
     return f"m_y {percent[0]:.2f} %, m_z {percent[1]:.2f} % of full scale at most"
 
 
 def matrix_lines(made: GaugeMatrix | None) -> Iterator[str]:
-    """Rows of coefficients with U95, where they have one."""
-    for row, sigmas in zip(made.matrix, made.sigma) if made is not None else ():
+    """Yield rows of coefficients with U95, where they have one; nothing for None."""
+    if made is None:
+        return
+    for row, sigmas in zip(made.matrix, made.sigma):
         cells = [f"{v:+9.4f}" + (f" ± {U95 * s:.4f}" if s > 0 else "") for v, s in zip(row, sigmas)]
         yield "  " + "   ".join(cells)
 
 
 def page(certificate: Certificate) -> "Figure":
-    """The certificate as one page: its lines, and the residuals over the moments."""
+    """Draw the certificate as one page: its lines, and the residuals over the moments."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.27, 11.69))
-    figure.text(
-        0.08,
-        0.965,
-        "\n".join(certificate.lines()),
-        va="top",
-        fontsize=7.6,
-        family="monospace",
-        linespacing=1.4,
-    )
-    grid = figure.subplots(
-        1, 2, gridspec_kw={"left": 0.1, "right": 0.96, "bottom": 0.06, "top": 0.34, "wspace": 0.3}
-    )
-    for axis, (axes, name) in enumerate(zip(grid, ("m_y", "m_z"))):
-        _draw_residuals(axes, certificate.pairs, certificate.gauges.all.matrix, axis)
-        axes.set(xlabel=f"{name} seen  [N·mm]", ylabel="gauge less seen  [N·mm]")
-        axes.axhline(0.0, color="0.6", lw=0.7)
+    text = "\n".join(certificate.lines())
+    figure.text(0.08, 0.965, text, va="top", fontsize=7.6, family="monospace", linespacing=1.4)
+    margins = {"left": 0.1, "right": 0.96, "bottom": 0.06, "top": 0.34, "wspace": 0.3}
+    grid = figure.subplots(1, 2, gridspec_kw=margins)
+    for axis, name in enumerate(_MOMENTS):
+        _draw_residuals(grid[axis], certificate.pairs, certificate.gauges.all.matrix, axis)
+        grid[axis].set(xlabel=f"{name} seen  [N·mm]", ylabel="gauge less seen  [N·mm]")
+        grid[axis].axhline(0.0, color="0.6", lw=0.7)
     if len(certificate.pairs) <= _MOST_NAMED:
         grid[0].legend(fontsize=6)
     return figure
 
 
-def _draw_residuals(axes, pairs: Sequence[Pairs], matrix, axis: int) -> None:
+def _draw_residuals(axes: "Axes", pairs: Sequence[Pairs], matrix: np.ndarray, axis: int) -> None:
+    """Draw the residuals of one axis over its moments, a colour a whisk."""
     for p in pairs:
-        off, sigma = p.residuals(matrix)[:, axis], p.moments_sigma[:, axis]
         axes.errorbar(
             p.moments[:, axis],
-            off,
-            sigma,
+            p.residuals(matrix)[:, axis],
+            p.moments_sigma[:, axis],
             fmt="o",
             ms=3,
             lw=0.8,

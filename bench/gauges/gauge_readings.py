@@ -1,4 +1,4 @@
-"""What a whisk of a gauge trial tells: moments known from the deflection seen, and the volts read beside them.
+"""Readings of a gauge trial's whisk: moments known from the deflection seen, and the volts beside them.
 
 Where a session has no pictures the deflection is that of a nominal bar held still, from the angle of felt touch.
 """
@@ -10,36 +10,40 @@ import numpy as np
 
 from bench.gauges.clamped_rod import moment_at_clamp
 from bench.gauges.drift import allow_drift
-from bench.gauges.felt import Stroke, gauge_delay, late_by
+from bench.gauges.felt import FeltStroke, gauge_delay, late_by
 from bench.gauges.matrix import to_follicle
 from bench.records.trial_result import SeenWhisk
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from estimator.beam import rigidity_at
-from estimator.signal import FeltTouch
+from estimator.signal import FeltTouch, MomentAt
 from vision.truth.value import Value
 
 # A rod that bends is drawn towards its clamp over the bar, and friction pulls it back. How rough the bar is, is not
 # known at this stage: from nothing to 0.4, all values alike. At 3° this is 0.2 % of the moment, ± 0.1 %.
-_FRICTION, _FRICTION_SIGMA = 0.2, 0.4 / np.sqrt(12.0)
-_LEAST_THETA_RAD = np.radians(0.3)  # rad: nearer to touch its error counts too much. Set by eye
-NOMINAL_SHARE = 0.01  # a distance set by a ruler
-# °: up to here the moments of a nominal distance are those of no slip to half a percent (1 − cos)
+_FRICTION = 0.2
+# Standard deviation of that uniform distribution.
+_FRICTION_SIGMA = 0.4 / np.sqrt(12.0)
+# [rad] Nearer to touch its error counts too much. Set by eye.
+_LEAST_THETA_RAD = np.radians(0.3)
+# A distance set by a ruler: one sigma over the distance.
+NOMINAL_SHARE = 0.01
+# [°] Up to here the moments of a nominal distance are those of no slip to half a percent (1 − cos).
 _NOMINAL_SLOPE_DEG = 5.0
-# rad: a stroke's usual range, where no frame tells the angles
+# [rad] A stroke's usual range, where no frame has the angles.
 _NOMINAL_THETA_RAD = np.radians(np.linspace(1.0, 4.0, 6))
-_MOST_HALF_WINDOW_RAD = np.radians(
-    0.5
-)  # rad: as the estimators average over (estimator.signal.HALF_WINDOW_RAD)
+# [rad] As the estimators average over (estimator.signal.HALF_WINDOW_RAD).
+_MOST_HALF_WINDOW_RAD = np.radians(0.5)
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """n pairs of one whisk. moments, volts (n, 2), in the follicle's axes and above the free stroke; their covariances
-    (2n, 2n), of y and z pair by pair, with everything that the pairs share but scale_sigma, their common share of error
-    (that of the distance); theta_rad (n,).
+    """n pairs of moments and volts of one whisk.
 
-    paper_moment, paper_volts (2,): the one pair that the paper takes, (2) at one pushing angle; NaN where not reached.
+    moments, volts (n, 2), in the follicle's axes and above the free stroke; their covariances (2n,
+    2n), of y and z pair by pair, with everything that the pairs share but scale_sigma, their common
+    share of error (that of the distance); theta_rad (n,). paper_moment, paper_volts (2,): the one
+    pair that the paper takes, (2) at one pushing angle; NaN where not reached.
     """
 
     trial: str
@@ -55,19 +59,18 @@ class Pairs:
     scale_sigma: float = 0.0
 
     def __len__(self) -> int:
+        """Return the number of pairs."""
         return len(self.theta_rad)
 
     def residuals(self, matrix: np.ndarray) -> np.ndarray:
-        """Moments (n, 2) by these coefficients (2, 2) less those known, N·mm."""
+        """Return the moments (n, 2) by these coefficients (2, 2) less those known, N·mm."""
         return self.volts @ matrix.T - self.moments
 
     @property
     def moments_sigma(self) -> np.ndarray:
-        """One standard deviation (n, 2) of the known moments, N·mm."""
-        return np.hypot(
-            np.sqrt(np.diag(self.moments_covariance)).reshape(-1, 2),
-            self.scale_sigma * self.moments,
-        )
+        """Return one standard deviation (n, 2) of the known moments, N·mm."""
+        own = np.sqrt(np.diag(self.moments_covariance)).reshape(-1, 2)
+        return np.hypot(own, self.scale_sigma * self.moments)
 
 
 ON_TIME = Value(0.0, 0.0)  # rad
@@ -75,10 +78,11 @@ ON_TIME = Value(0.0, 0.0)  # rad
 
 @dataclass(frozen=True)
 class ReferenceMoments:
-    """Moments (n, 2) in the hub's axes at motor angles motor_rad (n,), with covariance (2n, 2n); touch and distance.
+    """Known moments (n, 2) in the hub's axes, with covariance (2n, 2n); touch and distance.
 
-    scale_sigma: share by which all moments may be wrong together; not in the covariance. late_rad: by what the motor is
-    ahead of the volts of a moment.
+    motor_rad (n,): motor angles of the moments. scale_sigma: share by which all moments may be
+    wrong together; not in the covariance. late_rad: by what the motor is ahead of the volts of a
+    moment.
     """
 
     touch_rad: float
@@ -94,105 +98,120 @@ class ReferenceMoments:
 def pairs_of(
     trial: Trial,
     seen: SeenWhisk,
-    stroke: Stroke,
+    stroke: FeltStroke,
     drift_rate: np.ndarray,
     whisker: Whisker,
     theta_rad: float,
 ) -> Pairs | None:
-    """Pairs of one whisk, or None where it has none. theta_rad: the paper's pushing angle."""
+    """Return the pairs of one whisk, or None where it has none. theta_rad: the paper's pushing angle."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
     if touch.status:
         return None
-    is_seen = seen.deflection is not None
-    reference = (
-        reference_from_pictures(seen, whisker)
-        if is_seen
-        else reference_from_nominal(trial, touch, whisker)
-    )
+    if seen.deflection is None:
+        # it counts from felt touch, which is as late as the volts
+        reference = reference_from_nominal(trial, touch, whisker)
+    else:
+        reference = reference_from_pictures(seen, whisker)
+        if reference is not None:
+            late = late_by(gauge_delay(trial.gauge_filter_Hz), stroke.speed_rad_s)
+            reference = replace(reference, late_rad=late)
     if reference is None:
         return None
-    if is_seen:  # a nominal one counts from felt touch, which is as late as the volts
-        late = late_by(gauge_delay(trial.gauge_filter_Hz), stroke.speed_rad_s)
-        reference = replace(reference, late_rad=late)
     rigid_Nmm = whisker.beam.moment_Nmm(theta_rad, reference.d_x_mm)
     return _paired(trial, seen.whisk, reference, stroke, touch, rigid_Nmm, theta_rad)
 
 
 def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMoments | None:
-    """Moments of the frames in which the whisker touches, from the exact rod through the contact that was seen.
+    """Return the moments of the frames in which the whisker touches; None where there are none.
 
-    The deflection is from the unbent whisker as the free stroke shows it, so a sag or a set of the wire is no moment.
+    They are those of the exact rod through the contact that was seen. The deflection is from the
+    unbent whisker as the free stroke has it, so a sag or a set of the wire is no moment.
     """
     d = seen.deflection
     good = d.theta_rad > _LEAST_THETA_RAD
     if not good.any():
         return None
     across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
-    along, d_x = d.along_mm[good], seen.d_x_mm
-    share = _drawn_share(across, along, d.slip_mm[good])
+    along = d.along_mm[good]
+    share = _share_along_rod(across, along, d.slip_mm[good])
     moments, by_friction = _with_friction(along, across, share, whisker)
-    stiffness = np.repeat(moments_per_mm(moments, across), 2)
+    Nmm_per_mm = np.repeat(moments_per_mm(moments, across), 2)
     rows = np.repeat(good, 2)
-    covariance = d.covariance[np.ix_(rows, rows)] * np.outer(stiffness, stiffness)
-    covariance = covariance + _shared(_FRICTION_SIGMA * by_friction)
-    by_distance = 2.0 * d_x.sigma / d_x.value
-    theta, motor = d.theta_rad[good], d.motor_rad[good]
+    covariance = d.covariance[np.ix_(rows, rows)] * np.outer(Nmm_per_mm, Nmm_per_mm)
     return ReferenceMoments(
-        seen.touch_rad.value, d_x.value, motor, theta, moments, covariance, by_distance
+        seen.touch_rad.value,
+        seen.d_x_mm.value,
+        d.motor_rad[good],
+        d.theta_rad[good],
+        moments,
+        covariance + _common_cause(_FRICTION_SIGMA * by_friction),
+        scale_sigma=2.0 * seen.d_x_mm.sigma / seen.d_x_mm.value,
     )
 
 
-def _drawn_share(across, along, slip) -> np.ndarray:
-    """Share (n,) of the sliding that goes along the rod: the arc's excess over its chord, 0.6 w²/x, beside the slip."""
+def _share_along_rod(across: np.ndarray, along: np.ndarray, slip: np.ndarray) -> np.ndarray:
+    """Return the share (n,) of the sliding that goes along the rod.
+
+    That is the arc's excess over its chord, 0.6 w²/x, beside the slip across.
+    """
     drawn = 0.6 * np.sum(across**2, axis=1) / along
     return drawn / np.hypot(drawn, slip)
 
 
-def _with_friction(along, across, share, whisker: Whisker) -> tuple[np.ndarray, np.ndarray]:
-    """Moments (n, 2) in the hub's axes, and their change per unit of the friction coefficient."""
+def _with_friction(
+    along: np.ndarray, across: np.ndarray, share: np.ndarray, whisker: Whisker
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return moments (n, 2) in the hub's axes, and their change per unit of the friction coefficient."""
     size = np.linalg.norm(across, axis=1)
 
     def rigidity(arc):
         return rigidity_at(arc, whisker.EI_Nmm2, whisker.length_mm, whisker.beam.taper)
 
-    def moment(friction: float):
-        return moment_at_clamp(along, size, rigidity, -friction * share)
+    def direction_times(moment: np.ndarray) -> np.ndarray:
+        return (moment / size)[:, None] * across
 
-    rough, smooth = moment(_FRICTION), moment(0.0)
-    return (rough / size)[:, None] * across, ((rough - smooth) / _FRICTION / size)[:, None] * across
+    rough = moment_at_clamp(along, size, rigidity, -_FRICTION * share)
+    smooth = moment_at_clamp(along, size, rigidity)
+    return direction_times(rough), direction_times((rough - smooth) / _FRICTION)
 
 
 def moments_per_mm(moments: np.ndarray, across: np.ndarray) -> np.ndarray:
-    """Stiffness (n,) of each pair: moment over deflection."""
+    """Return the stiffness (n,) of each pair: moment over deflection."""
     return np.linalg.norm(moments, axis=1) / np.linalg.norm(across, axis=1)
 
 
-def _shared(effect) -> np.ndarray:
-    """Covariance (2n, 2n) of one cause that moves all moments (n, 2) together by `effect`."""
+def _common_cause(effect: np.ndarray) -> np.ndarray:
+    """Return the covariance (2n, 2n) of one cause that moves all moments (n, 2) by `effect`."""
     return np.outer(effect.ravel(), effect.ravel())
 
 
 def reference_from_nominal(
     trial: Trial, touch: FeltTouch, whisker: Whisker
 ) -> ReferenceMoments | None:
-    """Moments of a bar at right angles to the push, at the distance that a ruler gave; None where there is none.
+    """Return the moments of a bar at right angles to the push, at the distance that a ruler gave.
 
-    The bent whisker leans by half the pushing angle where it touches, and rolls that far over the bar towards its base.
+    The bent whisker leans by half the pushing angle where it touches, and rolls that far over the
+    bar towards its base. None where there is no such distance.
     """
     if trial.d_x_mm is None or abs(trial.beta_deg or 0.0) > _NOMINAL_SLOPE_DEG:
         return None
     theta = _NOMINAL_THETA_RAD
     radii_mm = 0.5 * trial.bar_diameter_mm + float(whisker.wire.radius_mm(trial.d_x_mm))
-    x, y = trial.d_x_mm - radii_mm * np.sin(theta / 2), radii_mm * (1.0 - np.cos(theta / 2))
-    along, across = x * np.cos(theta) + y * np.sin(theta), x * np.sin(theta) - y * np.cos(theta)
-    deflection = np.stack([np.zeros_like(across), across], axis=1)
-    moments, by_friction = _with_friction(along, deflection, np.ones_like(theta), whisker)
-    by_distance = trial.d_x_sigma_mm / trial.d_x_mm or NOMINAL_SHARE
+    x = trial.d_x_mm - radii_mm * np.sin(theta / 2)
+    y = radii_mm * (1.0 - np.cos(theta / 2))
+    along = x * np.cos(theta) + y * np.sin(theta)
+    across = np.zeros((len(theta), 2))
+    across[:, 1] = x * np.sin(theta) - y * np.cos(theta)
+    moments, by_friction = _with_friction(along, across, np.ones_like(theta), whisker)
     by_touch = touch.sigma_rad * moments / theta[:, None]
-    covariance = _shared(by_touch) + _shared(_FRICTION_SIGMA * by_friction)
-    motor = touch.motor_rad + theta
     return ReferenceMoments(
-        touch.motor_rad, trial.d_x_mm, motor, theta, moments, covariance, by_distance
+        touch.motor_rad,
+        trial.d_x_mm,
+        touch.motor_rad + theta,
+        theta,
+        moments,
+        _common_cause(by_touch) + _common_cause(_FRICTION_SIGMA * by_friction),
+        scale_sigma=trial.d_x_sigma_mm / trial.d_x_mm or NOMINAL_SHARE,
     )
 
 
@@ -200,63 +219,85 @@ def _paired(
     trial: Trial,
     whisk: int,
     reference: ReferenceMoments,
-    stroke: Stroke,
+    stroke: FeltStroke,
     touch: FeltTouch,
     rigid_Nmm: float,
     theta_rad: float,
 ) -> Pairs | None:
-    """Volts at the same motor angles, but as late as the gauges' filter has them, each from a short line through the
-    samples around it. None where the wanted pushing angle, as seen, is reached before a touch is felt."""
+    """Read the volts at the moments' motor angles, but as late as the gauges' filter has them.
+
+    Each is from a short line through the samples around it. None where the wanted pushing angle, as
+    seen, is reached before a touch is felt. rigid_Nmm: the paper's moment at that angle.
+    """
     late = reference.late_rad
-    theta = reference.motor_rad + late.value - touch.motor_rad
-    half = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(reference.motor_rad), initial=np.inf))
-    after = theta > 0.5 * _LEAST_THETA_RAD
-    read = [
-        stroke.at(t, touch, half_window_rad=half) if ok else None for t, ok in zip(theta, after)
-    ]
-    kept = np.array([r is not None and not r.status for r in read], dtype=bool)
+    felt_theta = reference.motor_rad + late.value - touch.motor_rad  # (n,)
     wanted = reference.touch_rad + theta_rad + late.value - touch.motor_rad
-    if not kept.any() or wanted <= 0.0:
+    kept, readings = _readings(stroke, touch, felt_theta, reference.motor_rad)
+    if not readings or wanted <= 0.0:
         return None
-    read, rows = [r for r, keep in zip(read, kept) if keep], np.repeat(kept, 2)
-    moments, covariance = _seen_from_follicle(
+    theta = felt_theta[kept]
+    rows = (2 * kept[:, None] + np.arange(2)).ravel()
+    moments, covariance = _in_follicle(
         trial, reference.moments[kept], reference.covariance[np.ix_(rows, rows)]
     )
-    at = stroke.at(wanted, touch)
+    volts = np.array([reading.values for reading in readings])
+    by_delay = volts / theta[:, None] * late.sigma
     return Pairs(
-        trial.name,
-        whisk,
-        trial.follicle_roll_deg,
-        reference.theta_rad[kept],
-        moments,
-        covariance,
-        volts := np.array([r.values for r in read]),
-        _volts_covariance(read, theta[kept], touch)
-        + _shared(volts / theta[kept, None] * late.sigma),
-        to_follicle(np.radians(trial.follicle_roll_deg)) @ [0.0, rigid_Nmm],
-        at.values,
-        reference.scale_sigma,
+        trial=trial.name,
+        whisk=whisk,
+        roll_deg=trial.follicle_roll_deg,
+        theta_rad=reference.theta_rad[kept],
+        moments=moments,
+        moments_covariance=covariance,
+        volts=volts,
+        volts_covariance=_volts_covariance(readings, theta, touch) + _common_cause(by_delay),
+        paper_moment=to_follicle(np.radians(trial.follicle_roll_deg)) @ [0.0, rigid_Nmm],
+        paper_volts=stroke.at(wanted, touch).values,
+        scale_sigma=reference.scale_sigma,
     )
 
 
-def _seen_from_follicle(trial: Trial, moments, covariance) -> tuple[np.ndarray, np.ndarray]:
-    """Moments (n, 2) and covariance in the axes of the turned follicle, with the turn's own sigma."""
+def _readings(
+    stroke: FeltStroke, touch: FeltTouch, theta: np.ndarray, motor_rad: np.ndarray
+) -> tuple[np.ndarray, list[MomentAt]]:
+    """Return the indices (k,) of pushing angles (n,) that can be read, and the readings there.
+
+    The lines of neighbouring angles do not overlap.
+    """
+    half_rad = min(_MOST_HALF_WINDOW_RAD, 0.5 * np.min(np.diff(motor_rad), initial=np.inf))
+    kept = []
+    readings = []
+    for k in np.flatnonzero(theta > 0.5 * _LEAST_THETA_RAD):
+        reading = stroke.at(theta[k], touch, half_window_rad=half_rad)
+        if not reading.status:
+            kept.append(k)
+            readings.append(reading)
+    return np.array(kept, dtype=int), readings
+
+
+def _in_follicle(
+    trial: Trial, moments: np.ndarray, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return moments (n, 2) and covariance (2n, 2n) in the axes of the turned follicle.
+
+    The covariance has the turn's own sigma.
+    """
     roll = np.radians(trial.follicle_roll_deg)
     turn = np.kron(np.eye(len(moments)), to_follicle(roll))
-    by_roll = moments @ to_follicle(roll + np.pi / 2).T * np.radians(trial.follicle_roll_sigma_deg)
-    return moments @ to_follicle(roll).T, turn @ covariance @ turn.T + _shared(by_roll)
+    per_radian = moments @ to_follicle(roll + np.pi / 2).T
+    by_roll = per_radian * np.radians(trial.follicle_roll_sigma_deg)
+    return moments @ to_follicle(roll).T, turn @ covariance @ turn.T + _common_cause(by_roll)
 
 
-def _volts_covariance(read: Sequence, theta, touch: FeltTouch) -> np.ndarray:
-    """(2n, 2n): each reading's own, and the zero that all share."""
-    n = len(read)
-    covariance = np.zeros((2 * n, 2 * n))
+def _volts_covariance(
+    readings: Sequence[MomentAt], theta: np.ndarray, touch: FeltTouch
+) -> np.ndarray:
+    """Return the covariance (2n, 2n) of readings: each one's own, and the zero that all share."""
+    n = len(readings)
+    angles = touch.motor_rad + theta
+    blocks = np.empty((n, 2, n, 2))
     for i in range(n):
         for j in range(n):
-            both = touch.level.covariance_between(
-                touch.motor_rad + theta[i], touch.motor_rad + theta[j]
-            )
-            covariance[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = (
-                read[i].covariance if i == j else both
-            )
-    return covariance
+            blocks[i, :, j] = touch.level.covariance_between(angles[i], angles[j])
+        blocks[i, :, i] = readings[i].covariance
+    return blocks.reshape(2 * n, 2 * n)

@@ -1,5 +1,7 @@
 """gauges.toml and [gauges]: coefficients brought along, or made by `calibrate gauges` and copied here."""
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,22 +11,21 @@ import tomli_w
 
 from bench.base.atomic import write_whole
 from bench.base.doubts import Doubts
-from bench.gauges.matrix import FROM_FILE, FROM_MANIFEST, GaugeMatrix, Gauges
+from bench.gauges.matrix import FROM_FILE, FROM_MANIFEST, GaugeCalibration, GaugeMatrix
 from bench.session import manifest
 from bench.session.session import Session
 from bench.session.strict_toml import Keys, as_keys, read_toml
 
 Rows4 = Annotated[
-    list[Annotated[list[float], msgspec.Meta(min_length=4, max_length=4)]],
+    list[manifest.Row4],
     msgspec.Meta(min_length=4, max_length=4),
 ]
-Matrix = Annotated[list[manifest.Pair], msgspec.Meta(min_length=2, max_length=2)]
 
 
-class WithoutKeys(Keys, kw_only=True):
+class WithoutKeys(Keys, kw_only=True, forbid_unknown_fields=True):
     """Coefficients without one trial; no matrix where the others do not fix it."""
 
-    matrix_Nmm_per_V: Matrix | None = None
+    matrix_Nmm_per_V: manifest.Matrix | None = None
     covariance: Rows4 | None = None
 
 
@@ -45,93 +46,88 @@ class FileKeys(manifest.GaugeKeys, kw_only=True):
     without: dict[str, WithoutKeys] | None = None
 
 
-def given_gauges(session: Session) -> Gauges | None:
-    """Coefficients in gauges.toml, which has the last word, or in [gauges]; None where there are none."""
+def given_gauges(session: Session) -> GaugeCalibration | None:
+    """Return the coefficients in gauges.toml, else in [gauges]; None where there are none."""
     if session.gauges_toml is not None:
         return read_gauges(session.gauges_toml, session.whisker.C_Nmm2)
-    if session.gauges is None:
-        return None
     given = session.gauges
-    return Gauges(_matrix(given.matrix_Nmm_per_V, given.matrix_sigma_Nmm_per_V), FROM_MANIFEST)
+    if given is None:
+        return None
+    covariance = np.diag(given.matrix_sigma_Nmm_per_V.ravel() ** 2)
+    return GaugeCalibration(GaugeMatrix(given.matrix_Nmm_per_V, covariance), FROM_MANIFEST)
 
 
-def read_gauges(path: Path, C_Nmm2: float) -> Gauges:
-    """Coefficients with their covariance, scaled to the session's C where they rest on another: so C cancels in d_x.
+def read_gauges(path: Path, C_Nmm2: float) -> GaugeCalibration:
+    """Read coefficients with their covariance, scaled to the session's C where they rest on another.
 
-    Raises BadInput where the file is not as the session format says.
+    C so cancels in d_x. Raises BadInput where the file is not as the session format says.
     """
     keys = as_keys(read_toml(path, path.name), FileKeys, path.name, Doubts())
-    scale = 1.0 if keys.C_Nmm2 is None else C_Nmm2 / keys.C_Nmm2
-    without = {
-        name: _scaled(w.matrix_Nmm_per_V, w.covariance, scale)
-        for name, w in (keys.without or {}).items()
-    }
-    sigma = keys.matrix_sigma_Nmm_per_V
-    given = _matrix(keys.matrix_Nmm_per_V, sigma)
-    covariance = given.covariance if keys.covariance is None else np.array(keys.covariance)
+    covariance = keys.covariance
+    if covariance is None and keys.matrix_sigma_Nmm_per_V is not None:
+        covariance = np.diag(np.ravel(keys.matrix_sigma_Nmm_per_V) ** 2)
+    without = {}
+    for name, rest in (keys.without or {}).items():
+        without[name] = _matrix(rest.matrix_Nmm_per_V, rest.covariance)
     factors = keys.one_factor_Nmm_per_V
-    return Gauges(
-        _scaled(keys.matrix_Nmm_per_V, covariance, scale),
+    full_scale = keys.full_scale_Nmm
+    gauges = GaugeCalibration(
+        _matrix(keys.matrix_Nmm_per_V, covariance),
         FROM_FILE,
         without,
-        None if factors is None else GaugeMatrix(scale * np.diag(factors)),
-        full_scale_Nmm=None
-        if keys.full_scale_Nmm is None
-        else scale * np.array(keys.full_scale_Nmm),
-        notes=()
-        if abs(scale - 1.0) < 1e-9
-        else (f"scaled by {scale:.6g} from the C that they were made with",),
+        one_factor=None if factors is None else GaugeMatrix(np.diag(factors)),
+        full_scale_Nmm=None if full_scale is None else np.array(full_scale),
     )
+    scale = 1.0 if keys.C_Nmm2 is None else C_Nmm2 / keys.C_Nmm2
+    if abs(scale - 1.0) >= 1e-9:
+        note = f"scaled by {scale:.6g} from the C that they were made with"
+        gauges = replace(gauges, notes=(note,))
+    return gauges.scaled(scale)
 
 
 def write_gauges(
     path: Path,
-    gauges: Gauges,
+    gauges: GaugeCalibration,
     zero: tuple[np.ndarray, np.ndarray],
     C: tuple[float, float],
     header: list[str],
 ) -> None:
     """Write gauges.toml whole; `header` goes before it as comments.
 
-    zero: volts (2,) and their sigma (2,); C: the stiffness in whose unit the coefficients are, with its sigma.
+    zero: volts (2,) and their sigma (2,); C: the stiffness in whose unit the coefficients are, with
+    its sigma.
     """
     document = {
-        "offset_V": _listed(zero[0]),
-        "offset_sigma_V": _listed(zero[1]),
-        "matrix_Nmm_per_V": _listed(gauges.all.matrix),
-        "matrix_sigma_Nmm_per_V": _listed(gauges.all.sigma),
-        "covariance": _listed(gauges.all.covariance),
-        "C_Nmm2": float(C[0]),
-        "C_sigma_Nmm2": float(C[1]),
-        "full_scale_Nmm": _listed(gauges.full_scale_Nmm),
+        "offset_V": zero[0],
+        "offset_sigma_V": zero[1],
+        "matrix_Nmm_per_V": gauges.all.matrix,
+        "matrix_sigma_Nmm_per_V": gauges.all.sigma,
+        "covariance": gauges.all.covariance,
+        "C_Nmm2": C[0],
+        "C_sigma_Nmm2": C[1],
+        "full_scale_Nmm": gauges.full_scale_Nmm,
     }
     if gauges.one_factor is not None and np.isfinite(gauges.one_factor.matrix).all():
-        document["one_factor_Nmm_per_V"] = _listed(np.diag(gauges.one_factor.matrix))
-    document["without"] = {name: _without(matrix) for name, matrix in gauges.without.items()}
-    write_whole(
-        path,
-        "".join(f"# {line}".rstrip() + "\n" for line in header) + "\n" + tomli_w.dumps(document),
-    )
+        document["one_factor_Nmm_per_V"] = np.diag(gauges.one_factor.matrix)
+    without = {}
+    for name, rest in gauges.without.items():
+        without[name] = {}
+        if rest is not None:
+            tables = {"matrix_Nmm_per_V": rest.matrix, "covariance": rest.covariance}
+            without[name] = _as_lists(tables)
+    comments = "".join(f"# {line}".rstrip() + "\n" for line in header)
+    tables = _as_lists(document) | {"without": without}
+    write_whole(path, f"{comments}\n{tomli_w.dumps(tables)}")
 
 
-def _without(matrix: GaugeMatrix | None) -> dict:
-    if matrix is None:
-        return {}
-    return {"matrix_Nmm_per_V": _listed(matrix.matrix), "covariance": _listed(matrix.covariance)}
+def _as_lists(arrays: Mapping[str, np.ndarray | float]) -> dict[str, list | float]:
+    """Return arrays and numbers by name as TOML has them."""
+    return {name: np.asarray(value, dtype=float).tolist() for name, value in arrays.items()}
 
 
-def _listed(values) -> list:
-    return np.asarray(values, dtype=float).tolist()
-
-
-def _scaled(matrix, covariance, scale: float) -> GaugeMatrix | None:
-    if matrix is None:
+def _matrix(coefficients: list | None, covariance: list | np.ndarray | None) -> GaugeMatrix | None:
+    """Return coefficients with their covariance, exact where it is not given; None without them."""
+    if coefficients is None:
         return None
-    covariance = np.zeros((4, 4)) if covariance is None else np.asarray(covariance, dtype=float)
-    return GaugeMatrix(scale * np.asarray(matrix, dtype=float), scale**2 * covariance)
-
-
-def _matrix(values, sigmas) -> GaugeMatrix:
-    """Sigmas that are not given are taken as exact."""
-    sigmas = np.zeros((2, 2)) if sigmas is None else np.asarray(sigmas, dtype=float)
-    return GaugeMatrix(np.asarray(values, dtype=float), np.diag(np.ravel(sigmas) ** 2))
+    known = np.zeros((4, 4)) if covariance is None else np.array(covariance, dtype=float)
+    return GaugeMatrix(np.array(coefficients, dtype=float), known)

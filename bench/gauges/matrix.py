@@ -1,17 +1,16 @@
 """Gauge coefficients: volts above the zero of each free stroke to moments, and which trial may take which."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-_BEYOND = 1.05  # of the largest calibrated moment; up to there a line is still the same line
+# Of the largest calibrated moment; up to there a line is still the same line.
+_BEYOND = 1.05
 
-FROM_FILE, FROM_MANIFEST, FROM_TRIALS = (
-    "gauges.toml",
-    "session.toml [gauges]",
-    "the session's gauge trials",
-)
+FROM_FILE = "gauges.toml"
+FROM_MANIFEST = "session.toml [gauges]"
+FROM_TRIALS = "the session's gauge trials"
 FROM_ALL = "all trials that can serve (--gauges-from-all)"
 
 
@@ -27,37 +26,39 @@ class GaugeMatrix:
 
     @property
     def sigma(self) -> np.ndarray:
-        """One standard deviation of each coefficient, (2, 2)."""
+        """Return one standard deviation of each coefficient, (2, 2)."""
         return np.sqrt(np.diag(self.covariance)).reshape(2, 2)
 
     def scaled(self, factor: float) -> "GaugeMatrix":
-        """In another unit of stiffness."""
+        """Return the matrix in another unit of stiffness."""
         return GaugeMatrix(factor * self.matrix, factor**2 * self.covariance)
 
     def changes_at(self, volts: np.ndarray) -> np.ndarray:
-        """(4, 2): what the moment of `volts` (2,) changes by at one sigma of each of four independent causes.
+        """Return the changes (4, 2) of the moment of `volts` (2,), each at one sigma of its cause.
 
-        The causes are the rows of the covariance's symmetric root, and so the same for all `volts`.
+        The four independent causes are the rows of the covariance's symmetric root, and so the same
+        for all `volts`.
         """
         variances, axes = np.linalg.eigh(self.covariance)
         root = axes * np.sqrt(np.maximum(variances, 0.0)) @ axes.T
         return root @ np.kron(np.eye(2), np.asarray(volts)[None, :]).T
 
     def covariance_at(self, volts: np.ndarray) -> np.ndarray:
-        """Covariance (2, 2) that the coefficients' uncertainty gives the moment of `volts` (2,)."""
+        """Return the covariance (2, 2) that the coefficients' gives to the moment of `volts` (2,)."""
         changes = self.changes_at(volts)
         return changes.T @ changes
 
 
 @dataclass(frozen=True)
-class Gauges:
-    """A session's gauges.
+class GaugeCalibration:
+    """The gauges of a session: coefficients, and which trial may be evaluated with which.
 
-    all: fitted to every gauge trial, or given. without: for each trial that took part in the fit, the coefficients
-    fitted without it, None where the rest cannot fix them: no whisk is judged by gauges fitted to it. one_factor: the
-    paper's way, one factor a channel and no cross-talk, NaN where a channel was not measured; at_angle: four
-    coefficients from the same readings at one angle. full_scale_Nmm: the largest moment (2,) in the follicle's axes
-    that the coefficients rest on; None where it is not known. notes: lines for the user.
+    all: fitted to every gauge trial, or given. without: for each trial that took part in the fit,
+    the coefficients fitted without it, None where the rest cannot fix them: no whisk is evaluated
+    with gauges fitted to it. one_factor: the paper's way, one factor a channel and no cross-talk,
+    NaN where a channel was not measured; at_angle: four coefficients from the same readings at one
+    angle. full_scale_Nmm: the largest moment (2,) in the follicle's axes that the coefficients rest
+    on; None where it is not known. notes: lines for the user.
     """
 
     all: GaugeMatrix
@@ -70,41 +71,45 @@ class Gauges:
 
     @property
     def of_wire(self) -> bool:
-        """Whether their newtons are those of this wire's bending, and go with its C."""
+        """Return whether their newtons are those of this wire's bending, and go with its C."""
         return self.source in (FROM_TRIALS, FROM_ALL)
 
-    def scaled(self, factor: float) -> "Gauges":
-        """The same gauges in another unit of stiffness: everything in N·mm times `factor`."""
-        without = {name: matrix and matrix.scaled(factor) for name, matrix in self.without.items()}
-        one, four = (
-            matrix and matrix.scaled(factor) for matrix in (self.one_factor, self.at_angle)
+    def scaled(self, factor: float) -> "GaugeCalibration":
+        """Return the gauges in another unit of stiffness: everything in N·mm times `factor`."""
+        full_scale = self.full_scale_Nmm
+        return replace(
+            self,
+            all=self.all.scaled(factor),
+            without={
+                name: matrix and matrix.scaled(factor) for name, matrix in self.without.items()
+            },
+            one_factor=self.one_factor and self.one_factor.scaled(factor),
+            at_angle=self.at_angle and self.at_angle.scaled(factor),
+            full_scale_Nmm=None if full_scale is None else factor * full_scale,
         )
-        most = None if self.full_scale_Nmm is None else factor * self.full_scale_Nmm
-        return Gauges(self.all.scaled(factor), self.source, without, one, four, most, self.notes)
 
     def for_trial(self, name: str) -> GaugeMatrix | None:
-        """The coefficients that this trial may be judged by; None where there are none."""
+        """Return the coefficients that this trial may be evaluated with; None where there are none."""
         return self.without.get(name, self.all)
 
     def beyond(self, moments_Nmm: np.ndarray) -> str:
-        """What to say of moments (2,) in the follicle's axes that exceed the calibrated range; '' within."""
+        """Return a line on moments (2,) in the follicle's axes beyond the calibrated range, or ''."""
         if self.full_scale_Nmm is None:
             return ""
-        over = np.abs(moments_Nmm) > _BEYOND * self.full_scale_Nmm
-        worst = "; ".join(
-            f"{name} of {value:.2f} N·mm is beyond the {most:.2f} N·mm that the gauges were calibrated to"
-            for name, value, most, is_over in zip(
-                ("m_y", "m_z"), moments_Nmm, self.full_scale_Nmm, over
-            )
-            if is_over
-        )
-        return worst
+        lines = []
+        for name, value, most in zip(("m_y", "m_z"), moments_Nmm, self.full_scale_Nmm):
+            if abs(value) > _BEYOND * most:
+                limit = f"the {most:.2f} N·mm that the gauges were calibrated to"
+                lines.append(f"{name} of {value:.2f} N·mm is beyond {limit}")
+        return "; ".join(lines)
 
 
 def to_follicle(roll_rad: float) -> np.ndarray:
-    """(2, 2): components (m_y, m_z) in the hub's axes to those in a follicle turned about +x.
+    """Return the matrix (2, 2) from (m_y, m_z) in the hub's axes to those of a follicle turned about +x.
 
-    At 90° the follicle's y axis points along rig z and its z axis along rig −y: channel y senses m_z, channel z −m_y.
+    At 90° the follicle's y axis points along rig z and its z axis along rig −y: channel y senses
+    m_z, channel z −m_y.
     """
-    c, s = np.cos(roll_rad), np.sin(roll_rad)
+    c = np.cos(roll_rad)
+    s = np.sin(roll_rad)
     return np.array([[c, s], [-s, c]])

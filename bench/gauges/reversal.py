@@ -1,4 +1,4 @@
-"""What the way back tells of the gauges: hysteresis and the return to zero, where a back stroke was recorded."""
+"""Hysteresis of the gauges and the return to zero, from the way back, where a back stroke was recorded."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,22 +6,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.base.settings import Settings
-from bench.gauges.felt import Stroke, strokes_of
-from bench.session.signals import Signals, forward_strokes
+from bench.gauges.felt import FeltStroke, strokes_of
+from bench.session.signals import Signals, forward_strokes, stroke_ends
 from bench.session.strokes import without_spikes
 from bench.session.trial import Trial
 
-_GUARD_RAD = np.radians(0.2)  # rad before felt touch, beyond what that is uncertain by. Set by eye
-_LEAST_SAMPLES = 20  # of a mean or a way back: fewer tell no level beyond the noise. Set by eye
-# between a tenth and nine tenths of the push: the largest of so many is the hysteresis
+# [rad] Before felt touch, beyond what that is uncertain by. Set by eye.
+_GUARD_RAD = np.radians(0.2)
+# [samples] Of a mean or a way back: fewer have no level beyond the noise. Set by eye.
+_LEAST_SAMPLES = 20
+# [angles] Between a tenth and nine tenths of the push: the largest of so many is the hysteresis.
 _ANGLES = 15
-_HALF_WINDOW_RAD = np.radians(0.15)  # rad: a line is straight over twice that. Set by eye
+# [rad] A line is straight over twice that. Set by eye.
+_HALF_WINDOW_RAD = np.radians(0.15)
 
 
 @dataclass(frozen=True)
 class Reversal:
-    """One whisk there and back. difference (k, 2): volts back less forward, at the same motor angles, from 1/10 to 9/10
-    of the push; zero_return (2,): level after less level before; NaN where the motor did not come back so far."""
+    """One whisk there and back.
+
+    difference (k, 2): volts back less forward, at the same motor angles, from 1/10 to 9/10 of the
+    push; zero_return (2,): level after less level before; NaN where the motor did not come back so
+    far.
+    """
 
     trial: str
     difference: np.ndarray
@@ -29,20 +36,21 @@ class Reversal:
 
 
 def reversals(trial: Trial, signals: Signals, settings: Settings) -> list[Reversal]:
-    """A Reversal for each whisk whose way back was recorded."""
-    places = forward_strokes(signals)
-    ends = [*(place.start for place in places[1:]), len(signals.motor_rad)]
-    strokes = strokes_of(signals, trial, settings, level=False)
+    """Return a Reversal for each whisk whose way back was recorded."""
+    found = []
     motor, _ = without_spikes(signals.motor_rad)
-    channels = np.stack([signals.y, signals.z], axis=1)
-    of_whisks = [
-        _reversal(trial.name, stroke, motor[place.stop : end], channels[place.stop : end])
-        for stroke, place, end in zip(strokes, places, ends)
-    ]
-    return [one for one in of_whisks if one is not None]
+    strokes = strokes_of(signals, trial, settings, level=False)
+    places = zip(forward_strokes(signals), stroke_ends(signals))
+    for stroke, (place, end) in zip(strokes, places):
+        back = slice(place.stop, end)
+        found.append(_reversal(trial.name, stroke, motor[back], signals.channels[back]))
+    return [each for each in found if each is not None]
 
 
-def _reversal(name: str, stroke: Stroke, motor, channels) -> Reversal | None:
+def _reversal(
+    name: str, stroke: FeltStroke, motor: np.ndarray, channels: np.ndarray
+) -> Reversal | None:
+    """Compare a stroke with its way back, motor (b,) and channels (b, 2); None without one."""
     touch = stroke.touch()
     if touch.status or len(motor) < _LEAST_SAMPLES:
         return None
@@ -50,41 +58,39 @@ def _reversal(name: str, stroke: Stroke, motor, channels) -> Reversal | None:
     if motor.min() > touch.motor_rad + 0.1 * push:
         return None
     angles = touch.motor_rad + push * np.linspace(0.1, 0.9, _ANGLES)
-    there, back = (
-        _means(m, c, angles) for m, c in ((stroke.motor_rad, stroke.channels), (motor, channels))
-    )
+    forward = _volts_at(stroke.motor_rad, stroke.channels, angles)
+    back = _volts_at(motor, channels, angles)
     free = motor < touch.motor_rad - _GUARD_RAD
-    after = (
-        np.nanmean(channels[free], axis=0) if free.sum() >= _LEAST_SAMPLES else np.full(2, np.nan)
-    )
-    return Reversal(name, back - there, after - touch.offset)
+    level_after = np.full(2, np.nan)
+    if free.sum() >= _LEAST_SAMPLES:
+        level_after = np.nanmean(channels[free], axis=0)
+    return Reversal(name, back - forward, level_after - touch.offset)
 
 
-def _means(motor, channels, angles) -> np.ndarray:
-    """Channels (k, 2) at motor angles: a line through the samples around each."""
-    near = (np.abs(motor - angle) < _HALF_WINDOW_RAD for angle in angles)
+def _volts_at(motor: np.ndarray, channels: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Fit channels (k, 2) at motor angles (k,): a line through the samples around each.
+
+    NaN where there are too few.
+    """
     good = np.isfinite(channels).all(axis=1)
-    return np.array(
-        [_line_at(motor[n & good] - angle, channels[n & good]) for n, angle in zip(near, angles)]
-    )
-
-
-def _line_at(motor, channels) -> np.ndarray:
-    """The line's value (2,) at motor = 0; NaN where there is none."""
-    if len(motor) < 3 or np.ptp(motor) == 0.0:
-        return np.full(2, np.nan)
-    return np.polyfit(motor, channels, 1)[-1]
+    volts = np.full((len(angles), 2), np.nan)
+    for k, angle in enumerate(angles):
+        near = good & (np.abs(motor - angle) < _HALF_WINDOW_RAD)
+        if near.sum() >= 3 and np.ptp(motor[near]) > 0.0:
+            volts[k] = np.polyfit(motor[near] - angle, channels[near], 1)[-1]
+    return volts
 
 
 def in_percent(
     reversals: Sequence[Reversal], matrix: np.ndarray, full_scale_Nmm: np.ndarray
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Largest hysteresis (2,) and largest return error (2,) of m_y, m_z in % of full scale; None where not measured."""
+    """Return the largest hysteresis (2,) and return error (2,) of m_y, m_z in % of full scale.
+
+    None where not measured.
+    """
+    differences = [np.nanmax(np.abs(each.difference @ matrix.T), axis=0) for each in reversals]
+    returns = [np.abs(matrix @ each.zero_return) for each in reversals]
+    returns = [each for each in returns if np.isfinite(each).all()]
     scale = 100.0 / np.asarray(full_scale_Nmm)
-    differences = [np.nanmax(np.abs(one.difference @ matrix.T), axis=0) for one in reversals]
-    returns = [
-        np.abs(matrix @ one.zero_return) for one in reversals if np.isfinite(one.zero_return).all()
-    ]
-    return tuple(
-        np.max(values, axis=0) * scale if values else None for values in (differences, returns)
-    )
+    hysteresis = np.max(differences, axis=0) * scale if differences else None
+    return hysteresis, np.max(returns, axis=0) * scale if returns else None

@@ -9,7 +9,10 @@ STATIC, KINETIC = "static", "kinetic"
 
 @dataclass(frozen=True)
 class Angle:
-    """One friction angle, rad: kind "static" or "kinetic", at which pushing angle, and its own sigma (not β's)."""
+    """One friction angle.
+
+    kind: STATIC or KINETIC. theta_rad: the pushing angle. sigma_rad: its own, without β's.
+    """
 
     kind: str
     theta_rad: float
@@ -19,24 +22,28 @@ class Angle:
 
 @dataclass(frozen=True)
 class Phases:
-    """Of one whisk: how many rests and jumps its record shows, and the angles at their ends."""
+    """The rests and jumps of one whisk, how many, and the friction angles at their ends."""
 
     rests: int
     jumps: int
     angles: tuple[Angle, ...]
 
     def mean(self, kind: str) -> tuple[float, float]:
-        """Weighted mean of the angles of one kind and its sigma from their scatter, rad; NaN without two of them."""
-        chosen = [a for a in self.angles if a.kind == kind]
-        if len(chosen) < 2:
+        """Return the weighted mean of the angles of one kind, rad, and its sigma from their scatter.
+
+        NaN without two of them.
+        """
+        chosen = [angle for angle in self.angles if angle.kind == kind]
+        count = len(chosen)
+        if count < 2:
             return float("nan"), float("nan")
-        values, sigmas = np.array([(a.alpha_rad, a.sigma_rad) for a in chosen]).T
-        weights = sigmas**-2.0 / np.sum(sigmas**-2.0)
+        values = np.array([angle.alpha_rad for angle in chosen])
+        information = np.array([angle.sigma_rad for angle in chosen]) ** -2.0
+        weights = information / np.sum(information)
         mean = float(weights @ values)
-        scatter = np.sqrt(
-            len(values) / (len(values) - 1) * np.sum(weights**2 * (values - mean) ** 2)
-        )
-        return mean, float(max(scatter, np.sum(sigmas**-2.0) ** -0.5))
+        squares = np.sum(weights**2 * (values - mean) ** 2)
+        scatter = np.sqrt(count / (count - 1) * squares)
+        return mean, float(max(scatter, np.sum(information) ** -0.5))
 
 
 NO_PHASES = Phases(0, 0, ())

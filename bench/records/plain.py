@@ -22,9 +22,12 @@ WHERE_THERE = {"where_there": True}  # of a field that has no key where it is No
 
 
 def to_plain(value: object) -> Any:
-    """A record, or a list or mapping of records, as plain values."""
+    """Return a record, or a list or mapping of records, as plain values."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {key: part for f in fields(value) for key, part in _keys(f, getattr(value, f.name))}
+        table = {}
+        for field in fields(value):
+            table |= _keys(field, getattr(value, field.name))
+        return table
     if isinstance(value, Mapping):
         return {str(key): to_plain(item) for key, item in value.items()}
     return [to_plain(item) for item in value] if isinstance(value, (list, tuple)) else plain(value)
@@ -35,21 +38,20 @@ def codes_name(name: str) -> str:
     return f"{name}_codes"
 
 
-def _keys(field: Field, value: object) -> list[tuple[str, Any]]:
+def _keys(field: Field, value: object) -> dict[str, Any]:
+    """Return the keys of a field with their plain values."""
+    name = field.name
     if field.type is Reason:
-        return [
-            (field.name, str(value)),
-            (codes_name(field.name), [list(part) for part in as_reason(value).parts]),
-        ]
+        return {name: str(value), codes_name(name): to_plain(as_reason(value).parts)}
     if isinstance(value, Value):
-        return [(field.name, plain(value.value)), (sigma_name(field.name), plain(value.sigma))]
-    return (
-        [] if value is None and field.metadata == WHERE_THERE else [(field.name, to_plain(value))]
-    )
+        return {name: plain(value.value), sigma_name(name): plain(value.sigma)}
+    if value is None and field.metadata == WHERE_THERE:
+        return {}
+    return {name: to_plain(value)}
 
 
 def from_plain(kind: type[Record], value: Any) -> Record:
-    """A record of this kind. Raises ValueError where it is not one: of an older version, or damaged."""
+    """Return the record of this kind. Raise ValueError where it is of an older version, or damaged."""
     try:
         return _read(kind, value)
     except (TypeError, AttributeError) as problem:
@@ -57,22 +59,19 @@ def from_plain(kind: type[Record], value: Any) -> Record:
 
 
 def _read(kind: Any, value: Any) -> Any:
-    """A plain value as its annotation has it; fields of other types stay as they are."""
+    """Return a plain value as its annotation has it; fields of other types stay as they are."""
     if isinstance(kind, UnionType):
-        return (
-            None
-            if value is None
-            else _read(next(k for k in get_args(kind) if k is not NoneType), value)
-        )
+        inner = next(each for each in get_args(kind) if each is not NoneType)
+        return None if value is None else _read(inner, value)
     if kind is float:
         return NAN if value is None else float(value)
     if kind is np.ndarray:
         return _array(value)
     if is_dataclass(kind):
-        hints = _hints(kind)
-        return kind(
-            **{f.name: part for f in fields(kind) for part in _field(kind, f, hints[f.name], value)}
-        )
+        given = {}
+        for field in fields(kind):
+            given |= _field(kind, field, value)
+        return kind(**given)
     if get_origin(kind) is tuple:
         return tuple(_read(get_args(kind)[0], item) for item in value)
     if get_origin(kind) is dict:
@@ -80,19 +79,23 @@ def _read(kind: Any, value: Any) -> Any:
     return value
 
 
-def _field(kind: type, field: Field, hint: Any, table: Mapping) -> list:
-    """The value of a field, or nothing where its default is to stand. Raises ValueError where there is neither."""
-    if table.get(field.name) is None and (
-        field.default is not MISSING or field.default_factory is not MISSING
-    ):
-        return []
-    if field.name not in table:
-        raise ValueError(f"{kind.__name__}: {field.name} is missing")
+def _field(kind: type, field: Field, table: Mapping) -> dict[str, Any]:
+    """Return the value of a field by its name; nothing where its default is to stand.
+
+    Raises ValueError where there is neither.
+    """
+    name = field.name
+    has_default = field.default is not MISSING or field.default_factory is not MISSING
+    if table.get(name) is None and has_default:
+        return {}
+    if name not in table:
+        raise ValueError(f"{kind.__name__}: {name} is missing")
+    hint = _hints(kind)[name]
     if hint in (Value, Value | None):
-        return [Value(_number(table[field.name]), _number(table.get(sigma_name(field.name))))]
+        return {name: Value(_number(table[name]), _number(table.get(sigma_name(name))))}
     if hint is Reason:
-        return [_reason(table[field.name], table.get(codes_name(field.name)))]
-    return [_read(hint, table[field.name])]
+        return {name: _reason(table[name], table.get(codes_name(name)))}
+    return {name: _read(hint, table[name])}
 
 
 def _reason(text: str, parts: list | None) -> Reason:
@@ -103,15 +106,17 @@ def _reason(text: str, parts: list | None) -> Reason:
 
 
 def _number(value: Any) -> float | np.ndarray:
+    """Return a number, or an array of a list; NaN for null."""
     return _array(value) if isinstance(value, list) else _read(float, value)
 
 
 def _array(value: Any) -> np.ndarray:
-    """Of numbers, null as NaN; truth values and whole numbers stay such."""
+    """Return an array of numbers, null as NaN; truth values and whole numbers stay such."""
     found = np.array(value)
     return found.astype(float) if found.dtype == object else found
 
 
 @lru_cache
 def _hints(kind: type) -> dict[str, Any]:
+    """Return the annotations of a record, by field."""
     return get_type_hints(kind)

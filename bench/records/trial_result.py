@@ -20,7 +20,7 @@ from vision.truth.value import NAN, UNKNOWN, UNKNOWN_POINT, Value
 
 @dataclass(frozen=True)
 class TrialFacts:
-    """What the manifest says of the trial."""
+    """The trial as the manifest states it."""
 
     name: str
     purpose: str
@@ -32,13 +32,13 @@ class TrialFacts:
 
     @property
     def panel(self) -> tuple[str, float | None]:
-        """Surface and speed: whisks that are alike in both belong together."""
+        """Return surface and speed: whisks that are alike in both belong together."""
         return self.surface, self.speed_deg_s
 
 
 @dataclass(frozen=True)
 class WhiskerFacts:
-    """What must be alike in results that are pooled."""
+    """The whisker, which must be alike in results that are pooled."""
 
     shape: str
     length_mm: float
@@ -47,16 +47,19 @@ class WhiskerFacts:
     tip_diameter_mm: float | None = None
 
     def left(self, x_mm: float) -> float:
-        """Share of the base's diameter that is left at a distance from the base."""
+        """Return the share of the base's diameter that is left at a distance from the base."""
         tip_mm = {"cylinder": self.diameter_mm, "cone": 0.0}.get(self.shape, self.tip_diameter_mm)
         return 1.0 - (1.0 - tip_mm / self.diameter_mm) * x_mm / self.length_mm
 
 
 @dataclass(frozen=True, eq=False)
 class Deflection:
-    """Where the contact lies in the hub's axes while touching, seen from the unbent whisker: (f,) each, and the joint
-    covariance (2f, 2f) of across z, y frame by frame. slip_mm: along the bar; past_mm: how far the whisker's material
-    has moved along itself past the bar, from any zero (rolling is no such motion)."""
+    """The contact in the hub's axes while touching, from the unbent whisker: (f,) each.
+
+    covariance: joint one (2f, 2f) of across z, y frame by frame. slip_mm: along the bar; past_mm:
+    how far the whisker's material has moved along itself past the bar, from any zero (rolling is no
+    such motion).
+    """
 
     theta_rad: np.ndarray
     motor_rad: np.ndarray
@@ -78,8 +81,11 @@ class Drawing:
 
 @dataclass(frozen=True)
 class ByOneCamera:
-    """What the shape seen by one camera tells without gauges (`estimator.seen_shape`). It sees its own trial: no
-    estimate to be judged beside the gauges'. stiffness_low_N_mm: no less than that, by 97.5 %."""
+    """Results from the shape seen by one camera, without gauges (`estimator.seen_shape`).
+
+    They rest on their own trial's pictures: no estimate to be compared beside the gauges'.
+    stiffness_low_N_mm: no less than that, by 97.5 %.
+    """
 
     camera: str
     touch_rad: Value = UNKNOWN
@@ -94,12 +100,14 @@ class ByOneCamera:
 
 @dataclass(frozen=True, eq=False)
 class SeenWhisk:
-    """One whisk as the cameras show it; d_x_mm is NaN exactly where there is no truth, and `status` says why.
+    """One whisk as the cameras see it.
 
-    The fields are those of `vision.truth.records.WhiskTruth`; at: truth at the wanted pushing angle; overlay: by
-    moment, "touch" and "theta". touch_shared_rad: the part of touch's sigma that felt touches of all whisks add to it
-    (`bench.trials.clocks`). looked: preset or settings file by which the pictures were looked at. contradicted: what
-    the recording says twice does not agree (`bench.trials.consistency`). by_one_camera: where that was asked for.
+    d_x_mm is NaN exactly where there is no truth, and `status` says why. The fields are those of
+    `vision.truth.records.WhiskTruth`; at: truth at the wanted pushing angle; overlay: by moment,
+    "touch" and "theta". touch_shared_rad: the part of touch's sigma that felt touches of all whisks
+    add to it (`bench.trials.clocks`). looked: preset or settings file by which the pictures were
+    evaluated. contradicted: two sources of the recording do not agree (`bench.trials.consistency`).
+    by_one_camera: where the settings want that.
     """
 
     whisk: int
@@ -133,13 +141,13 @@ class SeenWhisk:
 
     @property
     def has_truth(self) -> bool:
-        """Whether the whisk's distance is known."""
+        """Return whether the whisk's distance is known."""
         return bool(np.isfinite(self.d_x_mm.value))
 
 
 @dataclass(frozen=True)
 class Clock:
-    """What ties the frames to the signals: source, how well (one sigma), and whether by a recorded edge."""
+    """The tie of the frames to the signals: source, one sigma, and whether by a recorded edge."""
 
     source: str
     sigma_s: float
@@ -156,7 +164,7 @@ class BarLine:
 
 @dataclass(frozen=True, eq=False)
 class BackStroke:
-    """Touch as seen where the motor goes back, and the motor's speed, which is negative."""
+    """Seen touch where the motor goes back, and the motor's speed, which is negative."""
 
     touch_rad: Value
     speed_rad_s: float
@@ -166,8 +174,9 @@ class BackStroke:
 class SeenTrial:
     """The seen half of a trial; bar, radii and clock are missing where there are no pictures.
 
-    bar_looks: how thick the bar looks over how thick it is said to be, by camera. back: the first back stroke, where it
-    was recorded and has a truth. ways_back: the way back of each whisk, run backwards, where they are asked for.
+    bar_looks: the bar's apparent over its stated diameter, by camera. back: the first back stroke,
+    where it was recorded and has a truth. ways_back: the way back of each whisk, run backwards,
+    where the settings want them.
     """
 
     whisks: tuple[SeenWhisk, ...]
@@ -183,11 +192,12 @@ class SeenTrial:
 
 @dataclass(frozen=True)
 class EstimateRow:
-    """What one estimator says of a whisk; alpha_est_rad, beta_est_rad are NaN where it has none.
+    """One estimator's result on a whisk; alpha_est_rad, beta_est_rad are NaN where it has none.
 
-    d_x_est_sigma_alpha_exact_mm: the sigma as if alpha_est were right; d_x_est_low_mm, d_x_est_high_mm: the 95 %
-    interval. d_y_est_mm, d_z_est_mm, slip_est_mm: of the contact at the pushing angle; touch_covariance_mm_rad: of the
-    distance with the angle of touch, NaN where unknown.
+    d_x_est_sigma_alpha_exact_mm: the sigma as if alpha_est were right; d_x_est_low_mm,
+    d_x_est_high_mm: the 95 % interval. d_y_est_mm, d_z_est_mm, slip_est_mm: of the contact at the
+    pushing angle; touch_covariance_mm_rad: of the distance with the angle of touch, NaN where
+    unknown.
     """
 
     estimator: str
@@ -204,14 +214,15 @@ class EstimateRow:
     touch_covariance_mm_rad: float = NAN
 
     def holds(self, d_x_mm: float) -> bool | None:
-        """Whether the 95 % interval holds a distance; None where either is not known."""
-        known = np.isfinite([self.d_x_est_low_mm, self.d_x_est_high_mm, d_x_mm]).all()
-        return bool(self.d_x_est_low_mm <= d_x_mm <= self.d_x_est_high_mm) if known else None
+        """Return whether the 95 % interval holds a distance; None where either is not known."""
+        if not np.isfinite([self.d_x_est_low_mm, self.d_x_est_high_mm, d_x_mm]).all():
+            return None
+        return bool(self.d_x_est_low_mm <= d_x_mm <= self.d_x_est_high_mm)
 
 
 @dataclass(frozen=True, eq=False)
 class FeltAt:
-    """What is felt at one pushing angle, and the estimates of it; the fields are those of `FeltWhisk`."""
+    """Felt moments at one pushing angle, and estimates from them; the fields are `FeltWhisk`'s."""
 
     theta_rad: float
     m_y_Nmm: Value
@@ -224,7 +235,7 @@ class FeltAt:
 
 @dataclass(frozen=True)
 class WithDrift:
-    """Felt touch and d_x by (10) with the drift left in that shows from before touch to after the way back."""
+    """Felt touch and d_x by (10) without correction for drift from before touch to after the way back."""
 
     touch_felt_rad: float
     d_x_est_mm: float
@@ -232,17 +243,18 @@ class WithDrift:
 
 @dataclass(frozen=True, eq=False)
 class FeltWhisk:
-    """One whisk as the gauges show it: touch, moments and slip angle at the wanted pushing angle, phases, estimates.
+    """One whisk as the gauges feel it: touch, moments and slip angle at the wanted pushing angle.
 
-    theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the touch; covariance_at
-    (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing angle; shared_Nmm (k, 2): what the moments
-    change by at one sigma of each cause that all whisks have in common. agreement_chi2: of the moments with
-    those of the seen shape, 2 degrees of freedom; apart: they are not those, or the recording contradicts itself
-    elsewhere, and nothing is concluded from the whisk. one_factor: estimates with one factor a channel. by_theta:
-    moments and estimates at other pushing angles, up to the stroke's end. delay_s: of the gauges' filter, taken out of
-    the touch. sensors: what the other sensors of Table I say, where a load cell was recorded. kinetic: as on the
-    kinetic cone, where the moments alone show that the contact sticks and slips. with_drift: None where no drift was
-    taken out.
+    theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the
+    touch; covariance_at (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing
+    angle; shared_Nmm (k, 2): changes of the moments at one sigma of each cause that all whisks have
+    in common. agreement_chi2: of the moments with those of the seen shape, 2 degrees of freedom;
+    apart: they are not those, or the recording contradicts itself elsewhere, and nothing is
+    concluded from the whisk. one_factor: estimates with one factor a channel. by_theta: moments and
+    estimates at other pushing angles, up to the stroke's end. delay_s: of the gauges' filter, taken
+    out of the touch. sensors: estimates of the other sensors of Table I, where a load cell was
+    recorded. kinetic: as on the kinetic cone, where by the moments alone the contact sticks and
+    slips. with_drift: None where no drift was taken out.
     """
 
     whisk: int = 0
@@ -269,7 +281,7 @@ class FeltWhisk:
 
     @property
     def has_moments(self) -> bool:
-        """Whether the moments are known."""
+        """Return whether the moments are known."""
         return bool(np.isfinite(self.m_y_Nmm.value))
 
 
@@ -284,8 +296,11 @@ class FeltTrial:
 
 @dataclass(frozen=True, eq=False)
 class TrialResult:
-    """All of one trial. theta_deg: the wanted pushing angle. hash, seen_hash: of what the result, and its seen half,
-    were made from."""
+    """The whole result of one trial.
+
+    theta_deg: the wanted pushing angle. hash, seen_hash: of what the result, and its seen half,
+    were made from.
+    """
 
     trial: TrialFacts
     whisker: WhiskerFacts
@@ -297,7 +312,7 @@ class TrialResult:
 
 
 def whisks(results: Iterable[TrialResult]) -> Iterator[tuple[TrialResult, SeenWhisk, FeltWhisk]]:
-    """(result, seen, felt) of every whisk."""
+    """Yield (result, seen, felt) of every whisk."""
     for result in results:
         for seen, felt in zip(result.seen.whisks, result.felt.whisks):
             yield result, seen, felt

@@ -12,7 +12,7 @@ from bench.analyses.tilted import Tilted
 from bench.base.settings import Settings
 from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.certificate import Certificate
-from bench.gauges.matrix import Gauges
+from bench.gauges.matrix import GaugeCalibration
 from bench.records.trial_result import FeltWhisk, TrialResult
 from bench.session.session import Session
 from bench.session.whisker import Whisker
@@ -52,7 +52,7 @@ class Evaluation:
     settings: Settings
     results: tuple[TrialResult, ...]
     friction: tuple[SurfaceFriction, ...]
-    gauges: Gauges | None
+    gauges: GaugeCalibration | None
     calibration: SessionCalibration
     doubts: tuple[str, ...]  # each a Reason where it has a code
     recordings: Mapping[str, str]

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.tables import sigma_name
-from bench.gauges.matrix import Gauges
+from bench.gauges.matrix import GaugeCalibration
 from bench.session.session import Session
 from estimator.uncertainty import Z_95
 
@@ -50,12 +50,14 @@ class Score:
         )
 
 
-def score(session: Session, out: Path, gauges: Gauges | None = None) -> list[str]:
+def score(session: Session, out: Path, gauges: GaugeCalibration | None = None) -> list[str]:
     """Lines on bias, RMS and the share of 95 % intervals that hold; empty where the session has no truth files."""
     return score_all([(session, out)], gauges)
 
 
-def score_all(runs: Sequence[tuple[Session, Path]], gauges: Gauges | None = None) -> list[str]:
+def score_all(
+    runs: Sequence[tuple[Session, Path]], gauges: GaugeCalibration | None = None
+) -> list[str]:
     """The same of several runs (the whiskers of an array), each with its folder, taken together."""
     try:
         found = [one for session, out in runs for one in _scores(session, out)]
@@ -174,7 +176,7 @@ def _frames(session: Session, out: Path, column: str) -> Iterator[tuple[dict, fl
                     yield row, float(true[column])
 
 
-def _gauge_lines(session: Session, gauges: Gauges | None) -> Iterator[str]:
+def _gauge_lines(session: Session, gauges: GaugeCalibration | None) -> Iterator[str]:
     """Coefficients against truth.json: the diagonal in per cent, the rest in points of its column's diagonal."""
     path = session.path / "truth.json"
     if gauges is None or not path.is_file():

@@ -11,6 +11,7 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
@@ -21,8 +22,8 @@ from bench.session.session import (
     Base,
     Session,
     given_gauges,
-    loaded,
     read_manifest,
+    session_of,
     stated_whisker,
 )
 from bench.session.signals import FORCES, MOMENTS, MOTOR, TIME, VOLTS
@@ -33,7 +34,6 @@ from vision.geometry.rotation import compose
 
 _PARALLEL = 1e-6  # rounding of cosines: axes of bases on one motor
 _OWN = (*VOLTS, *MOMENTS, *FORCES)  # columns that no two whiskers share
-
 _OWN_GAUGES = "give each of [[whiskers]] its own: [whiskers.gauges]"
 
 
@@ -44,34 +44,49 @@ def load_views(
     trials: Collection[str] | None = None,
     follow_links: bool = False,
 ) -> tuple[Session, ...]:
-    """As `load_session`, a session a whisker: the one of [whisker] as it is, or a view for each of [[whiskers]].
+    """Load a session a whisker: the one of [whisker] as it is, or a view for each of [[whiskers]].
 
-    Raises BadInput, with [[whiskers]] also for names used twice, bases that touch, and whiskers that share a channel.
+    Options and errors are those of `load_session`. Raises BadInput with [[whiskers]] also for names
+    used twice, bases that touch, and whiskers that share a channel.
     """
-    path, doubts = Path(path), doubts or Doubts()
+    path = Path(path)
+    doubts = doubts or Doubts()
     keys = read_manifest(path, doubts, follow_links)
-    session = loaded(path, keys, doubts, trials=trials)
+    session = session_of(path, keys, doubts, trials=trials)
     if not keys.whiskers:
         return (session,)
     _check_tables(session, keys)
-    named = {one.name: one for one in keys.whiskers}
-    bases = [_base(one) for one in keys.whiskers]
-    _check_names([one.name for one in keys.whiskers])
-    _check_apart(bases, keys.whiskers)
-    channels: dict[str, dict[str, DaqFile]] = {}
+    bases = [_base(whisker) for whisker in keys.whiskers]
+    _check_names([base.name for base in bases])
+    _check_distances(bases, keys.whiskers)
+    trials_of = _trials_of_all(session, keys.whiskers, bases, doubts)
+    if session.has_pictures and session.T_rig_board is None and session.cameras_toml is None:
+        cure = "measure it, or bring cameras.toml: of several wires it says which is whose"
+        raise BadInput(f"[rig] T_rig_board is missing; {cure}", file=MANIFEST)
+    whiskers = zip(keys.whiskers, bases)
+    return tuple(_view(session, one, base, trials_of[base.name]) for one, base in whiskers)
+
+
+def _trials_of_all(
+    session: Session,
+    keys: Sequence[manifest.ArrayWhiskerKeys],
+    bases: Sequence[Base],
+    doubts: Doubts,
+) -> dict[str, list[Trial]]:
+    """Return the trials that can be read as each whisker would have recorded them, by its name."""
+    trials: dict[str, list[Trial]] = {base.name: [] for base in bases}
     for trial in session.trials:
         with doubts.guard():
-            channels[trial.name] = _channels_of_all(trial, named)
-            _check_motors(bases, channels[trial.name])
+            channels = _channels_of_all(trial, keys)
+            _check_motors(bases, channels)
             _check_cone(bases, trial)
-    if any(trial.camera_sources for trial in session.trials):
-        _check_placed(session)
-    readable = tuple(trial for trial in session.trials if trial.name in channels)
-    return tuple(_view(session, named[base.name], base, readable, channels) for base in bases)
+            for base in bases:
+                trials[base.name].append(_trial_of(base, trial, channels[base.name]))
+    return trials
 
 
 def _check_tables(session: Session, keys: manifest.SessionKeys) -> None:
-    """What one whisker alone has. Raises BadInput."""
+    """Raise BadInput for what one whisker alone has."""
     if keys.whisker is not None:
         raise BadInput("has [whisker] and [[whiskers]]; keep one of them", file=MANIFEST)
     if keys.gauges is not None:
@@ -80,155 +95,134 @@ def _check_tables(session: Session, keys: manifest.SessionKeys) -> None:
         raise BadInput(f"is one whisker's; {_OWN_GAUGES}", file="gauges.toml")
 
 
-def _check_placed(session: Session) -> None:
-    """Pictures of several wires do not tell where the bases stand. Raises BadInput."""
-    if session.T_rig_board is None and session.cameras_toml is None:
-        asked = "measure it, or bring cameras.toml: of several wires it says which is whose"
-        raise BadInput(f"[rig] T_rig_board is missing; {asked}", file=MANIFEST)
-
-
 def _check_names(names: Sequence[str]) -> None:
-    """Raises BadInput for one that cannot name a folder, or that two have."""
-    for number, name in enumerate(names):
+    """Raise BadInput for a name that cannot name a folder, or that two have."""
+    taken = set()
+    for name in names:
         if name.startswith(".") or not all(c.isalnum() or c in "_.-" for c in name):
-            raise BadInput(
-                f"[[whiskers]] name {name!r}: letters, digits, '_', '-' and '.' are allowed",
-                file=MANIFEST,
-            )
-        if name.casefold() in (other.casefold() for other in names[:number]):
+            fix = "letters, digits, '_', '-' and '.' are allowed"
+            raise BadInput(f"[[whiskers]] name {name!r}: {fix}", file=MANIFEST)
+        if name.casefold() in taken:
             raise BadInput(f"[[whiskers]] name {name!r} is used twice", file=MANIFEST)
+        taken.add(name.casefold())
 
 
 def _base(keys: manifest.ArrayWhiskerKeys) -> Base:
-    """Where a whisker's base stands: turned about the rig's x, then y, then z, and shifted."""
-    (cx, cy, cz), (sx, sy, sz) = (of(np.radians(keys.base_deg)) for of in (np.cos, np.sin))
-    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    pose = np.column_stack([about_z @ about_y @ about_x, keys.base_mm])
+    """Return a whisker's base: turned about the rig's x, then y, then z, and shifted."""
+    rotation = Rotation.from_euler("xyz", keys.base_deg, degrees=True).as_matrix()
+    pose = np.column_stack([rotation, keys.base_mm])
     return Base(keys.name, pose, keys.base_sigma_mm, float(np.radians(keys.base_sigma_deg)))
 
 
-def _check_apart(bases: Sequence[Base], keys: Sequence[manifest.ArrayWhiskerKeys]) -> None:
-    """Raises BadInput where two bases are nearer than both radii."""
+def _check_distances(bases: Sequence[Base], keys: Sequence[manifest.ArrayWhiskerKeys]) -> None:
+    """Raise BadInput where two bases are nearer than both radii."""
     for (one, a), (other, b) in combinations(zip(bases, keys), 2):
-        apart_mm = float(np.linalg.norm(one.T_rig_base[:, 3] - other.T_rig_base[:, 3]))
+        distance_mm = float(np.linalg.norm(one.T_rig_base[:, 3] - other.T_rig_base[:, 3]))
         radii_mm = 0.5 * (a.diameter_mm + b.diameter_mm)
-        if apart_mm < radii_mm:
-            found = f"the bases of {one.name} and {other.name} touch: {apart_mm:.3g} mm apart, radii {radii_mm:.3g} mm"
-            raise BadInput(
-                f"[[whiskers]] {found}; base_mm is each one's own, in the rig frame", file=MANIFEST
-            )
+        if distance_mm < radii_mm:
+            sizes = f"{distance_mm:.3g} mm apart, radii {radii_mm:.3g} mm"
+            found = f"the bases of {one.name} and {other.name} touch: {sizes}"
+            fix = "base_mm is each one's own, in the rig frame"
+            raise BadInput(f"[[whiskers]] {found}; {fix}", file=MANIFEST)
 
 
 def _channels_of_all(
-    trial: Trial, whiskers: Mapping[str, manifest.ArrayWhiskerKeys]
+    trial: Trial, whiskers: Sequence[manifest.ArrayWhiskerKeys]
 ) -> dict[str, DaqFile]:
-    """Each whisker's channels of the trial's file. Raises BadInput where two whiskers share one."""
-    found = {name: _channels(trial, keys) for name, keys in whiskers.items()}
+    """Return each whisker's channels of the trial's file. Raise BadInput where two share one."""
+    found = {keys.name: _channels(trial, keys) for keys in whiskers}
     owners: dict[str, str] = {}
     for name, daq in found.items():
         for column in filter(daq.channels.get, _OWN):
             channel = daq.channels[column].channel
-            if owner := owners.get(channel):
-                twice = (
-                    f"share the channel {channel!r}"
-                    if owner != name
-                    else f"has the channel {channel!r} twice"
-                )
-                whose = name if owner == name else f"{owner} and {name}"
-                raise BadInput(
-                    f"[[whiskers]] {whose} {twice}; [whiskers.channels] names each one's own",
-                    file=MANIFEST,
-                )
+            owner = owners.get(channel)
+            if owner is not None:
+                found_twice = f"{owner} and {name} share the channel {channel!r}"
+                if owner == name:
+                    found_twice = f"{name} has the channel {channel!r} twice"
+                fix = "[whiskers.channels] names each one's own"
+                raise BadInput(f"[[whiskers]] {found_twice}; {fix}", file=MANIFEST)
             owners[channel] = name
     return found
 
 
 def _channels(trial: Trial, keys: manifest.ArrayWhiskerKeys) -> DaqFile:
-    """A whisker's channels: as [whiskers.channels] names them; else those of [signals], or the columns that end in
-    @ and its name."""
+    """Return a whisker's channels.
+
+    They are as [whiskers.channels] names them; else those of [signals], or the columns of
+    signals.csv that end in @ and its name.
+    """
     named = {column: name for column, name in values(keys.channels).items() if name is not None}
     if trial.daq is not None:
-        given = trial.daq.channels
-        own = {
-            column: replace(given.get(column, Channel("")), channel=name)
-            for column, name in named.items()
-        }
-        return replace(trial.daq, channels=given | own)
-    there = column_names(trial.signals_path, trial.shown(trial.signals_path.name))
+        channels = dict(trial.daq.channels)
+        for column, name in named.items():
+            channels[column] = replace(channels.get(column, Channel("")), channel=name)
+        return replace(trial.daq, channels=channels)
+    file = trial.signals_path.name
+    in_file = column_names(trial.signals_path, trial.shown(file))
     tagged = {column: f"{column}@{keys.name}" for column in (MOTOR, *_OWN)}
-    columns = {column: name for column, name in tagged.items() if name in there} | named
-    columns = {TIME: TIME, MOTOR: MOTOR} | columns
+    columns = {TIME: TIME, MOTOR: MOTOR}
+    columns |= {column: name for column, name in tagged.items() if name in in_file}
+    columns |= named
     if not any(column in columns for column in (*VOLTS, *MOMENTS)):
         columns |= {column: tagged[column] for column in VOLTS}
-    return DaqFile(
-        trial.signals_path.name, None, {column: Channel(name) for column, name in columns.items()}
-    )
+    return DaqFile(file, None, {column: Channel(name) for column, name in columns.items()})
 
 
 def _check_motors(bases: Sequence[Base], channels: Mapping[str, DaqFile]) -> None:
-    """Raises BadInput where whiskers on one motor turn about axes that are not parallel."""
+    """Raise BadInput where whiskers on one motor turn about axes that are not parallel."""
     for one, other in combinations(bases, 2):
-        motors = [channels[base.name].channels[MOTOR] for base in (one, other)]
+        motor = channels[one.name].channels[MOTOR]
         cosine = one.T_rig_base[:, 2] @ other.T_rig_base[:, 2]
-        if motors[0] == motors[1] and abs(cosine) < 1 - _PARALLEL:
-            angle = np.degrees(np.arccos(cosine))
-            found = f"{one.name} and {other.name} are on one motor ({motors[0].channel}), their axes {angle:.3g}° apart"
-            raise BadInput(
-                f"[[whiskers]] {found}; name each one's own motor_deg in [whiskers.channels]",
-                file=MANIFEST,
-            )
+        if motor == channels[other.name].channels[MOTOR] and abs(cosine) < 1 - _PARALLEL:
+            angle = f"their axes {np.degrees(np.arccos(cosine)):.3g}° apart"
+            found = f"{one.name} and {other.name} are on one motor ({motor.channel}), {angle}"
+            fix = "name each one's own motor_deg in [whiskers.channels]"
+            raise BadInput(f"[[whiskers]] {found}; {fix}", file=MANIFEST)
 
 
 def _check_cone(bases: Sequence[Base], trial: Trial) -> None:
-    """Raises BadInput for a cone that is said to end before it comes to any whisker's plane of whisking."""
-    if trial.object is None or trial.object.shape != "cone" or trial.object.point_mm is None:
+    """Raise BadInput for a cone that is said to end before any whisker's plane of whisking."""
+    stated = trial.object
+    if stated is None or stated.shape != "cone" or stated.point_mm is None:
         return
-    tip, axis = (
-        np.array(given, dtype=float) for given in (trial.object.point_mm, trial.object.axis)
-    )
-    opening = np.radians(trial.object.half_angle_deg)
+    tip = np.array(stated.point_mm)
+    axis = np.array(stated.axis) / np.linalg.norm(stated.axis)
     for base in bases:
         normal = base.T_rig_base[:, 2]
         towards = np.copysign(1.0, (base.T_rig_base[:, 3] - tip) @ normal) * normal
-        if (
-            np.arccos(np.clip(-axis @ towards / np.linalg.norm(axis), -1.0, 1.0)) - opening
-            < np.pi / 2
-        ):
+        angle_rad = np.arccos(np.clip(-axis @ towards, -1.0, 1.0))
+        if angle_rad - np.radians(stated.half_angle_deg) < np.pi / 2:
             return
-    found = "the cone's tip, point_mm, lies before every whisker's plane: none can touch it; axis points to the tip"
-    raise BadInput(f"[object] {found}", file=f"trials/{trial.name}/trial.toml")
+    found = "the cone's tip, point_mm, lies before every whisker's plane: none can touch it"
+    raise BadInput(f"[object] {found}; axis points to the tip", file=f"{trial.place}/trial.toml")
 
 
-def _view(session: Session, keys, base: Base, trials: Sequence[Trial], channels) -> Session:
-    """The session as that whisker alone would have recorded it, in its base frame; the other wires are in its pictures,
-    too."""
-    own = tuple(
-        replace(
-            trial,
-            daq=channels[trial.name][base.name],
-            whisker=base.name,
-            object_velocity_mm_s=_turned(trial.object_velocity_mm_s, base),
-        )
-        for trial in trials
-    )
+def _trial_of(base: Base, trial: Trial, daq: DaqFile) -> Trial:
+    """Return a trial as one whisker alone would have recorded it, in its base frame."""
+    velocity = trial.object_velocity_mm_s
+    if velocity is not None:
+        velocity = (base.T_rig_base[:, :3].T @ velocity).tolist()
+    return replace(trial, daq=daq, whisker=base.name, object_velocity_mm_s=velocity)
+
+
+def _view(
+    session: Session, keys: manifest.ArrayWhiskerKeys, base: Base, trials: Sequence[Trial]
+) -> Session:
+    """Return the session as that whisker alone would have recorded it, in its base frame.
+
+    The other wires are in its pictures, too.
+    """
+    board = session.T_rig_board
     return replace(
         session,
         name=f"{session.name}, whisker {base.name}",
         whisker=stated_whisker(keys, f"[[whiskers]] {base.name}:"),
         gauges=given_gauges(keys.gauges),
-        trials=own,
+        trials=tuple(trials),
         base=base,
         whole=session,
-        T_rig_board=None
-        if session.T_rig_board is None
-        else compose(base.T_base_rig, session.T_rig_board),
+        T_rig_board=None if board is None else compose(base.T_base_rig, board),
         T_rig_board_sigma_mm=math.hypot(session.T_rig_board_sigma_mm, base.sigma_mm),
         T_rig_board_sigma_rad=math.hypot(session.T_rig_board_sigma_rad, base.sigma_rad),
     )
-
-
-def _turned(in_rig: Sequence[float] | None, base: Base) -> list[float] | None:
-    """A vector of the rig frame in a base's, where there is one."""
-    return None if in_rig is None else (base.T_rig_base[:, :3].T @ in_rig).tolist()

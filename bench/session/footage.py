@@ -1,4 +1,4 @@
-"""Where each camera's frames are in a session: a folder named after the camera, or a video or stack of that name."""
+"""The frames of each camera in a session: a folder of its name, or a video or stack of that name."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,10 +18,10 @@ from vision.pictures.frames import Frames
 
 
 def camera_sources(folder: Path, shown: str) -> dict[str, Path]:
-    """Camera name to its folder of pictures or its video, of what is in `folder`; empty where nothing is.
+    """Return the folder of pictures or the video of each camera in `folder`, by the camera's name.
 
-    Folders without pictures are no cameras. Raises BadInput where one camera has a folder and a video, or two
-    videos.
+    Folders without pictures are no cameras. Raises BadInput where one camera has a folder and a
+    video, or two videos.
     """
     sources: dict[str, Path] = {}
     for entry in visible(folder):
@@ -29,15 +29,17 @@ def camera_sources(folder: Path, shown: str) -> dict[str, Path]:
             continue
         name = entry.name if entry.is_dir() else entry.stem
         if name in sources:
-            raise BadInput(
-                f"camera {name} has {sources[name].name} and {entry.name}; keep one", file=shown
-            )
+            found = f"camera {name} has {sources[name].name} and {entry.name}"
+            raise BadInput(f"{found}; keep one", file=shown)
         sources[name] = entry
     return sources
 
 
 def single_pictures(folder: Path, shown: str) -> dict[str, Path]:
-    """Camera name to its one picture in `folder` (boards/rig). Raises BadInput where a camera has two."""
+    """Return the one picture of each camera in `folder` (boards/rig), by the camera's name.
+
+    Raises BadInput where a camera has two.
+    """
     pictures: dict[str, Path] = {}
     for entry in visible(folder):
         if entry.suffix.lower() not in PICTURE_SUFFIXES:
@@ -49,7 +51,7 @@ def single_pictures(folder: Path, shown: str) -> dict[str, Path]:
 
 
 def rig_picture(path: Path) -> np.ndarray:
-    """One of `Session.rig_pictures`, grey (h, w). Raises BadInput where it cannot be read."""
+    """Read one of `Session.rig_pictures`, grey (h, w). Raises BadInput where it cannot be read."""
     grey = read_picture(path)
     if grey is None:
         raise BadInput("cannot be read as a picture", file=f"boards/rig/{path.name}")
@@ -57,7 +59,7 @@ def rig_picture(path: Path) -> np.ndarray:
 
 
 def frame_count(source: Path) -> int:
-    """How many frames a source declares; 0 for a video that cannot be opened."""
+    """Return how many frames a source declares; 0 for a video that cannot be opened."""
     if source.is_dir():
         return len(pictures_in(source))
     try:
@@ -67,12 +69,12 @@ def frame_count(source: Path) -> int:
 
 
 def decoded_count(source: Path) -> int:
-    """How many frames a source really holds; of a video, by decoding it."""
+    """Count the frames that a source really holds; of a video, by decoding it."""
     return len(pictures_in(source)) if source.is_dir() else Frames.open(source).decoded_count
 
 
 def declared_rate_Hz(source: Path) -> float:
-    """Frames a second as a video's header states it; 0 where it does not, or cannot be opened."""
+    """Return the frame rate that a video's header states; 0 where it does not, or cannot be opened."""
     try:
         return Frames.open(source).rate_Hz
     except Refused:
@@ -80,20 +82,21 @@ def declared_rate_Hz(source: Path) -> float:
 
 
 def visible(folder: Path) -> list[Path]:
-    """What lies in a folder, in natural order, without hidden files; nothing where there is no folder."""
-    if not folder.is_dir():
-        return []
-    return sorted((e for e in folder.iterdir() if not e.name.startswith(".")), key=natural_order)
+    """List a folder in natural order, without hidden files; nothing where there is no folder."""
+    return sorted(folder.glob("[!.]*"), key=natural_order)
 
 
 def _holds_frames(entry: Path) -> bool:
+    """Return whether an entry is a folder of pictures or a video."""
     if entry.is_dir():
         return bool(pictures_in(entry))
     return entry.suffix.lower() in FILM_SUFFIXES
 
 
 def read_frames(source: Path, indices: Iterable[int]) -> dict[int, np.ndarray | None]:
-    """The pictures of one camera with these indices; None where it is damaged or the video does not open.
+    """Read the pictures of one camera with these indices.
+
+    None stands for a picture that is damaged, or of a video that does not open.
 
     Raises Refused where a picture has another size than the first.
     """

@@ -17,98 +17,108 @@ from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
 from vision.pictures.frames import Frames
 
-FRAME, TIME = "frame", "time_s"
-_DROPPED_STEPS = 1.5  # a gap of so many usual steps inside a whisk is a dropped frame
-# of the interval stated, beyond the steps in which times are written. Set by eye
+FRAME = "frame"
+TIME = "time_s"
+# A gap of so many usual steps inside a whisk is a dropped frame.
+_DROPPED_STEPS = 1.5
+# Of the interval stated, beyond the steps in which times are written. Set by eye.
 _RATE_TOLERANCE = 1e-3
 # A header's rate is nominal: crystals are right to 1e-4, a computer's timers to some 1e-3.
 _HEADER_TOLERANCE = 1e-2
-_MOST_NAMED = 5  # frames in a line
-_CLOCK_STEP_S = 1e-3  # times are written to a millisecond or better
+# [frames] Most in a line.
+_MOST_NAMED = 5
+# [s] Times are written to a millisecond or better.
+_CLOCK_STEP_S = 1e-3
 
 
 @dataclass(frozen=True)
 class FrameTimes:
-    """time_s: (n,) middle of the exposure of each frame, s, increasing. source: where the times come from.
+    """The frames of a trial in time.
 
-    picture: camera to (n,) the index of its picture of each frame, −1 where that camera dropped it. spread_s:
-    the largest difference between cameras within one frame. doubts: lines that the user should read. clock_sigma_s: how
-    well the times are known on the signals' clock: 0 where they were recorded on it, else half a frame. Forward
-    strokes do not tell it: an offset of the clock looks as one of the encoder's zero.
+    time_s: (n,) middle of the exposure of each frame, s, increasing. source: where the times come
+    from. picture: camera to (n,) the index of its picture of each frame, −1 where that camera
+    dropped it. spread_s: the largest difference between cameras within one frame. warnings: lines
+    that the user should read. clock_sigma_s: how well the times are known on the signals' clock: 0
+    where they were recorded on it, else half a frame. Forward strokes do not determine it: an
+    offset of the clock is indistinguishable from one of the encoder's zero.
     """
 
     time_s: np.ndarray
     source: str
     picture: Mapping[str, np.ndarray]
     spread_s: float = 0.0
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     clock_sigma_s: float = 0.0
 
     def __len__(self) -> int:
+        """Return the number of frames."""
         return len(self.time_s)
 
     def frames_in(self, signals: Signals, stroke: slice) -> slice:
-        """The frames taken during a stroke (a slice of samples), as a slice of frame indices."""
+        """Return the frames taken during a stroke (a slice of samples), as a slice of frame indices."""
         half_s = 0.5 / signals.rate_Hz
         first, last = signals.time_s[stroke][[0, -1]]
         return slice(*np.searchsorted(self.time_s, [first - half_s, last + half_s]).tolist())
 
     def lost_in(self, frames: slice) -> list[tuple[float, int]]:
-        """Of a stroke's frames: after which time, s, how many were dropped, by gaps of more than `_DROPPED_STEPS` usual
-        steps."""
-        time_s = self.time_s[frames]
-        steps = np.diff(time_s)
+        """Return after which times, s, how many of a stroke's frames were dropped.
+
+        They are dropped in gaps of more than `_DROPPED_STEPS` usual steps.
+        """
+        steps = np.diff(self.time_s[frames])
         if len(steps) < 2:
             return []
         usual = float(np.median(steps))
-        gaps = np.flatnonzero(steps > _DROPPED_STEPS * usual)
-        return [(float(time_s[k]), max(1, round(float(steps[k]) / usual) - 1)) for k in gaps]
+        lost = []
+        for time_s, step in zip(self.time_s[frames].tolist(), steps.tolist()):
+            if step > _DROPPED_STEPS * usual:
+                lost.append((time_s, max(1, round(step / usual) - 1)))
+        return lost
 
 
 def frame_times(trial: Trial) -> FrameTimes:
-    """The frame times of a trial, from the first source that there is.
+    """Return the frame times of a trial, from the first source that there is.
 
-    In this order: frames.csv, frames_<camera>.csv, edges of a DAQ channel, frame_rate_Hz and first_frame_s, the
-    container's times. Raises BadInput where there is none, times do not increase, their number is not that of the
-    frames, or the stated frame rate is another.
+    In this order: frames.csv, frames_<camera>.csv, edges of a DAQ channel, frame_rate_Hz and
+    first_frame_s, the container's times. Raises BadInput where there is none, times do not
+    increase, their number is not that of the frames, or the stated frame rate is another.
     """
     if (trial.folder / "frames.csv").is_file():
-        return _common(trial)
-    if trial.camera_sources and all(
-        (trial.folder / _own(camera)).is_file() for camera in trial.camera_sources
-    ):
-        return _merged(trial)
-    own = [camera for camera in trial.camera_sources if (trial.folder / _own(camera)).is_file()]
-    if own:
-        missing = next(camera for camera in trial.camera_sources if camera not in own)
-        raise BadInput(
-            f"is missing, and camera {own[0]} has its own", file=trial.shown(_own(missing))
-        )
-    if not trial.camera_sources:
+        return _in_common_file(trial)
+    cameras = list(trial.camera_sources)
+    with_own = [camera for camera in cameras if (trial.folder / _own_file(camera)).is_file()]
+    if with_own:
+        missing = [camera for camera in cameras if camera not in with_own]
+        if missing:
+            found = f"is missing, and camera {with_own[0]} has its own"
+            raise BadInput(found, file=trial.shown(_own_file(missing[0])))
+        return _in_own_files(trial)
+    if not cameras:
         return FrameTimes(np.array([]), "none", {})
     if trial.daq is not None and "frame_V" in trial.daq.channels:
         return _by_edges(trial, trial.daq)
-    return _steady(trial) if trial.frame_rate_Hz else _from_container(trial)
+    return _at_stated_rate(trial) if trial.frame_rate_Hz else _in_container(trial)
 
 
 def read_trial(
     trial: Trial, times: FrameTimes, wanted: Iterable[int] | None = None
 ) -> dict[str, dict[int, np.ndarray]]:
-    """Grey pictures by camera and frame index, of the frames wanted (None: all); lost ones are left out."""
-    frames, wanted = {}, range(len(times)) if wanted is None else sorted(set(wanted))
+    """Read grey pictures by camera and frame index; lost ones are left out.
+
+    wanted: frame indices; None: all.
+    """
+    indices = np.arange(len(times)) if wanted is None else np.array(sorted(set(wanted)), dtype=int)
+    frames = {}
     for name, source in trial.camera_sources.items():
-        place = {
-            frame: int(times.picture[name][frame])
-            for frame in wanted
-            if times.picture[name][frame] >= 0
-        }
-        read = read_frames(source, place.values())
-        frames[name] = {frame: read[k] for frame, k in place.items() if read[k] is not None}
+        pictures = times.picture[name][indices]
+        read = read_frames(source, pictures[pictures >= 0].tolist())
+        taken = zip(indices.tolist(), pictures.tolist())
+        frames[name] = {frame: read[k] for frame, k in taken if read.get(k) is not None}
     return frames
 
 
 def dropped(times: FrameTimes, places: Iterable[slice]) -> Iterator[str]:
-    """A line for each whisk with gaps between its frames' times."""
+    """Yield a line for each whisk with gaps between its frames' times."""
     for number, place in enumerate(places):
         lost = times.lost_in(place)
         if lost:
@@ -117,223 +127,238 @@ def dropped(times: FrameTimes, places: Iterable[slice]) -> Iterator[str]:
             yield f"whisk {number}: {frames} dropped by all cameras (after {at} s)"
 
 
-def _own(camera: str) -> str:
+def _own_file(camera: str) -> str:
+    """Return the name of the file of a camera's own times."""
     return f"frames_{camera}.csv"
 
 
-def _common(trial: Trial) -> FrameTimes:
-    """frames.csv: all cameras triggered together."""
+def _all_pictures(trial: Trial, count: int) -> dict[str, np.ndarray]:
+    """Return the pictures (count,) of each camera where none dropped a frame."""
+    return {camera: np.arange(count) for camera in trial.camera_sources}
+
+
+def _in_common_file(trial: Trial) -> FrameTimes:
+    """Return the times of frames.csv: all cameras were triggered together."""
     shown = trial.shown("frames.csv")
     table, repeats = _read(trial.folder / "frames.csv", shown)
-    doubts = tuple(
-        d for camera in trial.camera_sources for d in _check_count(trial, camera, len(table), shown)
-    )
+    warnings: list[str] = []
+    for camera in trial.camera_sources:
+        warnings += _count_warnings(trial, camera, len(table), shown)
     _check_rate(table[TIME], trial, shown)
-    doubts += tuple(_header_rates(table[TIME], trial, trial.camera_sources, shown))
+    warnings += _header_warnings(table[TIME], trial, trial.camera_sources, shown)
     if repeats:
         line = f"{shown}: {counted(repeats, 'repeated row')} dropped"
-        doubts = (*doubts, Reason("rows_repeated", line))
-    pictures = {camera: np.arange(len(table)) for camera in trial.camera_sources}
-    return FrameTimes(table[TIME], "frames.csv", pictures, doubts=doubts)
+        warnings.append(Reason("rows_repeated", line))
+    picture = _all_pictures(trial, len(table))
+    return FrameTimes(table[TIME], "frames.csv", picture, warnings=tuple(warnings))
 
 
-def _merged(trial: Trial) -> FrameTimes:
-    """frames_<camera>.csv: own times; frames of different cameras nearer than half a step are one."""
-    times, doubts = {}, []
+def _in_own_files(trial: Trial) -> FrameTimes:
+    """Return the merged times of frames_<camera>.csv."""
+    times_s = {}
+    warnings: list[str] = []
     for camera in trial.camera_sources:
-        shown = trial.shown(_own(camera))
-        table, _ = _read(trial.folder / _own(camera), shown)
-        doubts += _check_count(trial, camera, len(table), shown)
-        doubts += _header_rates(table[TIME], trial, (camera,), shown)
-        times[camera] = table[TIME]
-    time_s, picture, spread_s = merge_times(times)
-    return FrameTimes(time_s, "frames_<camera>.csv", picture, spread_s, tuple(doubts))
+        shown = trial.shown(_own_file(camera))
+        table, _ = _read(trial.folder / _own_file(camera), shown)
+        warnings += _count_warnings(trial, camera, len(table), shown)
+        warnings += _header_warnings(table[TIME], trial, [camera], shown)
+        times_s[camera] = table[TIME]
+    time_s, picture, spread_s = merge_times(times_s)
+    return FrameTimes(time_s, "frames_<camera>.csv", picture, spread_s, tuple(warnings))
 
 
 def merge_times(
     times_s: Mapping[str, np.ndarray],
 ) -> tuple[np.ndarray, dict[str, np.ndarray], float]:
-    """One series of frames from several cameras' times.
+    """Merge several cameras' times (n_camera,) to one series of frames.
 
-    Returns time_s (n,), camera -> picture index or −1 (n,), and the largest spread within a frame, s.
-    A frame's time is the mean of the cameras that have it.
+    Frames of different cameras nearer than half a step are one; its time is the mean of the cameras
+    that have it. Returns time_s (n,), camera -> picture index or −1 (n,), and the largest spread
+    within a frame, s.
     """
-    names = list(times_s)
-    every = np.concatenate([times_s[name] for name in names])
-    camera = np.concatenate([np.full(len(times_s[name]), k) for k, name in enumerate(names)])
-    index = np.concatenate([np.arange(len(times_s[name])) for name in names])
-    order = np.argsort(every, kind="stable")
-    step = min((np.median(np.diff(t)) for t in times_s.values() if len(t) > 1), default=np.inf)
-    frame = np.cumsum(np.concatenate([[0], np.diff(every[order]) > step / 2]))
-    picture = {name: np.full(frame[-1] + 1, -1) for name in names}
-    for k, name in enumerate(names):
-        mine = camera[order] == k
-        picture[name][frame[mine]] = index[order][mine]
-    total = np.bincount(frame, weights=every[order])
-    first, last = (
-        np.unique(frame, return_index=True)[1],
-        np.searchsorted(frame, np.arange(frame[-1] + 1), "right"),
-    )
-    spread = every[order][last - 1] - every[order][first]
-    return total / np.bincount(frame), picture, float(spread.max())
+    every = np.sort(np.concatenate(list(times_s.values())))
+    usual_steps = [np.median(np.diff(times)) for times in times_s.values() if len(times) > 1]
+    gaps = np.diff(every) > min(usual_steps, default=np.inf) / 2
+    firsts = np.concatenate([[0], np.flatnonzero(gaps) + 1])  # of each frame, in `every`
+    lasts = np.concatenate([firsts[1:], [len(every)]]) - 1
+    picture = {}
+    for name, times in times_s.items():
+        frame = np.searchsorted(every[firsts], times, side="right") - 1
+        picture[name] = np.full(len(firsts), -1)
+        picture[name][frame] = np.arange(len(times))
+    mean_s = np.add.reduceat(every, firsts) / (lasts - firsts + 1)
+    return mean_s, picture, float(np.max(every[lasts] - every[firsts]))
 
 
 def _by_edges(trial: Trial, daq: DaqFile) -> FrameTimes:
-    """Rising edges of a channel of the DAQ, one a frame of every camera."""
-    shown = trial.shown(trial.signals_path.name)
-    edges_s = frame_edges(
-        trial.signals_path, daq, read_daq(trial.signals_path, daq, shown)[TIME], shown
-    )
-    count = _one_count(
-        {camera: frame_count(source) for camera, source in trial.camera_sources.items()}, trial
-    )
+    """Return the rising edges of a channel of the DAQ, one a frame of every camera."""
+    path = trial.signals_path
+    shown = trial.shown(path.name)
+    edges_s = frame_edges(path, daq, read_daq(path, daq, shown)[TIME], shown)
+    count = _one_count(_frame_counts(trial), trial)
     if len(edges_s) != count:
-        found = f"channel {daq.channels['frame_V'].channel} rises {len(edges_s)} times, the cameras have {count} frames"
+        rises = f"channel {daq.channels['frame_V'].channel} rises {len(edges_s)} times"
+        found = f"{rises}, the cameras have {count} frames"
         raise BadInput(f"{found}; there must be an edge a frame", file=shown)
-    picture = {camera: np.arange(count) for camera in trial.camera_sources}
-    doubts = tuple(_header_rates(edges_s, trial, trial.camera_sources, shown))
-    return FrameTimes(edges_s, "edges of a DAQ channel", picture, doubts=doubts)
+    warnings = tuple(_header_warnings(edges_s, trial, trial.camera_sources, shown))
+    picture = _all_pictures(trial, count)
+    return FrameTimes(edges_s, "edges of a DAQ channel", picture, warnings=warnings)
 
 
-def _steady(trial: Trial) -> FrameTimes:
-    """frame_rate_Hz and first_frame_s of trial.toml."""
-    counts = {camera: frame_count(source) for camera, source in trial.camera_sources.items()}
-    count = _one_count(counts, trial)
-    first_s = 0.0 if trial.first_frame_s is None else trial.first_frame_s
-    doubts = (
-        ()
-        if trial.first_frame_s is not None
-        else (
-            Reason(
-                "first_frame_not_stated", f"{_shown(trial)}: first_frame_s is not given; taken as 0"
-            ),
-        )
+def _at_stated_rate(trial: Trial) -> FrameTimes:
+    """Return the times by frame_rate_Hz and first_frame_s of trial.toml."""
+    count = _one_count(_frame_counts(trial), trial)
+    warnings: tuple[str, ...] = ()
+    if trial.first_frame_s is None:
+        line = f"{_shown(trial)}: first_frame_s is not given; taken as 0"
+        warnings = (Reason("first_frame_not_stated", line),)
+    time_s = (trial.first_frame_s or 0.0) + np.arange(count) / trial.frame_rate_Hz
+    return FrameTimes(
+        time_s,
+        "frame_rate_Hz",
+        _all_pictures(trial, count),
+        warnings=warnings,
+        clock_sigma_s=_clock_sigma_s(trial, 1.0 / trial.frame_rate_Hz),
     )
-    picture = {camera: np.arange(count) for camera in counts}
-    time_s = first_s + np.arange(count) / trial.frame_rate_Hz
-    sigma_s = _clock_sigma_s(trial, 1.0 / trial.frame_rate_Hz)
-    return FrameTimes(time_s, "frame_rate_Hz", picture, doubts=doubts, clock_sigma_s=sigma_s)
+
+
+def _in_container(trial: Trial) -> FrameTimes:
+    """Return the times that the video's container states, which may be any clock's."""
+    times_s = {}
+    for camera, source in trial.camera_sources.items():
+        times_s[camera] = _container_times(source, trial)
+    count = _one_count({camera: len(times) for camera, times in times_s.items()}, trial)
+    first = next(iter(trial.camera_sources))
+    video = trial.camera_sources[first].name
+    line = f"{_shown(trial)}: frame times are those of {video}'s container"
+    untied = f"{line}; nothing ties them to the signals' clock"
+    interval_s = float(np.median(np.diff(times_s[first]))) if count > 1 else 0.0
+    return FrameTimes(
+        (trial.first_frame_s or 0.0) + times_s[first],
+        "container",
+        _all_pictures(trial, count),
+        warnings=(Reason("clock_of_container", untied),),
+        clock_sigma_s=_clock_sigma_s(trial, interval_s),
+    )
 
 
 def _clock_sigma_s(trial: Trial, interval_s: float) -> float:
-    """Of frame times that no recorded edge ties to the signals: the first frame's where stated, or half a frame."""
-    stated = trial.first_frame_s is not None and trial.first_frame_sigma_s > 0
-    return trial.first_frame_sigma_s if stated else 0.5 * interval_s
+    """Return the sigma of frame times that no recorded edge ties to the signals.
 
-
-def _from_container(trial: Trial) -> FrameTimes:
-    """The times that the video's container states, which may be any clock's."""
-    times = {
-        camera: _container_times(source, trial) for camera, source in trial.camera_sources.items()
-    }
-    count = _one_count({camera: len(t) for camera, t in times.items()}, trial)
-    first_s = trial.first_frame_s or 0.0
-    camera = next(iter(times))
-    doubt = f"{_shown(trial)}: frame times are those of {trial.camera_sources[camera].name}'s container; "
-    picture = {name: np.arange(count) for name in times}
-    line = doubt + "nothing ties them to the signals' clock"
-    doubts = (Reason("clock_of_container", line),)
-    sigma_s = _clock_sigma_s(trial, float(np.median(np.diff(times[camera]))) if count > 1 else 0.0)
-    return FrameTimes(
-        first_s + times[camera], "container", picture, doubts=doubts, clock_sigma_s=sigma_s
-    )
+    It is the first frame's where stated, else half a frame.
+    """
+    is_stated = trial.first_frame_s is not None and trial.first_frame_sigma_s > 0
+    return trial.first_frame_sigma_s if is_stated else 0.5 * interval_s
 
 
 def _container_times(source: Path, trial: Trial) -> np.ndarray:
+    """Return the times (n,) of a video's container, s. Raise BadInput where there are none."""
     fix = "write frames.csv (frame,time_s), or frame_rate_Hz and first_frame_s into trial.toml"
-    try:
-        found = None if source.is_dir() else Frames.open(source).times_s
-        if found is None:
-            raise BadInput(f"there are no frame times; {fix}", file=trial.shown("frames.csv"))
-        return found
-    except Refused as problem:
-        raise BadInput(
-            f"there are no frame times, and {problem}; {fix}", file=_shown(trial)
-        ) from None
+    found = None
+    if not source.is_dir():
+        try:
+            found = Frames.open(source).times_s
+        except Refused as problem:
+            line = f"there are no frame times, and {problem}; {fix}"
+            raise BadInput(line, file=_shown(trial)) from None
+    if found is None:
+        raise BadInput(f"there are no frame times; {fix}", file=trial.shown("frames.csv"))
+    return found
 
 
 def _read(path: Path, shown: str) -> tuple[NumberTable, int]:
+    """Read a table of frame times; return it and how many repeated rows it had.
+
+    Raises BadInput where times or frame numbers do not increase.
+    """
     table = read_table(path, shown)
     require_columns(table, (FRAME, TIME), shown)
     table, repeats = forward_in_time(table, TIME, shown)
     wrong = np.flatnonzero(np.diff(table[FRAME]) <= 0)
     if len(wrong):
         row = int(table.row[wrong[0] + 1])
-        raise BadInput(
-            "frame numbers must increase, a row a picture", file=shown, row=row, column=FRAME
-        )
+        found = "frame numbers must increase, a row a picture"
+        raise BadInput(found, file=shown, row=row, column=FRAME)
     return table, repeats
 
 
-def _check_count(trial: Trial, camera: str, rows: int, shown: str) -> tuple[str, ...]:
-    """Doubts about a camera's number of frames. Raises BadInput where it is not the number of rows.
+def _count_warnings(trial: Trial, camera: str, rows: int, shown: str) -> tuple[str, ...]:
+    """Return warnings on a camera's number of frames.
 
-    A video that is cut short is the trial's trouble, not the session's: its header still declares the rows,
-    or it does not open at all.
+    Raises BadInput where it is not the number of rows. A video that is cut short is the trial's
+    trouble, not the session's: its header still declares the rows, or it does not open at all.
     """
     source = trial.camera_sources[camera]
+    place = trial.shown(source.name)
     declared = frame_count(source)
     if declared == rows:
         return ()
     if not source.is_dir() and declared == 0:
-        line = f"{trial.shown(source.name)}: the video cannot be opened: truncated or damaged"
+        line = f"{place}: the video cannot be opened: truncated or damaged"
         return (Reason("frames_damaged", line),)
     found = decoded_count(source)
     if found == rows:
-        counts = f"the header declares {counted(declared, 'frame')}, there are {found}"
-        return (Reason("frame_count_unlike_header", f"{trial.shown(source.name)}: {counts}"),)
+        line = f"{place}: the header declares {counted(declared, 'frame')}, there are {found}"
+        return (Reason("frame_count_unlike_header", line),)
     unlike = f"has {counted(rows, 'row')}, camera {camera} has {counted(found, 'frame')}"
     raise BadInput(f"{unlike}; there must be a row a frame", file=shown)
 
 
+def _frame_counts(trial: Trial) -> dict[str, int]:
+    """Return how many frames each camera declares."""
+    return {camera: frame_count(source) for camera, source in trial.camera_sources.items()}
+
+
 def _one_count(counts: Mapping[str, int], trial: Trial) -> int:
+    """Return the number of frames of all cameras. Raise BadInput where it is not the same."""
     if len(set(counts.values())) > 1:
-        found = ", ".join(f"{camera} {count}" for camera, count in counts.items())
+        listed = ", ".join(f"{camera} {count}" for camera, count in counts.items())
+        found = f"the cameras have different numbers of frames ({listed})"
         fix = "record frames.csv or frames_<camera>.csv to say which frames belong together"
-        raise BadInput(
-            f"the cameras have different numbers of frames ({found}); {fix}", file=_shown(trial)
-        )
+        raise BadInput(f"{found}; {fix}", file=_shown(trial))
     return next(iter(counts.values()))
 
 
 def _check_rate(time_s: np.ndarray, trial: Trial, shown: str) -> None:
-    """A stated frame rate must be that of the times, over their longest run without a gap."""
+    """Raise BadInput where a stated frame rate is not that of the times between dropped frames."""
     if trial.frame_rate_Hz is None or len(time_s) < 3:
         return
     usual = _usual_steps(time_s)
-    stated_s, found_s = 1.0 / trial.frame_rate_Hz, float(usual.mean())
+    stated_s = 1.0 / trial.frame_rate_Hz
+    found_s = float(usual.mean())
     if abs(found_s - stated_s) > _RATE_TOLERANCE * stated_s + _CLOCK_STEP_S / len(usual):
-        found = f"frames come at {1 / found_s:.6g} Hz, trial.toml says frame_rate_Hz = {trial.frame_rate_Hz:g}"
+        stated = f"trial.toml says frame_rate_Hz = {trial.frame_rate_Hz:g}"
+        found = f"frames come at {1 / found_s:.6g} Hz, {stated}"
         raise BadInput(f"{found}; mend the wrong one (or take frame_rate_Hz out)", file=shown)
 
 
 def _usual_steps(time_s: np.ndarray) -> np.ndarray:
-    """Steps between frames of which none was dropped, s."""
+    """Return the steps between frames of which none was dropped, s."""
     steps = np.diff(time_s)
     return steps[steps < _DROPPED_STEPS * np.median(steps)]
 
 
-def _header_rates(
+def _header_warnings(
     time_s: np.ndarray, trial: Trial, cameras: Iterable[str], shown: str
 ) -> Iterator[str]:
-    """A line on each video whose header states another rate than the times, where trial.toml does not settle it."""
-    videos = {
-        source.name: source
-        for source in map(trial.camera_sources.get, cameras)
-        if not source.is_dir()
-    }
+    """Yield a line on each video whose header states another rate than the times.
+
+    A rate in trial.toml decides, and there is no such line.
+    """
     if trial.frame_rate_Hz is not None or len(time_s) < 3:
         return
     found_Hz = 1.0 / float(_usual_steps(time_s).mean())
-    for name, source in videos.items():
-        stated_Hz = declared_rate_Hz(source)
+    for source in (trial.camera_sources[camera] for camera in cameras):
+        stated_Hz = 0.0 if source.is_dir() else declared_rate_Hz(source)
         if stated_Hz and abs(stated_Hz / found_Hz - 1.0) > _HEADER_TOLERANCE:
             yield Reason(
                 "rate_unlike_header",
-                f"{shown}: frames come at {found_Hz:.4g} Hz, the header of {name} says {stated_Hz:.4g} Hz; the times "
-                "are taken: where they are right, say so by frame_rate_Hz in trial.toml, or in [trial] of session.toml",
+                f"{shown}: frames come at {found_Hz:.4g} Hz, the header of {source.name} says "
+                f"{stated_Hz:.4g} Hz; the times are taken: where they are right, say so by "
+                "frame_rate_Hz in trial.toml, or in [trial] of session.toml",
             )
 
 
 def _shown(trial: Trial) -> str:
+    """Return how messages name a trial's folder."""
     return f"trials/{trial.name}"

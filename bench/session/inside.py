@@ -1,10 +1,9 @@
 """A session holds folders and regular files, and links that stay within it: nothing else is opened.
 
-Large recordings often lie on another disk: where the user says so, a camera's folder, a picture or a video may be a
-link that leads out. Nothing else may: manifests and tables stay in the session.
+Large recordings often lie on another disk: where the user says so, a camera's folder, a picture or
+a video may be a link that leads out. Nothing else may: manifests and tables stay in the session.
 """
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -15,17 +14,18 @@ from vision.pictures.files import FILM_SUFFIXES, PICTURE_SUFFIXES
 
 _MOST_NAMED = 3  # names in one line
 _FOOTAGE = PICTURE_SUFFIXES | FILM_SUFFIXES
-# Where a camera's folder stands, in parts of the path within the session: boards/<camera>, trials/<trial>/<camera>.
-_CAMERA_AT = {"boards": 2, "trials": 3}
+# Depth of a camera's folder within the session: boards/<camera>, trials/<trial>/<camera>.
+_CAMERA_DEPTH = {"boards": 2, "trials": 3}
+_NOT_REGULAR = "is no regular file (a pipe, socket or device)"
 
 
 def check_inside(session: Path, doubts: Doubts, follow_links: bool = False) -> None:
-    """Refuses what would hang a reader (pipes, sockets, devices) and links that lead out of the session or nowhere.
+    """Refuse entries that would hang a reader, and links that lead out of the session or nowhere.
 
-    follow_links: those of cameras may lead out. Hidden entries are not read, so they are not looked at. Raises
-    BadInput, naming the first ones.
+    Pipes, sockets and devices hang a reader. follow_links: links of cameras may lead out. Hidden
+    entries are not read, and not checked. Raises BadInput, naming the first ones.
     """
-    found = list(_Looking(session.resolve(), follow_links).strange(session, PurePath()))
+    found = list(_Inspection(session.resolve(), follow_links).refused(session, PurePath()))
     with doubts.guard():
         if found:
             more = f", and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
@@ -33,25 +33,27 @@ def check_inside(session: Path, doubts: Doubts, follow_links: bool = False) -> N
 
 
 @dataclass(frozen=True)
-class _Looking:
+class _Inspection:
+    """An inspection of a session's folder. follow_links: links of cameras may lead out."""
+
     session: Path
     follow_links: bool
 
-    def strange(self, folder: Path, shown: PurePath) -> Iterator[str]:
-        """A line on each entry that is not opened. shown: the folder by its path within the session."""
-        with os.scandir(folder) as entries:
-            for entry in sorted(entries, key=lambda e: e.name):
-                path, name = Path(entry.path), shown / entry.name
-                if entry.name.startswith("."):
-                    continue
-                if entry.is_symlink():
-                    yield from self._of_link(path, name)
-                elif entry.is_dir():
-                    yield from self.strange(path, name)
-                elif not entry.is_file():
-                    yield f"{name.as_posix()}: is no regular file (a pipe, socket or device)"
+    def refused(self, folder: Path, shown: PurePath) -> Iterator[str]:
+        """Yield a line on each entry that is not opened. shown: the folder's path in the session."""
+        for path in sorted(folder.iterdir()):
+            name = shown / path.name
+            if path.name.startswith("."):
+                continue
+            if path.is_symlink():
+                yield from self._refused_link(path, name)
+            elif path.is_dir():
+                yield from self.refused(path, name)
+            elif not path.is_file():
+                yield f"{name.as_posix()}: {_NOT_REGULAR}"
 
-    def _of_link(self, path: Path, name: PurePath) -> Iterator[str]:
+    def _refused_link(self, path: Path, name: PurePath) -> Iterator[str]:
+        """Yield a line on a link that is not followed, or on each such entry below it."""
         try:
             target = path.resolve(strict=True)
         except (OSError, RuntimeError):  # RuntimeError: links in a circle, before Python 3.13
@@ -60,30 +62,31 @@ class _Looking:
         if self.session.is_relative_to(target) or path.parent.resolve().is_relative_to(target):
             yield f"{name.as_posix()}: is a link to a folder that holds it"
         elif not (target.is_dir() or target.is_file()):
-            yield f"{name.as_posix()}: is no regular file (a pipe, socket or device)"
+            yield f"{name.as_posix()}: {_NOT_REGULAR}"
         elif not target.is_relative_to(self.session):
-            yield from self._of_link_out(target, name)
+            yield from self._refused_link_out(target, name)
 
-    def _of_link_out(self, target: Path, name: PurePath) -> Iterator[str]:
-        out = f"{name.as_posix()}: is a link that leads out of the session"
+    def _refused_link_out(self, target: Path, name: PurePath) -> Iterator[str]:
+        """Yield a line on a link out of the session, or on each refused entry below it."""
+        found = f"{name.as_posix()}: is a link that leads out of the session"
+        cure = "put the files themselves there"
         if not _is_footage(target, name):
-            yield f"{out}; put the files themselves there"
+            yield f"{found}; {cure}"
         elif not self.follow_links:
-            yield f"{out}; put the files themselves there, or give --follow-links where you know who made it"
+            yield f"{found}; {cure}, or give --follow-links where you know who made it"
         elif target.is_dir():
-            yield from self.strange(target, name)
+            yield from self.refused(target, name)
 
 
 def _is_footage(target: Path, name: PurePath) -> bool:
-    """Whether what a link leads to is read as pictures alone."""
+    """Return whether the target of a link is read as pictures alone."""
     if target.is_dir():
-        return len(name.parts) == _CAMERA_AT.get(name.parts[0])
+        return len(name.parts) == _CAMERA_DEPTH.get(name.parts[0])
     return {name.suffix.lower(), target.suffix.lower()} <= _FOOTAGE
 
 
 def check_outside(out: Path, session: Path, option: str = "--out") -> None:
-    """Raises BadInput where results would be written into the session: it is what was recorded, and stays so."""
+    """Raise BadInput where results would be written into the session, which stays as recorded."""
     if out.resolve().is_relative_to(session.resolve()):
-        raise BadInput(
-            f"{option} {out} lies in the session, which is never written to; give a folder outside of it"
-        )
+        found = f"{option} {out} lies in the session, which is never written to"
+        raise BadInput(f"{found}; give a folder outside of it")

@@ -1,20 +1,42 @@
 """session.toml and trial.toml as people write them: their keys, and what values are plausible.
 
+A key is declared once: its type holds the range of plausible values.
 The comment above a key is what docs/formats.md says of it (`docs/formats.py`); it holds for the
 keys below, too, down to the next comment.
 """
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import msgspec
 
 from bench.session import plausible
 from bench.session.strict_toml import Keys
 
-Row4 = Annotated[list[float], msgspec.Meta(min_length=4, max_length=4)]
-Triple = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
-Pair = Annotated[list[float], msgspec.Meta(min_length=2, max_length=2)]
-Three = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
+# Lists of so many numbers.
+_TWO = msgspec.Meta(min_length=2, max_length=2)
+# Lists of so many numbers.
+_THREE = msgspec.Meta(min_length=3, max_length=3)
+# Lists of so many numbers.
+_FOUR = msgspec.Meta(min_length=4, max_length=4)
+Pair = Annotated[list[float], _TWO]
+Matrix = Annotated[list[Pair], _TWO]
+Row4 = Annotated[list[float], _FOUR]
+Place = Annotated[list[float], _THREE, plausible.PLACE]
+Velocity = Annotated[list[float], _THREE, plausible.VELOCITY]
+Turns = Annotated[list[float], _THREE, plausible.ANGLE]
+Length = Annotated[float, plausible.LENGTH]
+Thickness = Annotated[float, plausible.THICKNESS]
+Width = Annotated[float, plausible.WIDTH]
+Modulus = Annotated[float, plausible.YOUNGS_MODULUS]
+Rigidity = Annotated[float, plausible.RIGIDITY]
+Angle = Annotated[float, plausible.ANGLE]
+Slope = Annotated[float, plausible.SLOPE]
+HalfAngle = Annotated[float, plausible.HALF_ANGLE]
+Speed = Annotated[float, plausible.SPEED]
+Rate = Annotated[float, plausible.RATE]
+Exposure = Annotated[float, plausible.EXPOSURE]
+Force = Annotated[float, plausible.FORCE]
+Filter = Annotated[float, plausible.FILTER]
 
 
 class WhiskerKeys(Keys, kw_only=True):
@@ -24,49 +46,39 @@ class WhiskerKeys(Keys, kw_only=True):
     # `tip_diameter_mm` there
     shape: Literal["cylinder", "cone", "tapered"] = "cylinder"
     # length from the base to the tip
-    length_mm: float
+    length_mm: Length
     length_sigma_mm: float = 0.0
     # diameter at the base
-    diameter_mm: float
+    diameter_mm: Thickness
     diameter_sigma_mm: float = 0.0
     # diameter at `length_mm`; of "tapered", and of no other shape
-    tip_diameter_mm: float | None = None
+    tip_diameter_mm: Thickness | None = None
     # Young's modulus; this, or the rigidity
-    youngs_modulus_GPa: float | None = None
+    youngs_modulus_GPa: Modulus | None = None
     youngs_modulus_sigma_GPa: float = 0.0
     # rigidity E I at the base
-    flexural_rigidity_Nmm2: float | None = None
+    flexural_rigidity_Nmm2: Rigidity | None = None
     flexural_rigidity_sigma_Nmm2: float = 0.0
-
-    windows: ClassVar = {
-        "length_mm": plausible.LENGTH,
-        "diameter_mm": plausible.THICKNESS,
-        "tip_diameter_mm": plausible.THICKNESS,
-        "youngs_modulus_GPa": plausible.YOUNGS_MODULUS,
-        "flexural_rigidity_Nmm2": plausible.RIGIDITY,
-    }
 
 
 class BarKeys(Keys, kw_only=True):
     """[bar] of session.toml."""
 
     # diameter of the round bar that is touched
-    diameter_mm: float
+    diameter_mm: Width
     diameter_sigma_mm: float = 0.0
-
-    windows: ClassVar = {"diameter_mm": plausible.WIDTH}
 
 
 class BoardKeys(Keys, kw_only=True):
     """[board] of session.toml."""
 
     # how many squares [along x, along y]
-    squares: Annotated[list[int], msgspec.Meta(min_length=2, max_length=2)]
+    squares: Annotated[list[int], _TWO]
     # side of a square; all lengths seen depend on it
-    square_mm: float
+    square_mm: Width
     square_sigma_mm: float = 0.0
     # side of a marker, used to find the board alone; its sigma enters nothing
-    marker_mm: float
+    marker_mm: Width
     marker_sigma_mm: float = 0.0
     # OpenCV's name, such as "DICT_5X5_100"
     dictionary: str
@@ -75,18 +87,13 @@ class BoardKeys(Keys, kw_only=True):
     # printed white on black
     inverted: bool = False
 
-    windows: ClassVar = {
-        "square_mm": plausible.WIDTH,
-        "marker_mm": plausible.WIDTH,
-    }
-
 
 class RigKeys(Keys, kw_only=True):
     """[rig] of session.toml."""
 
     # 3 × 4, mm: rig = rows · [board x, y, z, 1] for the board in boards/rig; absent: it is
     # estimated from the free strokes
-    T_rig_board: Annotated[list[Row4], msgspec.Meta(min_length=3, max_length=3)] | None = None
+    T_rig_board: Annotated[list[Row4], _THREE] | None = None
     # standard deviation of each shift
     T_rig_board_sigma_mm: float = 0.0
     # standard deviation of each turn
@@ -100,10 +107,8 @@ class CameraKeys(Keys, kw_only=True):
     name: str
     # exposure, for the record: checked, and otherwise not used; how far the whisker slips meanwhile
     # is seen in its frames
-    exposure_s: float | None = None
+    exposure_s: Exposure | None = None
     exposure_sigma_s: float = 0.0
-
-    windows: ClassVar = {"exposure_s": plausible.EXPOSURE}
 
 
 class GaugeKeys(Keys, kw_only=True):
@@ -113,10 +118,8 @@ class GaugeKeys(Keys, kw_only=True):
     offset_V: Pair
     offset_sigma_V: Pair | None = None
     # [m_y, m_z] in the follicle's axes = matrix · ([y_V, z_V] − offset)
-    matrix_Nmm_per_V: Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)]
-    matrix_sigma_Nmm_per_V: (
-        Annotated[list[Pair], msgspec.Meta(min_length=2, max_length=2)] | None
-    ) = None
+    matrix_Nmm_per_V: Matrix
+    matrix_sigma_Nmm_per_V: Matrix | None = None
 
 
 class ChannelNames(Keys, kw_only=True):
@@ -140,23 +143,17 @@ class ArrayWhiskerKeys(WhiskerKeys, kw_only=True):
     # its own name; letters, digits, `_`, `-`, `.`
     name: str
     # [x, y, z] of its base in the rig frame
-    base_mm: Three
+    base_mm: Place
     base_sigma_mm: float = 0.0
     # its base frame, turned about the rig's x, then y, then z ([0, 0, 0]): z is the axis that it
     # turns about, x the whisker at motor angle 0
-    base_deg: Three = msgspec.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    base_deg: Turns = msgspec.field(default_factory=lambda: [0.0, 0.0, 0.0])
     base_sigma_deg: float = 0.0
     # the table `[whiskers.gauges]`, with the keys of `[gauges]`
     gauges: GaugeKeys | None = None
     # the table `[whiskers.channels]`; left out: `y_V@<name>` and so on in signals.csv, and
     # `motor_deg` for all, where there is no `motor_deg@<name>`
     channels: ChannelNames = ChannelNames()
-
-    windows: ClassVar = WhiskerKeys.windows | {
-        "base_mm": plausible.PLACE,
-        "base_deg": plausible.ANGLE,
-    }
-    tables: ClassVar = {"gauges": GaugeKeys, "channels": ChannelNames}
 
 
 class ObjectKeys(Keys, kw_only=True):
@@ -165,22 +162,16 @@ class ObjectKeys(Keys, kw_only=True):
     # "bar" (default), "ring": a bar bent to a circle, "sphere" or "cone"
     shape: Literal["bar", "ring", "sphere", "cone"] = "bar"
     # [x, y, z] of the bar's axis anywhere, the centre, or the cone's tip; left out: not known
-    point_mm: Three | None = None
+    point_mm: Place | None = None
     point_sigma_mm: float = 0.0
     # with `point_mm`: the bar's direction, the normal of the ring's plane, or where the cone points
     # ([0, 0, 1])
-    axis: Three | None = None
+    axis: Annotated[list[float], _THREE] | None = None
     # diameter of the circle that the ring's axis is
-    ring_diameter_mm: float | None = None
+    ring_diameter_mm: Length | None = None
     # angle of the cone between its axis and its surface. `bar_diameter_mm` then is twice its radius
     # across, along its normal, where it is touched; nothing of the cloud asks for it
-    half_angle_deg: float | None = None
-
-    windows: ClassVar = {
-        "point_mm": plausible.PLACE,
-        "ring_diameter_mm": plausible.LENGTH,
-        "half_angle_deg": plausible.HALF_ANGLE,
-    }
+    half_angle_deg: HalfAngle | None = None
 
 
 class TrialKeys(Keys, kw_only=True):
@@ -190,28 +181,28 @@ class TrialKeys(Keys, kw_only=True):
     surface: str = ""
     # nominal speed of the motor; a warning is given where signals say another; its sigma enters
     # nothing
-    speed_deg_s: float | None = None
+    speed_deg_s: Speed | None = None
     speed_sigma_deg_s: float = 0.0
     # nominal slope; where the slope is seen that one counts, and a warning is given where the two
     # differ by more than their sigmas allow
-    beta_deg: float | None = None
+    beta_deg: Slope | None = None
     beta_sigma_deg: float = 0.0
     # nominal distance; where it is seen that one counts
-    d_x_mm: float | None = None
+    d_x_mm: Length | None = None
     d_x_sigma_mm: float = 0.0
     # diameter of the bar where it differs from the session's (paper wrapped round it)
-    bar_diameter_mm: float | None = None
+    bar_diameter_mm: Width | None = None
     bar_diameter_sigma_mm: float = 0.0
     # "measure" (default), "gauge" (calibrates the gauges), "weight" (a force hung on the whisker)
     purpose: Literal["measure", "gauge", "weight"] = "measure"
     # force of a weight, along rig −z
-    force_N: float | None = None
+    force_N: Force | None = None
     force_sigma_N: float = 0.0
     # where the weight hangs, from the base
-    at_mm: float | None = None
+    at_mm: Length | None = None
     at_sigma_mm: float = 0.0
     # gives the times of frames where no file has them; its sigma enters nothing
-    frame_rate_Hz: float | None = None
+    frame_rate_Hz: Rate | None = None
     frame_rate_sigma_Hz: float = 0.0
     # time of frame 0 on the signals' clock; the sigma enters the touch seen
     first_frame_s: float | None = None
@@ -219,37 +210,22 @@ class TrialKeys(Keys, kw_only=True):
     # −3 dB of the low-pass between gauges and converter, taken as a Butterworth of fourth order; 0:
     # none. Its delay is taken out of touch felt. Left out: the paper's 800 Hz, and any delay from
     # none to twice as much is in the sigma
-    gauge_filter_Hz: float | None = None
+    gauge_filter_Hz: Filter | None = None
     # true: each way back is evaluated, too, and with the way there ([moving.md](moving.md))
     both_ways: bool = False
     # [x, y, z] in the rig frame of an object that moves at constant speed, and one sigma each way;
     # left out: it stands ([moving.md](moving.md))
-    object_velocity_mm_s: Triple | None = None
+    object_velocity_mm_s: Velocity | None = None
     object_velocity_sigma_mm_s: float = 0.0
     # true: the object stands until it is touched, gives way as it is pushed, and comes back; how
     # far is fitted to the pictures ([soft.md](soft.md))
     object_gives_way: bool = False
     # how far the follicle is turned about the whisker (+x)
-    follicle_roll_deg: float = 0.0
+    follicle_roll_deg: Angle = 0.0
     follicle_roll_sigma_deg: float = 0.0
     # the table `[object]` (`[trial.object]` in session.toml): what the object is, and where it
     # stands, which arrays are judged by
     object: ObjectKeys | None = None
-
-    tables: ClassVar = {"object": ObjectKeys}
-    windows: ClassVar = {
-        "speed_deg_s": plausible.SPEED,
-        "beta_deg": plausible.SLOPE,
-        "d_x_mm": plausible.LENGTH,
-        "bar_diameter_mm": BarKeys.windows["diameter_mm"],
-        "force_N": plausible.FORCE,
-        "at_mm": plausible.LENGTH,
-        "frame_rate_Hz": plausible.RATE,
-        "first_frame_s": plausible.CLOCK,
-        "gauge_filter_Hz": plausible.FILTER,
-        "object_velocity_mm_s": plausible.VELOCITY,
-        "follicle_roll_deg": plausible.ANGLE,
-    }
 
 
 class ChannelKeys(Keys, kw_only=True):
@@ -268,7 +244,7 @@ class SignalKeys(Keys, kw_only=True):
     # a TDMS channel is group/channel
     file: str
     # where no channel holds the times; the first sample is at 0 s
-    rate_Hz: float | None = None
+    rate_Hz: Rate | None = None
     # times in seconds
     time_s: ChannelKeys | None = None
     # the motor's angle
@@ -286,23 +262,6 @@ class SignalKeys(Keys, kw_only=True):
     # each rising edge through the middle of its range is a frame of every camera, where there is no
     # frames.csv
     frame_V: ChannelKeys | None = None
-
-    windows: ClassVar = {"rate_Hz": plausible.RATE}
-    tables: ClassVar = dict.fromkeys(
-        (
-            "time_s",
-            "motor_deg",
-            "y_V",
-            "z_V",
-            "m_y_Nmm",
-            "m_z_Nmm",
-            "f_x_N",
-            "f_y_N",
-            "f_z_N",
-            "frame_V",
-        ),
-        ChannelKeys,
-    )
 
 
 class SessionKeys(Keys, kw_only=True):
@@ -326,24 +285,10 @@ class SessionKeys(Keys, kw_only=True):
     signals: SignalKeys | None = None
     trial: TrialKeys = TrialKeys()
 
-    tables: ClassVar = {
-        "whisker": WhiskerKeys,
-        "whiskers": ArrayWhiskerKeys,
-        "bar": BarKeys,
-        "board": BoardKeys,
-        "rig": RigKeys,
-        "cameras": CameraKeys,
-        "gauges": GaugeKeys,
-        "signals": SignalKeys,
-        "trial": TrialKeys,
-    }
-
 
 def sigma_key(key: str) -> str:
-    """The key of a value's standard deviation, or '' for a key that has none: 'd_x_mm' -> 'd_x_sigma_mm'."""
-    names = (
-        n
-        for n in TrialKeys.__struct_fields__
-        if "_sigma_" in n and n.replace("_sigma_", "_") == key
-    )
-    return next(names, "")
+    """Return the key of a value's standard deviation: 'd_x_mm' -> 'd_x_sigma_mm'; '' without one."""
+    for name in TrialKeys.__struct_fields__:
+        if "_sigma_" in name and name.replace("_sigma_", "_") == key:
+            return name
+    return ""

@@ -1,4 +1,4 @@
-"""Plausibility windows: a value far outside is refused, with a guess at its unit that is never applied."""
+"""Plausible ranges: a value outside is refused, with a guess at its unit that is never applied."""
 
 import math
 from dataclasses import dataclass
@@ -7,74 +7,77 @@ from bench.base.errors import BadInput
 
 DEGREES_PER_RADIAN = 180.0 / math.pi
 
-METRES, MICROMETRES = ("metres", 1e3), ("micrometres", 1e-3)
-PASCALS, MEGAPASCALS = ("pascals", 1e-9), ("megapascals", 1e-3)
-MILLISECONDS, MICROSECONDS = ("milliseconds", 1e-3), ("microseconds", 1e-6)
+METRES = ("metres", 1e3)
+MICROMETRES = ("micrometres", 1e-3)
+PASCALS = ("pascals", 1e-9)
+MEGAPASCALS = ("megapascals", 1e-3)
+MILLISECONDS = ("milliseconds", 1e-3)
+MICROSECONDS = ("microseconds", 1e-6)
 MILLIVOLTS = ("millivolts", 1e-3)
 
 _PROTRACTOR_DEG = 5.0  # °: what people set slopes in
 
 
 @dataclass(frozen=True)
-class Window:
-    """`low` to `high` is taken; beyond, `units` are tried: (name, factor to the key's own unit)."""
+class PlausibleRange:
+    """The range of values that a key may have, and the units that a value beyond it may be in.
+
+    low, high: limits in the key's own unit. units: (name, factor to the key's own unit) of each.
+    """
 
     low: float
     high: float
     units: tuple[tuple[str, float], ...] = ()
 
     def holds(self, value: float) -> bool:
-        """Whether the value is finite and within."""
+        """Return whether the value is finite and within the limits."""
         return math.isfinite(value) and self.low <= value <= self.high
 
     @property
     def allowed(self) -> str:
-        """The window in words."""
-        return (
-            f"{self.low:g} or more"
-            if self.high == math.inf
-            else f"from {self.low:g} to {self.high:g}"
-        )
+        """Return the limits in words."""
+        if self.high == math.inf:
+            return f"{self.low:g} or more"
+        return f"from {self.low:g} to {self.high:g}"
 
     def guess(self, value: float) -> str:
-        """' Is it in metres? Then write 100.' or nothing."""
+        """Return ' Is it in metres? Then write 100.', or nothing where no unit explains it."""
         for name, factor in self.units:
             if self.holds(value * factor):
                 return f" Is it in {name}? Then write {value * factor:.6g}."
         return ""
 
     def check(self, value: float, name: str, file: str) -> None:
-        """Raises BadInput where the value is outside."""
+        """Raise BadInput where the value is outside."""
         if not self.holds(value):
-            raise BadInput(
-                f"{name} is {value:g}; {self.allowed} is allowed.{self.guess(value)}", file=file
-            )
+            found = f"{name} is {value:g}; {self.allowed} is allowed.{self.guess(value)}"
+            raise BadInput(found, file=file)
 
 
-LENGTH = Window(1.0, 5000.0, (METRES, MICROMETRES))
-PLACE = Window(-5000.0, 5000.0, (MICROMETRES,))
-THICKNESS = Window(0.01, 30.0, (METRES, MICROMETRES))
-WIDTH = Window(0.1, 500.0, (METRES, MICROMETRES))
-YOUNGS_MODULUS = Window(1e-3, 1500.0, (PASCALS, MEGAPASCALS))
-RIGIDITY = Window(1e-4, 1e8, (("N m2", 1e6),))
-ANGLE = Window(-360.0, 360.0)
-SLOPE = Window(-90.0, 90.0)
-HALF_ANGLE = Window(0.1, 85.0)
-SPEED = Window(1e-3, 1e5)
-RATE = Window(1e-2, 1e6)
-FILTER = Window(0.0, 1e6)
-CLOCK = Window(-1e7, 1e7)
-EXPOSURE = Window(1e-7, 1.0, (MILLISECONDS, MICROSECONDS))
-VELOCITY = Window(-1e4, 1e4, (("metres per second", 1e3),))
-FORCE = Window(0.0, 1e3)
-SIGMA = Window(0.0, math.inf)
+LENGTH = PlausibleRange(1.0, 5000.0, (METRES, MICROMETRES))
+PLACE = PlausibleRange(-5000.0, 5000.0, (MICROMETRES,))
+THICKNESS = PlausibleRange(0.01, 30.0, (METRES, MICROMETRES))
+WIDTH = PlausibleRange(0.1, 500.0, (METRES, MICROMETRES))
+YOUNGS_MODULUS = PlausibleRange(1e-3, 1500.0, (PASCALS, MEGAPASCALS))
+RIGIDITY = PlausibleRange(1e-4, 1e8, (("N m2", 1e6),))
+ANGLE = PlausibleRange(-360.0, 360.0)
+SLOPE = PlausibleRange(-90.0, 90.0)
+HALF_ANGLE = PlausibleRange(0.1, 85.0)
+SPEED = PlausibleRange(1e-3, 1e5)
+RATE = PlausibleRange(1e-2, 1e6)
+FILTER = PlausibleRange(0.0, 1e6)
+NUMBER = PlausibleRange(-1e7, 1e7)
+EXPOSURE = PlausibleRange(1e-7, 1.0, (MILLISECONDS, MICROSECONDS))
+VELOCITY = PlausibleRange(-1e4, 1e4, (("metres per second", 1e3),))
+FORCE = PlausibleRange(0.0, 1e3)
+SIGMA = PlausibleRange(0.0, math.inf)
 
 
 def looks_like_radians(angle_deg: float) -> bool:
-    """Whether an angle in degrees is one that a protractor shows (a multiple of 5°), but written in radians.
+    """Return whether an angle in degrees is one that a protractor shows, but written in radians.
 
-    An honest angle below 90 rad·(π/180) that is no round number in degrees meets this by chance in 1 of 250
-    cases.
+    A protractor shows multiples of 5°. An angle below 90 rad·(π/180) that is given in degrees, and
+    is no round number there, meets this by chance in 1 of 250 cases.
     """
     in_degrees = angle_deg * DEGREES_PER_RADIAN
     off_protractor = abs(in_degrees - _PROTRACTOR_DEG * round(in_degrees / _PROTRACTOR_DEG))

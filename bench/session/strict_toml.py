@@ -1,41 +1,40 @@
-"""TOML files of people: every unknown key named with the one likely meant, every type and value checked."""
+"""TOML files of people: every unknown key is named with the one probably meant, every value checked.
+
+A file is declared as a tree of `Keys`: the type of a key says what it holds, the range of plausible
+values (`Annotated[float, PlausibleRange(...)]`), or that it is a table of its own.
+"""
 
 import difflib
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, ClassVar, get_args, get_type_hints
+from typing import Any, TypeAlias, get_args, get_origin, get_type_hints
 
 import msgspec
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.session import plausible
+from bench.session.text_files import check_size, read_text
 
-_MOST_BYTES = 1 << 22  # a thousand times what people write
+# [bytes] Largest file that is read: a thousand times what people write.
+_MOST_BYTES = 1 << 22
+# Keys that people set by a protractor, and may write in radians.
+_SET_BY_PROTRACTOR = ("beta_deg", "follicle_roll_deg")
+# The names of the tables that lead to one, outermost first; a list of tables ends in [].
+TablePath: TypeAlias = tuple[str, ...]
 
 
-class Keys(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """One table of a file. `windows`: what is plausible for its keys; `tables`: the tables within it, by name."""
-
-    windows: ClassVar[dict[str, plausible.Window]] = {}
-    tables: ClassVar[dict[str, type["Keys"]]] = {}
+class Keys(msgspec.Struct, frozen=True):
+    """A table of a file: its keys with their types and defaults."""
 
 
 def read_toml(path: Path, shown: str) -> dict[str, Any]:
-    """The tables of a TOML file. Raises BadInput, naming the file as `shown`, where it is not one."""
-    if path.stat().st_size > _MOST_BYTES:
-        raise BadInput(
-            f"has more than {_MOST_BYTES >> 20} MB; a few lines are expected", file=shown
-        )
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as problem:
-        raise BadInput(f"cannot be read ({problem.strerror})", file=shown) from None
-    except UnicodeDecodeError:
-        raise BadInput("is not UTF-8 text; save it as UTF-8", file=shown) from None
+    """Return the tables of a TOML file. Raise BadInput, naming it as `shown`, where it is not one."""
+    check_size(path, _MOST_BYTES, "a few lines are expected", shown)
+    text = read_text(path, "save it as UTF-8", shown)
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as problem:
@@ -45,6 +44,7 @@ def read_toml(path: Path, shown: str) -> dict[str, Any]:
 
 
 def _bad_toml(problem: str, text: str, shown: str) -> BadInput:
+    """Return the error of a text that is not TOML, with its line."""
     place = re.search(r"line (\d+)", problem)
     if not place:
         return BadInput(f"is not TOML: {problem}", file=shown)
@@ -58,153 +58,182 @@ def _bad_toml(problem: str, text: str, shown: str) -> BadInput:
 def as_keys(
     tables: dict[str, Any], kind: type[Keys], shown: str, doubts: Doubts, needed: Sequence[str] = ()
 ) -> Keys:
-    """Check tables against `kind`: names, types, plausible values. Raises BadInput with the key's path.
+    """Check a file's tables against `kind`: names, types, plausible values. Return them as `kind`.
 
-    needed: tables that must be there.
-
-    With a collecting `doubts` every key that is unknown, missing or implausible is kept there; unknown ones are left
-    out.
+    needed: tables that must be there. Raises BadInput with the key's path. A collecting `doubts`
+    keeps every key that is unknown, missing or implausible; unknown ones are left out.
     """
-    without = (f"[{name}] is missing" for name in needed if name not in tables)
-    for line in (*_unknown_keys(tables, kind, top=kind), *without, *_missing_keys(tables, kind)):
+    absent = [f"[{name}] is missing" for name in needed if name not in tables]
+    for line in (*_unknown_keys(tables, kind), *absent, *_missing_keys(tables, kind)):
         with doubts.guard():
             raise BadInput(line, file=shown)
     try:
-        keys = msgspec.convert(_only_keys_of(tables, kind), kind, strict=True)
+        keys = msgspec.convert(tables, kind, strict=True)
     except msgspec.ValidationError as problem:
         raise BadInput(_in_plain_words(str(problem), kind), file=shown) from None
-    doubts.each(_value_checks(keys, "", shown))
+    doubts.each(_value_checks(tables, kind, shown))
     return keys
 
 
 def values(keys: Keys, leave_out: tuple[str, ...] = ()) -> dict[str, Any]:
-    """A table's values by key."""
+    """Return a table's values by key."""
     return {name: getattr(keys, name) for name in keys.__struct_fields__ if name not in leave_out}
 
 
-def _value_checks(keys: Keys, table: str, shown: str) -> Iterator[Callable[[], None]]:
-    """A check of each value, tables within included."""
-    for name in keys.__struct_fields__:
-        value = getattr(keys, name)
-        if name in keys.tables:
-            listed = isinstance(value, tuple)
-            for inner in value if listed else [value] if value else []:
-                yield from _value_checks(inner, f"[[{name}]] " if listed else f"[{name}] ", shown)
-        elif value is not None:
-            yield partial(_check_value, value, name, keys.windows.get(name), table, shown)
+@lru_cache
+def plausible_ranges(kind: type[Keys]) -> dict[str, plausible.PlausibleRange]:
+    """Return the ranges of plausible values that a table declares, by key."""
+    return _declared(kind, lambda part: isinstance(part, plausible.PlausibleRange))
 
 
-def _check_value(
-    value: Any, name: str, window: plausible.Window | None, table: str, shown: str
-) -> None:
-    if "_sigma_" in name:
-        window = plausible.SIGMA
-    for number in _numbers(value):
-        (window or plausible.CLOCK).check(number, table + name, shown)
-    if name in ("beta_deg", "follicle_roll_deg") and plausible.looks_like_radians(value):
-        degrees = value * plausible.DEGREES_PER_RADIAN
-        raise BadInput(
-            f"{table}{name} is {value:g}. Is it in radians? Then write {degrees:.4g}.", file=shown
-        )
+@lru_cache
+def inner_tables(kind: type[Keys]) -> dict[str, type[Keys]]:
+    """Return the kinds of the tables within a table, by key."""
+    return _declared(kind, lambda part: isinstance(part, type) and issubclass(part, Keys))
 
 
-def _numbers(value: Any) -> list[float]:
-    if isinstance(value, list):
-        return [number for item in value for number in _numbers(item)]
-    return [float(value)] if isinstance(value, int | float) and not isinstance(value, bool) else []
+def _declared(kind: type[Keys], is_wanted: Callable[[Any], bool]) -> dict[str, Any]:
+    """Return the first wanted part of each key's type, by key; keys without one are left out."""
+    found = {}
+    for field in msgspec.structs.fields(kind):
+        for part in filter(is_wanted, _parts(field.type)):
+            found.setdefault(field.name, part)
+    return found
 
 
-def _unknown_keys(
-    value: Any, kind: type[Keys], top: type[Keys], path: tuple[str, ...] = ()
-) -> Iterator[str]:
-    """A line for each key of a table, or of a list of tables, that is none of `kind`'s; tables within included."""
-    for table in value if isinstance(value, list) else [value]:
-        for key, inner in table.items() if isinstance(table, dict) else ():
-            if key not in kind.__struct_fields__:
-                yield f"{_key_path([*path, key])} is not a key of this file; {_meant(key, kind, top)}"
-            elif key in kind.tables:
-                name = f"{key}[]" if isinstance(inner, list) else key
-                yield from _unknown_keys(inner, kind.tables[key], top, (*path, name))
+def _parts(annotation: Any) -> Iterator[Any]:
+    """Yield a type and what it is made of. The keys of a dict are free, so it is no table."""
+    yield annotation
+    if get_origin(annotation) is not dict:
+        for part in get_args(annotation):
+            yield from _parts(part)
 
 
-def _missing_keys(value: Any, kind: type[Keys], path: tuple[str, ...] = ()) -> Iterator[str]:
-    """A line for each key that `kind` needs and a table, or one of a list of tables, lacks; tables within included."""
+def _tables(
+    value: Any, kind: type[Keys], path: TablePath = ()
+) -> Iterator[tuple[dict[str, Any], type[Keys], TablePath]]:
+    """Yield a table, or each of a list of tables, and all tables within, with their kinds and paths."""
     for table in value if isinstance(value, list) else [value]:
         if not isinstance(table, dict):
             continue
+        yield table, kind, path
+        for key, inner in table.items():
+            if key in inner_tables(kind):
+                name = f"{key}[]" if isinstance(inner, list) else key
+                yield from _tables(inner, inner_tables(kind)[key], (*path, name))
+
+
+def _unknown_keys(tables: dict[str, Any], top: type[Keys]) -> Iterator[str]:
+    """Yield a line for each key that its table does not have."""
+    for table, kind, path in _tables(tables, top):
+        for key in table:
+            if key not in kind.__struct_fields__:
+                place = _key_path([*path, key])
+                yield f"{place} is not a key of this file; {_probably_meant(key, kind, top)}"
+
+
+def _missing_keys(tables: dict[str, Any], top: type[Keys]) -> Iterator[str]:
+    """Yield a line for each key that a table needs and lacks."""
+    for table, kind, path in _tables(tables, top):
         for field in msgspec.structs.fields(kind):
             if field.required and field.name not in table:
                 yield f"{_key_path([*path, field.name])} is missing"
-        for key in filter(kind.tables.__contains__, table):
-            name = f"{key}[]" if isinstance(table[key], list) else key
-            yield from _missing_keys(table[key], kind.tables[key], (*path, name))
 
 
-def _only_keys_of(value: Any, kind: type[Keys] | None) -> Any:
-    """A table, or a list of tables, without its unknown keys; anything else as it is."""
-    if kind and isinstance(value, list):
-        return [_only_keys_of(item, kind) for item in value]
-    if kind and isinstance(value, dict):
-        return {
-            k: _only_keys_of(v, kind.tables.get(k))
-            for k, v in value.items()
-            if k in kind.__struct_fields__
-        }
-    return value
+def _value_checks(
+    tables: dict[str, Any], top: type[Keys], shown: str
+) -> Iterator[Callable[[], None]]:
+    """Yield a check of each value, tables within included."""
+    for table, kind, path in _tables(tables, top):
+        for key, value in table.items():
+            if key not in kind.__struct_fields__:
+                continue
+            if "_sigma_" in key:
+                plausible_range = plausible.SIGMA
+            else:
+                plausible_range = plausible_ranges(kind).get(key, plausible.NUMBER)
+            yield partial(_check_value, value, key, plausible_range, path[-1:], shown)
 
 
-def _meant(key: str, kind: type[Keys], top: type[Keys]) -> str:
-    """Which key was likely meant: a like one of this table, the same one of another table, or any."""
+def _check_value(
+    value: Any, key: str, plausible_range: plausible.PlausibleRange, path: TablePath, shown: str
+) -> None:
+    """Raise BadInput where a value, or a number of its lists, is not plausible."""
+    name = _key_path([*path, key])
+    for number in _numbers(value):
+        plausible_range.check(number, name, shown)
+    if key in _SET_BY_PROTRACTOR and plausible.looks_like_radians(value):
+        degrees = value * plausible.DEGREES_PER_RADIAN
+        found = f"{name} is {value:g}. Is it in radians? Then write {degrees:.4g}."
+        raise BadInput(found, file=shown)
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    """Yield the numbers of a value that is one, or of its lists; nothing for anything else."""
+    if isinstance(value, list):
+        for item in value:
+            yield from _numbers(item)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield float(value)
+
+
+def _probably_meant(key: str, kind: type[Keys], top: type[Keys]) -> str:
+    """Return which key was meant: one like it, the same one of another table, or which there are."""
     allowed = kind.__struct_fields__
     if near := difflib.get_close_matches(key, allowed, n=1, cutoff=0.6):
         return f"did you mean {near[0]!r}?"
-    if homes := [
-        f"[{name}]" for name, table in top.tables.items() if key in table.__struct_fields__
-    ]:
+    tables = inner_tables(top).items()
+    if homes := [f"[{name}]" for name, table in tables if key in table.__struct_fields__]:
         return f"it belongs in {' or '.join(homes)}."
     return f"allowed are {', '.join(name for name in allowed if '_sigma_' not in name)}."
 
 
 def _in_plain_words(problem: str, kind: type[Keys]) -> str:
-    """msgspec's message with the key's path as in the file; kind: of the whole file."""
+    """Return msgspec's message with the key's path as in the file; kind: of the whole file."""
     what, _, place = problem.partition(" - at `$")
     path = [part for part in re.split(r"[.`]", place) if part]
     if missing := re.match(r"Object missing required field `(.*)`", what):
         return f"{_key_path([*path, missing.group(1)])} is missing"
     if choice := re.match(r"Invalid enum value (.*)", what):
-        return f"{_key_path(path)}: {choice.group(1)} is none of its values; allowed are {_choices(path, kind)}"
+        found = f"{choice.group(1)} is none of its values"
+        return f"{_key_path(path)}: {found}; allowed are {_choices(path, kind)}"
     return f"{_key_path(path)}: {_what_is_wrong(what)}"
 
 
 def _choices(path: list[str], kind: type[Keys]) -> str:
-    """The values of a key that has a few."""
+    """Return the values of a key that has a few, as text."""
     *tables, key = path
     for table in tables:
-        kind = kind.tables[re.sub(r"\[.*", "", table)]
+        kind = inner_tables(kind)[re.sub(r"\[.*", "", table)]
     return ", ".join(map(repr, get_args(get_type_hints(kind)[key])))
 
 
+_TOML_WORDS = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "text",
+    "bool": "true or false",
+    "null": "nothing",
+}
+
+
 def _what_is_wrong(what: str) -> str:
-    """msgspec's "Expected `float | null`, got `str`" in the words of a person who writes TOML."""
-    words = {
-        "float": "a number",
-        "int": "a whole number",
-        "str": "text",
-        "bool": "true or false",
-        "null": "nothing",
-    }
-    found = re.sub(
-        r"`([^`]*)`", lambda m: words.get(m.group(1).removesuffix(" | null"), m.group(1)), what
-    )
+    """Return msgspec's "Expected `float | null`, got `str`" in the words of who writes TOML."""
+
+    def in_words(match: re.Match) -> str:
+        return _TOML_WORDS.get(match.group(1).removesuffix(" | null"), match.group(1))
+
+    found = re.sub(r"`([^`]*)`", in_words, what)
     return found.replace("Expected", "expected").replace("got", "found")
 
 
-def _key_path(path: list[str]) -> str:
-    """['board', 'square_mm'] -> '[board] square_mm'; ['cameras[]', 'name'] -> '[[cameras]] name'."""
+def _key_path(path: Sequence[str]) -> str:
+    """Return ['board', 'square_mm'] as '[board] square_mm', ['cameras[]', 'name'] as '[[cameras]] name'."""
     *tables, key = path
-    return " ".join([*(_table(name) for name in tables), key])
+    return " ".join([*map(_header, tables), key])
 
 
-def _table(name: str) -> str:
-    listed = re.fullmatch(r"(\w+)\[[\d.]*\]", name)
-    return f"[[{listed.group(1)}]]" if listed else f"[{name}]"
+def _header(table: str) -> str:
+    """Return the line that begins a table: 'rig' as '[rig]', 'cameras[0]' as '[[cameras]]'."""
+    listed = re.fullmatch(r"(\w+)\[[\d.]*\]", table)
+    return f"[[{listed.group(1)}]]" if listed else f"[{table}]"

@@ -3,113 +3,106 @@
 import csv
 import difflib
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bench.base.errors import BadInput
+from bench.session.text_files import check_size, decode, read_text
 from vision.geometry.counted import counted
 
-_MOST_BYTES = 1 << 29  # two hours at 2 kHz, which as text and numbers fill 4 GB of memory
+# [bytes] Two hours at 2 kHz, which as text and numbers fill 4 GB of memory.
+_MOST_BYTES = 1 << 29
+_EXPORT = "export it as CSV, UTF-8"
+_SEPARATORS = {";": "semicolons", "\t": "tabs"}
 
 
 @dataclass(frozen=True)
 class NumberTable:
-    """columns: name to array (n,); row: the file's row of each entry (the header is row 1), (n,)."""
+    """A table of numbers.
+
+    columns: name to array (n,); row: the file's row of each entry (the header is row 1), (n,).
+    """
 
     columns: dict[str, np.ndarray]
     row: np.ndarray
 
     def __getitem__(self, name: str) -> np.ndarray:
+        """Return a column."""
         return self.columns[name]
 
     def __len__(self) -> int:
+        """Return the number of entries."""
         return len(self.row)
 
     def keep(self, kept: np.ndarray) -> "NumberTable":
-        """The entries where `kept` (n,) is true."""
-        return NumberTable(
-            {name: values[kept] for name, values in self.columns.items()}, self.row[kept]
-        )
+        """Return the entries where `kept` (n,) is true."""
+        columns = {name: values[kept] for name, values in self.columns.items()}
+        return NumberTable(columns, self.row[kept])
 
 
 def read_table(path: Path, shown: str, only: Collection[str] | None = None) -> NumberTable:
-    """The columns of a comma-separated file of finite numbers: all, or those of `only` that are there, which is as fast
-    as they are few. A byte-order mark and CRLF are taken.
+    """Read the columns of a comma-separated file of finite numbers.
 
-    Raises BadInput, naming the file as `shown`: semicolons, tabs, decimal commas, text, an empty cell or row,
-    NaN, infinity, a row too short or too long, no rows at all.
+    only: names of the columns wanted, of which those that are there are read; None: all. A
+    byte-order mark and CRLF are taken. Raises BadInput, naming the file as `shown`: semicolons,
+    tabs, decimal commas, text, an empty cell or row, NaN, infinity, a row too short or too long, no
+    rows at all.
     """
     lines = _lines(path, shown)
-    names = _header(lines, shown)
+    names = _column_names(lines[0], shown)
     if len(lines) < 2:
         raise BadInput(f"has a header and no rows ({','.join(names)})", file=shown)
     chosen = [k for k, name in enumerate(names) if only is None or name in only]
-    values = _fast(lines[1:], len(names), chosen)
+    values = _read_at_once(lines[1:], len(names), chosen)
     if values is None:
-        values = _row_by_row(lines[1:], names, shown)[:, chosen]
-    return NumberTable(
-        {names[k]: column for k, column in zip(chosen, values.T)}, np.arange(2, len(values) + 2)
-    )
+        values = _read_row_by_row(lines[1:], names, shown)[:, chosen]
+    columns = {names[k]: column for k, column in zip(chosen, values.T)}
+    return NumberTable(columns, np.arange(2, len(values) + 2))
 
 
 def column_names(path: Path, shown: str) -> list[str]:
-    """Of a CSV file's first line, which alone is read. Raises BadInput as `read_table` does."""
+    """Read the names of a CSV file's columns. Raises BadInput as `read_table` does."""
     with path.open("rb") as file:
         first = file.readline(_MOST_BYTES)
-    try:
-        return _header([first.decode("utf-8-sig").rstrip("\r\n")], shown)
-    except UnicodeDecodeError:
-        raise BadInput("is not UTF-8 text; export it as CSV, UTF-8", file=shown) from None
+    return _column_names(decode(first, _EXPORT, shown).rstrip("\r\n"), shown)
 
 
 def forward_in_time(table: NumberTable, time: str, shown: str) -> tuple[NumberTable, int]:
-    """The table without rows that repeat the one before them, and how many those were.
+    """Drop the rows that repeat the one before them; return the table and how many those were.
 
     Raises BadInput where time goes back, or stands still while another value changes.
     """
-    values = np.column_stack(list(table.columns.values()))
+    values = np.column_stack(list(table.columns.values()))  # (n, columns)
     repeats = np.concatenate([[False], (np.diff(values, axis=0) == 0).all(axis=1)])
     table = table.keep(~repeats)
     wrong = np.flatnonzero(np.diff(table[time]) <= 0)
     if len(wrong):
-        before, after = table[time][wrong[0]], table[time][wrong[0] + 1]
-        found = (
-            f"goes back from {before:.10g} to {after:.10g}"
-            if after < before
-            else f"{after:.10g} comes twice"
-        )
+        before, after = table[time][wrong[0] : wrong[0] + 2]
+        found = f"{after:.10g} comes twice"
+        if after < before:
+            found = f"goes back from {before:.10g} to {after:.10g}"
         fix = "; times must increase (rows that are wholly the same are dropped)"
         raise BadInput(found + fix, file=shown, row=int(table.row[wrong[0] + 1]), column=time)
     return table, int(repeats.sum())
 
 
-def require_columns(table: NumberTable, names: tuple[str, ...], shown: str) -> None:
-    """Raises BadInput for the first column that is not there, with what it may have been called."""
+def require_columns(table: NumberTable, names: Sequence[str], shown: str) -> None:
+    """Raise BadInput for the first column that is not there, with what it may have been called."""
     for name in names:
-        if name not in table.columns:
-            near = difflib.get_close_matches(name, table.columns, n=1, cutoff=0.6)
-            hint = (
-                f"; found {near[0]!r} (names carry units)"
-                if near
-                else f"; found {','.join(table.columns)}"
-            )
-            raise BadInput(f"column {name} is missing{hint}", file=shown, row=1)
+        if name in table.columns:
+            continue
+        near = difflib.get_close_matches(name, table.columns, n=1, cutoff=0.6)
+        hint = f"{near[0]!r} (names carry units)" if near else ",".join(table.columns)
+        raise BadInput(f"column {name} is missing; found {hint}", file=shown, row=1)
 
 
 def _lines(path: Path, shown: str) -> list[str]:
-    if path.stat().st_size > _MOST_BYTES:
-        raise BadInput(
-            f"has more than {_MOST_BYTES >> 20} MB; record in several trials", file=shown
-        )
-    try:
-        lines = path.read_bytes().decode("utf-8-sig").splitlines()
-    except OSError as problem:
-        raise BadInput(f"cannot be read ({problem.strerror})", file=shown) from None
-    except UnicodeDecodeError:
-        raise BadInput("is not UTF-8 text; export it as CSV, UTF-8", file=shown) from None
+    """Return a file's lines without empty ones at its end. Raise BadInput where it has none."""
+    check_size(path, _MOST_BYTES, "record in several trials", shown)
+    lines = read_text(path, _EXPORT, shown).splitlines()
     while lines and not lines[-1].strip():
         lines.pop()
     if not lines:
@@ -117,14 +110,12 @@ def _lines(path: Path, shown: str) -> list[str]:
     return lines
 
 
-def _header(lines: list[str], shown: str) -> list[str]:
-    header = lines[0]
-    for mark, name in ((";", "semicolons"), ("\t", "tabs")):
+def _column_names(header: str, shown: str) -> list[str]:
+    """Return the names in a file's first line. Raise BadInput where it does not name columns."""
+    for mark, name in _SEPARATORS.items():
         if mark in header:
-            raise BadInput(
-                f"columns are separated by {name}; export with commas (and decimal points)",
-                file=shown,
-            )
+            fix = "export with commas (and decimal points)"
+            raise BadInput(f"columns are separated by {name}; {fix}", file=shown)
     names = [name.strip() for name in next(csv.reader([header]))]
     if all(_is_number(name) for name in names):
         raise BadInput(f"the first row must name the columns; found {header!r}", file=shown, row=1)
@@ -133,49 +124,46 @@ def _header(lines: list[str], shown: str) -> list[str]:
     return names
 
 
-def _fast(lines: list[str], width: int, chosen: list[int]) -> np.ndarray | None:
-    """The numbers of the chosen columns, (rows, chosen), or None where anything at all is unusual."""
-    some = {} if len(chosen) == width else {"usecols": chosen}
-    if some and (not chosen or any(line.count(",") != width - 1 for line in lines)):
-        return None
+def _read_at_once(lines: list[str], width: int, chosen: list[int]) -> np.ndarray | None:
+    """Read the chosen columns (rows, chosen); return None where anything at all is unusual."""
+    wanted = None
+    if len(chosen) < width:  # NumPy then does not count the cells of a row
+        if not chosen or any(line.count(",") != width - 1 for line in lines):
+            return None
+        wanted = chosen
     try:
-        values = np.loadtxt(lines, delimiter=",", comments=None, quotechar='"', ndmin=2, **some)
+        values = np.loadtxt(
+            lines, delimiter=",", comments=None, quotechar='"', ndmin=2, usecols=wanted
+        )
     except ValueError:
         return None
-    return (
-        values if values.shape == (len(lines), len(chosen)) and np.isfinite(values).all() else None
-    )
+    is_whole = values.shape == (len(lines), len(chosen)) and np.isfinite(values).all()
+    return values if is_whole else None
 
 
-def _row_by_row(lines: list[str], names: list[str], shown: str) -> np.ndarray:
-    """The same, slowly, to say which cell is bad."""
-    return np.array(
-        [_row(cells, names, shown, row) for row, cells in enumerate(csv.reader(lines), start=2)]
-    )
+def _read_row_by_row(lines: list[str], names: list[str], shown: str) -> np.ndarray:
+    """Read all columns (rows, columns). Raise BadInput naming the first cell that is bad."""
+    rows = enumerate(csv.reader(lines), start=2)
+    return np.array([_row(cells, names, shown, row) for row, cells in rows])
 
 
 def _row(cells: list[str], names: list[str], shown: str, row: int) -> list[float]:
-    if not cells or not "".join(cells).strip():
+    """Return the numbers of a row. Raise BadInput where it is not a number a column."""
+    if not "".join(cells).strip():
         raise BadInput("is empty", file=shown, row=row)
     if ";" in "".join(cells):
-        raise BadInput(
-            "values are separated by semicolons; export with commas", file=shown, row=row
-        )
+        found = "values are separated by semicolons; export with commas"
+        raise BadInput(found, file=shown, row=row)
     if len(cells) != len(names):
-        hint = (
-            " Decimal commas? Export with decimal points."
-            if len(names) < len(cells) <= 2 * len(names)
-            else ""
-        )
-        raise BadInput(
-            f"has {counted(len(cells), 'value')}, the header names {len(names)}.{hint}",
-            file=shown,
-            row=row,
-        )
+        found = f"has {counted(len(cells), 'value')}, the header names {len(names)}."
+        if len(names) < len(cells) <= 2 * len(names):
+            found += " Decimal commas? Export with decimal points."
+        raise BadInput(found, file=shown, row=row)
     return [_cell(cell.strip(), name, shown, row) for cell, name in zip(cells, names)]
 
 
 def _cell(cell: str, name: str, shown: str, row: int) -> float:
+    """Return the number of a cell. Raise BadInput where it is none."""
     if _is_number(cell):
         return float(cell)
     if cell == "":
@@ -188,6 +176,7 @@ def _cell(cell: str, name: str, shown: str, row: int) -> float:
 
 
 def _is_number(cell: str) -> bool:
+    """Return whether a text is a finite number, without Python's underscores."""
     try:
         return bool(np.isfinite(float(cell))) and "_" not in cell
     except ValueError:

@@ -1,4 +1,4 @@
-"""One trial of a session: its settings and where its files are. The files themselves are read elsewhere."""
+"""One trial of a session: its settings and where its files are. The files are read elsewhere."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,14 +12,18 @@ from bench.session.strict_toml import as_keys, read_toml, values
 
 MANIFEST = "trial.toml"
 SIGNALS = "signals.csv"
-_UPRIGHT = (0.0, 0.0, 1.0)  # axis of an object that stands somewhere, where it is not said
+_UPRIGHT = (0.0, 0.0, 1.0)  # axis of an object that stands somewhere, where it is not stated
+_SHAPE_OF_SIZE = {"ring_diameter_mm": "ring", "half_angle_deg": "cone"}
 
 
 @dataclass(frozen=True)
 class StatedObject:
-    """What the object is, and where it stands in the rig frame, with one sigma of each coordinate; None where that is
-    not said. point_mm (3,): of a bar's axis, the centre of a ring or sphere, or a cone's tip; axis (3,): the bar's
-    direction, the normal of the ring's plane, or where the cone points."""
+    """The object by trial.toml, and where it stands in the rig frame; None where that is not stated.
+
+    point_mm (3,): of a bar's axis, the centre of a ring or sphere, or a cone's tip, with one sigma
+    of each coordinate. axis (3,): the bar's direction, the normal of the ring's plane, or where the
+    cone points.
+    """
 
     shape: str
     point_mm: tuple[float, ...] | None
@@ -31,13 +35,14 @@ class StatedObject:
 
 @dataclass(frozen=True)
 class Trial:
-    """Settings of one recording; nominal values are None where not given, sigmas 0 where taken as exact.
+    """Settings of one recording; nominal values are None where not given, sigmas 0 where exact.
 
-    purpose: "measure", "gauge" or "weight" (then force_N hung at_mm from the base). follicle_roll_deg: how
-    the follicle was turned about the whisker. both_ways: each way back is evaluated, too. object_velocity_mm_s: (3,) in
-    the rig frame, of an object that moves at constant speed, with one sigma each way. object_gives_way: it moves as
-    it is pushed. camera_sources: camera to folder of pictures or video, empty where the trial has none. whisker: of an
-    array, whose channels `daq` names; '' where it is the only one.
+    purpose: "measure", "gauge" or "weight" (then force_N hung at_mm from the base).
+    follicle_roll_deg: how the follicle was turned about the whisker. both_ways: each way back is
+    evaluated, too. object_velocity_mm_s: (3,) in the rig frame, of an object that moves at constant
+    speed, with one sigma each way. object_gives_way: it moves as it is pushed. camera_sources:
+    camera to folder of pictures or video, empty where the trial has none. whisker: of an array,
+    whose channels `daq` names; '' where it is the only one.
     """
 
     name: str
@@ -75,24 +80,28 @@ class Trial:
 
     @property
     def is_bar(self) -> bool:
-        """Whether the object is a straight bar, as far as trial.toml says."""
+        """Return whether the object is a straight bar, as far as trial.toml says."""
         return self.object is None or self.object.shape == "bar"
 
     @property
     def place(self) -> str:
-        """How messages name it: by the path inside the session, and the whisker of an array."""
+        """Return how messages name the trial: its path in the session, and the whisker of an array."""
         return f"trials/{self.name}{self._of_whisker}"
 
     def shown(self, file: str) -> str:
-        """How messages name one of its files, likewise."""
+        """Return how messages name one of its files: its path, and the whisker of an array."""
         return f"trials/{self.name}/{file}{self._of_whisker}"
 
     @property
     def _of_whisker(self) -> str:
+        """Return what messages say of the whisker; '' where it is the only one."""
         return f" (whisker {self.whisker})" if self.whisker else ""
 
     def own(self, file: str) -> Path:
-        """The path of a file that each whisker of an array has its own of: truth.toml, or truth@NAME.toml."""
+        """Return the path of a file of which each whisker of an array has its own.
+
+        It is truth.toml, or truth@NAME.toml.
+        """
         stem, _, suffix = file.rpartition(".")
         return self.folder / (f"{stem}@{self.whisker}.{suffix}" if self.whisker else file)
 
@@ -100,99 +109,97 @@ class Trial:
 def load_trial(
     folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq: DaqFile | None = None
 ) -> Trial:
-    """Read trial.toml over the session's defaults and find the trial's files. Raises BadInput. daq: of [signals]."""
-    shown = f"trials/{folder.name}"
-    keys = _trial_keys(folder, session.trial, f"{shown}/{MANIFEST}", doubts)
-    _check_weight(keys, f"{shown}/{MANIFEST}")
-    _check_motion(keys, f"{shown}/{MANIFEST}")
+    """Read trial.toml over the session's defaults and find the trial's files. Raises BadInput.
+
+    daq: of [signals].
+    """
+    place = f"trials/{folder.name}"
+    shown = f"{place}/{MANIFEST}"
+    keys = _trial_keys(folder, session.trial, shown, doubts)
+    if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
+        raise BadInput('purpose = "weight" needs force_N and at_mm', file=shown)
+    if keys.object_gives_way and keys.object_velocity_mm_s is not None:
+        found = "an object that moves does not give way, too; leave out object_velocity_mm_s"
+        raise BadInput(f"object_gives_way: {found}", file=shown)
     signals_path = folder / (daq.file if daq else SIGNALS)
     if not signals_path.is_file():
-        raise BadInput(
-            "is not there; a trial needs its signals", file=f"{shown}/{signals_path.name}"
-        )
-    trial = Trial(
+        found = "is not there; a trial needs its signals"
+        raise BadInput(found, file=f"{place}/{signals_path.name}")
+    settings = values(keys) | _bar_diameter(keys, session.bar)
+    settings["object"] = _stated_object(keys.object, settings["bar_diameter_mm"], shown)
+    return Trial(
         name=folder.name,
         folder=folder,
-        camera_sources=camera_sources(folder, shown),
+        camera_sources=camera_sources(folder, place),
         signals_path=signals_path,
         daq=daq,
-        **values(keys)
-        | _bar(keys, session.bar)
-        | {"object": _object(keys.object, f"{shown}/{MANIFEST}")},
+        **settings,
     )
-    _check_size(trial, f"{shown}/{MANIFEST}")
-    return trial
-
-
-def _check_size(trial: Trial, shown: str) -> None:
-    """Raises BadInput for an object that is no straight bar and as said cannot be."""
-    if trial.is_bar:
-        return
-    thick, wide = trial.bar_diameter_mm, trial.object.ring_diameter_mm
-    if wide is not None and thick is not None and wide <= thick:
-        found = f"[object] ring_diameter_mm is {wide:g}, of a bar of {thick:g} mm (bar_diameter_mm)"
-        raise BadInput(
-            f"{found}; it is the diameter along the bar's middle, and larger", file=shown
-        )
 
 
 def _trial_keys(
     folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: Doubts
 ) -> manifest.TrialKeys:
-    """trial.toml, absent keys from the session's [trial]; a sigma comes from where its value comes from."""
+    """Return trial.toml, with absent keys from the session's [trial].
+
+    A sigma comes from where its value comes from.
+    """
     file = folder / MANIFEST
     if not file.is_file():
         return defaults
     given = read_toml(file, shown)
-    own = as_keys(given, manifest.TrialKeys, shown, doubts)
-    decided = set(given) | {manifest.sigma_key(key) for key in given}
-    return manifest.TrialKeys(
-        **{name: value for name, value in values(own).items() if name in decided}
-        | {name: value for name, value in values(defaults).items() if name not in decided}
+    own = values(as_keys(given, manifest.TrialKeys, shown, doubts))
+    stated = set(given) | {manifest.sigma_key(key) for key in given}
+    kept = {name: value for name, value in own.items() if name in stated}
+    return manifest.TrialKeys(**values(defaults) | kept)
+
+
+def _stated_object(
+    keys: manifest.ObjectKeys | None, thickness_mm: float | None, shown: str
+) -> StatedObject | None:
+    """Return the object of trial.toml; None where there is none. Raise BadInput for an impossible one.
+
+    thickness_mm: bar_diameter_mm.
+    """
+    if keys is None:
+        return None
+    _check_object(keys, thickness_mm, shown)
+    is_placed = keys.point_mm is not None
+    return StatedObject(
+        shape=keys.shape,
+        point_mm=tuple(keys.point_mm) if is_placed else None,
+        point_sigma_mm=keys.point_sigma_mm,
+        axis=tuple(keys.axis or _UPRIGHT) if is_placed else None,
+        ring_diameter_mm=keys.ring_diameter_mm,
+        half_angle_deg=keys.half_angle_deg,
     )
 
 
-def _check_weight(keys: manifest.TrialKeys, shown: str) -> None:
-    if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
-        raise BadInput('purpose = "weight" needs force_N and at_mm', file=shown)
-
-
-def _check_motion(keys: manifest.TrialKeys, shown: str) -> None:
-    if keys.object_gives_way and keys.object_velocity_mm_s is not None:
-        found = "an object that moves does not give way, too; leave out object_velocity_mm_s"
-        raise BadInput(f"object_gives_way: {found}", file=shown)
-
-
-def _object(keys: manifest.ObjectKeys | None, shown: str) -> StatedObject | None:
-    """Raises BadInput for one that cannot be."""
-    if keys is None:
-        return None
-    for key, shape in (("ring_diameter_mm", "ring"), ("half_angle_deg", "cone")):
+def _check_object(keys: manifest.ObjectKeys, thickness_mm: float | None, shown: str) -> None:
+    """Raise BadInput for an impossible object. thickness_mm: bar_diameter_mm."""
+    for key, shape in _SHAPE_OF_SIZE.items():
         if (keys.shape == shape) != (getattr(keys, key) is not None):
-            raise BadInput(
-                f'[object] {key} belongs to shape = "{shape}", and to no other shape', file=shown
-            )
+            found = f'{key} belongs to shape = "{shape}", and to no other shape'
+            raise BadInput(f"[object] {found}", file=shown)
     if keys.axis is not None and not any(keys.axis):
         raise BadInput("[object] axis is a direction, not zero", file=shown)
-    sizes = keys.ring_diameter_mm, keys.half_angle_deg
-    if keys.point_mm is None:
-        if keys.axis is not None or keys.point_sigma_mm:
-            raise BadInput(
-                "[object] says how it stands, and not where; point_mm is missing", file=shown
-            )
-        return StatedObject(keys.shape, None, 0.0, None, *sizes)
-    point, axis = tuple(keys.point_mm), tuple(keys.axis or _UPRIGHT)
-    return StatedObject(keys.shape, point, keys.point_sigma_mm, axis, *sizes)
+    if keys.point_mm is None and (keys.axis is not None or keys.point_sigma_mm):
+        found = "says how it stands, and not where; point_mm is missing"
+        raise BadInput(f"[object] {found}", file=shown)
+    ring_mm = keys.ring_diameter_mm
+    if ring_mm is not None and thickness_mm is not None and ring_mm <= thickness_mm:
+        found = (
+            f"ring_diameter_mm is {ring_mm:g}, of a bar of {thickness_mm:g} mm (bar_diameter_mm)"
+        )
+        meant = "it is the diameter along the bar's middle, and larger"
+        raise BadInput(f"[object] {found}; {meant}", file=shown)
 
 
-def _bar(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float | None]:
-    """The trial's own bar diameter with its sigma, else the session's."""
-    if keys.bar_diameter_mm is not None:
-        return {
-            "bar_diameter_mm": keys.bar_diameter_mm,
-            "bar_diameter_sigma_mm": keys.bar_diameter_sigma_mm,
-        }
+def _bar_diameter(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float]:
+    """Return the trial's own bar diameter with its sigma, else the session's."""
+    if keys.bar_diameter_mm is not None or bar is None:
+        return {}
     return {
-        "bar_diameter_mm": bar and bar.diameter_mm,
-        "bar_diameter_sigma_mm": bar.diameter_sigma_mm if bar else 0.0,
+        "bar_diameter_mm": bar.diameter_mm,
+        "bar_diameter_sigma_mm": bar.diameter_sigma_mm,
     }

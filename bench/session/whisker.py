@@ -1,4 +1,4 @@
-"""The whisker as the session states it: what truth and estimate both need to know of it."""
+"""The whisker as the session states it, for truth and estimate alike."""
 
 import math
 from dataclasses import dataclass
@@ -27,49 +27,58 @@ class Whisker:
     tip_diameter_mm: float | None = None
 
     def __post_init__(self):
+        """Raise ValueError where the keys contradict each other."""
         if (self.youngs_modulus_GPa is None) == (self.flexural_rigidity_Nmm2 is None):
             raise ValueError("give either youngs_modulus_GPa or flexural_rigidity_Nmm2")
         if (self.shape == "tapered") != (self.tip_diameter_mm is not None):
             raise ValueError('tip_diameter_mm belongs to shape = "tapered", and to no other shape')
         if self.tip_diameter_mm is not None and not 0 < self.tip_diameter_mm < self.diameter_mm:
-            raise ValueError(
-                f"tip_diameter_mm = {self.tip_diameter_mm:g}: must be below diameter_mm, and above 0"
-            )
+            found = f"tip_diameter_mm = {self.tip_diameter_mm:g}"
+            raise ValueError(f"{found}: must be below diameter_mm, and above 0")
 
     @property
     def wire(self) -> Wire:
-        """What the cameras look for."""
-        sigmas = self.length_sigma_mm, self.diameter_sigma_mm
-        return Wire(self.shape, self.length_mm, self.diameter_mm, *sigmas, self.tip_diameter_mm)
+        """Return the rod that the cameras look for."""
+        return Wire(
+            self.shape,
+            self.length_mm,
+            self.diameter_mm,
+            self.length_sigma_mm,
+            self.diameter_sigma_mm,
+            self.tip_diameter_mm,
+        )
 
     @property
     def EI_Nmm2(self) -> float:
-        """Flexural rigidity at the base, N·mm²."""
+        """Return the flexural rigidity at the base, N·mm²."""
         if self.flexural_rigidity_Nmm2 is not None:
             return self.flexural_rigidity_Nmm2
         return flexural_rigidity(self.youngs_modulus_GPa, self.diameter_mm)
 
     @property
     def implied_modulus_GPa(self) -> float:
-        """Young's modulus that rigidity and diameter amount to, GPa."""
+        """Return the Young's modulus that rigidity and diameter amount to, GPa."""
         return self.EI_Nmm2 / flexural_rigidity(1.0, self.diameter_mm)
 
     @property
     def C_Nmm2(self) -> float:
-        """C = 3 E I of the paper, N·mm²."""
+        """Return C = 3 E I of the paper, N·mm²."""
         return 3.0 * self.EI_Nmm2
 
     @property
     def beam(self) -> Beam:
-        """What an estimator may know of it."""
-        tip_share = (
-            None if self.tip_diameter_mm is None else self.tip_diameter_mm / self.diameter_mm
-        )
+        """Return the beam that an estimator may know of."""
+        tip_share = None
+        if self.tip_diameter_mm is not None:
+            tip_share = self.tip_diameter_mm / self.diameter_mm
         return Beam(self.C_Nmm2, self.length_mm, self.shape, tip_share)
 
     @property
     def C_sigma_Nmm2(self) -> float:
-        """One standard deviation of C: from the rigidity's, or from E's and (fourfold) the diameter's."""
+        """Return one standard deviation of C, N·mm².
+
+        It is from the rigidity's, or from E's and (fourfold) the diameter's.
+        """
         if self.flexural_rigidity_Nmm2 is not None:
             return 3.0 * self.flexural_rigidity_sigma_Nmm2
         by_modulus = self.youngs_modulus_sigma_GPa / self.youngs_modulus_GPa

@@ -16,8 +16,11 @@ from bench.session.plausible import WIDTH
 from vision.geometry.board import Board
 
 MM_PER_INCH = 25.4
-# What stands around the board: rulers on the left and below, with the words below them.
-_LEFT_MM, _RIGHT_MM, _TOP_MM, _BELOW_MM = 22.0, 10.0, 10.0, 34.0
+# Margins around the board: rulers on the left and below, with the words below them.
+_LEFT_MM = 22.0
+_RIGHT_MM = 10.0
+_TOP_MM = 10.0
+_BELOW_MM = 34.0
 _RULER_MM = 8.0  # from the board's edge: the white around a board helps to find it
 _A4_MM = (210.0, 297.0)  # mm: ISO 216
 _LARGEST = 4  # formats beyond A4: A3, A2, A1, A0
@@ -35,7 +38,10 @@ class Paper:
 
 
 def write_board(path: Path, board: Board) -> Paper:
-    """Write the PDF whole; the page it is on. Raises BadInput where no page holds the board, or it is no .pdf."""
+    """Write the PDF whole and return its page.
+
+    Raises BadInput where no page holds the board, or the path is no .pdf.
+    """
     if path.suffix.lower() != ".pdf":
         raise BadInput("must end in .pdf", file=path)
     WIDTH.check(board.square_mm, "--square-mm", str(path))
@@ -46,22 +52,31 @@ def write_board(path: Path, board: Board) -> Paper:
 
 
 def paper_for(board: Board) -> Paper:
-    """The smallest of A4 to A0, either way round, that holds the board. Raises BadInput where none does."""
-    width, height = (n * board.square_mm for n in board.squares)
-    need = width + _LEFT_MM + _RIGHT_MM, height + _TOP_MM + _BELOW_MM
+    """Return the smallest of A4 to A0, either way round, that holds the board.
+
+    Raises BadInput where none does.
+    """
+    width, height = _size_mm(board)
     short, long = _A4_MM
     for number in range(4, 4 - _LARGEST - 1, -1):
-        for name, across, down in (("landscape", long, short), ("portrait", short, long)):
-            if need[0] <= across and need[1] <= down:
-                return Paper(f"A{number} {name}", across, down)
+        landscape = Paper(f"A{number} landscape", long, short)
+        for paper in (landscape, Paper(f"A{number} portrait", short, long)):
+            has_width = width + _LEFT_MM + _RIGHT_MM <= paper.width_mm
+            if has_width and height + _TOP_MM + _BELOW_MM <= paper.height_mm:
+                return paper
         short, long = long, 2.0 * short
-    raise BadInput(
-        f"a board of {width:g} x {height:g} mm fits no page up to A0; take fewer or smaller squares"
-    )
+    found = f"a board of {width:g} x {height:g} mm fits no page up to A0"
+    raise BadInput(f"{found}; take fewer or smaller squares")
+
+
+def _size_mm(board: Board) -> tuple[float, float]:
+    """Return width and height of a board, mm."""
+    across, down = board.squares
+    return across * board.square_mm, down * board.square_mm
 
 
 def toml_block(board: Board) -> list[str]:
-    """The board as session.toml wants it."""
+    """Return the lines of the board in session.toml."""
     lines = [
         "[board]",
         f"squares = [{board.squares[0]}, {board.squares[1]}]",
@@ -73,17 +88,16 @@ def toml_block(board: Board) -> list[str]:
 
 
 def page(board: Board, paper: Paper) -> Figure:
-    """The page, in mm from its upper left corner."""
+    """Draw the page, in mm from its upper left corner."""
     figure = Figure(figsize=(paper.width_mm / MM_PER_INCH, paper.height_mm / MM_PER_INCH))
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, paper.width_mm), ylim=(paper.height_mm, 0))
     axes.set_axis_off()
-    width, height = (n * board.square_mm for n in board.squares)
+    width, height = _size_mm(board)
     left = 0.5 * (paper.width_mm + _LEFT_MM - _RIGHT_MM - width)
     top = 0.5 * (paper.height_mm + _TOP_MM - _BELOW_MM - height)
-    axes.add_collection(
-        PolyCollection(list(dark_rectangles(board, left, top)), fc="black", ec="none", lw=0)
-    )
+    dark = list(dark_rectangles(board, left, top))
+    axes.add_collection(PolyCollection(dark, fc="black", ec="none", lw=0))
     _ruler(axes, (left, top + height + _RULER_MM), width, down=False)
     _ruler(axes, (left - _RULER_MM, top), height, down=True)
     _words(axes, board, left, top + height + _RULER_MM + 11.0)
@@ -91,8 +105,11 @@ def page(board: Board, paper: Paper) -> Figure:
 
 
 def dark_rectangles(board: Board, left_mm: float, top_mm: float) -> Iterator[np.ndarray]:
-    """What is printed, as rectangles (4, 2), mm. They overlap, so that no seam shows between them: runs of cells along
-    rows, runs along columns, and the four cells about each point where both have a seam."""
+    """Yield what is printed, as rectangles (4, 2), mm.
+
+    They overlap, so that there is no seam between them: runs of cells along rows, runs along
+    columns, and the four cells about each point where both have a seam.
+    """
     made = rig.Board(
         board.squares,
         board.square_mm,
@@ -101,52 +118,58 @@ def dark_rectangles(board: Board, left_mm: float, top_mm: float) -> Iterator[np.
         board.legacy,
         board.inverted,
     )
-    printed = made.to_print(_INK, board.square_mm / 2 if board.inverted else 0.0).shift(
-        left_mm, top_mm
-    )
-    dark, x, y = printed.reflectance < 0.5, printed.x_mm, printed.y_mm
-    yield from (
-        _box(x[a], x[b], y[row], y[row + 1])
-        for row, cells in enumerate(dark)
-        for a, b in _runs(cells)
-    )
-    yield from (
-        _box(x[k], x[k + 1], y[a], y[b]) for k, cells in enumerate(dark.T) for a, b in _runs(cells)
-    )
+    margin_mm = board.square_mm / 2 if board.inverted else 0.0
+    printed = made.to_print(_INK, margin_mm).shift(left_mm, top_mm)
+    dark = printed.reflectance < 0.5
+    x = printed.x_mm
+    y = printed.y_mm
+    for row, cells in enumerate(dark):
+        for a, b in _runs(cells):
+            yield _box(x[a], x[b], y[row], y[row + 1])
+    for column, cells in enumerate(dark.T):
+        for a, b in _runs(cells):
+            yield _box(x[column], x[column + 1], y[a], y[b])
     all_four = dark[1:, 1:] & dark[:-1, 1:] & dark[1:, :-1] & dark[:-1, :-1]
-    yield from (_box(x[k], x[k + 2], y[row], y[row + 2]) for row, k in np.argwhere(all_four))
+    for row, column in np.argwhere(all_four):
+        yield _box(x[column], x[column + 2], y[row], y[row + 2])
 
 
 def _runs(cells: np.ndarray) -> np.ndarray:
-    """First cell of each run of true cells, and the one after its last, (n, 2)."""
+    """Return the first cell of each run of true cells, and the one after its last, (n, 2)."""
     steps = np.diff(np.concatenate([[0], cells.astype(int), [0]]))
     return np.stack([np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)], axis=1)
 
 
 def _box(x0: float, x1: float, y0: float, y1: float) -> np.ndarray:
+    """Return the corners (4, 2) of a rectangle."""
     return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
 
 
 def _ruler(axes: Axes, origin: tuple[float, float], length: float, *, down: bool) -> None:
-    """A tick each millimetre, a number each ten, from the board's corner outwards."""
+    """Draw a ruler from the board's corner outwards: a tick each millimetre, a number each ten."""
+    start = np.array(origin)
+    along = np.array([0.0, 1.0]) if down else np.array([1.0, 0.0])
+    outwards = np.array([-1.0, 0.0]) if down else np.array([0.0, 1.0])
+    alignment = {"ha": "right", "va": "center"} if down else {"ha": "center", "va": "top"}
+
+    def line(a: np.ndarray, b: np.ndarray) -> None:
+        axes.plot([a[0], b[0]], [a[1], b[1]], color="black", lw=0.3)
+
     for mm in range(int(length + 1e-6) + 1):
-        tick = 4.5 if mm % 10 == 0 else 3.0 if mm % 5 == 0 else 2.0
-        if down:
-            axes.plot([origin[0], origin[0] - tick], [origin[1] + mm] * 2, color="black", lw=0.3)
-        else:
-            axes.plot([origin[0] + mm] * 2, [origin[1], origin[1] + tick], color="black", lw=0.3)
-        if mm % 10 == 0 and down:
-            axes.text(origin[0] - 5.2, origin[1] + mm, str(mm), ha="right", va="center", fontsize=6)
-        elif mm % 10 == 0:
-            axes.text(origin[0] + mm, origin[1] + 5.2, str(mm), ha="center", va="top", fontsize=6)
-    end = (origin[0], origin[1] + length) if down else (origin[0] + length, origin[1])
-    axes.plot(*zip(origin, end), color="black", lw=0.3)
+        at = start + mm * along
+        tick_mm = 4.5 if mm % 10 == 0 else 3.0 if mm % 5 == 0 else 2.0
+        line(at, at + tick_mm * outwards)
+        if mm % 10 == 0:
+            x, y = at + 5.2 * outwards
+            axes.text(x, y, str(mm), fontsize=6, **alignment)
+    line(start, start + length * along)
 
 
 def _words(axes: Axes, board: Board, left: float, top: float) -> None:
-    said = (
+    """Write how to print the board and check the print, and its lines of session.toml."""
+    lines = (
         "Print at 100 % (not fitted to the page), glue to something flat, hold both rulers, in mm, against steel.",
         "If they are wrong, write what you measure into square_mm and marker_mm, and how well into square_sigma_mm.",
         "   ".join(toml_block(board)),
     )
-    axes.text(left, top, "\n".join(said), va="top", fontsize=5.5, linespacing=1.5)
+    axes.text(left, top, "\n".join(lines), va="top", fontsize=5.5, linespacing=1.5)

@@ -1,37 +1,40 @@
 """`whisker-bench new`: the folders of a session, and an annotated session.toml to fill in."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import tomli_w
 
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.session.manifest import BarKeys, BoardKeys, WhiskerKeys
-from bench.session.plausible import Window
+from bench.session.plausible import PlausibleRange
 from bench.session.session import MANIFEST
+from bench.session.strict_toml import plausible_ranges
 
 FOLDERS = ("boards", "boards/rig", "trials")
-Ask = Callable[[str], str]
-
-
+Ask: TypeAlias = Callable[[str], str]
 _TABLES = {"whisker": WhiskerKeys, "bar": BarKeys, "board": BoardKeys}
 
 
 @dataclass(frozen=True)
 class Question:
-    """A number that session.toml needs: option's name, table, key, and what to ask for."""
+    """A number that session.toml needs.
+
+    option: its name on the command line. table, key: in session.toml. wanted: what the number is.
+    """
 
     option: str
     table: str
     key: str
-    asked: str
+    wanted: str
 
     @property
-    def window(self) -> Window:
-        """What is plausible."""
-        return _TABLES[self.table].windows[self.key]
+    def plausible_range(self) -> PlausibleRange:
+        """Return the range of plausible answers."""
+        return plausible_ranges(_TABLES[self.table])[self.key]
 
 
 QUESTIONS = (
@@ -60,35 +63,33 @@ def new_session(
     dictionary: str,
     ask: Ask | None = None,
 ) -> list[str]:
-    """Make the folder of a session with its manifest. Lines that say what comes next. Raises BadInput where there is a
-    session already, or a number is implausible.
+    """Make the folder of a session with its manifest; return lines on what comes next.
 
-    given: by option's name; ask: answers a question, '' for not known; None asks nothing.
+    given: by option's name; ask: answers a question, '' for not known; None asks nothing. Raises
+    BadInput where there is a session already, or a number is implausible.
     """
     if (path / MANIFEST).exists():
         raise BadInput(f"there is a {MANIFEST} already; nothing was written", file=path)
     for question in QUESTIONS:
         if question.option in given:
-            question.window.check(
-                given[question.option], f"--{question.option.replace('_', '-')}", str(path)
-            )
+            option = f"--{question.option.replace('_', '-')}"
+            question.plausible_range.check(given[question.option], option, str(path))
     answers = dict(given)
     for question in QUESTIONS if ask else ():
         if question.option not in answers:
             answers |= _answered(question, ask)
     for folder in FOLDERS:
         (path / folder).mkdir(parents=True, exist_ok=True)
-    write_whole(
-        path / MANIFEST, manifest_text(name or path.resolve().name, answers, squares, dictionary)
-    )
+    text = manifest_text(name or path.resolve().name, answers, squares, dictionary)
+    write_whole(path / MANIFEST, text)
     return list(_next_steps(path, answers))
 
 
 def _answered(question: Question, ask: Ask) -> dict[str, float]:
-    """The answer, asked for until it is a number within its window, or nothing."""
-    while text := ask(f"{question.asked} (Enter: fill in later): ").strip():
+    """Ask until the answer is a plausible number, and return it by option; nothing for an empty one."""
+    while text := ask(f"{question.wanted} (Enter: fill in later): ").strip():
         try:
-            question.window.check(float(text), question.key, MANIFEST)
+            question.plausible_range.check(float(text), question.key, MANIFEST)
             return {question.option: float(text)}
         except ValueError:
             print(f"  {text!r} is no number; a decimal point, no unit")
@@ -100,21 +101,21 @@ def _answered(question: Question, ask: Ask) -> dict[str, float]:
 def manifest_text(
     name: str, answers: Mapping[str, float], squares: tuple[int, int], dictionary: str
 ) -> str:
-    """session.toml with what is known, and a line to fill in for what is not."""
-    lines = {q.option: _line(q.key, answers.get(q.option), q.asked) for q in QUESTIONS}
+    """Return session.toml with what is known, and a line to fill in for what is not."""
+    lines = {q.option: _line(q.key, answers.get(q.option), q.wanted) for q in QUESTIONS}
     named = tomli_w.dumps({"name": name}).strip()
     return _TEMPLATE.format(named=named, x=squares[0], y=squares[1], dictionary=dictionary, **lines)
 
 
-def _line(key: str, value: float | None, asked: str) -> str:
-    return (
-        f"# {key} =        # FILL IN: {asked}"
-        if value is None
-        else f"{key} = {value:.10g}".ljust(32) + f"# {asked}"
-    )
+def _line(key: str, value: float | None, wanted: str) -> str:
+    """Return the line of a key; one to fill in for None."""
+    if value is None:
+        return f"# {key} =        # FILL IN: {wanted}"
+    return f"{key} = {value:.10g}".ljust(32) + f"# {wanted}"
 
 
-def _next_steps(path: Path, answers: Mapping[str, float]):
+def _next_steps(path: Path, answers: Mapping[str, float]) -> Iterator[str]:
+    """Yield lines on what to do next."""
     yield f"written: {path / MANIFEST}"
     missing = sum(q.option not in answers for q in QUESTIONS)
     if missing:

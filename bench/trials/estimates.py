@@ -11,7 +11,7 @@ from bench.base.errors import BadInput
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
 from bench.base.statuses import reason
 from bench.gauges.drift import allow_drift
-from bench.gauges.felt import Stroke, late_by
+from bench.gauges.felt import FeltStroke, late_by
 from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.records.trial_result import EstimateRow, FeltAt, FeltWhisk
 from bench.session.trial import Trial
@@ -105,7 +105,7 @@ class Readout:
         """The whisk's moments (2,) at the wanted angle, in the axes of the gauges."""
         return to_follicle(self.roll_rad) @ [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
 
-    def moments_Nmm(self, stroke: Stroke, touch: FeltTouch) -> np.ndarray:
+    def moments_Nmm(self, stroke: FeltStroke, touch: FeltTouch) -> np.ndarray:
         """(n, 2): of the stroke's samples as recorded, unfiltered."""
         return (stroke.channels - touch.offset) @ self.matrix.T
 
@@ -130,7 +130,7 @@ class Readout:
 
 
 def felt_whisk(
-    stroke: Stroke, readout: Readout, drift_rate: np.ndarray, beam: Beam, theta_rad: float
+    stroke: FeltStroke, readout: Readout, drift_rate: np.ndarray, beam: Beam, theta_rad: float
 ) -> tuple[FeltTouch, Whisk | Reason]:
     """Felt touch, and all that an estimator may know; the reason instead where the stroke does not hold it."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
@@ -138,7 +138,7 @@ def felt_whisk(
 
 
 def whisk_at(
-    stroke: Stroke, readout: Readout, touch: FeltTouch, beam: Beam, theta_rad: float
+    stroke: FeltStroke, readout: Readout, touch: FeltTouch, beam: Beam, theta_rad: float
 ) -> Whisk | Reason:
     """`felt_whisk` of a touch that is known."""
     at = stroke.at(theta_rad, touch)
@@ -192,7 +192,7 @@ def _moments(whisk: Whisk) -> tuple[Value, Value]:
 
 
 def felt_by_theta(
-    stroke: Stroke,
+    stroke: FeltStroke,
     readout: Readout,
     touch: FeltTouch,
     beam: Beam,

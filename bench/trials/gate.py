@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import FeltStroke
 from bench.records.trial_result import EstimateRow, FeltAt
 from bench.trials.estimates import Readout, felt_at
 from bench.trials.stick_slip_phases import Rest, rests_of
@@ -22,7 +22,7 @@ _FROM_SHARE, _TO_SHARE = 0.5, 1.5
 
 
 def kinetic_of(
-    stroke: Stroke, touch: FeltTouch, readout: Readout, whisk: Whisk, given: EstimateRow
+    stroke: FeltStroke, touch: FeltTouch, readout: Readout, whisk: Whisk, given: EstimateRow
 ) -> FeltAt | None:
     """What a stroke shows of `kinetic_end`."""
     theta, moments = stroke.motor_rad - touch.motor_rad, readout.moments_Nmm(stroke, touch)

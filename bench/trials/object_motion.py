@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import FeltStroke
 from bench.session.trial import Trial
 from estimator.moving import known_motion
 from estimator.whisk import ObjectMotion, Whisk
@@ -19,7 +19,7 @@ def in_contact_frame(velocity_mm_s: np.ndarray, touch_rad: float) -> np.ndarray:
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]) @ velocity_mm_s
 
 
-def with_motion(whisk: Whisk, trial: Trial, stroke: Stroke, touch_rad: float) -> Whisk:
+def with_motion(whisk: Whisk, trial: Trial, stroke: FeltStroke, touch_rad: float) -> Whisk:
     """The whisk told how the trial's object moves; by where its touch was felt."""
     per_rad = 1.0 / stroke.speed_rad_s
     told = per_rad * in_contact_frame(np.array(trial.object_velocity_mm_s), touch_rad)

@@ -22,7 +22,7 @@ from bench.gauges.fit import fit_gauges
 from bench.gauges.gauge_faults import Undetermined, check_alive
 from bench.gauges.gauge_readings import pairs_of
 from bench.gauges.gauges_file import given_gauges
-from bench.gauges.matrix import FROM_ALL, Gauges
+from bench.gauges.matrix import FROM_ALL, GaugeCalibration
 from bench.gauges.reversal import reversals
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
@@ -110,7 +110,7 @@ def settled_units(
 
 def with_gauges(
     units: Sequence[Unit], pool: Workers, doubts: Doubts
-) -> tuple[Gauges | None, Certificate | None, list[Unit]]:
+) -> tuple[GaugeCalibration | None, Certificate | None, list[Unit]]:
     """The session's gauges, their certificate where its own trials calibrated them, and the units with the gauges and
     with the drift of the channels."""
     rate, of_forces = session_drift(units, pool)
@@ -132,7 +132,7 @@ def session_drift(units: Sequence[Unit], pool: Workers) -> tuple[np.ndarray, np.
 
 def session_gauges(
     units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts
-) -> tuple[Gauges | None, Certificate | None]:
+) -> tuple[GaugeCalibration | None, Certificate | None]:
     """Gauges as brought along, without a certificate; else from the gauge trials, or from all where the settings say
     so; none, and a note on what is lacking, where these cannot fix them."""
     given, from_all = given_gauges(units[0].session), units[0].settings.gauges_from_all

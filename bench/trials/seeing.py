@@ -2,15 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated
 
 import msgspec
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.settings import Seeing, Settings
-from bench.session.plausible import Window
-from bench.session.strict_toml import Keys, as_keys, read_toml, values
+from bench.session.plausible import PlausibleRange
+from bench.session.strict_toml import Keys, as_keys, plausible_ranges, read_toml, values
 from vision.geometry.vision_settings import VisionSettings
 
 # Each rung has what the one before leaves out. What a rung costs and how wrong it is, `tradeoff` measures.
@@ -28,30 +28,19 @@ class SeeingKeys(Keys, kw_only=True):
 
     preset: str = STANDARD
     cameras: tuple[str, ...] = ()
-    rounds: int | None = None
-    every_frame: int | None = None
-    picture_scale: int | None = None
-    wire_piece_px: int | None = None
-    bar_piece_px: int | None = None
-    bar_reach_mm: float | None = None
+    rounds: Annotated[int, PlausibleRange(0, 5)] | None = None
+    every_frame: Annotated[int, PlausibleRange(1, 20)] | None = None
+    picture_scale: Annotated[int, PlausibleRange(1, 8)] | None = None
+    wire_piece_px: Annotated[int, PlausibleRange(4, 60)] | None = None
+    bar_piece_px: Annotated[int, PlausibleRange(4, 60)] | None = None
+    bar_reach_mm: Annotated[float, PlausibleRange(10.0, 200.0)] | None = None
     check_beam: bool | None = None
-
-    windows: ClassVar = {
-        "rounds": Window(0, 5),
-        "every_frame": Window(1, 20),
-        "picture_scale": Window(1, 8),
-        "wire_piece_px": Window(4, 60),
-        "bar_piece_px": Window(4, 60),
-        "bar_reach_mm": Window(10.0, 200.0),
-    }
 
 
 class SettingsFile(Keys, kw_only=True):
     """A settings file: what `evaluate --settings` reads and `tradeoff` writes."""
 
     seeing: SeeingKeys = msgspec.field(default_factory=SeeingKeys)
-
-    tables: ClassVar = {_OWN_TABLE: SeeingKeys}
 
 
 def by_preset(name: str) -> Seeing:
@@ -87,7 +76,7 @@ def as_toml(seeing: Seeing) -> str:
         lines.append(
             f"cameras = [{', '.join(f'{name!r}'.replace(chr(39), chr(34)) for name in seeing.cameras)}]"
         )
-    for name in SeeingKeys.windows | {"check_beam": None}:
+    for name in [*plausible_ranges(SeeingKeys), "check_beam"]:
         value = getattr(seeing.vision, name)
         lines.append(f"{name} = {str(value).lower() if isinstance(value, bool) else f'{value:g}'}")
     return "\n".join(lines) + "\n"

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import FeltStroke
 from bench.trials.estimates import Readout
 from estimator.readings import force_at, rate_at
 from estimator.signal import FeltTouch
@@ -13,7 +13,7 @@ from estimator.whisk import OtherSensors, Whisk
 
 def with_others(
     whisk: Whisk,
-    stroke: Stroke,
+    stroke: FeltStroke,
     readout: Readout,
     touch: FeltTouch,
     *,

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import find_objects, label
 
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import FeltStroke
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Angle, Phases
 from bench.records.trial_result import SeenWhisk
 from bench.session.trial import Trial
@@ -96,7 +96,12 @@ def _runs(mask) -> list[tuple[int, int]]:
 
 
 def phases_of(
-    trial: Trial, stroke: Stroke, touch: FeltTouch, readout: Readout, seen: SeenWhisk, beam: Beam
+    trial: Trial,
+    stroke: FeltStroke,
+    touch: FeltTouch,
+    readout: Readout,
+    seen: SeenWhisk,
+    beam: Beam,
 ) -> Phases:
     """Phases felt, with the slope and distance as seen, or the nominal ones where no picture tells of them."""
     if seen.deflection is not None:

@@ -16,9 +16,9 @@ from bench.base.results import ESTIMATING, SEEING, hash_of, hash_of_code, read_r
 from bench.base.settings import Settings
 from bench.base.statuses import reason
 from bench.cameras.session_cameras import SessionCalibration
-from bench.gauges.felt import Stroke, gauge_delay, strokes_of, touch_on_the_way_back
+from bench.gauges.felt import FeltStroke, gauge_delay, strokes_of, touch_on_the_way_back
 from bench.gauges.gauge_readings import Pairs, pairs_of
-from bench.gauges.matrix import Gauges
+from bench.gauges.matrix import GaugeCalibration
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import (
     EstimateRow,
@@ -73,7 +73,7 @@ class Unit:
     settings: Settings
     out: Path
     drift_rate: np.ndarray | None = None
-    gauges: Gauges | None = None
+    gauges: GaugeCalibration | None = None
     stage: str = "seen"
     force_drift_rate: np.ndarray | None = None
     wires: tuple[tuple[str, Path], ...] = ()
@@ -120,7 +120,7 @@ class Unit:
     def with_gauges(
         self,
         drift_rate: np.ndarray,
-        gauges: Gauges | None,
+        gauges: GaugeCalibration | None,
         force_drift_rate: np.ndarray | None = None,
     ) -> "Unit":
         """The unit complete, once the gauges are known."""
@@ -204,7 +204,7 @@ def feel_trial(unit: Unit, signals: Signals, seen: SeenTrial) -> FeltTrial:
     return FeltTrial(whisks, there, back)
 
 
-def _feel(unit: Unit, kind: str, stroke: Stroke, seen: SeenWhisk, number: int) -> FeltWhisk:
+def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: int) -> FeltWhisk:
     readout, missing = readout_of(unit, kind)
     beam, theta_rad = unit.session.whisker.beam, unit.settings.theta_rad
     touch, whisk = felt_whisk(stroke, readout or Readout.bare(), unit.drift_rate, beam, theta_rad)
@@ -270,7 +270,7 @@ def _C_share(unit: Unit, readout: Readout, *, of_wire: bool) -> float:
 
 
 def _against_pictures(
-    felt: FeltWhisk, unit: Unit, stroke: Stroke, readout: Readout, seen: SeenWhisk
+    felt: FeltWhisk, unit: Unit, stroke: FeltStroke, readout: Readout, seen: SeenWhisk
 ) -> FeltWhisk:
     """The felt whisk with χ² of its moments and those of the seen shape, and what is likely wrong in its status. Where
     pictures contradict encoder or lengths, they tell nothing of gauges."""
@@ -308,7 +308,7 @@ def readout_of(unit: Unit, kind: str) -> tuple[Readout | None, Reason]:
     return (Readout.of(unit.trial, fitted), NO_REASON) if fitted is not None else (None, OWN_GAUGES)
 
 
-def _with_drift(unit: Unit, stroke: Stroke, readout: Readout) -> WithDrift | None:
+def _with_drift(unit: Unit, stroke: FeltStroke, readout: Readout) -> WithDrift | None:
     """Touch and (10) of the stroke as recorded; None where nothing was taken out of it."""
     if stroke.drift is None:
         return None
@@ -321,7 +321,7 @@ def _with_drift(unit: Unit, stroke: Stroke, readout: Readout) -> WithDrift | Non
     return WithDrift(felt.touch_felt_rad.value, row.d_x_est_mm.value)
 
 
-def _one_factor(unit: Unit, kind: str, stroke: Stroke) -> tuple[EstimateRow, ...]:
+def _one_factor(unit: Unit, kind: str, stroke: FeltStroke) -> tuple[EstimateRow, ...]:
     """The estimates with one factor a channel and no cross-talk, the paper's way, where that was calibrated, and by
     other trials: these factors are those of all."""
     plain_gauges = unit.gauges and unit.gauges.one_factor

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD
 from bench.base.statuses import reason
-from bench.gauges.felt import Stroke, gauge_delay, ways_back_of
+from bench.gauges.felt import FeltStroke, gauge_delay, ways_back_of
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenTrial, SeenWhisk
 from bench.session.signals import Signals
 from bench.trials.estimates import whisk_of
@@ -23,7 +23,7 @@ NO_WAY_BACK = reason("no_way_back")
 
 
 def feel_back(
-    feel: Callable[[Stroke, SeenWhisk, int], FeltWhisk],
+    feel: Callable[[FeltStroke, SeenWhisk, int], FeltWhisk],
     unit: "Unit",
     signals: Signals,
     seen: SeenTrial,

@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 
 from bench.gauges.certificate import matrix_lines
-from bench.gauges.matrix import GaugeMatrix, Gauges
+from bench.gauges.matrix import GaugeCalibration, GaugeMatrix
 
 
-def gauge_lines(gauges: Gauges | None) -> Iterator[str]:
+def gauge_lines(gauges: GaugeCalibration | None) -> Iterator[str]:
     """The matrices with 95 % limits, and what is not known; nothing without gauges."""
     if gauges is None:
         return

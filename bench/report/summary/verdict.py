@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from bench.analyses.runs import FITTED, KINETIC, RUNS, SEEN
 from bench.base.settings import Seeing, Settings
-from bench.gauges.matrix import FROM_ALL, Gauges
+from bench.gauges.matrix import FROM_ALL, GaugeCalibration
 from bench.records.trial_result import TrialResult, whisks
 from bench.report.estimator_accuracy import Accuracy, accuracies, truth_uncertainty
 from bench.trials.estimate_errors import Judged
@@ -146,7 +146,7 @@ def _recommendation(judged: Sequence[Accuracy], theta_deg: float) -> str:
     return f"{text}."
 
 
-def gauge_source_lines(gauges: Gauges | None) -> Iterator[str]:
+def gauge_source_lines(gauges: GaugeCalibration | None) -> Iterator[str]:
     """Yield what the verdict rests on where measured trials calibrated the gauges."""
     if gauges is not None and gauges.source == FROM_ALL:
         judged = sum(matrix is not None for matrix in gauges.without.values())

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from bench.gauges.drift import FreeSlope, allow_drift, drift_rate, free_slope
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import FeltStroke
 
 RATE_HZ, SPEED = 2000.0, np.radians(10.0)
 
 
-def stroke(rng, drift=(0.0, 0.0), noise=0.005) -> Stroke:
+def stroke(rng, drift=(0.0, 0.0), noise=0.005) -> FeltStroke:
     """0.16 s of free stroke, then a push; channels in volts."""
     time = np.arange(1240) / RATE_HZ
     motor = SPEED * time
     rise = np.maximum(0.0, motor - SPEED * 0.16)[:, None] * [1.0, 8.0]
     channels = rise + np.outer(time, drift) + noise * rng.normal(size=(len(time), 2))
-    return Stroke(time, motor, channels, channels)
+    return FeltStroke(time, motor, channels, channels)
 
 
 def test_slope_of_a_free_stroke_and_its_noise(rng):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.gauges.felt import Stroke
+from bench.gauges.felt import FeltStroke
 from bench.gauges.fit import fit_gauges, fit_matrix
 from bench.gauges.gauge_faults import check_alive
 from bench.gauges.gauge_readings import Pairs
@@ -180,10 +180,10 @@ def test_a_channel_that_stands_still_is_refused():
     time = np.arange(100) / 100.0
     still = np.stack([np.full(100, 10.0), time], axis=1)
     with pytest.raises(BadInput, match="channel y reads 10 V throughout"):
-        check_alive([Stroke(time, time, still, still)])
+        check_alive([FeltStroke(time, time, still, still)])
     railed = np.stack([time, np.full(100, np.nan)], axis=1)
     with pytest.raises(BadInput, match="channel z is saturated throughout"):
-        check_alive([Stroke(time, time, railed, railed)])
+        check_alive([FeltStroke(time, time, railed, railed)])
 
 
 def test_moments_beyond_the_calibrated_range_are_said():

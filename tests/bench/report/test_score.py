@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench.analyses.friction_tables import FRICTION
-from bench.gauges.matrix import GaugeMatrix, Gauges
+from bench.gauges.matrix import GaugeCalibration, GaugeMatrix
 from bench.report.score import Score, score
 from bench.report.whisk_tables import ESTIMATES, TRACK, WHISKS
 from bench.session.session import load_session
@@ -75,7 +75,7 @@ def test_gauges_against_the_true_matrix(finished, small_session):
         [[11.31159134809883, 0.32264565212488266], [-0.2488179917658187, 10.536191428351158]]
     )
     lines = score(
-        load_session(small_session), finished, Gauges(GaugeMatrix(true * [1.01, 1.0]), "")
+        load_session(small_session), finished, GaugeCalibration(GaugeMatrix(true * [1.01, 1.0]), "")
     )
     assert "diagonal +1.00 %, +0.00 %" in lines[-1] and "cross-talk +0.00, +0.00" in lines[-1]
 
@@ -83,7 +83,9 @@ def test_gauges_against_the_true_matrix(finished, small_session):
 @pytest.mark.filterwarnings("error")
 def test_a_channel_that_answers_to_no_moment_has_no_cross_talk(finished, small_session):
     lines = score(
-        load_session(small_session), finished, Gauges(GaugeMatrix(np.diag([11.3116, 0.0])), "")
+        load_session(small_session),
+        finished,
+        GaugeCalibration(GaugeMatrix(np.diag([11.3116, 0.0])), ""),
     )
     assert (
         "diagonal +0.00 %, -100.00 %" in lines[-1] and "cross-talk +nan, +2.20 points" in lines[-1]

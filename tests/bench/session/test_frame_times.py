@@ -41,7 +41,7 @@ def test_frames_csv(small_copy):
 def test_stated_rate(small_copy, folder):
     replace_frames_csv(folder, "frame_rate_Hz = 20.0\nfirst_frame_s = 0.0005\n")
     found = times(small_copy)
-    assert (found.source, found.doubts) == ("frame_rate_Hz", ())
+    assert (found.source, found.warnings) == ("frame_rate_Hz", ())
     assert found.clock_sigma_s == 0.025  # half a frame: no edge was recorded
     np.testing.assert_allclose(found.time_s, 0.0005 + 0.05 * np.arange(11), atol=1e-12)
 
@@ -55,7 +55,7 @@ def test_a_stated_sigma_of_the_first_frame_is_the_clocks(small_copy, folder):
 
 def test_stated_rate_without_a_start_is_doubtful(small_copy, folder):
     replace_frames_csv(folder, "frame_rate_Hz = 20.0\n")
-    assert "first_frame_s is not given; taken as 0" in times(small_copy).doubts[0]
+    assert "first_frame_s is not given; taken as 0" in times(small_copy).warnings[0]
 
 
 def test_own_times_of_each_camera(small_copy, folder):
@@ -89,7 +89,7 @@ def test_container_times_are_doubtful(small_copy, folder, as_video):
         as_video(folder / camera, ".mkv", "FFV1")
     found = times(small_copy)
     assert found.source == "container" and found.clock_sigma_s == pytest.approx(0.025, rel=0.05)
-    assert "nothing ties them to the signals' clock" in found.doubts[0]
+    assert "nothing ties them to the signals' clock" in found.warnings[0]
     np.testing.assert_allclose(
         found.time_s, 0.0005 + 0.05 * np.arange(11), atol=6e-4
     )  # rounded to 1 ms
@@ -108,10 +108,10 @@ def test_a_header_with_another_rate_is_doubtful_until_settled(
     with (folder / "trial.toml").open("a") as file:
         file.write(toml)
     found = times(small_copy)
-    assert (found.source, len(found.doubts)) == ("frames.csv", count)
+    assert (found.source, len(found.warnings)) == ("frames.csv", count)
     assert all(
         "frames come at 20 Hz, the header of" in doubt and "says 30 Hz" in doubt
-        for doubt in found.doubts
+        for doubt in found.warnings
     )
 
 
@@ -167,7 +167,7 @@ def test_a_tiff_stack_in_place_of_a_folder(small_copy, folder):
     pages = {camera: stacked(folder / camera, inside=False) for camera in ("high", "low")}
     trial = checked_session(small_copy).trial("b30_3")
     found = frame_times(trial)
-    assert (found.source, found.doubts) == ("frames.csv", ())
+    assert (found.source, found.warnings) == ("frames.csv", ())
     for camera, frames in read_trial(trial, found).items():
         assert all(np.array_equal(frames[k], page) for k, page in enumerate(pages[camera]))
     (folder / "frames.csv").unlink()

@@ -21,7 +21,7 @@ def test_volts_and_degrees(small_session):
     )
     np.testing.assert_allclose(np.degrees(signals.motor_rad), rows[:, 1], rtol=1e-14)
     assert signals.rate_Hz == pytest.approx(2000.0)
-    assert (dict(signals.dropped), signals.doubts) == ({}, ())
+    assert (dict(signals.dropped), signals.warnings) == ({}, ())
 
 
 def test_moments_in_place_of_volts(small_copy):
@@ -106,4 +106,4 @@ def test_a_weight_trial_may_stand_still(small_copy):
     manifest = file.with_name("trial.toml")
     manifest.write_text('purpose = "weight"\nforce_N = 0.05\nat_mm = 50.0\n')
     signals = read(small_copy)
-    assert (signals.doubts, forward_strokes(signals)) == ((), ())
+    assert (signals.warnings, forward_strokes(signals)) == ((), ())

@@ -96,7 +96,7 @@ def test_what_is_implausible_is_one_line(option, tmp_path, capsys):
     assert not (tmp_path / "s").exists()
 
 
-def test_every_question_has_its_window():
+def test_every_question_has_its_range():
     for question in QUESTIONS:
         with pytest.raises(BadInput):
-            question.window.check(-1.0, question.key, "session.toml")
+            question.plausible_range.check(-1.0, question.key, "session.toml")

@@ -8,7 +8,14 @@ import pytest
 from bench.base.settings import Settings
 from bench.commands.evaluate import evaluate
 from bench.gauges.gauge_readings import Pairs
-from bench.gauges.matrix import FROM_ALL, FROM_FILE, FROM_TRIALS, GaugeMatrix, Gauges, to_follicle
+from bench.gauges.matrix import (
+    FROM_ALL,
+    FROM_FILE,
+    FROM_TRIALS,
+    GaugeCalibration,
+    GaugeMatrix,
+    to_follicle,
+)
 from bench.rig.simulate import simulate
 from bench.trials.agreement import LEAST_CHANCE, agreement
 from bench.trials.estimates import Readout
@@ -38,9 +45,11 @@ def pairs(rng, spoil=None) -> Pairs:
 )
 def test_gauges_fitted_to_the_wire_agree_with_it_whatever_its_stiffness(rng, source, tells):
     """C cancels between such gauges and the seen shape: moments 5 % too large are a fault, however badly C is known.
-    Gauges with newtons of their own may show another C."""
+    GaugeCalibration with newtons of their own may show another C."""
     wire = SimpleNamespace(C_Nmm2=9000.0, C_sigma_Nmm2=450.0)
-    unit = SimpleNamespace(session=SimpleNamespace(whisker=wire), gauges=Gauges(GAUGES, source))
+    unit = SimpleNamespace(
+        session=SimpleNamespace(whisker=wire), gauges=GaugeCalibration(GAUGES, source)
+    )
     found = against_shape(unit, Readout(GAUGES, is_gauged=True), pairs(rng, 1.05 * np.eye(2)))
     assert (found.chance < LEAST_CHANCE) == tells
 

@@ -8,7 +8,7 @@ import pytest
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
-from bench.gauges.felt import Stroke, gauge_delay
+from bench.gauges.felt import FeltStroke, gauge_delay
 from bench.gauges.matrix import GaugeMatrix
 from bench.trials.estimates import Readout, answer, answers, as_felt, estimators, felt_whisk
 from estimator import slip
@@ -21,7 +21,7 @@ BEAM = Beam(8835.7, 100.0)
 THETA, BETA, ALPHA = np.radians([3.0, 60.0, 10.0])
 
 
-def stroke(rng, d_x=60.0, noise=1e-3, roll=0.0) -> Stroke:
+def stroke(rng, d_x=60.0, noise=1e-3, roll=0.0) -> FeltStroke:
     """A stroke of the small-angle theory (13), (14) at 10°/s, in volts of a turned follicle."""
     time = np.arange(1240) / 2000.0
     motor = np.radians(10.0) * time + 0.02
@@ -30,7 +30,7 @@ def stroke(rng, d_x=60.0, noise=1e-3, roll=0.0) -> Stroke:
     c, s = np.cos(roll), np.sin(roll)
     follicle = np.outer(theta, np.array([[c, s], [-s, c]]) @ [m_y, m_z])
     volts = np.linalg.solve(MATRIX, follicle.T).T + 0.2 + noise * rng.normal(size=follicle.shape)
-    return Stroke(time, motor, volts, volts)
+    return FeltStroke(time, motor, volts, volts)
 
 
 @pytest.mark.parametrize("roll_deg", [0.0, 90.0, -30.0])
@@ -116,7 +116,9 @@ def test_sigma_of_10_holds_how_thick_the_object_is_said_to_be(rng):
 
 def test_no_touch_is_a_reason(rng):
     free = stroke(rng)
-    silent = Stroke(free.time_s, free.motor_rad, *[0.01 * rng.normal(size=free.channels.shape)] * 2)
+    silent = FeltStroke(
+        free.time_s, free.motor_rad, *[0.01 * rng.normal(size=free.channels.shape)] * 2
+    )
     touch, reason = felt_whisk(silent, Readout.bare(), np.zeros(2), BEAM, THETA)
     assert (
         "never touches" in reason and allow_drift(touch, np.zeros(2), 0.17).status == touch.status

@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from bench.cameras.session_cameras import _backgrounds
+from bench.cameras.session_cameras import _background
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import load_session
 from bench.trials.seen import _lost
-from vision.geometry.camera import Camera, Cameras
 from vision.pictures.files import read_picture
 
 
@@ -26,21 +25,15 @@ def test_damaged_frames_are_counted_and_named(small_copy):
 def test_without_a_rig_picture_the_trials_median_is_the_background(small_session, monkeypatch):
     """Where neither rod ever stands, the median is the rig picture but for noise and light."""
     session = load_session(small_session)
-    cameras = Cameras(
-        [Camera("high", (1280, 720), np.diag([2000.0, 2000, 1]), np.zeros(5), np.eye(3, 4))]
-    )
     monkeypatch.setattr("bench.cameras.session_cameras._FEWEST_FOR_MEDIAN", 3)
     rig = read_picture(session.rig_pictures["high"]).astype(float)
     session.rig_pictures.clear()
-    median = _backgrounds(session, cameras)["high"]
+    median = _background(session, "high")
     corner = np.s_[:150, :150]
     assert abs(np.median(median[corner] - rig[corner])) < 2.0
 
 
 def test_too_few_trials_leave_no_background(small_session):
     session = load_session(small_session)
-    cameras = Cameras(
-        [Camera("high", (1280, 720), np.diag([2000.0, 2000, 1]), np.zeros(5), np.eye(3, 4))]
-    )
     session.rig_pictures.clear()
-    assert _backgrounds(session, cameras)["high"] is None
+    assert _background(session, "high") is None

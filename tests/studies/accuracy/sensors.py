@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from bench.base.drawing import label_of, save, style
 from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift, drift_rate
-from bench.gauges.felt import Stroke, strokes_of
+from bench.gauges.felt import FeltStroke, strokes_of
 from bench.gauges.matrix import GaugeMatrix
 from bench.records.trial_result import EstimateRow
 from bench.rig.protocol import Protocol
@@ -102,7 +102,7 @@ def on_grid(rng: np.random.Generator) -> Iterator[Drawn]:
                 )
 
 
-def recorded(one: Drawn, rng: np.random.Generator) -> tuple[float, Stroke] | None:
+def recorded(one: Drawn, rng: np.random.Generator) -> tuple[float, FeltStroke] | None:
     """(true d_x, the stroke as felt), None where the whisker finds no hold."""
     place = {
         "beta_deg": one.beta_deg,
@@ -137,7 +137,7 @@ def recorded(one: Drawn, rng: np.random.Generator) -> tuple[float, Stroke] | Non
     return recording.touch.d_x_mm, stroke
 
 
-def answered(one: Drawn, stroke: Stroke, settings: Settings) -> dict[str, EstimateRow]:
+def answered(one: Drawn, stroke: FeltStroke, settings: Settings) -> dict[str, EstimateRow]:
     """What each sensor says; nothing where no touch is felt. Nothing drifts, and the bench is told so."""
     readout = Readout(GaugeMatrix(10.0 * np.eye(2)))
     touch = allow_drift(stroke.touch(), drift_rate([]), stroke.speed_rad_s)
