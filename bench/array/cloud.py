@@ -95,9 +95,9 @@ def _of_whisk(mount: Mount, trial: str, seen: SeenWhisk, felt: FeltWhisk) -> Ite
         (mount.base.name, trial, seen.whisk),
         (mount.base.T_rig_base[:, 3], mount.wire),
     )
-    if seen.has_truth and seen.point_covariance_mm2 is not None:
+    if seen.has_truth and seen.truth.point_covariance_mm2 is not None:
         normal = _normal(seen.touch_rad.value, seen.beta_rad.value)
-        placed = _placed(mount.base, seen.point_mm.value, seen.point_covariance_mm2, normal)
+        placed = _placed(mount.base, seen.point_mm.value, seen.truth.point_covariance_mm2, normal)
         yield Contact(*of_whisk, SEEN, *placed, seen.beta_rad.sigma, seen.status, *whisker)
     for answer in (*felt.estimates, *felt.sensors):
         if math.isfinite(answer.d_x_est_mm.value) and math.isfinite(felt.touch_felt_rad.value):

@@ -101,17 +101,17 @@ def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) 
 
     A bar's axis is away from the contact by both radii, at right angles to whisker and axis.
     """
-    if not seen.has_truth or seen.point_covariance_mm2 is None:
+    if not seen.has_truth or seen.truth.point_covariance_mm2 is None:
         return None
     turn, shift = base.T_rig_base[:, :3], base.T_rig_base[:, 3]
-    if (there := seen.rounded) is not None:
+    if (there := seen.truth.rounded) is not None:
         place = (
             turn @ there.point_mm + shift,
             turn @ there.axis,
             there.radius_mm,
             there.ring_radius_mm,
         )
-        covariance = turn @ seen.point_covariance_mm2 @ turn.T
+        covariance = turn @ seen.truth.point_covariance_mm2 @ turn.T
         return Surface(there.shape, *place, covariance, SEEN, there.half_angle_rad)
     if not np.isfinite(bar_radius_mm):
         return None
@@ -122,5 +122,5 @@ def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) 
         turn @ (seen.point_mm.value + from_contact.point_mm) + shift,
         turn @ from_contact.direction,
     )
-    covariance = turn @ seen.point_covariance_mm2 @ turn.T
+    covariance = turn @ seen.truth.point_covariance_mm2 @ turn.T
     return Surface("bar", point, axis, bar_radius_mm, covariance_mm2=covariance, source=SEEN)

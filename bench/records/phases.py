@@ -4,12 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-STATIC, KINETIC = "static", "kinetic"
+from vision.truth.value import NAN
+
+STATIC = "static"
+KINETIC = "kinetic"
 
 
 @dataclass(frozen=True)
 class Angle:
-    """One friction angle, rad: kind "static" or "kinetic", at which pushing angle, and its own sigma (not β's)."""
+    """One friction angle: its kind, static or kinetic, the pushing angle, and its own sigma, which
+    leaves out β's.
+    """
 
     kind: str
     theta_rad: float
@@ -19,24 +24,27 @@ class Angle:
 
 @dataclass(frozen=True)
 class Phases:
-    """Of one whisk: how many rests and jumps its record shows, and the angles at their ends."""
+    """Numbers of rests and jumps that the record of a whisk shows, and the angles at their ends."""
 
     rests: int
     jumps: int
     angles: tuple[Angle, ...]
 
     def mean(self, kind: str) -> tuple[float, float]:
-        """Weighted mean of the angles of one kind and its sigma from their scatter, rad; NaN without two of them."""
-        chosen = [a for a in self.angles if a.kind == kind]
-        if len(chosen) < 2:
-            return float("nan"), float("nan")
-        values, sigmas = np.array([(a.alpha_rad, a.sigma_rad) for a in chosen]).T
-        weights = sigmas**-2.0 / np.sum(sigmas**-2.0)
+        """Return the weighted mean of the angles of one kind and its sigma from their scatter, rad.
+
+        Both are NaN with less than two angles.
+        """
+        chosen = [angle for angle in self.angles if angle.kind == kind]
+        count = len(chosen)
+        if count < 2:
+            return NAN, NAN
+        values = np.array([angle.alpha_rad for angle in chosen])
+        precisions = np.array([angle.sigma_rad for angle in chosen]) ** -2.0
+        weights = precisions / np.sum(precisions)
         mean = float(weights @ values)
-        scatter = np.sqrt(
-            len(values) / (len(values) - 1) * np.sum(weights**2 * (values - mean) ** 2)
-        )
-        return mean, float(max(scatter, np.sum(sigmas**-2.0) ** -0.5))
+        scatter = np.sqrt(count / (count - 1) * np.sum(weights**2 * (values - mean) ** 2))
+        return mean, float(max(scatter, np.sum(precisions) ** -0.5))
 
 
 NO_PHASES = Phases(0, 0, ())

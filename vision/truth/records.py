@@ -86,7 +86,7 @@ class WhiskTruth:
     """
 
     whisk: int
-    frames: FrameTruth | None
+    frames: FrameTruth | None = None
     touch_rad: Value = UNKNOWN
     point_mm: Value = UNKNOWN_POINT
     d_x_mm: Value = UNKNOWN

@@ -61,7 +61,7 @@ def card(row: Row, whisker: Whisker, out: Path, whisks: int) -> Card:
         "" if trial.speed_deg_s is None else f"{trial.speed_deg_s:g}°/s",
         trial.purpose,
     ]
-    rests_on = counted(seen.cameras, "camera"), counted(seen.frames_used, "frame")
+    rests_on = counted(seen.truth.cameras, "camera"), counted(seen.truth.frames_used, "frame")
     subtitle = ", ".join([*filter(None, said), *rests_on])
     source = (
         picture_source(out, f"overlays/{row.trial}_{seen.whisk}.png", whisks)
@@ -112,7 +112,7 @@ def numbers(row: Row) -> list[tuple[str, str]]:
         ("moment m_z felt", told(felt.m_z_Nmm), "N·mm"),
         ("force angle φ felt", told(felt.phi_felt_rad, degrees=True), "°"),
     ]
-    found += [] if seen.beam is None else _beam_numbers(seen.beam)
+    found += [] if seen.truth.beam is None else _beam_numbers(seen.truth.beam)
     return [(name, f"{text} {unit}") for name, text, unit in found if text != MISSING]
 
 

@@ -286,11 +286,11 @@ def budget_bars(rows: Sequence[Row]) -> list[Bar]:
             row.name,
             {
                 cause: 100.0 * share
-                for cause, share in row.seen.budget.items()
+                for cause, share in row.seen.truth.budget.items()
                 if math.isfinite(share)
             },
             f"± {row.seen.d_x_mm.sigma:.3f} mm",
         )
         for row in rows
-        if row.seen.has_truth and row.seen.budget
+        if row.seen.has_truth and row.seen.truth.budget
     ]

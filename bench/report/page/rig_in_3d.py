@@ -72,9 +72,9 @@ def _whisk(row: Row) -> dict:
 def _ellipsoid(seen: SeenWhisk) -> np.ndarray:
     """Its three half-axes (3, 3), mm, a row each, along their own directions; along x, y, z where no covariance is
     known."""
-    if seen.point_covariance_mm2 is None:
+    if seen.truth.point_covariance_mm2 is None:
         return np.diag(seen.point_mm.sigma)
-    variances, directions = np.linalg.eigh(seen.point_covariance_mm2)
+    variances, directions = np.linalg.eigh(seen.truth.point_covariance_mm2)
     return np.sqrt(np.maximum(variances, 0.0))[:, None] * directions.T
 
 
