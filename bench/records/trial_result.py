@@ -105,7 +105,7 @@ class SeenWhisk:
     wanted pushing angle. overlay: lines by moment, "touch" and "theta". touch_shared_rad: part
     of touch's sigma that comes from felt touches of all whisks (`bench.trials.clocks`). looked:
     preset or settings file of the evaluation. contradicted: two records of the same quantity
-    disagree (`bench.trials.consistency`). by_one_camera: only where it was asked for.
+    disagree (`bench.trials.consistency`). by_one_camera: only where the settings name one.
     """
 
     truth: WhiskTruth
@@ -192,7 +192,7 @@ class SeenTrial:
 
     bar_looks: ratio of the bar's apparent to its stated diameter, by camera. back: the first
     back stroke, where it was recorded and has a truth. ways_back: the way back of each whisk,
-    run backwards, where they are asked for.
+    run backwards, where the trial evaluates them.
     """
 
     whisks: tuple[SeenWhisk, ...]

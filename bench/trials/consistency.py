@@ -123,18 +123,18 @@ def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board |
     return Reason(code, f"{found}: {cure}")
 
 
-def check_wire_width(looks: Mapping[str, Value], whisker: Whisker) -> Reason:
+def check_wire_width(ratios: Mapping[str, Value], whisker: Whisker) -> Reason:
     """Compare the whisker's apparent diameter with the stated one.
 
-    A warning is given only where the whisker looks thinner, to cameras that agree with each other:
-    shadows beside a wire, bloom and movement make it look thicker in all cameras alike. looks:
-    ratio of the apparent to the stated diameter, by camera.
+    A warning is given only where the whisker appears thinner, to cameras that agree with each
+    other: shadows next to a wire, bloom and movement make it appear thicker in all cameras alike.
+    ratios: of the apparent to the stated diameter, by camera.
     """
-    if not looks:
+    if not ratios:
         return NO_REASON
-    logs, variances = _logarithms(looks)
+    logs, variances = _logarithms(ratios)
     stated = (whisker.diameter_sigma_mm / whisker.diameter_mm) ** 2
-    of_all = Difference(logs, np.linalg.inv(np.diag(variances) + stated), len(looks))
+    of_all = Difference(logs, np.linalg.inv(np.diag(variances) + stated), len(ratios))
     if of_all.is_chance or not are_alike(logs, variances):
         return NO_REASON
     factor = float(np.exp(np.average(logs, weights=1.0 / variances)))
@@ -147,10 +147,10 @@ def check_wire_width(looks: Mapping[str, Value], whisker: Whisker) -> Reason:
     return Reason("wire_width_unlike_stated", f"{found}: {cure}")
 
 
-def _logarithms(looks: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
+def _logarithms(ratios: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
     """Return the logarithms (n,) of ratios by camera, and their variances."""
-    values = np.array([one.value for one in looks.values()])
-    sigmas = np.array([one.sigma for one in looks.values()])
+    values = np.array([one.value for one in ratios.values()])
+    sigmas = np.array([one.sigma for one in ratios.values()])
     return np.log(values), (sigmas / values) ** 2
 
 

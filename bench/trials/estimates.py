@@ -1,4 +1,4 @@
-"""Estimators asked about a felt whisk: pushing angle since felt touch, and the moments, nothing seen."""
+"""Estimates of a felt whisk: from pushing angle since felt touch and the moments, nothing seen."""
 
 import importlib
 import math
@@ -119,14 +119,14 @@ def whisk_of(felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam) -> Whisk:
 
 def answers(
     whisk: Whisk,
-    asked: Mapping[str, Estimator],
+    by_name: Mapping[str, Estimator],
     settings: Settings,
     radii_mm: tuple[float, float] = UNKNOWN_RADII_MM,
 ) -> tuple[EstimateRow, ...]:
-    """Return the row of each estimator by name, as `answer` does."""
+    """Return the row of each estimator by name."""
     alpha_sigma_rad = float(np.radians(settings.first_alpha_est_sigma_deg))
     rows = []
-    for name, estimator in asked.items():
+    for name, estimator in by_name.items():
         rows.append(
             answer(name, estimator, whisk, settings.alpha_est_rad, alpha_sigma_rad, radii_mm)
         )

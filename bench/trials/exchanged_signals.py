@@ -3,7 +3,7 @@ the other.
 
 Compared over the session, of those whisks whose moments are not those of their own shape
 (`bench.trials.agreement`). With one motor program for all trials nothing else shows it: encoder and
-pictures agree whichever file is beside them.
+pictures agree whichever file they are with.
 """
 
 from collections.abc import Iterator, Sequence

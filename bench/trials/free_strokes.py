@@ -1,4 +1,4 @@
-"""Drift of the channels over each free stroke of a trial, kept beside the calibration: a session of
+"""Drift of the channels over each free stroke of a trial, kept with the calibration: a session of
 many trials asks for all of them at each run.
 """
 

@@ -19,7 +19,7 @@ NOT_SHOWN = "the camera shows nothing of this whisk's wire, or was left out"
 
 
 def require_camera(session: Session, settings: Settings) -> None:
-    """Raise BadInput where the one camera that is asked for took no pictures."""
+    """Raise BadInput where the one camera of the settings took no pictures."""
     asked = settings.one_camera
     names = sorted({name for trial in session.trials for name in trial.camera_sources})
     if asked is not None and asked not in names:

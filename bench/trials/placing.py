@@ -102,6 +102,7 @@ def _scale_cause(session: Session, board: Placement, strokes: Placement) -> str:
     trace = np.append(np.zeros(3), -session.T_rig_board[:, 3])
 
     def message(size: float) -> str:
+        """Return the sentence for a relative error of all lengths."""
         return f"; a square_mm of {square_mm / (1.0 + size):.4g} for {square_mm:g} explains it"
 
     return difference.explained_by([Cause(message, np.zeros(6), trace, 1)])

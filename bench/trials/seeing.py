@@ -75,7 +75,7 @@ def from_file(path: Path) -> Seeing:
 
 
 def presets_for(settings: Settings) -> list[Seeing]:
-    """Return the settings to try on a whisk, one after another until d_x is as exact as asked for."""
+    """Return the settings to try on a whisk, one after another until d_x is exact enough."""
     if settings.accuracy_mm is None:
         return [settings.seeing]
     return [replace(by_preset(name), cameras=settings.seeing.cameras) for name in PRESETS]

@@ -165,7 +165,7 @@ def _refine(
     preset: Seeing,
     accuracy_mm: float,
 ) -> list[Evaluated]:
-    """Evaluate those whisks anew whose distance has a larger sigma than asked for, by a finer preset.
+    """Evaluate those whisks anew whose distance has a larger sigma than wanted, by a finer preset.
 
     A whisk that has no truth by that preset keeps the one it has.
     """

@@ -18,7 +18,7 @@ from vision.truth.value import NAN
 
 
 def see_unit(unit: Unit) -> SeenTrial:
-    """Return the seen half, and keep it beside the calibration."""
+    """Return the seen half, and keep it with the calibration."""
     seen = kept_seen(unit)
     if seen is None:
         seen = _see(unit, read_signals(unit.trial))

@@ -11,10 +11,11 @@ from bench.base.doubts import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import SeenTrial, SeenWhisk
 from vision.fit.blocks import REST_PRIOR_MM
+from vision.geometry.reasons import NO_REASON
 from vision.pictures.others import Others, RodLines
 
 _MOSTLY = 0.5  # of a wire's length: of two wires in one place most is, of two that cross little
-# mm: as far as a wire is looked for, two sigma of what is believed of a clamp (`vision.fit.blocks`).
+# mm: as far as a wire is traced for, two sigma of what is believed of a clamp (`vision.fit.blocks`).
 _MOST_BESIDE_MM = 2.0 * float(REST_PRIOR_MM[0])
 
 
@@ -36,23 +37,23 @@ class _Line:
 
 
 def with_whose(
-    seen: SeenTrial, straight: Mapping[str, Others], looked: Mapping[str, Others], own: str
+    seen: SeenTrial, straight: Mapping[str, Others], traced: Mapping[str, Others], own: str
 ) -> SeenTrial:
     """Return the trial with a status on each whisk whose wire may be another whisker's.
 
-    straight: by camera and whisker, its own too, straight wires from their bases. looked: the
+    straight: by camera and whisker, its own too, straight wires from their bases. traced: the
     others' wires as seen before. own: the whisker's name.
     """
     checked = []
     for whisk in seen.whisks:
-        checked.append(_checked(whisk, straight, looked, own, seen.wire_radius_mm))
+        checked.append(_checked(whisk, straight, traced, own, seen.wire_radius_mm))
     return replace(seen, whisks=tuple(checked))
 
 
 def _checked(
     whisk: SeenWhisk,
     straight: Mapping[str, Others],
-    looked: Mapping[str, Others],
+    traced: Mapping[str, Others],
     own: str,
     radius_mm: float,
 ) -> SeenWhisk:
@@ -64,21 +65,20 @@ def _checked(
     for camera, lines in drawing.cameras.items():
         if camera in straight:
             wires[camera] = lines["wire"]
+    others = sorted(set().union(*straight.values()) - {own})
+    taken = [name for name in others if _lies_on(wires, traced, drawing.frame, name)]
     offset_mm, nearest = 0.0, own
     for camera, wire in wires.items():
         found = _base_offset(wire, straight[camera], drawing.frame, own, radius_mm)
         offset_mm, nearest = max((offset_mm, nearest), found)
-    others = sorted(set().union(*straight.values()) - {own})
-    taken = [name for name in others if _lies_on(wires, looked, drawing.frame, name)]
-    warnings = []
-    if offset_mm > _MOST_BESIDE_MM:
-        warnings.append(reason("wire_off_its_base", beside_mm=offset_mm))
-        if nearest != own and nearest not in taken:
-            taken.append(nearest)
-    if taken:
-        warnings.append(reason("wire_of_another", names=" or ".join(taken)))
-    status = in_one_status(whisk.status, *warnings)
-    return replace(whisk, status=status, contradicted=whisk.contradicted or bool(warnings))
+    is_off_base = offset_mm > _MOST_BESIDE_MM
+    if is_off_base and nearest not in (own, *taken):
+        taken.append(nearest)
+    off_base = reason("wire_off_its_base", beside_mm=offset_mm) if is_off_base else NO_REASON
+    of_another = reason("wire_of_another", names=" or ".join(taken)) if taken else NO_REASON
+    status = in_one_status(whisk.status, off_base, of_another)
+    is_wrong = is_off_base or bool(taken)
+    return replace(whisk, status=status, contradicted=whisk.contradicted or is_wrong)
 
 
 def _base_offset(
@@ -103,14 +103,14 @@ def _base_offset(
 
 
 def _lies_on(
-    wires: Mapping[str, np.ndarray], looked: Mapping[str, Others], frame: int, name: str
+    wires: Mapping[str, np.ndarray], traced: Mapping[str, Others], frame: int, name: str
 ) -> bool:
     """Return whether most of the wire lies on another's picture in every camera.
 
     Two wires hide each other in one camera, and in all only where they are one.
     """
     for camera, wire in wires.items():
-        line = _line(looked.get(camera, {}).get(name), frame)
+        line = _line(traced.get(camera, {}).get(name), frame)
         if line is None:
             return False
         is_on = line.distance_px(wire) < 2.0 * line.half_px
