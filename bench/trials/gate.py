@@ -18,8 +18,8 @@ from estimator.signal import FeltTouch
 from estimator.whisk import Whisk
 
 _FEWEST = 2  # teeth: one jump may be a knock
-# Teeth of the stroke that serve: from this part of the wanted angle to as much beyond. Near touch they are short.
-_FROM_SHARE, _TO_SHARE = 0.5, 1.5
+_FROM_SHARE = 0.5  # of the wanted angle: teeth before it, near touch, are short
+_TO_SHARE = 1.5  # of the wanted angle: as much beyond it
 
 
 def kinetic_of(

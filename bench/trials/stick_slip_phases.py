@@ -32,8 +32,10 @@ _REST_SHARE = 0.5  # of the slope of a slip that never rests, σ/θ: below it th
 _LONGEST_JUMP = 2  # intervals between frames
 _SIGMAS = 3.0  # a rest is told from free slip where they differ by so many
 _JUMP_SIGMAS = 6.0  # in thousands of samples noise reaches 4
-# rad, s, samples: half a window in which a slope is taken, the lesser of both, between the counts. Set by eye
-_WINDOW_RAD, _WINDOW_S, _FEWEST, _MOST = np.radians(0.12), 0.012, 4, 40
+_WINDOW_RAD = np.radians(0.12)  # rad: half a window in which a slope is taken. Set by eye
+_WINDOW_S = 0.012  # s: half a window, where that is less. Set by eye
+_FEWEST = 4  # samples in half a window, at least. Set by eye
+_MOST = 40  # samples in half a window, at most. Set by eye
 _GUARD = 3  # samples at a jump that the gauges' own filter smears
 
 
