@@ -1,8 +1,8 @@
 """Conversion of records to plain values of JSON, and back.
 
 A `Value` has two keys there, its own and that of its sigma. A `Reason` has two, too: its text, and the
-code and text of each of its sentences. NaN is null. A field that is None has no key where None is its
-default.
+code and text of each of its sentences. NaN is null, None is too. A field with the metadata "optional"
+has no key where it is None or empty.
 """
 
 from collections.abc import Mapping
@@ -48,7 +48,7 @@ def _keys(field: Field, value: object) -> dict[str, Any]:
         return {name: str(value), codes_name(name): parts}
     if isinstance(value, Value):
         return {name: plain(value.value), sigma_name(name): plain(value.sigma)}
-    if value is None and field.default is None:
+    if field.metadata.get("optional") and not value:
         return {}
     return {name: to_plain(value)}
 

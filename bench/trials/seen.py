@@ -220,14 +220,15 @@ def whisk_record(
     """Return the record of a whisk, from the truth that vision found.
 
     contradictions: in what ways the recording disagrees with itself or with what is stated; such
-    a whisk is marked. The record leaves out the fit itself and the lines of all frames but two.
+    a whisk is marked. The record leaves out the fit itself, what the checks alone need, and
+    the lines of all frames but two.
     """
     at = truth.at(settings.theta_rad)
     contradictions = list(contradictions)
     if truth.frames:
         contradictions.append(check_turns(truth.turns, motor_speed(truth.frames)))
     return SeenWhisk(
-        truth=replace(truth, overlay={}, smooth=None, problem=None),
+        truth=replace(truth, overlay={}, ends={}, looks={}, smooth=None, problem=None),
         status=in_one_status(truth.status, at.status, *contradictions, *warnings),
         at=at,
         deflection=_deflection(truth),
