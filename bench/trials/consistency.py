@@ -113,14 +113,13 @@ def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board |
     if Difference.scalar(np.log(factor), sigma).is_chance:
         return NO_REASON
     if board:
-        code = "bar_width_unlike_board"
         scale = f"square_mm some {board.square_mm / factor:.3g} for {board.square_mm:g}"
     else:
-        code = "bar_width_unlike_stated"
         scale = "the cameras' scale"
     found = f"the bar looks {factor:.2f} ± {sigma * factor:.2f} times as thick as said"
     cure = f"its diameter_mm would have to be some {stated * factor:.3g} for {stated:g}, or {scale}"
-    return Reason(code, f"{found}: {cure}")
+    sentence = f"{found}: {cure}"
+    return Reason("bar_width_unlike_board" if board else "bar_width_unlike_stated", sentence)
 
 
 def check_wire_width(ratios: Mapping[str, Value], whisker: Whisker) -> Reason:
