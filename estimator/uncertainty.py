@@ -64,6 +64,16 @@ def gradient_frictionless(
     return _stack(d_x, by_theta, by_y, by_z, 0.0)
 
 
+def slip_angle_sigma(m_y: float, m_z: float, covariance: np.ndarray) -> float:
+    """Return the standard deviation of φ of (8), in rad.
+
+    covariance (2, 2): of the moments. The gradient of φ is (m_z, −m_y) / |m|².
+    """
+    gradient = np.array([m_z, -m_y]) / (m_y**2 + m_z**2)
+    variance = gradient @ covariance @ gradient
+    return float(np.sqrt(max(variance, 0.0)))
+
+
 def gradient_cone(
     theta: ArrayLike,
     m_y: ArrayLike,

@@ -141,7 +141,7 @@ def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> tuple[f
 
 def _turns_with_slip(seen: SeenWhisk) -> bool:
     """Whether the object is curved along itself: a cone is straight there."""
-    return seen.rounded is not None and seen.rounded.shape != "cone"
+    return seen.truth.rounded is not None and seen.truth.rounded.shape != "cone"
 
 
 def _near_touch(d: Deflection) -> Deflection:

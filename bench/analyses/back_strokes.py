@@ -14,6 +14,7 @@ from bench.base.drawing import label_of
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from vision.geometry.counted import counted
+from vision.truth.records import WhiskTruth
 from vision.truth.value import UNKNOWN, Value
 
 BOTH_WAYS = Table(
@@ -78,7 +79,9 @@ def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
     """Every estimate of every way back; one without any where it was not felt."""
     found = []
     for result in results:
-        seen = result.seen.ways_back or tuple(SeenWhisk(f.whisk) for f in result.felt.ways_back)
+        seen = result.seen.ways_back or tuple(
+            SeenWhisk(WhiskTruth(f.whisk)) for f in result.felt.ways_back
+        )
         for one, forth, felt, there in zip(
             seen, result.seen.whisks, result.felt.ways_back, result.felt.whisks
         ):

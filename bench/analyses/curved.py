@@ -20,7 +20,7 @@ from bench.trials.estimate_errors import is_sound
 from estimator import curvature, first_order
 from estimator.beam import Beam
 from estimator.domain import RIGHT_ANGLE
-from estimator.uncertainty import Z_95, gradient_with_friction
+from estimator.uncertainty import Z_95, gradient_with_friction, slip_angle_sigma
 from vision.truth.value import UNKNOWN, Value
 
 CURVATURE = Table(
@@ -135,9 +135,7 @@ def _rate(theta: np.ndarray, values, sigmas) -> tuple[Value, Value]:
 
 def phi_sigma(at: FeltAt) -> float:
     """One sigma of φ by the moments, rad."""
-    m_y, m_z = at.m_y_Nmm.value, at.m_z_Nmm.value
-    gradient = np.array([m_z, -m_y]) / (m_y**2 + m_z**2)
-    return float(np.sqrt(gradient @ at.covariance_at @ gradient))
+    return slip_angle_sigma(at.m_y_Nmm.value, at.m_z_Nmm.value, at.covariance_at)
 
 
 def _distance(at: FeltAt, alpha_rad: float, beam: Beam) -> tuple[float, float]:

@@ -41,7 +41,7 @@ def write_gives_way(out: Path, results: Sequence[TrialResult]) -> None:
     rows = [
         row
         for result, seen, _ in whisks(results)
-        if seen.gave is not None
+        if seen.truth.gave is not None
         for row in _rows(result, seen)
     ]
     if rows:
@@ -49,7 +49,7 @@ def write_gives_way(out: Path, results: Sequence[TrialResult]) -> None:
 
 
 def _rows(result: TrialResult, seen: SeenWhisk) -> Iterator[dict]:
-    gave, trial = seen.gave, result.trial
+    gave, trial = seen.truth.gave, result.trial
     columns = gave.index, np.degrees(gave.theta_rad), gave.normal_mm.value, gave.normal_mm.sigma
     for values in zip(*columns, gave.aside_mm.value, gave.aside_mm.sigma):
         frame, *numbers = (value.item() for value in values)
@@ -58,7 +58,7 @@ def _rows(result: TrialResult, seen: SeenWhisk) -> Iterator[dict]:
 
 def gave_at(seen: SeenWhisk, theta_rad: float) -> Value:
     """How far the object came along its normal up to a pushing angle, mm; NaN beyond the frames."""
-    gave = seen.gave
+    gave = seen.truth.gave
     if gave is None or not gave.theta_rad[0] <= theta_rad <= gave.theta_rad[-1]:
         return UNKNOWN
     of = (

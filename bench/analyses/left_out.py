@@ -115,10 +115,10 @@ def of_truth(name: str, here: WhiskAtHand) -> LeftOut:
         return LeftOut(NAN, NAN, NAN, _NO_TRUTH)
     if name == "clock":
         return _clock(here)
-    if name not in here.seen.refinements:
+    if name not in here.seen.truth.refinements:
         in_vision = name in NAMES[: NAMES.index("gauges' delay")] or name == "one-sided light"
         return LeftOut(NAN, NAN, NAN, "the fit does not tell") if in_vision else LeftOut()
-    return here.seen.refinements[name]
+    return here.seen.truth.refinements[name]
 
 
 def _clock(here: WhiskAtHand) -> LeftOut:

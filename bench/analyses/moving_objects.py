@@ -131,7 +131,7 @@ def _row(one: Moved) -> dict:
         "beta_deg": float(np.degrees(seen.beta_rad.value)),
         "velocity_share_percent": one.share_percent,
     }
-    told, as_seen = trial.object_velocity_mm_s, seen.velocity_mm_s
+    told, as_seen = trial.object_velocity_mm_s, seen.truth.velocity_mm_s
     for k, way in enumerate(_WAYS):
         row[f"velocity_{way}_mm_s"] = float(told[k])
         if as_seen is not None:

@@ -87,7 +87,7 @@ def contacts(
         if trial.purpose != "measure":
             continue
         stated = surfaces.get(trial.name)
-        if seen.has_truth and seen.point_covariance_mm2 is not None:
+        if seen.has_truth and seen.truth.point_covariance_mm2 is not None:
             contact = _to_rig(_seen_contact(mount, trial.name, seen), mount.base)
             yield _compare(contact, stated) if stated else contact
         surface = stated or seen_surface(seen, result.seen.bar_radius_mm, mount.wire, mount.base)
@@ -107,7 +107,7 @@ def _seen_contact(mount: Mount, trial: str, seen: SeenWhisk) -> Contact:
         whisk=seen.whisk,
         estimator=SEEN,
         point_mm=seen.point_mm.value,
-        covariance_mm2=seen.point_covariance_mm2,
+        covariance_mm2=seen.truth.point_covariance_mm2,
         normal=_normal(seen.touch_rad.value, seen.beta_rad.value),
         normal_sigma_rad=seen.beta_rad.sigma,
         status=seen.status,

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
-from bench.trials.consistency import LEAST_CHANCE
+from bench.trials.differences import LEAST_CHANCE
 
 _Touches = dict[tuple[str, int], tuple[SeenWhisk, FeltWhisk]]  # by trial and whisk
 

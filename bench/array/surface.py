@@ -115,12 +115,12 @@ def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) 
     It is as uncertain as the place where it is touched. None where no touch is seen. A bar's axis is
     away from the contact by both radii, at right angles to whisker and axis.
     """
-    if not seen.has_truth or seen.point_covariance_mm2 is None:
+    if not seen.has_truth or seen.truth.point_covariance_mm2 is None:
         return None
     turn = base.T_rig_base[:, :3]
     origin = base.T_rig_base[:, 3]
-    covariance = turn @ seen.point_covariance_mm2 @ turn.T
-    rounded = seen.rounded
+    covariance = turn @ seen.truth.point_covariance_mm2 @ turn.T
+    rounded = seen.truth.rounded
     if rounded is not None:
         return Surface(
             rounded.shape,

@@ -18,7 +18,7 @@ from bench.session.session import Session
 from bench.session.session_check import checked_session
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
-from bench.trials.of_session import certified, judged, placed_units, session_drift
+from bench.trials.of_session import fit_certificate, placed_units, session_drift, trials_with_whisks
 
 
 def calibrate_gauges_command(
@@ -87,10 +87,12 @@ def calibrate_gauges(
     """Coefficients from what the cameras and the gauges show of these trials. Raises BadInput."""
     settings, names = Settings(), {trial.name for trial in trials}
     with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
-        every = judged(session)
+        every = trials_with_whisks(session)
         _, units = placed_units(session, every, Path(folder), settings, pool, doubts)
         rate, _ = session_drift(units, pool)
-        made = certified([unit for unit in units if unit.trial.name in names], rate, pool, doubts)
+        made = fit_certificate(
+            [unit for unit in units if unit.trial.name in names], rate, pool, doubts
+        )
     return made.in_newtons_of(
         scale_by_weights(session.trials, made.gauges.all, *zeros(made.strokes))
     )

@@ -24,8 +24,14 @@ from bench.session.session_check import checked_views
 from bench.session.trial import Trial
 from bench.trials.estimates import estimators
 from bench.trials.exchanged_signals import exchanged_signals
-from bench.trials.lost import evaluated
-from bench.trials.of_session import first_units, judged, require_some, settled_units, with_gauges
+from bench.trials.lost import evaluate_units
+from bench.trials.of_session import (
+    first_units,
+    require_some,
+    trials_with_whisks,
+    units_in_rig,
+    with_gauges,
+)
 from bench.trials.one_camera import require_camera
 from bench.trials.side_by_side import array_units
 from bench.trials.unit import Unit
@@ -59,7 +65,7 @@ def evaluate(
     doubts = Doubts()
     views = checked_views(session_path, doubts, trials, follow_links=settings.follow_links)
     require_camera(views[0], settings)
-    recorded = [judged(view) for view in views]
+    recorded = [trials_with_whisks(view) for view in views]
     require_some(recorded[0], settings)
     with lock_output(out), _workers(dask, workers, out, progress) as pool:
         if views[0].base is None:
@@ -104,10 +110,10 @@ def _evaluated(
     figure_formats: Sequence[str],
 ) -> Summary:
     """The recorded trials of one whisker's session, a unit each, into the folder `out`, which is locked."""
-    calibration, units = settled_units(session, units, pool, doubts)
+    calibration, units = units_in_rig(session, units, pool, doubts)
     gauges, certificate, units = with_gauges(units, pool, doubts)
     chosen = [unit for unit in units if settings.takes(unit.trial.name)]
-    whole = finished(evaluated(chosen, pool), session.whisker, settings)
+    whole = finished(evaluate_units(chosen, pool), session.whisker, settings)
     doubts.notes += [*filter(None, [whole.doubt]), *exchanged_signals(chosen, whole.results)]
     write_tables(out, whole.results)
     write_friction(out, whole.results, whole.friction, settings.alpha_est_rad)

@@ -19,8 +19,10 @@ from bench.records.trial_result import EstimateRow, SeenWhisk, TrialResult
 from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.trials.estimate_errors import is_sound
-from bench.trials.estimates import Readout, answers, estimators, felt_whisk
-from bench.trials.unit import Unit, readout_of
+from bench.trials.estimates import answers, estimators
+from bench.trials.felt_trial import readout_of
+from bench.trials.readout import Readout, felt_whisk
+from bench.trials.unit import Unit
 from estimator import first_order
 from estimator.beam import Beam
 from estimator.signal import HALF_WINDOW_RAD, HUM_PERIOD_S

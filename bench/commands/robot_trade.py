@@ -27,8 +27,8 @@ from bench.report.evaluation import finished
 from bench.session.inside import check_outside
 from bench.session.session_check import checked_session
 from bench.session.signals import read_signals
-from bench.trials.lost import evaluated
-from bench.trials.of_session import judged, placed_units, require_some, with_gauges
+from bench.trials.lost import evaluate_units
+from bench.trials.of_session import placed_units, require_some, trials_with_whisks, with_gauges
 
 FIGURE = "robot_trade"
 AS_RECORDED = Converter()
@@ -112,13 +112,13 @@ def robot_trade(
     check_outside(out, session_path)
     doubts = Doubts()
     session = checked_session(session_path, doubts, follow_links=settings.follow_links)
-    recorded = judged(session)
+    recorded = trials_with_whisks(session)
     require_some(recorded, settings)
     with lock_output(out), Workers(workers, progress) as pool:
         _, units = placed_units(session, recorded, out, settings, pool, doubts)
         *_, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
-        results = finished(evaluated(chosen, pool), session.whisker, settings).results
+        results = finished(evaluate_units(chosen, pool), session.whisker, settings).results
         range_V = np.max(
             [range_of(read_signals(unit.trial)) for unit in chosen], axis=0, initial=0.0
         )

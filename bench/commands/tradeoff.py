@@ -30,10 +30,11 @@ from bench.session.inside import check_outside
 from bench.session.session import Session
 from bench.session.session_check import checked_session
 from bench.session.signals import forward_strokes, read_signals
-from bench.trials.of_session import judged, placed_units, with_gauges
+from bench.trials.of_session import placed_units, trials_with_whisks, with_gauges
 from bench.trials.seeing import PRESETS, STANDARD, as_toml, by_preset
 from bench.trials.seen import see_trial
-from bench.trials.unit import Unit, trial_result
+from bench.trials.trial_evaluation import trial_result
+from bench.trials.unit import Unit
 from estimator.uncertainty import Z_95
 
 TRADEOFF = Table(
@@ -130,10 +131,12 @@ def tradeoff(
     check_outside(out, path)
     doubts, settings = Doubts(), Settings(trials=trials)
     session = checked_session(path, doubts, follow_links=follow_links)
-    if not any(settings.takes(trial.name) and trial.camera_sources for trial in judged(session)):
+    if not any(
+        settings.takes(trial.name) and trial.camera_sources for trial in trials_with_whisks(session)
+    ):
         raise BadInput(f"--trials {trials}: no trial with pictures has such a name")
     with lock_output(out), Workers(1, progress) as pool:
-        _, units = placed_units(session, judged(session), out, settings, pool, doubts)
+        _, units = placed_units(session, trials_with_whisks(session), out, settings, pool, doubts)
         *_, units = with_gauges(units, pool, doubts)
         chosen = [
             unit for unit in units if settings.takes(unit.trial.name) and unit.trial.camera_sources

@@ -52,17 +52,25 @@ def plan_seen(task: SeenTask) -> Row:
         )
     clock_sigma_s = 0.0 if task.seen.clock is None else task.seen.clock.sigma_s
     settings = VisionSettings(clock_sigma_s=clock_sigma_s)
-    cameras = task.cameras.subset([name for name in task.cameras.names if name in whisk.lines])
+    cameras = task.cameras.subset(
+        [name for name in task.cameras.names if name in whisk.truth.lines]
+    )
     found = outlook(
-        expected(staged, cameras, whisk.lines, settings=settings), whisk.lines, task.theta_rad
+        expected(staged, cameras, whisk.truth.lines, settings=settings),
+        whisk.truth.lines,
+        task.theta_rad,
     )
     tried = [
         tried_on(
-            staged, one, one.lines(whisk.lines, staged.axis), task.theta_rad, settings=settings
+            staged,
+            one,
+            one.lines(whisk.truth.lines, staged.axis),
+            task.theta_rad,
+            settings=settings,
         )
         for one in task.tries
     ]
-    return Row(facts, found, tuple(tried), whisk.lines, _stated(whisk))
+    return Row(facts, found, tuple(tried), whisk.truth.lines, _stated(whisk))
 
 
 def stage_again(task: SeenTask) -> Staged:

@@ -27,8 +27,8 @@ from bench.rig.protocol import Protocol, load
 from bench.session.inside import check_outside
 from bench.session.session import MANIFEST
 from bench.session.session_check import checked_session
-from bench.trials.of_session import judged, placed_units
-from bench.trials.unit import see_unit
+from bench.trials.of_session import placed_units, trials_with_whisks
+from bench.trials.trial_evaluation import see_unit
 from vision.calibration.views import MeasuredPose
 from vision.geometry.camera import Cameras
 from vision.geometry.refusals import Refused
@@ -202,7 +202,7 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
     check_outside(out, path)
     doubts = Doubts()
     session = checked_session(path, doubts, follow_links=options.follow_links)
-    trials = [trial for trial in judged(session) if trial.camera_sources]
+    trials = [trial for trial in trials_with_whisks(session) if trial.camera_sources]
     if not trials:
         raise BadInput("has no pictures: there is nothing to plan", file="trials")
     settings = Settings(theta_deg=options.theta_deg)

@@ -4,14 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-STATIC, KINETIC = "static", "kinetic"
+from vision.truth.value import NAN
+
+STATIC = "static"
+KINETIC = "kinetic"
 
 
 @dataclass(frozen=True)
 class Angle:
-    """One friction angle.
-
-    kind: STATIC or KINETIC. theta_rad: the pushing angle. sigma_rad: its own, without β's.
+    """One friction angle: its kind, static or kinetic, the pushing angle, and its own sigma, which
+    leaves out β's.
     """
 
     kind: str
@@ -22,28 +24,27 @@ class Angle:
 
 @dataclass(frozen=True)
 class Phases:
-    """The rests and jumps of one whisk, how many, and the friction angles at their ends."""
+    """Numbers of rests and jumps that the record of a whisk shows, and the angles at their ends."""
 
     rests: int
     jumps: int
     angles: tuple[Angle, ...]
 
     def mean(self, kind: str) -> tuple[float, float]:
-        """Return the weighted mean of the angles of one kind, rad, and its sigma from their scatter.
+        """Return the weighted mean of the angles of one kind and its sigma from their scatter, rad.
 
-        NaN without two of them.
+        Both are NaN with less than two angles.
         """
         chosen = [angle for angle in self.angles if angle.kind == kind]
         count = len(chosen)
         if count < 2:
-            return float("nan"), float("nan")
+            return NAN, NAN
         values = np.array([angle.alpha_rad for angle in chosen])
-        information = np.array([angle.sigma_rad for angle in chosen]) ** -2.0
-        weights = information / np.sum(information)
+        precisions = np.array([angle.sigma_rad for angle in chosen]) ** -2.0
+        weights = precisions / np.sum(precisions)
         mean = float(weights @ values)
-        squares = np.sum(weights**2 * (values - mean) ** 2)
-        scatter = np.sqrt(count / (count - 1) * squares)
-        return mean, float(max(scatter, np.sum(information) ** -0.5))
+        scatter = np.sqrt(count / (count - 1) * np.sum(weights**2 * (values - mean) ** 2))
+        return mean, float(max(scatter, np.sum(precisions) ** -0.5))
 
 
 NO_PHASES = Phases(0, 0, ())

@@ -1,7 +1,8 @@
-"""Records as JSON has them, and back.
+"""Conversion of records to plain values of JSON, and back.
 
-A `Value` is two keys there, its own and that of its sigma. A `Reason` is two, too: its text, and the
-code and text of each of its sentences. NaN is null.
+A `Value` has two keys there, its own and that of its sigma. A `Reason` has two, too: its text, and the
+code and text of each of its sentences. NaN is null, None is too. A field with the metadata "optional"
+has no key where it is None or empty.
 """
 
 from collections.abc import Mapping
@@ -18,19 +19,20 @@ from vision.geometry.reasons import Reason, as_reason
 from vision.truth.value import NAN, Value
 
 Record = TypeVar("Record")
-WHERE_THERE = {"where_there": True}  # of a field that has no key where it is None
 
 
 def to_plain(value: object) -> Any:
-    """Return a record, or a list or mapping of records, as plain values."""
+    """Convert a record, or a list or mapping of records, to plain values."""
     if is_dataclass(value) and not isinstance(value, type):
-        table = {}
+        table: dict[str, Any] = {}
         for field in fields(value):
             table |= _keys(field, getattr(value, field.name))
         return table
     if isinstance(value, Mapping):
         return {str(key): to_plain(item) for key, item in value.items()}
-    return [to_plain(item) for item in value] if isinstance(value, (list, tuple)) else plain(value)
+    if isinstance(value, (list, tuple)):
+        return [to_plain(item) for item in value]
+    return plain(value)
 
 
 def codes_name(name: str) -> str:
@@ -42,16 +44,20 @@ def _keys(field: Field, value: object) -> dict[str, Any]:
     """Return the keys of a field with their plain values."""
     name = field.name
     if field.type is Reason:
-        return {name: str(value), codes_name(name): to_plain(as_reason(value).parts)}
+        parts = [list(part) for part in as_reason(value).parts]
+        return {name: str(value), codes_name(name): parts}
     if isinstance(value, Value):
         return {name: plain(value.value), sigma_name(name): plain(value.sigma)}
-    if value is None and field.metadata == WHERE_THERE:
+    if field.metadata.get("optional") and not value:
         return {}
     return {name: to_plain(value)}
 
 
 def from_plain(kind: type[Record], value: Any) -> Record:
-    """Return the record of this kind. Raise ValueError where it is of an older version, or damaged."""
+    """Convert plain values to a record of a kind.
+
+    Raises ValueError where they are no such record: of an older version, or damaged.
+    """
     try:
         return _read(kind, value)
     except (TypeError, AttributeError) as problem:
@@ -59,19 +65,17 @@ def from_plain(kind: type[Record], value: Any) -> Record:
 
 
 def _read(kind: Any, value: Any) -> Any:
-    """Return a plain value as its annotation has it; fields of other types stay as they are."""
+    """Convert a plain value by its annotation; values of other types stay as they are."""
     if isinstance(kind, UnionType):
-        inner = next(each for each in get_args(kind) if each is not NoneType)
-        return None if value is None else _read(inner, value)
+        if value is None:
+            return None
+        kind = next(k for k in get_args(kind) if k is not NoneType)
     if kind is float:
         return NAN if value is None else float(value)
     if kind is np.ndarray:
         return _array(value)
     if is_dataclass(kind):
-        given = {}
-        for field in fields(kind):
-            given |= _field(kind, field, value)
-        return kind(**given)
+        return _read_record(kind, value)
     if get_origin(kind) is tuple:
         return tuple(_read(get_args(kind)[0], item) for item in value)
     if get_origin(kind) is dict:
@@ -79,23 +83,28 @@ def _read(kind: Any, value: Any) -> Any:
     return value
 
 
-def _field(kind: type, field: Field, table: Mapping) -> dict[str, Any]:
-    """Return the value of a field by its name; nothing where its default is to stand.
+def _read_record(kind: type[Record], table: Mapping) -> Record:
+    """Convert a table to a record. Raise ValueError where a field without a default is missing."""
+    hints = _hints(kind)
+    values = {}
+    for field in fields(kind):
+        name = field.name
+        has_default = field.default is not MISSING or field.default_factory is not MISSING
+        if has_default and table.get(name) is None:
+            continue
+        if name not in table:
+            raise ValueError(f"{kind.__name__}: {name} is missing")
+        values[name] = _read_field(hints[name], name, table)
+    return kind(**values)
 
-    Raises ValueError where there is neither.
-    """
-    name = field.name
-    has_default = field.default is not MISSING or field.default_factory is not MISSING
-    if table.get(name) is None and has_default:
-        return {}
-    if name not in table:
-        raise ValueError(f"{kind.__name__}: {name} is missing")
-    hint = _hints(kind)[name]
+
+def _read_field(hint: Any, name: str, table: Mapping) -> Any:
+    """Convert the keys of one field to its value."""
     if hint in (Value, Value | None):
-        return {name: Value(_number(table[name]), _number(table.get(sigma_name(name))))}
+        return Value(_number(table[name]), _number(table.get(sigma_name(name))))
     if hint is Reason:
-        return {name: _reason(table[name], table.get(codes_name(name)))}
-    return {name: _read(hint, table[name])}
+        return _reason(table[name], table.get(codes_name(name)))
+    return _read(hint, table[name])
 
 
 def _reason(text: str, parts: list | None) -> Reason:
@@ -106,17 +115,17 @@ def _reason(text: str, parts: list | None) -> Reason:
 
 
 def _number(value: Any) -> float | np.ndarray:
-    """Return a number, or an array of a list; NaN for null."""
+    """Convert a list to an array, anything else to a float."""
     return _array(value) if isinstance(value, list) else _read(float, value)
 
 
 def _array(value: Any) -> np.ndarray:
-    """Return an array of numbers, null as NaN; truth values and whole numbers stay such."""
+    """Convert a list of numbers, null as NaN; truth values and whole numbers stay such."""
     found = np.array(value)
     return found.astype(float) if found.dtype == object else found
 
 
 @lru_cache
 def _hints(kind: type) -> dict[str, Any]:
-    """Return the annotations of a record, by field."""
+    """Return the annotations of a record's fields as types."""
     return get_type_hints(kind)

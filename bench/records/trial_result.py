@@ -1,4 +1,7 @@
-"""The result of one trial: what is seen, felt and estimated in each whisk. Missing is NaN, or None with a status."""
+"""The result of one trial: what is seen, felt and estimated in each whisk.
+
+A number that is missing is NaN, a record that is missing None; a status says why.
+"""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -6,21 +9,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
-from bench.records.plain import WHERE_THERE
-from vision.fit.beam_check import BeamCheck
-from vision.fit.line_noise import LineNoise
-from vision.fit.refinements import LeftOut
-from vision.fit.turns import Turns
-from vision.geometry.base_lines import BaseLines
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.at_angle import TruthAtAngle
-from vision.truth.records import FrameTruth, GaveWay, SeenObject, WireShape
-from vision.truth.value import NAN, UNKNOWN, UNKNOWN_POINT, Value
+from vision.truth.records import FrameTruth, WhiskTruth
+from vision.truth.value import NAN, UNKNOWN, Value
 
 
 @dataclass(frozen=True)
 class TrialFacts:
-    """The trial as the manifest states it."""
+    """Facts of a trial from its manifest."""
 
     name: str
     purpose: str
@@ -38,7 +35,7 @@ class TrialFacts:
 
 @dataclass(frozen=True)
 class WhiskerFacts:
-    """The whisker, which must be alike in results that are pooled."""
+    """Facts of the whisker, which must be alike in results that are pooled."""
 
     shape: str
     length_mm: float
@@ -47,18 +44,19 @@ class WhiskerFacts:
     tip_diameter_mm: float | None = None
 
     def left(self, x_mm: float) -> float:
-        """Return the share of the base's diameter that is left at a distance from the base."""
-        tip_mm = {"cylinder": self.diameter_mm, "cone": 0.0}.get(self.shape, self.tip_diameter_mm)
+        """Return the diameter at a distance from the base as a share of the base's diameter."""
+        tips_mm = {"cylinder": self.diameter_mm, "cone": 0.0}
+        tip_mm = tips_mm.get(self.shape, self.tip_diameter_mm)
         return 1.0 - (1.0 - tip_mm / self.diameter_mm) * x_mm / self.length_mm
 
 
 @dataclass(frozen=True, eq=False)
 class Deflection:
-    """The contact in the hub's axes while touching, from the unbent whisker: (f,) each.
+    """Place of the contact in the hub's axes while it touches, relative to the unbent whisker.
 
-    covariance: joint one (2f, 2f) of across z, y frame by frame. slip_mm: along the bar; past_mm:
-    how far the whisker's material has moved along itself past the bar, from any zero (rolling is no
-    such motion).
+    Each array is (frames,). slip_mm: along the bar. past_mm: how far the whisker's material has
+    moved along itself past the bar, from any zero (rolling is no such motion). covariance
+    (2 frames, 2 frames): of across_z_mm and across_y_mm, frame by frame.
     """
 
     theta_rad: np.ndarray
@@ -73,7 +71,7 @@ class Deflection:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Lines (n, 2) by name, px, to draw on one frame of each camera; the contact is one point (2,)."""
+    """Lines (n, 2) px by camera and name, to draw on one frame; the contact is one point (2,)."""
 
     frame: int
     cameras: dict[str, dict[str, np.ndarray]]
@@ -81,10 +79,10 @@ class Drawing:
 
 @dataclass(frozen=True)
 class ByOneCamera:
-    """Results from the shape seen by one camera, without gauges (`estimator.seen_shape`).
+    """Contact from the shape that one camera shows, without gauges (`estimator.seen_shape`).
 
-    They rest on their own trial's pictures: no estimate to be compared beside the gauges'.
-    stiffness_low_N_mm: no less than that, by 97.5 %.
+    It uses pictures of its own trial, so it is not compared with estimates from gauges.
+    stiffness_low_N_mm: the object is at least as stiff, with 97.5 % probability.
     """
 
     camera: str
@@ -100,37 +98,18 @@ class ByOneCamera:
 
 @dataclass(frozen=True, eq=False)
 class SeenWhisk:
-    """One whisk as the cameras see it.
+    """One whisk as the cameras show it.
 
-    d_x_mm is NaN exactly where there is no truth, and `status` says why. The fields are those of
-    `vision.truth.records.WhiskTruth`; at: truth at the wanted pushing angle; overlay: by moment,
-    "touch" and "theta". touch_shared_rad: the part of touch's sigma that felt touches of all whisks
-    add to it (`bench.trials.clocks`). looked: preset or settings file by which the pictures were
-    evaluated. contradicted: two sources of the recording do not agree (`bench.trials.consistency`).
-    by_one_camera: where the settings want that.
+    truth: without what only a fit's own process needs (`bench.trials.seen.whisk_record`).
+    status: the truth's, with warnings of the trial and of the recording. at: truth at the
+    wanted pushing angle. overlay: lines by moment, "touch" and "theta". touch_shared_rad: part
+    of touch's sigma that comes from felt touches of all whisks (`bench.trials.clocks`). looked:
+    preset or settings file of the evaluation. contradicted: two records of the same quantity
+    disagree (`bench.trials.consistency`). by_one_camera: only where the settings name one.
     """
 
-    whisk: int
+    truth: WhiskTruth
     status: Reason = NO_REASON
-    cameras: int = 0
-    frames_used: int = 0
-    touch_rad: Value = UNKNOWN
-    point_mm: Value = UNKNOWN_POINT
-    d_x_mm: Value = UNKNOWN
-    beta_rad: Value = UNKNOWN
-    psi_rad: Value = UNKNOWN
-    budget: dict[str, float] = field(default_factory=dict)
-    base: BaseLines | None = None
-    beam: BeamCheck | None = None
-    turns: Turns | None = None
-    refinements: dict[str, LeftOut] = field(default_factory=dict)
-    lines: dict[str, LineNoise] = field(default_factory=dict)
-    point_covariance_mm2: np.ndarray | None = None
-    shape: WireShape | None = None
-    velocity_mm_s: Value | None = None
-    gave: GaveWay | None = field(default=None, metadata=WHERE_THERE)
-    rounded: SeenObject | None = field(default=None, metadata=WHERE_THERE)
-    frames: FrameTruth | None = None
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None
     overlay: dict[str, Drawing] = field(default_factory=dict)
@@ -140,6 +119,41 @@ class SeenWhisk:
     by_one_camera: ByOneCamera | None = None
 
     @property
+    def whisk(self) -> int:
+        """Return the number of the whisk in its trial."""
+        return self.truth.whisk
+
+    @property
+    def touch_rad(self) -> Value:
+        """Return the motor angle of first touch."""
+        return self.truth.touch_rad
+
+    @property
+    def point_mm(self) -> Value:
+        """Return the contact (3,) at first touch, in the rig frame."""
+        return self.truth.point_mm
+
+    @property
+    def d_x_mm(self) -> Value:
+        """Return the radial distance; NaN exactly where there is no truth."""
+        return self.truth.d_x_mm
+
+    @property
+    def beta_rad(self) -> Value:
+        """Return the bar's slope across the whisker."""
+        return self.truth.beta_rad
+
+    @property
+    def psi_rad(self) -> Value:
+        """Return the bar's lean along the whisker."""
+        return self.truth.psi_rad
+
+    @property
+    def frames(self) -> FrameTruth | None:
+        """Return the truth frame by frame."""
+        return self.truth.frames
+
+    @property
     def has_truth(self) -> bool:
         """Return whether the whisk's distance is known."""
         return bool(np.isfinite(self.d_x_mm.value))
@@ -147,7 +161,9 @@ class SeenWhisk:
 
 @dataclass(frozen=True)
 class Clock:
-    """The tie of the frames to the signals: source, one sigma, and whether by a recorded edge."""
+    """Relation of the frames' times to the signals': source, one sigma, whether an edge was
+    recorded.
+    """
 
     source: str
     sigma_s: float
@@ -156,7 +172,7 @@ class Clock:
 
 @dataclass(frozen=True, eq=False)
 class BarLine:
-    """The bar's axis in the rig frame: point (3,) and direction (3,)."""
+    """Axis of the bar in the rig frame: point (3,) and direction (3,)."""
 
     point_mm: np.ndarray
     direction: np.ndarray
@@ -164,7 +180,7 @@ class BarLine:
 
 @dataclass(frozen=True, eq=False)
 class BackStroke:
-    """Seen touch where the motor goes back, and the motor's speed, which is negative."""
+    """Touch as seen where the motor goes back, and the motor's speed, which is negative."""
 
     touch_rad: Value
     speed_rad_s: float
@@ -174,9 +190,9 @@ class BackStroke:
 class SeenTrial:
     """The seen half of a trial; bar, radii and clock are missing where there are no pictures.
 
-    bar_looks: the bar's apparent over its stated diameter, by camera. back: the first back stroke,
-    where it was recorded and has a truth. ways_back: the way back of each whisk, run backwards,
-    where the settings want them.
+    bar_looks: ratio of the bar's apparent to its stated diameter, by camera. back: the first
+    back stroke, where it was recorded and has a truth. ways_back: the way back of each whisk,
+    run backwards, where the trial evaluates them.
     """
 
     whisks: tuple[SeenWhisk, ...]
@@ -192,12 +208,11 @@ class SeenTrial:
 
 @dataclass(frozen=True)
 class EstimateRow:
-    """One estimator's result on a whisk; alpha_est_rad, beta_est_rad are NaN where it has none.
+    """One estimator's result for a whisk; alpha_est_rad, beta_est_rad are NaN where it has none.
 
-    d_x_est_sigma_alpha_exact_mm: the sigma as if alpha_est were right; d_x_est_low_mm,
+    d_x_est_sigma_alpha_exact_mm: the sigma as if alpha_est were exact. d_x_est_low_mm,
     d_x_est_high_mm: the 95 % interval. d_y_est_mm, d_z_est_mm, slip_est_mm: of the contact at the
-    pushing angle; touch_covariance_mm_rad: of the distance with the angle of touch, NaN where
-    unknown.
+    pushing angle. touch_covariance_mm_rad: of the distance with the angle of touch.
     """
 
     estimator: str
@@ -214,15 +229,16 @@ class EstimateRow:
     touch_covariance_mm_rad: float = NAN
 
     def holds(self, d_x_mm: float) -> bool | None:
-        """Return whether the 95 % interval holds a distance; None where either is not known."""
-        if not np.isfinite([self.d_x_est_low_mm, self.d_x_est_high_mm, d_x_mm]).all():
+        """Return whether the 95 % interval contains a distance; None where either is unknown."""
+        low, high = self.d_x_est_low_mm, self.d_x_est_high_mm
+        if not np.isfinite([low, high, d_x_mm]).all():
             return None
-        return bool(self.d_x_est_low_mm <= d_x_mm <= self.d_x_est_high_mm)
+        return bool(low <= d_x_mm <= high)
 
 
 @dataclass(frozen=True, eq=False)
 class FeltAt:
-    """Felt moments at one pushing angle, and estimates from them; the fields are `FeltWhisk`'s."""
+    """Moments at one pushing angle and the estimates from them; for the fields see `FeltWhisk`."""
 
     theta_rad: float
     m_y_Nmm: Value
@@ -235,7 +251,7 @@ class FeltAt:
 
 @dataclass(frozen=True)
 class WithDrift:
-    """Felt touch and d_x by (10) without correction for drift from before touch to after the way back."""
+    """Felt touch and d_x by (10) of signals whose drift over the whisk was not removed."""
 
     touch_felt_rad: float
     d_x_est_mm: float
@@ -243,18 +259,18 @@ class WithDrift:
 
 @dataclass(frozen=True, eq=False)
 class FeltWhisk:
-    """One whisk as the gauges feel it: touch, moments and slip angle at the wanted pushing angle.
+    """One whisk as the gauges show it: touch, moments and slip angle at the wanted pushing angle.
 
     theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the
-    touch; covariance_at (2, 2): of the moments; theta_moment_covariance_at (2,): with the pushing
-    angle; shared_Nmm (k, 2): changes of the moments at one sigma of each cause that all whisks have
-    in common. agreement_chi2: of the moments with those of the seen shape, 2 degrees of freedom;
-    apart: they are not those, or the recording contradicts itself elsewhere, and nothing is
-    concluded from the whisk. one_factor: estimates with one factor a channel. by_theta: moments and
-    estimates at other pushing angles, up to the stroke's end. delay_s: of the gauges' filter, taken
-    out of the touch. sensors: estimates of the other sensors of Table I, where a load cell was
-    recorded. kinetic: as on the kinetic cone, where by the moments alone the contact sticks and
-    slips. with_drift: None where no drift was taken out.
+    touch. covariance_at (2, 2): of the moments. theta_moment_covariance_at (2,): of the pushing
+    angle with the moments. shared_Nmm (k, 2): change of the moments at one sigma of each cause
+    that all whisks have in common. agreement_chi2: of the moments less those of the seen shape,
+    2 degrees of freedom. apart: they disagree, or the recording contradicts itself elsewhere, and
+    nothing is concluded from the whisk. one_factor: estimates with one gauge factor a channel.
+    by_theta: moments and estimates at other pushing angles, up to the stroke's end. delay_s: of
+    the gauges' filter, removed from the touch. sensors: estimates by the other sensors of Table I,
+    where a load cell was recorded. kinetic: the whisk on the kinetic cone, where the moments
+    show that the contact sticks and slips. with_drift: None where no drift was removed.
     """
 
     whisk: int = 0
@@ -287,7 +303,10 @@ class FeltWhisk:
 
 @dataclass(frozen=True, eq=False)
 class FeltTrial:
-    """The felt half of a trial. back_touch_rad: felt touch of the first back stroke. ways_back: see `SeenTrial`."""
+    """The felt half of a trial.
+
+    back_touch_rad: felt touch of the first back stroke. ways_back: see `SeenTrial`.
+    """
 
     whisks: tuple[FeltWhisk, ...]
     back_touch_rad: Value = UNKNOWN
@@ -296,10 +315,10 @@ class FeltTrial:
 
 @dataclass(frozen=True, eq=False)
 class TrialResult:
-    """The whole result of one trial.
+    """All of one trial.
 
-    theta_deg: the wanted pushing angle. hash, seen_hash: of what the result, and its seen half,
-    were made from.
+    theta_deg: the wanted pushing angle. hash, seen_hash: of all inputs of the result, and of its
+    seen half.
     """
 
     trial: TrialFacts
@@ -312,7 +331,7 @@ class TrialResult:
 
 
 def whisks(results: Iterable[TrialResult]) -> Iterator[tuple[TrialResult, SeenWhisk, FeltWhisk]]:
-    """Yield (result, seen, felt) of every whisk."""
+    """Yield the trial's result and the seen and the felt half of every whisk."""
     for result in results:
         for seen, felt in zip(result.seen.whisks, result.felt.whisks):
             yield result, seen, felt

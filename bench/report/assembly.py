@@ -70,29 +70,32 @@ def whisk_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
             for column, key in names:
                 row |= _cells(column, key, getattr(source, key, UNKNOWN))
         row |= _place(seen.point_mm.value, seen.point_mm.sigma)
-        row |= {name: getattr(seen, name) for name in ("cameras", "frames_used", "looked")}
+        row |= {name: getattr(seen.truth, name) for name in ("cameras", "frames_used")}
+        row["looked"] = seen.looked
         yield row | _whisk_of(result, seen)
 
 
 def budget_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
     """A row a whisk with truth: what part of d_x's variance each cause has."""
     for result, seen, _ in whisks(results):
-        if seen.has_truth and seen.budget:
-            shares = {f"{cause}_percent": 100.0 * seen.budget.get(cause, NAN) for cause in CAUSES}
+        if seen.has_truth and seen.truth.budget:
+            shares = {
+                f"{cause}_percent": 100.0 * seen.truth.budget.get(cause, NAN) for cause in CAUSES
+            }
             yield _whisk_of(result, seen) | {"d_x_sigma_mm": seen.d_x_mm.sigma} | shares
 
 
 def beam_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
     """A row a whisk with truth: d_x, touch, and slip at the largest pushing angle, by a beam and by a spline."""
     for result, seen, _ in whisks(results):
-        if not (seen.has_truth and seen.beam):
+        if not (seen.has_truth and seen.truth.beam):
             continue
         row = _whisk_of(result, seen) | {
-            "chance": seen.beam.chance,
-            "theta_deg": math.degrees(seen.beam.theta_rad),
+            "chance": seen.truth.beam.chance,
+            "theta_deg": math.degrees(seen.truth.beam.theta_rad),
         }
         for name, key in _BEAM:
-            (stem, unit), compared = name.rsplit("_", 1), getattr(seen.beam, key)
+            (stem, unit), compared = name.rsplit("_", 1), getattr(seen.truth.beam, key)
             for what in ("beam", "spline", "difference_sigma"):
                 value = getattr(compared, what)
                 row[f"{stem}_{what}_{unit}"] = math.degrees(value) if unit == "deg" else value

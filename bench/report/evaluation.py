@@ -34,7 +34,7 @@ def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Setting
     """The results as they stand in trials/, brought together."""
     results = tuple(with_runs(results, whisker, settings))
     shared = shared_touch(results)
-    doubt = shared_doubt(results, shared)
+    doubt = shared_doubt(shared)
     results = with_shared_touch(results, shared)
     return Finished(results, tuple(friction_of(results, whisker, settings.alpha_est_rad)), doubt)
 

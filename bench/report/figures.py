@@ -175,7 +175,7 @@ def variance_of_truth(results: Sequence[TrialResult]) -> Figure | None:
     sigma are drawn.
     """
     known = [(r.trial.name, seen) for r, seen, _ in whisks(results) if seen.has_truth]
-    known = [(trial, seen) for trial, seen in known if seen.budget]
+    known = [(trial, seen) for trial, seen in known if seen.truth.budget]
     known.sort(key=lambda one: -one[1].d_x_mm.sigma)
     known = known[:_MOST_BARS]
     if not known:
@@ -185,7 +185,7 @@ def variance_of_truth(results: Sequence[TrialResult]) -> Figure | None:
     places = np.arange(len(known))
     ends = np.zeros(len(known))
     for number, cause in enumerate(CAUSES):
-        shares = np.array([100.0 * seen.budget.get(cause, math.nan) for _, seen in known])
+        shares = np.array([100.0 * seen.truth.budget.get(cause, math.nan) for _, seen in known])
         shares = np.nan_to_num(shares)
         bars = axes.barh(places, shares, left=ends, color=f"C{number}", label=cause)
         for bar, (trial, seen) in zip(bars, known):

@@ -198,9 +198,9 @@ def _wire(
 ) -> np.ndarray:
     """The whisker (n, 3), mm, as it was fitted in frame k; unbent in frames that are not in the fit."""
     motor = float(whisk.frames.motor_rad[k])
-    if whisk.shape is None:
+    if whisk.truth.shape is None:
         return wire_between(motor, contact_mm, result.whisker.length_mm)
-    facts, shape = result.whisker, whisk.shape
+    facts, shape = result.whisker, whisk.truth.shape
     wire = Wire(
         facts.shape, facts.length_mm, facts.diameter_mm, tip_diameter_mm=facts.tip_diameter_mm
     )

@@ -1,11 +1,13 @@
-"""Felt against seen, whisk by whisk: the moments at the base that the seen shape asks for, beside those that were felt.
+"""Felt against seen, whisk by whisk: the moments at the base that follow from the seen shape, and
+those that were felt.
 
-The seen ones are the exact rod's through the contact (`bench.gauges.clamped_rod`), frame by frame; felt are the channels at the
-same motor angles. Both lines rise from nothing at touch, so their slopes are compared, two numbers with one covariance:
-of pictures, distance, friction along the rod, noise, zero, gauges and the follicle's turn.
+The former are the exact rod's through the contact (`bench.gauges.clamped_rod`), frame by frame; the
+latter are the channels at the same motor angles. Both rise from nothing at touch on a line, so
+their slopes are compared, two numbers with one covariance: of pictures, distance, friction along
+the rod, noise, zero, gauges and the follicle's turn.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,115 +15,114 @@ from scipy.special import chdtrc
 
 from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import GaugeMatrix
+from bench.trials.differences import LEAST_CHANCE, Cause, Difference, constant_message
 from vision.geometry.reasons import NO_REASON, Reason
 
-# Once in ten thousand whisks by chance: a session of 640 is then told of one that is sound in one of fifteen.
-LEAST_CHANCE = 1e-4
 _EXPLAINED = 0.01  # of the chance that a cause must leave
-_PER_PARAMETER = 2.0  # of χ², for each number that a cause is free to choose (Akaike)
-_OTHERWISE = (
+_UNEXPLAINED = (
     "no fault of the gauges alone explains it; look whether these are another trial's signals"
 )
+_NOTHING = np.zeros(2)
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """χ² of felt less seen moments, 2 degrees of freedom, its chance, and what is likely wrong ('' where nothing)."""
+    """χ² of felt less seen moments, 2 degrees of freedom, and its chance.
+
+    cause: sentence on the fault where both disagree, '' where they agree. is_explained: a fault of
+    the gauges or of the stated stiffness is that cause.
+    """
 
     chi2: float
     chance: float
     cause: str = ""
+    is_explained: bool = False
 
     @property
     def status(self) -> Reason:
-        """Return what to say of the whisk; nothing where both agree."""
+        """Return the status of the whisk; NO_REASON where both agree."""
         if self.chance >= LEAST_CHANCE:
             return NO_REASON
-        sentence = f"felt moments are not those of the seen shape (χ² {self.chi2:.0f}, 2 degrees of freedom): {self.cause}"
-        is_explained = self.cause != _OTHERWISE
-        return Reason("gauge_fault" if is_explained else "shape_not_felt", sentence)
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """Per radian of pushing, in the follicle's axes: volts (2,), seen moments (2,), covariance (2, 2) of matrix · volts
-    less seen."""
-
-    volts: np.ndarray
-    seen: np.ndarray
-    covariance: np.ndarray
-
-    @classmethod
-    def of(cls, pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> "Slopes":
-        """Least-squares slopes through zero of a whisk's pairs. scale_sigma: share by which all moments may be wrong
-        together, beyond what the pairs say of it: of C, where the gauges bring newtons of their own."""
-        weights = pairs.theta_rad / (pairs.theta_rad @ pairs.theta_rad)
-        mean, turn = np.kron(weights, np.eye(2)), np.kron(np.eye(len(pairs)), gauges.matrix)
-        volts, seen = weights @ pairs.volts, weights @ pairs.moments
-        own = pairs.moments_covariance + turn @ pairs.volts_covariance @ turn.T
-        scale = pairs.scale_sigma**2 + scale_sigma**2
-        shared = gauges.covariance_at(volts) + scale * np.outer(seen, seen)
-        return cls(volts, seen, mean @ own @ mean.T + shared)
-
-    def chi2(self, felt: np.ndarray) -> float:
-        """Of felt (2,) less seen."""
-        off = felt - self.seen
-        return float(off @ np.linalg.solve(self.covariance, off))
+        found = f"(χ² {self.chi2:.0f}, 2 degrees of freedom)"
+        sentence = f"felt moments are not those of the seen shape {found}: {self.cause}"
+        return Reason("gauge_fault" if self.is_explained else "shape_not_felt", sentence)
 
 
 def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> Agreement:
-    """What the whisk's felt moments are beside its seen ones, and the likeliest cause where they stand out."""
-    slopes = Slopes.of(pairs, gauges, scale_sigma)
-    found = slopes.chi2(gauges.matrix @ slopes.volts)
-    chance = float(chdtrc(2, found))
-    return Agreement(
-        found, chance, likeliest_cause(slopes, gauges.matrix) if chance < LEAST_CHANCE else ""
-    )
+    """Compare a whisk's felt moments with its seen ones, per radian of pushing.
+
+    scale_sigma: share by which all moments may be wrong together, beyond that of the pairs: of C,
+    where the gauges bring newtons of their own.
+    """
+    weights = pairs.theta_rad / (pairs.theta_rad @ pairs.theta_rad)  # (n,): slope through zero
+    volts = weights @ pairs.volts
+    seen = weights @ pairs.moments
+    covariance = _covariance(pairs, gauges, weights)
+    scale = pairs.scale_sigma**2 + scale_sigma**2
+    covariance += gauges.covariance_at(volts) + scale * np.outer(seen, seen)
+    felt = gauges.matrix @ volts
+    difference = Difference(felt - seen, np.linalg.inv(covariance), 2)
+    chi2 = difference.chi2
+    chance = float(chdtrc(2, chi2))
+    if chance >= LEAST_CHANCE:
+        return Agreement(chi2, chance)
+    causes = [*_exchanges(volts, gauges.matrix), *_turns(felt, seen)]
+    for cause in _scales(volts, gauges.matrix):
+        _, excess = difference.without(cause)
+        if excess < 1.0:  # more would reverse a moment
+            causes.append(cause)
+    sentence = difference.explained_by(causes, _EXPLAINED)
+    return Agreement(chi2, chance, sentence or _UNEXPLAINED, is_explained=bool(sentence))
 
 
-def likeliest_cause(slopes: Slopes, matrix: np.ndarray) -> str:
-    """The cause that leaves the least χ², two for each number that it is free to choose; of those that explain all."""
-    tried = list(_causes(slopes, matrix))
-    left = [slopes.chi2(felt) for _, free, felt in tried]
-    explains = [chdtrc(2 - free, c) > _EXPLAINED for c, (_, free, _) in zip(left, tried)]
-    costs = [
-        c + _PER_PARAMETER * free if ok else np.inf
-        for c, ok, (_, free, _) in zip(left, explains, tried)
-    ]
-    best = int(np.argmin(costs))
-    return tried[best][0] if np.isfinite(costs[best]) else _OTHERWISE
+def _covariance(pairs: Pairs, gauges: GaugeMatrix, weights: np.ndarray) -> np.ndarray:
+    """Return the covariance (2, 2) of the slopes, felt less seen, from the pairs' own."""
+    to_moments = np.kron(np.eye(len(pairs)), gauges.matrix)  # (2n, 2n)
+    of_slopes = np.kron(weights, np.eye(2))  # (2, 2n)
+    felt = to_moments @ pairs.volts_covariance @ to_moments.T
+    return of_slopes @ (pairs.moments_covariance + felt) @ of_slopes.T
 
 
-def _causes(slopes: Slopes, matrix: np.ndarray) -> Iterator[tuple[str, int, np.ndarray]]:
-    """(what is wrong, numbers it is free to choose, the felt moments (2,) without it)."""
-    volts, seen = slopes.volts, slopes.seen
-    felt = matrix @ volts
-    yield "y_V and z_V look exchanged", 0, matrix @ volts[::-1]
-    yield "y_V looks reversed", 0, matrix @ (volts * [-1, 1])
-    yield "z_V looks reversed", 0, matrix @ (volts * [1, -1])
-    yield "y_V and z_V look reversed", 0, -felt
+def _exchanges(volts: np.ndarray, matrix: np.ndarray) -> Iterator[Cause]:
+    """Yield the faults of channels that are exchanged or reversed."""
+    exchanged = {
+        "y_V and z_V look exchanged": volts[::-1],
+        "y_V looks reversed": volts * [-1, 1],
+        "z_V looks reversed": volts * [1, -1],
+        "y_V and z_V look reversed": -volts,
+    }
+    for sentence, right in exchanged.items():
+        yield Cause(constant_message(sentence), matrix @ (volts - right), None, 0)
+
+
+def _turns(felt: np.ndarray, seen: np.ndarray) -> Iterator[Cause]:
+    """Yield the fault of a follicle that is turned otherwise than stated."""
     turn = np.arctan2(felt[0] * seen[1] - felt[1] * seen[0], felt @ seen)
     c, s = np.cos(turn), np.sin(turn)
     turned = np.array([[c, -s], [s, c]]) @ felt
-    yield f"the follicle looks turned by {np.degrees(turn):+.1f}° more than stated", 1, turned
+    by = f"{np.degrees(turn):+.1f}° more than stated"
+    yield Cause(constant_message(f"the follicle looks turned by {by}"), felt - turned, None, 1)
+
+
+def _scales(volts: np.ndarray, matrix: np.ndarray) -> Iterator[Cause]:
+    """Yield the faults of one gauge's factor and of the stated stiffness.
+
+    The size of each is the share of these moments that is felt in excess.
+    """
     for channel, name in enumerate(("y_V", "z_V")):
-        alone = matrix[:, channel] * volts[channel]
-        share = _share(slopes, alone, felt - alone)
-        if share > 0:
-            gives = f"it gives {100 / share:.0f} % of what it should"
-            said = f"gauge {name} looks slipped, {gives}, or drifts while the whisker pushes"
-            yield said, 1, felt + (share - 1) * alone
-    share = _share(slopes, felt, np.zeros(2))
-    if share > 0:
-        yield (
-            f"the whisker looks {100 * share:.1f} % as stiff in the gauges' newtons as its E says",
-            1,
-            share * felt,
-        )
+        yield Cause(_slipped_message(name), _NOTHING, matrix[:, channel] * volts[channel], 1)
+    yield Cause(_stiffness_message, _NOTHING, matrix @ volts, 1)
 
 
-def _share(slopes: Slopes, part, rest) -> float:
-    """The factor on a part (2,) of the felt moments with which they come nearest to the seen ones; 0 for no part."""
-    weighted = np.linalg.solve(slopes.covariance, part)
-    size = weighted @ part
-    return float(weighted @ (slopes.seen - rest) / size) if size > 0 else 0.0
+def _slipped_message(name: str) -> Callable[[float], str]:
+    """Return the message on a gauge that gives more or less than it should."""
+    return lambda excess: (
+        f"gauge {name} looks slipped, it gives {100 / (1.0 - excess):.0f} % of what it should, "
+        "or drifts while the whisker pushes"
+    )
+
+
+def _stiffness_message(excess: float) -> str:
+    """Return the sentence on a whisker of another stiffness."""
+    percent = 100 * (1.0 - excess)
+    return f"the whisker looks {percent:.1f} % as stiff in the gauges' newtons as its E says"

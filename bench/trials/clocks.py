@@ -1,21 +1,23 @@
-"""Touch felt against touch seen, over all whisks of a session: an error that they share is the session's, not chance.
+"""Touch felt against touch seen, over all whisks of a session: an error that they share is the
+session's, not chance.
 
     felt − seen = zero + clock · speed
 
-The speed is negative on the way back. zero: what moves either touch by an angle (diameters, light on the bar, the
-gauges' onset); clock: by how much the frames' clock runs behind the signals', plus what the delay of the gauges' filter
-is longer than what was taken out. Whisks at one speed and in one direction tell their sum alone. No truth is moved by
-what is felt: an error that is more than chance is a doubt, and enters the sigma of touch seen.
+The speed is negative on the way back. zero: what moves either touch by an angle (diameters, light
+on the bar, the gauges' onset). clock: delay of the frames' clock behind the signals', plus the part
+of the gauges' filter's delay that was not removed. Whisks at one speed and in one direction
+determine their sum alone. No truth is moved by what is felt: an error that is more than chance is a
+warning, and enters the sigma of touch seen.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
 
 from bench.gauges.felt import motor_speed
-from bench.records.trial_result import SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import SeenWhisk, TrialResult
 from vision.geometry.counted import counted
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.value import Value
@@ -25,164 +27,181 @@ FALSE_ALARM = 1e-3
 # Before anything is known: wider than any bench has it.
 _PRIOR = np.array([np.radians(1.0), 0.05])
 # By so much (chi²) a clock must explain better than a zero, or the other way round, to be named alone: three sigma.
-_TOLD_APART = 9.0
+_CLEAR_PREFERENCE = 9.0
 _ALIKE = 0.1  # speeds: a motor's own scatter
 
 
 @dataclass(frozen=True)
 class SharedTouch:
-    """values (2,) = zero (rad) and clock (s) with covariance (2, 2); chance: of as much by sound sigmas.
+    """Error of touch that all whisks share.
 
-    likelier: by how much chi² the clock alone explains better than the zero alone. speeds_rad_s: lowest and highest.
-    whisks, back: how many forward and back strokes tell.
+    values (2,): zero (rad) and clock (s), with covariance (2, 2). chance: of as much by sound
+    sigmas. clock_preference: by how much χ² the clock alone explains better than the zero alone.
+    speeds_rad_s (n,): of the strokes that show it, negative on the way back.
     """
 
     values: np.ndarray
     covariance: np.ndarray
     chance: float
-    likelier: float
-    speeds_rad_s: tuple[float, float]
-    whisks: int
-    back: int
+    clock_preference: float
+    speeds_rad_s: np.ndarray
 
     @property
     def is_error(self) -> bool:
-        """Whether it is more than chance."""
+        """Return whether it is more than chance."""
         return self.chance < FALSE_ALARM
 
     def at(self, speed_rad_s: float) -> tuple[float, float]:
-        """felt − seen that whisks at this speed share, rad, and its sigma."""
+        """Return felt − seen that whisks at this speed share, rad, and its sigma."""
         row = np.array([1.0, speed_rad_s])
         return float(row @ self.values), float(np.sqrt(row @ self.covariance @ row))
 
     @property
     def tells_clock(self) -> bool:
-        """Whether speeds or directions tell a clock from a zero."""
-        low, high = self.speeds_rad_s
-        return high - low >= _ALIKE * abs(high)
+        """Return whether speeds or directions differ enough to separate a clock from a zero."""
+        return bool(np.ptp(self.speeds_rad_s) >= _ALIKE * abs(np.max(self.speeds_rad_s)))
+
+    @property
+    def strokes(self) -> str:
+        """Return the numbers of strokes in words."""
+        back = int(np.sum(self.speeds_rad_s < 0))
+        forward = counted(len(self.speeds_rad_s) - back, "whisk")
+        return f"{forward} and {counted(back, 'back stroke')}" if back else forward
 
     @property
     def line(self) -> str:
-        """For the summary."""
+        """Return the line of the summary."""
+        begin = f"felt − seen, by {self.strokes} together: "
         if not self.tells_clock:
-            late, sigma = np.degrees(self.at(self.speeds_rad_s[1]))
-            return (
-                f"felt − seen, by {_strokes(self.whisks, self.back)} together: {late:+.3f} ± {sigma:.3f}°; at one "
-                "speed and in one direction a clock is not told from a zero"
-            )
-        zero, clock = self.values * [np.degrees(1.0), 1e3]
-        sigma = np.sqrt(np.diag(self.covariance)) * [np.degrees(1.0), 1e3]
+            late, sigma = np.degrees(self.at(np.max(self.speeds_rad_s)))
+            alone = "at one speed and in one direction a clock is not told from a zero"
+            return f"{begin}{late:+.3f} ± {sigma:.3f}°; {alone}"
+        units = [np.degrees(1.0), 1e3]  # degrees, ms
+        zero, clock = self.values * units
+        zero_sigma, clock_sigma = np.sqrt(np.diag(self.covariance)) * units
         return (
-            f"felt − seen, by {_strokes(self.whisks, self.back)} together: zero {zero:+.3f} ± {sigma[0]:.3f}°, and "
-            f"{clock:+.2f} ± {sigma[1]:.2f} ms times the motor's speed"
+            f"{begin}zero {zero:+.3f} ± {zero_sigma:.3f}°, and {clock:+.2f} ± {clock_sigma:.2f} ms "
+            "times the motor's speed"
         )
 
 
 def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
-    """What all whisks of a session have in common of felt − seen; None where none has both touches."""
-    rows = np.array(list(_rows(results)))
-    if not len(rows):
+    """Fit what all whisks of a session have in common of felt − seen; None where none has both."""
+    strokes = np.array(list(_strokes(results)))
+    if not len(strokes):
         return None
-    difference, seen, felt, speed, late_s = rows.T
-    lever = np.stack([np.ones_like(speed), speed], axis=1)
+    difference, seen, felt, speed, delay = strokes.T
+    design = np.stack([np.ones_like(speed), speed], axis=1)  # (n, 2): zero, clock
     # What moves the seen touch of one whisk (light, lenses, diameters) may move all; clocks and filter surely do.
-    late = late_s * speed
-    weight = np.linalg.inv(np.diag(felt**2 + seen**2) + np.outer(seen, seen) + np.outer(late, late))
-    told = lever.T @ weight @ lever
-    pull = lever.T @ weight @ difference
-    covariance = np.linalg.inv(told + np.diag(_PRIOR**-2.0))
-    zero, moved = (pull[k] ** 2 / (told[k, k] + _PRIOR[k] ** -2.0) for k in range(2))
-    chance = float(chdtrc(2, pull @ covariance @ pull))
-    back = int(np.sum(speed < 0))
-    speeds = float(speed.min()), float(speed.max())
+    late = delay * speed
+    Sigma = np.diag(felt**2 + seen**2) + np.outer(seen, seen) + np.outer(late, late)
+    weight = np.linalg.inv(Sigma)
+    information = design.T @ weight @ design
+    gradient = design.T @ weight @ difference
+    prior = _PRIOR**-2.0
+    covariance = np.linalg.inv(information + np.diag(prior))
+    zero_alone, clock_alone = gradient**2 / (np.diag(information) + prior)
     return SharedTouch(
-        covariance @ pull, covariance, chance, float(moved - zero), speeds, len(rows) - back, back
+        covariance @ gradient,
+        covariance,
+        chance=float(chdtrc(2, gradient @ covariance @ gradient)),
+        clock_preference=float(clock_alone - zero_alone),
+        speeds_rad_s=speed,
     )
 
 
-def _rows(results: Iterable[TrialResult]):
-    """Of each stroke felt − seen, the sigmas of seen (its clock apart) and felt (the filter's delay apart), rad; its
-    speed, and the sigma of clock and delay together, s."""
+def _strokes(results: Iterable[TrialResult]) -> Iterator[np.ndarray]:
+    """Yield five numbers of each stroke, forward or back, whose touch is both felt and seen.
+
+    These are felt − seen touch, the sigma of seen without the clock's, the sigma of felt without
+    that of the filter's delay, rad, the speed, rad/s, and the sigma of clock and delay together, s.
+    """
     for result in results:
-        clock_s, back = result.seen.clock.sigma_s if result.seen.clock else 0.0, result.seen.back
-        delay_s = max((f.delay_s.sigma for f in result.felt.whisks), default=np.nan)
-        pairs = [
-            (
-                s.touch_rad,
-                s.touch_shared_rad,
-                Value(f.touch_felt_rad.value, f.theta_sigma_rad),
-                motor_speed(s.frames),
-                f.delay_s.sigma,
-            )
-            for _, s, f in whisks([result])
-            if np.isfinite(s.touch_rad.value)
-        ]
-        pairs += (
-            [(back.touch_rad, 0.0, result.felt.back_touch_rad, back.speed_rad_s, delay_s)]
-            if back
-            else []
-        )
-        for seen, shared, felt, speed, filter_s in pairs:
-            own = np.sqrt(max(seen.sigma**2 - shared**2 - (clock_s * speed) ** 2, 0.0))
-            row = felt.value - seen.value, own, felt.sigma
-            if np.isfinite(row).all():
-                yield *row, speed, float(np.hypot(clock_s, filter_s))
+        clock_s = result.seen.clock.sigma_s if result.seen.clock else 0.0
+        for seen, felt in zip(result.seen.whisks, result.felt.whisks):
+            if np.isfinite(seen.touch_rad.value):
+                speed = motor_speed(seen.frames)
+                shared = np.hypot(seen.touch_shared_rad, clock_s * speed)
+                touch = Value(felt.touch_felt_rad.value, felt.theta_sigma_rad)
+                delay_s = np.hypot(clock_s, felt.delay_s.sigma)
+                yield from _known(seen.touch_rad, shared, touch, speed, delay_s)
+        back = result.seen.back
+        if back:
+            shared = clock_s * back.speed_rad_s
+            filters_s = [felt.delay_s.sigma for felt in result.felt.whisks]
+            delay_s = np.hypot(clock_s, max(filters_s, default=np.nan))
+            touch = result.felt.back_touch_rad
+            yield from _known(back.touch_rad, shared, touch, back.speed_rad_s, delay_s)
+
+
+def _known(
+    seen: Value, shared_sigma: float, felt: Value, speed_rad_s: float, delay_s: float
+) -> Iterator[np.ndarray]:
+    """Yield the numbers of a stroke, unless a touch is unknown; shared_sigma: part of seen's sigma
+    to leave out.
+    """
+    own = np.sqrt(max(seen.sigma**2 - shared_sigma**2, 0.0))
+    touch = [felt.value - seen.value, own, felt.sigma]
+    if np.isfinite(touch).all():
+        yield np.array([*touch, speed_rad_s, delay_s])
 
 
 def with_shared_touch(
     results: Sequence[TrialResult], shared: SharedTouch | None
 ) -> tuple[TrialResult, ...]:
-    """The results with the error that all whisks share in the sigma of touch seen, where there is one."""
+    """Return the results with a shared error of touch in the sigma of touch seen."""
     if shared is None or not shared.is_error:
         return tuple(results)
-    return tuple(
-        replace(
-            result,
-            seen=replace(result.seen, whisks=tuple(_wider(s, shared) for s in result.seen.whisks)),
-        )
-        for result in results
-    )
+    widened = []
+    for result in results:
+        seen = tuple(_with_error(whisk, shared) for whisk in result.seen.whisks)
+        widened.append(replace(result, seen=replace(result.seen, whisks=seen)))
+    return tuple(widened)
 
 
-def _wider(seen: SeenWhisk, shared: SharedTouch) -> SeenWhisk:
-    if not np.isfinite(seen.touch_rad.value):
+def _with_error(seen: SeenWhisk, shared: SharedTouch) -> SeenWhisk:
+    """Return the whisk with the shared error in the sigma of its touch."""
+    touch = seen.touch_rad
+    if not np.isfinite(touch.value):
         return seen
     error = abs(shared.at(motor_speed(seen.frames))[0])
-    wider = float(np.hypot(seen.touch_rad.sigma, error))
-    return replace(seen, touch_rad=Value(seen.touch_rad.value, wider), touch_shared_rad=error)
+    sigma = float(np.hypot(touch.sigma, error))
+    truth = replace(seen.truth, touch_rad=Value(touch.value, sigma))
+    return replace(seen, truth=truth, touch_shared_rad=error)
 
 
-def shared_doubt(results: Sequence[TrialResult], shared: SharedTouch | None) -> Reason:
+def shared_doubt(shared: SharedTouch | None) -> Reason:
     """Return what to say of an error that all whisks share, with its most probable causes.
 
     Nothing is said where there is no such error.
     """
     if shared is None or not shared.is_error:
         return NO_REASON
-    forward = [shared.at(row[3]) for row in _rows(results) if row[3] > 0]
+    forward = [shared.at(speed) for speed in shared.speeds_rad_s if speed > 0]
     late, sigma = np.degrees(max(forward, key=lambda one: abs(one[0])))
-    clock_ms = 1e3 * shared.values[1]
-    if shared.likelier > _TOLD_APART:
-        cause = (
-            f"it goes with the motor's speed, as {abs(clock_ms):.1f} ms do by which the frames' clock runs "
-            f"{'behind' if clock_ms > 0 else 'ahead of'} the signals': check how frames are stamped"
-        )
-    elif shared.likelier < -_TOLD_APART:
-        cause = (
-            "it does not go with the motor's speed, so no clock does it: check the diameters of bar and whisker, and "
-            "that nothing touches the whisker or its gauges earlier"
-        )
-    else:
-        cause = (
-            "likeliest the clock of frames or signals, else diameters or the gauges' onset: strokes of one speed and "
-            "direction do not tell which; record back strokes with frames, or another speed"
-        )
     return Reason(
         "touch_apart",
-        f"touch felt less seen is {late:+.3f} ± {sigma:.3f}° by {_strokes(shared.whisks, shared.back)} together (sound "
-        f"sigmas show as much in {shared.chance:.0e} of sessions); {cause}. It is in the sigma of touch seen",
+        f"touch felt less seen is {late:+.3f} ± {sigma:.3f}° by {shared.strokes} together (sound "
+        f"sigmas show as much in {shared.chance:.0e} of sessions); {_probable_cause(shared)}. It is "
+        "in the sigma of touch seen",
     )
 
 
-def _strokes(forward: int, back: int) -> str:
-    return counted(forward, "whisk") + (f" and {counted(back, 'back stroke')}" if back else "")
+def _probable_cause(shared: SharedTouch) -> str:
+    """Return the sentence on clock or zero, whichever explains the error."""
+    if shared.clock_preference > _CLEAR_PREFERENCE:
+        clock_ms = 1e3 * shared.values[1]
+        where = "behind" if clock_ms > 0 else "ahead of"
+        return (
+            f"it goes with the motor's speed, as {abs(clock_ms):.1f} ms do by which the frames' clock runs "
+            f"{where} the signals': check how frames are stamped"
+        )
+    if shared.clock_preference < -_CLEAR_PREFERENCE:
+        return (
+            "it does not go with the motor's speed, so no clock does it: check the diameters of bar and whisker, and "
+            "that nothing touches the whisker or its gauges earlier"
+        )
+    return (
+        "likeliest the clock of frames or signals, else diameters or the gauges' onset: strokes of one speed and "
+        "direction do not tell which; record back strokes with frames, or another speed"
+    )

@@ -1,27 +1,28 @@
-"""What a recording says twice, and what is likely wrong where both do not agree.
+"""Quantities that a recording holds twice: a warning with the probable cause where both disagree.
 
-A difference of two records of one thing has a covariance: χ² tells whether it is more than chance. Each cause leaves a
-trace of its own; the one that leaves the least χ² when its trace is taken away is named.
+Each check returns NO_REASON where both agree or one of them is unknown.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
+from bench.trials.differences import (
+    Cause,
+    Difference,
+    are_alike,
+    constant_message,
+    without_mean,
+)
 from vision.fit.turns import Turns
 from vision.geometry.board import Board
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.touched.width import combine_widths
 from vision.truth.value import UNKNOWN, Value
 
-# Once in ten thousand whisks by chance. 51 path-traced scenes show 1.3 times their degrees of freedom at most.
-LEAST_CHANCE = 1e-4
-_EXPLAINED = 0.001  # of the chance that a cause must leave: its trace is that of an ideal fault
-_PER_PARAMETER = 2.0  # of χ², for each number that a cause is free to choose (Akaike)
 # Of a nominal slope that states no sigma: a bar set by eye and a protractor, written in steps of 5°.
 _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
 # A whisker leans on a bar within its friction angle of the bar's normal. μ = 1 is more than rubber or coarse sandpaper
@@ -29,286 +30,203 @@ _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
 _STEEPEST_FRICTION_RAD = np.radians(45.0)
 
 
-@dataclass(frozen=True)
-class Cause:
-    """A trace (n,) of known size, one of free size or None, how many numbers are free to choose, and what to say, given
-    the size found."""
+def check_turns(turns: Turns | None, speed_rad_s: float) -> Reason:
+    """Compare the whisker's turn from frame to frame with the motor's (encoder).
 
-    said: Callable[[float], str]
-    fixed: np.ndarray
-    trace: np.ndarray | None
-    free: int
-
-
-@dataclass(frozen=True, eq=False)
-class Difference:
-    """Of two records: values (n,), their information (inverse covariance) (n, n), and degrees of freedom."""
-
-    values: np.ndarray
-    information: np.ndarray
-    freedom: int
-
-    @property
-    def chi2(self) -> float:
-        """Of no difference."""
-        return float(self.values @ self.information @ self.values)
-
-    @property
-    def is_chance(self) -> bool:
-        """Whether both agree."""
-        return chdtrc(self.freedom, self.chi2) >= LEAST_CHANCE
-
-    def without(self, cause: Cause) -> tuple[float, float]:
-        """χ² that is left when the cause's trace is taken away, and the trace's size."""
-        left = self.values - cause.fixed
-        if cause.trace is None:
-            return float(left @ self.information @ left), 0.0
-        weighed = self.information @ cause.trace
-        size = float(weighed @ left) / max(float(weighed @ cause.trace), 1e-300)
-        left = left - size * cause.trace
-        return float(left @ self.information @ left), size
-
-    def likeliest(
-        self, causes: Sequence[Cause], otherwise: str = "no single cause explains it"
-    ) -> str:
-        """The cause that leaves the least χ², two for each number that it may choose; of those that explain all."""
-        left = [self.without(cause) for cause in causes]
-        explains = [
-            chdtrc(max(self.freedom - c.free, 1), x2) > _EXPLAINED
-            for (x2, _), c in zip(left, causes)
-        ]
-        costs = [
-            x2 + _PER_PARAMETER * c.free if ok else np.inf
-            for (x2, _), c, ok in zip(left, causes, explains)
-        ]
-        best = int(np.argmin(costs))
-        return causes[best].said(left[best][1]) if np.isfinite(costs[best]) else otherwise
-
-
-def turns_doubt(turns: Turns | None, speed_rad_s: float) -> Reason:
-    """The encoder against the pictures: a sentence where the whisker does not turn from frame to frame as the motor
-    does, '' where it does. speed_rad_s: of the motor."""
+    speed_rad_s: of the motor.
+    """
     if turns is None or len(turns.index) < 3:
         return NO_REASON
-    difference = Difference(turns.turn_rad, _without_mean(turns.covariance), len(turns.index) - 1)
+    # Without the mean: the angle at which the whisker is clamped is unknown.
+    difference = Difference(turns.turn_rad, without_mean(turns.covariance), len(turns.index) - 1)
     if difference.is_chance:
         return NO_REASON
     found = f"(χ² {difference.chi2:.0f}, {difference.freedom} degrees of freedom)"
-    cause = difference.likeliest(list(_turn_causes(turns, speed_rad_s)))
-    return Reason(
-        "turns_unlike_motor", f"the whisker is not seen to turn as the motor does {found}: {cause}"
-    )
-
-
-def _without_mean(covariance: np.ndarray) -> np.ndarray:
-    """Information on all but a common shift, (n, n): the whisker's clamp, which nothing tells."""
-    whole = np.linalg.inv(covariance)
-    common = whole.sum(axis=1)
-    return whole - np.outer(common, common) / common.sum()
-
-
-def _agree(values: np.ndarray, variances: np.ndarray) -> bool:
-    """Whether values (n,) are one but for chance; a single one is."""
-    return (
-        len(values) == 1
-        or Difference(values, _without_mean(np.diag(variances)), len(values) - 1).is_chance
-    )
-
-
-def _logs(looks: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
-    """Logarithms (n,) of what cameras see, and their variances."""
-    values, sigmas = np.array([(one.value, one.sigma) for one in looks.values()]).T
-    return np.log(values), (sigmas / values) ** 2
+    cause = difference.explained_by(list(_turn_causes(turns, speed_rad_s)))
+    cause = cause or "no single cause explains it"
+    sentence = f"the whisker is not seen to turn as the motor does {found}: {cause}"
+    return Reason("turns_unlike_motor", sentence)
 
 
 def _turn_causes(turns: Turns, speed_rad_s: float) -> Iterator[Cause]:
-    motor, index, n = turns.motor_rad, turns.index, len(turns.index)
-    none, ahead = np.zeros(n), np.diff(motor, append=2.0 * motor[-1] - motor[-2])
+    """Yield the faults of encoder and frame times that would turn the whisker unlike the motor."""
+    motor = turns.motor_rad
+    count = len(motor)
+    nothing = np.zeros(count)
+    ahead = np.diff(motor, append=2.0 * motor[-1] - motor[-2])
     behind = -np.diff(motor, prepend=2.0 * motor[0] - motor[1])
-
-    def scale(size: float) -> str:
-        return (
-            f"it turns {1.0 + size:.3f} times as far; check the encoder's scale and the rate of the frames' times, one "
-            "of them looks to need that factor"
+    yield Cause(_scale_message, nothing, motor - motor.mean(), 1)
+    for k in range(1, count):
+        later = np.arange(count) >= k
+        alone = np.arange(count) == k
+        frame = int(turns.index[k])
+        lost = f"a frame before frame {frame} looks lost; pictures after it have the times of the one before"
+        added = (
+            f"a frame too many before frame {frame}; pictures after it have the times of the next"
         )
-
-    yield Cause(scale, none, motor - motor.mean(), 1)
-    for k in range(1, n):
-        later, alone = np.arange(n) >= k, np.arange(n) == k
-        frame = int(index[k])
-        yield Cause(
-            _words(
-                f"a frame before frame {frame} looks lost; pictures after it have the times of the one "
-                "before"
-            ),
-            ahead * later,
-            None,
-            1,
-        )
-        yield Cause(
-            _words(
-                f"a frame too many before frame {frame}; pictures after it have the times of the next"
-            ),
-            behind * later,
-            None,
-            1,
-        )
-        yield Cause(
-            _words(f"frame {frame} looks the same as the one before it"), behind * alone, None, 1
-        )
-        yield Cause(_jump(motor[k]), none, later.astype(float), 2)
-        yield Cause(_another_time(frame, speed_rad_s), none, alone.astype(float), 2)
+        repeated = f"frame {frame} looks the same as the one before it"
+        yield Cause(constant_message(lost), ahead * later, None, 1)
+        yield Cause(constant_message(added), behind * later, None, 1)
+        yield Cause(constant_message(repeated), behind * alone, None, 1)
+        yield Cause(_jump_message(motor[k]), nothing, later.astype(float), 2)
+        yield Cause(_time_message(frame, speed_rad_s), nothing, alone.astype(float), 2)
 
 
-def _words(text: str) -> Callable[[float], str]:
-    return lambda size: text
+def _scale_message(size: float) -> str:
+    """Return the sentence on a whisker that turns farther than the motor by this share."""
+    return (
+        f"it turns {1.0 + size:.3f} times as far; check the encoder's scale and the rate of the frames' times, one "
+        "of them looks to need that factor"
+    )
 
 
-def _jump(at_rad: float) -> Callable[[float], str]:
+def _jump_message(at_rad: float) -> Callable[[float], str]:
+    """Return the message on an encoder that jumps at a motor angle."""
     where = f"before {np.degrees(at_rad):.2f}°, the whisker does not"
     return lambda size: f"motor_deg jumps by {-np.degrees(size):+.2f}° {where}"
 
 
-def _another_time(frame: int, speed_rad_s: float) -> Callable[[float], str]:
+def _time_message(frame: int, speed_rad_s: float) -> Callable[[float], str]:
+    """Return the message on a frame with a wrong time."""
     return lambda size: (
         f"frame {frame} looks taken {1e3 * size / speed_rad_s:+.1f} ms from its time"
     )
 
 
-def width_doubt(bar_looks: Mapping[str, Value], trial: Trial, board: Board | None) -> Reason:
-    """The bar against its diameter: a sentence where it looks thicker or thinner than said, '' where it does not, or
-    where no camera tells. bar_looks: how thick over how thick it is said to be, by camera."""
+def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board | None) -> Reason:
+    """Compare the bar's apparent diameter with the stated one.
+
+    bar_looks: ratio of the apparent to the stated diameter, by camera.
+    """
     if not bar_looks:
         return NO_REASON
-    looks, looks_sigma = combine_widths(
-        {name: (one.value, one.sigma) for name, one in bar_looks.items()}
-    )
-    logs, variances = _logs(bar_looks)
-    if not _agree(logs, variances):
-        low, high = (limit(one.value for one in bar_looks.values()) for limit in (min, max))
-        found = f"the bar looks {low:.2f} to {high:.2f} times as thick as said"
+    logs, variances = _logarithms(bar_looks)
+    if not are_alike(logs, variances):
+        ratios = [one.value for one in bar_looks.values()]
+        found = f"the bar looks {min(ratios):.2f} to {max(ratios):.2f} times as thick as said"
         sentence = f"{found}: check its diameter_mm, or something else is taken for it"
         return Reason("bar_width_unlike_stated", sentence)
-    sigma = float(
-        np.hypot(looks_sigma / looks, trial.bar_diameter_sigma_mm / trial.bar_diameter_mm)
-    )
-    difference = Difference(np.array([np.log(looks)]), np.array([[sigma**-2.0]]), 1)
-    if difference.is_chance:
+    pairs = {name: (one.value, one.sigma) for name, one in bar_looks.items()}
+    factor, factor_sigma = combine_widths(pairs)
+    stated = trial.bar_diameter_mm
+    sigma = float(np.hypot(factor_sigma / factor, trial.bar_diameter_sigma_mm / stated))
+    if Difference.scalar(np.log(factor), sigma).is_chance:
         return NO_REASON
-    factor = float(np.exp(difference.values[0]))
-    scale = (
-        f"square_mm some {board.square_mm / factor:.3g} for {board.square_mm:g}"
-        if board
-        else "the cameras' scale"
-    )
-    bar = f"some {trial.bar_diameter_mm * factor:.3g} for {trial.bar_diameter_mm:g}"
-    found = f"{factor:.2f} ± {sigma * factor:.2f} times as thick as said"
-    sentence = f"the bar looks {found}: its diameter_mm would have to be {bar}, or {scale}"
+    if board:
+        scale = f"square_mm some {board.square_mm / factor:.3g} for {board.square_mm:g}"
+    else:
+        scale = "the cameras' scale"
+    found = f"the bar looks {factor:.2f} ± {sigma * factor:.2f} times as thick as said"
+    cure = f"its diameter_mm would have to be some {stated * factor:.3g} for {stated:g}, or {scale}"
+    sentence = f"{found}: {cure}"
     return Reason("bar_width_unlike_board" if board else "bar_width_unlike_stated", sentence)
 
 
-def wire_doubt(looks: Mapping[str, Value], whisker: Whisker) -> Reason:
-    """The whisker's diameter as seen against its own: a sentence where cameras that agree with each other see a thinner
-    one, or the only one that tells; '' where they do not, or none tells. Shadows beside a wire, bloom and movement make
-    it look thicker, in all cameras alike, and nothing thinner. looks: how thick over how thick it is said to be, by
-    camera."""
-    if not looks:
+def check_wire_width(ratios: Mapping[str, Value], whisker: Whisker) -> Reason:
+    """Compare the whisker's apparent diameter with the stated one.
+
+    A warning is given only where the whisker appears thinner, to cameras that agree with each
+    other: shadows next to a wire, bloom and movement make it appear thicker in all cameras alike.
+    ratios: of the apparent to the stated diameter, by camera.
+    """
+    if not ratios:
         return NO_REASON
-    logs, variances = _logs(looks)
+    logs, variances = _logarithms(ratios)
     stated = (whisker.diameter_sigma_mm / whisker.diameter_mm) ** 2
-    of_all = Difference(logs, np.linalg.inv(np.diag(variances) + stated), len(looks))
-    if of_all.is_chance or not _agree(logs, variances):
+    of_all = Difference(logs, np.linalg.inv(np.diag(variances) + stated), len(ratios))
+    if of_all.is_chance or not are_alike(logs, variances):
         return NO_REASON
-    factor, sigma = (
-        float(np.exp(np.average(logs, weights=1.0 / variances))),
-        float(np.sum(1.0 / variances) ** -0.5),
-    )
+    factor = float(np.exp(np.average(logs, weights=1.0 / variances)))
     if factor > 1.0:
         return NO_REASON
-    found = f"{factor:.2f} ± {sigma * factor:.2f} times as thick as said"
-    cure = f"its diameter_mm would have to be some {whisker.diameter_mm * factor:.2g} for {whisker.diameter_mm:g}"
-    return Reason("wire_width_unlike_stated", f"the whisker looks {found}: {cure}")
+    sigma = float(np.sum(1.0 / variances) ** -0.5)
+    found = f"the whisker looks {factor:.2f} ± {sigma * factor:.2f} times as thick as said"
+    diameter_mm = whisker.diameter_mm
+    cure = f"its diameter_mm would have to be some {diameter_mm * factor:.2g} for {diameter_mm:g}"
+    return Reason("wire_width_unlike_stated", f"{found}: {cure}")
 
 
-def length_doubt(ends: Mapping[str, Value], whisker: Whisker) -> Reason:
-    """The whisker's end as seen against its length: a sentence where they are apart, '' where they are not, or where
-    no two cameras see it end in one place: before something dark a dark wire seems to end. ends: by camera, mm from
-    the base."""
+def _logarithms(ratios: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the logarithms (n,) of ratios by camera, and their variances."""
+    values = np.array([one.value for one in ratios.values()])
+    sigmas = np.array([one.sigma for one in ratios.values()])
+    return np.log(values), (sigmas / values) ** 2
+
+
+def check_length(ends: Mapping[str, Value], whisker: Whisker) -> Reason:
+    """Compare the distance of the whisker's visible end from its base with the stated length.
+
+    Two cameras must see the end in the same place: before something dark a dark wire seems to end.
+    ends: by camera, mm from the base.
+    """
     if len(ends) < 2:
         return NO_REASON
-    places, sigmas = (
-        np.array([getattr(end, name) for end in ends.values()]) for name in ("value", "sigma")
-    )
-    if not _agree(places, sigmas**2):
+    places = np.array([end.value for end in ends.values()])
+    sigmas = np.array([end.sigma for end in ends.values()])
+    if not are_alike(places, sigmas**2):
         return NO_REASON
     sigma = float(np.hypot(np.max(sigmas), whisker.length_sigma_mm))
-    seen_mm = float(np.average(places, weights=sigmas**-2.0))
-    if Difference(np.array([seen_mm - whisker.length_mm]), np.array([[sigma**-2.0]]), 1).is_chance:
+    end_mm = float(np.average(places, weights=sigmas**-2.0))
+    if Difference.scalar(end_mm - whisker.length_mm, sigma).is_chance:
         return NO_REASON
-    found = f"{seen_mm:.0f} ± {sigma:.0f} mm from its base"
-    return Reason(
-        "length_unlike_stated",
-        f"the whisker is seen to end {found}, length_mm says {whisker.length_mm:g}",
-    )
+    found = f"the whisker is seen to end {end_mm:.0f} ± {sigma:.0f} mm from its base"
+    sentence = f"{found}, length_mm says {whisker.length_mm:g}"
+    return Reason("length_unlike_stated", sentence)
 
 
-def slope_doubt(beta: Value, trial: Trial) -> Reason:
-    """The bar's slope as seen against trial.toml's: a sentence where they are apart, '' where they are not, or where
-    one of them is not known."""
+def check_slope(beta: Value, trial: Trial) -> Reason:
+    """Compare the bar's slope as seen with the one that trial.toml states."""
     nominal = nominal_slope(trial)
     apart = beta.value - nominal.value
     if not np.isfinite(apart):
         return NO_REASON
-    difference = Difference(
-        np.array([apart]), np.array([[1.0 / (beta.sigma**2 + nominal.sigma**2)]]), 1
-    )
+    difference = Difference.scalar(apart, float(np.hypot(beta.sigma, nominal.sigma)))
     if difference.is_chance:
         return NO_REASON
-    seen = f"{np.degrees(beta.value):.1f} ± {np.degrees(beta.sigma):.1f}°"
     mirrored = replace(difference, values=np.array([beta.value + nominal.value]))
-    cause = (
-        "its sign looks turned"
-        if mirrored.is_chance
-        else "check it, or something else is taken for the bar"
-    )
-    return Reason(
-        "slope_unlike_stated",
-        f"the bar's slope is seen as {seen}, beta_deg says {trial.beta_deg:g}: {cause}",
-    )
+    if mirrored.is_chance:
+        cause = "its sign looks turned"
+    else:
+        cause = "check it, or something else is taken for the bar"
+    seen = f"{np.degrees(beta.value):.1f} ± {np.degrees(beta.sigma):.1f}°"
+    found = f"the bar's slope is seen as {seen}, beta_deg says {trial.beta_deg:g}"
+    return Reason("slope_unlike_stated", f"{found}: {cause}")
 
 
-def cone_doubt(phi: Value, beta: Value, what: str) -> Reason:
-    """Direction of deflection or force against the cone of friction about the bar's normal: a sentence where it leaves
-    even the widest cone, with what would bring it back; '' where it does not, or where one of them is not known."""
+def check_friction_cone(phi: Value, beta: Value, source: str) -> Reason:
+    """Check that deflection or force lies within the widest friction cone about the bar's normal.
+
+    phi: its direction, seen or felt as `source` says. Where it lies outside, the warning says which
+    reversed axis would bring it back.
+    """
+    angle = _from_normal(phi.value, beta)
+    if not np.isfinite(angle) or angle <= _STEEPEST_FRICTION_RAD:
+        return NO_REASON
     sigma = float(np.hypot(phi.sigma, beta.sigma))
-    off = _from_normal(phi.value, beta)
-    if not np.isfinite(off) or off <= _STEEPEST_FRICTION_RAD:
+    if Difference.scalar(angle - _STEEPEST_FRICTION_RAD, sigma).is_chance:
         return NO_REASON
-    beyond = Difference(np.array([off - _STEEPEST_FRICTION_RAD]), np.array([[sigma**-2.0]]), 1)
-    if beyond.is_chance:
-        return NO_REASON
-    angles = f"φ {what} is {np.degrees(phi.value):.0f}°, {np.degrees(off):.0f}° from the normal of a bar at β = "
-    others = {"y": -phi.value, "z": np.pi - phi.value, "y and z": np.pi + phi.value}
-    within = [
-        name
-        for name, other in others.items()
-        if _from_normal(other, beta) <= _STEEPEST_FRICTION_RAD
-    ]
-    cause = f"; {' or '.join(within)} reversed would be within" if within else ""
-    sentence = f"{angles}{np.degrees(beta.value):.0f}°, where no friction holds a whisker (up to μ = 1){cause}"
-    return Reason("force_reversed" if within else "friction_too_large", sentence)
+    reversed_phi = {"y": -phi.value, "z": np.pi - phi.value, "y and z": np.pi + phi.value}
+    within = []
+    for axes, other in reversed_phi.items():
+        if _from_normal(other, beta) <= _STEEPEST_FRICTION_RAD:
+            within.append(axes)
+    found = f"φ {source} is {np.degrees(phi.value):.0f}°, {np.degrees(angle):.0f}° from the normal"
+    where = f"of a bar at β = {np.degrees(beta.value):.0f}°"
+    sentence = f"{found} {where}, where no friction holds a whisker (up to μ = 1)"
+    if not within:
+        return Reason("friction_too_large", sentence)
+    return Reason("force_reversed", f"{sentence}; {' or '.join(within)} reversed would be within")
 
 
 def _from_normal(phi_rad: float, beta: Value) -> float:
-    """How far φ is from the bar's normal, rad, 0 to π."""
-    return abs(float(np.arctan2(np.sin(phi_rad - beta.value), np.cos(phi_rad - beta.value))))
+    """Return the angle of φ with the bar's normal, 0 to π rad."""
+    difference = phi_rad - beta.value
+    return abs(float(np.arctan2(np.sin(difference), np.cos(difference))))
 
 
 def nominal_slope(trial: Trial) -> Value:
-    """β of trial.toml, with a protractor's sigma where none is stated; UNKNOWN where it says nothing."""
+    """Return β of trial.toml, with a protractor's sigma where none is stated; UNKNOWN without β."""
     if trial.beta_deg is None:
         return UNKNOWN
-    return Value(
-        float(np.radians(trial.beta_deg)),
-        float(np.radians(trial.beta_sigma_deg) or _NOMINAL_SLOPE_SIGMA_RAD),
-    )
+    sigma_rad = np.radians(trial.beta_sigma_deg) or _NOMINAL_SLOPE_SIGMA_RAD
+    return Value(float(np.radians(trial.beta_deg)), float(sigma_rad))

@@ -1,7 +1,9 @@
-"""Signals that stand in another trial's folder: each trial's felt moments against the shape seen in the other.
+"""Signals that stand in another trial's folder: each trial's felt moments against the shape seen in
+the other.
 
-Made over the session, of those whisks whose moments are not those of their own shape (`bench.trials.agreement`). With
-one motor program for all trials nothing else tells: encoder and pictures agree whichever file is beside them.
+Compared over the session, of those whisks whose moments are not those of their own shape
+(`bench.trials.agreement`). With one motor program for all trials nothing else shows it: encoder and
+pictures agree whichever file they are with.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,48 +16,50 @@ from bench.gauges.felt import strokes_of
 from bench.gauges.gauge_readings import pairs_of
 from bench.records.trial_result import TrialResult
 from bench.session.signals import read_signals
-from bench.trials.agreement import LEAST_CHANCE
-from bench.trials.unit import Unit, against_shape, readout_of
+from bench.trials.differences import LEAST_CHANCE
+from bench.trials.felt_trial import against_shape, readout_of
+from bench.trials.unit import Unit
 
-# Trials. Where more stand out, the session's gauges are wrong and no two of its files; each pair is looked at.
+# Trials. Where more disagree, the session's gauges are wrong and no two of its files; each pair is looked at.
 _MOST_APART = 12
 
 
 def exchanged_signals(units: Sequence[Unit], results: Sequence[TrialResult]) -> Iterator[str]:
-    """A line for each two trials whose signals fit each other's pictures, and neither its own. In one order."""
+    """Yield a line for each two trials whose signals fit each other's pictures, and neither its
+    own.
+    """
     apart = [(unit, result) for unit, result in zip(units, results) if _is_apart(result)]
     if len(apart) > _MOST_APART:
         return
-    for one, other in combinations(apart, 2):
-        if _fits(*one, other[0]) and _fits(*other, one[0]):
-            names = f"{one[0].trial.name} and {other[0].trial.name}"
+    for (unit, result), (other, other_result) in combinations(apart, 2):
+        if _fits(unit, result, other) and _fits(other, other_result, unit):
+            names = f"{unit.trial.name} and {other.trial.name}"
             yield reason("signals_exchanged", names=names)
 
 
 def _is_apart(result: TrialResult) -> bool:
-    """Whether all whisks whose moments could be held to their shape are not of it."""
-    pairs = zip(result.seen.whisks, result.felt.whisks)
-    held = [
-        felt.apart
-        for seen, felt in pairs
-        if not seen.contradicted and np.isfinite(felt.agreement_chi2)
-    ]
-    return bool(held) and all(held)
+    """Return whether all whisks disagree with their shape that could be compared with it."""
+    compared = []
+    for seen, felt in zip(result.seen.whisks, result.felt.whisks):
+        if not seen.contradicted and np.isfinite(felt.agreement_chi2):
+            compared.append(felt.apart)
+    return bool(compared) and all(compared)
 
 
 def _fits(unit: Unit, result: TrialResult, other: Unit) -> bool:
-    """Whether all whisks of a trial that can be held to another's signals agree with them."""
+    """Return whether all whisks of a trial that can be compared with another's signals agree."""
     signals = read_signals(other.trial)
     readout, _ = readout_of(unit, signals.kind)
     if readout is None:
         return False
-    strokes, settings = strokes_of(signals, unit.trial, unit.settings), unit.settings
-    held = [
-        pairs_of(
-            unit.trial, seen, stroke, unit.drift_rate, unit.session.whisker, settings.theta_rad
-        )
-        for seen, stroke in zip(result.seen.whisks, strokes)
-        if seen.deflection is not None and not seen.contradicted
-    ]
-    found = [against_shape(unit, readout, pairs).chance for pairs in held if pairs is not None]
-    return bool(found) and min(found) >= LEAST_CHANCE
+    whisker = unit.session.whisker
+    theta_rad = unit.settings.theta_rad
+    chances = []
+    strokes = strokes_of(signals, unit.trial, unit.settings)
+    for seen, stroke in zip(result.seen.whisks, strokes):
+        if seen.deflection is None or seen.contradicted:
+            continue
+        pairs = pairs_of(unit.trial, seen, stroke, unit.drift_rate, whisker, theta_rad)
+        if pairs is not None:
+            chances.append(against_shape(unit, readout, pairs).chance)
+    return bool(chances) and min(chances) >= LEAST_CHANCE

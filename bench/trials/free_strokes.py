@@ -1,5 +1,6 @@
-"""How the channels drift over each free stroke of a trial, kept beside the calibration: a session of many trials asks
-for all of them at each run."""
+"""Drift of the channels over each free stroke of a trial, kept with the calibration: a session of
+many trials asks for all of them at each run.
+"""
 
 from dataclasses import dataclass
 
@@ -21,23 +22,28 @@ _CODE = (
 
 @dataclass(frozen=True)
 class FreeStrokes:
-    """Of each stroke that has a touch: of the gauges' channels, and of the load cell's forces, where there is one."""
+    """Slopes of each stroke that has a touch: of the gauges' channels, and of the load cell's
+    forces, where there is one.
+    """
 
     channels: tuple[FreeSlope, ...]
     forces: tuple[FreeSlope, ...]
 
 
 def free_strokes(unit: Unit) -> FreeStrokes:
-    """A trial's, as kept, or found and kept."""
+    """Return the slopes of a trial's free strokes, and keep them."""
     path = unit.out / "calibration" / "free" / f"{unit.trial.name}.json"
-    key, kept = hash_of(hash_of_code(_CODE), unit.files, unit.trial), read_result(path)
+    key = hash_of(hash_of_code(_CODE), unit.files, unit.trial)
+    kept = read_result(path)
     if not kept or kept.get("hash") != key:
-        kept = {"hash": key, "free": to_plain(_found(unit))}
+        kept = {"hash": key, "free": to_plain(_measured(unit))}
         write_result(path, kept)
     return from_plain(FreeStrokes, kept["free"])
 
 
-def _found(unit: Unit) -> FreeStrokes:
+def _measured(unit: Unit) -> FreeStrokes:
+    """Measure the slopes of a trial's free strokes."""
     strokes = strokes_of(read_signals(unit.trial), unit.trial, unit.settings)
-    found = [[slope(stroke) for stroke in strokes] for slope in (free_slope, force_slope)]
-    return FreeStrokes(*(tuple(slope for slope in some if slope is not None) for some in found))
+    channels = filter(None, map(free_slope, strokes))
+    forces = filter(None, map(force_slope, strokes))
+    return FreeStrokes(tuple(channels), tuple(forces))

@@ -1,8 +1,8 @@
-"""Stick and slip told from the moments alone, and (10) at the kinetic ends of the teeth.
+"""Stick and slip detected from the moments alone, and (10) at the kinetic ends of the teeth.
 
-While a contact rests, friction lies anywhere between the kinetic and the static cone, and (10) has no angle to assume.
-Right after a jump it lies on the kinetic one. Slope and distance, by which slip shows, are those of (9) and (10): no
-picture and no manifest.
+While a contact rests, friction lies anywhere between the kinetic and the static cone, and (10) has
+no angle to assume. Right after a jump it lies on the kinetic one. Slope and distance, by which slip
+shows, are those of (9) and (10): no picture and no manifest.
 """
 
 from dataclasses import replace
@@ -11,22 +11,24 @@ import numpy as np
 
 from bench.gauges.felt import FeltStroke
 from bench.records.trial_result import EstimateRow, FeltAt
-from bench.trials.estimates import Readout, felt_at
-from bench.trials.stick_slip_phases import Rest, rests_of
+from bench.trials.estimates import felt_at
+from bench.trials.readout import Readout
+from bench.trials.stick_slip_phases import find_rests
 from estimator.signal import FeltTouch
 from estimator.whisk import Whisk
 
 _FEWEST = 2  # teeth: one jump may be a knock
-# Teeth of the stroke that serve: from this part of the wanted angle to as much beyond. Near touch they are short.
-_FROM_SHARE, _TO_SHARE = 0.5, 1.5
+_FROM_SHARE = 0.5  # of the wanted angle: teeth before it, near touch, are short
+_TO_SHARE = 1.5  # of the wanted angle: as much beyond it
 
 
 def kinetic_of(
-    stroke: FeltStroke, touch: FeltTouch, readout: Readout, whisk: Whisk, given: EstimateRow
+    stroke: FeltStroke, touch: FeltTouch, readout: Readout, whisk: Whisk, ten: EstimateRow
 ) -> FeltAt | None:
-    """What a stroke shows of `kinetic_end`."""
-    theta, moments = stroke.motor_rad - touch.motor_rad, readout.moments_Nmm(stroke, touch)
-    found = kinetic_end(stroke.time_s, theta, moments, whisk, given)
+    """Return the record of a stroke's `kinetic_end`; ten: (10) of the whisk."""
+    theta = stroke.motor_rad - touch.motor_rad
+    moments = readout.moments_Nmm(stroke, touch)
+    found = kinetic_end(stroke.time_s, theta, moments, whisk, ten)
     return None if found is None else felt_at(found)
 
 
@@ -35,31 +37,32 @@ def kinetic_end(
     theta_rad: np.ndarray,
     moments_Nmm: np.ndarray,
     whisk: Whisk,
-    given: EstimateRow,
+    ten: EstimateRow,
 ) -> Whisk | None:
-    """The whisk as it would be felt on the kinetic cone, or None where its moments show no teeth.
+    """Return the whisk with the moments that it would have on the kinetic cone.
 
-    moments_Nmm (n, 2): m_y, m_z as recorded, unfiltered; given: (10) of the whisk. On the cone both moments grow with θ
-    (13), (14): the kinetic ends of all teeth near the wanted angle tell them together.
+    moments_Nmm (n, 2): m_y, m_z as recorded, unfiltered. ten: (10) of the whisk. None where the
+    moments show no teeth. On the cone both moments grow with θ (13), (14), so the kinetic ends of
+    all teeth near the wanted angle are averaged per radian.
     """
-    if not (given.d_x_est_mm.value > 0 and given.beta_est_rad != 0):
+    d_x_mm = ten.d_x_est_mm.value
+    beta_rad = ten.beta_est_rad
+    if not (d_x_mm > 0 and beta_rad != 0):
         return None
-    _, rests = rests_of(
-        time_s, theta_rad, moments_Nmm, given.beta_est_rad, given.d_x_est_mm.value, whisk.beam
-    )
-    low, high = _FROM_SHARE * whisk.theta_at_rad, _TO_SHARE * whisk.theta_at_rad
-    ends = [_per_angle(rest) for rest in rests if low < rest.from_rad < high]
-    if len(ends) < _FEWEST:
+    _, rests = find_rests(time_s, theta_rad, moments_Nmm, beta_rad, d_x_mm, whisk.beam)
+    theta = whisk.theta_at_rad
+    per_rad = []  # (|m_y|, m_z) per radian where a rest begins
+    for rest in rests:
+        if _FROM_SHARE * theta < rest.from_rad < _TO_SHARE * theta:
+            moments, _ = rest.moments_at(rest.from_rad)
+            per_rad.append(moments / rest.from_rad)
+    if len(per_rad) < _FEWEST:
         return None
-    mean, spread = np.mean(ends, axis=0), np.cov(np.array(ends).T) / len(ends)
-    m_y, m_z = mean * whisk.theta_at_rad
-    covariance = whisk.covariance_at + spread * whisk.theta_at_rad**2
-    side = float(np.sign(given.beta_est_rad))
+    m_y, m_z = np.mean(per_rad, axis=0) * theta
+    scatter = np.cov(np.array(per_rad).T) / len(per_rad)
     return replace(
-        whisk, m_y_at_Nmm=side * float(m_y), m_z_at_Nmm=float(m_z), covariance_at=covariance
+        whisk,
+        m_y_at_Nmm=float(np.sign(beta_rad)) * float(m_y),
+        m_z_at_Nmm=float(m_z),
+        covariance_at=whisk.covariance_at + scatter * theta**2,
     )
-
-
-def _per_angle(rest: Rest) -> np.ndarray:
-    """|m_y| and m_z (2,) for a radian, where the rest begins."""
-    return rest.moments_at(rest.from_rad)[0] / rest.from_rad

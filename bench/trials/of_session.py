@@ -1,5 +1,7 @@
-"""The steps that concern all trials of a session: cameras placed in the rig, drift of the zero, gauges. `evaluate` and
-`calibrate gauges` share them."""
+"""Steps that concern all trials of a session: cameras placed in the rig, drift of the zero, gauges.
+
+`evaluate` and `calibrate gauges` share them.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -28,9 +30,10 @@ from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.trials.free_strokes import free_strokes
-from bench.trials.lost import seen_units
+from bench.trials.lost import see_units
 from bench.trials.placing import place_rig
-from bench.trials.unit import Unit, kept_seen
+from bench.trials.trial_evaluation import kept_seen
+from bench.trials.unit import Unit
 from vision.geometry.reasons import Reason
 
 _MORE = "or let the other trials serve: --gauges-from-all"
@@ -38,8 +41,10 @@ _MOST_NAMED = 8  # trials in one line
 _MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
 
 
-def judged(session: Session) -> list[Trial]:
-    """The trials with whisks: all but those with a weight. Raises BadInput where there is none, or no whisk in any."""
+def trials_with_whisks(session: Session) -> list[Trial]:
+    """Return all trials but those with a weight. Raise BadInput where there is none, or no whisk
+    in any.
+    """
     trials = [trial for trial in session.trials if trial.purpose != "weight"]
     if not trials:
         raise BadInput("there is no trial to evaluate", file="trials")
@@ -50,21 +55,23 @@ def judged(session: Session) -> list[Trial]:
 
 
 def require_some(trials: Sequence[Trial], settings: Settings) -> None:
-    """Raises BadInput where the settings take none of the trials, or ask a camera that has no pictures of any."""
+    """Raise BadInput where the settings choose none of the trials, or a camera without pictures."""
     if not any(settings.takes(trial.name) for trial in trials):
-        names = _some_of(trial.name for trial in trials)
+        names = _first_names(trial.name for trial in trials)
         raise BadInput(f"--trials {settings.trials}: no trial has such a name; there are {names}")
-    there = dict.fromkeys(name for trial in trials for name in trial.camera_sources)
+    cameras = dict.fromkeys(name for trial in trials for name in trial.camera_sources)
     for name in settings.seeing.cameras:
-        if name not in there:
-            raise BadInput(
-                f"cameras of {settings.seeing.name}: there is no camera {name}; there are {_some_of(there)}"
-            )
+        if name not in cameras:
+            found = f"there is no camera {name}; there are {_first_names(cameras)}"
+            raise BadInput(f"cameras of {settings.seeing.name}: {found}")
 
 
-def _some_of(names: Iterable[str]) -> str:
+def _first_names(names: Iterable[str]) -> str:
+    """Return the first names in one line, with an ellipsis where there are more."""
     first = list(islice(names, _MOST_NAMED + 1))
-    return ", ".join([*first[:_MOST_NAMED], *["…"] * (len(first) > _MOST_NAMED)])
+    if len(first) > _MOST_NAMED:
+        first[_MOST_NAMED] = "…"
+    return ", ".join(first)
 
 
 def placed_units(
@@ -75,9 +82,10 @@ def placed_units(
     pool: Workers,
     doubts: Doubts,
 ) -> tuple[SessionCalibration, list[Unit]]:
-    """The session's cameras in the rig frame of board and free strokes, and a unit of work for each trial, so far
-    without gauges. Raises BadInput."""
-    return settled_units(session, first_units(session, trials, out, settings), pool, doubts)
+    """Return the session's cameras in the rig frame and a unit of work for each trial, without
+    gauges. Raise BadInput.
+    """
+    return units_in_rig(session, first_units(session, trials, out, settings), pool, doubts)
 
 
 def first_units(
@@ -87,111 +95,132 @@ def first_units(
     settings: Settings,
     calibration: SessionCalibration | None = None,
 ) -> list[Unit]:
-    """A unit of work for each trial, by the cameras where the board has them; calibration: where there is one already.
-    Raises BadInput."""
+    """Return a unit of work for each trial, with the cameras in the frame that the board gives.
+
+    calibration: made from the session where it is None. Raises BadInput.
+    """
     calibration = calibration or calibrate_session(session, out)
     digests = Digests(out)
-    hashes = [hash_of_files([trial.folder], digests.of) for trial in trials]
+    units = []
+    for trial in trials:
+        files = hash_of_files([trial.folder], digests.of)
+        units.append(Unit(session, trial, files, calibration, settings, out))
     digests.keep()
-    return [
-        Unit(session, trial, files, calibration, settings, out)
-        for trial, files in zip(trials, hashes)
-    ]
+    return units
 
 
-def settled_units(
+def units_in_rig(
     session: Session, units: Sequence[Unit], pool: Workers, doubts: Doubts
 ) -> tuple[SessionCalibration, list[Unit]]:
-    """The session's cameras in the rig frame of board and free strokes, and the units by these. Raises BadInput."""
-    calibration = units[0].calibration
-    calibration = place_rig(session, calibration, units, pool, doubts)
+    """Return the cameras in the rig frame of board and free strokes, and the units with these.
+    Raise BadInput.
+    """
+    calibration = place_rig(session, units[0].calibration, units, pool, doubts)
     return calibration, [replace(unit, calibration=calibration) for unit in units]
 
 
 def with_gauges(
     units: Sequence[Unit], pool: Workers, doubts: Doubts
 ) -> tuple[GaugeCalibration | None, Certificate | None, list[Unit]]:
-    """The session's gauges, their certificate where its own trials calibrated them, and the units with the gauges and
-    with the drift of the channels."""
-    rate, of_forces = session_drift(units, pool)
-    gauges, made = session_gauges(units, rate, pool, doubts)
-    return gauges, made, [unit.with_gauges(rate, gauges, of_forces) for unit in units]
+    """Return the session's gauges, their certificate where its own trials calibrated them, and the
+    units with the gauges and the drift of the channels.
+    """
+    rate, force_rate = session_drift(units, pool)
+    gauges, certificate = session_gauges(units, rate, pool, doubts)
+    complete = []
+    for unit in units:
+        complete.append(replace(unit, drift_rate=rate, force_drift_rate=force_rate, gauges=gauges))
+    return gauges, certificate, complete
 
 
 def session_drift(units: Sequence[Unit], pool: Workers) -> tuple[np.ndarray, np.ndarray | None]:
-    """RMS drift per second, from free strokes all over the session: (2,) of the gauges' channels, and (3,) of the
-    forces, None where no load cell was recorded."""
+    """Return the RMS drift per second of the channels (2,) and of the forces (3,), from free
+    strokes all over the session; None for forces where no load cell was recorded.
+    """
     every = max(1, len(units) // _MOST_DRIFT_STROKES)
-    found = pool.run(free_strokes, units[::every], "free strokes")
-    gauges, forces = (
-        [one for of_trial in found for one in getattr(of_trial, kind)]
-        for kind in ("channels", "forces")
-    )
-    return drift_rate(gauges), drift_rate(forces) if forces else None
+    channels, forces = [], []
+    for strokes in pool.run(free_strokes, units[::every], "free strokes"):
+        channels += strokes.channels
+        forces += strokes.forces
+    return drift_rate(channels), drift_rate(forces) if forces else None
 
 
 def session_gauges(
     units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts
 ) -> tuple[GaugeCalibration | None, Certificate | None]:
-    """Gauges as brought along, without a certificate; else from the gauge trials, or from all where the settings say
-    so; none, and a note on what is lacking, where these cannot fix them."""
-    given, from_all = given_gauges(units[0].session), units[0].settings.gauges_from_all
-    serves = [from_all or unit.trial.purpose == "gauge" for unit in units]
-    trials = [unit for unit, one in zip(units, serves) if one and _has_volts(unit)]
-    if given is not None or not trials:
-        return given, None
+    """Return the session's gauges, and their certificate where its own trials calibrate them.
+
+    GaugeCalibration that were brought along come first; else they are fitted to the gauge trials, or to all
+    where the settings ask for that. Where these cannot fix them there are none, and a note.
+    """
+    gauges = given_gauges(units[0].session)
+    from_all = units[0].settings.gauges_from_all
+    chosen, others = [], []
+    for unit in units:
+        serves = from_all or unit.trial.purpose == "gauge"
+        (chosen if serves else others).append(unit)
+    chosen = [unit for unit in chosen if _has_volts(unit)]
+    if gauges is not None or not chosen:
+        return gauges, None
     try:
-        made = certified(trials, rate, pool, doubts)
-    except Undetermined as reason:
-        more = any(_has_volts(unit) for unit, one in zip(units, serves) if not one)
-        line = "; ".join([str(reason), *_lacking(trials), *[_MORE] * more])
-        doubts.note(Reason("gauges_undetermined", line))
+        certificate = fit_certificate(chosen, rate, pool, doubts)
+    except Undetermined as refusal:
+        parts = [str(refusal), *_lacking_truth(chosen)]
+        if any(_has_volts(unit) for unit in others):
+            parts.append(_MORE)
+        doubts.note(Reason("gauges_undetermined", "; ".join(parts)))
         return None, None
-    return (replace(made.gauges, source=FROM_ALL) if from_all else made.gauges), made
+    if from_all:
+        return replace(certificate.gauges, source=FROM_ALL), certificate
+    return certificate.gauges, certificate
 
 
 def _has_volts(unit: Unit) -> bool:
+    """Return whether the trial's signals are volts of gauges."""
     return read_signals(unit.trial).kind == "V"
 
 
-def certified(
+def fit_certificate(
     units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts
 ) -> Certificate:
-    """The gauges fitted to what the cameras and the gauges show of these trials, with all that they rest on.
+    """Fit the gauges to the pictures and signals of these trials, and return all that they rest on.
 
-    rate (2,): drift of the channels, V/s. Raises Undetermined where the trials do not fix the coefficients, BadInput
-    where a channel is dead, swapped or reversed.
+    rate (2,): drift of the channels, V/s. Raises Undetermined where the trials do not fix the
+    coefficients, BadInput where a channel is dead, swapped or reversed.
     """
     session, settings = units[0].session, units[0].settings
-    strokes = [strokes_of(read_signals(unit.trial), unit.trial, settings) for unit in units]
-    for of_trial in strokes:
-        check_alive(of_trial)
-    found = [
-        pairs_of(unit.trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
-        for unit, seen, of_trial in zip(
-            units, seen_units(units, pool, "gauge trials", doubts), strokes
-        )
-        for whisk, stroke in zip(seen.whisks, of_trial)
-    ]
-    pairs = tuple(p for p in found if p is not None)
-    every_stroke = tuple(stroke for of_trial in strokes for stroke in of_trial)
-    back = tuple(
-        r for unit in units for r in reversals(unit.trial, read_signals(unit.trial), settings)
-    )
-    turn = max(unit.trial.follicle_roll_sigma_deg for unit in units)
-    gauges = fit_gauges(pairs)
+    signals = [read_signals(unit.trial) for unit in units]
+    strokes = [strokes_of(one, unit.trial, settings) for one, unit in zip(signals, units)]
+    for trial_strokes in strokes:
+        check_alive(trial_strokes)
+    pairs, back = [], []
+    seen = see_units(units, pool, "gauge trials", doubts)
+    for unit, one, trial_seen, trial_strokes in zip(units, signals, seen, strokes):
+        back += reversals(unit.trial, one, settings)
+        for whisk, stroke in zip(trial_seen.whisks, trial_strokes):
+            pairs.append(
+                pairs_of(unit.trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
+            )
+    pairs = tuple(p for p in pairs if p is not None)
     return Certificate(
-        session.name, session.whisker, gauges, pairs, every_stroke, rate, back, roll_sigma_deg=turn
+        session.name,
+        session.whisker,
+        fit_gauges(pairs),
+        pairs,
+        tuple(stroke for trial_strokes in strokes for stroke in trial_strokes),
+        rate,
+        tuple(back),
+        roll_sigma_deg=max(unit.trial.follicle_roll_sigma_deg for unit in units),
     )
 
 
-def _lacking(units: Sequence[Unit]) -> Iterator[str]:
-    """What the truth of these trials lacks, of those that were seen."""
+def _lacking_truth(units: Sequence[Unit]) -> Iterator[str]:
+    """Yield a line on each trial with whisks that were evaluated and have no truth."""
     for unit in units:
         seen = kept_seen(unit)
-        whisks = seen.whisks if seen else ()
-        lacks = dict.fromkeys(
-            whisk.status for whisk in whisks if not whisk.has_truth and whisk.status
-        )
-        if lacks:
-            yield f"{unit.trial.name} has no truth: {', '.join(lacks)}"
+        if seen is None:
+            continue
+        statuses = [whisk.status for whisk in seen.whisks if not whisk.has_truth]
+        lacking = dict.fromkeys(filter(None, statuses))
+        if lacking:
+            yield f"{unit.trial.name} has no truth: {', '.join(lacking)}"

@@ -1,4 +1,4 @@
-"""Files that say where a whisker's wire is in the pictures of a trial, for those who look for another."""
+"""Files with the place of a whisker's wire in the pictures of a trial, for the other whiskers."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -9,20 +9,25 @@ from vision.pictures.others import Others, RodLines
 
 
 def write_lines(path: Path, key: str, lines: Mapping[str, RodLines]) -> None:
-    """The file of a wire's lines, by camera; key: hash of what they were made from."""
+    """Write a wire's lines by camera to a file; key: hash of their inputs."""
     write_result(path, {"hash": key, "cameras": to_plain(lines)})
 
 
 def has_lines(path: Path, key: str) -> bool:
-    """Whether the file stands there, made from the same."""
+    """Return whether the file is there and has the same inputs."""
     kept = read_result(path)
     return bool(kept) and kept.get("hash") == key
 
 
 def lines_in(files: Iterable[tuple[str, Path]]) -> dict[str, Others]:
-    """By camera the wires of whiskers, (name, file) each; of those that have a file."""
+    """Return the wires of whiskers by camera and name, from pairs (name, file); missing files are
+    left out.
+    """
     found: dict[str, dict[str, RodLines]] = {}
     for whisker, path in files:
-        for camera, lines in (read_result(path) or {"cameras": {}})["cameras"].items():
+        kept = read_result(path)
+        if kept is None:
+            continue
+        for camera, lines in kept["cameras"].items():
             found.setdefault(camera, {})[whisker] = from_plain(RodLines, lines)
     return found

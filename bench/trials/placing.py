@@ -1,4 +1,4 @@
-"""Where the rig is, learnt from the free strokes of the session's own trials and weighed against T_rig_board."""
+"""Place of the rig, from the free strokes of the session's own trials together with T_rig_board."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,8 +12,8 @@ from bench.base.workers import Workers
 from bench.cameras.first_look import by_first_look, first_look, spread
 from bench.cameras.session_cameras import SessionCalibration
 from bench.session.session import Session
-from bench.trials.consistency import Cause, Difference
-from bench.trials.lost import seen_units
+from bench.trials.differences import Cause, Difference
+from bench.trials.lost import see_units
 from bench.trials.unit import Unit
 from vision.calibration.place import (
     Placement,
@@ -50,62 +50,75 @@ def place_rig(
     pool: Workers,
     doubts: Doubts,
 ) -> SessionCalibration:
-    """The calibration with the cameras in the rig frame of board and free strokes together, and notes on both.
+    """Return the calibration with the cameras in the rig frame of board and free strokes together,
+    and notes on both.
 
-    Where T_rig_board is taken as exact, or the cameras were brought along, they stay and only the alarm speaks: a line
-    of `doubts`. Raises BadInput where neither tells the rig frame.
+    Cameras that were brought along, or whose T_rig_board is taken as exact, stay; an alarm is then
+    a note in `doubts`. Raises BadInput where neither board nor strokes determine the rig frame.
     """
     if calibration.cameras is None:
         return calibration
-    board, chosen = _before(session), spread([unit for unit in units if unit.trial.camera_sources])
-    alone = session.T_rig_board is None and session.cameras_toml is None
+    board = _placement_before(session)
+    chosen = spread([unit for unit in units if unit.trial.camera_sources])
+    strokes_only = session.T_rig_board is None and session.cameras_toml is None
     stays = session.cameras_toml is not None or not board.covariance.any()
     try:
         if stays:
-            strokes = _by_strokes(chosen, pool, doubts)
-            both, placed_here = combine(board, strokes), calibration
-            if both.alarm:
-                both = replace(both, alarm=both.alarm + _by_scale(session, board, strokes))
+            strokes = _placement_by_strokes(chosen, pool, doubts)
+            placement = _with_scale_alarm(combine(board, strokes), session, board, strokes)
+            placed_here = calibration
         else:
-            placed_here, both = _settled(calibration, board, chosen, pool, doubts)
-    except Refused as reason:
-        if alone:
-            asked = "record free strokes of some 10 degrees, or measure T_rig_board"
-            raise BadInput(
-                f"T_rig_board is missing, and {reason}: {asked}", file="trials"
-            ) from None
-        if isinstance(reason, _Unread):
-            doubts.notes += _elsewhere(session, calibration)
-        return calibration.with_notes(f"The free strokes do not tell where the rig is: {reason}")
-    if alone or (not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
-        _check_suffices(both, doubts)
-    if both.alarm and not alone:
-        doubts.note(Reason("board_misplaced", both.alarm))
-    return placed_here.with_notes(
-        *(both.notes[:1] if stays or alone else both.notes), *[_STAYS] * stays
-    )
+            placed_here, placement = _converge(calibration, board, chosen, pool, doubts)
+    except Refused as refusal:
+        if strokes_only:
+            cure = "record free strokes of some 10 degrees, or measure T_rig_board"
+            sentence = f"T_rig_board is missing, and {refusal}: {cure}"
+            raise BadInput(sentence, file="trials") from None
+        if isinstance(refusal, _Unread):
+            doubts.notes += _turning_elsewhere(session, calibration)
+        return calibration.with_notes(f"The free strokes do not tell where the rig is: {refusal}")
+    if strokes_only or (not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
+        _require_swing(placement, doubts)
+    if placement.alarm and not strokes_only:
+        doubts.note(Reason("board_misplaced", placement.alarm))
+    notes = placement.notes[:1] if stays or strokes_only else placement.notes
+    return placed_here.with_notes(*notes, *[_STAYS] * stays)
 
 
-def _by_scale(session: Session, board: Placement, strokes: Placement) -> str:
-    """What square_mm would explain that board and strokes disagree; '' where none does.
+def _with_scale_alarm(
+    both: Placement, session: Session, board: Placement, strokes: Placement
+) -> Placement:
+    """Return the placement with a square_mm in its alarm that would explain it."""
+    if not both.alarm:
+        return both
+    return replace(both, alarm=both.alarm + _scale_cause(session, board, strokes))
 
-    Where all lengths are taken f times too long, the centre of rotation is seen f times as far from the board as it
-    stands: it is off by (1 − f) of T_rig_board's shift.
+
+def _scale_cause(session: Session, board: Placement, strokes: Placement) -> str:
+    """Return the square_mm that would explain that board and strokes disagree; '' where none does.
+
+    Where all lengths are taken f times too long, the centre of rotation is seen f times as far from
+    the board as it stands: it is displaced by (1 − f) of T_rig_board's shift.
     """
     if session.board is None or session.T_rig_board is None:
         return ""
+    square_mm = session.board.square_mm
     information = np.linalg.inv(strokes.covariance + board.covariance)
-    apart = Difference(strokes.step - board.step, information, len(strokes.step))
-    trace, square_mm = np.append(np.zeros(3), -session.T_rig_board[:, 3]), session.board.square_mm
+    difference = Difference(strokes.step - board.step, information, len(strokes.step))
+    trace = np.append(np.zeros(3), -session.T_rig_board[:, 3])
 
-    def said(size: float) -> str:
+    def message(size: float) -> str:
+        """Return the sentence for a relative error of all lengths."""
         return f"; a square_mm of {square_mm / (1.0 + size):.4g} for {square_mm:g} explains it"
 
-    return apart.likeliest([Cause(said, np.zeros(6), trace, 1)], otherwise="")
+    return difference.explained_by([Cause(message, np.zeros(6), trace, 1)])
 
 
-def _elsewhere(session: Session, calibration: SessionCalibration) -> list[Reason]:
-    """A doubt where no stroke can be read and what turns with the motor is not where the board has the whisker."""
+def _turning_elsewhere(session: Session, calibration: SessionCalibration) -> list[Reason]:
+    """Return a warning where the moving part is not where the board has the whisker.
+
+    It is for sessions of which no stroke can be read.
+    """
     try:
         first = first_look(session, calibration.cameras)
     except BadInput:
@@ -120,63 +133,75 @@ def _elsewhere(session: Session, calibration: SessionCalibration) -> list[Reason
     return [Reason("board_misplaced", line)]
 
 
-def _check_suffices(both: Placement, doubts: Doubts) -> None:
+def _require_swing(placement: Placement, doubts: Doubts) -> None:
+    """Raise BadInput where the strokes are too short to place the rig; note where they nearly are."""
     try:
-        doubt = check_swing_suffices(both)
-    except Refused as reason:
-        raise BadInput(str(reason), file="trials") from None
-    if doubt:
-        doubts.note(Reason("board_misplaced", doubt))
+        warning = check_swing_suffices(placement)
+    except Refused as refusal:
+        raise BadInput(str(refusal), file="trials") from None
+    if warning:
+        doubts.note(Reason("board_misplaced", warning))
 
 
-def _settled(
+def _converge(
     calibration: SessionCalibration,
     board: Placement,
     chosen: Sequence[Unit],
     pool: Workers,
     doubts: Doubts,
 ) -> tuple[SessionCalibration, Placement]:
-    """The calibration moved to where board and strokes together have the rig, and that placement.
+    """Return the calibration moved to the rig frame of board and strokes together, and that
+    placement.
 
-    The strokes are read by cameras whose uncertainty leaves out T_rig_board's, which is weighed on the other side.
+    The strokes are read by cameras whose uncertainty leaves out T_rig_board's, which is in the
+    board's placement. Raises Refused where no stroke can be read.
     """
     exact = replace(board, covariance=np.zeros((6, 6)))
     here = _moved(calibration, board, exact)
     for round_number in range(_MOST_ROUNDS):
         units = [replace(unit, calibration=here, stage=f"swing{round_number}") for unit in chosen]
-        both = combine(board, _by_strokes(units, pool, doubts))
+        both = combine(board, _placement_by_strokes(units, pool, doubts))
         if np.all(np.abs(both.step) < _SMALL_STEP):
             break
         here = _moved(here, exact, replace(both, covariance=exact.covariance))
-        board, both = replace(board, step=board.step - both.step), replace(both, step=exact.step)
+        board = replace(board, step=board.step - both.step)
+        both = replace(both, step=exact.step)
     return _moved(here, exact, both), both
 
 
 def _moved(
     calibration: SessionCalibration, before: Placement, after: Placement
 ) -> SessionCalibration:
+    """Return the calibration with its cameras moved from one placement to another."""
     cameras = move_rig_frame(calibration.cameras, before, after)
     T_rig_board = calibration.T_rig_board
     if T_rig_board is not None:
         T_rig_board = compose(invert_transform(after.T_board_rig), T_rig_board)
-    made = hash_of(
-        [[camera, cameras.covariance, cameras.placement] for camera in cameras], calibration.hash
-    )
-    return replace(calibration, cameras=cameras, T_rig_board=T_rig_board, hash=made)
+    parts = [[camera, cameras.covariance, cameras.placement] for camera in cameras]
+    new_hash = hash_of(parts, calibration.hash)
+    return replace(calibration, cameras=cameras, T_rig_board=T_rig_board, hash=new_hash)
 
 
-def _before(session: Session) -> Placement:
-    """What is known of the rig frame that the cameras came in."""
-    if session.T_rig_board is None and session.cameras_toml is None:
-        return by_first_look()
-    T = np.eye(3, 4) if session.T_rig_board is None else session.T_rig_board
-    return by_board(T, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad)
+def _placement_before(session: Session) -> Placement:
+    """Return what is known of the rig frame that the cameras came in."""
+    T_rig_board = session.T_rig_board
+    if T_rig_board is None:
+        if session.cameras_toml is None:
+            return by_first_look()
+        T_rig_board = np.eye(3, 4)
+    return by_board(T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad)
 
 
-def _by_strokes(units: Sequence[Unit], pool: Workers, doubts: Doubts) -> Placement:
-    """What the free strokes of these trials say, of every whisk whose base is seen before touch. Raises Refused."""
-    seen = seen_units(units, pool, "free strokes", doubts)
-    lines = [whisk.base for trial in seen for whisk in trial.whisks if whisk.base is not None]
+def _placement_by_strokes(units: Sequence[Unit], pool: Workers, doubts: Doubts) -> Placement:
+    """Return the placement by the free strokes of these trials.
+
+    It takes every whisk whose base is seen before touch. Raises Refused without any.
+    """
+    lines = []
+    for trial in see_units(units, pool, "free strokes", doubts):
+        for whisk in trial.whisks:
+            if whisk.truth.base is not None:
+                lines.append(whisk.truth.base)
     if not lines:
         raise _Unread("none of them can be read")
     return by_strokes(lines)

@@ -1,4 +1,6 @@
-"""How hard pictures are looked at: three named rungs of one ladder, and files with any other setting."""
+"""Settings of the evaluation of pictures: three named presets of rising accuracy, and files with any
+other setting.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +15,7 @@ from bench.session.plausible import PlausibleRange
 from bench.session.strict_toml import Keys, as_keys, plausible_ranges, read_toml, values
 from vision.geometry.vision_settings import VisionSettings
 
-# Each rung has what the one before leaves out. What a rung costs and how wrong it is, `tradeoff` measures.
+# Each preset has what the one before leaves out. What it costs and how wrong it is, `tradeoff` measures.
 PRESETS = {
     "draft": VisionSettings(rounds=0, every_frame=2, check_beam=False),
     "standard": VisionSettings(),
@@ -24,7 +26,7 @@ _OWN_TABLE = "seeing"
 
 
 class SeeingKeys(Keys, kw_only=True):
-    """[seeing] of a settings file. What is not given goes by the preset."""
+    """Table [seeing] of a settings file; the preset has what is not given."""
 
     preset: str = STANDARD
     cameras: tuple[str, ...] = ()
@@ -38,45 +40,43 @@ class SeeingKeys(Keys, kw_only=True):
 
 
 class SettingsFile(Keys, kw_only=True):
-    """A settings file: what `evaluate --settings` reads and `tradeoff` writes."""
+    """A settings file, which `evaluate --settings` reads and `tradeoff` writes."""
 
     seeing: SeeingKeys = msgspec.field(default_factory=SeeingKeys)
 
 
 def by_preset(name: str) -> Seeing:
-    """The settings of a rung. Raises BadInput for a name that is none."""
+    """Return the settings of a preset. Raise BadInput for a name that is none."""
     if name not in PRESETS:
         raise BadInput(f"--preset {name}: there are {', '.join(PRESETS)}")
     return Seeing(name, PRESETS[name])
 
 
 def from_file(path: Path) -> Seeing:
-    """The settings of a TOML file. Raises BadInput, naming the key that is wrong."""
+    """Return the settings of a TOML file. Raise BadInput, naming the key that is wrong."""
     keys = as_keys(read_toml(path, path.name), SettingsFile, path.name, Doubts()).seeing
-    given = {
-        name: value
-        for name, value in values(keys, ("preset", "cameras")).items()
-        if value is not None
-    }
+    given = {}
+    for name, value in values(keys, ("preset", "cameras")).items():
+        if value is not None:
+            given[name] = value
     base = by_preset(keys.preset)
     return Seeing(path.name if given else base.name, replace(base.vision, **given), keys.cameras)
 
 
-def rungs(settings: Settings) -> list[Seeing]:
-    """What is tried on a whisk, one after another until its d_x is known as well as asked."""
+def presets_for(settings: Settings) -> list[Seeing]:
+    """Return the settings to try on a whisk, one after another until d_x is exact enough."""
     if settings.accuracy_mm is None:
         return [settings.seeing]
     return [replace(by_preset(name), cameras=settings.seeing.cameras) for name in PRESETS]
 
 
 def as_toml(seeing: Seeing) -> str:
-    """The settings as a file that `from_file` reads."""
+    """Return the settings as a file that `from_file` reads."""
     lines = [f"[{_OWN_TABLE}]"]
     if seeing.cameras:
-        lines.append(
-            f"cameras = [{', '.join(f'{name!r}'.replace(chr(39), chr(34)) for name in seeing.cameras)}]"
-        )
-    for name in [*plausible_ranges(SeeingKeys), "check_beam"]:
-        value = getattr(seeing.vision, name)
-        lines.append(f"{name} = {str(value).lower() if isinstance(value, bool) else f'{value:g}'}")
+        names = ", ".join(f'"{name}"' for name in seeing.cameras)
+        lines.append(f"cameras = [{names}]")
+    for name in plausible_ranges(SeeingKeys):
+        lines.append(f"{name} = {getattr(seeing.vision, name):g}")
+    lines.append(f"check_beam = {str(seeing.vision.check_beam).lower()}")
     return "\n".join(lines) + "\n"

@@ -1,13 +1,13 @@
 """The seen half of a trial's result: pictures in, truth out. No gauge is read here."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import fields, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from bench.base.doubts import in_one_status
-from bench.base.settings import Settings
+from bench.base.settings import Seeing, Settings
 from bench.base.statuses import reason
 from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.felt import motor_speed
@@ -25,29 +25,28 @@ from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
 from bench.session.trial import Trial
 from bench.trials.consistency import (
-    cone_doubt,
-    length_doubt,
-    slope_doubt,
-    turns_doubt,
-    width_doubt,
-    wire_doubt,
+    check_bar_width,
+    check_friction_cone,
+    check_length,
+    check_slope,
+    check_turns,
+    check_wire_width,
 )
 from bench.trials.one_camera import by_one_camera
-from bench.trials.seeing import rungs
-from bench.trials.trial_frames import Shown
-from vision.geometry.reasons import NO_REASON, Reason
+from bench.trials.seeing import presets_for
+from bench.trials.trial_frames import TrialFrames
+from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
-from vision.pictures.others import RodLines
+from vision.pictures.others import Others
 from vision.truth.observe import observe_trial
 from vision.truth.records import TrialTruth, WhiskTruth
 
 NO_PICTURES = reason("no_pictures")
 _MOST_DEFLECTIONS = 12  # frames of a whisk, kept with their joint covariance
 _MOST_NAMED = 5  # frames in a line
-_SAME = tuple(
-    {f.name for f in fields(SeenWhisk)}
-    & {f.name for f in fields(WhiskTruth)} - {"status", "overlay"}
-)
+
+# The truth of a whisk, and the name of the preset or file with whose settings it was found.
+Evaluated = tuple[str, WhiskTruth]
 
 
 def see_trial(
@@ -56,192 +55,228 @@ def see_trial(
     signals: Signals,
     calibration: SessionCalibration,
     settings: Settings,
-    wires: Mapping[str, Mapping[str, RodLines]] | None = None,
+    wires: Mapping[str, Others] | None = None,
 ) -> SeenTrial:
-    """Whisks of a trial as the cameras show them. wires: by camera, those of an array's whiskers by name.
+    """Return the whisks of a trial as the cameras show them.
 
-    What keeps a trial from being seen is the status of its whisks; the others go on.
+    wires: by camera and name, the wires of an array's whiskers. A trial that cannot be evaluated
+    has whisks whose status says why.
     """
     count = len(forward_strokes(signals))
     if not trial.camera_sources or calibration.cameras is None:
         return unseen(count, NO_PICTURES)
     try:
-        shown = Shown.of(session, trial, signals, calibration, settings, wires or {})
-        return _see(session, trial, shown, calibration, settings)
+        frames = TrialFrames.read(session, trial, signals, calibration, settings, wires or {})
+        return _see(session, trial, frames, calibration, settings)
     except Refused as refusal:
         return unseen(count, refusal.reason)
 
 
 def unseen(count: int, status: Reason) -> SeenTrial:
-    """So many whisks without a truth, and why."""
-    return SeenTrial(tuple(SeenWhisk(number, status) for number in range(count)))
+    """Return a trial whose whisks have no truth, and why."""
+    return SeenTrial(tuple(SeenWhisk(WhiskTruth(number), status) for number in range(count)))
 
 
 def _see(
     session: Session,
     trial: Trial,
-    shown: Shown,
+    frames: TrialFrames,
     calibration: SessionCalibration,
     settings: Settings,
 ) -> SeenTrial:
-    times, scene, places, back, rods = (
-        shown.times,
-        shown.scene,
-        shown.places,
-        shown.back,
-        shown.rods,
-    )
-    clock_sigma_s = (
-        times.clock_sigma_s if settings.clock_sigma_s is None else settings.clock_sigma_s
-    )
-    observe = partial(observe_trial, shown.pictures, cameras=calibration.cameras, rods=rods)
-    first, *harder = [
-        (one.name, replace(one.vision, clock_sigma_s=clock_sigma_s)) for one in rungs(settings)
-    ]
-    truth = observe(whisks=[*places, *back.values()], settings=first[1])
-    looked = [(first[0], whisk) for whisk in truth.whisks[: len(places)]]
-    for rung in harder:
-        looked = _looked_harder(observe, places, looked, rung, settings.accuracy_mm)
-    thick, left_out = width_doubt(truth.bar_looks, trial, session.board), scene.left_out.values()
-    wide = wire_doubt(next((one.looks for one in truth.whisks if one.looks), {}), session.whisker)
-    odd = [
-        [
-            thick,
-            wide,
-            length_doubt(one.ends, session.whisker),
-            slope_doubt(one.beta_rad, trial),
-            _leaning(one, settings),
-        ]
-        for _, one in looked
-    ]
-    whisks = (whisk_record(one, settings, left_out, what) for (_, one), what in zip(looked, odd))
+    """Evaluate the pictures of a trial. Raise Refused where they do not suffice."""
+    times = frames.times
+    clock_sigma_s = settings.clock_sigma_s
+    if clock_sigma_s is None:
+        clock_sigma_s = times.clock_sigma_s
+    presets = [_with_clock(preset, clock_sigma_s) for preset in presets_for(settings)]
+    truth, whisks = _observe(frames, calibration, presets, settings.accuracy_mm)
+    back = dict(zip(frames.back, truth.whisks[len(whisks) :]))
+    warnings = frames.scene.left_out.values()
+    of_trial = _trial_contradictions(truth, session, trial)
+    seen = []
+    for name, whisk in whisks:
+        contradictions = [*of_trial, *_whisk_contradictions(whisk, session, trial, settings)]
+        record = whisk_record(whisk, settings, warnings, contradictions)
+        alone = by_one_camera(whisk, session.whisker, settings)
+        seen.append(replace(record, looked=name, by_one_camera=alone))
+    missing = _missing_frames(frames.by_camera, times)
     return SeenTrial(
-        tuple(
-            replace(whisk, looked=name, by_one_camera=by_one_camera(one, session.whisker, settings))
-            for whisk, (name, one) in zip(whisks, looked)
-        ),
-        (*truth.notes, *_lost(shown.frames, times), *dropped(times, places), *scene.notes),
-        BarLine(truth.bar_point_mm, truth.bar_direction),
-        0.5 * trial.bar_diameter_mm,
-        0.5 * rods.wire.diameter_mm,
-        Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
-        truth.bar_looks,
-        _touch_alone(truth.whisks[len(places)]) if 0 in back else None,
-        _seen_back(dict(zip(back, truth.whisks[len(places) :])), len(places), settings)
-        if trial.both_ways
-        else (),
+        tuple(seen),
+        notes=(*truth.notes, *missing, *dropped(times, frames.places), *frames.scene.notes),
+        bar=BarLine(truth.bar_point_mm, truth.bar_direction),
+        bar_radius_mm=0.5 * trial.bar_diameter_mm,
+        wire_radius_mm=0.5 * frames.rods.wire.diameter_mm,
+        clock=Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
+        bar_looks=truth.bar_looks,
+        back=_back_stroke(back[0]) if 0 in back else None,
+        ways_back=_ways_back(back, len(whisks), settings) if trial.both_ways else (),
     )
 
 
-def _leaning(truth: WhiskTruth, settings: Settings) -> Reason:
-    return cone_doubt(truth.at(settings.theta_rad).phi_rad, truth.beta_rad, "seen")
+def _observe(
+    frames: TrialFrames,
+    calibration: SessionCalibration,
+    presets: Sequence[Seeing],
+    accuracy_mm: float | None,
+) -> tuple[TrialTruth, list[Evaluated]]:
+    """Return the truth of the trial by the first preset, and its forward whisks, each by the first
+    preset that reaches the accuracy.
+    """
+    observe = partial(observe_trial, frames.pictures, cameras=calibration.cameras, rods=frames.rods)
+    first, *finer = presets
+    truth = observe(whisks=[*frames.places, *frames.back.values()], settings=first.vision)
+    whisks = [(first.name, whisk) for whisk in truth.whisks[: len(frames.places)]]
+    for preset in finer:
+        whisks = _refine(observe, frames.places, whisks, preset, accuracy_mm)
+    return truth, whisks
 
 
-def _looked_harder(
-    observe: Callable[..., TrialTruth], places, looked, rung, accuracy_mm: float
-) -> list:
-    """Whisks with the name of what they were looked at by, those that are not known so well by another rung. What that
-    does not see stays."""
-    name, vision = rung
-    left = [k for k, (_, whisk) in enumerate(looked) if not whisk.d_x_mm.sigma <= accuracy_mm]
-    again = observe(whisks=[places[k] for k in left], settings=vision).whisks if left else ()
-    better = {
-        k: (name, replace(whisk, whisk=k))
-        for k, whisk in zip(left, again)
-        if np.isfinite(whisk.d_x_mm.value)
-    }
-    return [better.get(k, one) for k, one in enumerate(looked)]
+def _with_clock(preset: Seeing, clock_sigma_s: float) -> Seeing:
+    """Return settings with the sigma of the frames' clock."""
+    return replace(preset, vision=replace(preset.vision, clock_sigma_s=clock_sigma_s))
 
 
-def _seen_back(
-    truths: dict[int, WhiskTruth], count: int, settings: Settings
+def _trial_contradictions(truth: TrialTruth, session: Session, trial: Trial) -> list[Reason]:
+    """Return how the pictures contradict the stated diameters of bar and whisker."""
+    wire_looks = next((whisk.looks for whisk in truth.whisks if whisk.looks), {})
+    return [
+        check_bar_width(truth.bar_looks, trial, session.board),
+        check_wire_width(wire_looks, session.whisker),
+    ]
+
+
+def _whisk_contradictions(
+    truth: WhiskTruth, session: Session, trial: Trial, settings: Settings
+) -> list[Reason]:
+    """Return how a whisk contradicts the stated length and slope, or friction."""
+    deflected = truth.at(settings.theta_rad).phi_rad
+    return [
+        check_length(truth.ends, session.whisker),
+        check_slope(truth.beta_rad, trial),
+        check_friction_cone(deflected, truth.beta_rad, "seen"),
+    ]
+
+
+def _refine(
+    observe: Callable[..., TrialTruth],
+    places: Sequence[slice],
+    whisks: Sequence[Evaluated],
+    preset: Seeing,
+    accuracy_mm: float,
+) -> list[Evaluated]:
+    """Evaluate those whisks anew whose distance has a larger sigma than wanted, by a finer preset.
+
+    A whisk that has no truth by that preset keeps the one it has.
+    """
+    refined = list(whisks)
+    coarse = [k for k, (_, whisk) in enumerate(whisks) if not whisk.d_x_mm.sigma <= accuracy_mm]
+    if not coarse:
+        return refined
+    truth = observe(whisks=[places[k] for k in coarse], settings=preset.vision)
+    for k, whisk in zip(coarse, truth.whisks):
+        if np.isfinite(whisk.d_x_mm.value):
+            refined[k] = preset.name, replace(whisk, whisk=k)
+    return refined
+
+
+def _ways_back(
+    truths: Mapping[int, WhiskTruth], count: int, settings: Settings
 ) -> tuple[SeenWhisk, ...]:
-    """The way back of each whisk, by the number of that."""
-    seen = {k: whisk_record(replace(truth, whisk=k), settings) for k, truth in truths.items()}
-    return tuple(seen.get(k, SeenWhisk(k, NO_PICTURES)) for k in range(count))
+    """Return the record of each whisk's way back, from truths by the number of the whisk."""
+    seen = list(unseen(count, NO_PICTURES).whisks)
+    for k, truth in truths.items():
+        seen[k] = whisk_record(replace(truth, whisk=k), settings)
+    return tuple(seen)
 
 
-def _touch_alone(truth: WhiskTruth) -> BackStroke | None:
-    """Of a back stroke what tells the clock; None where it has no truth."""
-    known = np.isfinite(truth.touch_rad.value)
-    return BackStroke(truth.touch_rad, motor_speed(truth.frames)) if known else None
+def _back_stroke(truth: WhiskTruth) -> BackStroke | None:
+    """Return touch and speed of a back stroke; None where it has no truth."""
+    if not np.isfinite(truth.touch_rad.value):
+        return None
+    return BackStroke(truth.touch_rad, motor_speed(truth.frames))
 
 
-def _lost(frames: dict, times: FrameTimes) -> Iterator[str]:
-    """A line for each camera that has no picture of some frames: dropped by it, or damaged."""
+def _missing_frames(frames: Mapping[str, Mapping], times: FrameTimes) -> Iterator[str]:
+    """Yield a line on the dropped and one on the damaged frames of each camera that has some."""
+    count = len(times)
     for name, pictures in frames.items():
-        dropped = int(np.sum(times.picture[name] < 0))
-        damaged = [
-            str(k) for k in range(len(times)) if times.picture[name][k] >= 0 and k not in pictures
-        ]
-        if dropped:
-            yield f"camera {name} dropped {dropped} of {len(times)} frames"
+        is_recorded = times.picture[name] >= 0
+        lost = int(np.sum(~is_recorded))
+        damaged = [str(k) for k in np.flatnonzero(is_recorded) if k not in pictures]
+        if lost:
+            yield f"camera {name} dropped {lost} of {count} frames"
         if damaged:
-            yield f"camera {name}: {len(damaged)} of {len(times)} frames damaged ({', '.join(damaged[:_MOST_NAMED])})"
+            named = ", ".join(damaged[:_MOST_NAMED])
+            yield f"camera {name}: {len(damaged)} of {count} frames damaged ({named})"
 
 
 def whisk_record(
     truth: WhiskTruth,
     settings: Settings,
-    doubts: Iterable[Reason] = (),
+    warnings: Iterable[Reason] = (),
     contradictions: Iterable[Reason] = (),
 ) -> SeenWhisk:
-    """One whisk: at first touch, at the wanted angle, a row a frame, and lines to draw."""
+    """Return the record of a whisk, from the truth that vision found.
+
+    contradictions: in what ways the recording disagrees with itself or with what is stated; such
+    a whisk is marked. The record leaves out the fit itself, what the checks alone need, and
+    the lines of all frames but two.
+    """
     at = truth.at(settings.theta_rad)
-    contradictions = [
-        *contradictions,
-        turns_doubt(truth.turns, motor_speed(truth.frames)) if truth.frames else NO_REASON,
-    ]
-    status = in_one_status(truth.status, at.status, *contradictions, *doubts)
-    drawn = _overlay(truth, at.theta_rad)
-    same = {name: getattr(truth, name) for name in _SAME}
-    odd = any(contradictions)
+    contradictions = list(contradictions)
+    if truth.frames:
+        contradictions.append(check_turns(truth.turns, motor_speed(truth.frames)))
     return SeenWhisk(
-        **same, status=status, at=at, deflection=_deflection(truth), overlay=drawn, contradicted=odd
+        truth=replace(truth, overlay={}, ends={}, looks={}, smooth=None, problem=None),
+        status=in_one_status(truth.status, at.status, *contradictions, *warnings),
+        at=at,
+        deflection=_deflection(truth),
+        overlay=_overlay(truth, at.theta_rad),
+        contradicted=any(contradictions),
     )
 
 
 def _deflection(truth: WhiskTruth) -> Deflection | None:
-    """Of up to a dozen of the touching frames; None where none touches."""
+    """Return the deflection in up to a dozen of the touching frames; None where none touches."""
     smooth = truth.smooth
     if smooth is None or len(smooth.theta_rad) == 0:
         return None
-    chosen = np.unique(
-        np.linspace(0, len(smooth.theta_rad) - 1, _MOST_DEFLECTIONS).round().astype(int)
-    )
-    theta, d_y, d_z = (
-        smooth.theta_rad[chosen],
-        smooth.values["d_y"][chosen],
-        smooth.values["d_z"][chosen],
-    )
+    count = len(smooth.theta_rad)
+    chosen = np.unique(np.linspace(0, count - 1, _MOST_DEFLECTIONS).round().astype(int))
+    theta = smooth.theta_rad[chosen]
+    d_y = smooth.values["d_y"][chosen]
+    d_z = smooth.values["d_z"][chosen]
     frames = truth.frames
     x, y, _ = frames.point_mm.value[frames.touching][chosen].T
-    touch, d_x = truth.touch_rad.value, truth.d_x_mm.value
-    towards = np.cos(touch) * x + np.sin(touch) * y - d_x
+    touch = truth.touch_rad.value
+    d_x = truth.d_x_mm.value
+    # Beyond the contact at touch, along the unbent whisker there.
+    beyond = np.cos(touch) * x + np.sin(touch) * y - d_x
+    by_z = smooth.jacobians["d_z"][chosen]  # (frames, parameters)
     by_y = np.cos(theta)[:, None] * smooth.jacobians["d_y"][chosen]
-    jacobian = np.stack([smooth.jacobians["d_z"][chosen], by_y], axis=1).reshape(
-        2 * len(chosen), -1
-    )
+    jacobian = np.stack([by_z, by_y], axis=1).reshape(2 * len(chosen), -1)
     return Deflection(
         theta_rad=theta,
         motor_rad=touch + theta,
         slip_mm=smooth.values["slip"][chosen],
-        along_mm=d_x / np.cos(theta) - d_y * np.sin(theta) + towards * np.cos(theta),
-        across_y_mm=d_y * np.cos(theta) + towards * np.sin(theta),
+        along_mm=d_x / np.cos(theta) - d_y * np.sin(theta) + beyond * np.cos(theta),
+        across_y_mm=d_y * np.cos(theta) + beyond * np.sin(theta),
         across_z_mm=d_z,
-        past_mm=towards - frames.arc_mm[frames.touching][chosen],
+        past_mm=beyond - frames.arc_mm[frames.touching][chosen],
         covariance=jacobian @ smooth.covariance @ jacobian.T,
     )
 
 
 def _overlay(truth: WhiskTruth, theta_rad: float) -> dict[str, Drawing]:
-    """Lines in the frames nearest to touch and to the wanted angle."""
+    """Return the lines of the frames nearest to touch and to the wanted angle."""
     if truth.frames is None or not truth.overlay:
         return {}
-    drawn = [k for k, index in enumerate(truth.frames.index) if int(index) in truth.overlay]
-    chosen = {}
+    index = truth.frames.index
+    drawn = np.flatnonzero(np.isin(index, list(truth.overlay)))
+    angles = truth.frames.theta_rad.value[drawn]
+    overlay = {}
     for name, angle in (("touch", 0.0), ("theta", theta_rad)):
-        k = min(drawn, key=lambda k: abs(truth.frames.theta_rad.value[k] - angle))
-        frame = int(truth.frames.index[k])
-        chosen[name] = Drawing(frame, truth.overlay[frame])
-    return chosen
+        frame = int(index[drawn[np.argmin(np.abs(angles - angle))]])
+        overlay[name] = Drawing(frame, truth.overlay[frame])
+    return overlay

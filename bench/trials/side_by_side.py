@@ -1,7 +1,8 @@
-"""Whiskers of an array in each other's pictures: where each one's wire is, before any is measured.
+"""Whiskers of an array in each other's pictures: coarse passes that locate each wire before any is
+measured.
 
-At first all are taken to be straight and to turn with their motors. Then each is looked for where the others are not,
-several times: each look knows the others as the one before has seen them.
+At first all are taken to be straight and to turn with their motors. Then each is located where the
+others are not, several times: each pass masks the others at the places of the pass before.
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ from bench.session.signals import read_signals
 from bench.session.trial import Trial
 from bench.trials.of_session import first_units
 from bench.trials.other_wires import has_lines, lines_in, write_lines
-from bench.trials.trial_frames import Shown
+from bench.trials.trial_frames import TrialFrames
 from bench.trials.unit import Unit
 from vision.geometry.centreline import REST_POWERS, one_curve
 from vision.geometry.refusals import Refused
@@ -28,7 +29,7 @@ from vision.pictures.others import RodLines
 from vision.truth.observe import wire_lines
 from vision.wire.trace import lines_of
 
-_LOOKS = 3  # wires that others cross are up to 38 px off after the first, 18 after the second, 2 after the third
+_PASSES = 3  # wires that others cross are up to 38 px off after the first, 18 after the second, 2 after the third
 
 
 def array_units(
@@ -39,84 +40,94 @@ def array_units(
     settings: Settings,
     pool: Workers,
 ) -> list[list[Unit]]:
-    """As `first_units`, of each whisker of an array, by its view, recorded trials and folder: by one calibration of the
-    whole in `out`, and with where the others' wires are. Raises BadInput."""
+    """Return the units of work of each whisker of an array, with the places of the others' wires.
+
+    views, recorded, folders: session, trials and output of each whisker. The cameras are those of
+    one calibration of the whole, in `out`. Raises BadInput.
+    """
     calibration = calibrate_session(views[0].whole, out)
-    known = [
-        first_units(view, trials, folder, settings, at_base(calibration, view))
-        for view, trials, folder in zip(views, recorded, folders)
-    ]
-    for look in range(_LOOKS + 1):
-        staged = [
-            replace(unit, stage=f"wires{look}")
-            for units in known
-            for unit in units
-            if _is_seen(unit)
-        ]
-        pool.run(_look if look else _predict, staged, "wires side by side")
-        known = [
-            [_told(unit, known, look) if _is_seen(unit) else unit for unit in units]
-            for units in known
-        ]
-    return known
+    whiskers = []
+    for view, trials, folder in zip(views, recorded, folders):
+        placed = at_base(calibration, view)
+        whiskers.append(first_units(view, trials, folder, settings, placed))
+    for number in range(_PASSES + 1):
+        seen = [unit for units in whiskers for unit in units if _is_seen(unit)]
+        staged = [replace(unit, stage=f"wires{number}") for unit in seen]
+        job = _write_traced if number else _write_straight
+        pool.run(job, staged, "wires side by side")
+        whiskers = [_with_wires(units, staged, is_first=number == 0) for units in whiskers]
+    return whiskers
 
 
 def _is_seen(unit: Unit) -> bool:
+    """Return whether there are pictures and cameras."""
     return bool(unit.trial.camera_sources) and unit.calibration.cameras is not None
 
 
-def _told(unit: Unit, whiskers: Sequence[Sequence[Unit]], look: int) -> Unit:
-    """The unit with the files of that look at it and the others."""
-    files = tuple(
-        (one.session.base.name, replace(one, stage=f"wires{look}").seen_path)
-        for units in whiskers
-        for one in units
-        if one.trial.name == unit.trial.name
-    )
-    made_from = hash_of([name for name, _ in files], [hash_of_files([path]) for _, path in files])
-    return replace(
-        unit, wires=files, wires_hash=made_from, straight=unit.straight if look else files
-    )
+def _with_wires(units: Sequence[Unit], staged: Sequence[Unit], *, is_first: bool) -> list[Unit]:
+    """Return a whisker's units with the files of the pass for its own and the others' wires.
+
+    staged: units of all whiskers in that pass. is_first: its wires are the straight ones.
+    """
+    known = []
+    for unit in units:
+        if _is_seen(unit):
+            same = [one for one in staged if one.trial.name == unit.trial.name]
+            files = tuple((one.session.base.name, one.seen_path) for one in same)
+            hashes = [hash_of_files([path]) for _, path in files]
+            wires_hash = hash_of([name for name, _ in files], hashes)
+            straight = files if is_first else unit.straight
+            unit = replace(unit, wires=files, wires_hash=wires_hash, straight=straight)
+        known.append(unit)
+    return known
 
 
 def _key(unit: Unit) -> str:
-    return hash_of(
-        hash_of_code(("bench/trials/side_by_side.py",)), hash_of_code(SEEING), unit.seen_hash
-    )
+    """Return the hash of all inputs of a unit's lines."""
+    code = hash_of_code(("bench/trials/side_by_side.py",))
+    return hash_of(code, hash_of_code(SEEING), unit.seen_hash)
 
 
-def _predict(unit: Unit) -> None:
-    """The straight wire of each frame."""
-    if has_lines(unit.seen_path, _key(unit)):
+def _write_straight(unit: Unit) -> None:
+    """Write the lines of a straight wire in each frame, unless they are there."""
+    key = _key(unit)
+    if has_lines(unit.seen_path, key):
         return
-    signals, times = read_signals(unit.trial), frame_times(unit.trial)
-    motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
-    wire, straight = unit.session.whisker.wire, np.zeros((2, REST_POWERS))
-    curves = {
-        k: one_curve(straight, np.zeros(2), wire.length_mm, motor, wire)
-        for k, motor in enumerate(motor_rad)
-    }
-    lines = {camera.name: lines_of(camera, wire, curves) for camera in unit.calibration.cameras}
-    write_lines(unit.seen_path, _key(unit), lines)
-
-
-def _look(unit: Unit) -> None:
-    """The wire where a first look finds it."""
-    if not has_lines(unit.seen_path, _key(unit)):
-        write_lines(unit.seen_path, _key(unit), _found(unit))
-
-
-def _found(unit: Unit) -> dict[str, RodLines]:
-    """By camera; straight in a trial that cannot be seen."""
-    usual = replace(unit.settings.seeing.vision, every_frame=1, picture_scale=1)
     signals = read_signals(unit.trial)
+    times = frame_times(unit.trial)
+    motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
+    wire = unit.session.whisker.wire
+    rest_mm = np.zeros((2, REST_POWERS))
+    curves = {}
+    for frame, angle in enumerate(motor_rad):
+        curves[frame] = one_curve(rest_mm, np.zeros(2), wire.length_mm, angle, wire)
+    lines = {camera.name: lines_of(camera, wire, curves) for camera in unit.calibration.cameras}
+    write_lines(unit.seen_path, key, lines)
+
+
+def _write_traced(unit: Unit) -> None:
+    """Write the lines of the wire as traced in the pictures, unless they are there."""
+    key = _key(unit)
+    if not has_lines(unit.seen_path, key):
+        write_lines(unit.seen_path, key, _traced(unit))
+
+
+def _traced(unit: Unit) -> dict[str, RodLines]:
+    """Trace the wire in each camera; it is straight in a trial that cannot be evaluated."""
+    vision = replace(unit.settings.seeing.vision, every_frame=1, picture_scale=1)
+    cameras = unit.calibration.cameras
     try:
-        told = unit.trial, signals, unit.calibration, unit.settings, lines_in(unit.wires)
-        shown = Shown.of(unit.session, *told)
-        whisks = [*shown.places, *shown.back.values()]
-        return wire_lines(shown.pictures, whisks, unit.calibration.cameras, shown.rods, usual)
+        frames = TrialFrames.read(
+            unit.session,
+            unit.trial,
+            read_signals(unit.trial),
+            unit.calibration,
+            unit.settings,
+            lines_in(unit.wires),
+        )
+        whisks = [*frames.places, *frames.back.values()]
+        return wire_lines(frames.pictures, whisks, cameras, frames.rods, vision)
     except Refused:
-        name = unit.session.base.name
-        return {
-            camera: some[name] for camera, some in lines_in(unit.straight).items() if name in some
-        }
+        own = unit.session.base.name
+        straight = lines_in(unit.straight)
+        return {camera: wires[own] for camera, wires in straight.items() if own in wires}

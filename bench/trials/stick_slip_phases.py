@@ -1,98 +1,119 @@
-"""Stick and slip: where the contact rests on the bar, where it jumps, and the friction angles at both ends of a rest.
+"""Stick and slip: rests of the contact on the bar, jumps, and the friction angles at both ends of a rest.
 
-The record is the slip over the pushing angle: frame by frame as the cameras show it, and sample by sample from the
-moments felt, with the bar's slope as seen. A rest ends when the force leaves the static cone, so |β| − |φ| just before
-the jump is the static angle. A jump ends where the force is back on the kinetic cone; a whisker that swings beyond it
-would show too large an angle, as nothing tells the two apart.
+The record is the slip over the pushing angle: frame by frame as the cameras show it, and sample by
+sample from the moments felt, with the bar's slope as seen. A rest ends when the force leaves the
+static cone, so |β| − |φ| just before the jump is the static angle. A jump ends where the force is
+back on the kinetic cone; a whisker that swings beyond it would show too large an angle, as nothing
+separates the two.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import find_objects, label
+from scipy.ndimage import find_objects, label, maximum_filter1d
 
 from bench.gauges.felt import FeltStroke
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Angle, Phases
 from bench.records.trial_result import SeenWhisk
 from bench.session.trial import Trial
-from bench.trials.estimates import Readout
+from bench.trials.readout import Readout
 from estimator.beam import Beam
 from estimator.signal import FeltTouch
+from estimator.uncertainty import slip_angle_sigma
 from vision.truth.records import FrameTruth
 
-_LEAST_SLIP_MM, _LEAST_FRAMES = (
-    0.1,
-    3,
-)  # mm, frames: less slip, or fewer frames, show neither rest nor jump. Set by eye
+# mm: less slip shows neither rest nor jump. Set by eye
+_LEAST_SLIP_MM = 0.1
+_LEAST_FRAMES = 3  # fewer show neither rest nor jump. Set by eye
 _FIRST_RAD = np.radians(0.5)  # before, the slip angle is mostly noise
 _REST_SHARE = 0.5  # of the slope of a slip that never rests, σ/θ: below it the contact rests
 _LONGEST_JUMP = 2  # intervals between frames
 _SIGMAS = 3.0  # a rest is told from free slip where they differ by so many
 _JUMP_SIGMAS = 6.0  # in thousands of samples noise reaches 4
-# rad, s, samples: half a window in which a slope is taken, the lesser of both, between the counts. Set by eye
-_WINDOW_RAD, _WINDOW_S, _FEWEST, _MOST = np.radians(0.12), 0.012, 4, 40
+_WINDOW_RAD = np.radians(0.12)  # rad: half a window in which a slope is taken. Set by eye
+_WINDOW_S = 0.012  # s: half a window, where that is less. Set by eye
+_FEWEST = 4  # samples in half a window, at least. Set by eye
+_MOST = 40  # samples in half a window, at most. Set by eye
 _GUARD = 3  # samples at a jump that the gauges' own filter smears
 
 
-def seen_phases(frames: FrameTruth, beta_rad: float, d_x_mm: float) -> Phases:
-    """Phases from the slip of each touching frame, with its sigma.
-
-    A jump lies anywhere between its two frames: its angles are carried half the way to it, as a contact at rest has
-    them, and the other half goes into their sigma.
+def slips(seen: SeenWhisk) -> bool:
+    """Return whether the contact moves along the bar. Else the force may lie anywhere within the
+    friction cone.
     """
-    theta, slip, sigma, d_y, d_z, alpha, alpha_sigma = _touching(frames)
+    deflection = seen.deflection
+    if deflection is None or len(deflection.theta_rad) < _LEAST_FRAMES:
+        return False
+    return bool(np.ptp(deflection.slip_mm) >= _LEAST_SLIP_MM)
+
+
+def seen_phases(frames: FrameTruth, beta_rad: float, d_x_mm: float) -> Phases:
+    """Find phases in the slip of each touching frame, with its sigma."""
+    touching = _touching(frames)
+    theta = frames.theta_rad.value[touching]
     if len(theta) < _LEAST_FRAMES:
         return NO_PHASES
-    step, freely = (
-        np.diff(slip) * np.sign(beta_rad),
-        np.abs(slip[:-1]) / theta[:-1] * np.diff(theta),
-    )
-    rests = np.abs(step) < _REST_SHARE * freely
-    known = freely * _REST_SHARE > _SIGMAS * np.sqrt(2.0) * np.maximum(sigma[:-1], sigma[1:])
+    slip = frames.slip_mm.value[touching]
+    sigma = frames.slip_mm.sigma[touching]
+    # One number an interval between frames, here and below.
+    step = np.diff(slip) * np.sign(beta_rad)
+    free_step = np.abs(slip[:-1]) / theta[:-1] * np.diff(theta)
+    step_sigma = np.sqrt(2.0) * np.maximum(sigma[:-1], sigma[1:])
+    is_clear = free_step * _REST_SHARE > _SIGMAS * step_sigma
+    is_below = np.abs(step) < _REST_SHARE * free_step
+    rests = is_below & is_clear
+    jumps = [run for run in _runs(~is_below & is_clear) if _is_jump(*run, rests)]
+    if not jumps:
+        return NO_PHASES
+    angles = _seen_angles(frames, np.flatnonzero(touching), jumps, d_x_mm)
+    return Phases(len(_runs(rests)), len(jumps), tuple(angles))
+
+
+def _seen_angles(
+    frames: FrameTruth, index: np.ndarray, jumps: Sequence[tuple[int, int]], d_x_mm: float
+) -> list[Angle]:
+    """Return the friction angles at both ends of each jump between two of the frames `index`.
+
+    A jump lies anywhere between its two frames: its angles are carried half the way to it, as a
+    contact at rest has them, and the other half goes into their sigma.
+    """
+    theta = frames.theta_rad.value[index]
+    d_y = frames.d_y_mm.value[index]
+    d_z = frames.d_z_mm.value[index]
+    alpha = frames.alpha_rad.value[index]
+    alpha_sigma = frames.alpha_rad.sigma[index]
     turning = np.abs(d_z) * d_x_mm / (d_y**2 + d_z**2)  # dα/dθ of a contact at rest
     angles = []
-    jumps = [run for run in _runs(~rests & known) if _is_jump(*run, rests & known)]
     for first, last in jumps:
-        way, middle = theta[last] - theta[first], 0.5 * (theta[first] + theta[last])
+        middle = float(0.5 * (theta[first] + theta[last]))
+        width = theta[last] - theta[first]
         for kind, k, half in ((STATIC, first, 0.5), (KINETIC, last, -0.5)):
-            spread = float(np.hypot(alpha_sigma[k], turning[k] * way / np.sqrt(12.0)))
-            angles.append(
-                Angle(kind, float(middle), float(alpha[k] + half * way * turning[k]), spread)
-            )
-    return Phases(len(_runs(rests & known)), len(jumps), tuple(angles)) if jumps else NO_PHASES
-
-
-def _is_jump(first: int, last: int, rests) -> bool:
-    """Is this short stretch of intervals enclosed by rests?"""
-    return (
-        first > 0
-        and last < len(rests)
-        and last - first <= _LONGEST_JUMP
-        and bool(rests[first - 1] and rests[last])
-    )
+            value = float(alpha[k] + half * width * turning[k])
+            spread = float(np.hypot(alpha_sigma[k], turning[k] * width / np.sqrt(12.0)))
+            angles.append(Angle(kind, middle, value, spread))
+    return angles
 
 
 def _touching(frames: FrameTruth) -> np.ndarray:
-    """Rows (7, n): θ, slip, its sigma, d_y, d_z, α, its sigma, of the frames that touch and are known."""
-    slip, alpha = frames.slip_mm, frames.alpha_rad
-    rows = np.array(
-        [
-            frames.theta_rad.value,
-            slip.value,
-            slip.sigma,
-            frames.d_y_mm.value,
-            frames.d_z_mm.value,
-            alpha.value,
-            alpha.sigma,
-        ]
-    )
-    return rows[:, frames.touching & np.isfinite(rows).all(axis=0) & (rows[0] > _FIRST_RAD)]
+    """Return the mask (n,) of frames that touch, well after touch, and whose values are known."""
+    values = [frames.theta_rad, frames.slip_mm, frames.d_y_mm, frames.d_z_mm, frames.alpha_rad]
+    known = np.isfinite([value.value for value in values]).all(axis=0)
+    known &= np.isfinite(frames.slip_mm.sigma) & np.isfinite(frames.alpha_rad.sigma)
+    return frames.touching & known & (frames.theta_rad.value > _FIRST_RAD)
 
 
-def _runs(mask) -> list[tuple[int, int]]:
-    """(first, one past the last) of each unbroken stretch of True."""
+def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
+    """Return (first, one past the last) of each unbroken run of True."""
     return [(run.start, run.stop) for (run,) in find_objects(label(mask)[0])]
+
+
+def _is_jump(first: int, last: int, rests: np.ndarray) -> bool:
+    """Return whether a run of intervals is short and enclosed by rests."""
+    if first == 0 or last == len(rests) or last - first > _LONGEST_JUMP:
+        return False
+    return bool(rests[first - 1] and rests[last])
 
 
 def phases_of(
@@ -103,14 +124,21 @@ def phases_of(
     seen: SeenWhisk,
     beam: Beam,
 ) -> Phases:
-    """Phases felt, with the slope and distance as seen, or the nominal ones where no picture tells of them."""
-    if seen.deflection is not None:
-        beta_rad, d_x_mm = (seen.beta_rad.value, seen.d_x_mm.value) if slips(seen) else (None, None)
+    """Find felt phases, with slope and distance as seen, or nominal ones where no picture shows
+    them.
+    """
+    if seen.deflection is None:
+        beta_rad = trial.beta_deg and np.radians(trial.beta_deg)
+        d_x_mm = trial.d_x_mm
+    elif slips(seen):
+        beta_rad = seen.beta_rad.value
+        d_x_mm = seen.d_x_mm.value
     else:
-        beta_rad, d_x_mm = trial.beta_deg and np.radians(trial.beta_deg), trial.d_x_mm
+        return NO_PHASES
     if not beta_rad or not d_x_mm:
         return NO_PHASES
-    theta, moments = stroke.motor_rad - touch.motor_rad, readout.moments_Nmm(stroke, touch)
+    theta = stroke.motor_rad - touch.motor_rad
+    moments = readout.moments_Nmm(stroke, touch)
     return felt_phases(stroke.time_s, theta, moments, beta_rad, d_x_mm, beam)
 
 
@@ -122,20 +150,27 @@ def felt_phases(
     d_x_mm: float,
     beam: Beam,
 ) -> Phases:
-    """Phases from the moments (n, 2), m_y and m_z as recorded, unfiltered; NaN samples are left out.
+    """Find phases in the moments (n, 2), m_y and m_z as recorded, unfiltered; NaN samples are left
+    out.
 
     Between two jumps both moments are lines, whose ends give the friction angles.
     """
-    jumps, found = rests_of(time_s, theta_rad, moments_Nmm, beta_rad, d_x_mm, beam)
-    angles = tuple(angle for rest in found for angle in rest.angles(abs(beta_rad)))
-    return Phases(len(found), jumps, angles) if jumps else NO_PHASES
+    jumps, rests = find_rests(time_s, theta_rad, moments_Nmm, beta_rad, d_x_mm, beam)
+    if not jumps:
+        return NO_PHASES
+    angles: list[Angle] = []
+    for rest in rests:
+        angles += rest.angles(abs(beta_rad))
+    return Phases(len(rests), jumps, tuple(angles))
 
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """A contact at rest between two jumps: from and to which θ (to: NaN where the record ends before the next jump).
+    """A contact at rest between two jumps.
 
-    lines (2, 2): |m_y| and m_z, value and slope about a middle; shape (2, 2) and variances (2,) of their covariance.
+    from_rad, to_rad: pushing angles of its ends; to_rad is NaN where the record ends before the
+    next jump. lines (2, 2): value and slope of |m_y| and m_z about a middle. shape (2, 2),
+    variances (2,): the lines' covariance is their product.
     """
 
     from_rad: float
@@ -146,19 +181,23 @@ class Rest:
     variances: np.ndarray
 
     def moments_at(self, theta_rad: float) -> tuple[np.ndarray, np.ndarray]:
-        """|m_y| and m_z (2,) there, and their variances (2,)."""
+        """Return |m_y| and m_z (2,) at a pushing angle, and their variances (2,)."""
         row = np.array([1.0, theta_rad - self.middle_rad])
         return row @ self.lines, row @ self.shape @ row * self.variances
 
-    def angles(self, slope: float) -> list[Angle]:
-        """|β| − |φ| at both ends."""
-        ends = ((KINETIC, self.from_rad), (STATIC, self.to_rad))
-        return [
-            _angle(kind, at, *self.moments_at(at), slope) for kind, at in ends if np.isfinite(at)
-        ]
+    def angles(self, slope_rad: float) -> list[Angle]:
+        """Return the friction angles |β| − |φ| at both ends, for a slope |β|."""
+        found = []
+        for kind, theta_rad in ((KINETIC, self.from_rad), (STATIC, self.to_rad)):
+            if np.isfinite(theta_rad):
+                (m_y, m_z), variances = self.moments_at(theta_rad)
+                alpha_rad = slope_rad - float(np.arctan2(m_y, m_z))
+                sigma_rad = slip_angle_sigma(m_y, m_z, np.diag(variances))
+                found.append(Angle(kind, theta_rad, alpha_rad, sigma_rad))
+        return found
 
 
-def rests_of(
+def find_rests(
     time_s: np.ndarray,
     theta_rad: np.ndarray,
     moments_Nmm: np.ndarray,
@@ -166,88 +205,85 @@ def rests_of(
     d_x_mm: float,
     beam: Beam,
 ) -> tuple[int, list[Rest]]:
-    """How many jumps there are, and what lies between two of them where the contact rests there; as `felt_phases`."""
+    """Return the number of jumps, and the rests between two of them; arguments as `felt_phases`."""
     good = np.isfinite(moments_Nmm).all(axis=1)
-    time, theta, moments = (
-        time_s[good],
-        theta_rad[good],
-        moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0],
-    )
+    time = time_s[good]
+    theta = theta_rad[good]
+    moments = moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0]
     slope = abs(beta_rad)
     mm_per_Nmm = d_x_mm / beam.moment_Nmm(1.0, d_x_mm)
-    slip = mm_per_Nmm * (moments @ [np.cos(slope), -np.sin(slope)]) + d_x_mm * np.sin(slope) * theta
+    along = moments @ [np.cos(slope), -np.sin(slope)]
+    slip = mm_per_Nmm * along + d_x_mm * np.sin(slope) * theta
     jumps = _jumps(time, theta, slip)
-    ends = [(a, b, b < len(theta)) for a, b in zip(jumps, [*jumps[1:], len(theta)])]
-    found = [_rest(theta[a:b], moments[a:b], slip[a:b], jumps_off) for a, b, jumps_off in ends]
-    return len(jumps), [rest for rest in found if rest is not None]
+    rests = []
+    for first, last in pairwise([*jumps, len(theta)]):
+        part = slice(first, last)
+        rest = _rest(theta[part], moments[part], slip[part], ends_in_jump=last < len(theta))
+        if rest is not None:
+            rests.append(rest)
+    return len(jumps), rests
 
 
-def _jumps(time, theta, slip) -> list[int]:
-    """Samples at which the slip steps up, against a line before and after it."""
+def _jumps(time: np.ndarray, theta: np.ndarray, slip: np.ndarray) -> list[int]:
+    """Return the samples at which the slip steps up, relative to one line before and after it."""
     rate = (len(time) - 1) / (time[-1] - time[0])
     speed = np.ptp(theta) / np.ptp(time)
     half = int(np.clip(min(_WINDOW_RAD / speed, _WINDOW_S) * rate, _FEWEST, _MOST))
     at = np.arange(-half, half) + 0.5
-    kernel = np.linalg.pinv(np.stack([np.ones_like(at), at, at > 0], axis=1))[2]
+    design = np.stack([np.ones_like(at), at, at > 0], axis=1)
+    kernel = np.linalg.pinv(design)[2]
     step = np.convolve(slip, kernel[::-1], mode="same")
     free = step[theta < -_FIRST_RAD / 2][half:-half]
     if len(free) < 4 * half:
         return []
-    candidates = np.flatnonzero((step > _JUMP_SIGMAS * free.std()) & (theta > _FIRST_RAD))
-    candidates = candidates[(candidates >= half) & (candidates < len(step) - half)]
-    return _without_ringing(
-        [int(k) for k in candidates if step[k] == step[k - half : k + half + 1].max()], theta, slip
-    )
+    is_jump = (step > _JUMP_SIGMAS * free.std()) & (theta > _FIRST_RAD)
+    is_jump &= step == maximum_filter1d(step, 2 * half + 1)
+    is_jump[:half] = False
+    is_jump[-half:] = False
+    return _without_ringing(np.flatnonzero(is_jump).tolist(), theta, slip)
 
 
-def _without_ringing(jumps: list[int], theta, slip) -> list[int]:
-    """The jumps that carry the contact on: those between whose sides the mean slip grows. A whisker that rings after a
-    jump steps to and fro about one place."""
+def _without_ringing(jumps: list[int], theta: np.ndarray, slip: np.ndarray) -> list[int]:
+    """Return the jumps between whose sides the mean slip grows: those that carry the contact on.
+
+    A whisker that rings after a jump steps to and fro about one place.
+    """
+    jumps = list(jumps)
     while jumps:
-        edges = [0, *jumps, len(theta)]
-        edges[0] = max(0, 2 * jumps[0] - (jumps[1] if len(jumps) > 1 else len(theta)))
-        middle, mean = np.array(
-            [(theta[a:b].mean(), slip[a:b].mean()) for a, b in pairwise(edges)]
-        ).T
-        share = (
-            np.diff(mean) / np.diff(middle) * middle[1:] / mean[1:]
-        )  # 1: as a slip that never rests
+        after_first = jumps[1] if len(jumps) > 1 else len(theta)
+        start = max(0, 2 * jumps[0] - after_first)
+        sides = [slice(*ends) for ends in pairwise([start, *jumps, len(theta)])]
+        middle = np.array([theta[side].mean() for side in sides])
+        mean = np.array([slip[side].mean() for side in sides])
+        slope = np.diff(mean) / np.diff(middle)
+        share = slope * middle[1:] / mean[1:]  # 1: as a slip that never rests
         if share.min() >= _REST_SHARE:
             break
-        jumps = [k for i, k in enumerate(jumps) if i != int(np.argmin(share))]
+        del jumps[int(np.argmin(share))]
     return jumps
 
 
-def _rest(theta, moments, slip, jumps_off: bool) -> Rest | None:
-    """What lies between two jumps; None where the contact does not rest there."""
+def _rest(
+    theta: np.ndarray, moments: np.ndarray, slip: np.ndarray, *, ends_in_jump: bool
+) -> Rest | None:
+    """Fit lines to the moments (n, 2) between two jumps; None where the contact does not rest."""
     inner = slice(_GUARD, len(theta) - _GUARD)
     if len(theta[inner]) < 2 * _FEWEST:
         return None
     middle = theta.mean()
     design = np.stack([np.ones_like(theta[inner]), theta[inner] - middle], axis=1)
-    columns = np.column_stack([moments[inner], slip[inner]])
+    columns = np.column_stack([moments[inner], slip[inner]])  # |m_y|, m_z, slip
     lines, _, _, _ = np.linalg.lstsq(design, columns, rcond=None)
-    if lines[1, 2] > _REST_SHARE * lines[0, 2] / middle:
+    slip_mm, slip_per_rad = lines[:, 2]
+    if slip_per_rad > _REST_SHARE * slip_mm / middle:
         return None
-    variances = np.sum((columns - design @ lines) ** 2, axis=0)[:2] / (len(design) - 2)
-    ends = float(theta[0]), float(theta[-1]) if jumps_off else np.nan
-    return Rest(*ends, float(middle), lines[:, :2], np.linalg.inv(design.T @ design), variances)
-
-
-def _angle(kind: str, at: float, moments, variances, slope: float) -> Angle:
-    """|β| − |φ| of the moments |m_y|, m_z with their variances."""
-    m_y, m_z = moments
-    gradient = np.array([m_z, -m_y]) / (m_y**2 + m_z**2)
-    return Angle(
-        kind, at, slope - float(np.arctan2(m_y, m_z)), float(np.sqrt(gradient**2 @ variances))
-    )
-
-
-def slips(seen: SeenWhisk) -> bool:
-    """Does the contact move along the bar? Else the force may lie anywhere within the friction cone."""
-    d = seen.deflection
-    return (
-        d is not None
-        and len(d.theta_rad) >= _LEAST_FRAMES
-        and bool(np.ptp(d.slip_mm) >= _LEAST_SLIP_MM)
+    residuals = columns - design @ lines
+    variances = np.sum(residuals**2, axis=0)[:2] / (len(design) - 2)
+    return Rest(
+        from_rad=float(theta[0]),
+        to_rad=float(theta[-1]) if ends_in_jump else np.nan,
+        middle_rad=float(middle),
+        lines=lines[:, :2],
+        shape=np.linalg.inv(design.T @ design),
+        variances=variances,
     )

@@ -1,5 +1,6 @@
-"""Each frame's still scene (board, bench, clamps) against the rig picture: a camera knocked by any amount, mirrored or
-exchanged, a lens cap, an exposure that changed."""
+"""Still scene (board, bench, clamps) of each frame, compared with the rig picture: a camera knocked by
+any amount, mirrored or exchanged, a lens cap, an exposure that changed.
+"""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -26,17 +27,20 @@ _LEAST_MOVED_PX = 3.0
 _CLEARER = 2.0
 _MOST_NAMED = 5  # frames in a line
 
-_TURNED = {
-    "mirrored left to right": lambda grey: grey[:, ::-1],
-    "mirrored upside down": lambda grey: grey[::-1],
-    "turned by 180°": lambda grey: grey[::-1, ::-1],
+_FLIPS = {
+    "mirrored left to right": np.fliplr,
+    "mirrored upside down": np.flipud,
+    "turned by 180°": np.flip,
 }
 
 
 @dataclass(frozen=True)
 class StillScene:
-    """The frames to see by, camera to index to picture, as evenly exposed as they can be made; left_out: a line on each
-    camera that shows another scene than the rig picture; notes: what was made good."""
+    """Frames whose still scene is that of the rig picture.
+
+    frames: by camera and index, as evenly exposed as they can be made. left_out: a line on each
+    camera that shows another scene. notes: lines on frames that were corrected.
+    """
 
     frames: dict[str, Pictures]
     left_out: dict[str, Reason]
@@ -46,30 +50,29 @@ class StillScene:
 def still_scene(
     session: Session, calibration: "SessionCalibration", frames: Mapping[str, Pictures]
 ) -> StillScene:
-    """A trial's frames, held to the pictures of the scene without rods."""
-    from bench.cameras.session_cameras import (
-        moved_cameras,
-    )  # with all of the calibration: `check` does without
+    """Compare a trial's frames with the pictures of the scene without rods."""
+    # It imports all of the calibration, which `check` does without.
+    from bench.cameras.session_cameras import moved_cameras
 
     kept, left_out, notes = {}, {}, []
     for name, pictures in frames.items():
-        doubt = (
-            other_scene(name, pictures, calibration.background)
-            if pictures
-            else "none of its frames can be read"
-        )
-        if doubt:
-            sentence = f"camera {name} was left out: {doubt}"
-            left_out[name] = Reason("camera_left_out", sentence)
+        fault = "none of its frames can be read"
+        if pictures:
+            fault = other_scene(name, pictures, calibration.background)
+        if fault:
+            left_out[name] = Reason("camera_left_out", f"camera {name} was left out: {fault}")
         else:
-            kept[name], said = evenly_exposed(name, pictures)
-            notes += said
-    return StillScene(kept, left_out | moved_cameras(session, calibration, kept), tuple(notes))
+            kept[name], lines = evenly_exposed(name, pictures)
+            notes += lines
+    moved = moved_cameras(session, calibration, kept)
+    return StillScene(kept, left_out | moved, tuple(notes))
 
 
 def other_scene(name: str, pictures: Pictures, background: Mapping[str, np.ndarray | None]) -> str:
-    """What the frame in the middle shows in place of the rig picture's scene; '' where it is that scene, or where
-    nothing tells."""
+    """Return what the frame in the middle shows instead of the rig picture's scene.
+
+    It is '' where it shows that scene, or where nothing decides it.
+    """
     picture = pictures[sorted(pictures)[len(pictures) // 2]]
     if is_blank(picture):
         return "its frames show nothing, they are all of one grey; is its cap on, or its exposure far off?"
@@ -77,26 +80,29 @@ def other_scene(name: str, pictures: Pictures, background: Mapping[str, np.ndarr
     if rig is None or rig.shape != picture.shape:
         return ""
     shown = texture(picture)
-    as_is = likeness(shown, texture(rig))
+    rig_texture = texture(rig)
+    as_is = likeness(shown, rig_texture)
     if as_is.is_same_scene and as_is.shift_length_px < _LEAST_MOVED_PX:
         return ""
-    said = [as_is_moved(as_is)] if as_is.is_same_scene else []
-    others = {
-        turn: likeness(texture(change(picture)), texture(rig)) for turn, change in _TURNED.items()
-    }
-    for turn, found in others.items():
-        if found.is_same_scene and found.peak > _CLEARER * as_is.peak:
-            said = [f"its frames are {turn}"]
+    fault = _moved_sentence(as_is) if as_is.is_same_scene else ""
+    for flip, flipped in _FLIPS.items():
+        if _is_clearer(likeness(texture(flipped(picture)), rig_texture), as_is):
+            fault = f"its frames are {flip}"
     for other, scene in background.items():
-        if other != name and scene is not None and scene.shape == picture.shape:
-            found = likeness(shown, texture(scene))
-            if found.is_same_scene and found.peak > _CLEARER * as_is.peak:
-                said = [f"its frames are those of camera {other}"]
-    return said[-1] if said else ""
+        if other == name or scene is None or scene.shape != picture.shape:
+            continue
+        if _is_clearer(likeness(shown, texture(scene)), as_is):
+            fault = f"its frames are those of camera {other}"
+    return fault
 
 
-def as_is_moved(found: Likeness) -> str:
-    """On a camera that stands elsewhere."""
+def _is_clearer(found: Likeness, as_is: Likeness) -> bool:
+    """Return whether a scene is found, and far more clearly than in the picture as it is."""
+    return found.is_same_scene and found.peak > _CLEARER * as_is.peak
+
+
+def _moved_sentence(found: Likeness) -> str:
+    """Return the sentence on a camera that stands elsewhere."""
     x, y = found.shift_px
     return (
         f"the scene lies {x:+.0f}, {y:+.0f} px from where the rig picture has it, so it was moved"
@@ -104,43 +110,54 @@ def as_is_moved(found: Likeness) -> str:
 
 
 def evenly_exposed(name: str, pictures: Pictures) -> tuple[Pictures, list[str]]:
-    """The pictures as bright as they are in the median, and lines on those that were not."""
+    """Return the pictures as bright as they are in the median, and lines on those that were not.
+
+    A picture whose brightness is too far from that is left out.
+    """
     indices = sorted(pictures)
     full_scale = float(np.iinfo(pictures[indices[0]].dtype).max)
     gains = exposures([pictures[k] for k in indices], full_scale)
-    off = {k: gain for k, gain in zip(indices, gains) if abs(gain - 1.0) > _STEADY}
-    if not off:
+    corrected, lost = {}, {}
+    for k, gain in zip(indices, gains):
+        if abs(gain - 1.0) > _STEADY:
+            is_usable = 1.0 / _MOST_CORRECTED < gain < _MOST_CORRECTED
+            (corrected if is_usable else lost)[k] = gain
+    if not corrected and not lost:
         return pictures, []
-    lost = [k for k, gain in off.items() if not 1.0 / _MOST_CORRECTED < gain < _MOST_CORRECTED]
-    mended = {k: gain for k, gain in off.items() if k not in lost}
-    even = {k: _divided(grey, mended.get(k, 1.0)) for k, grey in pictures.items() if k not in lost}
-    return even, list(_exposure_lines(name, off, lost, mended, len(indices)))
+    even = {}
+    for k, grey in pictures.items():
+        if k not in lost:
+            even[k] = _divided(grey, corrected[k]) if k in corrected else grey
+    return even, list(_exposure_lines(name, corrected, lost, len(indices)))
 
 
 def _exposure_lines(
-    name: str, off: dict, lost: list[int], mended: dict, count: int
+    name: str, corrected: Mapping[int, float], lost: Mapping[int, float], count: int
 ) -> Iterator[str]:
-    if mended:
-        yield f"camera {name}: {_brighter(mended, count, 3)}, made good ({_few(mended)})"
+    """Yield a line on the frames that were corrected, and one on those that were left out."""
+    if corrected:
+        found = _brightness(corrected, count, digits=3)
+        yield f"camera {name}: {found}, made good ({_first_frames(corrected)})"
     if lost:
-        found = _brighter({k: off[k] for k in lost}, count, 2)
-        yield f"camera {name}: {found}, left out ({_few(lost)}): fix exposure and gain"
+        found = _brightness(lost, count, digits=2)
+        yield f"camera {name}: {found}, left out ({_first_frames(lost)}): fix exposure and gain"
 
 
-def _brighter(gains: Mapping[int, float], count: int, digits: int) -> str:
-    """How many frames are how many times as bright: one number where all are alike."""
-    ends = dict.fromkeys(f"{end(gains.values()):.{digits}f}" for end in (min, max))
+def _brightness(gains: Mapping[int, float], count: int, *, digits: int) -> str:
+    """Return how many frames are how many times as bright: one number where all are alike."""
+    ends = [f"{end:.{digits}f}" for end in (min(gains.values()), max(gains.values()))]
     are = "is" if len(gains) == 1 else "are"
-    return f"{len(gains)} of {count} frames {are} {' to '.join(ends)} times as bright as most"
+    times = " to ".join(dict.fromkeys(ends))
+    return f"{len(gains)} of {count} frames {are} {times} times as bright as most"
 
 
-def _few(indices: Collection[int]) -> str:
+def _first_frames(indices: Collection[int]) -> str:
+    """Return the first frames by number, with an ellipsis where there are more."""
     shown = ", ".join(map(str, list(indices)[:_MOST_NAMED]))
     frames = "frame" if len(indices) == 1 else "frames"
     return f"{frames} {shown}" + (", …" if len(indices) > _MOST_NAMED else "")
 
 
 def _divided(grey: np.ndarray, gain: float) -> np.ndarray:
-    if gain == 1.0:
-        return grey
+    """Return a picture with its brightness divided by a gain, clipped to its type's range."""
     return np.clip(np.rint(grey / gain), 0, np.iinfo(grey.dtype).max).astype(grey.dtype)

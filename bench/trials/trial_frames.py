@@ -1,4 +1,6 @@
-"""A trial's pictures as vision takes them: frames held to the still scene, on the clock of the signals, by whisks."""
+"""A trial's pictures as vision takes them: frames of an unmoved scene, on the clock of the signals,
+by whisks.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -15,19 +17,22 @@ from bench.trials.still_scene import StillScene, still_scene
 from vision.geometry.forms import touched_object
 from vision.geometry.rods import Bar, Rods
 from vision.geometry.touched import StatedSizes, Touched
-from vision.pictures.others import RodLines
+from vision.pictures.others import Others
 from vision.truth.trial_pictures import TrialPictures
 
 _FEWEST_BACK = 6  # frames of a back stroke: two free ones, two that touch, and two about the touch
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
-    """What a trial shows. frames: as read, by camera; places: frames of each forward stroke; back: of ways back, by
-    the number of the whisk, last frame first."""
+class TrialFrames:
+    """The frames of a trial.
+
+    by_camera: pictures by frame, as read. places: frames of each forward stroke. back: frames of
+    ways back by the number of the whisk, last frame first. pictures: what vision evaluates.
+    """
 
     times: FrameTimes
-    frames: dict[str, dict[int, np.ndarray]]
+    by_camera: dict[str, dict[int, np.ndarray]]
     scene: StillScene
     places: list[slice]
     back: dict[int, slice]
@@ -35,54 +40,54 @@ class Shown:
     rods: Rods
 
     @classmethod
-    def of(
+    def read(
         cls,
         session: Session,
         trial: Trial,
         signals: Signals,
         calibration: SessionCalibration,
         settings: Settings,
-        wires: Mapping[str, Mapping[str, RodLines]],
-    ) -> "Shown":
-        """wires: by camera, where those of an array's whiskers are, its own among them. Raises BadInput where pictures
-        and times do not go together."""
+        wires: Mapping[str, Others],
+    ) -> "TrialFrames":
+        """Read the frames of a trial.
+
+        wires: by camera and name, the wires of an array's whiskers, its own among them. Raises
+        BadInput where pictures and times do not match.
+        """
         times = frame_times(trial)
-        frames = read_trial(trial, times)
-        scene = still_scene(session, calibration, frames)
-        wanted = ways_back(signals) if trial.both_ways else ways_back(signals)[:1]
-        back = {
-            k: where
-            for k, one in enumerate(wanted)
-            if (where := _backwards(signals, times, one)) is not None
-        }
+        by_camera = read_trial(trial, times)
+        scene = still_scene(session, calibration, by_camera)
+        chosen = {}
+        for name, frames in scene.frames.items():
+            if name not in scene.left_out and settings.seeing.asks(name):
+                chosen[name] = frames
+        velocity = trial.object_velocity_mm_s
         own = session.base.name if session.base else ""
         pictures = TrialPictures(
-            {
-                name: f
-                for name, f in scene.frames.items()
-                if name not in scene.left_out and settings.seeing.asks(name)
-            },
+            chosen,
             times.time_s,
-            np.interp(
-                times.time_s, signals.time_s, signals.motor_rad
-            ),  # frames outside belong to no whisk
+            # Frames before the first or after the last sample belong to no whisk.
+            np.interp(times.time_s, signals.time_s, signals.motor_rad),
             calibration.background,
-            trial.object_velocity_mm_s and np.array(trial.object_velocity_mm_s),
-            trial.object_velocity_sigma_mm_s,
-            trial.object_gives_way,
-            {
-                camera: {name: one for name, one in some.items() if name != own}
-                for camera, some in wires.items()
-            },
-            {camera: some[own] for camera, some in wires.items() if own in some},
+            object_velocity_mm_s=np.array(velocity) if velocity else None,
+            object_velocity_sigma_mm_s=trial.object_velocity_sigma_mm_s,
+            object_gives_way=trial.object_gives_way,
+            others={camera: _without(some, own) for camera, some in wires.items()},
+            itself={camera: some[own] for camera, some in wires.items() if own in some},
         )
         places = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
-        rods = Rods(session.whisker.wire, touched(trial))
-        return cls(times, frames, scene, places, back, pictures, rods)
+        back = _back_frames(trial, signals, times)
+        rods = Rods(session.whisker.wire, stated_object(trial))
+        return cls(times, by_camera, scene, places, back, pictures, rods)
 
 
-def touched(trial: Trial) -> Touched:
-    """Return what is touched, as vision takes it."""
+def _without(wires: Others, name: str) -> Others:
+    """Return all wires but the one of that name."""
+    return {other: lines for other, lines in wires.items() if other != name}
+
+
+def stated_object(trial: Trial) -> Touched:
+    """Return the object of a trial as vision takes it."""
     thickness = StatedSizes(trial.bar_diameter_mm or 0.0, trial.bar_diameter_sigma_mm)
     given = trial.object
     if given is None:
@@ -95,12 +100,19 @@ def touched(trial: Trial) -> Touched:
     return touched_object(given.shape, stated)
 
 
-def _backwards(signals: Signals, times: FrameTimes, where: slice | None) -> slice | None:
-    """Frames of a back stroke, last to first, so that the whisker comes to the bar; None where few were taken.
+def _back_frames(trial: Trial, signals: Signals, times: FrameTimes) -> dict[int, slice]:
+    """Return the frames of ways back by whisk, last to first, so that the whisker comes to the bar.
 
-    A clock that is late has the whisker touch late on the way there and early on the way back.
+    The first way back alone is taken unless the trial asks for all. A way back of few frames is
+    left out. A clock that is late makes the touch late on the way there and early on the way back.
     """
-    frames = None if where is None else times.frames_in(signals, where)
-    if frames is None or frames.stop - frames.start < _FEWEST_BACK:
-        return None
-    return slice(frames.stop - 1, frames.start - 1 if frames.start else None, -1)
+    strokes = ways_back(signals)
+    back = {}
+    for k, stroke in enumerate(strokes if trial.both_ways else strokes[:1]):
+        if stroke is None:
+            continue
+        frames = times.frames_in(signals, stroke)
+        if frames.stop - frames.start >= _FEWEST_BACK:
+            stop = frames.start - 1 if frames.start else None
+            back[k] = slice(frames.stop - 1, stop, -1)
+    return back

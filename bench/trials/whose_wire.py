@@ -1,8 +1,9 @@
-"""Whether the wire that was seen for a whisker of an array is its own: by the bases that session.toml states, and by
-where the others' wires are."""
+"""Check that the wire seen for a whisker of an array is its own: by the bases that session.toml
+states, and by the places of the others' wires.
+"""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,89 +11,119 @@ from bench.base.doubts import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import SeenTrial, SeenWhisk
 from vision.fit.blocks import REST_PRIOR_MM
+from vision.geometry.reasons import NO_REASON
 from vision.pictures.others import Others, RodLines
 
 _MOSTLY = 0.5  # of a wire's length: of two wires in one place most is, of two that cross little
-# mm: as far as a wire is looked for, two sigma of what is believed of a clamp (`vision.fit.blocks`).
+# mm: as far as a wire is traced for, two sigma of what is believed of a clamp (`vision.fit.blocks`).
 _MOST_BESIDE_MM = 2.0 * float(REST_PRIOR_MM[0])
 
 
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """Picture of a wire in one frame: middle (m, 2) and half-width, px."""
+
+    middle_px: np.ndarray
+    half_px: float
+
+    def distance_px(self, points: np.ndarray) -> np.ndarray:
+        """Return the distance (n,) of points (n, 2) from the middle, a polygonal line."""
+        start = self.middle_px[:-1]
+        step = np.diff(self.middle_px, axis=0)
+        from_start = points[:, None] - start  # (n, m - 1, 2)
+        length2 = np.maximum(np.sum(step**2, axis=1), 1e-12)
+        share = np.clip(np.einsum("nmi,mi->nm", from_start, step) / length2, 0.0, 1.0)
+        return np.linalg.norm(from_start - share[..., None] * step, axis=2).min(axis=1)
+
+
 def with_whose(
-    seen: SeenTrial, straight: Mapping[str, Others], looked: Mapping[str, Others], own: str
+    seen: SeenTrial, straight: Mapping[str, Others], traced: Mapping[str, Others], own: str
 ) -> SeenTrial:
-    """The trial with a status on each whisk whose wire may be another whisker's.
+    """Return the trial with a status on each whisk whose wire may be another whisker's.
 
-    straight: by camera and whisker, its own too, the wires as the bases have them; looked: the others' as seen first;
-    own: the whisker's name.
+    straight: by camera and whisker, its own too, straight wires from their bases. traced: the
+    others' wires as seen before. own: the whisker's name.
     """
-    told = straight, looked, own, seen.wire_radius_mm
-    return replace(seen, whisks=tuple(_checked(whisk, *told) for whisk in seen.whisks))
+    checked = []
+    for whisk in seen.whisks:
+        checked.append(_checked(whisk, straight, traced, own, seen.wire_radius_mm))
+    return replace(seen, whisks=tuple(checked))
 
 
-def _checked(whisk: SeenWhisk, straight, looked, own: str, radius_mm: float) -> SeenWhisk:
+def _checked(
+    whisk: SeenWhisk,
+    straight: Mapping[str, Others],
+    traced: Mapping[str, Others],
+    own: str,
+    radius_mm: float,
+) -> SeenWhisk:
+    """Return the whisk with a status where its wire is not from its base or lies on another's."""
     if not whisk.overlay:
         return whisk
     drawing = next(iter(whisk.overlay.values()))
-    wires = {
-        camera: lines["wire"] for camera, lines in drawing.cameras.items() if camera in straight
-    }
-    others = sorted({name for one in straight.values() for name in one} - {own})
-    starts = [
-        _start(wire, straight[camera], drawing.frame, own, radius_mm)
-        for camera, wire in wires.items()
-    ]
-    beside_mm, nearest = max(starts, default=(0.0, own))
-    taken = [name for name in others if _lies_on(wires, looked, drawing.frame, name)]
-    said = []
-    if beside_mm > _MOST_BESIDE_MM:
-        said.append(reason("wire_off_its_base", beside_mm=beside_mm))
-        taken += [nearest] * (nearest != own and nearest not in taken)
-    if taken:
-        said.append(reason("wire_of_another", names=" or ".join(taken)))
-    status = in_one_status(whisk.status, *said)
-    return replace(whisk, status=status, contradicted=whisk.contradicted or bool(said))
+    wires = {}  # (m, 2) px, by camera
+    for camera, lines in drawing.cameras.items():
+        if camera in straight:
+            wires[camera] = lines["wire"]
+    others = sorted(set().union(*straight.values()) - {own})
+    taken = [name for name in others if _lies_on(wires, traced, drawing.frame, name)]
+    offset_mm, nearest = 0.0, own
+    for camera, wire in wires.items():
+        found = _base_offset(wire, straight[camera], drawing.frame, own, radius_mm)
+        offset_mm, nearest = max((offset_mm, nearest), found)
+    is_off_base = offset_mm > _MOST_BESIDE_MM
+    if is_off_base and nearest not in (own, *taken):
+        taken.append(nearest)
+    off_base = reason("wire_off_its_base", beside_mm=offset_mm) if is_off_base else NO_REASON
+    of_another = reason("wire_of_another", names=" or ".join(taken)) if taken else NO_REASON
+    status = in_one_status(whisk.status, off_base, of_another)
+    is_wrong = is_off_base or bool(taken)
+    return replace(whisk, status=status, contradicted=whisk.contradicted or is_wrong)
 
 
-def _start(
+def _base_offset(
     wire: np.ndarray, straight: Others, frame: int, own: str, radius_mm: float
 ) -> tuple[float, str]:
-    """How far, mm, the first part of a wire's line (m, 2) in a camera is beside where its base has it, and the whisker
-    whose base has its wire nearest to it."""
-    lines = {name: line for name in straight if (line := _line(straight[name], frame)) is not None}
-    if own not in lines:
-        return 0.0, own
+    """Return the lateral offset, mm, of a wire's first part in a camera from where its base has it,
+    and the whisker whose base has its wire nearest.
+
+    wire (m, 2): px. The offset is 0 where the camera does not show the whisker's own base.
+    """
     first = wire[1 : 1 + len(wire) // 10]
-    off_px = {
-        name: float(np.sqrt(np.mean(_away_px(first, line) ** 2)))
-        for name, (line, _) in lines.items()
-    }
-    px_per_mm = lines[own][1] / radius_mm
-    return off_px[own] / px_per_mm, min(off_px, key=lambda name: (off_px[name], name != own))
+    offsets_px = {}
+    for name, rods in straight.items():
+        line = _line(rods, frame)
+        if line is not None:
+            offsets_px[name] = float(np.sqrt(np.mean(line.distance_px(first) ** 2)))
+    if own not in offsets_px:
+        return 0.0, own
+    px_per_mm = _line(straight[own], frame).half_px / radius_mm
+    nearest = min(offsets_px, key=lambda name: (offsets_px[name], name != own))
+    return offsets_px[own] / px_per_mm, nearest
 
 
-def _lies_on(wires: Mapping[str, np.ndarray], looked, frame: int, name: str) -> bool:
-    """Whether most of the wire lies on another's picture in every camera: two wires hide each other in one camera, and
-    in all only where they are one."""
-    on = []
+def _lies_on(
+    wires: Mapping[str, np.ndarray], traced: Mapping[str, Others], frame: int, name: str
+) -> bool:
+    """Return whether most of the wire lies on another's picture in every camera.
+
+    Two wires hide each other in one camera, and in all only where they are one.
+    """
     for camera, wire in wires.items():
-        line = _line(looked.get(camera, {}).get(name), frame)
-        on.append(
-            line is not None and float(np.mean(_away_px(wire, line[0]) < 2.0 * line[1])) > _MOSTLY
-        )
-    return bool(on) and all(on)
+        line = _line(traced.get(camera, {}).get(name), frame)
+        if line is None:
+            return False
+        is_on = line.distance_px(wire) < 2.0 * line.half_px
+        if not float(np.mean(is_on)) > _MOSTLY:
+            return False
+    return bool(wires)
 
 
-def _line(lines: RodLines | None, frame: int) -> tuple[np.ndarray, float] | None:
-    """Middle (m, 2) and half-width, px, in a frame."""
-    there = np.flatnonzero(lines.within(frame)) if lines is not None else ()
-    return (lines.middle_px[there[0]], float(lines.half_px[there[0]])) if len(there) else None
-
-
-def _away_px(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Distance (n,) of points (n, 2) from a line (m, 2) of straight parts."""
-    start, step = line[:-1], np.diff(line, axis=0)
-    share = np.einsum("nmi,mi->nm", points[:, None] - start, step) / np.maximum(
-        np.sum(step**2, axis=1), 1e-12
-    )
-    nearest = start + np.clip(share, 0.0, 1.0)[..., None] * step
-    return np.min(np.linalg.norm(points[:, None] - nearest, axis=2), axis=1)
+def _line(rods: RodLines | None, frame: int) -> _Line | None:
+    """Return the picture of a wire in a frame; None where there is none."""
+    if rods is None:
+        return None
+    there = np.flatnonzero(rods.within(frame))
+    if len(there) == 0:
+        return None
+    return _Line(rods.middle_px[there[0]], float(rods.half_px[there[0]]))

@@ -99,7 +99,7 @@ def _smooth(theta, touching, values) -> Smooth:
     )
 
 
-def see_exactly(session, trial, signals, calibration, settings) -> SeenTrial:
+def see_exactly(session, trial, signals, calibration, settings, wires=None) -> SeenTrial:
     """In place of `see_trial`: what perfect pictures would show, from the truth files."""
     strokes = forward_strokes(signals)
     time_s = read_csv(trial.folder / "truth.csv")["time_s"]
@@ -153,7 +153,7 @@ def _see_exactly_in(monkeypatch) -> list[str]:
         looks.append(trial.name)
         return see_exactly(session, trial, *rest)
 
-    monkeypatch.setattr("bench.trials.unit.see_trial", see)
+    monkeypatch.setattr("bench.trials.trial_evaluation.see_trial", see)
     nothing = SessionCalibration(None, {}, hash_of("exact"))
     monkeypatch.setattr("bench.trials.of_session.calibrate_session", lambda session, out: nothing)
     return looks

@@ -67,14 +67,15 @@ def result(beta_deg, d_x=60.0, *, alpha=ALPHA, name=None, nominal_mm=60.0) -> Tr
         "d_x_est_mm": with_friction(THETA, m_y, m_z, np.radians(10.0), C),
         "beta_est_rad": 0.0,
     }
-    seen = {
+    truth = {
         "whisk": 0,
         "d_x_mm": d_x,
         "d_x_sigma_mm": 0.01,
         "beta_rad": beta,
         "beta_sigma_rad": np.radians(0.1),
     }
-    seen |= {"deflection": deflection(d_x, beta), "frames": FREE_FRAME, "status": ""}
+    truth["frames"] = FREE_FRAME
+    seen = {"truth": truth, "deflection": deflection(d_x, beta), "status": ""}
     trial = {
         "name": name or f"b{beta_deg:g}",
         "surface": "steel",

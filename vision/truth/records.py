@@ -14,6 +14,8 @@ from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.at_angle import Smooth, TruthAtAngle, at_angle
 from vision.truth.value import UNKNOWN, UNKNOWN_POINT, Value, WhileTouching
 
+_OPTIONAL = {"optional": True}  # a file has no key for it where it is None or empty
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrameTruth(WhileTouching):
@@ -97,7 +99,7 @@ class WhiskTruth:
     """
 
     whisk: int
-    frames: FrameTruth | None
+    frames: FrameTruth | None = None
     touch_rad: Value = UNKNOWN
     point_mm: Value = UNKNOWN_POINT
     d_x_mm: Value = UNKNOWN
@@ -106,22 +108,24 @@ class WhiskTruth:
     cameras: int = 0
     frames_used: int = 0
     status: Reason = NO_REASON
-    overlay: dict[int, dict[str, dict[str, np.ndarray]]] = field(default_factory=dict)
-    smooth: Smooth | None = None
+    overlay: dict[int, dict[str, dict[str, np.ndarray]]] = field(
+        default_factory=dict, metadata=_OPTIONAL
+    )
+    smooth: Smooth | None = field(default=None, metadata=_OPTIONAL)
     budget: dict[str, float] = field(default_factory=dict)
     base: BaseLines | None = None
     beam: BeamCheck | None = None
     turns: Turns | None = None
     refinements: dict[str, LeftOut] = field(default_factory=dict)
     lines: dict[str, LineNoise] = field(default_factory=dict)
-    ends: dict[str, Value] = field(default_factory=dict)
-    looks: dict[str, Value] = field(default_factory=dict)
+    ends: dict[str, Value] = field(default_factory=dict, metadata=_OPTIONAL)
+    looks: dict[str, Value] = field(default_factory=dict, metadata=_OPTIONAL)
     point_covariance_mm2: np.ndarray | None = None
     shape: WireShape | None = None
     velocity_mm_s: Value | None = None
-    gave: GaveWay | None = None
-    rounded: SeenObject | None = None
-    problem: Problem | None = None
+    gave: GaveWay | None = field(default=None, metadata=_OPTIONAL)
+    rounded: SeenObject | None = field(default=None, metadata=_OPTIONAL)
+    problem: Problem | None = field(default=None, metadata=_OPTIONAL)
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Return the truth at a pushing angle, by a fit over the frames around it."""

@@ -76,8 +76,8 @@ def _subtitle(row: Row) -> str:
         parts.append(f"{trial.speed_deg_s:g}°/s")
     parts += [
         trial.purpose,
-        counted(row.seen.cameras, "camera"),
-        counted(row.seen.frames_used, "frame"),
+        counted(row.seen.truth.cameras, "camera"),
+        counted(row.seen.truth.frames_used, "frame"),
     ]
     return ", ".join(parts)
 
@@ -121,8 +121,8 @@ def numbers(row: Row) -> list[tuple[str, str]]:
         ("moment m_z felt", told(felt.m_z_Nmm), "N·mm"),
         ("force angle φ felt", told(felt.phi_felt_rad, degrees=True), "°"),
     ]
-    if seen.beam is not None:
-        found += _beam_numbers(seen.beam)
+    if seen.truth.beam is not None:
+        found += _beam_numbers(seen.truth.beam)
     return [(name, f"{text} {unit}") for name, text, unit in found if text != MISSING]
 
 

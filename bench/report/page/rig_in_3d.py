@@ -80,9 +80,9 @@ def _ellipsoid(seen: SeenWhisk) -> np.ndarray:
 
     Where no covariance is known they are along x, y, z.
     """
-    if seen.point_covariance_mm2 is None:
+    if seen.truth.point_covariance_mm2 is None:
         return np.diag(seen.point_mm.sigma)
-    variances, directions = np.linalg.eigh(seen.point_covariance_mm2)
+    variances, directions = np.linalg.eigh(seen.truth.point_covariance_mm2)
     return np.sqrt(np.maximum(variances, 0.0))[:, None] * directions.T
 
 

@@ -41,11 +41,11 @@ class SharedDistance:
 
 def shared_distance(results: Sequence[TrialResult]) -> SharedDistance | None:
     """None where fewer than two whisks have a truth with its budget."""
-    seen = [s for _, s, _ in whisks(results) if s.has_truth and s.budget]
+    seen = [s for _, s, _ in whisks(results) if s.has_truth and s.truth.budget]
     if len(seen) < 2:
         return None
     variance = np.array([s.d_x_mm.sigma**2 for s in seen])
-    share = np.array([sum(np.nan_to_num(s.budget[cause]) for cause in SHARED) for s in seen])
+    share = np.array([sum(np.nan_to_num(s.truth.budget[cause]) for cause in SHARED) for s in seen])
     shared, own = (
         float(np.sqrt(np.mean(variance * part))) for part in (share, np.maximum(1.0 - share, 0.0))
     )

@@ -37,6 +37,11 @@ def test_an_offset_common_to_all_deflections_drops_out(exact_record, steel_signa
     assert seen_friction(replace(record, deflection=raised))[0] == pytest.approx(before, abs=1e-9)
 
 
+def solid(shape: str) -> SeenObject:
+    """Return an object of 20 mm radius at the origin."""
+    return SeenObject(shape, np.zeros(3), np.ones(3), 20.0, 0.0, 0.3)
+
+
 def test_along_a_sphere_alpha_is_that_at_theta_and_along_a_cone_the_deflections_slope(
     exact_record, steel_signals
 ):
@@ -44,9 +49,7 @@ def test_along_a_sphere_alpha_is_that_at_theta_and_along_a_cone_the_deflections_
     record = exact_record(load_session(steel_signals).trial("b60_4"))
     at = TruthAtAngle(theta_rad=0.05, alpha_rad=Value(0.2, 0.01))
     of = {
-        shape: replace(
-            record, at=at, rounded=SeenObject(shape, np.zeros(3), np.ones(3), 20.0, 0.0, 0.3)
-        )
+        shape: replace(record, at=at, truth=replace(record.truth, rounded=solid(shape)))
         for shape in ("sphere", "ring", "cone")
     }
     assert seen_friction(of["sphere"]) == seen_friction(of["ring"]) == (0.2, 0.01)

@@ -20,7 +20,7 @@ from bench.records.trial_result import (
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from tests.scenes.rig_sessions import protocol_file, rows
-from vision.truth.records import GaveWay
+from vision.truth.records import GaveWay, WhiskTruth
 from vision.truth.value import UNKNOWN, Value
 
 THETA_RAD = np.radians([1.0, 2.0, 4.0])
@@ -36,7 +36,7 @@ def result(beta_deg=0.0, gave=GAVE) -> TrialResult:
         0.5 * np.array([-np.cos(beta), np.sin(beta)]),
     )
     m_y, m_z = (Value(float(m), 0.01) for m in across + along)
-    seen = SeenWhisk(0, d_x_mm=Value(60.0, 0.0), beta_rad=Value(beta, 0.0), gave=gave)
+    seen = SeenWhisk(WhiskTruth(0, d_x_mm=Value(60.0, 0.0), beta_rad=Value(beta, 0.0), gave=gave))
     felt = FeltWhisk(0, m_y_Nmm=m_y, m_z_Nmm=m_z)
     facts = TrialFacts("one", "measure", "foam", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 3000.0)
     return TrialResult(*facts, 3.0, SeenTrial((seen,)), FeltTrial((felt,)), "", "")
@@ -74,8 +74,8 @@ def test_a_row_a_frame_and_none_where_it_stands(tmp_path):
 def test_a_record_has_no_key_of_an_object_that_stands():
     """Results of hard bars are the bytes that they were."""
     seen = result().seen.whisks[0]
-    assert "gave" not in to_plain(replace(seen, gave=None))
-    assert from_plain(SeenWhisk, to_plain(seen)).gave.normal_mm.value == pytest.approx(
+    assert "gave" not in to_plain(replace(seen.truth, gave=None))
+    assert from_plain(SeenWhisk, to_plain(seen)).truth.gave.normal_mm.value == pytest.approx(
         GAVE.normal_mm.value
     )
 

@@ -37,7 +37,10 @@ def with_felt(whisk, **fields):
 
 def with_seen(whisk, **fields):
     (seen,) = whisk.seen.whisks
-    return replace(whisk, seen=replace(whisk.seen, whisks=(replace(seen, **fields),)))
+    return replace(
+        whisk,
+        seen=replace(whisk.seen, whisks=(replace(seen, truth=replace(seen.truth, **fields)),)),
+    )
 
 
 def entry(effect: float, sigma: float, other: float = 0.0) -> Entry:

@@ -54,7 +54,8 @@ def result(
     whisker = {"shape": "cylinder", "length_mm": 100.0, "diameter_mm": 1.0, "EI_Nmm2": C / 3}
     whole = {"trial": trial, "whisker": whisker, "theta_deg": 3.0}
     return from_plain(
-        TrialResult, whole | {"seen": {"whisks": [truth]}, "felt": {"whisks": [felt]}}
+        TrialResult,
+        whole | {"seen": {"whisks": [{"truth": truth, "status": ""}]}, "felt": {"whisks": [felt]}},
     )
 
 
@@ -140,7 +141,7 @@ def test_a_whisker_that_tapers_is_fitted_as_one(beam):
     for beta, d_x in ((0, 60), (30, 50), (60, 70), (-45, 55)):
         whisk = result(beta, 12.0, float(beam.as_cylinder_mm(d_x)))
         (seen,) = whisk.seen.whisks
-        seen = replace(seen, d_x_mm=Value(float(d_x), 0.01))
+        seen = replace(seen, truth=replace(seen.truth, d_x_mm=Value(float(d_x), 0.01)))
         whisks.append(replace(whisk, seen=replace(whisk.seen, whisks=(seen,))))
     (found,) = surfaces(whisks, beam)
     assert np.degrees(found.alpha_rad) == pytest.approx(12.0, abs=1e-6)

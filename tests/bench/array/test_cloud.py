@@ -19,6 +19,7 @@ from bench.records.trial_result import (
 from bench.report.assembly import Z_C_MM
 from bench.session.session import Base
 from vision.geometry.rods import Wire
+from vision.truth.records import WhiskTruth
 from vision.truth.value import Value
 
 WIRE = Wire("cylinder", 100.0, 1.0)
@@ -38,7 +39,7 @@ def felt(d_x_mm=60.0, touch_rad=0.3, beta=0.5, status="") -> TrialResult:
         facts,
         WhiskerFacts("cylinder", 100.0, 1.0, 2945.0, None),
         3.0,
-        SeenTrial((SeenWhisk(0),)),
+        SeenTrial((SeenWhisk(WhiskTruth(0)),)),
         FeltTrial((whisk,)),
     )
 

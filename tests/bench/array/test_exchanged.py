@@ -12,6 +12,7 @@ from bench.records.trial_result import (
     TrialResult,
     WhiskerFacts,
 )
+from vision.truth.records import WhiskTruth
 from vision.truth.value import NAN, Value
 
 SIGMA = 1e-4
@@ -19,7 +20,7 @@ SIGMA = 1e-4
 
 def result(seen_rad: float, felt_rad: float, shared_rad: float = 0.0) -> TrialResult:
     touch = Value(seen_rad, float(np.hypot(SIGMA, shared_rad)))
-    seen = SeenWhisk(0, touch_rad=touch, touch_shared_rad=shared_rad)
+    seen = SeenWhisk(WhiskTruth(0, touch_rad=touch), touch_shared_rad=shared_rad)
     felt = FeltWhisk(touch_felt_rad=Value(felt_rad, SIGMA))
     facts = TrialFacts("t", "measure", "steel", 10.0)
     return TrialResult(

@@ -14,9 +14,10 @@ from bench.base.workers import DIED, Workers
 from bench.commands.evaluate import evaluate
 from bench.records.trial_result import SeenWhisk
 from bench.report.whisk_tables import ESTIMATES, TRACK, WHISKS
-from bench.trials.unit import evaluate_unit
+from bench.trials.trial_evaluation import evaluate_unit
 from tests.faults.interrupted import contents, full_disk
 from tests.scenes.results import table
+from vision.truth.records import WhiskTruth
 
 TRUE_ALPHA = Settings(alpha_est_deg=10.5)
 
@@ -172,10 +173,10 @@ def test_an_interrupted_run_goes_on_where_it_stopped(
     small_copy, exact_vision, tmp_path, monkeypatch
 ):
     """Ctrl-C in the third trial: what is finished stands whole, nothing else is there, and is not done again."""
-    from bench.trials import unit
+    from bench.trials import trial_evaluation
 
     out, done = tmp_path / "out", []
-    finished = unit.write_result
+    finished = trial_evaluation.write_result
 
     def stop_at_third(path, result):
         done.append(path.name)
@@ -183,11 +184,11 @@ def test_an_interrupted_run_goes_on_where_it_stopped(
             raise KeyboardInterrupt
         finished(path, result)
 
-    monkeypatch.setattr(unit, "write_result", stop_at_third)
+    monkeypatch.setattr(trial_evaluation, "write_result", stop_at_third)
     with pytest.raises(KeyboardInterrupt):
         run(small_copy, out)
     assert len(list(out.glob("trials/*"))) == 1 and not (out / "whisks.csv").exists()
-    monkeypatch.setattr(unit, "write_result", finished)
+    monkeypatch.setattr(trial_evaluation, "write_result", finished)
     exact_vision.clear()
     run(small_copy, out)
     assert len(exact_vision) == 1 and len(table(out / "whisks.csv")) == 4
@@ -258,14 +259,17 @@ def test_gauge_trials_without_truth_say_what_it_lacks(
     small_copy, exact_vision, tmp_path, monkeypatch
 ):
     """The verdict hangs on them: what their pictures lack stands beside what to record, and another way out."""
-    seen = sys.modules["bench.trials.unit"].see_trial
+    seen = sys.modules["bench.trials.trial_evaluation"].see_trial
 
     def see(session, trial, *rest):
         found = seen(session, trial, *rest)
-        dark = tuple(SeenWhisk(whisk.whisk, "the bar stands in the dark") for whisk in found.whisks)
+        dark = tuple(
+            SeenWhisk(WhiskTruth(whisk.whisk), "the bar stands in the dark")
+            for whisk in found.whisks
+        )
         return replace(found, whisks=dark) if trial.purpose == "gauge" else found
 
-    monkeypatch.setattr("bench.trials.unit.see_trial", see)
+    monkeypatch.setattr("bench.trials.trial_evaluation.see_trial", see)
     for name in ("gauge_roll0", "gauge_roll90"):
         path = small_copy / "trials" / name / "trial.toml"
         path.write_text(

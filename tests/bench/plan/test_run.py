@@ -23,6 +23,7 @@ from bench.trials.seen import whisk_record
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
 from tests.scenes.rig_sessions import protocol_file, rows
 from vision.fit.line_noise import LineNoise
+from vision.truth.records import WhiskTruth
 
 SMALL = """
 name = "small"
@@ -100,7 +101,7 @@ def test_a_recorded_whisk_beside_what_was_stated(tmp_path, steel_signals):
     truth = expected(staged, cameras, dict.fromkeys(cameras.names, LINES)).truth
     session = load_session(steel_signals)
     seen = whisk_record(truth, Settings())
-    assert seen.lines["high"].wire_px == pytest.approx(LINES.wire_px)
+    assert seen.truth.lines["high"].wire_px == pytest.approx(LINES.wire_px)
     trial = SeenTrial((seen,), clock=Clock("frames.csv", 0.0, True))
     row = plan_seen(SeenTask(session, session.trials[0], trial, seen, cameras, (), np.radians(3.0)))
     ratios = np.array([row.outlook.sigma[name] / row.stated[name] for name in QUANTITIES])
@@ -116,7 +117,7 @@ def test_a_recorded_whisk_beside_what_was_stated(tmp_path, steel_signals):
 
 def test_a_whisk_without_truth_keeps_its_reason(steel_signals, tmp_path):
     session, protocol = load_session(steel_signals), protocol_of(tmp_path)
-    seen = SeenWhisk(0, "the whisker never touches")
+    seen = SeenWhisk(WhiskTruth(0), "the whisker never touches")
     task = SeenTask(
         session, session.trials[0], SeenTrial((seen,)), seen, cameras_of(protocol), (), 0.05
     )

@@ -8,6 +8,7 @@ import pytest
 from bench.records.phases import STATIC, Angle, Phases
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenTrial, SeenWhisk, TrialFacts
+from vision.truth.records import WhiskTruth
 from vision.truth.value import Value
 
 
@@ -17,7 +18,7 @@ def there_and_back(record):
 
 def test_a_value_is_two_keys_and_its_sigma_stands_before_the_unit():
     plain = to_plain(
-        SeenWhisk(0, d_x_mm=Value(60.0, 0.01), point_mm=Value(np.arange(3.0), np.ones(3)))
+        WhiskTruth(0, d_x_mm=Value(60.0, 0.01), point_mm=Value(np.arange(3.0), np.ones(3)))
     )
     assert (plain["d_x_mm"], plain["d_x_sigma_mm"]) == (60.0, 0.01)
     assert (plain["point_mm"], plain["point_sigma_mm"]) == ([0.0, 1.0, 2.0], [1.0, 1.0, 1.0])
@@ -55,7 +56,7 @@ def test_whole_records_come_back_with_all_that_vision_told(exact_record, steel_t
 
 
 def test_missing_is_nan_and_no_truth():
-    seen = there_and_back(SeenWhisk(1, "no pictures"))
+    seen = there_and_back(SeenWhisk(WhiskTruth(1), "no pictures"))
     assert np.isnan(seen.d_x_mm.value) and not seen.has_truth and seen.frames is None
 
 

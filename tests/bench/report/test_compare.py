@@ -31,13 +31,15 @@ def moved(sigmas: float):
     """d_x is moved by so many of its stated sigmas."""
 
     def change(seen: dict) -> None:
-        seen["d_x_mm"] += sigmas * seen["d_x_sigma_mm"]
+        truth = seen["truth"]
+        truth["d_x_mm"] += sigmas * truth["d_x_sigma_mm"]
 
     return change
 
 
 def no_truth(seen: dict) -> None:
-    seen |= {"d_x_mm": None, "d_x_sigma_mm": None, "status": "the whisker never touches"}
+    seen["truth"] |= {"d_x_mm": None, "d_x_sigma_mm": None}
+    seen["status"] = "the whisker never touches"
     seen["status_codes"] = [["never_touches", "the whisker never touches"]]
 
 

@@ -117,7 +117,8 @@ def test_the_sensing_planes_triangle_closes(steep):
 def test_the_sensing_plane_can_be_drawn_for_either_side(steep):
     facts = TrialFacts("t", "measure", "steel", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 2945.2)
     for sign in (1, -1):
-        whisk = replace(steep, beta_rad=Value(sign * steep.beta_rad.value, steep.beta_rad.sigma))
+        beta_rad = Value(sign * steep.beta_rad.value, steep.beta_rad.sigma)
+        whisk = replace(steep, truth=replace(steep.truth, beta_rad=beta_rad))
         seen = SeenTrial((whisk,), bar_radius_mm=3.0, wire_radius_mm=0.5)
         axes = Figure().subplots()
         result = TrialResult(*facts, 3.0, seen, FeltTrial((FeltWhisk(),)))

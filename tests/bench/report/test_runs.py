@@ -48,13 +48,12 @@ def run(tmp_path):
             trial |= {"d_x_nominal_mm": d_x_mm, "beta_nominal_deg": float(beta)}
             codes = [["no_pictures", "no pictures"]]
             seen = {"status": "no pictures", "status_codes": codes}
-            seen |= {"d_x_mm": None, "cameras": 0, "frames_used": 0}
             result = {
                 "hash": f"{name}{beta}",
                 "trial": trial,
                 "whisker": whisker or WHISKER,
                 "theta_deg": theta_deg,
-                "seen": {"whisks": [{"whisk": k} | seen for k in range(len(alphas))], "notes": []},
+                "seen": {"whisks": [{"truth": {"whisk": k}} | seen for k in range(len(alphas))]},
                 "felt": {
                     "whisks": [whisk(beta, alpha, d_x_mm, k) for k, alpha in enumerate(alphas)]
                 },

@@ -14,6 +14,7 @@ from bench.records.trial_result import (
 )
 from bench.report.summary.shared import shared_distance, shared_doubts, shared_lines
 from vision.fit.covariance import CAUSES
+from vision.truth.records import WhiskTruth
 from vision.truth.value import Value
 
 SHARED_MM, OWN_MM = 0.008, 0.002
@@ -34,11 +35,13 @@ def session(rng, trials, a_trial, own_mm=OWN_MM):
         sigma = float(np.hypot(SHARED_MM, OWN_MM))
         whisks = [
             SeenWhisk(
-                k,
-                d_x_mm=Value(60.0 + e, sigma),
-                budget=budget,
-                touch_rad=Value(0.04),
-                beta_rad=Value(0.5),
+                WhiskTruth(
+                    k,
+                    d_x_mm=Value(60.0 + e, sigma),
+                    budget=budget,
+                    touch_rad=Value(0.04),
+                    beta_rad=Value(0.5),
+                )
             )
             for k, e in enumerate(errors)
         ]

@@ -61,7 +61,9 @@ def test_every_frame_is_there_with_its_contact(filmed, tmp_path, name, capfd):
     assert main(command) == 0
     said = capfd.readouterr()
     assert said.out.strip() == str(tmp_path / name) and not said.err
-    frames = json.loads((out / "trials" / "b60_4.json").read_text())["seen"]["whisks"][0]["frames"]
+    frames = json.loads((out / "trials" / "b60_4.json").read_text())["seen"]["whisks"][0]["truth"][
+        "frames"
+    ]
     film = read(tmp_path / name)
     assert len(film) == len(frames["index"])
     k = max(k for k, touching in enumerate(frames["touching"]) if touching)
@@ -118,7 +120,12 @@ def test_the_wire_drawn_is_the_one_that_was_fitted(tmp_path):
     wire = _wire(result, whisk, last, contact)
     # nodes are 2.5 mm apart, and the wire bows by less than 0.01 mm between two of them
     assert np.min(np.linalg.norm(_dense(wire) - contact, axis=1)) < 0.01
-    earlier = replace(whisk, shape=replace(whisk.shape, index=whisk.shape.index + 1000))
+    earlier = replace(
+        whisk,
+        truth=replace(
+            whisk.truth, shape=replace(whisk.truth.shape, index=whisk.truth.shape.index + 1000)
+        ),
+    )
     assert np.allclose(_wire(result, earlier, last, contact)[-1, 2], 0.0, atol=1e-9)
 
 

@@ -17,9 +17,10 @@ from bench.gauges.matrix import (
     to_follicle,
 )
 from bench.rig.simulate import simulate
-from bench.trials.agreement import LEAST_CHANCE, agreement
-from bench.trials.estimates import Readout
-from bench.trials.unit import against_shape
+from bench.trials.agreement import agreement
+from bench.trials.differences import LEAST_CHANCE
+from bench.trials.felt_trial import against_shape
+from bench.trials.readout import Readout
 from tests.scenes.results import table
 
 MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])

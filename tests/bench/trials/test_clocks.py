@@ -15,7 +15,7 @@ from bench.records.trial_result import (
     WhiskerFacts,
 )
 from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
-from vision.truth.records import FrameTruth
+from vision.truth.records import FrameTruth, WhiskTruth
 from vision.truth.value import UNKNOWN, Value
 
 SEEN_RAD, FELT_RAD = np.radians(0.006), np.radians(0.005)
@@ -56,7 +56,9 @@ def session(rng, speeds_deg_s, *, clock_s=0.0, zero_rad=0.0, back=False):
         halves = (
             {"back": BackStroke(rest[0][0], rest[0][2]), "felt_back": rest[0][1]} if back else {}
         )
-        results.append(trial(SeenWhisk(0, touch_rad=sees, frames=frames(way)), feels, **halves))
+        results.append(
+            trial(SeenWhisk(WhiskTruth(0, touch_rad=sees, frames=frames(way))), feels, **halves)
+        )
     return results
 
 
@@ -70,7 +72,7 @@ def test_a_clock_at_one_speed_is_a_doubt_and_in_the_sigma_of_touch(rng):
     results = session(rng, [10.0] * 12, clock_s=0.004)
     shared = shared_touch(results)
     assert shared.chance < 1e-6
-    assert "record back strokes with frames, or another speed" in shared_doubt(results, shared)
+    assert "record back strokes with frames, or another speed" in shared_doubt(shared)
     for before, after in zip(results, with_shared_touch(results, shared)):
         one, other = (result.seen.whisks[0].touch_rad for result in (before, after))
         assert other.value == one.value  # what is felt moves no truth
@@ -98,7 +100,7 @@ def test_back_strokes_and_speeds_tell_a_clock_from_a_zero(rng, how, clock_s, zer
     off = shared.values - [np.radians(zero_deg), clock_s]
     assert np.all(np.abs(off) < 4 * np.sqrt(np.diag(shared.covariance)))
     assert shared.covariance[1, 1] ** 0.5 < 1.5 * gauge_delay(None).value
-    assert words in shared_doubt(results, shared)
+    assert words in shared_doubt(shared)
 
 
 def test_sound_sessions_raise_no_doubt(rng):
@@ -107,12 +109,12 @@ def test_sound_sessions_raise_no_doubt(rng):
     assert sum(one.is_error for one in found) <= 2
     results = session(rng, [10.0] * 8)
     assert list(with_shared_touch(results, shared_touch(results))) == results
-    assert shared_doubt(results, shared_touch(results)) == ""
+    assert shared_doubt(shared_touch(results)) == ""
 
 
 def test_no_touch_no_word():
-    nothing = trial(SeenWhisk(0, "no pictures"), UNKNOWN)
-    assert shared_touch([nothing]) is None and shared_doubt([nothing], None) == ""
+    nothing = trial(SeenWhisk(WhiskTruth(0), "no pictures"), UNKNOWN)
+    assert shared_touch([nothing]) is None and shared_doubt(None) == ""
     assert with_shared_touch([nothing], None) == (nothing,)
 
 

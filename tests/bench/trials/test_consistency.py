@@ -10,22 +10,23 @@ from bench.records.trial_result import FeltWhisk, SeenWhisk
 from bench.session.session import load_session
 from bench.session.whisker import Whisker
 from bench.trials.consistency import (
-    cone_doubt,
-    length_doubt,
+    check_bar_width,
+    check_friction_cone,
+    check_length,
+    check_slope,
+    check_turns,
+    check_wire_width,
     nominal_slope,
-    slope_doubt,
-    turns_doubt,
-    width_doubt,
-    wire_doubt,
 )
-from bench.trials.placing import _by_scale
-from bench.trials.unit import _against_pictures
+from bench.trials.felt_trial import _against_pictures
+from bench.trials.placing import _scale_cause
 from tests.scenes.model_scenes import begun, scene, with_points
 from vision.calibration.place import Placement, by_board
 from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
 from vision.fit.turns import frame_turns
 from vision.geometry.board import Board
+from vision.truth.records import WhiskTruth
 from vision.truth.value import UNKNOWN, Value
 
 SPEED = np.radians(18.0)  # rad/s: 0.9° a frame, 20 frames a second
@@ -48,7 +49,7 @@ def doubt(rng, spoil=None, kept=None) -> str:
     state, _ = solve(problem, begun(problem, truth))
     problem = inflated_by_residuals(problem, state)
     state, _ = solve(problem, state)
-    return turns_doubt(frame_turns(problem, state, np.arange(FRAMES)), SPEED)
+    return check_turns(frame_turns(problem, state, np.arange(FRAMES)), SPEED)
 
 
 @pytest.mark.parametrize("draw", range(4))
@@ -103,25 +104,27 @@ BOARD = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
 
 
 def test_a_bar_as_thick_as_said_is_not_doubted(trial):
-    assert width_doubt({"low": Value(0.97, 0.03), "high": Value(1.0, 0.02)}, trial, BOARD) == ""
-    assert width_doubt({}, trial, BOARD) == ""
+    assert check_bar_width({"low": Value(0.97, 0.03), "high": Value(1.0, 0.02)}, trial, BOARD) == ""
+    assert check_bar_width({}, trial, BOARD) == ""
 
 
 def test_a_bar_that_looks_thicker_names_both_lengths_with_what_they_would_need(trial):
-    said = width_doubt({"low": Value(1.45, 0.04), "high": Value(1.52, 0.04)}, trial, BOARD)
+    said = check_bar_width({"low": Value(1.45, 0.04), "high": Value(1.52, 0.04)}, trial, BOARD)
     assert said.startswith("the bar looks 1.49 ± 0.05 times as thick as said")
     assert "diameter_mm would have to be some 8.92 for 6, or square_mm some 10.1 for 15" in said
 
 
 def test_cameras_that_see_different_widths_do_not_see_the_bar_alone(trial):
-    said = width_doubt({"low": Value(0.98, 0.022), "high": Value(1.21, 0.042)}, trial, BOARD)
+    said = check_bar_width({"low": Value(0.98, 0.022), "high": Value(1.21, 0.042)}, trial, BOARD)
     assert said.startswith("the bar looks 0.98 to 1.21 times as thick as said")
-    assert width_doubt({"low": Value(0.98, 0.03), "high": Value(1.08, 0.042)}, trial, BOARD) == ""
+    assert (
+        check_bar_width({"low": Value(0.98, 0.03), "high": Value(1.08, 0.042)}, trial, BOARD) == ""
+    )
 
 
 def test_a_diameter_known_badly_is_not_contradicted(trial):
     assert (
-        width_doubt({"low": Value(1.2, 0.02)}, replace(trial, bar_diameter_sigma_mm=0.5), BOARD)
+        check_bar_width({"low": Value(1.2, 0.02)}, replace(trial, bar_diameter_sigma_mm=0.5), BOARD)
         == ""
     )
 
@@ -142,7 +145,7 @@ def test_a_diameter_known_badly_is_not_contradicted(trial):
 )
 def test_a_whisker_of_another_length_is_told_by_two_cameras(ends_mm, length_mm, said):
     whisker = Whisker("cylinder", length_mm, 1.0, 200.0)
-    found = length_doubt({str(k): Value(end, 2.0) for k, end in enumerate(ends_mm)}, whisker)
+    found = check_length({str(k): Value(end, 2.0) for k, end in enumerate(ends_mm)}, whisker)
     assert found.endswith(said) and bool(found) == bool(said)
 
 
@@ -169,7 +172,7 @@ def test_a_whisker_of_another_diameter_is_told_by_cameras_that_do_not_contradict
     looks, sigma_mm, said
 ):
     whisker = Whisker("cylinder", 100.0, 1.5, 60.0, diameter_sigma_mm=sigma_mm)
-    found = wire_doubt({str(k): one for k, one in enumerate(looks)}, whisker)
+    found = check_wire_width({str(k): one for k, one in enumerate(looks)}, whisker)
     assert said in found and bool(found) == bool(said)
 
 
@@ -196,7 +199,7 @@ def strokes(session, factor, rng, turned=0.0) -> Placement:
 def test_a_board_at_another_scale_is_told_by_where_the_whisker_turns(small_session, rng, factor):
     session = load_session(small_session)
     exact = by_board(session.T_rig_board, 0.0, 0.0)
-    said = _by_scale(session, exact, strokes(session, factor, rng))
+    said = _scale_cause(session, exact, strokes(session, factor, rng))
     found = float(said.removeprefix("; a square_mm of ").split(" for 15 ")[0])
     assert found == pytest.approx(15.0 / factor, abs=0.1)  # 59 mm to the board, known to 0.15
 
@@ -204,7 +207,7 @@ def test_a_board_at_another_scale_is_told_by_where_the_whisker_turns(small_sessi
 def test_a_leaning_axis_is_no_scale(small_session, rng):
     session = load_session(small_session)
     exact = by_board(session.T_rig_board, 0.0, 0.0)
-    assert _by_scale(session, exact, strokes(session, 1.1, rng, turned=0.1)) == ""
+    assert _scale_cause(session, exact, strokes(session, 1.1, rng, turned=0.1)) == ""
 
 
 @pytest.mark.parametrize(
@@ -220,9 +223,9 @@ def test_a_leaning_axis_is_no_scale(small_session, rng):
 def test_a_slope_is_held_to_its_nominal_one(beta_deg, sigma_deg, nominal, said, trial):
     beta = Value(np.radians(beta_deg), np.radians(sigma_deg))
     trial = replace(trial, beta_deg=nominal)
-    found = slope_doubt(beta, trial)
+    found = check_slope(beta, trial)
     assert said in found if said else found == ""
-    assert slope_doubt(UNKNOWN, trial) == ""
+    assert check_slope(UNKNOWN, trial) == ""
 
 
 def degrees(value, sigma) -> Value:
@@ -242,7 +245,7 @@ def degrees(value, sigma) -> Value:
     ],
 )
 def test_a_whisker_leans_within_frictions_cone(phi_deg, beta_deg, said):
-    found = cone_doubt(degrees(phi_deg, 4.0), degrees(beta_deg, 3.0), "felt")
+    found = check_friction_cone(degrees(phi_deg, 4.0), degrees(beta_deg, 3.0), "felt")
     assert found.endswith(said) and bool(found) == bool(said)
 
 
@@ -251,6 +254,6 @@ def test_reversed_gauges_are_told_without_a_picture(trial):
     felt = FeltWhisk(phi_felt_rad=degrees(-50.0, 0.5))
     for beta_deg, apart in ((60.0, True), (-60.0, False), (None, False)):
         unit = SimpleNamespace(trial=replace(trial, beta_deg=beta_deg))
-        found = _against_pictures(felt, unit, None, None, SeenWhisk(0))
+        found = _against_pictures(felt, unit, None, None, SeenWhisk(WhiskTruth(0)))
         assert found.apart == apart and ("y reversed" in found.status) == apart
     assert nominal_slope(trial).sigma == pytest.approx(np.radians(3.0))

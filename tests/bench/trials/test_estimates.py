@@ -10,7 +10,8 @@ from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import FeltStroke, gauge_delay
 from bench.gauges.matrix import GaugeMatrix
-from bench.trials.estimates import Readout, answer, answers, as_felt, estimators, felt_whisk
+from bench.trials.estimates import answer, answers, as_felt, estimators
+from bench.trials.readout import Readout, felt_whisk
 from estimator import slip
 from estimator.beam import Beam
 from estimator.builtin import with_friction

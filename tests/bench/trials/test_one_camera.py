@@ -82,7 +82,7 @@ def test_a_camera_that_took_no_pictures_is_refused():
 
 def test_rows_and_the_line_of_the_summary(tmp_path):
     result = SimpleNamespace(trial=SimpleNamespace(name="b00", surface="steel"))
-    truth = SeenWhisk(0, d_x_mm=Value(60.0, 0.03), touch_rad=Value(0.04, 1e-4))
+    truth = SeenWhisk(WhiskTruth(0, d_x_mm=Value(60.0, 0.03), touch_rad=Value(0.04, 1e-4)))
     found = [
         ShapeSeen(result, truth, ByOneCamera("one", d_x_mm=Value(60.0 + error, 0.4)))
         for error in (0.3, -1.2)

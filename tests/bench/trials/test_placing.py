@@ -19,6 +19,7 @@ from bench.trials.unit import Unit
 from tests.scenes.base_lines import some_lines
 from tests.scenes.model_scenes import CAMERAS
 from vision.calibration.hub_turning import FirstRig
+from vision.truth.records import WhiskTruth
 
 SMALL = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
 T_RIG_BOARD = load_session(SMALL).T_rig_board
@@ -46,7 +47,13 @@ def place(small_copy, monkeypatch):
                 width_deg, left, across_mm=0.01, turn_rad=5e-4, frames=frames or 1, rng=rng
             )
             base = lines.setdefault((unit.stage, unit.trial.name), made if frames else None)
-            return SeenTrial((SeenWhisk(0, base=base), SeenWhisk(1), SeenWhisk(2, "no pictures")))
+            return SeenTrial(
+                (
+                    SeenWhisk(WhiskTruth(0, base=base)),
+                    SeenWhisk(WhiskTruth(1)),
+                    SeenWhisk(WhiskTruth(2), "no pictures"),
+                )
+            )
 
         monkeypatch.setattr("bench.trials.lost.see_unit", see)
         session = replace(load_session(small_copy), T_rig_board_sigma_mm=sigma_mm)

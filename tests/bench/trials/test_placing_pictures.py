@@ -16,7 +16,8 @@ from bench.cameras.session_cameras import SessionCalibration, on_the_rig
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from bench.trials.placing import place_rig
-from bench.trials.unit import Unit, see_unit
+from bench.trials.trial_evaluation import see_unit
+from bench.trials.unit import Unit
 from tests.scenes.recorded import exact_cameras
 from vision.geometry.camera import Cameras
 from vision.geometry.rotation import compose, invert_transform

@@ -8,7 +8,7 @@ import pytest
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.trials.seeing import PRESETS, as_toml, by_preset, from_file
-from bench.trials.seen import _looked_harder
+from bench.trials.seen import _refine
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.value import Value
 
@@ -78,7 +78,7 @@ def test_a_whisk_climbs_until_it_is_known_well_enough():
         ("draft", whisk(2, np.nan, np.nan)),
     ]
     places = [slice(0, 9), slice(10, 19), slice(20, 29)]
-    looked = _looked_harder(observe, places, first, ("standard", PRESETS["standard"]), 0.05)
+    looked = _refine(observe, places, first, by_preset("standard"), 0.05)
     assert asked == places[1:]
     found = [(name, one.whisk, one.d_x_mm.value) for name, one in looked[:2]]
     assert found == [("draft", 0, 50.0), ("standard", 1, 50.1)]

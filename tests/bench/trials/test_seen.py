@@ -5,7 +5,7 @@ import numpy as np
 from bench.cameras.session_cameras import _background
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import load_session
-from bench.trials.seen import _lost
+from bench.trials.seen import _missing_frames
 from vision.pictures.files import read_picture
 
 
@@ -17,7 +17,7 @@ def test_damaged_frames_are_counted_and_named(small_copy):
     third.write_bytes(data[: len(data) // 2][:40])
     trial = next(t for t in load_session(small_copy).trials if t.name == "b60_4")
     times = frame_times(trial)
-    assert list(_lost(read_trial(trial, times), times)) == [
+    assert list(_missing_frames(read_trial(trial, times), times)) == [
         f"camera low: 1 of {len(times)} frames damaged (2)"
     ]
 

@@ -6,6 +6,7 @@ import pytest
 from bench.records.trial_result import Drawing, SeenTrial, SeenWhisk
 from bench.trials.whose_wire import with_whose
 from vision.pictures.others import RodLines
+from vision.truth.records import WhiskTruth
 
 PX_PER_MM = 4.0
 RADIUS_MM = 0.5
@@ -26,7 +27,9 @@ LOOKED = {camera: {"b": rod(line(140.0, -0.1))} for camera in ("left", "right")}
 
 def status(left: np.ndarray, right: np.ndarray, looked=None) -> str:
     drawing = Drawing(7, {"left": {"wire": left}, "right": {"wire": right}})
-    seen = SeenTrial((SeenWhisk(0, overlay={"touch": drawing}),), wire_radius_mm=RADIUS_MM)
+    seen = SeenTrial(
+        (SeenWhisk(WhiskTruth(0), overlay={"touch": drawing}),), wire_radius_mm=RADIUS_MM
+    )
     (whisk,) = with_whose(seen, STRAIGHT, looked or LOOKED, "a").whisks
     assert whisk.contradicted == bool(whisk.status)
     return whisk.status
@@ -59,7 +62,7 @@ def test_a_wire_that_lies_on_anothers_in_all_cameras_may_be_that():
 
 
 def test_whisks_without_a_truth_stay_as_they_are():
-    seen = SeenTrial((SeenWhisk(0, "no pictures"),), wire_radius_mm=RADIUS_MM)
+    seen = SeenTrial((SeenWhisk(WhiskTruth(0), "no pictures"),), wire_radius_mm=RADIUS_MM)
     assert with_whose(seen, STRAIGHT, LOOKED, "a").whisks == seen.whisks
 
 

@@ -17,10 +17,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
+from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD
 from bench.rig.bar import Bar, find_first_touch
 from bench.rig.marched import MarchedWhisk
 from bench.rig.stick_slip import Friction
-from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD
 from estimator.both_ways import there_and_back
 from estimator.builtin import with_friction
 from estimator.uncertainty import Z_95

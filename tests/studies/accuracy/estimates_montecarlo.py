@@ -19,12 +19,13 @@ from scipy.stats import truncnorm
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
+from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD
 from bench.records.trial_result import EstimateRow
 from bench.rig.bar import Bar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import Friction, March
-from bench.trials.estimates import OBJECT_REACH_MM, TILT_SIGMA_RAD, answer
+from bench.trials.estimates import answer
 from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import Whisk

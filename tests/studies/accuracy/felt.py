@@ -26,7 +26,8 @@ from bench.report.score import Score
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
-from bench.trials.estimates import Readout, answer, as_felt, felt_whisk
+from bench.trials.estimates import answer, as_felt
+from bench.trials.readout import Readout, felt_whisk
 from estimator.builtin import with_friction
 
 PROTOCOL = """

@@ -18,7 +18,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.base.drawing import blank, colour_of, label_of, save, style
-from bench.trials.estimates import TILT_SIGMA_RAD, answer
+from bench.base.settings import TILT_SIGMA_RAD
+from bench.trials.estimates import answer
 from estimator.builtin import ESTIMATORS
 from estimator.moving import known_motion
 from estimator.whisk import EstimatorSettings, ObjectMotion, Whisk

@@ -39,7 +39,8 @@ from bench.rig.protocol_tables import (
 )
 from bench.rig.recording import Recording
 from bench.session.signals import Signals
-from bench.trials.estimates import Readout, answers, whisk_at
+from bench.trials.estimates import answers
+from bench.trials.readout import Readout, whisk_at
 from bench.trials.sensor_readings import with_others
 from estimator.beam import Beam
 from estimator.builtin import no_slip, with_friction

@@ -13,7 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.session.whisker import Whisker
-from bench.trials.consistency import length_doubt
+from bench.trials.consistency import check_length
 from bench.trials.seeing import PRESETS
 from tests.studies.accuracy.bar_scenes import read_scene
 from vision.geometry.rods import Rods
@@ -36,7 +36,7 @@ def ends(folder: Path, factor: float) -> tuple[dict, str]:
         pictures, everything, cameras, Rods(wire, rods.bar), PRESETS["draft"]
     ).whisks
     stated = Whisker(wire.shape, wire.length_mm, wire.diameter_mm, youngs_modulus_GPa=1.0)
-    return whisk.ends, length_doubt(whisk.ends, stated) or whisk.status
+    return whisk.ends, check_length(whisk.ends, stated) or whisk.status
 
 
 def main(folder: Path, factor: str = "1", pattern: str = "*") -> None:

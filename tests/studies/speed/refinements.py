@@ -32,7 +32,7 @@ from vision.fit.blocks import BAR_PRIOR, REST_PRIOR_MM  # noqa: E402
 from vision.geometry.centreline import REST_POWERS, centrelines, rotation_z, simpson, tangent_growth  # noqa: E402
 from vision.geometry.rods import Wire  # noqa: E402
 
-WHISK = ("vision/truth/observe.py:_see_whisk", "bench/trials/unit.py:feel_trial")
+WHISK = ("vision/truth/observe.py:_see_whisk", "bench/trials/felt_trial.py:feel_trial")
 FIT = "vision/fit/solve.py:linearise"
 LENS = ("vision/geometry/lens.py:distort", "vision/geometry/lens.py:distort_jacobian")
 # Functions by refinement; and how many of the columns by which the fit is differentiated are its own.

@@ -1,0 +1,112 @@
+"""Channels of a stroke as moments: felt touch and the whisk that an estimator may know."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.gauges.drift import allow_drift
+from bench.gauges.felt import FeltStroke
+from bench.gauges.matrix import GaugeMatrix, to_follicle
+from bench.session.trial import Trial
+from estimator.beam import Beam
+from estimator.signal import FeltTouch
+from estimator.whisk import Whisk
+from vision.geometry.reasons import Reason, as_reason
+
+
+@dataclass(frozen=True)
+class Readout:
+    """Conversion of a trial's channels to moments in the hub's axes: the gauges, and the follicle's
+    turn with its sigma.
+
+    Moments that were recorded as such need neither (`Readout.bare`).
+    """
+
+    gauges: GaugeMatrix
+    roll_rad: float = 0.0
+    roll_sigma_rad: float = 0.0
+    is_gauged: bool = False
+
+    @classmethod
+    def bare(cls) -> "Readout":
+        """Return the readout of signals that are moments already."""
+        return cls(GaugeMatrix(np.eye(2)))
+
+    @classmethod
+    def of(cls, trial: Trial, gauges: GaugeMatrix) -> "Readout":
+        """Return the readout of the trial's follicle with these gauges."""
+        roll_rad = math.radians(trial.follicle_roll_deg)
+        roll_sigma_rad = math.radians(trial.follicle_roll_sigma_deg)
+        return cls(gauges, roll_rad, roll_sigma_rad, is_gauged=True)
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """Return the matrix (2, 2) from channels to (m_y, m_z) in the hub's axes."""
+        return to_follicle(self.roll_rad).T @ self.gauges.matrix
+
+    def in_follicle(self, whisk: Whisk) -> np.ndarray:
+        """Return the whisk's moments (2,) at the wanted angle, in the axes of the gauges."""
+        return to_follicle(self.roll_rad) @ [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
+
+    def moments_Nmm(self, stroke: FeltStroke, touch: FeltTouch) -> np.ndarray:
+        """Return the moments (n, 2) of the stroke's samples as recorded, unfiltered."""
+        return (stroke.channels - touch.offset) @ self.matrix.T
+
+    def covariance(self, channels: np.ndarray, channels_covariance: np.ndarray) -> np.ndarray:
+        """Return the covariance (2, 2) of the moments of `channels` (2,).
+
+        It adds those of the channels (2, 2), of the gauges and of the follicle's turn.
+        """
+        changes = self._shared_changes(channels)
+        return self.matrix @ channels_covariance @ self.matrix.T + changes.T @ changes
+
+    def shared_Nmm(self, whisk: Whisk) -> np.ndarray:
+        """Return the change (5, 2) of a whisk's moments at one sigma of each cause that all whisks
+        of a session have in common: four of the gauges, and the follicle's turn.
+        """
+        moments = [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
+        return self._shared_changes(np.linalg.solve(self.matrix, moments))
+
+    def _shared_changes(self, channels: np.ndarray) -> np.ndarray:
+        """Return the change (5, 2) of the moments of `channels` (2,) at one sigma of each cause."""
+        by_gauges = self.gauges.changes_at(channels) @ to_follicle(self.roll_rad)
+        per_rad = to_follicle(self.roll_rad + np.pi / 2).T @ self.gauges.matrix @ channels
+        return np.vstack([by_gauges, per_rad * self.roll_sigma_rad])
+
+
+def felt_whisk(
+    stroke: FeltStroke, readout: Readout, drift_rate: np.ndarray, beam: Beam, theta_rad: float
+) -> tuple[FeltTouch, Whisk | Reason]:
+    """Return felt touch, and the whisk, or the reason why the stroke does not hold it.
+
+    drift_rate (2,): RMS drift of the channels per second.
+    """
+    touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
+    if touch.status:
+        return touch, as_reason(touch.status)
+    return touch, whisk_at(stroke, readout, touch, beam, theta_rad)
+
+
+def whisk_at(
+    stroke: FeltStroke, readout: Readout, touch: FeltTouch, beam: Beam, theta_rad: float
+) -> Whisk | Reason:
+    """Return the whisk at a pushing angle, or the reason why the stroke does not hold it."""
+    at = stroke.at(theta_rad, touch)
+    if at.status:
+        return as_reason(at.status)
+    moments = (stroke.filtered - touch.offset) @ readout.matrix.T  # (n, 2) N·mm
+    m_y, m_z = readout.matrix @ at.values
+    return Whisk(
+        time_s=stroke.time_s,
+        theta_rad=stroke.motor_rad - touch.motor_rad,
+        m_y_Nmm=moments[:, 0],
+        m_z_Nmm=moments[:, 1],
+        theta_at_rad=theta_rad,
+        m_y_at_Nmm=float(m_y),
+        m_z_at_Nmm=float(m_z),
+        covariance_at=readout.covariance(at.values, at.covariance),
+        theta_sigma_rad=touch.sigma_rad,
+        beam=beam,
+        theta_moment_covariance_at=readout.matrix @ at.theta_covariance,
+    )
