@@ -27,7 +27,7 @@ from bench.report.evaluation import Finished, finished
 from bench.report.pooled import read_run
 from bench.report.record import ARRAY, RUNS, read_record
 from bench.report.run_facts import RunRecord, Section
-from bench.report.summary.compose import DOUBTFUL, Summary
+from bench.report.summary.compose import DOUBTFUL, SCORE, Summary
 from bench.report.summary.verdict import verdict
 from bench.report.whisk_tables import ESTIMATES, WHISKS
 from bench.session.session import Base, Session
@@ -190,15 +190,29 @@ def _summary(
         len(doubtful),
     )
     sections = (
-        Section("Whiskers", tuple(f"{run.base.name}: {run.record.verdict[0]}" for run in runs)),
-        Section("Surface: contacts from the object, mm (surface.csv)", tuple(surface_lines(cloud))),
-        Section("Size of the object by (10), its place free (size.csv)", tuple(size_lines(sizes))),
-        Section(DOUBTFUL, tuple(doubtful)),
         Section(
-            "Score against the truth files of this synthetic session (no result knows them)",
+            "whiskers",
+            "Whiskers",
+            tuple(f"{run.base.name}: {run.record.verdict[0]}" for run in runs),
+        ),
+        Section(
+            "surface",
+            "Surface: contacts from the object, mm (surface.csv)",
+            tuple(surface_lines(cloud)),
+        ),
+        Section(
+            "size",
+            "Size of the object by (10), its place free (size.csv)",
+            tuple(size_lines(sizes)),
+        ),
+        Section("doubtful", DOUBTFUL, tuple(doubtful)),
+        Section(
+            "score",
+            SCORE,
             record.scores,
         ),
         Section(
+            "files",
             "Files",
             (f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/",),
         ),

@@ -1,4 +1,4 @@
-"""Figures of an evaluated session: Fig. 8, error against slope, and each trial's planes and overlays."""
+"""Figures of an evaluated session that no analysis draws: error against slope, each trial's planes and overlays."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bench.analyses.figure_8 import figure_8
 from bench.analyses.surfaces import Surface
 from bench.base.drawing import SLOPES_DEG, colour_of, is_drawn, label_of, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
@@ -25,23 +24,24 @@ _MARKERS = "osD^vP"
 
 
 def write_figures(evaluation: Evaluation, pool: Workers) -> list[str]:
-    """All figures that the results allow, each made again only where what it shows has changed. Their names."""
-    results, out, settings = evaluation.results, evaluation.out, evaluation.settings
+    """Draw error against slope, and the figures of each trial; return the names of the files.
+
+    Each is drawn again only where what it shows has changed.
+    """
+    results = evaluation.results
+    out = evaluation.out
+    settings = evaluation.settings
     fitted = [friction.surface for friction in evaluation.friction]
-    stamp = hash_of([r.hash for r in results], hash_of_code(DRAWING))
-    names = ["fig8.png"] if fitted else []
+    stamp = hash_of([result.hash for result in results], hash_of_code(DRAWING))
     judged = [j for j in judge(results) if j.purpose == "measure" and np.isfinite(j.error_percent)]
-    names += ["error_against_slope.png"] if judged else []
-    if fitted and not is_drawn(out / "fig8.png", stamp):
+    names = ["error_against_slope.png"] if judged else []
+    if judged and not is_drawn(out / names[0], stamp):
         with style():
-            save(figure_8(fitted), out / "fig8.png", stamp)
-    if judged and not is_drawn(out / names[-1], stamp):
-        with style():
-            save(error_against_slope(judged, fitted, settings), out / names[-1], stamp)
-    tasks = [
-        (evaluation.session.trial(r.trial.name), r, _friction_of(r, fitted, settings), out)
-        for r in results
-    ]
+            save(error_against_slope(judged, fitted, settings), out / names[0], stamp)
+    tasks = []
+    for result in results:
+        trial = evaluation.session.trial(result.trial.name)
+        tasks.append((trial, result, _friction_of(result, fitted, settings), out))
     drawn = pool.run(draw_trial, tasks, "figures")
     return [*names, *(name for group in drawn for name in group)]
 

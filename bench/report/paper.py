@@ -6,16 +6,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from bench.analyses.against_theta import against_theta, figure
-from bench.analyses.error_map import draw_error_map, measured_cells, typical_taper
-from bench.analyses.explained import draw_explained, explained_rows, mean_row
-from bench.analyses.figure_8 import figure_8
-from bench.analyses.friction_tables import SurfaceFriction
+from bench.analyses.analysis import Run
+from bench.analyses.catalogue import ANALYSES
 from bench.base.drawing import paper_style, publish
-from bench.base.settings import Settings
-from bench.records.trial_result import TrialResult
 from bench.report.figures import error_against_slope
-from bench.session.whisker import Whisker
 from bench.trials.estimate_errors import judge
 
 FOLDER = "figures"
@@ -25,50 +19,31 @@ _DPI = 600
 _BESIDE = 2  # panels side by side take both columns
 
 
-def session_figures(
-    results: Sequence[TrialResult],
-    friction: Sequence[SurfaceFriction],
-    whisker: Whisker,
-    settings: Settings,
-) -> dict[str, Figure]:
-    """All figures of the session that the results allow, by the names of their files."""
-    fitted, figures = [f.surface for f in friction], {}
-    if fitted:
-        figures["fig8"] = figure_8(fitted)
+def session_figures(run: Run) -> dict[str, Figure]:
+    """Draw all figures that results without a session allow, by the names of their files."""
+    figures = {}
+    for analysis in ANALYSES:
+        if analysis.figure_name and not analysis.needs_session:
+            figures[analysis.figure_name] = analysis.figure(analysis.compute(run))
     judged = [
-        j for j in judge(results) if j.purpose == "measure" and math.isfinite(j.error_percent)
+        j for j in judge(run.results) if j.purpose == "measure" and math.isfinite(j.error_percent)
     ]
     if judged:
-        figures["error_against_slope"] = error_against_slope(judged, fitted, settings)
-    rows = list(explained_rows(results, whisker))
-    if rows:
-        figures["explained"] = draw_explained([*rows, mean_row(rows)])
-    cells = measured_cells(results, friction, settings.alpha_est_rad)
-    if cells:
-        figures["error_map"] = draw_error_map(
-            cells, settings.alpha_est_rad, typical_taper(friction)
-        )
-    by_theta = against_theta(results)
-    if any(row.whisks for row in by_theta):
-        figures["against_theta"] = figure(by_theta)
-    return figures
+        fitted = [friction.surface for friction in run.friction]
+        figures["error_against_slope"] = error_against_slope(judged, fitted, run.settings)
+    return {name: figure for name, figure in figures.items() if figure is not None}
 
 
-def write_paper_figures(
-    out: Path,
-    results: Sequence[TrialResult],
-    friction: Sequence[SurfaceFriction],
-    whisker: Whisker,
-    settings: Settings,
-    formats: Sequence[str],
-) -> list[Path]:
-    """The figures in out/figures, as wide as one column or both of a journal. formats: of `drawing.FORMATS`. The paths
-    written."""
+def write_paper_figures(out: Path, run: Run, formats: Sequence[str]) -> list[Path]:
+    """Write the figures into out/figures, as wide as one column or both of a journal.
+
+    formats: of `drawing.FORMATS`. Returns the paths written.
+    """
+    if not formats:
+        return []
     paths = []
     with paper_style():
-        for name, figure in (
-            session_figures(results, friction, whisker, settings).items() if formats else ()
-        ):
+        for name, figure in session_figures(run).items():
             width, height = figure.get_size_inches()
             wide = _BOTH_IN if _columns(figure) >= _BESIDE else _COLUMN_IN
             figure.set_size_inches(wide, wide * max(height / width, 0.45))

@@ -90,7 +90,7 @@ def _estimates(
         "and the touch angle that these show; equation (10) of Solomon and Hartmann (2008) assumed a friction angle "
         f"of {settings.alpha_est_deg:g}°."
     )
-    gauges = record.lines("Gauges")
+    gauges = record.lines("gauges")
     if gauges:
         yield f"Gauge coefficients are from {gauges[0].split(';')[0].removeprefix('from ')}."
     for s in accuracy_of_all:
