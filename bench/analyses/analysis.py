@@ -82,8 +82,12 @@ class Analysis(ABC):
         """Return what this analysis finds in a run, in the form that its other methods take."""
 
     def rows(self, found: Any) -> Mapping[Table, Iterable[dict]]:
-        """Return the rows of each of its tables."""
-        return {}
+        """Return the rows of each of its tables: by default `row` of each item of `found`."""
+        return {table: [self.row(one) for one in found] for table in self.tables}
+
+    def row(self, one: Any) -> dict:
+        """Return the row of an item: by default its fields are the columns."""
+        return vars(one)
 
     def lines(self, found: Any) -> Iterable[str]:
         """Return its lines of the summary."""

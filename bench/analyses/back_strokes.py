@@ -95,9 +95,36 @@ class BothWays(Analysis):
         """Return every estimate of every way back."""
         return ways_back(run.results)
 
-    def rows(self, found: Sequence[WayBack]) -> dict[Table, list[dict]]:
-        """Return a row a way back and estimator."""
-        return {BOTH_WAYS: [_row(one) for one in found]}
+    def row(self, one: WayBack) -> dict:
+        """Return the row of a way back and estimator."""
+        seen = one.seen
+        felt = one.felt
+        answer = one.answer
+        phi_seen_rad = np.nan if seen.at is None else seen.at.phi_rad.value
+        return {
+            "trial": one.result.trial.name,
+            "whisk": seen.whisk,
+            "surface": one.result.trial.surface,
+            **angle_cells("touch_deg", seen.touch_rad),
+            **angle_cells("touch_felt_deg", felt.touch_felt_rad),
+            **value_cells("d_x_mm", one.d_x_mm),
+            **angle_cells("beta_deg", seen.beta_rad),
+            "phi_seen_deg": degrees(phi_seen_rad),
+            "phi_felt_deg": degrees(felt.phi_felt_rad.value),
+            "phi_there_deg": degrees(one.felt_there.phi_felt_rad.value),
+            "m_y_Nmm": felt.m_y_Nmm.value,
+            "m_z_Nmm": felt.m_z_Nmm.value,
+            "estimator": answer.estimator,
+            **value_cells("d_x_est_mm", answer.d_x_est_mm),
+            "d_x_est_low_mm": answer.d_x_est_low_mm,
+            "d_x_est_high_mm": answer.d_x_est_high_mm,
+            "beta_est_deg": degrees(answer.beta_est_rad),
+            "alpha_est_deg": degrees(answer.alpha_est_rad),
+            "error_mm": one.error_mm,
+            "error_percent": one.error_percent,
+            "inside": as_cell(one.inside),
+            "status": in_one_status(seen.status, felt.status, answer.status),
+        }
 
     def lines(self, found: Sequence[WayBack]) -> Iterator[str]:
         """Yield a line an estimator, over the ways back whose truth is known."""
@@ -124,35 +151,3 @@ def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
             for answer in felt.estimates or (EstimateRow("", UNKNOWN),):
                 found.append(WayBack(result, seen, d_x_mm, felt, felt_there, answer))
     return found
-
-
-def _row(one: WayBack) -> dict:
-    """Return the row of a way back and estimator."""
-    seen = one.seen
-    felt = one.felt
-    answer = one.answer
-    phi_seen_rad = np.nan if seen.at is None else seen.at.phi_rad.value
-    return {
-        "trial": one.result.trial.name,
-        "whisk": seen.whisk,
-        "surface": one.result.trial.surface,
-        **angle_cells("touch_deg", seen.touch_rad),
-        **angle_cells("touch_felt_deg", felt.touch_felt_rad),
-        **value_cells("d_x_mm", one.d_x_mm),
-        **angle_cells("beta_deg", seen.beta_rad),
-        "phi_seen_deg": degrees(phi_seen_rad),
-        "phi_felt_deg": degrees(felt.phi_felt_rad.value),
-        "phi_there_deg": degrees(one.felt_there.phi_felt_rad.value),
-        "m_y_Nmm": felt.m_y_Nmm.value,
-        "m_z_Nmm": felt.m_z_Nmm.value,
-        "estimator": answer.estimator,
-        **value_cells("d_x_est_mm", answer.d_x_est_mm),
-        "d_x_est_low_mm": answer.d_x_est_low_mm,
-        "d_x_est_high_mm": answer.d_x_est_high_mm,
-        "beta_est_deg": degrees(answer.beta_est_rad),
-        "alpha_est_deg": degrees(answer.alpha_est_rad),
-        "error_mm": one.error_mm,
-        "error_percent": one.error_percent,
-        "inside": as_cell(one.inside),
-        "status": in_one_status(seen.status, felt.status, answer.status),
-    }

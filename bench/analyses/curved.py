@@ -102,9 +102,21 @@ class Curvature(Analysis):
                 found.append(CurvedWhisk(result, felt, by_whisk))
         return found
 
-    def rows(self, found: Sequence[CurvedWhisk]) -> dict[Table, list[dict]]:
-        """Return a row a whisk."""
-        return {CURVATURE: [_row(one) for one in found]}
+    def row(self, one: CurvedWhisk) -> dict:
+        """Return the row of a whisk."""
+        by_whisk = one.curved
+        return {
+            "trial": one.result.trial.name,
+            "whisk": one.felt.whisk,
+            "angles": by_whisk.angles,
+            **value_cells("radius_mm", by_whisk.radius_mm),
+            "bar_radius_mm": one.bar_radius_mm,
+            **angle_cells("phi_0_deg", by_whisk.phi_0_rad),
+            "lateral_per_mm": by_whisk.lateral_per_mm.value,
+            "lateral_sigma_per_mm": by_whisk.lateral_per_mm.sigma,
+            "lateral_printed_per_mm": by_whisk.lateral_printed_per_mm,
+            "status": by_whisk.status,
+        }
 
     def lines(self, found: Sequence[CurvedWhisk]) -> Iterator[str]:
         """Yield the mean radius less the bar's own, and whisks whose object is curved sideways."""
@@ -132,23 +144,6 @@ class Curvature(Analysis):
                     f"{one.curved.lateral_printed_per_mm:.4f} by (24) as printed), or it leans along "
                     "the whisker"
                 )
-
-
-def _row(one: CurvedWhisk) -> dict:
-    """Return the row of a whisk."""
-    by_whisk = one.curved
-    return {
-        "trial": one.result.trial.name,
-        "whisk": one.felt.whisk,
-        "angles": by_whisk.angles,
-        **value_cells("radius_mm", by_whisk.radius_mm),
-        "bar_radius_mm": one.bar_radius_mm,
-        **angle_cells("phi_0_deg", by_whisk.phi_0_rad),
-        "lateral_per_mm": by_whisk.lateral_per_mm.value,
-        "lateral_sigma_per_mm": by_whisk.lateral_per_mm.sigma,
-        "lateral_printed_per_mm": by_whisk.lateral_printed_per_mm,
-        "status": by_whisk.status,
-    }
 
 
 def curved(

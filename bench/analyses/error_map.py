@@ -100,7 +100,7 @@ class ErrorMap(Analysis):
         return {ERROR_MAP: [_row(cell) for cell in found.cells]}
 
     def figure(self, found: MeasuredMap) -> "Figure | None":
-        """Draw the measured cells, and beside them the predicted field, in one scale of colours."""
+        """Draw the measured cells, and to their right the predicted field, in one scale of colours."""
         if not found.cells:
             return None
         drawing = blank(9.6, 3.9)

@@ -1,7 +1,7 @@
 """How far objects that give way were seen to come, and over the force felt how soft they are: gives_way.csv.
 
 Only where a trial says that its object gives way (object_gives_way in trial.toml). The way is seen without any gauge;
-only what it is worth in mm/N takes the force that is felt. compliance.csv has that beside section VII's.
+only what it is worth in mm/N takes the force that is felt. compliance.csv has that next to section VII's.
 """
 
 from collections.abc import Iterator, Sequence

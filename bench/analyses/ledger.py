@@ -155,9 +155,9 @@ class Ledger(Analysis):
         """Return every refinement of every whisk."""
         return ledger(run.results, run.whisker)
 
-    def rows(self, found: Sequence[Entry]) -> dict[Table, list[dict]]:
-        """Return a row a refinement and whisk."""
-        return {LEDGER: [entry.row for entry in found]}
+    def row(self, one: Entry) -> dict:
+        """Return the row of a refinement and whisk."""
+        return one.row
 
     def lines(self, found: Sequence[Entry]) -> Iterator[str]:
         """Yield a line a refinement: its largest effect, and in how many whisks it is needed."""

@@ -105,9 +105,32 @@ class MovingObjects(Analysis):
                 found.append(Moved(trial, seen, answer, share, is_sound(seen, felt)))
         return found
 
-    def rows(self, found: Sequence[Moved]) -> dict[Table, list[dict]]:
-        """Return a row a whisk and estimator."""
-        return {MOVING: [_row(one) for one in found]}
+    def row(self, one: Moved) -> dict:
+        """Return the row of a whisk and estimator."""
+        trial = one.trial
+        seen = one.seen
+        answer = one.answer
+        row = {
+            "trial": trial.name,
+            "whisk": seen.whisk,
+            "surface": trial.surface,
+            "beta_deg": degrees(seen.beta_rad.value),
+            "velocity_share_percent": one.share_percent,
+            "velocity_sigma_mm_s": trial.object_velocity_sigma_mm_s,
+            "estimator": answer.estimator,
+            **value_cells("d_x_mm", seen.d_x_mm),
+            **value_cells("d_x_est_mm", answer.d_x_est_mm),
+            "error_mm": answer.d_x_est_mm.value - seen.d_x_mm.value,
+            "error_percent": one.error_percent,
+            "inside": as_cell(one.inside),
+            "status": answer.status,
+        }
+        for k, axis in enumerate(_AXES):
+            row[f"velocity_{axis}_mm_s"] = float(trial.object_velocity_mm_s[k])
+            if seen.velocity_mm_s is not None:
+                row[f"velocity_seen_{axis}_mm_s"] = float(seen.velocity_mm_s.value[k])
+                row[f"velocity_seen_{axis}_sigma_mm_s"] = float(seen.velocity_mm_s.sigma[k])
+        return row
 
     def lines(self, found: Sequence[Moved]) -> Iterator[str]:
         """Yield a line on the whisks, and one an estimator."""
@@ -155,31 +178,3 @@ def _share_percent(trial: Trial, seen: SeenWhisk) -> float:
     along_mm_s = in_contact_frame(velocity_mm_s, seen.touch_rad.value)[1]
     whisker_mm_s = motor_speed(seen.frames) * seen.d_x_mm.value
     return float(100.0 * along_mm_s / whisker_mm_s)
-
-
-def _row(one: Moved) -> dict:
-    """Return the row of a whisk and estimator."""
-    trial = one.trial
-    seen = one.seen
-    answer = one.answer
-    row = {
-        "trial": trial.name,
-        "whisk": seen.whisk,
-        "surface": trial.surface,
-        "beta_deg": degrees(seen.beta_rad.value),
-        "velocity_share_percent": one.share_percent,
-        "velocity_sigma_mm_s": trial.object_velocity_sigma_mm_s,
-        "estimator": answer.estimator,
-        **value_cells("d_x_mm", seen.d_x_mm),
-        **value_cells("d_x_est_mm", answer.d_x_est_mm),
-        "error_mm": answer.d_x_est_mm.value - seen.d_x_mm.value,
-        "error_percent": one.error_percent,
-        "inside": as_cell(one.inside),
-        "status": answer.status,
-    }
-    for k, axis in enumerate(_AXES):
-        row[f"velocity_{axis}_mm_s"] = float(trial.object_velocity_mm_s[k])
-        if seen.velocity_mm_s is not None:
-            row[f"velocity_seen_{axis}_mm_s"] = float(seen.velocity_mm_s.value[k])
-            row[f"velocity_seen_{axis}_sigma_mm_s"] = float(seen.velocity_mm_s.sigma[k])
-    return row

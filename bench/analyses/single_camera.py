@@ -93,7 +93,7 @@ class ShapeSeen:
 
 
 class OneCamera(Analysis):
-    """How well one camera, without any gauge, tells where the whisker touches."""
+    """How well one camera, without any gauge, locates the contact."""
 
     tables = (ONE_CAMERA,)
     in_every_run = False
@@ -109,9 +109,30 @@ class OneCamera(Analysis):
                 found.append(ShapeSeen(result, seen, seen.by_one_camera))
         return found
 
-    def rows(self, found: Sequence[ShapeSeen]) -> dict[Table, list[dict]]:
-        """Return a row a whisk."""
-        return {ONE_CAMERA: [_row(one) for one in found]}
+    def row(self, one: ShapeSeen) -> dict:
+        """Return the row of a whisk."""
+        seen = one.seen
+        by_one = one.by_one
+        return {
+            "trial": one.result.trial.name,
+            "whisk": seen.whisk,
+            "surface": one.result.trial.surface,
+            "camera": by_one.camera,
+            **angle_cells("touch_deg", seen.touch_rad),
+            **angle_cells("touch_est_deg", by_one.touch_rad),
+            **value_cells("d_x_mm", seen.d_x_mm),
+            **value_cells("d_x_est_mm", by_one.d_x_mm),
+            "error_mm": one.error_mm,
+            "error_percent": 100.0 * one.error_mm / float(seen.d_x_mm.value),
+            "inside": as_cell(one.inside),
+            **value_cells("moved_mm", one.moved_mm),
+            **value_cells("moved_est_mm", by_one.moved_mm),
+            **value_cells("force_N", by_one.force_N),
+            "stiffness_N_mm": by_one.stiffness_N_mm,
+            "stiffness_sigma_N_mm": by_one.stiffness_sigma_N_mm,
+            "stiffness_low_N_mm": by_one.stiffness_low_N_mm,
+            "status": in_one_status(seen.status, by_one.status),
+        }
 
     def lines(self, found: Sequence[ShapeSeen]) -> Iterator[str]:
         """Yield a line a camera, over the whisks of which both distances are known."""
@@ -127,29 +148,3 @@ class OneCamera(Analysis):
                 f"{name}: d_x off by {error_mm:.2g} mm RMS (stated {stated_mm:.2g}); its 95 % interval "
                 f"holds {inside} of {counted(len(known), 'whisk')}"
             )
-
-
-def _row(one: ShapeSeen) -> dict:
-    """Return the row of a whisk."""
-    seen = one.seen
-    by_one = one.by_one
-    return {
-        "trial": one.result.trial.name,
-        "whisk": seen.whisk,
-        "surface": one.result.trial.surface,
-        "camera": by_one.camera,
-        **angle_cells("touch_deg", seen.touch_rad),
-        **angle_cells("touch_est_deg", by_one.touch_rad),
-        **value_cells("d_x_mm", seen.d_x_mm),
-        **value_cells("d_x_est_mm", by_one.d_x_mm),
-        "error_mm": one.error_mm,
-        "error_percent": 100.0 * one.error_mm / float(seen.d_x_mm.value),
-        "inside": as_cell(one.inside),
-        **value_cells("moved_mm", one.moved_mm),
-        **value_cells("moved_est_mm", by_one.moved_mm),
-        **value_cells("force_N", by_one.force_N),
-        "stiffness_N_mm": by_one.stiffness_N_mm,
-        "stiffness_sigma_N_mm": by_one.stiffness_sigma_N_mm,
-        "stiffness_low_N_mm": by_one.stiffness_low_N_mm,
-        "status": in_one_status(seen.status, by_one.status),
-    }

@@ -83,10 +83,6 @@ class Sensors(Analysis):
         """Return the errors of each sensor, surface and range of slopes."""
         return sensor_errors(run.results, run.friction)
 
-    def rows(self, found: Sequence[SensorErrors]) -> dict[Table, list[dict]]:
-        """Return a row a sensor, surface and range of slopes."""
-        return {SENSORS: [vars(one) for one in found]}
-
     def lines(self, found: Sequence[SensorErrors]) -> Iterator[str]:
         """Yield a line a surface and range of slopes."""
         for (surface, slope), mine in grouped(found, lambda one: one.group).items():
@@ -145,22 +141,38 @@ def sensor_errors(
     found = []
     for key in sorted(percent):
         surface, middle_deg, order = key
-        known, none = known_rows(percent[key], 3)
-        pooled = SensorErrors(
-            _ESTIMATORS[order],
-            surface,
-            max(middle_deg - 0.5 * _BETA_DEG, 0.0),
-            middle_deg + 0.5 * _BETA_DEG,
-            alphas_deg.get(surface, np.nan),
-            len(known),
-            none,
-            error_mean_percent=float(known[:, 0].mean()) if len(known) else np.nan,
-            error_rms_percent=rms(known[:, 0]),
-            error_sigma_percent=rms(known[:, 1]),
-            inside_percent=float(known[:, 2].mean()) if len(known) else np.nan,
-        )
+        alpha_deg = alphas_deg.get(surface, np.nan)
+        pooled = _pooled(_ESTIMATORS[order], surface, middle_deg, alpha_deg, percent[key])
         found.append(pooled)
     return found
+
+
+def _pooled(
+    estimator: str,
+    surface: str,
+    middle_deg: float,
+    alpha_deg: float,
+    percent: Sequence[tuple[float, float, float]],
+) -> SensorErrors:
+    """Return the errors of a sensor over whisks, as `_error_percent` has each.
+
+    middle_deg: of the range of slopes.
+    """
+    known, none = known_rows(percent, 3)
+    errors, sigmas, inside = known.T
+    return SensorErrors(
+        estimator,
+        surface,
+        max(middle_deg - 0.5 * _BETA_DEG, 0.0),
+        middle_deg + 0.5 * _BETA_DEG,
+        alpha_deg,
+        len(known),
+        none,
+        error_mean_percent=float(errors.mean()) if len(known) else np.nan,
+        error_rms_percent=rms(errors),
+        error_sigma_percent=rms(sigmas),
+        inside_percent=float(inside.mean()) if len(known) else np.nan,
+    )
 
 
 def _error_percent(row: EstimateRow, truth: Value) -> tuple[float, float, float]:

@@ -92,9 +92,31 @@ class Tilts(Analysis):
         """Return each surface, speed and nominal distance with whisks at two slopes or more."""
         return tilted_whisks(run.session, run.results)
 
-    def rows(self, found: Sequence[Tilted]) -> dict[Table, list[dict]]:
-        """Return a row a surface, speed and nominal distance."""
-        return {TILTS: [_row(one) for one in found]}
+    def row(self, one: Tilted) -> dict:
+        """Return the row of a surface, speed and nominal distance."""
+        contact = one.contact
+        d_x_sigma_mm = one.d_x_sigma_mm
+        alpha_sigma_rad = one.alpha_sigma_rad
+        error_mm = contact.d_x_mm - one.d_x_true_mm
+        return {
+            "surface": one.surface,
+            "speed_deg_s": one.speed_deg_s,
+            "nominal_mm": one.nominal_mm,
+            "trials": one.trials,
+            "whisks": one.whisks,
+            "beta_from_deg": one.beta_deg[0],
+            "beta_to_deg": one.beta_deg[1],
+            "d_x_mm": contact.d_x_mm,
+            "d_x_sigma_mm": d_x_sigma_mm,
+            "d_x_low_mm": contact.low_mm,
+            "d_x_high_mm": contact.high_mm,
+            "alpha_deg": degrees(contact.alpha_rad),
+            "alpha_sigma_deg": degrees(alpha_sigma_rad),
+            "correlation": float(contact.covariance[0, 1] / (d_x_sigma_mm * alpha_sigma_rad)),
+            "error_mm": error_mm,
+            "error_percent": 100.0 * error_mm / one.d_x_true_mm,
+            "status": contact.status,
+        }
 
     def lines(self, found: Sequence[Tilted]) -> Iterator[str]:
         """Yield a line a surface that has a result."""
@@ -177,30 +199,3 @@ def _solve(session: Session, nominal_mm: float, of_group: Sequence[tuple]) -> Sh
         places=names,
         shared_Nmm=shared_Nmm,
     )
-
-
-def _row(one: Tilted) -> dict:
-    """Return the row of a surface, speed and nominal distance."""
-    contact = one.contact
-    d_x_sigma_mm = one.d_x_sigma_mm
-    alpha_sigma_rad = one.alpha_sigma_rad
-    error_mm = contact.d_x_mm - one.d_x_true_mm
-    return {
-        "surface": one.surface,
-        "speed_deg_s": one.speed_deg_s,
-        "nominal_mm": one.nominal_mm,
-        "trials": one.trials,
-        "whisks": one.whisks,
-        "beta_from_deg": one.beta_deg[0],
-        "beta_to_deg": one.beta_deg[1],
-        "d_x_mm": contact.d_x_mm,
-        "d_x_sigma_mm": d_x_sigma_mm,
-        "d_x_low_mm": contact.low_mm,
-        "d_x_high_mm": contact.high_mm,
-        "alpha_deg": degrees(contact.alpha_rad),
-        "alpha_sigma_deg": degrees(alpha_sigma_rad),
-        "correlation": float(contact.covariance[0, 1] / (d_x_sigma_mm * alpha_sigma_rad)),
-        "error_mm": error_mm,
-        "error_percent": 100.0 * error_mm / one.d_x_true_mm,
-        "status": contact.status,
-    }

@@ -1,4 +1,4 @@
-"""The page put together and written, with methods.md and results.bib beside it."""
+"""The page, put together and written with methods.md and results.bib."""
 
 import json
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""summary.txt: the verdict first, then what it rests on. Verdict and doubts are shown in the terminal."""
+"""summary.txt: the verdict first, then what it rests on. Verdict and warnings appear in the terminal."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from bench.report.run_facts import Section
 from bench.report.run_tables import RUN_TABLES
 from bench.report.summary.error_lines import contact_lines, error_lines
 from bench.report.summary.gauge_lines import gauge_lines
-from bench.report.summary.shared import shared_doubts, shared_lines
+from bench.report.summary.shared import scatter_warnings, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
 from bench.report.summary.verdict import (
     gauge_source_lines,
@@ -24,7 +24,7 @@ from bench.report.summary.warning_lines import (
     frame_lines,
     light_lines,
     taken_as_exact,
-    whisk_doubts,
+    whisk_warnings,
 )
 from bench.trials.estimate_errors import judge
 
@@ -95,7 +95,7 @@ def summary_of(
     results = evaluation.results
     settings = evaluation.settings
     session = evaluation.session
-    doubtful = (*evaluation.doubts, *shared_doubts(results), *whisk_doubts(results))
+    doubtful = (*evaluation.doubts, *scatter_warnings(results), *whisk_warnings(results))
     has_pictures = any(trial.camera_sources for trial in session.trials)
     spoken = (
         *verdict(session.name, has_pictures, results, settings, len(doubtful)),

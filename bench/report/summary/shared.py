@@ -98,7 +98,7 @@ def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
         )
 
 
-def shared_doubts(results: Sequence[TrialResult]) -> Iterator[Reason]:
+def scatter_warnings(results: Sequence[TrialResult]) -> Iterator[Reason]:
     """Yield a warning where whisks of one recording, which share bar and light, differ too much."""
     shared = shared_distance(results)
     if shared is not None and shared.is_too_narrow:

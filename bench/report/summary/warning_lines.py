@@ -17,11 +17,11 @@ _EXPECTED = ("no_slip", "frictionless", *RUNS)
 
 
 def is_silent(status: Reason) -> bool:
-    """Return whether a status says nothing that the user should look at."""
+    """Return whether a status is as it should be, and no warning."""
     return SILENT.issuperset(status.codes)
 
 
-def whisk_doubts(results: Iterable[TrialResult]) -> Iterator[Reason]:
+def whisk_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:
     """Yield a line for each whisk that something is doubtful of.
 
     A gauge trial that cannot be judged is as it should be.
