@@ -104,11 +104,8 @@ class Run:
         """The session's figures by name, to change and save as one likes."""
         from bench.report.paper import session_figures
 
-        whole = self.results()
         with style():
-            return session_figures(
-                whole.results, whole.friction, self.record.whisker, self.record.settings
-            )
+            return session_figures(self.results())
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,9 @@ A part stands between two comments, of which the first names what it is made fro
     <!-- made from bench.report.whisk_tables.WHISKS -->
     <!-- end -->
 
-That is a `bench.base.tables.Table`, whose columns have their meanings; or a `Keys` of a TOML file,
-whose keys are explained by the comment above them, which holds down to the next comment. All else
-in the page is written by hand, and stays.
+That is a `bench.base.tables.Table`, whose columns have their meanings; or the analyses of a run,
+with the tables of each; or a `Keys` of a TOML file, whose keys are explained by the comment above
+them, which holds down to the next comment. All else in the page is written by hand, and stays.
 """
 
 import ast
@@ -36,9 +36,12 @@ def page(text: str) -> str:
     return PART.sub(_part, text)
 
 
-def named_parts(text: str) -> list[object]:
-    """Return what the parts of a page are made from, in their order."""
-    return [_named(name) for name in PART.findall(text)]
+def named_parts(text: str) -> list[Table | type[Keys]]:
+    """Return the tables and keys that the parts of a page are made from, in their order."""
+    found = []
+    for name in PART.findall(text):
+        found += _declared(name)
+    return found
 
 
 def explained_keys(keys: type[Keys]) -> Iterator[tuple[str, str]]:
@@ -71,20 +74,29 @@ def _comment_above(lines: list[str], node: ast.AnnAssign) -> str:
 
 def _part(match: re.Match) -> str:
     """Return a part of the page, with its two comments."""
-    made_from = _named(match[1])
-    if isinstance(made_from, Table):
-        rows = ((column.name, column.meaning) for column in made_from.columns)
-        lines = [f"### `{made_from.file}`", "", *textwrap.wrap(made_from.rows, 120), ""]
-        lines += _as_markdown("column", rows)
-    else:
-        lines = _as_markdown("key", explained_keys(made_from))
-    return "\n".join([f"<!-- made from {match[1]} -->", "", *lines, "", "<!-- end -->"])
+    sections = [_section(declared) for declared in _declared(match[1])]
+    return "\n\n".join([f"<!-- made from {match[1]} -->", *sections, "<!-- end -->"])
 
 
-def _named(name: str) -> object:
-    """Return a name of a module, such as package.module.NAME."""
+def _section(declared: Table | type[Keys]) -> str:
+    """Return the text on a table, or on the keys of a table of a TOML file."""
+    if not isinstance(declared, Table):
+        return "\n".join(_as_markdown("key", explained_keys(declared)))
+    rows = ((column.name, column.meaning) for column in declared.columns)
+    lines = [f"### `{declared.file}`", "", *textwrap.wrap(declared.rows, 120), ""]
+    return "\n".join([*lines, *_as_markdown("column", rows)])
+
+
+def _declared(name: str) -> list[Table | type[Keys]]:
+    """Return what a name of a module declares, such as package.module.NAME.
+
+    Of analyses that is every table of theirs.
+    """
     module, _, attribute = name.rpartition(".")
-    return getattr(importlib.import_module(module), attribute)
+    declared = getattr(importlib.import_module(module), attribute)
+    if isinstance(declared, tuple):
+        return [table for analysis in declared for table in analysis.tables]
+    return [declared]
 
 
 def _as_markdown(head: str, explained: Iterable[tuple[str, str]]) -> list[str]:

@@ -1,4 +1,4 @@
-"""What many whisks tell of friction: surfaces, fitted angles, section VII, the error explained and mapped.
+"""The questions that are put to all whisks of a session together: one module an analysis, all of them in `catalogue`.
 
 May import base, session, cameras, gauges, trials.
 """

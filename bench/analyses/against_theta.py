@@ -1,17 +1,17 @@
-"""Error and sigma of each estimator against the pushing angle θ, over the whisks of one run: table, figure, summary.
+"""Error and sigma of each estimator against the pushing angle θ, over the whisks of one run.
 
 Section VII has θ small, noise has it large: where between them an estimator errs least is read off here.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.base.drawing import blank, colour_of, is_drawn, label_of, save, style
-from bench.base.results import DRAWING, hash_of, hash_of_code
+from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.pooling import grouped, known_rows, measured, rms
+from bench.base.drawing import blank, colour_of, label_of
 from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table
 from bench.records.trial_result import TrialResult, whisks
 from bench.trials.estimate_errors import is_sound
@@ -38,14 +38,15 @@ AGAINST_THETA = Table(
         ),
     ),
 )
-FIGURE = "against_theta.png"
-_FEWEST_SHARE = 0.9  # of an estimator's whisks: a θ that fewer reach is one of other whisks
+# [share] Of an estimator's whisks: a θ that fewer reach is one of other whisks.
+_FEWEST_SHARE = 0.9
+# [°] Labels of the logarithmic axis, as many as stand apart.
+_TICKS_DEG = (0.2, 0.5, 1, 2, 3, 5, 10, 20)
 
 
 @dataclass(frozen=True)
 class AtTheta:
-    """One estimator at one pushing angle: whisks with a distance and without, mean and RMS error, % of d_x, and the RMS
-    of the stated sigmas, with what α_est may be off by and as if it were right."""
+    """Errors of one estimator at one pushing angle: the columns of AGAINST_THETA."""
 
     estimator: str
     theta_deg: float
@@ -57,110 +58,106 @@ class AtTheta:
     error_sigma_alpha_exact_percent: float
 
 
+@dataclass(frozen=True)
+class ThetaErrors:
+    """Errors at all pushing angles; theta_deg: the run's own pushing angle."""
+
+    at: tuple[AtTheta, ...]
+    theta_deg: float
+
+
+class AgainstTheta(Analysis):
+    """At which pushing angle an estimator errs least."""
+
+    tables = (AGAINST_THETA,)
+    heading = Heading("against_theta", "Error and sigma against θ (against_theta.csv)")
+    figure_name = "against_theta"
+    figure_title = "Error and sigma against θ"
+    figure_caption = "RMS over the sound whisks: solid the error, dashed the stated sigma. Small θ: noise; large: bending."
+
+    def compute(self, run: Run) -> ThetaErrors:
+        """Return the errors of every estimator at every pushing angle."""
+        return ThetaErrors(tuple(against_theta(run.results)), run.settings.theta_deg)
+
+    def rows(self, found: ThetaErrors) -> dict[Table, list[dict]]:
+        """Return a row an estimator and pushing angle."""
+        return {AGAINST_THETA: [vars(one) for one in found.at]}
+
+    def lines(self, found: ThetaErrors) -> Iterator[str]:
+        """Yield a line an estimator: the θ of least error, and the error where the run's θ is."""
+        for name, mine in grouped(found.at, lambda one: one.estimator).items():
+            least = least_error(found.at, name)
+            if least is None:
+                continue
+            at_own_theta = ""
+            for one in mine:
+                if one.theta_deg == found.theta_deg and one.whisks and one != least:
+                    at_own_theta = f"; at {found.theta_deg:g}° {one.error_rms_percent:.2f} %"
+            yield (
+                f"{label_of(name)}: least error at θ = {least.theta_deg:g}°, "
+                f"{least.error_rms_percent:.2f} % RMS over {counted(least.whisks, 'whisk')}, "
+                f"{least.error_sigma_percent:.2f} % stated{at_own_theta}"
+            )
+
+    def figure(self, found: ThetaErrors) -> "Figure | None":
+        """Draw RMS error solid, stated sigma dashed, sigma as if α_est were right dotted.
+
+        A ring stands where the error is least.
+        """
+        if not any(one.whisks for one in found.at):
+            return None
+        return _draw(found.at)
+
+
 def against_theta(results: Sequence[TrialResult]) -> list[AtTheta]:
-    """Over the measured whisks of which truth and estimate are sound."""
-    groups: dict[tuple[str, float], list[np.ndarray]] = {}
-    for result, seen, felt in whisks(results):
-        if result.trial.purpose != "measure" or not (seen.has_truth and is_sound(seen, felt)):
+    """Return the errors at each pushing angle, over measured whisks that are sound, seen and felt."""
+    percent: dict[tuple[str, float], list[np.ndarray]] = {}
+    for _, seen, felt in whisks(measured(results)):
+        if not (seen.has_truth and is_sound(seen, felt)):
             continue
+        truth = seen.d_x_mm
         for at in felt.by_theta:
+            theta_deg = round(float(np.degrees(at.theta_rad)), 6)
             for row in at.estimates:
-                sigmas = np.array([row.d_x_est_mm.sigma, row.d_x_est_sigma_alpha_exact_mm])
-                error = row.d_x_est_mm.value - seen.d_x_mm.value
-                percent = (
-                    100.0
-                    / seen.d_x_mm.value
-                    * np.array([error, *np.hypot(sigmas, seen.d_x_mm.sigma)])
-                )
-                groups.setdefault(
-                    (row.estimator, round(float(np.degrees(at.theta_rad)), 6)), []
-                ).append(percent)
-    return [
-        _pooled(*key, np.array(found))
-        for key, found in sorted(groups.items(), key=lambda item: item[0][1])
-    ]
+                error_mm = row.d_x_est_mm.value - truth.value
+                sigma_mm = np.hypot(row.d_x_est_mm.sigma, truth.sigma)
+                exact_mm = np.hypot(row.d_x_est_sigma_alpha_exact_mm, truth.sigma)
+                shares = 100.0 / truth.value * np.array([error_mm, sigma_mm, exact_mm])
+                percent.setdefault((row.estimator, theta_deg), []).append(shares)
+    in_order = sorted(percent, key=lambda key: key[1])
+    return [_pooled(*key, percent[key]) for key in in_order]
 
 
-def _pooled(estimator: str, theta_deg: float, percent: np.ndarray) -> AtTheta:
-    finite = percent[np.isfinite(percent).all(axis=1)]
-    count = len(finite), len(percent) - len(finite)
-    if not len(finite):
-        return AtTheta(estimator, theta_deg, *count, *(np.nan,) * 4)
-    rms = np.sqrt(np.mean(finite**2, axis=0)).tolist()
-    return AtTheta(estimator, theta_deg, *count, float(finite[:, 0].mean()), *rms)
+def _pooled(estimator: str, theta_deg: float, percent: Sequence[np.ndarray]) -> AtTheta:
+    """Pool the errors of whisks and their two sigmas, percent (n, 3)."""
+    known, none = known_rows(percent, 3)
+    mean = float(known[:, 0].mean()) if len(known) else np.nan
+    return AtTheta(estimator, theta_deg, len(known), none, mean, *map(rms, known.T))
 
 
-def best(rows: Sequence[AtTheta], estimator: str) -> AtTheta | None:
-    """Where the estimator's RMS error is least, among the θ that nearly all of its whisks reach."""
+def least_error(rows: Sequence[AtTheta], estimator: str) -> AtTheta | None:
+    """Return where an estimator's RMS error is least, of the θ that nearly all its whisks reach."""
     mine = [row for row in rows if row.estimator == estimator and row.whisks]
     most = max((row.whisks for row in mine), default=0)
-    return min(
-        (row for row in mine if row.whisks >= _FEWEST_SHARE * most),
-        key=lambda row: row.error_rms_percent,
-        default=None,
-    )
+    reached = [row for row in mine if row.whisks >= _FEWEST_SHARE * most]
+    return min(reached, key=lambda row: row.error_rms_percent, default=None)
 
 
-def theta_lines(rows: Sequence[AtTheta], theta_deg: float) -> Iterator[str]:
-    """A line an estimator: the θ of least error, and the error where the run's own θ is."""
-    for name in dict.fromkeys(row.estimator for row in rows):
-        least = best(rows, name)
-        if least is None:
-            continue
-        here = [
-            row
-            for row in rows
-            if row.estimator == name and row.theta_deg == theta_deg and row.whisks
-        ]
-        beside = (
-            f"; at {theta_deg:g}° {here[0].error_rms_percent:.2f} %"
-            if here and here[0] != least
-            else ""
-        )
-        yield (
-            f"{label_of(name)}: least error at θ = {least.theta_deg:g}°, {least.error_rms_percent:.2f} % RMS over "
-            f"{counted(least.whisks, 'whisk')}, {least.error_sigma_percent:.2f} % stated{beside}"
-        )
-
-
-def write_against_theta(
-    out: Path, results: Sequence[TrialResult], *, drawn: bool = True
-) -> tuple[list[AtTheta], list[str]]:
-    """Table, and the figure where it is to be `drawn`; the rows, and the figure's name where there is one."""
-    rows = against_theta(results)
-    AGAINST_THETA.write(out, map(vars, rows))
-    if not drawn or not any(row.whisks for row in rows):
-        return rows, []
-    stamp = hash_of([vars(row) for row in rows], hash_of_code(DRAWING))
-    if not is_drawn(out / FIGURE, stamp):
-        with style():
-            save(figure(rows), out / FIGURE, stamp)
-    return rows, [FIGURE]
-
-
-def figure(rows: Sequence[AtTheta]) -> "Figure":
-    """RMS error solid, stated sigma dashed, as if α_est were right dotted; a ring where the error is least."""
+def _draw(rows: Sequence[AtTheta]) -> "Figure":
+    """Draw the lines of all estimators, and what kinds of lines mean."""
     drawing = blank(5.6, 4.8)
     axes = drawing.subplots()
-    for number, name in enumerate(dict.fromkeys(row.estimator for row in rows)):
-        mine, colour = (
-            [row for row in rows if row.estimator == name and row.whisks],
-            colour_of(name, number),
-        )
-        theta = [row.theta_deg for row in mine]
-        axes.plot(
-            theta,
-            [row.error_rms_percent for row in mine],
-            "o-",
-            ms=3.5,
-            color=colour,
-            label=label_of(name),
-        )
-        axes.plot(theta, [row.error_sigma_percent for row in mine], "--", lw=1.0, color=colour)
-        axes.plot(
-            theta, [row.error_sigma_alpha_exact_percent for row in mine], ":", lw=1.0, color=colour
-        )
-        least = best(rows, name)
+    for number, (name, mine) in enumerate(grouped(rows, lambda row: row.estimator).items()):
+        known = [row for row in mine if row.whisks]
+        colour = colour_of(name, number)
+        theta_deg = [row.theta_deg for row in known]
+        errors = [row.error_rms_percent for row in known]
+        sigmas = [row.error_sigma_percent for row in known]
+        exact_sigmas = [row.error_sigma_alpha_exact_percent for row in known]
+        axes.plot(theta_deg, errors, "o-", ms=3.5, color=colour, label=label_of(name))
+        axes.plot(theta_deg, sigmas, "--", lw=1.0, color=colour)
+        axes.plot(theta_deg, exact_sigmas, ":", lw=1.0, color=colour)
+        least = least_error(rows, name)
         if least is not None:
             axes.plot(least.theta_deg, least.error_rms_percent, "o", ms=9, mfc="none", mec=colour)
     axes.plot([], [], "--", lw=1.0, color="0.4", label="stated sigma")
@@ -175,18 +172,22 @@ def figure(rows: Sequence[AtTheta]) -> "Figure":
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter("")
-    axes.set_xticks(
-        [t for t in (0.2, 0.5, 1, 2, 3, 5, 10, 20) if t <= max(row.theta_deg for row in rows)]
-    )
+    farthest_deg = max(row.theta_deg for row in rows)
+    axes.set_xticks([tick for tick in _TICKS_DEG if tick <= farthest_deg])
     axes.grid(alpha=0.25, which="major")
-    _legend(drawing, axes)
+    _add_legend(drawing, axes, 3)
     return drawing
 
 
-def _legend(drawing: "Figure", axes: "Axes", styles: int = 3) -> None:
-    """A column of estimators, and one of what the last lines, the `styles`, stand for; the shorter one is filled up."""
+def _add_legend(drawing: "Figure", axes: "Axes", styles: int) -> None:
+    """Add a column of estimators, and one of what the last lines, `styles` of them, stand for.
+
+    The shorter column is filled up with empty entries.
+    """
     entries = list(zip(*axes.get_legend_handles_labels()))
-    columns, nothing = (entries[:-styles], entries[-styles:]), (axes.plot([], [], " ")[0], "")
-    most = max(map(len, columns))
-    filled = [entry for column in columns for entry in [*column, *[nothing] * (most - len(column))]]
+    empty = (axes.plot([], [], " ")[0], "")
+    estimators = entries[:-styles]
+    meanings = entries[-styles:]
+    missing = len(estimators) - len(meanings)
+    filled = [*estimators, *[empty] * -missing, *meanings, *[empty] * missing]
     drawing.legend(*zip(*filled), loc="outside lower center", ncols=2)

@@ -1,4 +1,4 @@
-"""The friction angle α of each whisk: seen (no gauge) and felt (β seen, φ from the moments), rad with one sigma."""
+"""The friction angle α of each whisk: seen (no gauge) and felt (β seen, φ from the moments), in rad."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -21,18 +21,22 @@ from vision.truth.value import Value
 _ROUNDS = 12  # each leaves less than half of the change up to a heading of 45°
 # Terms of θ² are enough up to here: pushed by 8, 16 and 25 degrees against a bar at 40, α seen is off by 0.03, 0.3 and
 # 0.7 degrees with them, but for the slope's error, and by 0.5, 1.5 and 3.8 without.
-_FARTHEST_RAD, _FEWEST_NEAR = np.radians(10.0), 5
-UNKNOWN = (float("nan"), float("nan"))
-BETA_BY_HAND_RAD = np.radians(1.0)  # one sigma of a slope set by hand, where no picture tells it
+_FARTHEST_RAD = np.radians(10.0)
+_FEWEST_NEAR = 5  # frames
+UNKNOWN = (np.nan, np.nan)
+BETA_BY_HAND_RAD = np.radians(1.0)  # one sigma of a slope set by hand, where no picture shows it
 
 
 @dataclass(frozen=True)
 class WhiskAlphas:
-    """α of one whisk, each a pair (value, sigma) in rad; NaN where the whisk does not show it."""
+    """Friction angles of one whisk, each a pair (value, sigma) in rad; NaN where it shows none.
+
+    shared_seen_rad, shared_felt_rad: sigma that all angles of this whisk share, of β, and felt also of
+    the moments. nominal: β is that of the manifest, because no picture shows it.
+    """
 
     trial: str
     whisk: int
-    purpose: str
     surface: str
     speed_deg_s: float | None
     beta_rad: float
@@ -40,112 +44,120 @@ class WhiskAlphas:
     felt: tuple[float, float]
     phases_seen: Phases
     phases_felt: Phases
-    shared_seen_rad: (
-        float  # sigma that all angles of this whisk share: of β, and felt also of the moments
-    )
+    shared_seen_rad: float
     shared_felt_rad: float
-    nominal: bool = False  # β is that of the manifest: no picture shows it
+    nominal: bool = False
+
+    def phases(self, record: str) -> Phases:
+        """Return rests and jumps as "seen" or "felt"."""
+        return self.phases_seen if record == "seen" else self.phases_felt
 
     def apart(self, kind: str, record: str) -> tuple[float, float]:
-        """Static or kinetic α from the record "seen" or "felt"; NaN where it shows no stick–slip."""
-        phases, shared = (
-            (self.phases_seen, self.shared_seen_rad)
-            if record == "seen"
-            else (self.phases_felt, self.shared_felt_rad)
-        )
-        mean, sigma = phases.mean(kind)
-        return mean, float(np.hypot(sigma, shared))
+        """Return static or kinetic α by the record "seen" or "felt"; NaN without stick–slip."""
+        shared_rad = self.shared_seen_rad if record == "seen" else self.shared_felt_rad
+        mean, sigma = self.phases(record).mean(kind)
+        return mean, float(np.hypot(sigma, shared_rad))
 
     @property
     def panel(self) -> tuple[str, float | None]:
-        """Surface and speed, as `TrialFacts.panel` has them."""
+        """Return surface and speed, as `TrialFacts.panel` has them."""
         return self.surface, self.speed_deg_s
 
     @property
     def key(self) -> tuple[str, int]:
-        """Which whisk."""
+        """Return trial and number of the whisk."""
         return self.trial, self.whisk
 
 
 def alphas_of(results: Iterable[TrialResult]) -> list[WhiskAlphas]:
-    """α of every whisk, in their order."""
-    return [
-        _alphas(result.trial, seen, felt, np.radians(result.theta_deg))
-        for result, seen, felt in whisks(results)
-    ]
+    """Return the friction angles of every whisk, in their order."""
+    found = []
+    for result, seen, felt in whisks(results):
+        found.append(_alphas(result.trial, seen, felt, np.radians(result.theta_deg)))
+    return found
 
 
 def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> WhiskAlphas:
-    beta, nominal = seen.beta_rad, not np.isfinite(seen.beta_rad.value)
+    """Return the friction angles of one whisk at a pushing angle."""
+    nominal = not np.isfinite(seen.beta_rad.value)
+    beta = seen.beta_rad
     if nominal:
         beta = Value(float(np.radians(trial.beta_nominal_deg)), BETA_BY_HAND_RAD)
-    of_seen = seen_phases(seen.frames, beta.value, seen.d_x_mm.value) if slips(seen) else NO_PHASES
-    shared = beta.sigma, float(np.hypot(beta.sigma, felt.phi_felt_rad.sigma))
+    phases = NO_PHASES
+    if slips(seen):
+        phases = seen_phases(seen.frames, beta.value, seen.d_x_mm.value)
     return WhiskAlphas(
         trial.name,
         seen.whisk,
-        trial.purpose,
         *trial.panel,
-        beta.value,
-        seen_friction(seen),
-        felt_friction(seen, felt, theta_rad),
-        of_seen,
-        felt.phases,
-        *shared,
-        nominal,
+        beta_rad=beta.value,
+        seen=seen_friction(seen),
+        felt=felt_friction(seen, felt, theta_rad),
+        phases_seen=phases,
+        phases_felt=felt.phases,
+        shared_seen_rad=beta.sigma,
+        shared_felt_rad=float(np.hypot(beta.sigma, felt.phi_felt_rad.sigma)),
+        nominal=nominal,
     )
 
 
 def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
-    """α from the slope of d_z against d_y over the frames of a slipping whisk, and β. NaN where it hardly slips.
+    """Return α and its sigma by the slope of d_z against d_y over the frames of a slipping whisk, and β.
 
-    A line's slope is free of what offsets all deflections alike. What friction along the whisker and large angles
-    (`bench.analyses.direction`) bend that line by is taken out of d_z first. Along a sphere or a ring the slope turns
-    with the slip, and no line is straight: there α is that at θ, by the normal at the contact.
+    NaN where it hardly slips. A line's slope is free of what offsets all deflections alike. What friction
+    along the whisker and large angles (`bench.analyses.direction`) bend that line by is taken out of d_z
+    first. Along a sphere or a ring the slope turns with the slip, and no line is straight: there α is that
+    at θ, by the normal at the contact.
     """
     if not slips(seen):
         return UNKNOWN
     if _turns_with_slip(seen):
         return UNKNOWN if seen.at is None else (seen.at.alpha_rad.value, seen.at.alpha_rad.sigma)
-    d, beta = _near_touch(seen.deflection), abs(seen.beta_rad.value)
-    weights = (d.across_y_mm - d.across_y_mm.mean()) / np.sum(
-        (d.across_y_mm - d.across_y_mm.mean()) ** 2
-    )
-    slope, alpha = float(weights @ d.across_z_mm), np.nan
+    d = _near_touch(seen.deflection)
+    beta = abs(seen.beta_rad.value)
+    centred = d.across_y_mm - d.across_y_mm.mean()
+    weights = centred / np.sum(centred**2)  # (frames,) of the slope of a line
+    slope = float(weights @ d.across_z_mm)
     side = np.copysign(1.0, slope)
+    heading_rad = _heading(d, d.theta_rad)
+    alpha = np.nan
     for _ in range(_ROUNDS):
         alpha = beta - np.arctan(side * slope)
-        across = np.arctan(np.tan(alpha) * np.cos(_heading(d, d.theta_rad)))
-        phi = slip_angle(d.theta_rad, beta, across)
-        bent = d.across_y_mm * (np.tan(phi) - np.tan(beta - alpha))
-        slope = float(weights @ (d.across_z_mm - side * bent))
-    n = len(weights)
-    by_z, by_y = np.eye(2 * n)[0::2], np.eye(2 * n)[1::2]
-    through = weights @ (
-        by_z - slope * by_y
-    )  # to first order an error of d_y acts as one of d_z times the slope
-    slope_sigma = float(np.sqrt(through @ d.covariance @ through))
+        across_rad = np.arctan(np.tan(alpha) * np.cos(heading_rad))
+        phi = slip_angle(d.theta_rad, beta, across_rad)
+        bent_mm = d.across_y_mm * (np.tan(phi) - np.tan(beta - alpha))
+        slope = float(weights @ (d.across_z_mm - side * bent_mm))
+    # To first order an error of d_y acts as one of d_z times the slope; rows of z and y take turns.
+    frames = len(weights)
+    by_z = np.eye(2 * frames)[0::2]
+    by_y = np.eye(2 * frames)[1::2]
+    gradient = weights @ (by_z - slope * by_y)
+    slope_sigma = float(np.sqrt(gradient @ d.covariance @ gradient))
     return float(alpha), float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
 
 
 def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> tuple[float, float]:
-    """α by |β| − |φ|, the slope as seen and the slip angle from the moments at θ, of a whisk that was seen to slip;
-    unknown where the moments are not those of the seen shape, or the slope at θ is not that at touch."""
-    beta, phi = seen.beta_rad, felt.phi_felt_rad
+    """Return α and its sigma by |β| − |φ|: the slope as seen, the slip angle by the moments at θ.
+
+    Of a whisk that was seen to slip; NaN where the moments are not those of the seen shape, or the slope
+    at θ is not that at touch.
+    """
+    beta = seen.beta_rad
+    phi = felt.phi_felt_rad
     if not (slips(seen) and np.isfinite(phi.value)) or felt.apart or _turns_with_slip(seen):
         return UNKNOWN
-    across = abs(beta.value) - abs(phi.value)
-    alpha = np.arctan(np.tan(across) / np.cos(_heading(seen.deflection, theta_rad)))
+    across_rad = abs(beta.value) - abs(phi.value)
+    alpha = np.arctan(np.tan(across_rad) / np.cos(_heading(seen.deflection, theta_rad)))
     return float(alpha), float(np.hypot(beta.sigma, phi.sigma))
 
 
 def _turns_with_slip(seen: SeenWhisk) -> bool:
-    """Whether the object is curved along itself: a cone is straight there."""
+    """Return whether the object is curved along itself: a cone is straight there."""
     return seen.truth.rounded is not None and seen.truth.rounded.shape != "cone"
 
 
 def _near_touch(d: Deflection) -> Deflection:
-    """The frames up to _FARTHEST_RAD, or all where these are few."""
+    """Return the frames up to _FARTHEST_RAD, or all where these are few."""
     near = d.theta_rad <= _FARTHEST_RAD
     if np.all(near) or np.sum(near) < _FEWEST_NEAR:
         return d
@@ -155,21 +167,23 @@ def _near_touch(d: Deflection) -> Deflection:
 
 
 def _heading(d: Deflection, theta_rad: float | np.ndarray) -> float | np.ndarray:
-    """The angle h between the slip at θ and the bar, as seen: the whisker's material moves along itself, too.
+    """Return the angle h between the slip at θ and the bar, as seen.
 
-    Friction acts against the whole motion, so that |β| − |φ|, the angle of the force across the whisker, is less than
-    α: tan(|β| − |φ|) = tan α cos h. The slip grows in proportion to θ, the motion along the whisker to θ².
+    The whisker's material moves along itself, too. Friction acts against the whole motion, so that
+    |β| − |φ|, the angle of the force across the whisker, is less than α: tan(|β| − |φ|) = tan α cos h.
+    The slip grows in proportion to θ, the motion along the whisker to θ².
     """
     square = d.theta_rad**2 - np.mean(d.theta_rad**2)
-    past = 2.0 * (square @ d.past_mm) / (square @ square) * theta_rad
-    return np.arctan(past / ((d.theta_rad @ d.slip_mm) / (d.theta_rad @ d.theta_rad)))
+    past_per_rad = 2.0 * (square @ d.past_mm) / (square @ square) * theta_rad
+    slip_per_rad = (d.theta_rad @ d.slip_mm) / (d.theta_rad @ d.theta_rad)
+    return np.arctan(past_per_rad / slip_per_rad)
 
 
 def mean_alpha(alphas: Iterable[tuple[float, float]]) -> tuple[float, float]:
-    """Weighted mean and its sigma, rad.
+    """Return the weighted mean of pairs (value, sigma) and its sigma, rad; NaN where none is known.
 
-    Cameras and gauges are common to all whisks, and how much of each sigma is theirs is not told apart: so it is not
-    divided by the number of whisks; where the whisks scatter more than that, the scatter of the mean counts.
+    Cameras and gauges are common to all whisks, and how much of each sigma is theirs is not known: so it is
+    not divided by the number of whisks. Where the whisks scatter by more, the scatter of the mean counts.
     """
     known = np.array([pair for pair in alphas if np.isfinite(pair).all() and pair[1] > 0])
     if not len(known):

@@ -1,14 +1,15 @@
-"""Ways back as forward strokes are judged, and each with its way there: both_ways.csv, and lines of the summary.
+"""Ways back, judged as forward strokes are, and each together with its way there: both_ways.csv.
 
 Only where a trial asks for it (both_ways in trial.toml).
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.pooling import angle_cells, as_cell, degrees, grouped, rms, value_cells
 from bench.base.doubts import in_one_status
 from bench.base.drawing import label_of
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
@@ -54,96 +55,102 @@ BOTH_WAYS = Table(
 
 @dataclass(frozen=True, eq=False)
 class WayBack:
-    """What one estimator says of one way back, or why none does; there: the way there, as felt; d_x_mm: the contact's,
-    as seen on the way back, else on the way there."""
+    """One estimate of one way back.
+
+    d_x_mm: distance of the contact as seen on the way back, else on the way there. felt, felt_there:
+    moments of the way back and of the way there. answer: the estimate, with a status alone where
+    there is none.
+    """
 
     result: TrialResult
     seen: SeenWhisk
     d_x_mm: Value
     felt: FeltWhisk
-    there: FeltWhisk
+    felt_there: FeltWhisk
     answer: EstimateRow
 
     @property
     def error_mm(self) -> float:
-        """Estimate less truth."""
+        """Return estimate less truth."""
         return self.answer.d_x_est_mm.value - float(self.d_x_mm.value)
 
     @property
+    def error_percent(self) -> float:
+        """Return estimate less truth, percent of the truth."""
+        return 100.0 * self.error_mm / float(self.d_x_mm.value)
+
+    @property
     def inside(self) -> bool | None:
-        """Whether the 95 % interval holds the truth; None where either is not known."""
+        """Return whether the 95 % interval holds the truth; None where either is not known."""
         return self.answer.holds(self.d_x_mm.value)
 
 
+class BothWays(Analysis):
+    """How well ways back are estimated, alone and with their ways there."""
+
+    tables = (BOTH_WAYS,)
+    in_every_run = False
+    heading = Heading("both_ways", "Ways back (both_ways.csv)")
+
+    def compute(self, run: Run) -> list[WayBack]:
+        """Return every estimate of every way back."""
+        return ways_back(run.results)
+
+    def row(self, one: WayBack) -> dict:
+        """Return the row of a way back and estimator."""
+        seen = one.seen
+        felt = one.felt
+        answer = one.answer
+        phi_seen_rad = np.nan if seen.at is None else seen.at.phi_rad.value
+        return {
+            "trial": one.result.trial.name,
+            "whisk": seen.whisk,
+            "surface": one.result.trial.surface,
+            **angle_cells("touch_deg", seen.touch_rad),
+            **angle_cells("touch_felt_deg", felt.touch_felt_rad),
+            **value_cells("d_x_mm", one.d_x_mm),
+            **angle_cells("beta_deg", seen.beta_rad),
+            "phi_seen_deg": degrees(phi_seen_rad),
+            "phi_felt_deg": degrees(felt.phi_felt_rad.value),
+            "phi_there_deg": degrees(one.felt_there.phi_felt_rad.value),
+            "m_y_Nmm": felt.m_y_Nmm.value,
+            "m_z_Nmm": felt.m_z_Nmm.value,
+            "estimator": answer.estimator,
+            **value_cells("d_x_est_mm", answer.d_x_est_mm),
+            "d_x_est_low_mm": answer.d_x_est_low_mm,
+            "d_x_est_high_mm": answer.d_x_est_high_mm,
+            "beta_est_deg": degrees(answer.beta_est_rad),
+            "alpha_est_deg": degrees(answer.alpha_est_rad),
+            "error_mm": one.error_mm,
+            "error_percent": one.error_percent,
+            "inside": as_cell(one.inside),
+            "status": in_one_status(seen.status, felt.status, answer.status),
+        }
+
+    def lines(self, found: Sequence[WayBack]) -> Iterator[str]:
+        """Yield a line an estimator, over the ways back whose truth is known."""
+        known = [one for one in found if np.isfinite(one.error_mm)]
+        for name, mine in grouped(known, lambda one: one.answer.estimator).items():
+            error_percent = rms(one.error_percent for one in mine)
+            inside = sum(bool(one.inside) for one in mine)
+            yield (
+                f"{label_of(name)}: error of d_x {error_percent:.2g} % RMS; its 95 % interval holds "
+                f"{inside} of {counted(len(mine), 'way')} back"
+            )
+
+
 def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
-    """Every estimate of every way back; one without any where it was not felt."""
+    """Return every estimate of every way back; one without a distance where it was not felt."""
     found = []
     for result in results:
-        seen = result.seen.ways_back or tuple(
-            SeenWhisk(WhiskTruth(f.whisk)) for f in result.felt.ways_back
+        felt_back = result.felt.ways_back
+        seen_back = result.seen.ways_back or tuple(
+            SeenWhisk(WhiskTruth(felt.whisk)) for felt in felt_back
         )
-        for one, forth, felt, there in zip(
-            seen, result.seen.whisks, result.felt.ways_back, result.felt.whisks
+        for seen, seen_there, felt, felt_there in zip(
+            seen_back, result.seen.whisks, felt_back, result.felt.whisks
         ):
-            d_x = one.d_x_mm if one.has_truth else forth.d_x_mm
-            found += [
-                WayBack(result, one, d_x, felt, there, a)
-                for a in felt.estimates or (EstimateRow("", UNKNOWN),)
-            ]
+            d_x_mm = seen.d_x_mm if seen.has_truth else seen_there.d_x_mm
+            for answer in felt.estimates or (EstimateRow("", UNKNOWN),):
+                found.append(WayBack(result, seen, d_x_mm, felt, felt_there, answer))
     return found
-
-
-def write_both_ways(out: Path, found: Sequence[WayBack]) -> None:
-    """both_ways.csv; nothing where no way back was asked for."""
-    if found:
-        BOTH_WAYS.write(out, map(_row, found))
-
-
-def _row(one: WayBack) -> dict:
-    """Return the row of a way back and estimator."""
-    seen = one.seen
-    felt = one.felt
-    answer = one.answer
-    phi_seen_rad = np.nan if seen.at is None else seen.at.phi_rad.value
-    return {
-        "trial": one.result.trial.name,
-        "whisk": seen.whisk,
-        "surface": one.result.trial.surface,
-        "touch_deg": float(np.degrees(seen.touch_rad.value)),
-        "touch_sigma_deg": float(np.degrees(seen.touch_rad.sigma)),
-        "touch_felt_deg": float(np.degrees(felt.touch_felt_rad.value)),
-        "touch_felt_sigma_deg": float(np.degrees(felt.touch_felt_rad.sigma)),
-        "d_x_mm": float(one.d_x_mm.value),
-        "d_x_sigma_mm": float(one.d_x_mm.sigma),
-        "beta_deg": float(np.degrees(seen.beta_rad.value)),
-        "beta_sigma_deg": float(np.degrees(seen.beta_rad.sigma)),
-        "phi_seen_deg": float(np.degrees(phi_seen_rad)),
-        "phi_felt_deg": float(np.degrees(felt.phi_felt_rad.value)),
-        "phi_there_deg": float(np.degrees(one.there.phi_felt_rad.value)),
-        "m_y_Nmm": felt.m_y_Nmm.value,
-        "m_z_Nmm": felt.m_z_Nmm.value,
-        "estimator": answer.estimator,
-        "d_x_est_mm": answer.d_x_est_mm.value,
-        "d_x_est_sigma_mm": answer.d_x_est_mm.sigma,
-        "d_x_est_low_mm": answer.d_x_est_low_mm,
-        "d_x_est_high_mm": answer.d_x_est_high_mm,
-        "beta_est_deg": float(np.degrees(answer.beta_est_rad)),
-        "alpha_est_deg": float(np.degrees(answer.alpha_est_rad)),
-        "error_mm": one.error_mm,
-        "error_percent": 100.0 * one.error_mm / float(one.d_x_mm.value),
-        "inside": None if one.inside is None else int(one.inside),
-        "status": in_one_status(seen.status, felt.status, answer.status),
-    }
-
-
-def both_ways_lines(found: Sequence[WayBack]) -> Iterator[str]:
-    """For the summary: a line an estimator, over the ways back whose truth is known."""
-    judged = [one for one in found if np.isfinite(one.error_mm)]
-    for name in dict.fromkeys(one.answer.estimator for one in judged):
-        mine = [one for one in judged if one.answer.estimator == name]
-        percent = [100.0 * one.error_mm / float(one.d_x_mm.value) for one in mine]
-        held = sum(bool(one.inside) for one in mine)
-        yield (
-            f"{label_of(name)}: error of d_x {np.sqrt(np.mean(np.square(percent))):.2g} % RMS; its 95 % interval holds "
-            f"{held} of {counted(len(mine), 'way')} back"
-        )

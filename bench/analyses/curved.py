@@ -8,10 +8,12 @@ Appendix B, by (23) to (25) as printed and by the exact form.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.analysis import Analysis, Run
+from bench.analyses.gave import OBJECT
+from bench.analyses.pooling import angle_cells, known_rows, measured, value_cells
 from bench.base.settings import TILT_SIGMA_RAD
 from bench.base.tables import TRIAL, WHISK, Column, Table, status, with_sigma
 from bench.records.trial_result import FeltAt, FeltWhisk, TrialResult, whisks
@@ -43,9 +45,8 @@ CURVATURE = Table(
         status("what is missing"),
     ),
 )
-_FIRST_RAD = np.radians(
-    0.95
-)  # nearer to touch the window of a moment is shorter, and (10) mostly noise
+# Nearer to touch the window of a moment is shorter, and (10) mostly noise.
+_FIRST_RAD = np.radians(0.95)
 _APART_RAD = np.radians(0.95)  # windows of half a degree to either side share no sample
 _FEWEST = 6  # angles, for four numbers
 _HELD_SIGMAS = 2.0  # a slip angle within so many of its own is none: 95 % of whisks that are held
@@ -57,8 +58,10 @@ TOO_FEW = f"needs moments at {_FEWEST} pushing angles a degree apart: push furth
 
 @dataclass(frozen=True)
 class Curved:
-    """Of one whisk: the object's radius in the whisking plane, mm; φ at touch, rad; lateral curvature, 1/mm, by the
-    exact form and by (24) as printed. NaN where it is not told, and why.
+    """The curvature of an object by one whisk; NaN where it is not known, and status says why.
+
+    angles: how many pushing angles served. radius_mm: in the whisking plane. phi_0_rad: φ at touch.
+    lateral_per_mm: curvature in the sensing plane by the exact form; lateral_printed_per_mm: by (24).
     """
 
     angles: int
@@ -69,178 +72,213 @@ class Curved:
     status: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class CurvedWhisk:
+    """A whisk, and the curvature of its object."""
+
+    result: TrialResult
+    felt: FeltWhisk
+    curved: Curved
+
+    @property
+    def bar_radius_mm(self) -> float:
+        """Return the radius of the bar as stated."""
+        return 0.5 * self.result.trial.bar_diameter_mm
+
+
+class Curvature(Analysis):
+    """How objects are curved along and across the whisker's way."""
+
+    tables = (CURVATURE,)
+    heading = OBJECT
+
+    def compute(self, run: Run) -> list[CurvedWhisk]:
+        """Return the curvature by every measured whisk with sound moments."""
+        alpha_est = Value(run.settings.alpha_est_rad, run.alpha_est_sigma_rad)
+        found = []
+        for result, seen, felt in whisks(measured(run.results)):
+            if felt.has_moments and is_sound(seen, felt):
+                by_whisk = curved(felt.by_theta, run.whisker, alpha_est.value, alpha_est.sigma)
+                found.append(CurvedWhisk(result, felt, by_whisk))
+        return found
+
+    def row(self, one: CurvedWhisk) -> dict:
+        """Return the row of a whisk."""
+        by_whisk = one.curved
+        return {
+            "trial": one.result.trial.name,
+            "whisk": one.felt.whisk,
+            "angles": by_whisk.angles,
+            **value_cells("radius_mm", by_whisk.radius_mm),
+            "bar_radius_mm": one.bar_radius_mm,
+            **angle_cells("phi_0_deg", by_whisk.phi_0_rad),
+            "lateral_per_mm": by_whisk.lateral_per_mm.value,
+            "lateral_sigma_per_mm": by_whisk.lateral_per_mm.sigma,
+            "lateral_printed_per_mm": by_whisk.lateral_printed_per_mm,
+            "status": by_whisk.status,
+        }
+
+    def lines(self, found: Sequence[CurvedWhisk]) -> Iterator[str]:
+        """Yield the mean radius less the bar's own, and whisks whose object is curved sideways."""
+        errors = []
+        for one in found:
+            radius = one.curved.radius_mm
+            errors.append((radius.value - one.bar_radius_mm, radius.sigma))
+        known, _ = known_rows(errors, 2)
+        if len(known):
+            error_mm, sigma_mm = known.T
+            precision = np.sum(sigma_mm**-2.0)
+            mean_mm = sigma_mm**-2.0 / precision @ error_mm
+            inside = 100.0 * np.mean(np.abs(error_mm) < Z_95 * sigma_mm)
+            yield (
+                f"radius of the object in the whisking plane, by successive contacts of {len(known)} "
+                f"whisks, less the bar's own: {mean_mm:+.1f} ± {precision**-0.5:.1f} mm, 95 % "
+                f"intervals hold in {inside:.0f} % (curvature.csv)"
+            )
+        for one in found:
+            lateral = one.curved.lateral_per_mm
+            if abs(lateral.value) > Z_95 * lateral.sigma:
+                yield (
+                    f"{one.result.trial.name}, whisk {one.felt.whisk}: curved to the side by "
+                    f"{lateral.value:.4f} ± {lateral.sigma:.4f} 1/mm (Appendix B; "
+                    f"{one.curved.lateral_printed_per_mm:.4f} by (24) as printed), or it leans along "
+                    "the whisker"
+                )
+
+
 def curved(
     felt: Iterable[FeltAt], whisker: Whisker, alpha_rad: float, alpha_sigma_rad: float
 ) -> Curved:
-    """What the moments of a whisk at successive pushing angles tell, at the first of these where φ turns far; α_est and
-    its sigma in rad."""
-    chosen = apart(felt)
-    if len(chosen) < _FEWEST:
-        return Curved(len(chosen), status=TOO_FEW)
-    theta, moments = (
-        np.array([at.theta_rad for at in chosen]),
-        np.array([(at.m_y_Nmm.value, at.m_z_Nmm.value) for at in chosen]),
-    )
-    phis = np.arctan2(*moments.T)
-    phi, phi_rate = _rate(theta, phis, [phi_sigma(at) for at in chosen])
-    beam, held = whisker.beam, abs(phi.value) <= _HELD_SIGMAS * phi.sigma
+    """Return the curvature by the moments of a whisk at successive pushing angles.
+
+    Where φ turns far, only the first angles count. alpha_rad, alpha_sigma_rad: the assumed friction
+    angle and its standard deviation.
+    """
+    chosen = independent_angles(felt)
+    count = len(chosen)
+    if count < _FEWEST:
+        return Curved(count, status=TOO_FEW)
+    theta = np.array([at.theta_rad for at in chosen])
+    m_y = np.array([at.m_y_Nmm.value for at in chosen])
+    m_z = np.array([at.m_z_Nmm.value for at in chosen])
+    phis = np.arctan2(m_y, m_z)
+    phi, phi_rate = _at_touch(theta, phis, np.array([phi_sigma(at) for at in chosen]))
+    is_held = abs(phi.value) <= _HELD_SIGMAS * phi.sigma
     span = float(np.ptp(phis))
-    if not held and span > _MOST_TURN * abs(phi.value) + _HELD_SIGMAS * phi.sigma:
-        if len(chosen) > _FEWEST:
+    if not is_held and span > _MOST_TURN * abs(phi.value) + _HELD_SIGMAS * phi.sigma:
+        if count > _FEWEST:
             return curved(chosen[:-1], whisker, alpha_rad, alpha_sigma_rad)
-        return Curved(
-            len(chosen),
-            phi_0_rad=phi,
-            status=f"phi turns by {np.degrees(span):.0f} degrees: too far",
-        )
-    distances = [_distance(at, alpha_rad, beam) for at in chosen]
+        too_far = f"phi turns by {np.degrees(span):.0f} degrees: too far"
+        return Curved(count, phi_0_rad=phi, status=too_far)
+    distances = np.array([_distance(at, alpha_rad, whisker.beam) for at in chosen])
     if not np.isfinite(distances).all():
-        return Curved(
-            len(chosen), phi_0_rad=phi, status="(10) has no distance at all of the angles"
-        )
-    d_x, creep = _rate(theta, *np.array(distances).T)
-    turned = 0.0 if held else _turned(d_x.value, phi.value, phi_rate, alpha_rad)
-    radius = _radius(
-        d_x.value, creep, 0.0 if held else phi.value, (alpha_rad, alpha_sigma_rad), turned, whisker
-    )
-    if held:
-        return Curved(
-            len(chosen), radius, phi, status="does not slip sideways: no lateral curvature"
-        )
-    return Curved(len(chosen), radius, phi, *_lateral(phi.value, phi_rate, d_x.value, alpha_rad))
+        unknown = "(10) has no distance at all of the angles"
+        return Curved(count, phi_0_rad=phi, status=unknown)
+    d_x, creep = _at_touch(theta, distances[:, 0], distances[:, 1])
+    alpha = Value(alpha_rad, alpha_sigma_rad)
+    if is_held:
+        radius = _radius(d_x.value, creep, 0.0, alpha, 0.0, whisker)
+        return Curved(count, radius, phi, status="does not slip sideways: no lateral curvature")
+    turned = _turned(d_x.value, phi.value, phi_rate, alpha_rad)
+    radius = _radius(d_x.value, creep, phi.value, alpha, turned, whisker)
+    lateral, printed = _lateral(phi.value, phi_rate, d_x.value, alpha_rad)
+    return Curved(count, radius, phi, lateral, printed)
 
 
-def apart(felt: Iterable[FeltAt]) -> list[FeltAt]:
-    """Those whose moments share no sample."""
+def independent_angles(felt: Iterable[FeltAt]) -> list[FeltAt]:
+    """Return the pushing angles whose moments share no sample, from the first on."""
     chosen: list[FeltAt] = []
     for at in sorted(felt, key=lambda at: at.theta_rad):
-        if at.theta_rad >= _FIRST_RAD and (
-            not chosen or at.theta_rad - chosen[-1].theta_rad >= _APART_RAD
-        ):
+        is_apart = not chosen or at.theta_rad - chosen[-1].theta_rad >= _APART_RAD
+        if at.theta_rad >= _FIRST_RAD and is_apart:
             chosen.append(at)
     return chosen
 
 
-def _rate(theta: np.ndarray, values, sigmas) -> tuple[Value, Value]:
-    """Value and rate at θ = 0 of what is felt at θ (n,): to second order, with a part that goes as 1/θ, as errors of
-    touch and zero do. The sigmas also hold what is common to all angles."""
-    design = (
-        np.stack([np.ones_like(theta), theta, theta**2, 1 / theta], axis=1)
-        / np.asarray(sigmas)[:, None]
-    )
-    found, *_ = np.linalg.lstsq(design, values / np.asarray(sigmas), rcond=None)
-    spread = np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
-    return Value(float(found[0]), float(spread[0])), Value(float(found[1]), float(spread[1]))
+def weighted_fit(
+    columns: Sequence[np.ndarray], values: np.ndarray, sigmas: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Fit values (n,) of stated sigmas (n,) by a sum of columns, each (n,).
+
+    Returns the coefficients (k,), their covariance (k, k), and χ² of what is left.
+    """
+    design = np.stack(columns, axis=1) / sigmas[:, None]
+    coefficients, *_ = np.linalg.lstsq(design, values / sigmas, rcond=None)
+    residuals = values / sigmas - design @ coefficients
+    return coefficients, np.linalg.inv(design.T @ design), float(np.sum(residuals**2))
+
+
+def _at_touch(theta: np.ndarray, values: np.ndarray, sigmas: np.ndarray) -> tuple[Value, Value]:
+    """Return value and rate at θ = 0 of what is felt at θ (n,).
+
+    The fit is to second order, with a part that goes as 1/θ, as errors of touch and zero do. The
+    sigmas also hold what is common to all angles.
+    """
+    columns = (np.ones_like(theta), theta, theta**2, 1 / theta)
+    coefficients, covariance, _ = weighted_fit(columns, values, sigmas)
+    spread = np.sqrt(np.diag(covariance))
+    value = Value(float(coefficients[0]), float(spread[0]))
+    return value, Value(float(coefficients[1]), float(spread[1]))
 
 
 def phi_sigma(at: FeltAt) -> float:
-    """One sigma of φ by the moments, rad."""
+    """Return the standard deviation of φ by the moments, rad."""
     return slip_angle_sigma(at.m_y_Nmm.value, at.m_z_Nmm.value, at.covariance_at)
 
 
 def _distance(at: FeltAt, alpha_rad: float, beam: Beam) -> tuple[float, float]:
-    """(10) and its sigma by the moments alone, mm."""
-    felt = at.theta_rad, at.m_y_Nmm.value, at.m_z_Nmm.value, alpha_rad, beam.C_Nmm2
-    gradient = gradient_with_friction(*felt)
-    cylinder = float(gradient[0] * at.theta_rad)  # ∂d/∂θ = d/θ
-    d_x = float(beam.distance_mm(cylinder))
-    by_moments = gradient[1:3] * (d_x / cylinder) ** 2
-    return d_x, float(np.sqrt(by_moments @ at.covariance_at @ by_moments))
+    """Return d_x of (10) and its sigma by the moments alone, mm."""
+    gradient = gradient_with_friction(
+        at.theta_rad, at.m_y_Nmm.value, at.m_z_Nmm.value, alpha_rad, beam.C_Nmm2
+    )
+    cylinder_mm = float(gradient[0] * at.theta_rad)  # ∂d/∂θ = d/θ
+    d_x_mm = float(beam.distance_mm(cylinder_mm))
+    by_moments = gradient[1:3] * (d_x_mm / cylinder_mm) ** 2
+    return d_x_mm, float(np.sqrt(by_moments @ at.covariance_at @ by_moments))
 
 
-def _turned(d_x: float, phi: float, rate: Value, alpha_rad: float) -> float:
-    """What (10) may change by with θ, mm/rad, because φ turns by more than an object's lean by hand and noise let it:
-    by all of it where the object leans, by half of it the other way where it is curved to the side
-    (`bench.analyses.turning_phi`, docs/maps.md)."""
+def _turned(d_x_mm: float, phi: float, rate: Value, alpha_rad: float) -> float:
+    """Return by how much (10) may change with θ because φ turns, mm/rad.
+
+    Of the turn counts what is beyond an object's lean by hand and noise: all of it where the object
+    leans, half of it the other way where it is curved to the side (`bench.analyses.turning_phi`,
+    docs/maps.md).
+    """
     beta = min(abs(phi) + alpha_rad, 0.999 * RIGHT_ANGLE)
     by_hand = 0.5 * np.cos(beta) * np.tan(TILT_SIGMA_RAD)
     beyond = float(np.sqrt(max(rate.value**2 - rate.sigma**2 - by_hand**2, 0.0)))
-    return float(d_x * beyond * np.sin(abs(phi)) / (np.cos(alpha_rad) * np.cos(beta)))
+    return float(d_x_mm * beyond * np.sin(abs(phi)) / (np.cos(alpha_rad) * np.cos(beta)))
 
 
 def _radius(
-    d_x: float,
-    creep: Value,
-    phi: float,
-    alpha: tuple[float, float],
-    turned: float,
-    whisker: Whisker,
+    d_x_mm: float, creep: Value, phi: float, alpha: Value, turned: float, whisker: Whisker
 ) -> Value:
-    """Of the object, from the change of (10) with θ, mm/rad; phi 0 where the contact is held."""
-    left = whisker.beam.left(d_x)
-    per_mm = float(first_order.rolling(1.0, 1.0, phi, alpha[0], 1.0, left))
-    held = d_x * float(first_order.dragging(1.0, alpha[0])) if phi == 0 else 0.0
-    by_alpha = 0.2 * d_x * alpha[1] * first_order.HELD_SHARE if phi == 0 else 0.0
-    leaning = d_x * float(first_order.leaning(1.0, TILT_SIGMA_RAD, phi, alpha[0]))
-    reach = (creep.value - first_order.HELD_SHARE * held) / per_mm
-    others = np.array([creep.sigma, first_order.HELD_SPREAD * held, by_alpha, leaning, turned])
-    return Value(reach - 0.5 * whisker.diameter_mm * left, float(np.linalg.norm(others / per_mm)))
+    """Return the radius of the object by the change of (10) with θ, mm.
+
+    creep: that change, mm/rad. phi: 0 where the contact is held. alpha: as assumed, rad. turned: what
+    a turn of φ may add, mm/rad.
+    """
+    left = whisker.beam.left(d_x_mm)
+    per_mm = float(first_order.rolling(1.0, 1.0, phi, alpha.value, 1.0, left))
+    dragging = 0.0
+    by_alpha = 0.0
+    if phi == 0:
+        dragging = d_x_mm * float(first_order.dragging(1.0, alpha.value))
+        by_alpha = 0.2 * d_x_mm * alpha.sigma * first_order.HELD_SHARE
+    leaning = d_x_mm * float(first_order.leaning(1.0, TILT_SIGMA_RAD, phi, alpha.value))
+    reach_mm = (creep.value - first_order.HELD_SHARE * dragging) / per_mm
+    spread = first_order.HELD_SPREAD * dragging
+    sigmas = np.array([creep.sigma, spread, by_alpha, leaning, turned]) / per_mm
+    return Value(reach_mm - 0.5 * whisker.diameter_mm * left, float(np.linalg.norm(sigmas)))
 
 
-def _lateral(phi: float, rate: Value, d_x: float, alpha_rad: float) -> tuple[Value, float]:
-    """κ by the exact form, with its sigma, and by (24) as printed, 1/mm; one that leans turns φ by ½ θ cos β tan ψ."""
-    exact, printed = (
-        float(f(1.0, phi, alpha_rad)) / d_x
-        for f in (curvature.curvature_of_slip, curvature.curvature_of_slip_printed)
-    )
+def _lateral(phi: float, rate: Value, d_x_mm: float, alpha_rad: float) -> tuple[Value, float]:
+    """Return the lateral curvature by the exact form, and by (24) as printed, 1/mm.
+
+    An object that leans turns φ by ½ θ cos β tan ψ, which is in the sigma.
+    """
+    exact = float(curvature.curvature_of_slip(1.0, phi, alpha_rad)) / d_x_mm
+    printed = float(curvature.curvature_of_slip_printed(1.0, phi, alpha_rad)) / d_x_mm
     leaning = 0.5 * np.cos(abs(phi) + alpha_rad) * np.tan(TILT_SIGMA_RAD)
-    return Value(
-        exact * rate.value, abs(exact) * float(np.hypot(rate.sigma, leaning))
-    ), printed * rate.value
-
-
-def curved_whisks(
-    results: Iterable[TrialResult], whisker: Whisker, alpha_rad: float, alpha_sigma_rad: float
-) -> list[tuple[TrialResult, FeltWhisk, Curved]]:
-    """Of every measured whisk with moments of which nothing is doubtful."""
-    return [
-        (result, felt, curved(felt.by_theta, whisker, alpha_rad, alpha_sigma_rad))
-        for result, seen, felt in whisks(results)
-        if result.trial.purpose == "measure" and felt.has_moments and is_sound(seen, felt)
-    ]
-
-
-def write_curvature(out: Path, found: Sequence[tuple[TrialResult, FeltWhisk, Curved]]) -> None:
-    """Write curvature.csv."""
-    CURVATURE.write(out, (_row(*one) for one in found))
-
-
-def _row(result: TrialResult, felt: FeltWhisk, c: Curved) -> dict:
-    """Return the row of a whisk."""
-    return {
-        "trial": result.trial.name,
-        "whisk": felt.whisk,
-        "angles": c.angles,
-        "radius_mm": c.radius_mm.value,
-        "radius_sigma_mm": c.radius_mm.sigma,
-        "bar_radius_mm": 0.5 * result.trial.bar_diameter_mm,
-        "phi_0_deg": float(np.degrees(c.phi_0_rad.value)),
-        "phi_0_sigma_deg": float(np.degrees(c.phi_0_rad.sigma)),
-        "lateral_per_mm": c.lateral_per_mm.value,
-        "lateral_sigma_per_mm": c.lateral_per_mm.sigma,
-        "lateral_printed_per_mm": c.lateral_printed_per_mm,
-        "status": c.status,
-    }
-
-
-def curved_lines(found: Sequence[tuple[TrialResult, FeltWhisk, Curved]]) -> Iterator[str]:
-    """The mean radius beside the bar's own, and whisks whose object is curved to the side."""
-    known = [
-        (c.radius_mm.value - 0.5 * r.trial.bar_diameter_mm, c.radius_mm.sigma) for r, _, c in found
-    ]
-    off, sigma = np.array([pair for pair in known if np.isfinite(pair).all()]).reshape(-1, 2).T
-    if len(off):
-        weights = sigma**-2.0 / np.sum(sigma**-2.0)
-        holds = 100.0 * np.mean(np.abs(off) < Z_95 * sigma)
-        yield (
-            f"radius of the object in the whisking plane, by successive contacts of {len(off)} whisks, less the bar's "
-            f"own: {weights @ off:+.1f} ± {np.sum(sigma**-2.0) ** -0.5:.1f} mm, 95 % intervals hold in {holds:.0f} % "
-            "(curvature.csv)"
-        )
-    for result, felt, c in found:
-        if abs(c.lateral_per_mm.value) > Z_95 * c.lateral_per_mm.sigma:
-            yield (
-                f"{result.trial.name}, whisk {felt.whisk}: curved to the side by {c.lateral_per_mm.value:.4f} ± "
-                f"{c.lateral_per_mm.sigma:.4f} 1/mm (Appendix B; {c.lateral_printed_per_mm:.4f} by (24) as printed), "
-                "or it leans along the whisker"
-            )
+    sigma = abs(exact) * float(np.hypot(rate.sigma, leaning))
+    return Value(exact * rate.value, sigma), printed * rate.value

@@ -5,11 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bench.analyses.analysis import Analysis, Run
+from bench.analyses.pooling import angle_cells, degrees
 from bench.analyses.surfaces import Point, Surface
 from bench.base.drawing import SLOPES_DEG, blank, colour_of
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma
 from estimator.beam import moment_in_EI_per_metre
 from estimator.friction import curves
+from vision.truth.value import UNKNOWN, Value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,28 +42,48 @@ _MOST_COLUMNS = 4  # panels beside each other that can still be read on a page
 _LETTERS = "abcdefghijklmnopqrstuvwxyz"
 
 
+class Figure8(Analysis):
+    """Moments and slip angles against the slope, and the friction angle that fits them."""
+
+    figure_name = "fig8"
+    figure_title = "Fig. 8: moment and slip angle against slope"
+    figure_caption = (
+        "What was felt, |m| scaled to one d_x. Lines: (13), (14) with the α that fits the surface."
+    )
+
+    def compute(self, run: Run) -> list[Surface]:
+        """Return a panel for each surface and speed."""
+        return [friction.surface for friction in run.friction]
+
+    def figure(self, found: Sequence[Surface]) -> "Figure | None":
+        """Draw a column for each surface and speed."""
+        return figure_8(found) if found else None
+
+
 def figure_8(fitted: Sequence[Surface]) -> "Figure":
-    """A column for each surface and speed: |m| above, φ below."""
+    """Draw a column for each surface and speed: |m| above, φ below."""
     columns = min(len(fitted), _MOST_COLUMNS)
     blocks = -(-len(fitted) // columns)
     figure = blank(1.2 + 3.2 * columns, 5.2 * blocks)
     grid = figure.subplots(2 * blocks, columns, sharex=True, sharey="row", squeeze=False)
     for number in range(blocks * columns):
         block, column = divmod(number, columns)
-        pair = grid[2 * block : 2 * block + 2, column]
+        top = grid[2 * block, column]
+        bottom = grid[2 * block + 1, column]
         if number < len(fitted):
-            _panel(*pair, fitted[number], f"({_letter(number)})")
+            _draw_panel(top, bottom, fitted[number], f"({_letter(number)})")
         else:
-            for axes in pair:
-                axes.set_visible(False)
+            top.set_visible(False)
+            bottom.set_visible(False)
     for axes in grid[::2, 0]:  # once all panels of the row are drawn, which share their limits
         axes.set_ylabel("|m|  [EI/m]")
         axes.set_ylim(bottom=0)
     for axes in grid[1::2, 0]:
         axes.set_ylabel("slip angle φ  [°]")
-    named = {
-        label: line for axes in grid.flat for line, label in zip(*axes.get_legend_handles_labels())
-    }
+    named = {}
+    for axes in grid.flat:
+        lines, labels = axes.get_legend_handles_labels()
+        named |= zip(labels, lines)
     figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=2)
     return figure
 
@@ -71,55 +94,61 @@ def rows(fitted: Sequence[Surface]) -> Iterator[dict]:
     With one whisk a point, m_sd and phi_sd are its stated sigmas.
     """
     for number, surface in enumerate(fitted):
-        points, EI = surface.points(), surface.beam.rigidity_Nmm2
-        panel = {
-            "panel": _letter(number),
-            "surface": surface.name,
-            "speed_deg_s": surface.speed_deg_s,
-            "theta_deg": float(np.degrees(surface.theta_rad)),
-            "d_x_mm": surface.common_d_x_mm,
-            "alpha_deg": float(np.degrees(surface.alpha_rad)),
-            "alpha_sigma_deg": float(np.degrees(surface.fit.sigma_rad))
-            if surface.fit is not None
-            else float("nan"),
-        }
-        for p, m_fit, phi_fit in zip(
-            points, *_fitted(surface, np.array([p.beta_deg for p in points]))
-        ):
-            yield panel | {
-                "beta_deg": p.beta_deg,
-                "whisks": p.whisks,
-                "m_EI_per_metre": moment_in_EI_per_metre(p.m_Nmm, EI),
-                "m_sd_EI_per_metre": moment_in_EI_per_metre(p.m_sd_Nmm, EI),
-                "phi_deg": p.phi_deg,
-                "phi_sd_deg": p.phi_sd_deg,
-                "m_fit_EI_per_metre": float(m_fit),
-                "phi_fit_deg": float(phi_fit),
+        points = surface.points()
+        EI = surface.beam.rigidity_Nmm2
+        fit = surface.fit
+        alpha = UNKNOWN if fit is None else Value(fit.alpha_rad, fit.sigma_rad)
+        m_fit, phi_fit_deg = _fitted_curves(surface, np.array([one.beta_deg for one in points]))
+        for k, point in enumerate(points):
+            yield {
+                "panel": _letter(number),
+                "surface": surface.name,
+                "speed_deg_s": surface.speed_deg_s,
+                "theta_deg": degrees(surface.theta_rad),
+                "d_x_mm": surface.common_d_x_mm,
+                **angle_cells("alpha_deg", alpha),
+                "beta_deg": point.beta_deg,
+                "whisks": point.whisks,
+                "m_EI_per_metre": moment_in_EI_per_metre(point.m_Nmm, EI),
+                "m_sd_EI_per_metre": moment_in_EI_per_metre(point.m_sd_Nmm, EI),
+                "phi_deg": point.phi_deg,
+                "phi_sd_deg": point.phi_sd_deg,
+                "m_fit_EI_per_metre": float(m_fit[k]),
+                "phi_fit_deg": float(phi_fit_deg[k]),
             }
 
 
 def _letter(number: int) -> str:
+    """Return the letter of a panel."""
     return _LETTERS[number % len(_LETTERS)]
 
 
-def _fitted(surface: Surface, beta_deg) -> tuple[np.ndarray, np.ndarray]:
-    """|m| [EI/m] and φ [°] of (13), (14) at the fitted α over slopes (n,); NaN where there is no fit."""
+def _fitted_curves(surface: Surface, beta_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return |m| [EI/m] and φ [°] of (13), (14) at the fitted α over slopes (n,).
+
+    NaN where there is no fit.
+    """
     if surface.fit is None:
-        return np.full(len(beta_deg), np.nan), np.full(len(beta_deg), np.nan)
+        nothing = np.full(len(beta_deg), np.nan)
+        return nothing, nothing
     beam = surface.beam
-    as_cylinder = beam.as_cylinder_mm(surface.common_d_x_mm)
-    m, phi = curves(
-        surface.alpha_rad, np.radians(beta_deg), as_cylinder, surface.theta_rad, beam.C_Nmm2
-    )
+    d_x_mm = beam.as_cylinder_mm(surface.common_d_x_mm)
+    beta_rad = np.radians(beta_deg)
+    m, phi = curves(surface.alpha_rad, beta_rad, d_x_mm, surface.theta_rad, beam.C_Nmm2)
     return moment_in_EI_per_metre(m, beam.rigidity_Nmm2), np.degrees(phi)
 
 
-def _panel(top: "Axes", bottom: "Axes", surface: Surface, letter: str) -> None:
-    """|m| above, φ below; negative slopes are drawn at their mirror image's place."""
-    points, EI = surface.points(), surface.beam.rigidity_Nmm2
-    beta = [abs(p.beta_deg) for p in points]
+def _draw_panel(top: "Axes", bottom: "Axes", surface: Surface, letter: str) -> None:
+    """Draw |m| above, φ below; negative slopes stand at their mirror image's place."""
+    points = surface.points()
+    EI = surface.beam.rigidity_Nmm2
+    beta_deg = [abs(point.beta_deg) for point in points]
+    m = [moment_in_EI_per_metre(point.m_Nmm, EI) for point in points]
+    m_sd = [moment_in_EI_per_metre(point.m_sd_Nmm, EI) for point in points]
+    phi_deg = [abs(point.phi_deg) for point in points]
+    phi_sd_deg = [point.phi_sd_deg for point in points]
     # Hollow points no larger than caps: bars of half a degree are seen.
-    look = {
+    bars = {
         "fmt": "o",
         "ms": 3,
         "mfc": "white",
@@ -130,33 +159,23 @@ def _panel(top: "Axes", bottom: "Axes", surface: Surface, letter: str) -> None:
         "lw": 0,
         "zorder": 3,
     }
-    top.errorbar(
-        beta,
-        [moment_in_EI_per_metre(p.m_Nmm, EI) for p in points],
-        [moment_in_EI_per_metre(p.m_sd_Nmm, EI) for p in points],
-        **look,
-        label=_what(points),
-    )
-    bottom.errorbar(beta, [abs(p.phi_deg) for p in points], [p.phi_sd_deg for p in points], **look)
+    top.errorbar(beta_deg, m, m_sd, **bars, label=_meaning(points))
+    bottom.errorbar(beta_deg, phi_deg, phi_sd_deg, **bars)
+    fitted = ""
     if surface.fit is not None:
-        m, phi = _fitted(surface, SLOPES_DEG)
-        alpha, sigma = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
-        line = {"color": colour_of("with_friction"), "lw": 1.4}
-        top.plot(SLOPES_DEG, m, **line, label="(13), (14) with the fitted α")
-        bottom.plot(SLOPES_DEG, phi, **line)
-        held = f"α = {alpha:.2f} ± {sigma:.2f}°\n"
-    else:
-        held = ""
+        m_fit, phi_fit_deg = _fitted_curves(surface, SLOPES_DEG)
+        colour = colour_of("with_friction")
+        label = "(13), (14) with the fitted α"
+        top.plot(SLOPES_DEG, m_fit, color=colour, lw=1.4, label=label)
+        bottom.plot(SLOPES_DEG, phi_fit_deg, color=colour, lw=1.4)
+        alpha_deg, sigma_deg = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
+        fitted = f"α = {alpha_deg:.2f} ± {sigma_deg:.2f}°\n"
     top.set_title(f"{letter} {surface.title}", loc="left")
-    bottom.set(
-        xlabel="slope β  [°]" + (" (nominal)" if surface.felt[0].nominal else ""),
-        xlim=(-2, 82),
-        ylim=(-3, 82),
-    )
-    spread = 100.0 * float(np.median([p.m_sd_Nmm / p.m_Nmm for p in points]))
-    told = f"{held}|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)"
+    nominal = " (nominal)" if surface.felt[0].nominal else ""
+    bottom.set(xlabel=f"slope β  [°]{nominal}", xlim=(-2, 82), ylim=(-3, 82))
+    spread = 100.0 * float(np.median([point.m_sd_Nmm / point.m_Nmm for point in points]))
     top.annotate(
-        told,
+        f"{fitted}|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)",
         (0.04, 0.04),
         xycoords="axes fraction",
         fontsize=7,
@@ -166,6 +185,7 @@ def _panel(top: "Axes", bottom: "Axes", surface: Surface, letter: str) -> None:
     )
 
 
-def _what(points: Sequence[Point]) -> str:
-    most = max(p.whisks for p in points)
+def _meaning(points: Sequence[Point]) -> str:
+    """Return what points and their bars are."""
+    most = max(point.whisks for point in points)
     return "one whisk each, ± its sigma" if most == 1 else f"mean ± SD of up to {most} whisks"

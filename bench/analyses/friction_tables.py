@@ -1,12 +1,15 @@
-"""What a session tells of friction: friction.csv (whisks), phases.csv (stick and slip), surfaces.csv, summary lines."""
+"""The friction of a session: friction.csv (whisks), phases.csv (stick and slip), surfaces.csv."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bench.analyses.alphas import UNKNOWN, WhiskAlphas, alphas_of, mean_alpha
+from bench.analyses.analysis import Analysis, Heading, PageTable, Run, read_rows
+from bench.analyses.page_cells import cell_with_sigma, panel_cell
+from bench.analyses.pooling import angle_cells, degrees, measured
 from bench.analyses.section_vii import (
     Way,
     by_consistency,
@@ -16,30 +19,16 @@ from bench.analyses.section_vii import (
     weights,
 )
 from bench.analyses.surfaces import Surface, surfaces
-from bench.base.tables import (
-    SPEED,
-    SURFACE,
-    TRIAL,
-    WHISK,
-    Column,
-    Kind,
-    Table,
-    alike,
-    sigma_name,
-    with_sigma,
-)
-from bench.records.phases import KINETIC, STATIC
+from bench.base.tables import SPEED, SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, with_sigma
+from bench.records.phases import KINETIC, STATIC, Phases
 from bench.records.trial_result import TrialResult
 from bench.session.whisker import Whisker
-from bench.trials.estimate_errors import Judged, judge
+from bench.trials.estimate_errors import judge
+from vision.truth.value import Value
 
+FRICTION_ANGLE = Heading("friction", "Friction angle α (± one sigma)")
 RECORDS = ("seen", "felt")
 WAYS = ("tilting", "consistency", "smoothness")
-_APART = tuple((kind, record) for kind in (STATIC, KINETIC) for record in RECORDS)
-
-
-# What the records of whisks hold of α: in the friction of a whisk, and as means in that of a surface.
-_OF_WHISK = (*RECORDS, *(f"{kind}_{record}" for kind, record in _APART))
 FRICTION = Table(
     "friction",
     "A row a whisk: friction angles α, each with its sigma.",
@@ -117,11 +106,23 @@ SURFACES = Table(
 )
 
 
+# Columns of SURFACES on the page, where any surface has a number there.
+_ON_PAGE = {
+    "seen": "seen",
+    "felt": "felt",
+    "least_squares": "fit of Fig. 8",
+    "tilting": "tilting",
+    "consistency": "one distance",
+    "smoothness": "several distances",
+}
+
+
 @dataclass(frozen=True)
 class SurfaceFriction:
-    """All that one surface at one speed tells of α: of its whisks, Fig. 8's fit, the ways of section VII.
+    """The friction angle of one surface at one speed, by every way that finds it.
 
-    error_rms_percent, error_rms_weighted_percent: of (10), α_est given, all whisks alike or by confidence.
+    surface: the fit of Fig. 8. ways: those of section VII. error_rms_percent: of (10) with α_est as
+    given, all whisks alike; error_rms_weighted_percent: weighted by confidence.
     """
 
     surface: Surface
@@ -131,156 +132,214 @@ class SurfaceFriction:
     error_rms_weighted_percent: float
 
     def alpha(self, name: str) -> tuple[float, float]:
-        """(value, sigma) in rad by the name in the columns; NaN where it is not known."""
+        """Return (value, sigma) in rad by the name in the columns of SURFACES; NaN if not known."""
         if name in RECORDS:
-            return mean_alpha(getattr(w, name) for w in self.whisks)
+            return mean_alpha(getattr(whisk, name) for whisk in self.whisks)
         if name == "least_squares":
             fit = self.surface.fit
             return (fit.alpha_rad, fit.sigma_rad) if fit else UNKNOWN
         kind, _, record = name.partition("_")
         if record:
-            return mean_alpha(w.apart(kind, record) for w in self.whisks)
+            return mean_alpha(whisk.apart(kind, record) for whisk in self.whisks)
         way = next(way for way in self.ways if way.name == name)
         return way.alpha_rad, way.sigma_rad
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionResult:
+    """Friction angles of all whisks, those of the surfaces, and the assumed one."""
+
+    whisks: tuple[WhiskAlphas, ...]
+    surfaces: tuple[SurfaceFriction, ...]
+    alpha_est_rad: float
+
+
+class Friction(Analysis):
+    """How rough each surface is, seen and felt."""
+
+    tables = (FRICTION, PHASES, SURFACES)
+    heading = FRICTION_ANGLE
+
+    def compute(self, run: Run) -> FrictionResult:
+        """Return the friction angles of whisks and surfaces."""
+        alphas = tuple(alphas_of(run.results))
+        return FrictionResult(alphas, run.friction, run.settings.alpha_est_rad)
+
+    def rows(self, found: FrictionResult) -> dict[Table, Iterable[dict]]:
+        """Return a row a whisk, a row an end of a rest or jump, a row a surface and speed."""
+        phi_rad = {}
+        for one in found.surfaces:
+            for felt in one.surface.felt:
+                phi_rad[felt.trial, felt.whisk] = np.radians(felt.phi_deg)
+        of_whisks = []
+        for whisk in found.whisks:
+            confidence = None
+            if whisk.key in phi_rad:
+                confidence = float(weights([phi_rad[whisk.key]], found.alpha_est_rad)[0])
+            of_whisks.append(_whisk_row(whisk, confidence))
+        of_surfaces = [_surface_row(one) for one in found.surfaces]
+        return {FRICTION: of_whisks, PHASES: _phase_rows(found.whisks), SURFACES: of_surfaces}
+
+    def lines(self, found: FrictionResult) -> Iterator[str]:
+        """Yield a line a surface with α seen, felt and fitted; then stick–slip and section VII."""
+        if not found.surfaces:
+            return
+        yield f"{'surface':<24}{'whisks':>7}  {'seen':>15}  {'felt':>15}  {'Fig. 8 fit':>15}"
+        for one in found.surfaces:
+            names = (*RECORDS, "least_squares")
+            cells = "  ".join(f"{_alpha_text(one.alpha(name)):>15}" for name in names)
+            yield f"{one.surface.title:<24}{len(one.whisks):>7}  {cells}"
+        for one in found.surfaces:
+            for line in (*_stick_slip_lines(one), *_section_vii_lines(one)):
+                yield f"{one.surface.title}: {line}"
+
+    def page_table(self, out: Path) -> PageTable | None:
+        """Return a row a surface and speed, a column a way that finds any angle."""
+        table = read_rows(out, SURFACES)
+        ways = []
+        for way in _ON_PAGE:
+            if any(np.isfinite(row[f"alpha_{way}_deg"]) for row in table):
+                ways.append(way)
+        if not ways:
+            return None
+        head = ("surface", "whisks", *(f"{_ON_PAGE[way]} [°]" for way in ways))
+        rows = []
+        for row in table:
+            cells = [cell_with_sigma(row, f"alpha_{way}", "deg") for way in ways]
+            rows.append((panel_cell(row), str(row["whisks"]), *cells))
+        title = "Friction angle α of each surface, way by way"
+        return PageTable(title, SURFACES.file, head, tuple(rows))
 
 
 def friction_of(
     results: Sequence[TrialResult], whisker: Whisker, alpha_est_rad: float
 ) -> list[SurfaceFriction]:
-    """Every surface and speed among the measure trials."""
-    alphas = alphas_of(results)
-    return [
-        _friction(s, results, alphas, whisker, alpha_est_rad)
-        for s in surfaces(results, whisker.beam)
-    ]
+    """Return the friction of every surface and speed among the trials that measure."""
+    alphas = alphas_of(measured(results))
+    error_percent = {}
+    for judged in judge(results):
+        if judged.estimator == "with_friction" and not judged.one_factor:
+            error_percent[judged.trial, judged.whisk] = judged.error_percent
+    found = []
+    for surface in surfaces(results, whisker.beam):
+        felt = contacts(results, surface.panel)
+        ways = (by_tilting(felt), by_consistency(felt, whisker), by_smoothness(felt, whisker))
+        errors = []
+        phi_rad = []
+        for one in surface.felt:
+            error = error_percent.get((one.trial, one.whisk), np.nan)
+            if np.isfinite(error):
+                errors.append(error)
+                phi_rad.append(np.radians(one.phi_deg))
+        of_surface = tuple(alpha for alpha in alphas if alpha.panel == surface.panel)
+        friction = SurfaceFriction(
+            surface,
+            of_surface,
+            ways,
+            _weighted_rms(errors, np.ones(len(errors))),
+            _weighted_rms(errors, weights(phi_rad, alpha_est_rad)),
+        )
+        found.append(friction)
+    return found
 
 
-def _friction(
-    surface: Surface,
-    results: Sequence[TrialResult],
-    alphas: Sequence[WhiskAlphas],
-    whisker: Whisker,
-    alpha_est_rad: float,
-) -> SurfaceFriction:
-    mine = tuple(a for a in alphas if a.purpose == "measure" and a.panel == surface.panel)
-    felt = contacts(results, surface.panel)
-    ways = by_tilting(felt), by_consistency(felt, whisker), by_smoothness(felt, whisker)
-    errors = {(j.trial, j.whisk): j.error_percent for j in judge(results) if _is_given(j)}
-    phi = {(f.trial, f.whisk): np.radians(f.phi_deg) for f in surface.felt}
-    known = [k for k in phi if np.isfinite(errors.get(k, np.nan))]
-    squares = np.array([errors[k] ** 2 for k in known])
-    trusted = weights([phi[k] for k in known], alpha_est_rad)
-    return SurfaceFriction(
-        surface, mine, ways, _rms(squares, np.ones(len(squares))), _rms(squares, trusted)
-    )
+def _weighted_rms(errors: Sequence[float], shares: np.ndarray) -> float:
+    """Return the root of the weighted mean square; NaN where no weight is left."""
+    if not (len(errors) and shares.sum() > 0):
+        return np.nan
+    return float(np.sqrt(shares @ np.square(errors) / shares.sum()))
 
 
-def _is_given(judged: Judged) -> bool:
-    return judged.estimator == "with_friction" and not judged.one_factor
-
-
-def _rms(squares, shares) -> float:
-    return (
-        float(np.sqrt(shares @ squares / shares.sum()))
-        if len(squares) and shares.sum() > 0
-        else float("nan")
-    )
-
-
-def write_friction(
-    out: Path,
-    results: Sequence[TrialResult],
-    friction: Sequence[SurfaceFriction],
-    alpha_est_rad: float,
-) -> None:
-    """Write friction.csv, phases.csv and surfaces.csv."""
-    alphas = alphas_of(results)
-    phi = {(f.trial, f.whisk): np.radians(f.phi_deg) for s in friction for f in s.surface.felt}
-    FRICTION.write(out, (_whisk_row(a, phi.get(a.key), alpha_est_rad) for a in alphas))
-    PHASES.write(out, (row for a in alphas for row in _phase_rows(a)))
-    SURFACES.write(out, map(_surface_row, friction))
-
-
-def _whisk_row(a: WhiskAlphas, phi_rad: float | None, alpha_est_rad: float) -> dict:
-    row = {"trial": a.trial, "whisk": a.whisk, "surface": a.surface, "speed_deg_s": a.speed_deg_s}
-    row |= {
-        "beta_deg": float(np.degrees(a.beta_rad)),
-        "beta_from": "manifest" if a.nominal else "pictures",
+def _whisk_row(whisk: WhiskAlphas, confidence: float | None) -> dict:
+    """Return the row of a whisk in FRICTION."""
+    row = {
+        "trial": whisk.trial,
+        "whisk": whisk.whisk,
+        "surface": whisk.surface,
+        "speed_deg_s": whisk.speed_deg_s,
+        "beta_deg": degrees(whisk.beta_rad),
+        "beta_from": "manifest" if whisk.nominal else "pictures",
+        "confidence": confidence,
     }
-    row |= _cells("seen", a.seen) | _cells("felt", a.felt)
-    for kind, record in _APART:
-        row |= _cells(f"{kind}_{record}", a.apart(kind, record))
-    for record, phases in (("seen", a.phases_seen), ("felt", a.phases_felt)):
-        row |= {f"rests_{record}": phases.rests, f"jumps_{record}": phases.jumps}
-    return row | {
-        "confidence": None if phi_rad is None else float(weights([phi_rad], alpha_est_rad)[0])
-    }
-
-
-def _phase_rows(a: WhiskAlphas) -> Iterator[dict]:
-    for record, phases in (("seen", a.phases_seen), ("felt", a.phases_felt)):
-        for angle in phases.angles:
-            row = {"trial": a.trial, "whisk": a.whisk, "record": record, "kind": angle.kind}
-            degrees = np.degrees([angle.theta_rad, angle.alpha_rad, angle.sigma_rad])
-            yield row | dict(zip(("theta_deg", "alpha_deg", "alpha_sigma_deg"), degrees.tolist()))
-
-
-def _surface_row(s: SurfaceFriction) -> dict:
-    row = {"surface": s.surface.name, "speed_deg_s": s.surface.speed_deg_s, "whisks": len(s.whisks)}
-    for name in (*_OF_WHISK, "least_squares", *WAYS):
-        row |= _cells(name, s.alpha(name))
-    notes = [f"{way.name}: {way.status}" for way in s.ways if way.status]
-    row |= {
-        "error_rms_percent": s.error_rms_percent,
-        "error_rms_weighted_percent": s.error_rms_weighted_percent,
-    }
-    return row | {"notes": "; ".join(notes)}
-
-
-def _cells(name: str, pair: tuple[float, float]) -> dict:
-    column = f"alpha_{name}_deg"
-    return {column: float(np.degrees(pair[0])), sigma_name(column): float(np.degrees(pair[1]))}
-
-
-def alpha_lines(friction: Sequence[SurfaceFriction]) -> Iterator[str]:
-    """The summary's table: α by every way, a line a surface; then stick–slip and section VII."""
-    if not friction:
-        return
-    yield f"{'surface':<24}{'whisks':>7}  {'seen':>15}  {'felt':>15}  {'Fig. 8 fit':>15}"
-    for s in friction:
-        cells = "  ".join(f"{_shown(s.alpha(name)):>15}" for name in (*RECORDS, "least_squares"))
-        yield f"{s.surface.title:<24}{len(s.whisks):>7}  {cells}"
-    for s in friction:
-        yield from (f"{s.surface.title}: {line}" for line in (*_stick_slip(s), *_section_vii(s)))
-
-
-def _stick_slip(s: SurfaceFriction) -> Iterator[str]:
     for record in RECORDS:
-        phases = [getattr(w, f"phases_{record}") for w in s.whisks]
-        jumps, rests = sum(p.jumps for p in phases), sum(p.rests for p in phases)
-        if jumps:
-            angles = " and ".join(
-                f"{kind} α = {_shown(s.alpha(f'{kind}_{record}'))}" for kind in (STATIC, KINETIC)
-            )
-            sticking = sum(p.jumps > 0 for p in phases)
-            by_hand = (
-                ", slopes as the manifest has them" if any(w.nominal for w in s.whisks) else ""
-            )
-            yield f"stick–slip {record}{by_hand} in {sticking} whisks, {rests} rests and {jumps} jumps; {angles}"
+        phases = whisk.phases(record)
+        row |= _alpha_cells(record, getattr(whisk, record))
+        row |= _alpha_cells(f"{STATIC}_{record}", whisk.apart(STATIC, record))
+        row |= _alpha_cells(f"{KINETIC}_{record}", whisk.apart(KINETIC, record))
+        row |= {f"rests_{record}": phases.rests, f"jumps_{record}": phases.jumps}
+    return row
 
 
-def _section_vii(s: SurfaceFriction) -> Iterator[str]:
-    for way in s.ways:
-        if np.isfinite(way.alpha_rad):
-            doubt = f"; {way.status}" if way.status else ""
-            yield f"by {way.name} (section VII) α = {_shown((way.alpha_rad, way.sigma_rad))}{doubt}"
-    if np.isfinite(s.error_rms_weighted_percent) and len(s.whisks) > 1:
+def _phase_rows(whisks: Iterable[WhiskAlphas]) -> Iterator[dict]:
+    """Yield the rows of PHASES."""
+    for whisk in whisks:
+        for record in RECORDS:
+            for angle in whisk.phases(record).angles:
+                yield {
+                    "trial": whisk.trial,
+                    "whisk": whisk.whisk,
+                    "record": record,
+                    "kind": angle.kind,
+                    "theta_deg": degrees(angle.theta_rad),
+                    **angle_cells("alpha_deg", Value(angle.alpha_rad, angle.sigma_rad)),
+                }
+
+
+def _surface_row(one: SurfaceFriction) -> dict:
+    """Return the row of a surface and speed in SURFACES."""
+    row = {
+        "surface": one.surface.name,
+        "speed_deg_s": one.surface.speed_deg_s,
+        "whisks": len(one.whisks),
+        "error_rms_percent": one.error_rms_percent,
+        "error_rms_weighted_percent": one.error_rms_weighted_percent,
+        "notes": "; ".join(f"{way.name}: {way.status}" for way in one.ways if way.status),
+    }
+    phases = [f"{kind}_{record}" for kind in (STATIC, KINETIC) for record in RECORDS]
+    for name in (*RECORDS, *phases, "least_squares", *WAYS):
+        row |= _alpha_cells(name, one.alpha(name))
+    return row
+
+
+def _alpha_cells(name: str, alpha: tuple[float, float]) -> dict:
+    """Return the cells of a friction angle (value, sigma) in rad."""
+    return angle_cells(f"alpha_{name}_deg", Value(*alpha))
+
+
+def _stick_slip_lines(one: SurfaceFriction) -> Iterator[str]:
+    """Yield a line on stick–slip as seen, and one as felt, where there is any."""
+    for record in RECORDS:
+        phases: list[Phases] = [whisk.phases(record) for whisk in one.whisks]
+        jumps = sum(each.jumps for each in phases)
+        if not jumps:
+            continue
+        rests = sum(each.rests for each in phases)
+        sticking = sum(each.jumps > 0 for each in phases)
+        static = _alpha_text(one.alpha(f"{STATIC}_{record}"))
+        kinetic = _alpha_text(one.alpha(f"{KINETIC}_{record}"))
+        is_nominal = any(whisk.nominal for whisk in one.whisks)
+        by_hand = ", slopes as the manifest has them" if is_nominal else ""
         yield (
-            f"RMS error of (10), α_est given: {s.error_rms_percent:.2f} %, weighted by confidence (section VII) "
-            f"{s.error_rms_weighted_percent:.2f} %"
+            f"stick–slip {record}{by_hand} in {sticking} whisks, {rests} rests and {jumps} jumps; "
+            f"{STATIC} α = {static} and {KINETIC} α = {kinetic}"
         )
 
 
-def _shown(pair: tuple[float, float]) -> str:
-    value, sigma = np.degrees(pair)
+def _section_vii_lines(one: SurfaceFriction) -> Iterator[str]:
+    """Yield α by the ways of section VII, and the error of (10) weighted by confidence."""
+    for way in one.ways:
+        if np.isfinite(way.alpha_rad):
+            status = f"; {way.status}" if way.status else ""
+            alpha = _alpha_text((way.alpha_rad, way.sigma_rad))
+            yield f"by {way.name} (section VII) α = {alpha}{status}"
+    if np.isfinite(one.error_rms_weighted_percent) and len(one.whisks) > 1:
+        yield (
+            f"RMS error of (10), α_est given: {one.error_rms_percent:.2f} %, weighted by confidence "
+            f"(section VII) {one.error_rms_weighted_percent:.2f} %"
+        )
+
+
+def _alpha_text(alpha: tuple[float, float]) -> str:
+    """Return a friction angle (value, sigma) in degrees; a dash where it is not known."""
+    value, sigma = np.degrees(alpha)
     return f"{value:.2f} ± {sigma:.2f}°" if np.isfinite(value) else "-"

@@ -1,15 +1,15 @@
-"""How far objects that give way were seen to come, and over the force felt how soft they are: gives_way.csv, lines of
-the summary, and what compliance.csv has beside section VII's.
+"""How far objects that give way were seen to come, and over the force felt how soft they are: gives_way.csv.
 
 Only where a trial says that its object gives way (object_gives_way in trial.toml). The way is seen without any gauge;
-only what it is worth in mm/N takes the force that is felt.
+only what it is worth in mm/N takes the force that is felt. compliance.csv has that next to section VII's.
 """
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.pooling import grouped, panel_title, rms
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.trials.estimate_errors import is_sound
@@ -36,89 +36,113 @@ GIVES_WAY = Table(
 )
 
 
-def write_gives_way(out: Path, results: Sequence[TrialResult]) -> None:
-    """gives_way.csv, a row a touching frame; nothing where no object gave way."""
-    rows = [
-        row
-        for result, seen, _ in whisks(results)
-        if seen.truth.gave is not None
-        for row in _rows(result, seen)
-    ]
-    if rows:
-        GIVES_WAY.write(out, rows)
+OBJECT = Heading("object", "The object")
 
 
-def _rows(result: TrialResult, seen: SeenWhisk) -> Iterator[dict]:
-    gave, trial = seen.truth.gave, result.trial
-    columns = gave.index, np.degrees(gave.theta_rad), gave.normal_mm.value, gave.normal_mm.sigma
-    for values in zip(*columns, gave.aside_mm.value, gave.aside_mm.sigma):
-        frame, *numbers = (value.item() for value in values)
-        yield dict(zip(GIVES_WAY.names, (trial.name, seen.whisk, trial.surface, frame, *numbers)))
+class GivesWay(Analysis):
+    """How far objects were seen to give way, and how soft that makes them."""
+
+    tables = (GIVES_WAY,)
+    in_every_run = False
+    heading = OBJECT
+
+    def compute(self, run: Run) -> tuple[TrialResult, ...]:
+        """Return the results as they are: they hold what was seen."""
+        return run.results
+
+    def rows(self, found: Sequence[TrialResult]) -> dict[Table, Iterator[dict]]:
+        """Return a row a touching frame; none where no object gave way."""
+        return {GIVES_WAY: _rows(found)}
+
+    def lines(self, found: Sequence[TrialResult]) -> Iterator[str]:
+        """Yield a line a surface and speed whose object was seen to give way."""
+        for panel, results in grouped(found, lambda result: result.trial.panel).items():
+            give, count = mean_give(results)
+            if count:
+                yield (
+                    f"{panel_title(*panel)}: seen to give way ({GIVES_WAY.file}); over the force "
+                    f"felt by {give.value:.3f} ± {give.sigma:.3f} mm/N ({counted(count, 'whisk')})"
+                )
+
+
+def _rows(results: Sequence[TrialResult]) -> Iterator[dict]:
+    """Yield the rows of all whisks whose object gave way."""
+    for result, seen, _ in whisks(results):
+        gave = seen.truth.gave
+        if gave is None:
+            continue
+        for k, frame in enumerate(gave.index):
+            yield {
+                "trial": result.trial.name,
+                "whisk": seen.whisk,
+                "surface": result.trial.surface,
+                "frame": int(frame),
+                "theta_deg": float(np.degrees(gave.theta_rad[k])),
+                "gave_mm": float(gave.normal_mm.value[k]),
+                "gave_sigma_mm": float(gave.normal_mm.sigma[k]),
+                "gave_aside_mm": float(gave.aside_mm.value[k]),
+                "gave_aside_sigma_mm": float(gave.aside_mm.sigma[k]),
+            }
 
 
 def gave_at(seen: SeenWhisk, theta_rad: float) -> Value:
-    """How far the object came along its normal up to a pushing angle, mm; NaN beyond the frames."""
+    """Return how far the object came along its normal up to a pushing angle, mm.
+
+    NaN beyond the frames.
+    """
     gave = seen.truth.gave
     if gave is None or not gave.theta_rad[0] <= theta_rad <= gave.theta_rad[-1]:
         return UNKNOWN
-    of = (
-        float(np.interp(theta_rad, gave.theta_rad, part))
-        for part in (gave.normal_mm.value, gave.normal_mm.sigma)
-    )
-    return Value(*of)
+    value = np.interp(theta_rad, gave.theta_rad, gave.normal_mm.value)
+    sigma = np.interp(theta_rad, gave.theta_rad, gave.normal_mm.sigma)
+    return Value(float(value), float(sigma))
 
 
 def normal_force_N(seen: SeenWhisk, felt: FeltWhisk) -> Value:
-    """Of the whisker on the object, along its normal: by the moments felt where the contact is seen,
-    (m_z cos β + m_y sin β)/d_x."""
-    m_y, m_z, d_x, beta = felt.m_y_Nmm, felt.m_z_Nmm, seen.d_x_mm, seen.beta_rad.value
-    along = m_y.value * np.sin(beta) + m_z.value * np.cos(beta)
-    own = np.hypot(m_y.sigma * np.sin(beta), m_z.sigma * np.cos(beta))
-    turned = (m_y.value * np.cos(beta) - m_z.value * np.sin(beta)) * seen.beta_rad.sigma
-    force = along / d_x.value
+    """Return the force of the whisker on the object, along its normal.
+
+    By the moments felt where the contact is seen: (m_z cos β + m_y sin β)/d_x.
+    """
+    m_y = felt.m_y_Nmm
+    m_z = felt.m_z_Nmm
+    d_x = seen.d_x_mm
+    sin = np.sin(seen.beta_rad.value)
+    cos = np.cos(seen.beta_rad.value)
+    moment = m_y.value * sin + m_z.value * cos
+    by_moments = np.hypot(m_y.sigma * sin, m_z.sigma * cos)
+    by_slope = (m_y.value * cos - m_z.value * sin) * seen.beta_rad.sigma
+    force = moment / d_x.value
+    by_distance = force * d_x.sigma / d_x.value
     return Value(
-        float(force),
-        float(np.hypot(np.hypot(own, turned) / d_x.value, force * d_x.sigma / d_x.value)),
+        float(force), float(np.hypot(np.hypot(by_moments, by_slope) / d_x.value, by_distance))
     )
 
 
 def give_seen(result: TrialResult, seen: SeenWhisk, felt: FeltWhisk) -> Value:
-    """Compliance of the object by the way seen and the force felt, mm/N; NaN where either is not known."""
+    """Return the object's compliance by the way seen and the force felt, mm/N.
+
+    NaN where either is not known.
+    """
     way = gave_at(seen, float(np.radians(result.theta_deg)))
     if not (np.isfinite(way.value) and felt.has_moments and seen.has_truth):
         return UNKNOWN
     force = normal_force_N(seen, felt)
     give = way.value / force.value
-    return Value(
-        give, abs(give) * float(np.hypot(way.sigma / way.value, force.sigma / force.value))
-    )
+    relative_sigma = float(np.hypot(way.sigma / way.value, force.sigma / force.value))
+    return Value(give, abs(give) * relative_sigma)
 
 
 def mean_give(results: Sequence[TrialResult]) -> tuple[Value, int]:
-    """Of all sound whisks whose object gave way: mean compliance, mm/N, and their number. Gauges and cameras are those
-    of all, so that the mean is known no better than one."""
-    each = [
-        give_seen(result, seen, felt)
-        for result, seen, felt in whisks(results)
-        if is_sound(seen, felt)
-    ]
-    each = [give for give in each if np.isfinite(give.value)]
-    if not each:
+    """Return the mean compliance of all sound whisks whose object gave way, mm/N, and their number.
+
+    Gauges and cameras are those of all, so that the mean is known no better than one.
+    """
+    gives = []
+    for result, seen, felt in whisks(results):
+        if is_sound(seen, felt):
+            gives.append(give_seen(result, seen, felt))
+    gives = [give for give in gives if np.isfinite(give.value)]
+    if not gives:
         return UNKNOWN, 0
-    sigma = float(np.sqrt(np.mean([give.sigma**2 for give in each])))
-    return Value(float(np.mean([give.value for give in each])), sigma), len(each)
-
-
-def gave_lines(results: Sequence[TrialResult]) -> Iterator[str]:
-    """A line a surface and speed whose object was seen to give way."""
-    for surface, speed in dict.fromkeys(r.trial.panel for r in results):
-        mine = [r for r in results if r.trial.panel == (surface, speed)]
-        give, count = mean_give(mine)
-        if count:
-            named = (
-                f"{surface or 'surface not named'}{f', {speed:g}°/s' if speed is not None else ''}"
-            )
-            yield (
-                f"{named}: seen to give way ({GIVES_WAY.file}); over the force felt by {give.value:.3f} ± {give.sigma:.3f} mm/N "
-                f"({counted(count, 'whisk')})"
-            )
+    mean = float(np.mean([give.value for give in gives]))
+    return Value(mean, rms(give.sigma for give in gives)), len(gives)

@@ -1,17 +1,24 @@
 """Which refinements of the model a scene requires: ledger.csv, a row a refinement and whisk.
 
-Each row says by how much truth, felt touch and estimate would differ without the refinement, beside their sigmas. What
+Each row says by how much truth, felt touch and estimate would differ without the refinement, and their sigmas. What
 is less than a tenth of every sigma may be left out: it adds no more than a two-hundredth to an error. It is kept even
-so, at every preset, for leaving it out would save next to nothing: beside it stands what it costs.
+so, at every preset, for leaving it out would save next to nothing: the row says what it costs.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.left_out import COST_PERCENT, NAMES, WhiskAtHand, of_estimate, of_truth
+from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.left_out import (
+    COST_PERCENT,
+    NAMES,
+    WhiskModel,
+    effect_on_estimate,
+    effect_on_truth,
+)
+from bench.analyses.pooling import grouped
 from bench.base.doubts import in_one_status
 from bench.base.tables import TRIAL, WHISK, Column, Kind, Table, alike, status
 from bench.records.trial_result import TrialResult, whisks
@@ -20,9 +27,12 @@ from bench.trials.clocks import shared_touch
 from vision.truth.value import NAN, UNKNOWN
 
 MATTERS = 0.1  # of a sigma: the user's own bound
-NEEDED, MAY_GO, NOT_KNOWN = "needed", "may be left out, kept", "not known"
+NEEDED = "needed"
+MAY_GO = "may be left out, kept"
+NOT_KNOWN = "not known"
 QUANTITIES = ("d_x_mm", "touch_deg", "slip_mm", "touch_felt_deg", "d_x_est_mm")
-_SIDE = {"touch_deg": "d_x_mm", "slip_mm": "d_x_mm"}  # there where that is
+# Quantities that a whisk has only where it has the other.
+_KNOWN_WITH = {"touch_deg": "d_x_mm", "slip_mm": "d_x_mm"}
 
 
 def _columns(quantity: str) -> tuple[str, str]:
@@ -72,7 +82,10 @@ LEDGER = Table(
 
 @dataclass(frozen=True)
 class Entry:
-    """One refinement of one whisk: effects and sigmas by QUANTITIES, NaN where they are not known, and why."""
+    """One refinement of one whisk.
+
+    effects, sigmas: by QUANTITIES, NaN where they are not known; status says why.
+    """
 
     trial: str
     whisk: int
@@ -83,112 +96,132 @@ class Entry:
 
     @property
     def ratios(self) -> dict[str, float]:
-        """Effects over their sigmas, where both are known; of no effect 0, whatever the sigma."""
-        known = {
-            name: (abs(effect), self.sigmas[name])
-            for name, effect in self.effects.items()
-            if np.isfinite(effect)
-        }
-        return {
-            name: effect / sigma if effect else 0.0
-            for name, (effect, sigma) in known.items()
-            if effect == 0.0 or sigma > 0
-        }
+        """Return effects over their sigmas, where both are known; of no effect 0."""
+        found = {}
+        for name, effect in self.effects.items():
+            sigma = self.sigmas[name]
+            if effect == 0.0:
+                found[name] = 0.0
+            elif np.isfinite(effect) and sigma > 0:
+                found[name] = abs(effect) / sigma
+        return found
 
     @property
     def largest(self) -> float:
-        """The largest of `ratios`; NaN where there is none."""
+        """Return the largest of `ratios`; NaN where there is none."""
         return max(self.ratios.values(), default=NAN)
 
     @property
     def verdict(self) -> str:
-        """Whether any effect is more than a tenth of its sigma; not known where one of them is not."""
+        """Return whether any effect is above a tenth of its sigma; not known where one effect is not."""
         if self.largest > MATTERS:
             return NEEDED
-        there = (
-            effect
-            for name, effect in self.effects.items()
-            if np.isfinite(self.sigmas[_SIDE.get(name, name)])
-        )
-        return NOT_KNOWN if not self.ratios or any(map(np.isnan, there)) else MAY_GO
+        if not self.ratios:
+            return NOT_KNOWN
+        for name, effect in self.effects.items():
+            sigma = self.sigmas[_KNOWN_WITH.get(name, name)]
+            if np.isnan(effect) and np.isfinite(sigma):
+                return NOT_KNOWN
+        return MAY_GO
 
     @property
     def row(self) -> dict:
-        """By column."""
-        cells = {}
-        for name in QUANTITIES:
-            cells |= zip(_columns(name), (self.effects[name], self.sigmas[name]))
-        about = {
+        """Return the row of LEDGER."""
+        row = {
             "trial": self.trial,
             "whisk": self.whisk,
             "refinement": self.refinement,
+            "largest_over_sigma": self.largest,
+            "verdict": self.verdict,
+            "cost_percent": COST_PERCENT[self.refinement],
             "status": self.status,
         }
-        said = {"largest_over_sigma": self.largest, "verdict": self.verdict}
-        return about | cells | said | {"cost_percent": COST_PERCENT[self.refinement]}
+        for name in QUANTITIES:
+            effect_column, sigma_column = _columns(name)
+            row[effect_column] = self.effects[name]
+            row[sigma_column] = self.sigmas[name]
+        return row
+
+
+class Ledger(Analysis):
+    """Which refinements of the model the scene requires."""
+
+    tables = (LEDGER,)
+    heading = Heading(
+        "ledger", "Only what the scene requires: the effect of leaving it out (ledger.csv)"
+    )
+
+    def compute(self, run: Run) -> list[Entry]:
+        """Return every refinement of every whisk."""
+        return ledger(run.results, run.whisker)
+
+    def row(self, one: Entry) -> dict:
+        """Return the row of a refinement and whisk."""
+        return one.row
+
+    def lines(self, found: Sequence[Entry]) -> Iterator[str]:
+        """Yield a line a refinement: its largest effect, and in how many whisks it is needed."""
+        for name, entries in grouped(found, lambda entry: entry.refinement).items():
+            yield f"{name:<28}{_verdict_of_all(entries)}"
 
 
 def ledger(results: Sequence[TrialResult], whisker: Whisker) -> list[Entry]:
-    """Every refinement of every whisk."""
+    """Return every refinement of every whisk."""
     shared = shared_touch(results)
-    here = [WhiskAtHand(*whisk, whisker, shared) for whisk in whisks(results)]
-    return [_entry(name, one) for one in here for name in NAMES]
-
-
-def _entry(name: str, here: WhiskAtHand) -> Entry:
-    seen, felt = of_truth(name, here), of_estimate(name, here)
-    effects = (
-        seen.d_x_mm,
-        np.degrees(seen.touch_rad),
-        seen.slip_mm,
-        np.degrees(felt.touch_rad),
-        felt.d_x_est_mm,
-    )
-    slips = (
-        here.seen.frames.slip_mm.sigma[here.seen.frames.touching]
-        if here.seen.frames is not None
-        else ()
-    )
-    d_x_est = here.given.d_x_est_mm if here.given else UNKNOWN
-    sigmas = (
-        here.seen.d_x_mm.sigma,
-        np.degrees(here.seen.touch_rad.sigma),
-        slips[-1] if len(slips) else NAN,
-        np.degrees(here.felt.touch_felt_rad.sigma),
-        d_x_est.sigma,
-    )
-    status = in_one_status(seen.why, felt.why)
-    named = (dict(zip(QUANTITIES, map(float, values))) for values in (effects, sigmas))
-    return Entry(here.result.trial.name, here.seen.whisk, name, *named, status)
-
-
-def write_ledger(out: Path, results: Sequence[TrialResult], whisker: Whisker) -> list[Entry]:
-    """The table; its rows."""
-    entries = ledger(results, whisker)
-    LEDGER.write(out, (entry.row for entry in entries))
+    entries = []
+    for result, seen, felt in whisks(results):
+        model = WhiskModel(result, seen, felt, whisker, shared)
+        sigmas = _sigmas(model)
+        entries += [_entry(name, model, sigmas) for name in NAMES]
     return entries
 
 
-def ledger_lines(entries: Iterable[Entry]) -> Iterator[str]:
-    """A line a refinement: its largest effect over sigma, and in how many whisks it is needed."""
-    entries = list(entries)
-    for name in NAMES if entries else ():
-        yield f"{name:<28}{_line([entry for entry in entries if entry.refinement == name])}"
+def _entry(name: str, model: WhiskModel, sigmas: dict[str, float]) -> Entry:
+    """Return the effects of one refinement on a whisk."""
+    truth = effect_on_truth(name, model)
+    estimate = effect_on_estimate(name, model)
+    effects = {
+        "d_x_mm": float(truth.d_x_mm),
+        "touch_deg": float(np.degrees(truth.touch_rad)),
+        "slip_mm": float(truth.slip_mm),
+        "touch_felt_deg": float(np.degrees(estimate.touch_rad)),
+        "d_x_est_mm": float(estimate.d_x_est_mm),
+    }
+    reason = in_one_status(truth.why, estimate.why)
+    return Entry(model.result.trial.name, model.seen.whisk, name, effects, sigmas, reason)
 
 
-def _line(mine: Sequence[Entry]) -> str:
-    known = [entry for entry in mine if entry.verdict != NOT_KNOWN]
+def _sigmas(model: WhiskModel) -> dict[str, float]:
+    """Return the standard deviation of each of QUANTITIES."""
+    seen = model.seen
+    d_x_est_mm = model.given.d_x_est_mm if model.given else UNKNOWN
+    slip_sigmas = () if seen.frames is None else seen.frames.slip_mm.sigma[seen.frames.touching]
+    return {
+        "d_x_mm": float(seen.d_x_mm.sigma),
+        "touch_deg": float(np.degrees(seen.touch_rad.sigma)),
+        "slip_mm": float(slip_sigmas[-1]) if len(slip_sigmas) else NAN,
+        "touch_felt_deg": float(np.degrees(model.felt.touch_felt_rad.sigma)),
+        "d_x_est_mm": float(d_x_est_mm.sigma),
+    }
+
+
+def _verdict_of_all(entries: Sequence[Entry]) -> str:
+    """Return the verdict on one refinement over all whisks."""
+    known = [entry for entry in entries if entry.verdict != NOT_KNOWN]
     if not known:
-        return f"{NOT_KNOWN}: {mine[0].status}"
-    worst, needed = (
-        max(known, key=lambda entry: entry.largest),
-        sum(entry.verdict == NEEDED for entry in known),
-    )
-    cost = COST_PERCENT[worst.refinement]
-    kept = f"{MAY_GO} at {f'{cost:g} % of the time at most' if cost else 'no cost'}"
-    verdict = f"{NEEDED} in {needed} of {len(known)}" if needed else kept
+        return f"{NOT_KNOWN}: {entries[0].status}"
+    worst = max(known, key=lambda entry: entry.largest)
+    needed = sum(entry.verdict == NEEDED for entry in known)
+    if needed:
+        verdict = f"{NEEDED} in {needed} of {len(known)}"
+    else:
+        percent = COST_PERCENT[worst.refinement]
+        cost = f"{percent:g} % of the time at most" if percent else "no cost"
+        verdict = f"{MAY_GO} at {cost}"
     if not worst.largest:
-        return f"{verdict}: no effect" + (f" ({worst.status})" if worst.status else "")
+        reason = f" ({worst.status})" if worst.status else ""
+        return f"{verdict}: no effect{reason}"
     name = max(worst.ratios, key=worst.ratios.get)
     stem, _, unit = name.rpartition("_")
-    return f"{verdict}: at most {worst.effects[name]:+.2g} {unit} of {stem}, {worst.largest:.2g} sigma ({worst.trial})"
+    effect = f"{worst.effects[name]:+.2g} {unit} of {stem}"
+    return f"{verdict}: at most {effect}, {worst.largest:.2g} sigma ({worst.trial})"

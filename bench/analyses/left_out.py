@@ -1,10 +1,10 @@
 """By how much truth, felt touch and estimate of a whisk would differ without one refinement of the model.
 
-Effects on the truth are the fit's own answers (`vision.fit.refinements`); those on the estimate are made from the
+Effects on the truth are the fit's own sensitivities (`vision.fit.refinements`); those on the estimate are made from the
 moments once more, or are the closed forms of docs/maps.md, with slope, tilt and friction as seen.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,30 +19,42 @@ from vision.fit.refinements import ALONG, LENS_TERMS, LeftOut
 from vision.truth.value import NAN
 
 NAMES = (
-    *("large bending", "bar radius", "psi", ALONG, "taper", "sag and set", *LENS_TERMS),
-    *(
-        "gauges' delay",
-        "cross-talk",
-        "drift",
-        "one-sided light",
-        "clock",
-        "second friction coefficient",
-    ),
+    "large bending",
+    "bar radius",
+    "psi",
+    ALONG,
+    "taper",
+    "sag and set",
+    *LENS_TERMS,
+    "gauges' delay",
+    "cross-talk",
+    "drift",
+    "one-sided light",
+    "clock",
+    "second friction coefficient",
 )
+# Refinements of the fit to the pictures; the others change no picture's model.
+_IN_VISION = (*NAMES[: NAMES.index("gauges' delay")], "one-sided light")
 # What each costs at most, percent of a whisk's processor time; 0 where it is below 0.1 (`tests/studies/speed/refinements.py`,
 # two whisks and two gauge trials of fixtures/small-session).
 COST_PERCENT = dict.fromkeys(NAMES, 0.0) | {
-    **{"large bending": 0.7, "bar radius": 0.2, "psi": 0.6, "taper": 0.8, "sag and set": 2.3},
+    "large bending": 0.7,
+    "bar radius": 0.2,
+    "psi": 0.6,
+    "taper": 0.8,
+    "sag and set": 2.3,
     **dict.fromkeys(LENS_TERMS, 1.8),
-    **{"cross-talk": 0.8, "one-sided light": 0.3},
+    "cross-talk": 0.8,
+    "one-sided light": 0.3,
 }
-_NO_TRUTH, _NO_MOMENTS = "no truth", "no moments"
 
 
 @dataclass(frozen=True)
-class Felt:
-    """By how much felt touch (rad) and d_x by (10) (mm) differ without a refinement; NaN where it is not known. why: of
-    a zero or a NaN."""
+class EstimateEffect:
+    """By how much felt touch and d_x by (10) differ without a refinement; NaN where not known.
+
+    why: the reason of a zero or a NaN.
+    """
 
     touch_rad: float = 0.0
     d_x_est_mm: float = 0.0
@@ -50,180 +62,192 @@ class Felt:
 
 
 @dataclass(frozen=True)
-class WhiskAtHand:
-    """One whisk, and what (10) says of it: None without moments."""
+class WhiskModel:
+    """One whisk, and what the closed forms of its errors need.
+
+    shared: the error of touch that all whisks have in common; None where it is not known.
+    """
 
     result: TrialResult
     seen: SeenWhisk
     felt: FeltWhisk
     whisker: Whisker
     shared: SharedTouch | None
-    given: EstimateRow | None = field(init=False)
 
-    def __post_init__(self):
-        rows = (
-            row
-            for row in self.felt.estimates
-            if row.estimator == GIVEN and np.isfinite(row.d_x_est_mm.value)
-        )
-        object.__setattr__(self, "given", next(rows, None))
+    @property
+    def given(self) -> EstimateRow | None:
+        """Return the estimate by (10) with α_est as given; None without moments."""
+        for row in self.felt.estimates:
+            if row.estimator == GIVEN and np.isfinite(row.d_x_est_mm.value):
+                return row
+        return None
+
+    @property
+    def d_x_est_mm(self) -> float:
+        """Return the distance by (10)."""
+        return self.given.d_x_est_mm.value
 
     @property
     def alpha_rad(self) -> float:
-        """Its friction angle, as well as it is known: as seen, as felt, as assumed."""
-        known = (
-            pair[0]
-            for pair in (
-                seen_friction(self.seen),
-                felt_friction(self.seen, self.felt, self.theta_rad),
-            )
-        )
+        """Return its friction angle, as well as it is known: as seen, as felt, as assumed."""
+        seen, _ = seen_friction(self.seen)
+        felt, _ = felt_friction(self.seen, self.felt, self.theta_rad)
         assumed = self.given.alpha_est_rad if self.given else NAN
-        return max(next((alpha for alpha in known if np.isfinite(alpha)), assumed), 0.0)
+        for alpha in (seen, felt):
+            if np.isfinite(alpha):
+                return max(alpha, 0.0)
+        return max(assumed, 0.0)
 
     @property
     def dragged(self) -> float:
-        """Share of friction that is left to act along the whisker: 0 of a contact that slips to the side."""
+        """Return the share of friction that is left to act along the whisker.
+
+        It is 0 of a contact that slips to the side.
+        """
         slope = abs(np.tan(self.seen.beta_rad.value)) / max(np.tan(self.alpha_rad), 1e-12)
         return float(np.sqrt(1.0 - slope**2)) if slope < 1 else 0.0
 
     @property
     def speed_rad_s(self) -> float:
-        """Of the motor, by its frames; NaN where they do not say."""
+        """Return the motor's speed by its frames; NaN where they do not show it."""
         frames = self.seen.frames
         return motor_speed(frames) if frames is not None and len(frames.time_s) > 1 else NAN
 
     @property
     def theta_rad(self) -> float:
-        """The wanted pushing angle."""
+        """Return the wanted pushing angle."""
         return float(np.radians(self.result.theta_deg))
 
     @property
     def left(self) -> float:
-        """Share of the base's diameter that is left at the contact."""
-        return self.whisker.beam.left(self.given.d_x_est_mm.value)
+        """Return the share of the base's diameter that is left at the contact."""
+        return self.whisker.beam.left(self.d_x_est_mm)
 
     @property
     def phi_rad(self) -> float:
-        """Direction of the force as felt; 0 of a contact that is held against slip."""
+        """Return the direction of the force as felt; 0 of a contact that is held against slip."""
         return 0.0 if self.dragged else self.felt.phi_felt_rad.value
 
 
-def of_truth(name: str, here: WhiskAtHand) -> LeftOut:
-    """What the truth would differ by."""
-    if not here.seen.has_truth:
-        return LeftOut(NAN, NAN, NAN, _NO_TRUTH)
+def effect_on_truth(name: str, model: WhiskModel) -> LeftOut:
+    """Return by how much the truth would differ without a refinement."""
+    if not model.seen.has_truth:
+        return LeftOut(NAN, NAN, NAN, "no truth")
     if name == "clock":
-        return _clock(here)
-    if name not in here.seen.truth.refinements:
-        in_vision = name in NAMES[: NAMES.index("gauges' delay")] or name == "one-sided light"
-        return LeftOut(NAN, NAN, NAN, "the fit does not tell") if in_vision else LeftOut()
-    return here.seen.truth.refinements[name]
+        return _effect_of_clock(model)
+    if name in model.seen.truth.refinements:
+        return model.seen.truth.refinements[name]
+    return LeftOut(NAN, NAN, NAN, "the fit does not tell") if name in _IN_VISION else LeftOut()
 
 
-def _clock(here: WhiskAtHand) -> LeftOut:
-    if here.shared is None or not here.shared.tells_clock:
-        return LeftOut(
-            0.0, NAN, 0.0, "at one speed and in one direction a clock is not told from a zero"
-        )
-    late_s, sigma_s = here.shared.values[1], np.sqrt(here.shared.covariance[1, 1])
+def _effect_of_clock(model: WhiskModel) -> LeftOut:
+    """Return the effect of the error of the frames' clock, as felt − seen shows it."""
+    shared = model.shared
+    if shared is None or not shared.tells_clock:
+        unknown = "at one speed and in one direction a clock is not told from a zero"
+        return LeftOut(0.0, NAN, 0.0, unknown)
+    late_s = shared.values[1]
+    sigma_s = np.sqrt(shared.covariance[1, 1])
     why = f"felt − seen says {1e3 * late_s:+.2f} ± {1e3 * sigma_s:.2f} ms"
-    return LeftOut(0.0, float(late_s) * here.speed_rad_s, 0.0, why)
+    return LeftOut(0.0, float(late_s) * model.speed_rad_s, 0.0, why)
 
 
-def of_estimate(name: str, here: WhiskAtHand) -> Felt:
-    """What felt touch and (10) would differ by."""
-    if here.given is None:
-        touch = (
-            _delay(here).touch_rad if name == "gauges' delay" else NAN if name == "drift" else 0.0
-        )
-        return Felt(touch, NAN, here.felt.status or _NO_MOMENTS)
-    made = {
-        "large bending": _large_bending,
-        "bar radius": _bar_radius,
-        "psi": _psi,
-        ALONG: _along,
-        "taper": _taper,
-        "sag and set": _sag_and_set,
-        "gauges' delay": _delay,
-        "cross-talk": _cross_talk,
-        "drift": _drift,
-        "second friction coefficient": _kinetic,
-    }
-    return made[name](here) if name in made else Felt()
+def effect_on_estimate(name: str, model: WhiskModel) -> EstimateEffect:
+    """Return by how much felt touch and (10) would differ without a refinement."""
+    if model.given is None:
+        touch_rad = 0.0
+        if name == "gauges' delay":
+            touch_rad = _delay(model).touch_rad
+        elif name == "drift":
+            touch_rad = NAN
+        return EstimateEffect(touch_rad, NAN, model.felt.status or "no moments")
+    effect = _EFFECTS.get(name)
+    return EstimateEffect() if effect is None else effect(model)
 
 
-def _large_bending(here: WhiskAtHand) -> Felt:
-    size = here.theta_rad**2 / (6 * here.left)
-    return Felt(
-        0.0, size * here.given.d_x_est_mm.value, "of the estimate its size alone (docs/maps.md)"
+def _large_bending(model: WhiskModel) -> EstimateEffect:
+    size = model.theta_rad**2 / (6 * model.left)
+    why = "of the estimate its size alone (docs/maps.md)"
+    return EstimateEffect(0.0, size * model.d_x_est_mm, why)
+
+
+def _bar_radius(model: WhiskModel) -> EstimateEffect:
+    bar_mm = 0.5 * model.result.trial.bar_diameter_mm
+    reach_mm = bar_mm + 0.5 * model.whisker.diameter_mm * model.left
+    share = first_order.rolling(
+        model.theta_rad, reach_mm, model.phi_rad, model.alpha_rad, model.d_x_est_mm, model.left
     )
+    return _share_of_distance(model, share, "no bar diameter or friction angle is known")
 
 
-def _bar_radius(here: WhiskAtHand) -> Felt:
-    reach = 0.5 * here.result.trial.bar_diameter_mm + 0.5 * here.whisker.diameter_mm * here.left
-    d_x, known = here.given.d_x_est_mm.value, (here.phi_rad, here.alpha_rad)
-    share = first_order.rolling(here.theta_rad, reach, *known, d_x, here.left)
-    return _share(here, share, "no bar diameter or friction angle is known")
+def _psi(model: WhiskModel) -> EstimateEffect:
+    psi_rad = model.seen.psi_rad.value
+    share = first_order.leaning(model.theta_rad, psi_rad, model.phi_rad, model.alpha_rad)
+    return _share_of_distance(model, share, "no tilt is known")
 
 
-def _psi(here: WhiskAtHand) -> Felt:
-    share = first_order.leaning(
-        here.theta_rad, here.seen.psi_rad.value, here.phi_rad, here.alpha_rad
-    )
-    return _share(here, share, "no tilt is known")
+def _along(model: WhiskModel) -> EstimateEffect:
+    dragged = model.dragged if np.isfinite(model.seen.beta_rad.value) else NAN
+    share = dragged * first_order.dragging(model.theta_rad, model.alpha_rad)
+    return _share_of_distance(model, share, "no slope is known")
 
 
-def _along(here: WhiskAtHand) -> Felt:
-    dragged = here.dragged if np.isfinite(here.seen.beta_rad.value) else NAN
-    return _share(
-        here, dragged * first_order.dragging(here.theta_rad, here.alpha_rad), "no slope is known"
-    )
+def _share_of_distance(model: WhiskModel, share: float, unless: str) -> EstimateEffect:
+    """Return an effect that is a share of d_x; `unless` is the reason where it is not known."""
+    why = "" if np.isfinite(share) else unless
+    return EstimateEffect(0.0, float(share) * model.d_x_est_mm + 0.0, why)
 
 
-def _share(here: WhiskAtHand, share: float, unless: str) -> Felt:
-    """An effect that is a share of d_x; why it is not known where it is not."""
-    known = bool(np.isfinite(share))
-    return Felt(0.0, float(share) * here.given.d_x_est_mm.value + 0.0, "" if known else unless)
+def _taper(model: WhiskModel) -> EstimateEffect:
+    beam = model.whisker.beam
+    change_mm = float(beam.as_cylinder_mm(model.d_x_est_mm)) - model.d_x_est_mm
+    return EstimateEffect(0.0, change_mm, "" if beam.taper else "the whisker does not taper")
 
 
-def _taper(here: WhiskAtHand) -> Felt:
-    d_x, beam = here.given.d_x_est_mm.value, here.whisker.beam
-    return Felt(
-        0.0,
-        float(beam.as_cylinder_mm(d_x)) - d_x,
-        "" if beam.taper else "the whisker does not taper",
-    )
+def _sag_and_set(_: WhiskModel) -> EstimateEffect:
+    why = "of the estimate none to first order: "
+    why += "moments above the free stroke's are those of the deflection"
+    return EstimateEffect(why=why)
 
 
-def _sag_and_set(_: WhiskAtHand) -> Felt:
-    return Felt(
-        why="of the estimate none to first order: moments above the free stroke's are those of the deflection"
-    )
+def _delay(model: WhiskModel) -> EstimateEffect:
+    late_rad = model.felt.delay_s.value * model.speed_rad_s
+    known = "touch and moments are late alike"
+    return EstimateEffect(late_rad, 0.0, known if np.isfinite(late_rad) else "no speed is known")
 
 
-def _delay(here: WhiskAtHand) -> Felt:
-    late = here.felt.delay_s.value * here.speed_rad_s
-    unless = "" if np.isfinite(late) else "no speed is known"
-    return Felt(late, 0.0, unless or "touch and moments are late alike")
+def _cross_talk(model: WhiskModel) -> EstimateEffect:
+    for row in model.felt.one_factor:
+        if row.estimator == GIVEN:
+            return EstimateEffect(0.0, row.d_x_est_mm.value - model.d_x_est_mm, row.status)
+    return EstimateEffect(0.0, NAN, "no gauges with one factor a channel are known")
 
 
-def _cross_talk(here: WhiskAtHand) -> Felt:
-    row = next((row for row in here.felt.one_factor if row.estimator == GIVEN), None)
-    if row is None:
-        return Felt(0.0, NAN, "no gauges with one factor a channel are known")
-    return Felt(0.0, row.d_x_est_mm.value - here.given.d_x_est_mm.value, row.status)
-
-
-def _drift(here: WhiskAtHand) -> Felt:
-    drifted, touch = here.felt.with_drift, here.felt.touch_felt_rad.value
+def _drift(model: WhiskModel) -> EstimateEffect:
+    drifted = model.felt.with_drift
     if drifted is None:
-        return Felt(why="no free stroke before and after the contact: none was taken out")
-    return Felt(drifted.touch_felt_rad - touch, drifted.d_x_est_mm - here.given.d_x_est_mm.value)
+        return EstimateEffect(why="no free stroke before and after the contact: none was taken out")
+    touch_rad = drifted.touch_felt_rad - model.felt.touch_felt_rad.value
+    return EstimateEffect(touch_rad, drifted.d_x_est_mm - model.d_x_est_mm)
 
 
-def _kinetic(here: WhiskAtHand) -> Felt:
-    row = next((row for row in here.felt.estimates if row.estimator == KINETIC), None)
-    if row is None:
-        return Felt(why="the moments show no stick–slip")
-    return Felt(0.0, here.given.d_x_est_mm.value - row.d_x_est_mm.value, row.status)
+def _kinetic(model: WhiskModel) -> EstimateEffect:
+    for row in model.felt.estimates:
+        if row.estimator == KINETIC:
+            return EstimateEffect(0.0, model.d_x_est_mm - row.d_x_est_mm.value, row.status)
+    return EstimateEffect(why="the moments show no stick–slip")
+
+
+# Refinements that change the estimate: how they do. All others leave it as it is.
+_EFFECTS = {
+    "large bending": _large_bending,
+    "bar radius": _bar_radius,
+    "psi": _psi,
+    ALONG: _along,
+    "taper": _taper,
+    "sag and set": _sag_and_set,
+    "gauges' delay": _delay,
+    "cross-talk": _cross_talk,
+    "drift": _drift,
+    "second friction coefficient": _kinetic,
+}

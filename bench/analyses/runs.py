@@ -1,14 +1,14 @@
 """(10) run again with what is known of the friction: α fitted per surface, α as seen, and on the kinetic cone.
 
-Of a whisk whose moments alone show that it sticks and slips (`bench.trials.gate`), (10) with α_est as given is asked
-once more at the kinetic ends of its teeth.
+Of a whisk whose moments alone show that it sticks and slips (`bench.trials.gate`), (10) with α_est as given is
+evaluated once more at the kinetic ends of its teeth.
 
 α_est as given needs nothing and stands in each whisk's own result. The fit of Fig. 8 leaves out the whisk that it
 judges. The run with α as seen is no estimate that a robot could make: it shows what is left of the error when friction
 is known.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,186 +26,207 @@ from bench.records.trial_result import (
     whisks,
 )
 from bench.session.whisker import Whisker
-from bench.trials.estimates import answer, whisk_of
+from bench.trials.estimates import Estimator, answer, whisk_of
 from estimator.beam import Beam
 from estimator.builtin import corrected, with_friction
+from estimator.friction import FrictionFit
 from estimator.uncertainty import Z_95
-from estimator.whisk import EstimatorSettings
+from estimator.whisk import EstimatorSettings, Whisk
 from vision.truth.value import Value
 
-GIVEN, FITTED, SEEN = "with_friction", "with_friction_fitted", "with_friction_seen"
+GIVEN = "with_friction"
+FITTED = "with_friction_fitted"
+SEEN = "with_friction_seen"
 KINETIC = "with_friction_kinetic"
 RUNS = (FITTED, SEEN, KINETIC)
 ASSUMING = {GIVEN: with_friction, "corrected": corrected}  # take α_est as given
 
 
 def alpha_est_sigma(found: Iterable[Surface], settings: Settings) -> float:
-    """How far α_est may be off in this session, rad, one sigma: as given, else by its surfaces.
+    """Return how far α_est may be off in this session, rad, one sigma: as given, else by its surfaces.
 
-    Root mean square of fitted less assumed α over the surfaces, among which the 5° that hold without any count as one
-    (the scale of a scaled inverse χ² posterior): a single surface does not tell how much others differ.
+    Root mean square of fitted less assumed α over the surfaces, among which the 5° that hold without any
+    count as one (the scale of a scaled inverse χ² posterior): a single surface does not show how much
+    others differ.
     """
-    first = np.radians(settings.first_alpha_est_sigma_deg)
-    fits = [s.fit for s in found if s.fit is not None]
+    first_rad = np.radians(settings.first_alpha_est_sigma_deg)
+    fits = [surface.fit for surface in found if surface.fit is not None]
     if settings.alpha_est_sigma_deg is not None or not fits:
-        return float(first)
-    squares = [
-        first**2,
-        *((fit.alpha_rad - settings.alpha_est_rad) ** 2 + fit.sigma_rad**2 for fit in fits),
-    ]
+        return float(first_rad)
+    squares = [first_rad**2]
+    for fit in fits:
+        squares.append((fit.alpha_rad - settings.alpha_est_rad) ** 2 + fit.sigma_rad**2)
     return float(np.sqrt(np.mean(squares)))
 
 
 @dataclass(frozen=True)
-class Doubt:
-    """What α_est may be off by in the session, rad, one sigma, and that over what whisks were asked with one by one."""
+class AlphaUncertainty:
+    """Standard deviation of the assumed friction angle α_est.
+
+    sigma_rad: by the session's surfaces. ratio_to_first: over the value with which single whisks were
+    evaluated before the session's surfaces were known.
+    """
 
     sigma_rad: float
-    part: float
+    ratio_to_first: float
 
 
-def _doubt(sigma_rad: float, settings: Settings) -> Doubt:
-    first = np.radians(settings.first_alpha_est_sigma_deg)
-    return Doubt(sigma_rad, sigma_rad / first if first else 1.0)
+@dataclass(frozen=True)
+class AskedAgain:
+    """How (10) is evaluated once more on the whisks of one trial."""
+
+    theta_rad: float
+    beam: Beam
+    radii_mm: tuple[float, float]
+    alpha_est: AlphaUncertainty
+
+    def evaluate(
+        self,
+        name: str,
+        estimator: Estimator,
+        whisk: Whisk,
+        alpha: tuple[float, float],
+        exact_sigma_mm: float | None = None,
+    ) -> EstimateRow:
+        """Return the estimate with a friction angle (value, sigma) in rad.
+
+        exact_sigma_mm: its sigma as if that angle were right, where that is known already.
+        """
+        return answer(name, estimator, whisk, *alpha, self.radii_mm, exact_sigma_mm=exact_sigma_mm)
+
+    def given(self, felt: FeltAt | FeltWhisk, theta_rad: float) -> tuple[EstimateRow, ...]:
+        """Return the estimates, those that assume α_est with the session's sigma of it."""
+        whisk = whisk_of(felt, theta_rad, self.beam)
+        rows = []
+        for row in felt.estimates:
+            if row.estimator not in ASSUMING:
+                rows.append(_rescaled(row, self.alpha_est.ratio_to_first))
+                continue
+            exact_mm = row.d_x_est_sigma_alpha_exact_mm
+            again = self.evaluate(
+                row.estimator,
+                ASSUMING[row.estimator],
+                whisk,
+                (row.alpha_est_rad, self.alpha_est.sigma_rad),
+                exact_mm if np.isfinite(exact_mm) else None,
+            )
+            rows.append(again)
+        return tuple(rows)
 
 
 def with_runs(
     results: Iterable[TrialResult], whisker: Whisker, settings: Settings
 ) -> list[TrialResult]:
-    """The results, (10) with the session's sigma of α_est, and each whisk's estimates followed by those of (10) with α
-    fitted and with α seen, where known."""
+    """Return the results, (10) with the session's sigma of α_est.
+
+    Each whisk's estimates are followed by those of (10) with α fitted and with α seen, where known.
+    """
     results = list(results)
     found = surfaces(results, whisker.beam)
-    by_panel, doubt = (
-        {s.panel: s for s in found},
-        _doubt(alpha_est_sigma(found, settings), settings),
+    surface_of = {surface.panel: surface for surface in found}
+    sigma_rad = alpha_est_sigma(found, settings)
+    first_rad = np.radians(settings.first_alpha_est_sigma_deg)
+    alpha_est = AlphaUncertainty(sigma_rad, sigma_rad / first_rad if first_rad else 1.0)
+    finished = []
+    for result in results:
+        again = AskedAgain(np.radians(result.theta_deg), whisker.beam, _radii_mm(result), alpha_est)
+        surface = surface_of.get(result.trial.panel)
+        felt = []
+        for _, seen, of_whisk in whisks([result]):
+            fit = surface and surface.fit_without(result.trial.name, seen.whisk)
+            felt.append(_with_runs(seen, of_whisk, fit, again))
+        finished.append(replace(result, felt=replace(result.felt, whisks=tuple(felt))))
+    return finished
+
+
+def _with_runs(
+    seen: SeenWhisk, felt: FeltWhisk, fit: FrictionFit | None, again: AskedAgain
+) -> FeltWhisk:
+    """Return the whisk with (10) run again. fit: of α to the other whisks of its surface."""
+    ratio = again.alpha_est.ratio_to_first
+    return replace(
+        felt,
+        estimates=_estimates(seen, felt, fit, again),
+        sensors=tuple(_rescaled_sensor(row, again.beam, ratio) for row in felt.sensors),
+        by_theta=tuple(
+            replace(at, estimates=again.given(at, at.theta_rad)) for at in felt.by_theta
+        ),
     )
-    return [_with_runs(result, by_panel, whisker.beam, doubt) for result in results]
 
 
-def _with_runs(result: TrialResult, by_panel: Mapping, beam: Beam, doubt: Doubt) -> TrialResult:
-    surface = by_panel.get(result.trial.panel)
-    felt = tuple(
-        _by_theta(
-            result,
-            replace(felt, estimates=answers, sensors=_sensors(felt, beam, doubt)),
-            beam,
-            doubt,
-        )
-        for _, seen, felt in whisks([result])
-        for answers in [_answers(result, seen, felt, surface, beam, doubt)]
-    )
-    return replace(result, felt=replace(result.felt, whisks=felt))
-
-
-def _by_theta(result: TrialResult, felt: FeltWhisk, beam: Beam, doubt: Doubt) -> FeltWhisk:
-    """The whisk with the session's sigma of α_est at all pushing angles."""
-    asked = (
-        replace(at, estimates=_given(result, at, at.theta_rad, beam, doubt)) for at in felt.by_theta
-    )
-    return replace(felt, by_theta=tuple(asked))
-
-
-def _answers(
-    result: TrialResult,
-    seen: SeenWhisk,
-    felt: FeltWhisk,
-    surface: Surface | None,
-    beam: Beam,
-    doubt: Doubt,
+def _estimates(
+    seen: SeenWhisk, felt: FeltWhisk, fit: FrictionFit | None, again: AskedAgain
 ) -> tuple[EstimateRow, ...]:
-    """The whisk's estimates with the new ones."""
+    """Return the whisk's estimates with the new ones."""
     if not felt.estimates:
         return ()
-    fit = surface and surface.fit_without(result.trial.name, seen.whisk)
+    given = again.given(felt, again.theta_rad)
+    whisk = whisk_of(felt, again.theta_rad, again.beam)
+    runs = []
     fitted = (fit.alpha_rad, fit.sigma_rad) if fit else (np.nan, np.nan)
-    theta_rad = np.radians(result.theta_deg)
-    whisk = whisk_of(felt, theta_rad, beam)
-    angles = ((FITTED, fitted), (SEEN, seen_friction(seen)))
-    radii_mm, known = (
-        _radii_mm(result),
-        ((name, *pair) for name, pair in angles if np.isfinite(pair[0])),
-    )
-    runs = [
-        answer(name, with_friction, whisk, max(a, 0.0), sigma, radii_mm) for name, a, sigma in known
-    ]
-    given = _given(result, felt, theta_rad, beam, doubt)
+    for name, (alpha_rad, sigma_rad) in ((FITTED, fitted), (SEEN, seen_friction(seen))):
+        if np.isfinite(alpha_rad):
+            alpha = (max(alpha_rad, 0.0), sigma_rad)
+            runs.append(again.evaluate(name, with_friction, whisk, alpha))
     if felt.kinetic is not None:
-        alpha = next(a.alpha_est_rad for a in given if a.estimator == GIVEN)
-        kinetic = whisk_of(felt.kinetic, theta_rad, beam)
-        runs.append(answer(KINETIC, with_friction, kinetic, alpha, doubt.sigma_rad, radii_mm))
-    rate, ten = turn(felt.by_theta), {*ASSUMING, *RUNS}
-    turned = felt.phi_felt_rad.value, rate, theta_rad, beam.length_mm
-    return tuple(
-        with_turn(row, *turned) if row.estimator in ten else row for row in (*given, *runs)
-    )
-
-
-def _given(
-    result: TrialResult, felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam, doubt: Doubt
-) -> tuple[EstimateRow, ...]:
-    """The estimates, those with α_est as given asked again with the session's sigma of it."""
-    whisk, radii_mm = whisk_of(felt, theta_rad, beam), _radii_mm(result)
-
-    def again(a: EstimateRow) -> EstimateRow:
-        asked = (
-            a.estimator,
-            ASSUMING[a.estimator],
-            whisk,
-            a.alpha_est_rad,
-            doubt.sigma_rad,
-            radii_mm,
-        )
-        exact_mm = a.d_x_est_sigma_alpha_exact_mm
-        return answer(*asked, exact_sigma_mm=exact_mm if np.isfinite(exact_mm) else None)
-
-    return tuple(
-        again(a) if a.estimator in ASSUMING else _rescaled(a, doubt.part) for a in felt.estimates
-    )
+        alpha_rad = next(row.alpha_est_rad for row in given if row.estimator == GIVEN)
+        alpha = (alpha_rad, again.alpha_est.sigma_rad)
+        kinetic = whisk_of(felt.kinetic, again.theta_rad, again.beam)
+        runs.append(again.evaluate(KINETIC, with_friction, kinetic, alpha))
+    rate = turn(felt.by_theta)
+    phi_rad = felt.phi_felt_rad.value
+    rows = []
+    for row in (*given, *runs):
+        if row.estimator in ASSUMING or row.estimator in RUNS:
+            row = with_turn(row, phi_rad, rate, again.theta_rad, again.beam.length_mm)
+        rows.append(row)
+    return tuple(rows)
 
 
 def _radii_mm(result: TrialResult) -> tuple[float, float]:
-    """Of the bar, NaN where the manifest does not say, and of the whisker's base."""
+    """Return the radii of the bar, NaN where the manifest does not say, and of the whisker's base."""
     return 0.5 * result.trial.bar_diameter_mm, 0.5 * result.whisker.diameter_mm
 
 
-def _rescaled(row: EstimateRow, part: float) -> EstimateRow:
-    """One's own estimate, which was asked with the first sigma of α_est, with this part of it: to first order, what the
-    sigma holds beyond that of an exact α_est goes with it. An interval of its own stays."""
-    own, value = row.d_x_est_sigma_alpha_exact_mm, row.d_x_est_mm
-    if not value.sigma > own:
+def _rescaled(row: EstimateRow, ratio: float) -> EstimateRow:
+    """Return a user's own estimate with another sigma of α_est, by its ratio to the first.
+
+    To first order, what the sigma holds beyond that of an exact α_est goes with it. An interval of its own
+    stays.
+    """
+    exact = row.d_x_est_sigma_alpha_exact_mm
+    value = row.d_x_est_mm.value
+    before = row.d_x_est_mm.sigma
+    if not before > exact:
         return row
-    sigma = float(np.sqrt(own**2 + part**2 * (value.sigma**2 - own**2)))
-    ends = {
-        "d_x_est_low_mm": value.value - Z_95 * sigma,
-        "d_x_est_high_mm": value.value + Z_95 * sigma,
-    }
-    symmetric = np.isclose(row.d_x_est_high_mm - value.value, Z_95 * value.sigma)
-    return replace(row, d_x_est_mm=Value(value.value, sigma), **(ends if symmetric else {}))
-
-
-def _sensors(felt: FeltWhisk, beam: Beam, doubt: Doubt) -> tuple[EstimateRow, ...]:
-    """What other sensors say, likewise, each side of an interval that is not symmetric by itself."""
-    return tuple(
-        replace(_rescaled(row, doubt.part), **_sides(row, beam, doubt.part)) for row in felt.sensors
+    sigma = float(np.sqrt(exact**2 + ratio**2 * (before**2 - exact**2)))
+    rescaled = replace(row, d_x_est_mm=Value(value, sigma))
+    if not np.isclose(row.d_x_est_high_mm - value, Z_95 * before):
+        return rescaled
+    return replace(
+        rescaled, d_x_est_low_mm=value - Z_95 * sigma, d_x_est_high_mm=value + Z_95 * sigma
     )
 
 
-def _sides(row: EstimateRow, beam: Beam, part: float) -> dict[str, float]:
-    """Both ends, with this part of what they hold beyond an exact α_est. An open end stays open."""
-    value, own = row.d_x_est_mm.value, Z_95 * row.d_x_est_sigma_alpha_exact_mm
+def _rescaled_sensor(row: EstimateRow, beam: Beam, ratio: float) -> EstimateRow:
+    """Return the estimate of another sensor with another sigma of α_est.
+
+    Each side of an interval that is not symmetric is rescaled by itself; an open end stays open.
+    """
+    value = row.d_x_est_mm.value
+    exact = Z_95 * row.d_x_est_sigma_alpha_exact_mm
     ends = {}
-    for name, way in (("d_x_est_low_mm", -1.0), ("d_x_est_high_mm", 1.0)):
+    for name, side in (("d_x_est_low_mm", -1.0), ("d_x_est_high_mm", 1.0)):
         end = getattr(row, name)
-        half = way * (end - value)
-        if 0 < end < beam.length_mm and half > own:
-            moved = value + way * float(np.sqrt(own**2 + part**2 * (half**2 - own**2)))
+        half = side * (end - value)
+        if 0 < end < beam.length_mm and half > exact:
+            moved = value + side * float(np.sqrt(exact**2 + ratio**2 * (half**2 - exact**2)))
             ends[name] = min(max(moved, 0.0), beam.length_mm)
-    return ends
+    return replace(_rescaled(row, ratio), **ends)
 
 
-def told_of(result: TrialResult) -> EstimatorSettings:
-    """What an estimator that asks for no α_est is told of a trial's object."""
+def settings_without_alpha(result: TrialResult) -> EstimatorSettings:
+    """Return what an estimator that assumes no α_est is given of a trial's object."""
     radii_mm = _radii_mm(result)
     reach_mm = OBJECT_REACH_MM if np.isnan(radii_mm[0]) else sum(radii_mm)
     return EstimatorSettings(0.0, 0.0, reach_mm, TILT_SIGMA_RAD, *radii_mm)

@@ -16,6 +16,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import stdtrit
 
 from bench.analyses.explained import by_10
+from bench.analyses.pooling import grouped, measured
 from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.whisker import Whisker
@@ -36,12 +37,17 @@ _LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under an
 
 @dataclass(frozen=True)
 class Way:
-    """One way on one surface: α with sigma, rad, or NaN and why."""
+    """One way on one surface: α with its standard deviation, rad; NaN where status says why."""
 
     name: str
     alpha_rad: float
     sigma_rad: float
     status: str = ""
+
+
+def _unknown(name: str, status: str) -> Way:
+    """Return a way that has no result."""
+    return Way(name, np.nan, np.nan, status)
 
 
 @dataclass(frozen=True)
@@ -61,87 +67,85 @@ class Contact:
 
     @property
     def phi_rad(self) -> float:
-        """The slip angle (8)."""
+        """Return the slip angle (8)."""
         return felt_slip_angle(self.m_y_Nmm, self.m_z_Nmm)
 
     def moved(self, cause: int) -> "Contact":
-        """The same with one of the shared causes off by its sigma."""
-        m_y, m_z = (float(m) for m in (self.m_y_Nmm, self.m_z_Nmm) + self.shared_Nmm[cause])
-        return replace(self, m_y_Nmm=m_y, m_z_Nmm=m_z)
+        """Return the contact with one of the shared causes off by its sigma."""
+        by_y, by_z = self.shared_Nmm[cause]
+        return replace(self, m_y_Nmm=float(self.m_y_Nmm + by_y), m_z_Nmm=float(self.m_z_Nmm + by_z))
 
 
 def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) -> list[Contact]:
-    """The measured whisks of one surface and speed."""
-    return [
-        Contact(
-            np.radians(result.trial.beta_nominal_deg),
-            result.trial.d_x_nominal_mm,
+    """Return the measured whisks of one surface and speed that have sound moments."""
+    found = []
+    for result, _, felt in whisks(measured(results)):
+        trial = result.trial
+        if trial.panel != panel or not felt.has_moments or felt.apart:
+            continue
+        contact = Contact(
+            np.radians(trial.beta_nominal_deg),
+            trial.d_x_nominal_mm,
             float(np.radians(result.theta_deg)),
             felt.m_y_Nmm.value,
             felt.m_z_Nmm.value,
             felt.shared_Nmm,
-            result.trial.name,
+            trial.name,
         )
-        for result, _, felt in whisks(results)
-        if result.trial.purpose == "measure"
-        and result.trial.panel == panel
-        and felt.has_moments
-        and not felt.apart
-    ]
+        found.append(contact)
+    return found
 
 
 def by_tilting(of_surface: Sequence[Contact]) -> Way:
-    """Way 1."""
-    known = [c for c in of_surface if np.isfinite(c.beta_rad)]
-    if not (any(c.beta_rad < 0 for c in known) and any(c.beta_rad > 0 for c in known)):
-        return Way("tilting", np.nan, np.nan, "needs nominal slopes (beta_deg) of both signs")
+    """Return α by way 1, from nominal slopes of both signs."""
+    known = [contact for contact in of_surface if np.isfinite(contact.beta_rad)]
+    slopes = [contact.beta_rad for contact in known]
+    if not (slopes and min(slopes) < 0 < max(slopes)):
+        return _unknown("tilting", "needs nominal slopes (beta_deg) of both signs")
 
-    def found(some: Sequence[Contact]) -> _Found:
-        fit = alpha_from_tilts([c.beta_rad for c in some], [c.phi_rad for c in some])
-        return _Found(fit.alpha_rad, fit.sigma_rad, fit.freedom, fit.status)
+    def fit(recordings: Sequence[Contact]) -> _Fit:
+        """Fit the slip angles of tilts."""
+        betas = [contact.beta_rad for contact in recordings]
+        fitted = alpha_from_tilts(betas, [contact.phi_rad for contact in recordings])
+        return _Fit(fitted.alpha_rad, fitted.sigma_rad, fitted.freedom, fitted.status)
 
-    return _with_shared("tilting", found, known)
+    return _with_shared("tilting", fit, known)
 
 
 def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
-    """Way 2: the α under which distances scatter least as shares of themselves."""
-    nominal = {c.d_x_nominal_mm for c in of_surface}
+    """Return α by way 2: that under which distances scatter least as shares of themselves."""
+    nominal = {contact.d_x_nominal_mm for contact in of_surface}
     if len(of_surface) < _FEWEST or len(nominal) != 1 or not np.isfinite(list(nominal)).all():
-        return Way(
-            "consistency",
-            np.nan,
-            np.nan,
-            f"needs {_FEWEST} whisks or more at one nominal distance (d_x_mm)",
-        )
+        few = f"needs {_FEWEST} whisks or more at one nominal distance (d_x_mm)"
+        return _unknown("consistency", few)
     return _by_object("consistency", of_surface, whisker, 0)
 
 
 def by_smoothness(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
-    """Way 2 of an object that is no edge at one distance: the α whose contacts lie best on a straight one.
+    """Return α by way 2 of an object that is no edge at one distance: contacts lie on a straight one.
 
     Bars at several nominal distances stand for one straight edge that leans along the whisker, touched at heights that
     are these distances.
     """
-    nominal = {c.d_x_nominal_mm for c in of_surface}
+    nominal = {contact.d_x_nominal_mm for contact in of_surface}
     if len(nominal) < 2 or not np.isfinite(list(nominal)).all():
-        return Way(
-            "smoothness", np.nan, np.nan, "needs whisks at two nominal distances (d_x_mm) or more"
-        )
+        few = "needs whisks at two nominal distances (d_x_mm) or more"
+        return _unknown("smoothness", few)
     return _by_object("smoothness", of_surface, whisker, 1)
 
 
 def _by_object(name: str, of_surface: Sequence[Contact], whisker: Whisker, degree: int) -> Way:
-    """Way 2 with an object whose distance is a polynomial of this degree in height."""
+    """Return α by way 2 with an object whose distance is a polynomial of this degree in height."""
     if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
-        return Way(name, np.nan, np.nan, "a whisk is no push against an object")
-    if np.ptp([abs(np.tan(c.phi_rad)) for c in of_surface]) < _LEAST_SPREAD:
-        return Way(name, np.nan, np.nan, "the whisks do not span two slip angles")
+        return _unknown(name, "a whisk is no push against an object")
+    if np.ptp([abs(np.tan(contact.phi_rad)) for contact in of_surface]) < _LEAST_SPREAD:
+        return _unknown(name, "the whisks do not span two slip angles")
     return _with_shared(name, lambda some: _least_scatter(some, whisker, degree), of_surface)
 
 
 @dataclass(frozen=True)
-class _Found:
-    """What a fit to recordings gives: α, its sigma by their residuals, and the degrees of freedom of that."""
+class _Fit:
+    """A fit of α to recordings, with its sigma by their residuals and the degrees of freedom of that."""
 
     alpha_rad: float
     sigma_rad: float = np.nan
@@ -150,23 +154,23 @@ class _Found:
 
 
 def _with_shared(
-    name: str, found: Callable[[Sequence[Contact]], _Found], known: Sequence[Contact]
+    name: str, fit_to: Callable[[Sequence[Contact]], _Fit], known: Sequence[Contact]
 ) -> Way:
-    """What `found` makes of recordings; NaN where that has a status.
+    """Return the way by a fit to recordings, with what all whisks share in its sigma.
 
     Whisks of one recording share a bar that was set up once, and are no independent repeats: their mean counts as one.
     What all whisks share comes on top, one cause after another. The sum has the degrees of freedom of Welch and
     Satterthwaite, cut to a whole number (GUM, G.4); sigma is half a 95 % interval by Student's t, over 1.96.
     """
-    of_trials = [
-        [c for c in known if c.trial == trial] for trial in dict.fromkeys(c.trial for c in known)
-    ]
-    recordings = [_mean(some) for some in of_trials]
-    fit = found(recordings)
+    of_trials = grouped(known, lambda contact: contact.trial)
+    recordings = [_mean(some) for some in of_trials.values()]
+    fit = fit_to(recordings)
     if fit.status or fit.freedom < 1:
-        return Way(name, np.nan, np.nan, fit.status or TOO_FEW)
-    causes = range(len(known[0].shared_Nmm))
-    shared = [found([c.moved(k) for c in recordings]).alpha_rad - fit.alpha_rad for k in causes]
+        return _unknown(name, fit.status or TOO_FEW)
+    shared = []
+    for cause in range(len(known[0].shared_Nmm)):
+        moved = fit_to([contact.moved(cause) for contact in recordings])
+        shared.append(moved.alpha_rad - fit.alpha_rad)
     variance = fit.sigma_rad**2 + np.sum(np.nan_to_num(shared) ** 2)
     own = max(fit.sigma_rad**2 / variance, _LEAST_SHARE) if variance > 0 else 1.0
     freedom = np.floor(fit.freedom / own**2)
@@ -174,62 +178,73 @@ def _with_shared(
 
 
 def _mean(some: Sequence[Contact]) -> Contact:
-    """The whisks of one recording as one."""
-    means = {
-        name: np.mean([getattr(c, name) for c in some], axis=0)
-        for name in ("m_y_Nmm", "m_z_Nmm", "shared_Nmm")
-    }
-    return replace(some[0], **means)
+    """Return the whisks of one recording as one."""
+    return replace(
+        some[0],
+        m_y_Nmm=np.mean([contact.m_y_Nmm for contact in some]),
+        m_z_Nmm=np.mean([contact.m_z_Nmm for contact in some]),
+        shared_Nmm=np.mean([contact.shared_Nmm for contact in some], axis=0),
+    )
 
 
-def _distances(some: Sequence[Contact], alphas_rad, whisker: Whisker) -> np.ndarray:
-    """By (10), mm, (contacts, α); NaN where there is none."""
-    felt = ([[getattr(c, name)] for c in some] for name in ("theta_rad", "m_y_Nmm", "m_z_Nmm"))
-    return by_10(*map(np.array, felt), alphas_rad, whisker)
+def _distances(some: Sequence[Contact], alphas_rad: np.ndarray, whisker: Whisker) -> np.ndarray:
+    """Return d_x by (10), mm, (contacts, α); NaN where there is none."""
+    theta = np.array([[contact.theta_rad] for contact in some])
+    m_y = np.array([[contact.m_y_Nmm] for contact in some])
+    m_z = np.array([[contact.m_z_Nmm] for contact in some])
+    return by_10(theta, m_y, m_z, alphas_rad, whisker)
 
 
-def _off(distances: np.ndarray, heights: np.ndarray, degree: int) -> np.ndarray:
-    """How far contacts (n,) lie off the polynomial in height that fits them best, as shares of their distances."""
+def _residuals(distances: np.ndarray, heights: np.ndarray, degree: int) -> np.ndarray:
+    """Return how far contacts (n,) lie from the polynomial in height that fits them best.
+
+    As shares of their distances.
+    """
     design = np.vander(heights, degree + 1) / distances[:, None]
     if not np.isfinite(design).all():
         return np.full(len(distances), np.nan)
     return 1.0 - design @ np.linalg.lstsq(design, np.ones(len(distances)), rcond=None)[0]
 
 
-def _least_scatter(some: Sequence[Contact], whisker: Whisker, degree: int) -> _Found:
-    """α at which the contacts lie least off an object; where one of their distances ends, the search ends, and says so.
+def _least_scatter(some: Sequence[Contact], whisker: Whisker, degree: int) -> _Fit:
+    """Fit the α at which the contacts lie least off an object.
 
-    Sigma is that of a least-squares fit whose residuals, all of one size, are what bars are set up wrong by.
+    Where one of their distances ends, the search ends, and status says so. Sigma is that of a least-squares fit whose
+    residuals, all of one size, are what bars are set up wrong by.
     """
-    heights = np.array([c.d_x_nominal_mm for c in some])
+    heights = np.array([contact.d_x_nominal_mm for contact in some])
 
-    def off(alphas_rad) -> np.ndarray:
-        return np.array(
-            [
-                _off(d, heights, degree)
-                for d in _distances(some, np.atleast_1d(alphas_rad), whisker).T
-            ]
-        )
+    def residuals(alphas_rad: np.ndarray) -> np.ndarray:
+        """Return residuals (α, contacts)."""
+        distances = _distances(some, alphas_rad, whisker)  # (contacts, α)
+        return np.array([_residuals(of_alpha, heights, degree) for of_alpha in distances.T])
 
-    on_grid = np.sum(off(_GRID_RAD) ** 2, axis=1)
-    last, best = int(np.flatnonzero(np.isfinite(on_grid))[-1]), int(np.nanargmin(on_grid))
+    on_grid = np.sum(residuals(_GRID_RAD) ** 2, axis=1)
+    last = int(np.flatnonzero(np.isfinite(on_grid))[-1])
+    best = int(np.nanargmin(on_grid))
     if best in (0, last):
-        bound = np.degrees(_GRID_RAD[best])
-        return _Found(
-            np.nan, status=f"at the bound of the search, {bound:.1f}°: no angle between fits"
-        )
-    bracket = _GRID_RAD[best - 1], _GRID_RAD[best + 1]
+        bound_deg = np.degrees(_GRID_RAD[best])
+        status = f"at the bound of the search, {bound_deg:.1f}°: no angle between fits"
+        return _Fit(np.nan, status=status)
     found = minimize_scalar(
-        lambda a: np.sum(off(a) ** 2), bounds=bracket, method="bounded", options={"xatol": 1e-7}
+        lambda alpha_rad: np.sum(residuals(np.array([alpha_rad])) ** 2),
+        bounds=(_GRID_RAD[best - 1], _GRID_RAD[best + 1]),
+        method="bounded",
+        options={"xatol": 1e-7},
     )
+    alpha_rad = float(found.x)
     freedom = len(some) - degree - 2  # the object's coefficients, and α
     if freedom < 1:
-        return _Found(float(found.x))
-    high, low = off(found.x + _STEP_RAD * np.array([1.0, -1.0]))
-    sigma = np.sqrt(found.fun / freedom / np.sum(((high - low) / (2.0 * _STEP_RAD)) ** 2))
-    return _Found(float(found.x), float(sigma), freedom)
+        return _Fit(alpha_rad)
+    high, low = residuals(alpha_rad + _STEP_RAD * np.array([1.0, -1.0]))
+    slope = (high - low) / (2.0 * _STEP_RAD)
+    sigma = np.sqrt(found.fun / freedom / np.sum(slope**2))
+    return _Fit(alpha_rad, float(sigma), freedom)
 
 
 def weights(phi_rad: Sequence[float], alpha_est_rad: float) -> np.ndarray:
-    """Way 3: confidence (n,) in contacts of these slip angles, 1 where friction does not matter."""
+    """Return by way 3 the confidence (n,) in contacts of these slip angles.
+
+    It is 1 where friction does not matter.
+    """
     return np.atleast_1d(confidence(np.array(phi_rad), alpha_est_rad, _ALPHA_EST_SIGMA_RAD))

@@ -1,14 +1,16 @@
-"""What the shape seen by one camera tells of each whisk, against the truth of all cameras: one_camera.csv.
+"""Distance by the shape that one camera sees of each whisk, against the truth of all cameras.
 
-These rows see their own trial, so they stand in no table of the gauges' estimates. Only where `--one-camera` asks.
+These rows see their own trial, so they stand in no table of the gauges' estimates: one_camera.csv.
+Only where `--one-camera` asks for it.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.pooling import angle_cells, as_cell, grouped, rms, value_cells
 from bench.base.doubts import in_one_status
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, status, with_sigma
 from bench.records.trial_result import ByOneCamera, SeenWhisk, TrialResult, whisks
@@ -54,101 +56,95 @@ ONE_CAMERA = Table(
 
 @dataclass(frozen=True, eq=False)
 class ShapeSeen:
-    """One whisk as all cameras saw it, and what one camera's shape says of it."""
+    """One whisk as all cameras saw it, and its contact by the shape that one camera saw."""
 
     result: TrialResult
     seen: SeenWhisk
-    said: ByOneCamera
+    by_one: ByOneCamera
 
     @property
     def error_mm(self) -> float:
-        """Distance by the shape less the truth."""
-        return float(self.said.d_x_mm.value - self.seen.d_x_mm.value)
+        """Return the distance by the shape less the truth."""
+        return float(self.by_one.d_x_mm.value - self.seen.d_x_mm.value)
 
     @property
-    def sigma_mm(self) -> float:
-        """Stated sigma of that."""
-        return float(np.hypot(self.said.d_x_mm.sigma, self.seen.d_x_mm.sigma))
+    def error_sigma_mm(self) -> float:
+        """Return the stated standard deviation of the error."""
+        return float(np.hypot(self.by_one.d_x_mm.sigma, self.seen.d_x_mm.sigma))
 
     @property
     def inside(self) -> bool | None:
-        """Whether the error lies within its 95 % interval; None where either distance is not known."""
-        return abs(self.error_mm) <= Z_95 * self.sigma_mm if np.isfinite(self.error_mm) else None
+        """Return whether the error lies within its 95 % interval; None where it is not known."""
+        if not np.isfinite(self.error_mm):
+            return None
+        return abs(self.error_mm) <= Z_95 * self.error_sigma_mm
 
     @property
     def moved_mm(self) -> Value:
-        """How far the contact went the way it is pushed, by all cameras: that of the unbent whisker less d_y."""
+        """Return how far the contact went the way it is pushed, by all cameras.
+
+        That is the way of the unbent whisker less d_y.
+        """
         at = self.seen.at
         if at is None:
             return UNKNOWN
-        d_x, deflection = self.seen.d_x_mm, at.d_y_mm
-        return Value(
-            float(d_x.value * np.tan(at.theta_rad) - deflection.value), float(deflection.sigma)
-        )
+        unbent_mm = self.seen.d_x_mm.value * np.tan(at.theta_rad)
+        return Value(float(unbent_mm - at.d_y_mm.value), float(at.d_y_mm.sigma))
 
 
-def shapes_seen(results: Sequence[TrialResult]) -> list[ShapeSeen]:
-    """Of every whisk that was asked for; empty without `--one-camera`."""
-    found = whisks(results)
-    return [
-        ShapeSeen(result, seen, seen.by_one_camera)
-        for result, seen, _ in found
-        if seen.by_one_camera is not None
-    ]
+class OneCamera(Analysis):
+    """How well one camera, without any gauge, locates the contact."""
 
+    tables = (ONE_CAMERA,)
+    in_every_run = False
+    heading = Heading(
+        "one_camera", "By one camera's pictures of its own trial, no gauge (one_camera.csv)"
+    )
 
-def write_one_camera(out: Path, found: Sequence[ShapeSeen]) -> None:
-    """one_camera.csv; nothing where no camera was asked for."""
-    if found:
-        ONE_CAMERA.write(out, map(_row, found))
+    def compute(self, run: Run) -> list[ShapeSeen]:
+        """Return the shape of every whisk that was evaluated by one camera."""
+        found = []
+        for result, seen, _ in whisks(run.results):
+            if seen.by_one_camera is not None:
+                found.append(ShapeSeen(result, seen, seen.by_one_camera))
+        return found
 
+    def row(self, one: ShapeSeen) -> dict:
+        """Return the row of a whisk."""
+        seen = one.seen
+        by_one = one.by_one
+        return {
+            "trial": one.result.trial.name,
+            "whisk": seen.whisk,
+            "surface": one.result.trial.surface,
+            "camera": by_one.camera,
+            **angle_cells("touch_deg", seen.touch_rad),
+            **angle_cells("touch_est_deg", by_one.touch_rad),
+            **value_cells("d_x_mm", seen.d_x_mm),
+            **value_cells("d_x_est_mm", by_one.d_x_mm),
+            "error_mm": one.error_mm,
+            "error_percent": 100.0 * one.error_mm / float(seen.d_x_mm.value),
+            "inside": as_cell(one.inside),
+            **value_cells("moved_mm", one.moved_mm),
+            **value_cells("moved_est_mm", by_one.moved_mm),
+            **value_cells("force_N", by_one.force_N),
+            "stiffness_N_mm": by_one.stiffness_N_mm,
+            "stiffness_sigma_N_mm": by_one.stiffness_sigma_N_mm,
+            "stiffness_low_N_mm": by_one.stiffness_low_N_mm,
+            "status": in_one_status(seen.status, by_one.status),
+        }
 
-def _row(one: ShapeSeen) -> dict:
-    """Return the row of a whisk."""
-    seen = one.seen
-    said = one.said
-    return {
-        "trial": one.result.trial.name,
-        "whisk": seen.whisk,
-        "surface": one.result.trial.surface,
-        "camera": said.camera,
-        "touch_deg": float(np.degrees(seen.touch_rad.value)),
-        "touch_sigma_deg": float(np.degrees(seen.touch_rad.sigma)),
-        "touch_est_deg": float(np.degrees(said.touch_rad.value)),
-        "touch_est_sigma_deg": float(np.degrees(said.touch_rad.sigma)),
-        "d_x_mm": float(seen.d_x_mm.value),
-        "d_x_sigma_mm": float(seen.d_x_mm.sigma),
-        "d_x_est_mm": float(said.d_x_mm.value),
-        "d_x_est_sigma_mm": float(said.d_x_mm.sigma),
-        "error_mm": one.error_mm,
-        "error_percent": 100.0 * one.error_mm / float(seen.d_x_mm.value),
-        "inside": None if one.inside is None else int(one.inside),
-        "moved_mm": float(one.moved_mm.value),
-        "moved_sigma_mm": float(one.moved_mm.sigma),
-        "moved_est_mm": float(said.moved_mm.value),
-        "moved_est_sigma_mm": float(said.moved_mm.sigma),
-        "force_N": said.force_N.value,
-        "force_sigma_N": said.force_N.sigma,
-        "stiffness_N_mm": said.stiffness_N_mm,
-        "stiffness_sigma_N_mm": said.stiffness_sigma_N_mm,
-        "stiffness_low_N_mm": said.stiffness_low_N_mm,
-        "status": in_one_status(seen.status, said.status),
-    }
-
-
-def one_camera_lines(found: Sequence[ShapeSeen]) -> Iterator[str]:
-    """For the summary: one line a camera, over the whisks of which both distances are known."""
-    for name in dict.fromkeys(one.said.camera for one in found):
-        mine = [one for one in found if one.said.camera == name]
-        known = [one for one in mine if one.inside is not None]
-        if not known:
-            yield f"{name}: none of {counted(len(mine), 'whisk')} has a distance"
-            continue
-        errors, sigmas = (
-            np.sqrt(np.mean(np.square(of)))
-            for of in zip(*((k.error_mm, k.sigma_mm) for k in known))
-        )
-        yield (
-            f"{name}: d_x off by {errors:.2g} mm RMS (stated {sigmas:.2g}); its 95 % interval holds "
-            f"{sum(bool(one.inside) for one in known)} of {counted(len(known), 'whisk')}"
-        )
+    def lines(self, found: Sequence[ShapeSeen]) -> Iterator[str]:
+        """Yield a line a camera, over the whisks of which both distances are known."""
+        for name, mine in grouped(found, lambda one: one.by_one.camera).items():
+            known = [one for one in mine if one.inside is not None]
+            if not known:
+                yield f"{name}: none of {counted(len(mine), 'whisk')} has a distance"
+                continue
+            error_mm = rms(one.error_mm for one in known)
+            stated_mm = rms(one.error_sigma_mm for one in known)
+            inside = sum(bool(one.inside) for one in known)
+            yield (
+                f"{name}: d_x off by {error_mm:.2g} mm RMS (stated {stated_mm:.2g}); its 95 % interval "
+                f"holds {inside} of {counted(len(known), 'whisk')}"
+            )

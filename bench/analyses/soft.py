@@ -2,7 +2,7 @@
 
 The whisker is moved along itself by a known shift, between trials of one surface and speed whose nominal distances
 (d_x_mm in trial.toml) differ. Only whisks that do not slip sideways serve, for the equation has no slip. No picture is
-looked at; where they show the object giving way, what they tell stands beside it (`bench.analyses.gave`).
+looked at; where pictures show the object giving way, that stands in the same row (`bench.analyses.gave`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.gave import mean_give
+from bench.analyses.analysis import Analysis, PageTable, Run, read_rows
+from bench.analyses.gave import OBJECT, mean_give
+from bench.analyses.page_cells import cell_with_sigma, panel_cell
+from bench.analyses.pooling import grouped, measured, panel_title
+from bench.base.numbers import MISSING, number_range
 from bench.base.tables import SPEED, SURFACE, Column, Table, alike, status, with_sigma
 from bench.gauges.gauge_readings import NOMINAL_SHARE
 from bench.records.trial_result import FeltWhisk, TrialFacts, TrialResult, whisks
@@ -70,8 +74,11 @@ NO_PUSH = "no distance explains both compliances"
 
 @dataclass(frozen=True)
 class Place:
-    """Whisks at one nominal distance: mean compliance k_θ with its own sigma, rad/(N·mm), of so many whisks; what it
-    changes by at one sigma of each cause that all whisks have in common, (k,)."""
+    """Whisks at one nominal distance.
+
+    compliance: mean k_θ, rad/(N·mm); sigma: its own, without what all whisks share. shared (k,): what
+    it changes by at one sigma of each cause that all whisks have in common.
+    """
 
     nominal_mm: float
     nominal_sigma_mm: float
@@ -83,8 +90,11 @@ class Place:
 
 @dataclass(frozen=True)
 class Soft:
-    """What two places tell of one surface: the nearer distance, how far the object gives way, mm/N; NaN and why. seen:
-    the same by pictures and force, of whisks_seen."""
+    """One surface by whisks at two places: the nearer distance, and how far the object gives way.
+
+    NaN where that is not known, and status says why. seen: the same by pictures and force, mm/N, of so
+    many whisks_seen.
+    """
 
     surface: str
     speed_deg_s: float | None
@@ -99,139 +109,221 @@ class Soft:
     whisks_seen: int = 0
 
     @property
+    def shift_mm(self) -> float:
+        """Return by how much the whisker was moved along itself."""
+        return self.far.nominal_mm - self.near.nominal_mm
+
+    @property
     def stiffness_N_mm(self) -> tuple[float, float, float]:
-        """k and both ends of its 95 % interval; infinite where the object gives way no more than a rigid one."""
+        """Return the stiffness and both ends of its 95 % interval.
+
+        Infinite where the object gives way no more than a rigid one.
+        """
+        if not np.isfinite(self.give_mm_N):
+            return np.nan, np.nan, np.nan
         reach = Z_95 * self.give_sigma_mm_N
-        middle, low, high = (
-            1 / g if g > 0 else np.inf
-            for g in (self.give_mm_N, self.give_mm_N + reach, self.give_mm_N - reach)
+        return (
+            _inverse(self.give_mm_N),
+            _inverse(self.give_mm_N + reach),
+            _inverse(self.give_mm_N - reach),
         )
-        return (middle, low, high) if np.isfinite(self.give_mm_N) else (np.nan,) * 3
 
 
-def soft_objects(
-    session: Session, results: Sequence[TrialResult], alpha_est_rad: float, sigma_rad: float
-) -> list[Soft]:
-    """A row for each two neighbouring nominal distances of a surface and speed; sigma_rad: of alpha_est."""
-    found, alpha_est = [], Value(alpha_est_rad, sigma_rad)
-    for panel in dict.fromkeys(r.trial.panel for r in results if r.trial.purpose == "measure"):
-        mine = [r for r in results if r.trial.purpose == "measure" and r.trial.panel == panel]
-        places = [place for place in _places(session, mine) if place is not None]
-        facts, theta = mine[0].trial, float(np.radians(mine[0].theta_deg))
-        seen, count = mean_give(mine)
-        told = (
-            softness(session.whisker, facts, *pair, theta, alpha_est)
-            for pair in pairwise(places)
-            if pair[1].nominal_mm - pair[0].nominal_mm >= _LEAST_SHIFT_MM
-        )
-        found += [replace(soft, seen=seen, whisks_seen=count) for soft in told]
+def _inverse(give_mm_N: float) -> float:
+    """Return a stiffness; infinite of what does not give way."""
+    return 1 / give_mm_N if give_mm_N > 0 else np.inf
+
+
+class Softness(Analysis):
+    """How soft the objects are, without pictures."""
+
+    tables = (COMPLIANCE_SEEN,)
+    heading = OBJECT
+    needs_session = True
+
+    def compute(self, run: Run) -> list[Soft]:
+        """Return what each two neighbouring nominal distances of a surface and speed give."""
+        return soft_objects(run)
+
+    def rows(self, found: Sequence[Soft]) -> dict[Table, list[dict]]:
+        """Return a row a pair of distances; with columns of what was seen where anything was."""
+        table = COMPLIANCE_SEEN if any(soft.whisks_seen for soft in found) else COMPLIANCE
+        return {table: [_row(soft) for soft in found]}
+
+    def lines(self, found: Sequence[Soft]) -> Iterator[str]:
+        """Yield a line a pair of distances that says anything."""
+        for soft in found:
+            if not np.isfinite(soft.give_mm_N):
+                continue
+            stiffness, low, high = soft.stiffness_N_mm
+            if soft.status:
+                verdict = f"{NOT_SOFT}, stiffer than {low:.2g} N/mm (95 %)"
+            else:
+                verdict = f"stiffness {stiffness:.3g} N/mm ({low:.3g} to {high:.3g})"
+            yield (
+                f"{panel_title(soft.surface, soft.speed_deg_s)}: two distances {soft.shift_mm:g} mm "
+                f"apart (section VII): gives way by {soft.give_mm_N:.3f} ± {soft.give_sigma_mm_N:.3f} "
+                f"mm/N: {verdict}; d_x {soft.d_x_mm:.2f} ± {soft.d_x_sigma_mm:.2f} mm"
+            )
+
+    def page_table(self, out: Path) -> PageTable:
+        """Return a row a pair of distances."""
+        head = ("surface", "whisks", "distances set [mm]", "d_x [mm]", "gives way [mm/N]")
+        head += ("stiffness, 95 % [N/mm]", "status")
+        rows = []
+        for row in read_rows(out, COMPLIANCE):
+            cells = (
+                panel_cell(row),
+                f"{row['whisks_near']:g} + {row['whisks_far']:g}",
+                number_range(row["near_nominal_mm"], row["far_nominal_mm"], 0),
+                cell_with_sigma(row, "d_x", "mm"),
+                cell_with_sigma(row, "give", "mm_N"),
+                _stiffness_cell(row["stiffness_low_N_mm"], row["stiffness_high_N_mm"]),
+                row["status"] or MISSING,
+            )
+            rows.append(cells)
+        title = "Softness of the object, from whisks at two distances"
+        return PageTable(title, COMPLIANCE.file, head, tuple(rows))
+
+
+def _stiffness_cell(low: float, high: float) -> str:
+    """Return a range of stiffness, N/mm; an end that is missing is infinite."""
+    if not np.isfinite(low):
+        return MISSING
+    return f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"more than {low:.3g}"
+
+
+def soft_objects(run: Run) -> list[Soft]:
+    """Return the softness by each two neighbouring nominal distances of a surface and speed."""
+    found = []
+    alpha_est = Value(run.settings.alpha_est_rad, run.alpha_est_sigma_rad)
+    by_panel = grouped(measured(run.results), lambda result: result.trial.panel)
+    for results in by_panel.values():
+        facts = results[0].trial
+        theta_rad = float(np.radians(results[0].theta_deg))
+        seen, whisks_seen = mean_give(results)
+        for near, far in pairwise(_places(run.session, results)):
+            if far.nominal_mm - near.nominal_mm >= _LEAST_SHIFT_MM:
+                soft = softness(run.whisker, facts, near, far, theta_rad, alpha_est)
+                found.append(replace(soft, seen=seen, whisks_seen=whisks_seen))
     return found
 
 
-def _places(session: Session, results: Sequence[TrialResult]) -> Iterator[Place | None]:
-    """By nominal distance, from near to far; None where no whisk serves. Where nobody says how well a distance is known
-    it was set by a ruler, for each recording anew."""
-    nominal = {r.trial.d_x_nominal_mm for r in results}
-    for d_x in sorted(d for d in nominal if np.isfinite(d)):
-        there = [r for r in results if r.trial.d_x_nominal_mm == d_x]
-        by_ruler = NOMINAL_SHARE * d_x / np.sqrt(len(there))
-        sigma_mm = max(session.trial(r.trial.name).d_x_sigma_mm for r in there) or by_ruler
-        rows = [
-            _compliance(r, felt)
-            for r, seen, felt in whisks(there)
-            if is_sound(seen, felt) and _is_held(felt)
-        ]
-        yield _place(d_x, sigma_mm, *map(np.array, zip(*rows))) if rows else None
+def _places(session: Session, results: Sequence[TrialResult]) -> list[Place]:
+    """Return the places with whisks that serve, from near to far.
+
+    Where nobody says how well a distance is known it was set by a ruler, for each recording anew.
+    """
+    places = []
+    known = [one for one in results if np.isfinite(one.trial.d_x_nominal_mm)]
+    for d_x_mm, there in sorted(grouped(known, lambda one: one.trial.d_x_nominal_mm).items()):
+        by_ruler_mm = NOMINAL_SHARE * d_x_mm / np.sqrt(len(there))
+        sigma_mm = max(session.trial(one.trial.name).d_x_sigma_mm for one in there) or by_ruler_mm
+        held = []
+        for result, seen, felt in whisks(there):
+            if is_sound(seen, felt) and _is_held(felt):
+                held.append(_compliance(result, felt))
+        if held:
+            places.append(_place(d_x_mm, sigma_mm, *map(np.array, zip(*held))))
+    return places
 
 
 def _place(
-    d_x: float, sigma_mm: float, compliances: np.ndarray, sigmas: np.ndarray, shared: np.ndarray
+    d_x_mm: float,
+    sigma_mm: float,
+    compliances: np.ndarray,
+    sigmas: np.ndarray,
+    shared: np.ndarray,
 ) -> Place:
-    """The mean of n whisks: compliances and their own sigmas (n,), what all have in common (n, k)."""
+    """Average n whisks: compliances and their own sigmas (n,), what all have in common (n, k)."""
     n = len(compliances)
     own = float(np.sqrt(np.sum(sigmas**2))) / n
-    return Place(d_x, sigma_mm, float(compliances.mean()), own, n, shared.mean(axis=0))
+    return Place(d_x_mm, sigma_mm, float(compliances.mean()), own, n, shared.mean(axis=0))
 
 
 def _is_held(felt: FeltWhisk) -> bool:
+    """Return whether the contact does not slip sideways."""
     phi = felt.phi_felt_rad
     return felt.has_moments and abs(phi.value) <= _HELD_SIGMAS * phi.sigma
 
 
 def _compliance(result: TrialResult, felt: FeltWhisk) -> tuple[float, float, np.ndarray]:
-    """k_θ = θ/m_z, its own sigma, and what it changes by with each shared cause (k,)."""
-    theta, m_z = float(np.radians(result.theta_deg)), felt.m_z_Nmm
-    k, shared = theta / m_z.value, felt.shared_Nmm[:, 1] / m_z.value
-    of_moment = (m_z.sigma / m_z.value) ** 2 - shared @ shared
-    mixed = felt.theta_moment_covariance_at[1] / (theta * m_z.value)
-    own = (felt.theta_sigma_rad / theta) ** 2 + of_moment - 2 * mixed
-    return k, k * float(np.sqrt(max(own, 0.0))), -k * shared
+    """Return k_θ = θ/m_z, its own sigma, and its change with each shared cause (k,)."""
+    theta = float(np.radians(result.theta_deg))
+    m_z = felt.m_z_Nmm
+    k_theta = theta / m_z.value
+    shared = felt.shared_Nmm[:, 1] / m_z.value  # (k,) of the moment, relative
+    own_of_moment = (m_z.sigma / m_z.value) ** 2 - shared @ shared
+    covariance = felt.theta_moment_covariance_at[1] / (theta * m_z.value)
+    variance = (felt.theta_sigma_rad / theta) ** 2 + own_of_moment - 2 * covariance
+    return k_theta, k_theta * float(np.sqrt(max(variance, 0.0))), -k_theta * shared
 
 
 def softness(
     whisker: Whisker, trial: TrialFacts, near: Place, far: Place, theta_rad: float, alpha_est: Value
 ) -> Soft:
-    """What two places tell, whose whisks are those of `trial` but for the distance; alpha_est: rad, as assumed."""
-    described = trial.surface, trial.speed_deg_s, near, far
-    C, taper = whisker.C_Nmm2, whisker.beam.taper / whisker.length_mm
-    shift = far.nominal_mm - near.nominal_mm
-    known = whisker.beam, 0.5 * np.nan_to_num(trial.bar_diameter_mm), 0.5 * whisker.diameter_mm
-    k_near, k_far = (_corrected(place, *known, theta_rad, alpha_est.value) for place in (near, far))
-    d_x, _ = compliance.two_distances(k_near, k_far, shift, C, taper)
+    """Return distance and compliance of the object by two places.
+
+    trial: of the places' whisks, but for the distance. alpha_est: as assumed, rad.
+    """
+    beam = whisker.beam
+    taper = beam.taper / whisker.length_mm
+    shift_mm = far.nominal_mm - near.nominal_mm
+    corrected = []
+    shared = []
+    for place in (near, far):
+        corrected.append(
+            _corrected(place, whisker, trial.bar_diameter_mm, theta_rad, alpha_est.value)
+        )
+        shared.append(np.append(place.shared, _model_sigma(place, beam, theta_rad, alpha_est)))
+    d_x, _ = compliance.two_distances(*corrected, shift_mm, beam.C_Nmm2, taper)
+    panel = (trial.surface, trial.speed_deg_s)
     if not np.isfinite(d_x):
-        return Soft(*described, *(np.nan,) * 4, NO_PUSH)
-    give = compliance.give(d_x, k_near, C, taper)
-    shift_sigma = float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm))
+        return Soft(*panel, near, far, np.nan, np.nan, np.nan, np.nan, NO_PUSH)
+    give = compliance.give(d_x, corrected[0], beam.C_Nmm2, taper)
+    shift_sigma_mm = float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm))
     own = compliance.two_distances_spread(
-        d_x, give, shift, C, near.sigma, far.sigma, shift_sigma, taper
+        d_x, give, shift_mm, beam.C_Nmm2, near.sigma, far.sigma, shift_sigma_mm, taper
     )
-    alike = (
-        np.append(place.shared, _left(place, whisker.beam, theta_rad, alpha_est))
-        for place in (near, far)
-    )
-    shared = compliance.two_distances_moved(d_x, give, shift, C, *alike, taper)
-    sigmas = [float(np.hypot(*pair)) for pair in zip(own, np.linalg.norm(shared, axis=1))]
-    status = NOT_SOFT if give <= Z_95 * sigmas[1] else ""
-    return Soft(*described, float(d_x), sigmas[0], float(give), sigmas[1], status)
+    moved = compliance.two_distances_moved(d_x, give, shift_mm, beam.C_Nmm2, *shared, taper)
+    d_x_sigma = float(np.hypot(own[0], np.linalg.norm(moved[0])))
+    give_sigma = float(np.hypot(own[1], np.linalg.norm(moved[1])))
+    status = NOT_SOFT if give <= Z_95 * give_sigma else ""
+    return Soft(*panel, near, far, float(d_x), d_x_sigma, float(give), give_sigma, status)
 
 
 def _corrected(
-    place: Place,
-    beam: Beam,
-    bar_radius_mm: float,
-    base_radius_mm: float,
-    theta: float,
-    alpha_rad: float,
+    place: Place, whisker: Whisker, bar_diameter_mm: float, theta_rad: float, alpha_rad: float
 ) -> float:
-    """k_θ of a place without the first order of what (2) leaves out (`estimator.first_order`)."""
+    """Return k_θ of a place without the first order of what (2) leaves out.
+
+    See `estimator.first_order`; a bar whose diameter is not known counts as thin.
+    """
+    beam = whisker.beam
     left = beam.left(place.nominal_mm)
-    reach = bar_radius_mm + base_radius_mm * left
-    share = first_order.rolling(theta, reach, 0.0, alpha_rad, place.nominal_mm, left)
-    share += first_order.HELD_SHARE * first_order.dragging(theta, alpha_rad)
+    reach_mm = 0.5 * np.nan_to_num(bar_diameter_mm) + 0.5 * whisker.diameter_mm * left
+    share = first_order.rolling(theta_rad, reach_mm, 0.0, alpha_rad, place.nominal_mm, left)
+    share += first_order.HELD_SHARE * first_order.dragging(theta_rad, alpha_rad)
     return place.compliance - share * _compliance_of_distance(beam, place)
 
 
-def _left(place: Place, beam: Beam, theta: float, alpha_est: Value) -> float:
-    """What is left of that in k_θ, of a cause that both places have alike: the contact is the same, and so is α."""
-    alpha, left = alpha_est.value, beam.left(place.nominal_mm)
-    share = model_share(theta, 0.0, alpha, 1.0, left=left, held_spread=first_order.HELD_SPREAD)
-    by_alpha = first_order.dragging(theta, alpha + alpha_est.sigma) - first_order.dragging(
-        theta, alpha
-    )
-    return float(np.hypot(share, first_order.HELD_SHARE * by_alpha)) * _compliance_of_distance(
-        beam, place
-    )
+def _model_sigma(place: Place, beam: Beam, theta_rad: float, alpha_est: Value) -> float:
+    """Return the sigma of k_θ by what the correction leaves.
+
+    Both places have that alike: the contact is the same, and so is α.
+    """
+    alpha = alpha_est.value
+    left = beam.left(place.nominal_mm)
+    share = model_share(theta_rad, 0.0, alpha, 1.0, left=left, held_spread=first_order.HELD_SPREAD)
+    dragging = first_order.dragging(theta_rad, alpha)
+    by_alpha = first_order.dragging(theta_rad, alpha + alpha_est.sigma) - dragging
+    relative = float(np.hypot(share, first_order.HELD_SHARE * by_alpha))
+    return relative * _compliance_of_distance(beam, place)
 
 
 def _compliance_of_distance(beam: Beam, place: Place) -> float:
-    """What k_θ changes by with a relative error of the distance: d_x ∂(d/C)/∂d_x."""
+    """Return the change of k_θ with a relative error of the distance: d_x ∂(d/C)/∂d_x."""
     return place.nominal_mm / (beam.C_Nmm2 * beam.left(place.nominal_mm) ** 2)
-
-
-def write_compliance(out: Path, found: Sequence[Soft]) -> None:
-    """Write compliance.csv: with what was seen, where anything was."""
-    table = COMPLIANCE_SEEN if any(soft.whisks_seen for soft in found) else COMPLIANCE
-    table.write(out, map(_row, found))
 
 
 def _row(soft: Soft) -> dict:
@@ -246,7 +338,7 @@ def _row(soft: Soft) -> dict:
         "far_nominal_mm": far.nominal_mm,
         "whisks_near": near.whisks,
         "whisks_far": far.whisks,
-        "shift_mm": far.nominal_mm - near.nominal_mm,
+        "shift_mm": soft.shift_mm,
         "shift_sigma_mm": float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm)),
         "d_x_mm": soft.d_x_mm,
         "d_x_sigma_mm": soft.d_x_sigma_mm,
@@ -260,23 +352,3 @@ def _row(soft: Soft) -> dict:
         "give_seen_mm_N": soft.seen.value,
         "give_seen_sigma_mm_N": soft.seen.sigma,
     }
-
-
-def soft_lines(found: Sequence[Soft]) -> Iterator[str]:
-    """A line a pair of distances that tells something."""
-    for soft in found:
-        if not np.isfinite(soft.give_mm_N):
-            continue
-        k, low, high = soft.stiffness_N_mm
-        told = f"gives way by {soft.give_mm_N:.3f} ± {soft.give_sigma_mm_N:.3f} mm/N: "
-        told += (
-            f"stiffness {k:.3g} N/mm ({low:.3g} to {high:.3g})"
-            if not soft.status
-            else (f"{NOT_SOFT}, stiffer than {low:.2g} N/mm (95 %)")
-        )
-        shift = soft.far.nominal_mm - soft.near.nominal_mm
-        speed = f", {soft.speed_deg_s:g}°/s" if soft.speed_deg_s is not None else ""
-        yield (
-            f"{soft.surface or 'surface not named'}{speed}: two distances {shift:g} mm apart (section VII): {told}; "
-            f"d_x {soft.d_x_mm:.2f} ± {soft.d_x_sigma_mm:.2f} mm"
-        )

@@ -1,4 +1,4 @@
-"""What each sensor of Table I is worth on a session's own trials, by slope and friction: sensors.csv, summary lines.
+"""What each sensor of Table I is worth on a session's own trials, by slope and friction: sensors.csv.
 
 Only where a load cell was recorded: then each whisk is judged by all of them.
 """
@@ -9,8 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.analysis import Analysis, Heading, PageTable, Run, read_rows
 from bench.analyses.friction_tables import SurfaceFriction
+from bench.analyses.pooling import degrees, grouped, known_rows, measured, rms
 from bench.base.drawing import label_of
+from bench.base.numbers import MISSING, number, number_range
 from bench.base.tables import SURFACE, WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
 from bench.records.trial_result import EstimateRow, TrialResult, whisks
 from bench.trials.estimate_errors import is_sound, slope_deg
@@ -38,14 +41,14 @@ SENSORS = Table(
         Column("inside_percent", "how many of the 95 % intervals hold the truth"),
     ),
 )
-_ASKED = ("touch_alone", "no_slip", "moment_rate", "with_friction", "force_and_moment")
-_BETA_DEG = 15.0  # °: slopes of one row, of the paper's steps of 5° three; 0, 15, 30 … lie in the middles of theirs
+_ESTIMATORS = ("touch_alone", "no_slip", "moment_rate", "with_friction", "force_and_moment")
+# [°] Slopes of one row, of the paper's steps of 5° three; 0, 15, 30 … lie in the middles of theirs.
+_BETA_DEG = 15.0
 
 
 @dataclass(frozen=True)
-class SensorWorth:
-    """One sensor's estimator over the whisks of one surface within a range of slopes; alpha_deg: of that surface, as
-    seen, else as fitted. none: whisks without a distance; inside_percent: of the 95 % intervals, how many hold."""
+class SensorErrors:
+    """Errors of one sensor on one surface within a range of slopes: the columns of SENSORS."""
 
     estimator: str
     surface: str
@@ -59,80 +62,134 @@ class SensorWorth:
     error_sigma_percent: float
     inside_percent: float
 
+    @property
+    def group(self) -> tuple[str, float]:
+        """Return surface and least slope: sensors of one group were judged by the same whisks."""
+        return self.surface, self.beta_from_deg
 
-def sensors_worth(
+    @property
+    def text(self) -> str:
+        """Return the RMS error as the summary has it."""
+        return f"{self.error_rms_percent:.2g} %" if self.whisks else "none"
+
+
+class Sensors(Analysis):
+    """How far each sensor of Table I errs on the same whisks."""
+
+    tables = (SENSORS,)
+    heading = Heading("sensors", "Sensors of Table I: error of d_x, RMS (sensors.csv)")
+
+    def compute(self, run: Run) -> list[SensorErrors]:
+        """Return the errors of each sensor, surface and range of slopes."""
+        return sensor_errors(run.results, run.friction)
+
+    def lines(self, found: Sequence[SensorErrors]) -> Iterator[str]:
+        """Yield a line a surface and range of slopes."""
+        for (surface, slope), mine in grouped(found, lambda one: one.group).items():
+            first = mine[0]
+            alpha = f", α {first.alpha_deg:.1f}°" if np.isfinite(first.alpha_deg) else ""
+            errors = ", ".join(f"{label_of(one.estimator)} {one.text}" for one in mine)
+            count = counted(max(one.whisks + one.none for one in mine), "whisk")
+            yield f"{surface or 'whisks'}, β {slope:g} to {first.beta_to_deg:g}°{alpha} ({count}): {errors}"
+
+    def page_table(self, out: Path) -> PageTable:
+        """Return a row a surface and range of slopes, a column a sensor."""
+        table = read_rows(out, SENSORS)
+        names = list(dict.fromkeys(str(row["estimator"]) for row in table))
+        groups = grouped(table, lambda row: (row["surface"], row["beta_from_deg"]))
+        title = "Sensors of Table I: RMS error of d_x (± RMS of the stated sigmas)"
+        head = ("surface", "slope seen [°]", "α [°]", "whisks")
+        head += tuple(f"{label_of(name)} [%]" for name in names)
+        rows = tuple(_page_row(mine, names) for mine in groups.values())
+        return PageTable(title, SENSORS.file, head, rows)
+
+
+def _page_row(rows: Sequence[np.void], names: Sequence[str]) -> tuple[str, ...]:
+    """Return the cells of a surface and range of slopes, from the rows of its sensors."""
+    of_sensor = {str(row["estimator"]): row for row in rows}
+    first = rows[0]
+    count = max(int(row["whisks"] + row["none"]) for row in rows)
+    slopes = number_range(first["beta_from_deg"], first["beta_to_deg"], 1)
+    cells = [first["surface"] or MISSING, slopes, number(first["alpha_deg"], 1), str(count)]
+    for name in names:
+        cells.append(_error_cell(of_sensor[name]) if name in of_sensor else MISSING)
+    return tuple(cells)
+
+
+def _error_cell(row: np.void) -> str:
+    """Return a sensor's error with its stated sigma; of how many whisks where it lacks some."""
+    if not row["whisks"]:
+        return MISSING
+    few = f" ({row['whisks']} whisks)" if row["none"] else ""
+    return f"{number(row['error_rms_percent'], 1)} ± {number(row['error_sigma_percent'], 1)}{few}"
+
+
+def sensor_errors(
     results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]
-) -> list[SensorWorth]:
-    """Over the measured whisks of which truth and estimate are sound; empty where no load cell was recorded."""
-    groups: dict[tuple, list[np.ndarray]] = {}
-    for result, seen, felt in whisks(results):
-        if result.trial.purpose != "measure" or not (
-            felt.sensors and seen.has_truth and is_sound(seen, felt)
-        ):
+) -> list[SensorErrors]:
+    """Return the errors over measured whisks that are sound; none without a load cell."""
+    percent: dict[tuple, list[tuple[float, float, float]]] = {}
+    for result, seen, felt in whisks(measured(results)):
+        if not (felt.sensors and seen.has_truth and is_sound(seen, felt)):
             continue
-        said = {row.estimator: row for row in (*felt.estimates, *felt.sensors)}
-        middle = float(np.rint(abs(slope_deg(result, seen)) / _BETA_DEG) * _BETA_DEG)
-        for name in _ASKED:
-            groups.setdefault((result.trial.surface, middle, name), []).append(
-                _judged(said[name], seen.d_x_mm)
-            )
-    alphas = _alphas_deg(friction)
-    return [
-        _pooled(name, surface, middle, alphas.get(surface, np.nan), np.array(found))
-        for (surface, middle, name), found in sorted(groups.items(), key=_in_order)
-    ]
-
-
-def _in_order(item: tuple) -> tuple:
-    surface, middle, name = item[0]
-    return surface, middle, _ASKED.index(name)
-
-
-def _judged(row: EstimateRow, truth: Value) -> np.ndarray:
-    """Error and its stated sigma, % of the truth, and whether the interval holds it (3,)."""
-    error, sigma = row.d_x_est_mm.value - truth.value, np.hypot(row.d_x_est_mm.sigma, truth.sigma)
-    return 100.0 * np.array(
-        [error / truth.value, sigma / truth.value, bool(row.holds(truth.value))]
-    )
-
-
-def _alphas_deg(friction: Iterable[SurfaceFriction]) -> dict[str, float]:
-    """Friction angle by surface: of all its speeds the mean, as seen, else as fitted."""
-    found: dict[str, list[float]] = {}
-    for one in friction:
-        seen = one.alpha("seen")[0]
-        found.setdefault(one.surface.name, []).append(
-            seen if np.isfinite(seen) else one.alpha("least_squares")[0]
-        )
-    return {surface: float(np.degrees(np.mean(alphas))) for surface, alphas in found.items()}
+        answers = {row.estimator: row for row in (*felt.estimates, *felt.sensors)}
+        middle_deg = float(np.rint(abs(slope_deg(result, seen)) / _BETA_DEG) * _BETA_DEG)
+        for order, name in enumerate(_ESTIMATORS):
+            key = (result.trial.surface, middle_deg, order)
+            percent.setdefault(key, []).append(_error_percent(answers[name], seen.d_x_mm))
+    alphas_deg = _alphas_deg(friction)
+    found = []
+    for key in sorted(percent):
+        surface, middle_deg, order = key
+        alpha_deg = alphas_deg.get(surface, np.nan)
+        pooled = _pooled(_ESTIMATORS[order], surface, middle_deg, alpha_deg, percent[key])
+        found.append(pooled)
+    return found
 
 
 def _pooled(
-    name: str, surface: str, middle: float, alpha_deg: float, percent: np.ndarray
-) -> SensorWorth:
-    known = percent[np.isfinite(percent).all(axis=1)]
-    slopes = max(middle - 0.5 * _BETA_DEG, 0.0), middle + 0.5 * _BETA_DEG
-    place = name, surface, *slopes, alpha_deg, len(known), len(percent) - len(known)
-    if not len(known):
-        return SensorWorth(*place, *(np.nan,) * 4)
-    rms = np.sqrt(np.mean(known[:, :2] ** 2, axis=0)).tolist()
-    return SensorWorth(*place, float(known[:, 0].mean()), *rms, float(known[:, 2].mean()))
+    estimator: str,
+    surface: str,
+    middle_deg: float,
+    alpha_deg: float,
+    percent: Sequence[tuple[float, float, float]],
+) -> SensorErrors:
+    """Return the errors of a sensor over whisks, as `_error_percent` has each.
+
+    middle_deg: of the range of slopes.
+    """
+    known, none = known_rows(percent, 3)
+    errors, sigmas, inside = known.T
+    return SensorErrors(
+        estimator,
+        surface,
+        max(middle_deg - 0.5 * _BETA_DEG, 0.0),
+        middle_deg + 0.5 * _BETA_DEG,
+        alpha_deg,
+        len(known),
+        none,
+        error_mean_percent=float(errors.mean()) if len(known) else np.nan,
+        error_rms_percent=rms(errors),
+        error_sigma_percent=rms(sigmas),
+        inside_percent=float(inside.mean()) if len(known) else np.nan,
+    )
 
 
-def write_sensors(out: Path, worth: Sequence[SensorWorth]) -> None:
-    """Write sensors.csv."""
-    SENSORS.write(out, map(vars, worth))
+def _error_percent(row: EstimateRow, truth: Value) -> tuple[float, float, float]:
+    """Return error and its stated sigma, percent of the truth; 100 where the interval holds it."""
+    error_mm = row.d_x_est_mm.value - truth.value
+    sigma_mm = np.hypot(row.d_x_est_mm.sigma, truth.sigma)
+    inside = 100.0 * bool(row.holds(truth.value))
+    return 100.0 * (error_mm / truth.value), 100.0 * (sigma_mm / truth.value), inside
 
 
-def sensor_lines(worth: Sequence[SensorWorth]) -> Iterator[str]:
-    """For the summary: a line a surface and range of slopes."""
-    for surface, slope in dict.fromkeys((one.surface, one.beta_from_deg) for one in worth):
-        mine = [one for one in worth if (one.surface, one.beta_from_deg) == (surface, slope)]
-        alpha = f", α {mine[0].alpha_deg:.1f}°" if np.isfinite(mine[0].alpha_deg) else ""
-        said = ", ".join(f"{label_of(one.estimator)} {_percent(one)}" for one in mine)
-        many = counted(max(one.whisks + one.none for one in mine), "whisk")
-        yield f"{surface or 'whisks'}, β {slope:g} to {mine[0].beta_to_deg:g}°{alpha} ({many}): {said}"
-
-
-def _percent(one: SensorWorth) -> str:
-    return f"{one.error_rms_percent:.2g} %" if one.whisks else "none"
+def _alphas_deg(friction: Iterable[SurfaceFriction]) -> dict[str, float]:
+    """Return the friction angle by surface: the mean of all its speeds, as seen, else as fitted."""
+    found = {}
+    for surface, of_speeds in grouped(friction, lambda one: one.surface.name).items():
+        alphas_rad = []
+        for one in of_speeds:
+            seen = one.alpha("seen")[0]
+            alphas_rad.append(seen if np.isfinite(seen) else one.alpha("least_squares")[0])
+        found[surface] = degrees(np.mean(alphas_rad))
+    return found

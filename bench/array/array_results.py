@@ -28,7 +28,7 @@ from bench.report.evaluation import Finished, finished
 from bench.report.pooled import read_run
 from bench.report.record import ARRAY, RUNS, read_record
 from bench.report.run_facts import RunRecord, Section
-from bench.report.summary.compose import DOUBTFUL, Summary
+from bench.report.summary.compose import DOUBTFUL, SCORE, Summary
 from bench.report.summary.verdict import verdict
 from bench.report.whisk_tables import ESTIMATES, WHISKS
 from bench.session.session import Base, Session
@@ -186,26 +186,27 @@ def _summarise(
     sizes: Sequence[FeltSize],
 ) -> Summary:
     """Return verdict and sections of the array's summary; sections without lines are left out."""
-    doubtful = [*record.doubts, *exchanged({run.base.name: run.results for run in runs})]
+    doubtful = [*record.doubts, *exchanged({run.base.name: run.whole.results for run in runs})]
     results = []
     first_lines = []
     for run in runs:
         doubtful += [f"{run.base.name}: {line}" for line in run.record.doubts]
-        results += [_named_by_whisker(result, run) for result in run.results]
+        results += [_named_by_whisker(result, run) for result in run.whole.results]
         first_lines.append(f"{run.base.name}: {run.record.verdict[0]}")
     title = f"{record.session}, {counted(len(runs), 'whisker')}"
     has_pictures = any(run.record.has_pictures for run in runs)
     settings = runs[0].record.settings
     general = verdict(title, has_pictures, results, settings, len(doubtful))
     files = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
-    lines_by_title = {
-        "Whiskers": first_lines,
-        "Surface: contacts from the object, mm (surface.csv)": surface_lines(cloud),
-        "Size of the object by (10), its place free (size.csv)": size_lines(sizes),
-        DOUBTFUL: doubtful,
-        "Score against the truth files of this synthetic session (no result knows them)": record.scores,
-        "Files": [files],
-    }
-    sections = [Section(name, tuple(lines)) for name, lines in lines_by_title.items()]
+    surface_title = "Surface: contacts from the object, mm (surface.csv)"
+    size_title = "Size of the object by (10), its place free (size.csv)"
+    sections = [
+        Section("whiskers", "Whiskers", tuple(first_lines)),
+        Section("surface", surface_title, tuple(surface_lines(cloud))),
+        Section("size", size_title, tuple(size_lines(sizes))),
+        Section("doubtful", DOUBTFUL, tuple(doubtful)),
+        Section("score", SCORE, record.scores),
+        Section("files", "Files", (files,)),
+    ]
     kept = tuple(section for section in sections if section.lines)
     return Summary((*surface_verdict(cloud), *general), tuple(doubtful), kept)

@@ -1,5 +1,7 @@
-"""run.json: the run in its folder, so that report, comparison and video need no session. `.session` says where that
-is, and only the video asks."""
+"""run.json: the run in its folder, so that report, comparison and video need no session.
+
+`.session` names the session's folder, which only the video needs.
+"""
 
 import json
 from collections.abc import Sequence
@@ -16,84 +18,99 @@ from bench.report.summary.compose import Summary
 from bench.session.session import Session
 from vision.geometry.reasons import as_reason
 
-RECORD, SESSION = "run.json", ".session"
-ARRAY, RUNS = (
-    "array.json",
-    "whiskers",
-)  # of several whiskers: each one's run stands in a folder of its own
+RECORD = "run.json"
+SESSION = ".session"
+ARRAY = "array.json"  # of several whiskers
+RUNS = "whiskers"  # folder of theirs, in which each has a run of its own
 _AGAIN = "evaluate the session again into this folder"
 
 
 def record_of(evaluation: Evaluation, summary: Summary, figures: Sequence[str]) -> RunRecord:
-    """All that the report needs beside the trials' results. figures: names of the pictures."""
-    session, calibration = evaluation.session, evaluation.calibration
+    """Return all that the report needs beyond the trials' results. figures: names of the pictures."""
+    session = evaluation.session
+    calibration = evaluation.calibration
     return RunRecord(
-        session.name,
-        session.whisker,
-        evaluation.settings,
-        summary.verdict,
-        summary.doubtful,
-        tuple(as_reason(line).codes for line in summary.doubtful),
-        summary.sections,
-        tuple(figures),
-        any(trial.camera_sources for trial in session.trials),
-        _cameras(calibration),
-        _board(session, calibration),
-        _gauges(evaluation),
-        dict(evaluation.recordings),
-        {result.trial.name: result.hash for result in evaluation.results},
-        versions(),
+        session=session.name,
+        whisker=session.whisker,
+        settings=evaluation.settings,
+        verdict=summary.verdict,
+        doubts=summary.doubtful,
+        doubt_codes=tuple(as_reason(line).codes for line in summary.doubtful),
+        sections=summary.sections,
+        figures=tuple(figures),
+        has_pictures=any(trial.camera_sources for trial in session.trials),
+        cameras=_cameras(calibration),
+        board=_board(session, calibration),
+        gauges=_gauges(evaluation),
+        recordings=dict(evaluation.recordings),
+        results={result.trial.name: result.hash for result in evaluation.results},
+        versions=versions(),
     )
 
 
 def _cameras(calibration: SessionCalibration) -> tuple[CameraFacts, ...]:
-    return tuple(
-        CameraFacts(c.name, c.size_px, c.matrix, c.distortion, c.T_camera_rig, float(c.rms_px))
-        for c in calibration.cameras or ()
-    )
+    """Return the cameras as they were used."""
+    cameras = []
+    for camera in calibration.cameras or ():
+        facts = CameraFacts(
+            camera.name,
+            camera.size_px,
+            camera.matrix,
+            camera.distortion,
+            camera.T_camera_rig,
+            float(camera.rms_px),
+        )
+        cameras.append(facts)
+    return tuple(cameras)
 
 
 def _board(session: Session, calibration: SessionCalibration) -> BoardFacts | None:
-    if session.board is None or calibration.T_rig_board is None:
+    """Return the board on the rig; None where there is none."""
+    board = session.board
+    if board is None or calibration.T_rig_board is None:
         return None
-    return BoardFacts(
-        tuple(session.board.squares), session.board.square_mm, calibration.T_rig_board
-    )
+    return BoardFacts(tuple(board.squares), board.square_mm, calibration.T_rig_board)
 
 
 def _gauges(evaluation: Evaluation) -> GaugeFacts | None:
-    gauges, made = evaluation.gauges, evaluation.certificate
+    """Return the gauges as they were used; None where volts cannot become moments."""
+    gauges = evaluation.gauges
     if gauges is None:
         return None
-    matrix, lines = gauges.all.matrix, () if made is None else tuple(made.lines())
-    points = tuple(
-        GaugePoints(p.trial, p.whisk, p.roll_deg, p.moments, p.residuals(matrix), p.moments_sigma)
-        for p in (() if made is None else made.pairs)
-    )
-    return GaugeFacts(gauges.source, matrix, gauges.all.sigma, lines, points)
+    matrix = gauges.all.matrix
+    certificate = evaluation.certificate
+    if certificate is None:
+        return GaugeFacts(gauges.source, matrix, gauges.all.sigma)
+    points = []
+    for pair in certificate.pairs:
+        residuals = pair.residuals(matrix)
+        of_whisk = GaugePoints(
+            pair.trial, pair.whisk, pair.roll_deg, pair.moments, residuals, pair.moments_sigma
+        )
+        points.append(of_whisk)
+    lines = tuple(certificate.lines())
+    return GaugeFacts(gauges.source, matrix, gauges.all.sigma, lines, tuple(points))
 
 
 def write_record(out: Path, record: RunRecord, session: Path) -> RunRecord:
-    """run.json and .session, each whole. The record as the file holds it, which is what is used in every run."""
-    write_whole(
-        out / RECORD,
-        json.dumps(to_plain(record), sort_keys=True, ensure_ascii=False, indent=1) + "\n",
-    )
+    """Write run.json and .session, each whole; return the record as the file holds it.
+
+    Every report is made from that, so that one made again is the same.
+    """
+    text = json.dumps(to_plain(record), sort_keys=True, ensure_ascii=False, indent=1)
+    write_whole(out / RECORD, text + "\n")
     write_whole(out / SESSION, f"{session.resolve()}\n")
     return read_record(out)
 
 
 def read_record(out: Path) -> RunRecord:
-    """The run of a folder. Raises BadInput where it is no finished run of this version."""
+    """Read the run of a folder. Raises BadInput where it is no finished run of this version."""
     if (out / ARRAY).is_file():
-        raise BadInput(
-            f"is of several whiskers; give the folder of one of them, {RUNS}/<name> in it", file=out
-        )
+        several = f"is of several whiskers; give the folder of one of them, {RUNS}/<name> in it"
+        raise BadInput(several, file=out)
     if not (out / RECORD).is_file():
-        raise BadInput(
-            f"is no evaluated run (there is no {RECORD} in it); give the OUT of `evaluate`",
-            file=out,
-        )
+        none = f"is no evaluated run (there is no {RECORD} in it); give the OUT of `evaluate`"
+        raise BadInput(none, file=out)
     try:
         return from_plain(RunRecord, json.loads((out / RECORD).read_text(encoding="utf-8")))
     except (ValueError, BadInput):

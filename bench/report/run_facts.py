@@ -1,4 +1,4 @@
-"""What a run was told and what it said: with the trials' results, all that a report is made from."""
+"""The settings and findings of a run: with the trials' results, all that a report is made from."""
 
 from dataclasses import dataclass, field
 
@@ -10,8 +10,9 @@ from bench.session.whisker import Whisker
 
 @dataclass(frozen=True)
 class Section:
-    """A title of the summary with its lines."""
+    """A section of the summary: its code, by which programs know it, its title, its lines."""
 
+    code: str
     title: str
     lines: tuple[str, ...]
 
@@ -39,8 +40,11 @@ class BoardFacts:
 
 @dataclass(frozen=True, eq=False)
 class GaugePoints:
-    """What one whisk's n points say of the coefficients: moments (n, 2) known from its deflection, with their
-    sigma, and what the gauges differ from them by, in the follicle's axes, turned by roll_deg."""
+    """The moments at n points of one whisk that served for the coefficients.
+
+    moments_Nmm (n, 2): known from its deflection, with their sigma. residuals_Nmm: by what the gauges
+    differ from them, in the follicle's axes, turned by roll_deg.
+    """
 
     trial: str
     whisk: int
@@ -52,8 +56,10 @@ class GaugePoints:
 
 @dataclass(frozen=True, eq=False)
 class GaugeFacts:
-    """The gauges as they were used: matrix (2, 2) from [y_V, z_V] to [m_y, m_z], and its sigma. certificate,
-    points: its lines and what they rest on; empty where the coefficients were brought along."""
+    """The gauges as they were used: matrix (2, 2) from [y_V, z_V] to [m_y, m_z], and its sigma.
+
+    certificate, points: its lines and what they rest on; empty where the coefficients were brought along.
+    """
 
     source: str
     matrix_Nmm_per_V: np.ndarray
@@ -64,7 +70,7 @@ class GaugeFacts:
 
 @dataclass(frozen=True, eq=False)
 class RunRecord:
-    """What a run found, and what it was found with.
+    """The findings of a run, and by what they were found.
 
     verdict, doubts and sections: as the summary has them. doubt_codes: codes of the statuses in each
     doubt. figures: names of the pictures in the folder. recordings: hash of each trial's files, by
@@ -87,6 +93,9 @@ class RunRecord:
     results: dict[str, str] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=dict)
 
-    def lines(self, title: str) -> tuple[str, ...]:
-        """The lines of the section whose title begins so; none where there is no such section."""
-        return next((s.lines for s in self.sections if s.title.startswith(title)), ())
+    def lines(self, code: str) -> tuple[str, ...]:
+        """Return the lines of the section of this code; none where there is no such section."""
+        for section in self.sections:
+            if section.code == code:
+                return section.lines
+        return ()

@@ -3,7 +3,10 @@
 import numpy as np
 
 from bench.analyses import direction
+from bench.analyses.analysis import Run
+from bench.analyses.friction_tables import friction_of
 from bench.base.results import plain
+from bench.base.settings import Settings
 from bench.records.plain import from_plain
 from bench.records.trial_result import TrialResult, WhiskerFacts
 from bench.session.whisker import Whisker
@@ -21,6 +24,19 @@ FREE_FRAME = {
     **{name: [np.nan] for name in ("d_y_mm", "d_z_mm", "alpha_rad", "alpha_sigma_rad")},
 }
 PHI_SIGMA = np.radians(0.3)
+
+
+def run_of(*results: TrialResult, session=None) -> Run:
+    """Return a run of these results, with α_est = 10°."""
+    settings = Settings()
+    return Run(
+        whisker=WHISKER,
+        settings=settings,
+        results=results,
+        friction=tuple(friction_of(results, WHISKER, settings.alpha_est_rad)),
+        alpha_est_sigma_rad=np.radians(5.0),
+        session=session,
+    )
 
 
 def deflection(d_x, beta):

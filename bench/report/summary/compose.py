@@ -1,23 +1,18 @@
-"""summary.txt: the verdict first, then what it rests on. The verdict and what is doubtful are shown in the terminal."""
+"""summary.txt: the verdict first, then what it rests on. Verdict and warnings appear in the terminal."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from bench.analyses.against_theta import AtTheta, theta_lines
-from bench.analyses.curved import curved_lines
-from bench.analyses.friction_tables import alpha_lines
-from bench.analyses.gave import gave_lines
-from bench.analyses.ledger import Entry, ledger_lines
-from bench.analyses.soft import soft_lines
-from bench.analyses.table_i_sensors import SensorWorth, sensor_lines
-from bench.analyses.tilted import tilted_lines
+from bench.analyses.analysis import Analysis
+from bench.analyses.friction_tables import Friction
 from bench.report.evaluation import Evaluation
 from bench.report.run_facts import Section
 from bench.report.run_tables import RUN_TABLES
 from bench.report.summary.error_lines import contact_lines, error_lines
 from bench.report.summary.gauge_lines import gauge_lines
-from bench.report.summary.shared import shared_doubts, shared_lines
+from bench.report.summary.shared import scatter_warnings, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
 from bench.report.summary.verdict import (
     gauge_source_lines,
@@ -29,17 +24,35 @@ from bench.report.summary.warning_lines import (
     frame_lines,
     light_lines,
     taken_as_exact,
-    whisk_doubts,
+    whisk_warnings,
 )
-from bench.trials.estimate_errors import Judged, judge
+from bench.trials.estimate_errors import judge
 
 DOUBTFUL = "Doubtful"
+SCORE = "Score against the truth files of this synthetic session (no result knows them)"
 _MOST_ON_SCREEN = 20  # lines: a screen
+# Codes of the sections of analyses in their order; those of other analyses come after these.
+_ANALYSES_FIRST = (
+    "sensors",
+    "both_ways",
+    "one_camera",
+    "moving",
+    "against_theta",
+    "friction",
+    "object",
+)
+# Codes of sections of analyses that stand behind the gauges: they are about the model.
+_ANALYSES_LAST = ("ledger",)
+# Figures in the order in which the files are listed; others come after these.
+_FIGURES_FIRST = ("fig8.png", "error_against_slope.png", "against_theta.png", "moving.png")
+
+# What each analysis found in a run.
+Findings = Mapping[Analysis, Any]
 
 
 @dataclass(frozen=True)
 class Summary:
-    """The verdict, what is doubtful, and titled sections, of which "Doubtful" is one."""
+    """The verdict, what is doubtful, and titled sections, of which one has what is doubtful."""
 
     verdict: tuple[str, ...]
     doubtful: tuple[str, ...]
@@ -47,129 +60,114 @@ class Summary:
 
     @property
     def text(self) -> str:
-        """As summary.txt has it."""
+        """Return the text of summary.txt."""
         return "\n".join([*self.verdict, "", *section_lines(self.sections)]).rstrip() + "\n"
 
     def on_screen(self, out: Path) -> str:
-        """What is seen at a glance: the verdict, what is doubtful, and where the rest is."""
-        shown = self.doubtful[:_MOST_ON_SCREEN]
-        more = len(self.doubtful) - len(shown)
-        doubtful = [
-            _titled(DOUBTFUL, [*shown, *([f"and {more} more, in summary.txt"] if more else [])])
-        ]
-        rest = f"All of it: {out / 'report.html'}, {out / 'summary.txt'}"
-        return "\n".join([*self.verdict, "", *(section_lines(doubtful) if shown else ()), rest])
+        """Return what is seen at a glance: the verdict, what is doubtful, and where the rest is."""
+        lines = [*self.verdict, ""]
+        if self.doubtful:
+            doubtful = list(self.doubtful[:_MOST_ON_SCREEN])
+            more = len(self.doubtful) - len(doubtful)
+            if more:
+                doubtful.append(f"and {more} more, in summary.txt")
+            lines += section_lines([Section("doubtful", DOUBTFUL, tuple(doubtful))])
+        lines.append(f"All of it: {out / 'report.html'}, {out / 'summary.txt'}")
+        return "\n".join(lines)
 
 
 def section_lines(sections: Iterable[Section]) -> Iterator[str]:
-    """Titles with their lines below them, and an empty line after each."""
-    return (line for s in sections for line in (s.title, *(f"  {line}" for line in s.lines), ""))
+    """Yield titles with their lines below them, and an empty line after each."""
+    for section in sections:
+        yield section.title
+        for line in section.lines:
+            yield f"  {line}"
+        yield ""
 
 
 def summary_of(
-    evaluation: Evaluation,
-    scores: Sequence[str],
-    figures: Sequence[str],
-    by_theta: Sequence[AtTheta] = (),
-    needed: Sequence[Entry] = (),
-    sensors: Sequence[SensorWorth] = (),
-    moving: Sequence[str] = (),
-    both_ways: Sequence[str] = (),
-    one_camera: Sequence[str] = (),
+    evaluation: Evaluation, findings: Findings, scores: Sequence[str], figures: Sequence[str]
 ) -> Summary:
-    """The summary of a run. scores: lines on a synthetic session's truth; figures: names of the pictures; by_theta:
-    errors against θ; needed: which refinements are; sensors: what each is worth, where a load cell was recorded;
-    moving, both_ways, one_camera: lines on objects that moved, on ways back, and on shapes seen by one camera."""
-    doubtful = [
-        *evaluation.doubts,
-        *shared_doubts(evaluation.results),
-        *whisk_doubts(evaluation.results),
-    ]
-    judged = judge(evaluation.results)
-    name, pictures = (
-        evaluation.session.name,
-        any(trial.camera_sources for trial in evaluation.session.trials),
-    )
-    said = verdict(name, pictures, evaluation.results, evaluation.settings, len(doubtful))
-    said = (
-        *said,
+    """Return the summary of a run.
+
+    scores: lines on a synthetic session's truth. figures: names of the pictures.
+    """
+    results = evaluation.results
+    settings = evaluation.settings
+    session = evaluation.session
+    doubtful = (*evaluation.doubts, *scatter_warnings(results), *whisk_warnings(results))
+    has_pictures = any(trial.camera_sources for trial in session.trials)
+    spoken = (
+        *verdict(session.name, has_pictures, results, settings, len(doubtful)),
         *gauge_source_lines(evaluation.gauges),
-        *preset_lines(evaluation.results, evaluation.settings),
+        *preset_lines(results, settings),
     )
-    others = moving, both_ways, one_camera
-    sections = _sections(
-        evaluation, judged, doubtful, scores, figures, by_theta, needed, sensors, *others
+    of_analyses = _sections_of_analyses(evaluation, findings)
+    last = [of_analyses.pop(code) for code in _ANALYSES_LAST if code in of_analyses]
+    sections = (
+        *_sections_of_errors(evaluation),
+        *of_analyses.values(),
+        _section("gauges", "Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges)),
+        *last,
+        _section("cameras", "Cameras", evaluation.calibration.notes),
+        _section("light", "Light from one side", light_lines(results)),
+        _section("frames", "Frames", frame_lines(results)),
+        _section("doubtful", DOUBTFUL, doubtful),
+        _section("score", SCORE, scores),
+        _section("exact", "Taken as exact, for no sigma was given", taken_as_exact(session)),
+        _section("files", "Files", [_file_list(figures)]),
     )
-    return Summary(said, tuple(doubtful), tuple(section for section in sections if section.lines))
+    return Summary(spoken, doubtful, tuple(section for section in sections if section.lines))
 
 
-def _sections(
-    evaluation: Evaluation,
-    judged: Sequence[Judged],
-    doubtful: Sequence[str],
-    scores: Sequence[str],
-    figures: Sequence[str],
-    by_theta: Sequence[AtTheta],
-    needed: Sequence[Entry],
-    sensors: Sequence[SensorWorth],
-    moving: Sequence[str],
-    both_ways: Sequence[str],
-    one_camera: Sequence[str],
-) -> Iterator[Section]:
-    results, settings = evaluation.results, evaluation.settings
-    errors = f"Error of d_x at θ = {settings.theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
-    truth = [
+def _sections_of_errors(evaluation: Evaluation) -> Iterator[Section]:
+    """Yield the sections on truth, clocks and errors, with which the summary begins."""
+    results = evaluation.results
+    truth = (
         *truth_lines(results),
         *budget_lines(results),
         *shared_lines(results),
         *beam_lines(results),
-    ]
-    yield _titled("Truth, from the pictures (± one sigma)", truth)
-    yield _titled("Clocks", clock_lines(results))
-    yield _titled(errors, [*error_lines(judged), *contact_lines(results)])
-    yield _titled("Sensors of Table I: error of d_x, RMS (sensors.csv)", sensor_lines(sensors))
-    yield _titled("Ways back (both_ways.csv)", both_ways)
-    yield _titled(
-        "By one camera's pictures of its own trial, no gauge (one_camera.csv)", one_camera
     )
-    yield _titled("Objects that moved (moving.csv)", moving)
-    yield _titled(
-        "Error and sigma against θ (against_theta.csv)", theta_lines(by_theta, settings.theta_deg)
+    theta_deg = evaluation.settings.theta_deg
+    title = (
+        f"Error of d_x at θ = {theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
     )
-    friction = [
-        *alpha_lines(evaluation.friction),
-        *known_friction_lines(results, settings),
-        *tilted_lines(evaluation.tilted),
-    ]
-    yield _titled("Friction angle α (± one sigma)", friction)
-    soft = [*soft_lines(evaluation.soft), *gave_lines(results)]
-    yield _titled("The object", [*soft, *curved_lines(evaluation.shapes)])
-    yield _titled("Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges))
-    yield _titled(
-        "Only what the scene requires: the effect of leaving it out (ledger.csv)",
-        ledger_lines(needed),
-    )
-    yield _titled("Cameras", evaluation.calibration.notes)
-    yield _titled("Light from one side", light_lines(results))
-    yield _titled("Frames", frame_lines(results))
-    yield _titled(DOUBTFUL, doubtful)
-    yield _titled(
-        "Score against the truth files of this synthetic session (no result knows them)", scores
-    )
-    yield _titled("Taken as exact, for no sigma was given", taken_as_exact(evaluation.session))
-    yield _titled("Files", _files(figures))
+    yield _section("truth", "Truth, from the pictures (± one sigma)", truth)
+    yield _section("clocks", "Clocks", clock_lines(results))
+    yield _section("errors", title, [*error_lines(judge(results)), *contact_lines(results)])
 
 
-def _titled(title: str, lines: Iterable[str]) -> Section:
-    return Section(title, tuple(lines))
+def _sections_of_analyses(evaluation: Evaluation, findings: Findings) -> dict[str, Section]:
+    """Return the sections of the analyses by their codes, in the summary's order.
+
+    Analyses of one code share a section. (10) with what is known of the friction stands with it.
+    """
+    titles = {}
+    lines: dict[str, list[str]] = {code: [] for code in _ANALYSES_FIRST}
+    for analysis, found in findings.items():
+        heading = analysis.heading
+        if heading is None:
+            continue
+        titles[heading.code] = heading.title
+        of_section = lines.setdefault(heading.code, [])
+        of_section += analysis.lines(found)
+        if isinstance(analysis, Friction):
+            of_section += known_friction_lines(evaluation.results, evaluation.settings)
+    return {code: _section(code, titles[code], lines[code]) for code in lines if code in titles}
 
 
-def _files(figures: Sequence[str]) -> list[str]:
+def _section(code: str, title: str, lines: Iterable[str]) -> Section:
+    """Return a section of the summary."""
+    return Section(code, title, tuple(lines))
+
+
+def _file_list(figures: Sequence[str]) -> str:
+    """Return the names of all files and folders of figures of a run."""
     single = [name for name in figures if "/" not in name]
+    first = [name for name in _FIGURES_FIRST if name in single]
+    others = [name for name in single if name not in first]
     folders = sorted({name.split("/")[0] for name in figures if "/" in name})
     tables = [table.file for table in RUN_TABLES.values()]
-    return [
-        ", ".join(
-            ["report.html", *tables, "track/", *single, *(f"{folder}/" for folder in folders)]
-        )
-    ]
+    of_folders = [f"{folder}/" for folder in folders]
+    return ", ".join(["report.html", *tables, "track/", *first, *others, *of_folders])

@@ -4,63 +4,66 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from bench.analyses.pooling import grouped, rms
 from bench.base.drawing import label_of
 from bench.records.trial_result import TrialResult
 from bench.report.assembly import estimate_rows
 from bench.trials.estimate_errors import Judged, sound_whisks
 
+_NARROWEST = 17  # letters of a column
+
 
 def error_lines(judged: Sequence[Judged]) -> Iterator[str]:
-    """A column an estimator, estimate less truth in per cent."""
-    judged = [j for j in judged if np.isfinite(j.error_percent)]
-    if not judged:
+    """Yield a head and a line a whisk, a column an estimator: estimate less truth in percent."""
+    known = []
+    for one in judged:
+        is_shown = not one.one_factor or one.estimator == "with_friction"
+        if np.isfinite(one.error_percent) and is_shown:
+            known.append(one)
+    if not known:
         return
-    columns = list(
-        dict.fromkeys(
-            (j.estimator, j.one_factor) for j in sorted(judged, key=lambda j: j.one_factor)
-        )
-    )
-    columns = [c for c in columns if not c[1] or c[0] == "with_friction"]
+    by_factor = sorted(known, key=lambda one: one.one_factor)
+    columns = list(dict.fromkeys((one.estimator, one.one_factor) for one in by_factor))
     names = [label_of(name) + (", one factor" if one else "") for name, one in columns]
-    widths = [max(17, len(name)) for name in names]
-    yield f"{'trial':<18}{'whisk':>5}  {'β':>6}   " + "  ".join(
-        f"{n:>{width}}" for n, width in zip(names, widths)
-    )
-    for key in dict.fromkeys((j.trial, j.whisk) for j in judged):
-        mine = {(j.estimator, j.one_factor): j for j in judged if (j.trial, j.whisk) == key}
-        cells = [f"{_error(mine.get(c)):>{width}}" for c, width in zip(columns, widths)]
-        yield (
-            f"{key[0]:<18}{key[1]:>5}  {next(iter(mine.values())).beta_deg:>5.1f}°   "
-            + "  ".join(cells)
-        )
+    widths = [max(_NARROWEST, len(name)) for name in names]
+    head = "  ".join(f"{name:>{width}}" for name, width in zip(names, widths))
+    yield f"{'trial':<18}{'whisk':>5}  {'β':>6}   {head}"
+    for (trial, whisk), mine in grouped(known, lambda one: (one.trial, one.whisk)).items():
+        of_column = {(one.estimator, one.one_factor): one for one in mine}
+        errors = [_error(of_column.get(column)) for column in columns]
+        cells = "  ".join(f"{error:>{width}}" for error, width in zip(errors, widths))
+        yield f"{trial:<18}{whisk:>5}  {mine[0].beta_deg:>5.1f}°   {cells}"
 
 
 def contact_lines(results: Iterable[TrialResult]) -> Iterator[str]:
-    """How far contact points, deflections and slip by (10) are from those seen: RMS over whisks of which nothing is
-    doubtful, and what was stated of each."""
+    """Yield how far contact points, deflections and slip by (10) are from those seen.
+
+    RMS over whisks of which nothing is doubtful, and what was stated of each.
+    """
     results = list(results)
     sound = sound_whisks(results)
-    rows = [row for row in estimate_rows(results) if row["estimator"] == "with_friction"]
-    rows = [row for row in rows if (row["trial"], row["whisk"]) in sound]
-    columns = (
-        ("point", None),
-        ("d_y", "d_y_est_sigma_mm"),
-        ("d_z", "d_z_est_sigma_mm"),
-        ("slip", "slip_est_sigma_mm"),
-    )
+    rows = []
+    for row in estimate_rows(results):
+        if row["estimator"] == "with_friction" and (row["trial"], row["whisk"]) in sound:
+            rows.append(row)
     parts = []
-    for name, sigma in columns:
-        finite = [row for row in rows if np.isfinite(row[f"{name}_error_mm"])]
-        if finite:
-            stated = f" ({_rms(finite, sigma):.3f} stated)" if sigma else ""
-            parts.append(f"{name} {_rms(finite, f'{name}_error_mm'):.3f} mm{stated}")
+    for name in ("point", "d_y", "d_z", "slip"):
+        error = f"{name}_error_mm"
+        known = [row for row in rows if np.isfinite(row[error])]
+        if not known:
+            continue
+        part = f"{name} {rms(row[error] for row in known):.3f} mm"
+        if name != "point":
+            stated_mm = rms(row[f"{name}_est_sigma_mm"] for row in known)
+            part += f" ({stated_mm:.3f} stated)"
+        parts.append(part)
     if parts:
-        yield f"the contact felt by (10), RMS of what it is off by: {', '.join(parts)} (estimates.csv)"
+        errors = ", ".join(parts)
+        yield f"the contact felt by (10), RMS of what it is off by: {errors} (estimates.csv)"
 
 
-def _rms(rows: Sequence[dict], column: str) -> float:
-    return float(np.sqrt(np.mean(np.square([row[column] for row in rows]))))
-
-
-def _error(j: Judged | None) -> str:
-    return "-" if j is None else f"{j.error_percent:+.2f} ± {j.error_sigma_percent:.2f}"
+def _error(judged: Judged | None) -> str:
+    """Return an error with its standard deviation, percent."""
+    if judged is None:
+        return "-"
+    return f"{judged.error_percent:+.2f} ± {judged.error_sigma_percent:.2f}"

@@ -1,4 +1,4 @@
-"""What the whisks of a session share of their error: no mean over whisks makes it less, and no scatter shows it."""
+"""The error that the whisks of a session share: no mean over whisks makes it less, and no scatter shows it."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,13 +13,17 @@ from vision.geometry.reasons import Reason
 SHARED = ("diameters", "light", "cameras", "placement")
 # Chance by which whisks of one recording would scatter so much with a sound part of their own.
 _FALSE_ALARM = 1e-3
-_BESIDE = (("touch", "touch_rad"), ("β", "beta_rad"))
+# Angles whose scatter stands with that of the distance, by their names.
+_ANGLES = {"touch": "touch_rad", "β": "beta_rad"}
 
 
 @dataclass(frozen=True)
 class SharedDistance:
-    """Of d_x, mm: RMS over n whisks of the part of sigma that all share, and of each whisk's own. scatter_mm: of whisks
-    of one recording about their mean, with so many degrees of freedom; NaN of none."""
+    """The part of d_x's error that all n whisks share, and each whisk's own, RMS of sigmas in mm.
+
+    scatter_mm: of whisks of one recording about their mean, with so many degrees of freedom; NaN of
+    none.
+    """
 
     shared_mm: float
     own_mm: float
@@ -29,41 +33,52 @@ class SharedDistance:
 
     @property
     def mean_sigma_mm(self) -> float:
-        """Of the mean error of all whisks."""
+        """Return the standard deviation of the mean error of all whisks."""
         return float(np.hypot(self.shared_mm, self.own_mm / np.sqrt(self.n)))
 
     @property
     def is_too_narrow(self) -> bool:
-        """Whether whisks of one recording scatter by more than their own part says."""
-        most = self.own_mm**2 * chdtri(self.freedom, _FALSE_ALARM) if self.freedom else np.inf
+        """Return whether whisks of one recording scatter by more than their own part allows."""
+        if not self.freedom:
+            return False
+        most = self.own_mm**2 * chdtri(self.freedom, _FALSE_ALARM)
         return self.freedom * self.scatter_mm**2 > most
 
 
 def shared_distance(results: Sequence[TrialResult]) -> SharedDistance | None:
-    """None where fewer than two whisks have a truth with its budget."""
-    seen = [s for _, s, _ in whisks(results) if s.has_truth and s.truth.budget]
-    if len(seen) < 2:
+    """Return shared and own error; None where fewer than two whisks have a truth with its budget."""
+    variances = []
+    shares = []
+    for _, seen, _ in whisks(results):
+        if seen.has_truth and seen.truth.budget:
+            variances.append(seen.d_x_mm.sigma**2)
+            shares.append(sum(np.nan_to_num(seen.truth.budget[cause]) for cause in SHARED))
+    if len(variances) < 2:
         return None
-    variance = np.array([s.d_x_mm.sigma**2 for s in seen])
-    share = np.array([sum(np.nan_to_num(s.truth.budget[cause]) for cause in SHARED) for s in seen])
-    shared, own = (
-        float(np.sqrt(np.mean(variance * part))) for part in (share, np.maximum(1.0 - share, 0.0))
-    )
-    return SharedDistance(shared, own, len(seen), *_scatter(results, "d_x_mm"))
+    variance = np.array(variances)
+    share = np.array(shares)
+    shared_mm = float(np.sqrt(np.mean(variance * share)))
+    own_mm = float(np.sqrt(np.mean(variance * np.maximum(1.0 - share, 0.0))))
+    return SharedDistance(shared_mm, own_mm, len(variances), *_scatter(results, "d_x_mm"))
 
 
-def _scatter(results: Sequence[TrialResult], key: str) -> tuple[float, int]:
-    """Standard deviation of whisks of one recording about their mean, pooled, and its degrees of freedom."""
-    groups = [
-        [getattr(s, key).value for s in result.seen.whisks if s.has_truth] for result in results
-    ]
-    freedom = sum(max(len(group) - 1, 0) for group in groups)
-    squares = sum(len(group) * np.var(group) for group in groups if len(group) > 1)
+def _scatter(results: Sequence[TrialResult], name: str) -> tuple[float, int]:
+    """Return the standard deviation of whisks of one recording about their mean, pooled.
+
+    With its degrees of freedom; name: of a `Value` of SeenWhisk.
+    """
+    freedom = 0
+    squares = 0.0
+    for result in results:
+        values = [getattr(seen, name).value for seen in result.seen.whisks if seen.has_truth]
+        if len(values) > 1:
+            freedom += len(values) - 1
+            squares += len(values) * np.var(values)
     return (float(np.sqrt(squares / freedom)) if freedom else np.nan), freedom
 
 
 def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
-    """For the summary."""
+    """Yield the lines of the summary on what whisks share."""
     shared = shared_distance(results)
     if shared is None:
         return
@@ -73,15 +88,18 @@ def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
         f"{shared.mean_sigma_mm:.4f} mm"
     )
     if shared.freedom:
-        beside = (f"{name} {np.degrees(_scatter(results, key)[0]):.4f}°" for name, key in _BESIDE)
+        angles = []
+        for name, field in _ANGLES.items():
+            scatter_rad, _ = _scatter(results, field)
+            angles.append(f"{name} {np.degrees(scatter_rad):.4f}°")
         yield (
             f"  whisks of one recording scatter about their mean by d_x {shared.scatter_mm:.4f} mm, "
-            f"{', '.join(beside)} ({shared.freedom} degrees of freedom)"
+            f"{', '.join(angles)} ({shared.freedom} degrees of freedom)"
         )
 
 
-def shared_doubts(results: Sequence[TrialResult]) -> Iterator[Reason]:
-    """A line where whisks of one recording, which share bar and light, differ by more than they may."""
+def scatter_warnings(results: Sequence[TrialResult]) -> Iterator[Reason]:
+    """Yield a warning where whisks of one recording, which share bar and light, differ too much."""
     shared = shared_distance(results)
     if shared is not None and shared.is_too_narrow:
         yield Reason(

@@ -130,7 +130,7 @@ def _error_range(judged: Sequence[Judged]) -> str:
 
 
 def _recommendation(judged: Sequence[Accuracy], theta_deg: float) -> str:
-    """Return which estimator to use, and which others these whisks cannot tell from it.
+    """Return which estimator to use, and which others these whisks cannot distinguish from it.
 
     Only estimators that give a distance for as many whisks as any other are compared.
     """

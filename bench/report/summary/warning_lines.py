@@ -1,4 +1,4 @@
-"""What is doubtful of each whisk, what the light hides, and what was taken as exact."""
+"""Warnings of each whisk, what the light hides, and what was taken as exact."""
 
 from collections.abc import Iterable, Iterator
 
@@ -17,11 +17,11 @@ _EXPECTED = ("no_slip", "frictionless", *RUNS)
 
 
 def is_silent(status: Reason) -> bool:
-    """Return whether a status says nothing that the user should look at."""
+    """Return whether a status is as it should be, and no warning."""
     return SILENT.issuperset(status.codes)
 
 
-def whisk_doubts(results: Iterable[TrialResult]) -> Iterator[Reason]:
+def whisk_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:
     """Yield a line for each whisk that something is doubtful of.
 
     A gauge trial that cannot be judged is as it should be.
@@ -41,31 +41,33 @@ def whisk_doubts(results: Iterable[TrialResult]) -> Iterator[Reason]:
 
 
 def light_lines(results: Iterable[TrialResult]) -> Iterator[str]:
-    """A line a camera that saw the wire lit from one side: the first trial's, and in how many it was so."""
+    """Yield a line a camera that saw the wire lit from one side: the first trial's, and how many more."""
     notes_of: dict[str, list[str]] = {}
     for result in results:
-        for note in filter(_of_light, result.seen.notes):
-            notes_of.setdefault(note.split(" sees ")[0], []).append(f"{result.trial.name}: {note}")
+        for note in filter(_is_of_light, result.seen.notes):
+            camera = note.split(" sees ")[0]
+            notes_of.setdefault(camera, []).append(f"{result.trial.name}: {note}")
     for notes in notes_of.values():
-        yield notes[0] + (
-            f" (and so in {counted(len(notes) - 1, 'more trial')})" if len(notes) > 1 else ""
-        )
+        more = len(notes) - 1
+        others = f" (and so in {counted(more, 'more trial')})" if more else ""
+        yield notes[0] + others
 
 
 def frame_lines(results: Iterable[TrialResult]) -> Iterator[str]:
-    """A line for frames that were dropped, damaged, made good or left out."""
+    """Yield a line for frames that were dropped, damaged, made good or left out."""
     for result in results:
-        yield from (
-            f"{result.trial.name}: {note}" for note in result.seen.notes if not _of_light(note)
-        )
+        for note in result.seen.notes:
+            if not _is_of_light(note):
+                yield f"{result.trial.name}: {note}"
 
 
-def _of_light(note: str) -> bool:
+def _is_of_light(note: str) -> bool:
+    """Return whether a note is on light from one side."""
     return " sees " in note
 
 
 def taken_as_exact(session: Session) -> Iterator[str]:
-    """One line that names what was given without a sigma; none where all has one."""
+    """Yield one line that names what was given without a sigma; none where all has one."""
     whisker = session.whisker
     given = {
         "whisker length": whisker.length_sigma_mm,

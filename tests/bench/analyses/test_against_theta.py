@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.analyses.against_theta import against_theta, best, figure, theta_lines
+from bench.analyses.against_theta import AgainstTheta, ThetaErrors, against_theta, least_error
 from bench.records.trial_result import EstimateRow, FeltAt, TrialResult
 from tests.scenes.friction_results import result
 from vision.truth.value import Value
@@ -47,22 +47,22 @@ def test_errors_are_pooled_angle_by_angle_over_sound_whisks():
     assert first.error_rms_percent == pytest.approx(np.sqrt(2.5))
     assert first.error_sigma_percent == pytest.approx(100 * np.hypot(0.3, 0.01) / 60)
     assert first.error_sigma_alpha_exact_percent == pytest.approx(100 * np.hypot(0.1, 0.01) / 60)
-    assert best([first, second], "with_friction") is second
-    (line,) = theta_lines([first, second], 1.0)
+    assert least_error([first, second], "with_friction") is second
+    (line,) = AgainstTheta().lines(ThetaErrors((first, second), 1.0))
     assert "least error at θ = 3°, 0.50 % RMS over 2 whisks" in line and "at 1° 1.58 %" in line
 
 
-def test_an_angle_that_few_whisks_reach_is_not_the_best():
+def test_an_angle_that_few_whisks_reach_is_not_the_least_error():
     far = {1.0: 0.6, 12.0: 0.0}
     rows = against_theta(
         [with_errors(result(20.0), far), *[with_errors(result(40.0), {1.0: 0.6})] * 3]
     )
-    assert best(rows, "with_friction").theta_deg == 1.0
+    assert least_error(rows, "with_friction").theta_deg == 1.0
 
 
 def test_a_distance_that_is_none_is_counted_and_drawn_around():
     rows = against_theta([with_errors(result(20.0), {1.0: np.nan, 2.0: 0.6})])
     assert [(row.whisks, row.none) for row in rows] == [(0, 1), (1, 0)]
     assert np.isnan(rows[0].error_rms_percent)
-    (axes,) = figure(rows).axes
+    (axes,) = AgainstTheta().figure(ThetaErrors(tuple(rows), 1.0)).axes
     assert axes.lines[0].get_xdata().tolist() == [2.0]

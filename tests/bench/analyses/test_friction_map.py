@@ -5,36 +5,37 @@ import csv
 import numpy as np
 import pytest
 
-from bench.analyses.error_map import draw_error_map, measured_cells, write_error_map
-from bench.analyses.explained import SHARES, TOTAL, draw_explained, mean_row
-from bench.analyses.friction_tables import friction_of
-from tests.scenes.friction_results import WHISKER, result
-
-ALPHA_EST = np.radians(10.0)
+from bench.analyses.error_map import ErrorMap
+from bench.analyses.explained import SHARES, TOTAL, Explained, mean_row
+from tests.scenes.friction_results import result, run_of
 
 
 def test_cells_hold_what_was_measured_and_agree_with_theory(tmp_path):
     """Whisks made by (13), (14) are wrong by just what (13), (14) predict, at the same α (14°) and α_est."""
     results = [result(b, name=f"{b} {k}") for b in (30, 60, -60) for k in range(2)]
-    found = friction_of(results, WHISKER, ALPHA_EST)
-    cells = measured_cells(results, found, ALPHA_EST)
+    run = run_of(*results)
+    found = ErrorMap().compute(run)
+    cells = found.cells
     assert [(c.beta_deg, len(c.errors)) for c in cells] == [(27.5, 2), (57.5, 4)]
     assert all(c.errors == pytest.approx(c.predicted, abs=0.02) for c in cells)
-    assert write_error_map(tmp_path, results, found, ALPHA_EST) == ["error_map.png"]
+    ErrorMap().write(tmp_path, found)
+    assert ErrorMap().draw(tmp_path, run, found) == ["error_map.png"]
     with (tmp_path / "error_map.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["whisks"] for row in rows] == ["2", "4"]
 
 
 def test_cells_without_a_whisk_stay_empty():
-    results = [result(30), result(60)]
-    cells = measured_cells(results, friction_of(results, WHISKER, ALPHA_EST), ALPHA_EST)
-    drawn = draw_error_map(cells, ALPHA_EST).axes[0].collections[0].get_array()
+    found = ErrorMap().compute(run_of(result(30), result(60)))
+    drawn = ErrorMap().figure(found).axes[0].collections[0].get_array()
     assert np.isfinite(np.ma.filled(drawn, np.nan)).sum() == 2
 
 
 def test_nothing_measured_no_picture(tmp_path):
-    assert write_error_map(tmp_path, [], [], ALPHA_EST) == []
+    run = run_of()
+    found = ErrorMap().compute(run)
+    ErrorMap().write(tmp_path, found)
+    assert ErrorMap().draw(tmp_path, run, found) == []
     assert (tmp_path / "error_map.csv").read_text().count("\n") == 1
 
 
@@ -55,7 +56,7 @@ def test_mean_shares_add_up_and_leave_out_what_is_not_known():
     assert (
         mean["error_mm"] == pytest.approx(sum(mean[name] for name in SHARES)) == pytest.approx(6.0)
     )
-    heights = [p.get_height() for p in draw_explained([*rows, mean]).axes[0].patches]
+    heights = [p.get_height() for p in Explained().figure([*rows, mean]).axes[0].patches]
     assert sum(heights[3::4]) == pytest.approx(
         10.0
     )  # shares of 60 mm in per cent: the mean's bar is the fourth

@@ -8,7 +8,7 @@ import pytest
 
 from bench.analyses.alphas import felt_friction, mean_alpha, seen_friction
 from bench.analyses.direction import slip_angle
-from bench.analyses.friction_tables import alpha_lines, friction_of, write_friction
+from bench.analyses.friction_tables import Friction, friction_of
 from bench.analyses.runs import FITTED, SEEN, _rescaled, with_runs
 from bench.analyses.section_vii import Contact, by_consistency, by_smoothness, by_tilting, weights
 from bench.base.settings import Settings
@@ -17,7 +17,7 @@ from bench.report.assembly import estimate_rows
 from bench.session.whisker import Whisker
 from estimator import slip
 from estimator.uncertainty import Z_95
-from tests.scenes.friction_results import ALPHA, THETA, WHISKER, C, result
+from tests.scenes.friction_results import ALPHA, THETA, WHISKER, C, result, run_of
 from vision.truth.value import Value
 
 NOTHING_SHARED = np.zeros((1, 2))
@@ -101,12 +101,13 @@ def test_every_way_finds_the_friction_angle(tmp_path):
     for name in ("seen", "felt", "least_squares", "tilting", "consistency"):
         assert np.degrees(surface.alpha(name)[0]) == pytest.approx(14.0, abs=0.06), name
     assert surface.error_rms_weighted_percent < 0.5 * surface.error_rms_percent
-    write_friction(tmp_path, results, found, np.radians(10.0))
+    of_run = Friction().compute(run_of(*results))
+    Friction().write(tmp_path, of_run)
     with (tmp_path / "surfaces.csv").open(newline="") as file:
         (row,) = csv.DictReader(file)
     assert float(row["alpha_felt_deg"]) == pytest.approx(14.0, abs=1e-6)
     assert row["alpha_static_felt_deg"] == ""  # it only slides
-    assert any("tilting" in line for line in alpha_lines(found))
+    assert any("tilting" in line for line in Friction().lines(of_run))
 
 
 def contact(beta_deg, d_x_nominal_mm=60.0) -> Contact:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.analyses.gave import gave_at, give_seen, mean_give, write_gives_way
+from bench.analyses.gave import GivesWay, gave_at, give_seen, mean_give
 from bench.base.errors import BadInput
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import (
@@ -60,9 +60,9 @@ def test_beyond_the_frames_nothing_is_told():
 
 
 def test_a_row_a_frame_and_none_where_it_stands(tmp_path):
-    write_gives_way(tmp_path, [result(gave=None)])
+    GivesWay().write(tmp_path, [result(gave=None)])
     assert not list(tmp_path.iterdir())
-    write_gives_way(tmp_path, [result()])
+    GivesWay().write(tmp_path, [result()])
     written = rows(tmp_path / "gives_way.csv")
     assert [(row["frame"], float(row["gave_mm"])) for row in written] == [
         ("7", 0.25),

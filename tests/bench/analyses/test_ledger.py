@@ -12,9 +12,8 @@ from bench.analyses.ledger import (
     NOT_KNOWN,
     QUANTITIES,
     Entry,
+    Ledger,
     ledger,
-    ledger_lines,
-    write_ledger,
 )
 from bench.analyses.left_out import NAMES
 from bench.gauges.felt import gauge_delay
@@ -61,7 +60,7 @@ def test_what_may_be_left_out_is_kept_and_for_how_much():
         0.6,
         0.0,
     ]
-    said = {line[:28].strip(): line[28:] for line in ledger_lines(entries)}
+    said = {line[:28].strip(): line[28:] for line in Ledger().lines(entries)}
     assert said["psi"].startswith(
         "may be left out, kept at 0.6 % of the time at most: at most +0.0001 mm of d_x"
     )
@@ -137,7 +136,7 @@ def test_summary_and_page_say_it(exact_run):
     )
 
 
-def test_the_table_and_the_lines(exact_run, tmp_path):
+def test_the_table_and_the_lines(exact_run):
     table = LEDGER.read(exact_run)
     assert table.dtype.names == LEDGER.names and set(table["refinement"]) == set(NAMES)
     trials = set(table["trial"].tolist())
@@ -147,6 +146,6 @@ def test_the_table_and_the_lines(exact_run, tmp_path):
         gauge_delay(None).value * 10.0, rel=0.02
     )  # 10°/s
     assert delay["verdict"].tolist() == [NEEDED]
-    lines = list(ledger_lines(write_ledger(tmp_path, [result(50.0)], WHISKER)))
+    lines = list(Ledger().lines(ledger([result(50.0)], WHISKER)))
     assert len(lines) == len(NAMES) and any("needed in 1 of 1" in line for line in lines)
-    assert list(ledger_lines([])) == []
+    assert list(Ledger().lines([])) == []

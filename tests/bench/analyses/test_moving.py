@@ -61,7 +61,7 @@ def test_an_object_that_moves_is_judged_by_itself(tmp_path, exact_vision):
     text = (out / "summary.txt").read_text()
     assert "Objects that moved (moving.csv)" in text and "(10), motion known:" in text
     assert "wrong by" not in text.splitlines()[0]
-    figure = moving.error_over_speed([drawn(row) for row in rows.values()])
+    figure = moving.MovingObjects().figure([drawn(row) for row in rows.values()])
     assert len(figure.axes[0].lines) == 1 + len(rows)
 
 

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from bench.analyses.soft import NO_PUSH, NOT_SOFT, Place, soft_lines, softness
+from bench.analyses.soft import NO_PUSH, NOT_SOFT, Place, Softness, softness
 from bench.base.settings import Settings
 from bench.commands.evaluate import evaluate
 from bench.records.trial_result import TrialFacts
@@ -58,7 +58,7 @@ def test_a_rigid_object_is_only_stiffer_than_something():
     assert found.status == NOT_SOFT
     _, low, high = found.stiffness_N_mm
     assert 0 < low < np.inf and high == np.inf
-    (line,) = soft_lines([found])
+    (line,) = Softness().lines([found])
     assert "stiffer than" in line and "inf" not in line
 
 
@@ -68,7 +68,7 @@ def test_what_no_distance_explains_has_no_stiffness():
         WHISKER, FACTS, Place(45.0, 0.0, 1e-9, 1e-6, 1, NOTHING_SHARED), far, 0.05, FRICTIONLESS
     )
     assert found.status == NO_PUSH and np.isnan(found.stiffness_N_mm).all()
-    assert list(soft_lines([found])) == []
+    assert list(Softness().lines([found])) == []
 
 
 def test_a_simulated_sponge_is_soft_and_steel_is_not(tmp_path):

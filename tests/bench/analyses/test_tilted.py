@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.analyses.tilted import TILTS, tilted_lines, tilted_whisks, write_tilts
+from bench.analyses.tilted import TILTS, Tilts, tilted_whisks
 from estimator.two_tilts import ALIKE
 from tests.scenes.friction_results import ALPHA, WHISKER, result
 
@@ -37,20 +37,20 @@ def test_distance_and_friction_are_those_of_the_whisks(tmp_path):
     ]
     (found,) = tilted_whisks(session(0.1), whisks)
     assert (found.trials, found.whisks, found.beta_deg) == (3, 3, (5.0, 60.0))
-    sigma_mm, sigma_rad = np.sqrt(np.diag(found.found.covariance))
-    assert found.found.d_x_mm == pytest.approx(60.0, abs=0.3 + 2 * sigma_mm)
-    assert found.found.alpha_rad == pytest.approx(ALPHA, abs=np.radians(0.3) + 2 * sigma_rad)
-    write_tilts(tmp_path, [found])
+    sigma_mm, sigma_rad = np.sqrt(np.diag(found.contact.covariance))
+    assert found.contact.d_x_mm == pytest.approx(60.0, abs=0.3 + 2 * sigma_mm)
+    assert found.contact.alpha_rad == pytest.approx(ALPHA, abs=np.radians(0.3) + 2 * sigma_rad)
+    Tilts().write(tmp_path, [found])
     (row,) = csv.DictReader((tmp_path / "tilts.csv").read_text().splitlines())
     assert tuple(row) == TILTS.names
-    assert float(row["error_mm"]) == pytest.approx(found.found.d_x_mm - 60.0, abs=1e-6)
-    (line,) = tilted_lines([found])
+    assert float(row["error_mm"]) == pytest.approx(found.contact.d_x_mm - 60.0, abs=1e-6)
+    (line,) = Tilts().lines([found])
     assert "3 whisks at slopes from 5 to 60° together, without α_est: d_x" in line
 
 
 def test_a_distance_set_by_a_ruler_is_known_to_one_percent():
     whisks = [result(5.0), result(60.0)]
-    ruler, stated = (tilted_whisks(session(sigma), whisks)[0].found for sigma in (0.0, 0.6))
+    ruler, stated = (tilted_whisks(session(sigma), whisks)[0].contact for sigma in (0.0, 0.6))
     assert ruler.covariance == pytest.approx(stated.covariance)
 
 
@@ -60,7 +60,7 @@ def test_one_slope_set_up_twice_is_no_tilt():
 
 def test_held_whisks_do_not_tell(tmp_path):
     (found,) = tilted_whisks(session(), [result(0.0), result(11.0)])
-    assert found.found.status == ALIKE and list(tilted_lines([found])) == []
-    write_tilts(tmp_path, [found])
+    assert found.contact.status == ALIKE and list(Tilts().lines([found])) == []
+    Tilts().write(tmp_path, [found])
     (row,) = csv.DictReader((tmp_path / "tilts.csv").read_text().splitlines())
     assert row["d_x_mm"] == row["alpha_deg"] == "" and row["status"] == ALIKE

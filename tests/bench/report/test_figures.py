@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from bench.analyses.error_against_slope import error_against_slope
 from bench.analyses.figure_8 import figure_8
 from bench.analyses.surfaces import Felt, Surface
 from bench.base.drawing import is_drawn, save
@@ -21,7 +22,6 @@ from bench.records.trial_result import (
     TrialResult,
     WhiskerFacts,
 )
-from bench.report.figures import error_against_slope
 from bench.report.planes import contact_path, sensing_plane
 from bench.session.session import load_session
 from bench.trials.estimate_errors import Judged

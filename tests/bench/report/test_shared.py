@@ -12,7 +12,7 @@ from bench.records.trial_result import (
     TrialResult,
     WhiskerFacts,
 )
-from bench.report.summary.shared import shared_distance, shared_doubts, shared_lines
+from bench.report.summary.shared import scatter_warnings, shared_distance, shared_lines
 from vision.fit.covariance import CAUSES
 from vision.truth.records import WhiskTruth
 from vision.truth.value import Value
@@ -71,9 +71,9 @@ def test_a_mean_over_whisks_is_known_to_what_they_share():
 
 def test_scatter_within_recordings_tests_the_own_part():
     rng = np.random.default_rng(4)
-    sound = [list(shared_doubts(session(rng, 4, 3))) for _ in range(300)]
+    sound = [list(scatter_warnings(session(rng, 4, 3))) for _ in range(300)]
     assert sum(map(len, sound)) <= 2  # one in a thousand
-    (line,) = shared_doubts(session(rng, 4, 10, own_mm=3 * OWN_MM))
+    (line,) = scatter_warnings(session(rng, 4, 10, own_mm=3 * OWN_MM))
     assert "mm is stated as each whisk's own" in line
 
 
@@ -81,4 +81,6 @@ def test_single_whisks_say_nothing_of_their_scatter():
     rng = np.random.default_rng(5)
     (line,) = shared_lines(session(rng, 3, 1))
     assert "one error that all 3 whisks share" in line
-    assert list(shared_lines(session(rng, 1, 1))) == list(shared_doubts(session(rng, 3, 1))) == []
+    assert (
+        list(shared_lines(session(rng, 1, 1))) == list(scatter_warnings(session(rng, 3, 1))) == []
+    )

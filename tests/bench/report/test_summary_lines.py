@@ -93,7 +93,10 @@ def test_beam_and_spline_stand_side_by_side():
 
 def test_the_screen_shows_the_verdict_and_what_is_doubtful(tmp_path):
     doubts = tuple(f"t{k}, whisk 0: slips in jumps" for k in range(30))
-    sections = Section("Cameras", ("camera high: 10 views",)), Section("Doubtful", doubts)
+    sections = (
+        Section("cameras", "Cameras", ("camera high: 10 views",)),
+        Section("doubtful", "Doubtful", doubts),
+    )
     shown = Summary(("(2) is wrong.",), doubts, sections).on_screen(tmp_path).splitlines()
     assert shown[:3] == ["(2) is wrong.", "", "Doubtful"]
     where = f"All of it: {tmp_path}/report.html, {tmp_path}/summary.txt"

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.analyses.single_camera import ONE_CAMERA, ShapeSeen, one_camera_lines, write_one_camera
+from bench.analyses.single_camera import ONE_CAMERA, OneCamera, ShapeSeen
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.records.trial_result import ByOneCamera, SeenWhisk
@@ -87,11 +87,11 @@ def test_rows_and_the_line_of_the_summary(tmp_path):
         ShapeSeen(result, truth, ByOneCamera("one", d_x_mm=Value(60.0 + error, 0.4)))
         for error in (0.3, -1.2)
     ]
-    write_one_camera(tmp_path, found)
+    OneCamera().write(tmp_path, found)
     head, *rows = (tmp_path / "one_camera.csv").read_text().splitlines()
     assert head == ",".join(ONE_CAMERA.names)
     assert [dict(zip(ONE_CAMERA.names, row.split(",")))["inside"] for row in rows] == ["1", "0"]
-    (line,) = one_camera_lines(found)
+    (line,) = OneCamera().lines(found)
     assert line == "one: d_x off by 0.87 mm RMS (stated 0.4); its 95 % interval holds 1 of 2 whisks"
-    write_one_camera(tmp_path / "none", [])
+    OneCamera().write(tmp_path / "none", [])
     assert not (tmp_path / "none").exists()

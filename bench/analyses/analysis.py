@@ -1,0 +1,141 @@
+"""What an analysis of an evaluated session is, and what it is given.
+
+An analysis puts one question to all whisks together. It is one module of this folder, with its tables,
+its lines of the summary, its figure and its table on the page. Nobody calls it by name: `evaluate`, the
+summary, the page and docs/formats.md ask each of `bench.analyses.catalogue.ANALYSES` for its part.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from bench.base.drawing import is_drawn, save, style
+from bench.base.results import DRAWING, hash_of, hash_of_code
+from bench.base.settings import Settings
+from bench.base.tables import Table
+from bench.records.trial_result import TrialResult
+from bench.session.session import Session
+from bench.session.whisker import Whisker
+
+if TYPE_CHECKING:  # matplotlib is loaded where something is drawn
+    from matplotlib.figure import Figure
+
+    from bench.analyses.friction_tables import SurfaceFriction
+
+_FIGURE_CODE = (*DRAWING, "bench/analyses")  # sources that a figure depends on
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Run:
+    """The results of an evaluated session: all that an analysis is given.
+
+    friction: of each surface and speed. alpha_est_sigma_rad: standard deviation of the assumed
+    friction angle. session: its manifests; None where only the folder of results is there.
+    """
+
+    whisker: Whisker
+    settings: Settings
+    results: tuple[TrialResult, ...]
+    friction: tuple["SurfaceFriction", ...]
+    alpha_est_sigma_rad: float
+    session: Session | None = None
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A section of the summary: its code, by which programs know it, and its title for people."""
+
+    code: str
+    title: str
+
+
+@dataclass(frozen=True)
+class PageTable:
+    """A table of the page: title, the file that has it all, head, and a text a cell."""
+
+    title: str
+    file: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+class Analysis(ABC):
+    """A question put to all whisks of a session together.
+
+    tables: that it may write; in_every_run: whether it writes them without rows, too. heading: of the
+    section of the summary that has its lines; analyses of one code share that section. figure_name:
+    of its figure's file, without .png; figure_title, figure_caption: on the page. needs_session:
+    whether results alone are not enough for it.
+    """
+
+    tables: ClassVar[tuple[Table, ...]] = ()
+    in_every_run: ClassVar[bool] = True
+    heading: ClassVar[Heading | None] = None
+    figure_name: ClassVar[str] = ""
+    figure_title: ClassVar[str] = ""
+    figure_caption: ClassVar[str] = ""
+    needs_session: ClassVar[bool] = False
+
+    @abstractmethod
+    def compute(self, run: Run) -> Any:
+        """Return what this analysis finds in a run, in the form that its other methods take."""
+
+    def rows(self, found: Any) -> Mapping[Table, Iterable[dict]]:
+        """Return the rows of each of its tables: by default `row` of each item of `found`."""
+        return {table: [self.row(one) for one in found] for table in self.tables}
+
+    def row(self, one: Any) -> dict:
+        """Return the row of an item: by default its fields are the columns."""
+        return vars(one)
+
+    def lines(self, found: Any) -> Iterable[str]:
+        """Return its lines of the summary."""
+        return ()
+
+    def figure(self, found: Any) -> "Figure | None":
+        """Draw its figure; None where there is nothing to show."""
+        return None
+
+    def page_table(self, out: Path) -> PageTable | None:
+        """Return its table of the page, made from the tables in the folder `out`.
+
+        None where there is nothing to show. Raises BadInput where a table is damaged.
+        """
+        return None
+
+    def write(self, out: Path, found: Any) -> None:
+        """Write its tables into a folder, each whole."""
+        for table, rows in self.rows(found).items():
+            rows = list(rows)
+            if rows or self.in_every_run:
+                table.write(out, rows)
+
+    def draw(self, out: Path, run: Run, found: Any) -> list[str]:
+        """Write its figure into a folder; return the names of the files.
+
+        The file has the hash of what it shows, and stays as it is where that has not changed.
+        """
+        if not self.figure_name:
+            return []
+        path = out / f"{self.figure_name}.png"
+        hashes = [result.hash for result in run.results]
+        stamp = hash_of(hashes, run.settings, hash_of_code(_FIGURE_CODE))
+        if not is_drawn(path, stamp):
+            with style():
+                figure = self.figure(found)
+                if figure is None:
+                    return []
+                save(figure, path, stamp)
+        return [path.name]
+
+
+def read_rows(out: Path, table: Table) -> np.ndarray:
+    """Read the rows of a table of a run; none where the run has no such table.
+
+    Raises BadInput where the file is damaged.
+    """
+    return table.read(out) if (out / table.file).exists() else np.array([])

@@ -1,0 +1,65 @@
+"""What analyses have in common: whisks by group, errors pooled over whisks, cells of a row."""
+
+from collections.abc import Callable, Hashable, Iterable
+from typing import TypeVar
+
+import numpy as np
+
+from bench.base.tables import sigma_name
+from bench.records.trial_result import TrialResult
+from vision.truth.value import Value
+
+Item = TypeVar("Item")
+Key = TypeVar("Key", bound=Hashable)
+
+
+def grouped(items: Iterable[Item], key: Callable[[Item], Key]) -> dict[Key, list[Item]]:
+    """Return the items by their key, keys in the order in which they come."""
+    groups: dict[Key, list[Item]] = {}
+    for item in items:
+        groups.setdefault(key(item), []).append(item)
+    return groups
+
+
+def measured(results: Iterable[TrialResult]) -> list[TrialResult]:
+    """Return the results of trials that measure, leaving out those that calibrate gauges."""
+    return [result for result in results if result.trial.purpose == "measure"]
+
+
+def rms(values: Iterable[float]) -> float:
+    """Return the root mean square; NaN of nothing."""
+    squares = np.square(list(values))
+    return float(np.sqrt(np.mean(squares))) if len(squares) else np.nan
+
+
+def known_rows(rows: Iterable[Iterable[float]], columns: int) -> tuple[np.ndarray, int]:
+    """Return the rows of numbers that are all finite (n, columns), and how many are not."""
+    table = np.array([list(row) for row in rows], dtype=float).reshape(-1, columns)
+    is_known = np.isfinite(table).all(axis=1)
+    return table[is_known], int(np.sum(~is_known))
+
+
+def value_cells(column: str, value: Value) -> dict[str, float]:
+    """Return the cells of a number and of its standard deviation."""
+    return {column: float(value.value), sigma_name(column): float(value.sigma)}
+
+
+def angle_cells(column: str, angle: Value) -> dict[str, float]:
+    """Return the cells, in degrees, of an angle in rad and of its standard deviation."""
+    return value_cells(column, Value(np.degrees(angle.value), np.degrees(angle.sigma)))
+
+
+def degrees(angle_rad: float) -> float:
+    """Return an angle in degrees as a plain number."""
+    return float(np.degrees(angle_rad))
+
+
+def as_cell(is_inside: bool | None) -> int | None:
+    """Return the cell of whether an interval holds the truth; empty where that is not known."""
+    return None if is_inside is None else int(is_inside)
+
+
+def panel_title(surface: str, speed_deg_s: float | None) -> str:
+    """Return surface and speed in words."""
+    name = surface or "surface not named"
+    return name if speed_deg_s is None else f"{name}, {speed_deg_s:g}°/s"
