@@ -186,12 +186,12 @@ def _summarise(
     sizes: Sequence[FeltSize],
 ) -> Summary:
     """Return verdict and sections of the array's summary; sections without lines are left out."""
-    doubtful = [*record.doubts, *exchanged({run.base.name: run.whole.results for run in runs})]
+    doubtful = [*record.doubts, *exchanged({run.base.name: run.results for run in runs})]
     results = []
     first_lines = []
     for run in runs:
         doubtful += [f"{run.base.name}: {line}" for line in run.record.doubts]
-        results += [_named_by_whisker(result, run) for result in run.whole.results]
+        results += [_named_by_whisker(result, run) for result in run.results]
         first_lines.append(f"{run.base.name}: {run.record.verdict[0]}")
     title = f"{record.session}, {counted(len(runs), 'whisker')}"
     has_pictures = any(run.record.has_pictures for run in runs)
