@@ -1,54 +1,31 @@
 """One whisk: wire and object traced in all its frames and fitted together, by turns."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vision.fit.first_bends import SwingPictures, contact_arc, find_rest, follow_bends
-from vision.fit.problem import (
-    Problem,
-    State,
-    bar_axis,
-    bends,
-    curves_of,
-    rest_shape,
-    shifts_mm,
-)
+from vision.fit.problem import Problem, State, bar_axis, bends, curves_of, rest_shape, shifts_mm
 from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.fit.touch import begins_free
 from vision.geometry.centreline import Curves, one_curve
 from vision.geometry.contact import clearance
 from vision.geometry.refusals import Misled, Refused, TooFewFrames
-from vision.geometry.touched import Axis
-from vision.pictures.view import SATURATED, View
-from vision.truth.readers import ObjectReader, WhereAbout
+from vision.truth.line_source import LineSource, WhiskPlace
 from vision.truth.strategies import Strategy, Touch, early, strategies
+from vision.truth.traced_lines import TracedLines, blurs_px
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
-from vision.wire.bands import Pieces
-from vision.wire.one_sided import WireAppearance, seen_width
 from vision.wire.points import Observed
-from vision.wire.shading import Knots
-from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, wire_pieces
 
-# [mm] Between knots of the wire's shading: light and finish are much the same a centimetre
-# farther on. Study: thresholds.py truth.whisk _WIRE_KNOT_MM ….
-_WIRE_KNOT_MM = 12.0
-# [px] Beside the wire: three of a lens blur of a pixel. A piece that lacks a pixel within, for
-# another whisker's wire, gives no point: of those that lacked some the wire scattered by 0.09 px,
-# without them by 0.05. Study: arrays_seen.py.
-_EDGE_PX = 3.0
-# [px] Wire nearer to the bar's outline is mixed with it by the lens: four blurs. Study:
-# thresholds.py truth.whisk _BESIDE_BAR_PX ….
-BESIDE_BAR_PX = 4.0
 # [1] Least that a variance grows by, of the free stroke that places the rig: what changes slowly
 # over a wide stroke passes for the whisker's turn, which takes up what would show it as scatter.
 # Study: tests/bench/trials/test_placing_pictures.py.
 _FREE_SHARED = 4.0
 # [px] A camera whose points scatter by more sees another thing: where a wire is seen at all its
-# points lie on one line to a tenth of a pixel. Study: thresholds.py truth.whisk _MOST_SCATTER_PX
-# ….
+# points lie on one line to a tenth of a pixel. Study: thresholds.py
+# truth.whisk_truth _MOST_SCATTER_PX ….
 _MOST_SCATTER_PX = 0.7
 
 
@@ -56,21 +33,16 @@ _MOST_SCATTER_PX = 0.7
 class _Expected:
     """What is expected before a pass, in f frames.
 
-    axis: of the object. came_mm (f, 3): how far it is from there in each frame, if it moves.
-    rest_mm (2, 4): rest shape. bend_rad (f, 2), arcs_mm (f,): bends and contact arcs. curves: of
-    the wire, by frame. touching, free (f,) bool. blur_px: of each camera's lens, by the pass
-    before.
+    place: of object and wire. rest_mm (2, 4): rest shape. bend_rad (f, 2), arcs_mm (f,): bends and
+    contact arcs. touching, free (f,) bool.
     """
 
-    axis: Axis
-    came_mm: np.ndarray
+    place: WhiskPlace
     rest_mm: np.ndarray
     bend_rad: np.ndarray
     arcs_mm: np.ndarray
-    curves: Mapping[int, Curves]
     touching: np.ndarray
     free: np.ndarray
-    blur_px: Mapping[str, float] = field(default_factory=dict)
 
 
 def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
@@ -91,12 +63,20 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
 
 
 def _fit_by(whisk: WhiskPictures, strategy: Strategy) -> FittedWhisk:
-    """Fit a whisk by one strategy, pass by pass. Raises Refused where it does not serve."""
-    reader = strategy.reader
-    touch = strategy.touch
-    whisk, expected = _expect_coarsely(whisk, touch)
+    """Fit a whisk by one strategy. Raises Refused where it does not serve."""
+    whisk, expected = _expect_coarsely(whisk, strategy.touch)
+    return _fit_lines(whisk, TracedLines(whisk, strategy.reader), expected, strategy.touch)
+
+
+def _fit_lines(
+    whisk: WhiskPictures, lines: LineSource, expected: _Expected, touch: Touch
+) -> FittedWhisk:
+    """Fit the lines of a whisk pass by pass, each time beside the curves of the pass before.
+
+    Raises Refused where the lines determine no touch.
+    """
     for _ in range(whisk.settings.rounds):
-        seen = _trace_all(whisk, reader, expected, last=False)
+        seen = lines.all_points(expected.place, last=False)
         if len({one.camera for one in seen if one.frame >= 0}) < touch.fewest_cameras:
             raise Refused("a single camera sees wire and bar", code="single_camera")
         problem, state, covariance = _fit(whisk, expected, seen, touch)
@@ -104,17 +84,14 @@ def _fit_by(whisk: WhiskPictures, strategy: Strategy) -> FittedWhisk:
         _check_scatter(problem, state)
         touching, free = touch.part_by_fit(problem, state, covariance)
         expected = _Expected(
-            axis=bar_axis(problem, state.vector).upward(),
-            came_mm=shifts_mm(problem, state.vector),
+            place=_fitted_place(whisk, problem, state),
             rest_mm=rest_shape(problem, state.vector),
             bend_rad=bends(problem, state.vector),
             arcs_mm=state.arcs_mm,
-            curves=_fitted_curves(problem, state, whisk.frames),
             touching=touching,
             free=free,
-            blur_px=_blurs_px(whisk),
         )
-    seen = _trace_all(whisk, reader, expected, last=True)
+    seen = lines.all_points(expected.place, last=True)
     problem, state, covariance = _fit(whisk, expected, seen, touch)
     return FittedWhisk.of(problem, state, covariance, whisk.frames)
 
@@ -145,8 +122,8 @@ def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures,
         last_free = np.flatnonzero(free[:first])[-1]
         touch_rad = float(np.mean(whisk.angles_rad[[last_free, first]]))
         whisk = whisk.yielding(came, touch_rad)
-    arcs = np.array(arcs)
-    return whisk, _Expected(axis, came, rest, bend, arcs, curves, touching, free)
+    place = WhiskPlace(axis, curves, whisk.bar_swept_mm, came)
+    return whisk, _Expected(place, rest, bend, np.array(arcs), touching, free)
 
 
 def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarray]]:
@@ -187,7 +164,7 @@ def _fit(
     problem = Problem(
         whisk.cameras,
         whisk.rods,
-        expected.axis,
+        expected.place.axis,
         whisk.angles_rad,
         expected.touching,
         ~expected.free,
@@ -226,9 +203,11 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     curves = {}
     for f, motor_rad in whisk.motor.items():
         curves[f] = one_curve(rest, np.zeros(2), wire.length_mm, motor_rad, wire)
+    place = WhiskPlace(axis, curves, whisk.bar_swept_mm)
+    lines = TracedLines(whisk, blur_px=blurs_px(whisk))
     seen = []
-    for view in whisk.views:
-        seen += trace_wire(whisk, view, axis, curves, _blurs_px(whisk))
+    for on_wire in lines.wire_points(place, last=True).values():
+        seen += on_wire
     nothing = np.zeros(len(curves), dtype=bool)
     alone = replace(
         problem,
@@ -243,15 +222,16 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     return inflated_by_residuals(alone, state, _FREE_SHARED), state
 
 
-def _fitted_curves(problem: Problem, state: State, frames: Sequence[int]) -> dict[int, Curves]:
-    """Return by frame the wire's centreline of a fit."""
-    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
-    return {f: curves.one(k) for k, f in enumerate(frames)}
-
-
-def _blurs_px(whisk: WhiskPictures) -> dict[str, float]:
-    """Return the lens blur of each camera in which the wire was traced."""
-    return {name: light.blur_px for name, light in whisk.light.items()}
+def _fitted_place(whisk: WhiskPictures, problem: Problem, state: State) -> WhiskPlace:
+    """Return where a fit has object and wire."""
+    vector = state.vector
+    curves, _ = curves_of(problem, vector, state.arcs_mm)
+    return WhiskPlace(
+        axis=bar_axis(problem, vector).upward(),
+        curves={f: curves.one(k) for k, f in enumerate(whisk.frames)},
+        swept_mm=whisk.bar_swept_mm,
+        came_mm=shifts_mm(problem, vector),
+    )
 
 
 def _begin(problem: Problem, expected: _Expected) -> State:
@@ -259,84 +239,6 @@ def _begin(problem: Problem, expected: _Expected) -> State:
     vector = np.zeros(problem.size)
     vector[problem.blocks.rest_shape.slice] = np.ravel(expected.rest_mm)
     if problem.motion is not None and problem.motion.from_touch:
-        vector[problem.blocks.motion.slice] = problem.motion.values(expected.came_mm)
+        vector[problem.blocks.motion.slice] = problem.motion.values(expected.place.came_mm)
     vector[problem.first_bend :] = expected.bend_rad[problem.bent].ravel()
     return State(vector, np.asarray(expected.arcs_mm, dtype=float))
-
-
-def _trace_all(
-    whisk: WhiskPictures, reader: ObjectReader, expected: _Expected, *, last: bool
-) -> list[Observed]:
-    """Trace wire and object in all cameras. Raises Refused where one of them is seen in none."""
-    curves = expected.curves
-    wires_px = {}
-    for view in whisk.views:
-        lines_px = [view.camera.project(curve.points_mm) for curve in curves.values()]
-        wires_px[view.camera.name] = lines_px
-    about = WhereAbout(expected.axis, expected.came_mm, list(curves), wires_px)
-    lines = reader.read(about, last=last)
-    seen = []
-    for number, view in enumerate(whisk.views):
-        seen += trace_wire(whisk, view, expected.axis, curves, expected.blur_px, last=last)
-        for line in lines.get(view.camera.name, []):
-            seen.append(Observed(-1, number, line.points, line.side, line.frame))
-    require_both_rods(seen)
-    return seen
-
-
-def require_both_rods(seen: Sequence[Observed]) -> None:
-    """Raise Refused where wire or bar is seen in no camera."""
-    for rod, is_seen in (
-        ("wire clear of the bar", any(one.frame >= 0 for one in seen)),
-        ("bar clear of the wire", any(one.frame < 0 for one in seen)),
-    ):
-        if not is_seen:
-            raise Refused(f"no camera shows enough of the {rod}", code="rod_hidden")
-
-
-def trace_wire(
-    whisk: WhiskPictures,
-    view: View,
-    axis: Axis,
-    curves: Mapping[int, Curves],
-    seen_blur_px: Mapping[str, float] | None = None,
-    *,
-    last: bool = True,
-) -> list[Observed]:
-    """Trace the wire in one of a whisk's cameras near its curves by frame.
-
-    seen_blur_px: by camera, of the pass that gave the curves. Fills whisk.light with how the camera
-    sees the wire.
-    """
-    name = view.camera.name
-    pieces = clear_pieces(whisk, view, axis, curves)
-    if len(pieces) == 0:
-        return []
-    blur_px = (seen_blur_px or {}).get(name)
-    traced = trace(pieces, wire_knots(whisk), seen_blur_px=blur_px, last=last)
-    width = seen_width(traced.pieces, traced.blur_px)
-    whisk.light[name] = WireAppearance(traced.blur_px, width, float(np.sqrt(traced.misfit)))
-    points, source = to_points(traced)
-    return observed(points, source, whisk.cameras.names.index(name), list(curves))
-
-
-def clear_pieces(
-    whisk: WhiskPictures, view: View, axis: Axis, curves: Mapping[int, Curves]
-) -> Pieces:
-    """Cut out the wire near its curves, clear of clamp and object, in one of a whisk's cameras."""
-    settings = whisk.settings
-    pieces = wire_pieces(
-        view, curves, whisk.rods.wire, settings.wire_piece_px, settings.wire_margin_px
-    )
-    if view.others:
-        pieces = pieces.select(pieces.show_rod(_EDGE_PX))
-    pieces = pieces.below(SATURATED * view.full_scale)
-    middle_px, radius_px = axis.covering_discs(view.camera, whisk.bar_swept_mm)
-    is_clear = clear_of_bar(pieces, middle_px, radius_px, BESIDE_BAR_PX)
-    return pieces.select(is_clear & (pieces.place > NEAR_CLAMP_MM))
-
-
-def wire_knots(whisk: WhiskPictures) -> Knots:
-    """Return the knots between which the wire's shading is linear."""
-    length_mm = whisk.rods.wire.length_mm
-    return Knots.of_turning(np.arange(NEAR_CLAMP_MM, length_mm, _WIRE_KNOT_MM), whisk.motor)
