@@ -7,7 +7,6 @@ import numpy as np
 
 from vision.fit.line_noise import LineNoise
 from vision.truth.predicted_truth import PredictedTruth
-from vision.truth.sight import Sight
 
 # The columns of a row, by vision's name of the quantity: at touch, then at a pushing angle.
 COLUMNS = {
@@ -67,7 +66,7 @@ class Outlook:
 def outlook(predicted: PredictedTruth, noise: Mapping[str, LineNoise], theta_rad: float) -> Outlook:
     """Return what a whisk would give; slip, φ and α at a pushing angle."""
     truth = predicted.truth
-    sentences = tuple(obstacles(predicted.sights, noise))
+    sentences = tuple(obstacles(predicted, noise))
     if not predicted.is_known:
         return Outlook(status=truth.status, obstacles=sentences)
     limits = {}
@@ -85,9 +84,9 @@ def sigmas(predicted: PredictedTruth, theta_rad: float) -> dict[str, float]:
     return found
 
 
-def obstacles(sights: Mapping[str, Sight], noise: Mapping[str, LineNoise]) -> Iterator[str]:
+def obstacles(predicted: PredictedTruth, noise: Mapping[str, LineNoise]) -> Iterator[str]:
     """Yield what keeps each camera from seeing the whole whisk, a sentence each."""
-    for name, sight in sights.items():
+    for name, sight in predicted.sights.items():
         own = noise.get(name)
         if sight.is_along_bar:
             angle_deg = np.degrees(sight.angle_to_bar_rad)

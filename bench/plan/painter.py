@@ -12,6 +12,7 @@ from bench.rig import boards, build
 from bench.rig.album import JPEG_QUALITY
 from bench.rig.moments import exposure_moments
 from bench.rig.painted_scene import block_corners_mm
+from bench.rig.printed_board import Board as PrintedBoard
 from bench.rig.protocol import Protocol
 from bench.rig.studio import Setting, Studio
 from vision.boards.corners import refine_corners
@@ -51,6 +52,11 @@ class Painter:
         """Return the board for vision."""
         return as_board(self.protocol.board)
 
+    @cached_property
+    def printed(self) -> PrintedBoard:
+        """Return the board for the rig."""
+        return build.board(self.protocol)
+
     def _stream(self, *words: int) -> np.random.Generator:
         """Return the random stream of these words."""
         return np.random.default_rng([self.seed, *words])
@@ -76,8 +82,7 @@ class Painter:
         """Return the median sigma of corners in one camera, px. Raises Refused."""
         studio = self.studios[number]
         camera = self.cameras[number]
-        printed = build.board(self.protocol)
-        pose = boards.draw_poses(printed, studio.camera, 2, self._stream(number))[0]
+        pose = boards.draw_poses(self.printed, studio.camera, 2, self._stream(number))[0]
         brightness = studio.board_brightness(pose)
         picture = studio.sensor.expose(brightness, self._stream(number, _BOARD_PICTURE))
         px = camera.project(apply(pose, self.board.corners_mm))
@@ -94,7 +99,7 @@ class Painter:
         return self.studios[number].setting(staged.marched.bar, staged.known.axis.point_mm)
 
     def frame(self, number: int, staged: StagedWhisk, setting: Setting, frame: int) -> np.ndarray:
-        """Paint one frame (h, w) of one camera as its file gives it back."""
+        """Return one painted frame (h, w) of one camera as its file gives it back."""
         studio = self.studios[number]
         motor_rad = float(staged.known.motor_rad[frame])
         instants = exposure_moments(
@@ -108,7 +113,7 @@ class Painter:
         return cv2.imdecode(encoded, cv2.IMREAD_GRAYSCALE)
 
     def last_frames(self, staged: StagedWhisk) -> dict[str, np.ndarray]:
-        """Paint by camera the frame (h, w) of a whisk's largest motor angle."""
+        """Return by camera the painted frame (h, w) of a whisk's largest motor angle."""
         last = int(np.argmax(staged.known.motor_rad))
         pictures = {}
         for number, camera in enumerate(self.cameras):

@@ -25,11 +25,12 @@ _VIEWS, _NOISE = range(2)  # words of the random streams
 class BoardWork:
     """What cameras are calibrated from.
 
-    on_rig: where the board stands on the rig. views: of it held up to each camera. corner_px: sigma
-    of a corner along each axis, by camera.
+    printed: the same board for the rig. on_rig: where it stands on the rig. views: of it held up to
+    each camera. corner_px: sigma of a corner along each axis, by camera.
     """
 
     board: Board
+    printed: RigBoard
     on_rig: MeasuredPose
     views: int
     corner_px: Mapping[str, float]
@@ -61,7 +62,8 @@ def expected_cameras(cameras: Sequence[Camera], work: BoardWork, seed: int = 0) 
     for number, camera in enumerate(cameras):
         rng = np.random.default_rng([seed, _NOISE, number])
         sigma_px = work.corner_px.get(camera.name, work.largest_corner_px)
-        poses = _held_poses(camera, work, np.random.default_rng([seed, _VIEWS, number]))
+        of_views = np.random.default_rng([seed, _VIEWS, number])
+        poses = boards.draw_poses(work.printed, as_rig_camera(camera), work.views, of_views)
         held[camera.name] = [_corners(camera, work.board, pose, sigma_px, rng) for pose in poses]
         on_rig = work.on_rig.T_rig_board
         standing[camera.name] = _corners(camera, work.board, on_rig, sigma_px, rng)
@@ -69,20 +71,6 @@ def expected_cameras(cameras: Sequence[Camera], work: BoardWork, seed: int = 0) 
     views = BoardViews(held, sizes_px, standing)
     found = calibrate_cameras(views, work.board, work.on_rig, triggered=True).cameras
     return Cameras(tuple(cameras), found.covariance, found.placement)
-
-
-def _held_poses(camera: Camera, work: BoardWork, rng: np.random.Generator) -> list[np.ndarray]:
-    """Return T_rig_board (3, 4) of each view of the board held up to a camera."""
-    board = work.board
-    printed = RigBoard(
-        board.squares,
-        board.square_mm,
-        board.marker_mm,
-        board.dictionary,
-        board.legacy,
-        board.inverted,
-    )
-    return boards.draw_poses(printed, as_rig_camera(camera), work.views, rng)
 
 
 def _corners(

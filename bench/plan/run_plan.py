@@ -22,6 +22,7 @@ from bench.plan.plan_rows import Plan, RigTask, painter_of, plan_run
 from bench.plan.planned_cameras import BoardWork, expected_cameras
 from bench.plan.recorded_whisk import SeenTask, plan_seen, stage_again
 from bench.plan.staged import StagedWhisk, stage_run
+from bench.records.trial_result import SeenTrial
 from bench.rig import build
 from bench.rig.protocol import Protocol, load
 from bench.session.inside import check_outside
@@ -30,6 +31,7 @@ from bench.session.session_check import checked_session
 from bench.trials.of_session import placed_units, trials_with_whisks
 from bench.trials.trial_evaluation import see_unit
 from vision.calibration.views import MeasuredPose
+from vision.geometry.board import Board
 from vision.geometry.camera import Cameras
 from vision.geometry.refusals import Refused
 
@@ -71,9 +73,9 @@ def plan(
     progress: bool = False,
     announce: Callable[[str], object] = print,
 ) -> Plan:
-    """Plan a RIG.toml or a SESSION into the folder `out`; raise BadInput where it cannot be read.
+    """Write the plan of a RIG.toml or a SESSION into the folder `out`, and return it.
 
-    announce: is given the text.
+    announce: is given the text. Raises BadInput.
     """
     make = plan_session if what.is_dir() else plan_rig
     with Workers(workers, progress) as pool:
@@ -83,7 +85,7 @@ def plan(
 
 
 def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
-    """Plan a rig as a protocol describes it, and draw it. Raises BadInput."""
+    """Return the plan of a rig as a protocol describes it, and draw it. Raises BadInput."""
     protocol = _load_rig(path)
     staged = _stage_runs(protocol)
     if not staged:
@@ -102,9 +104,7 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
         raise BadInput(bad.reason, file=path) from None
     except (Refused, ValueError, cv2.error) as problem:
         raise _on_one_line(problem, path) from None
-    changes: tuple[Change, ...] = ()
-    if options.changes:
-        changes = tuple(list_changes(cameras, work, target_mm, light=True))
+    changes = list_changes(cameras, work, target_mm, light=True) if options.changes else ()
     theta_rad = float(np.radians(options.theta_deg))
     runs = protocol.runs()
     tasks = [RigTask(protocol, run, cameras, changes, theta_rad) for run in runs]
@@ -176,7 +176,7 @@ def _board_work(painter: Painter) -> BoardWork:
         table.pose_sigma_mm,
         float(np.radians(table.pose_sigma_deg)),
     )
-    return BoardWork(painter.board, on_rig, table.views, painter.corner_px())
+    return BoardWork(painter.board, painter.printed, on_rig, table.views, painter.corner_px())
 
 
 def _assumptions(work: BoardWork) -> Iterator[str]:
@@ -234,7 +234,7 @@ def _drawn(staged: Iterable[StagedWhisk]) -> list[StagedWhisk]:
 
 
 def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
-    """Plan a session as recorded, and draw it. Raises BadInput."""
+    """Return the plan of a session as recorded, and draw it. Raises BadInput."""
     check_outside(out, path)
     doubts = Doubts()
     session = checked_session(path, doubts, follow_links=options.follow_links)
@@ -246,13 +246,7 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
         calibration, units = placed_units(session, trials, out, settings, pool, doubts)
         seen = pool.run(see_unit, units, "trials")
         cameras = calibration.cameras
-        points_mm = []
-        for trial in seen:
-            points_mm += [whisk.point_mm.value for whisk in trial.whisks if whisk.has_truth]
-        changes: tuple[Change, ...] = ()
-        if points_mm and options.changes:
-            target_mm = np.mean(points_mm, axis=0)
-            changes = tuple(list_changes(cameras, None, target_mm, light=False))
+        changes = _changes_of_session(cameras, seen) if options.changes else ()
         tasks = []
         for unit, trial in zip(units, seen):
             for whisk in trial.whisks:
@@ -263,10 +257,7 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
         rows = pool.run(plan_seen, tasks, "whisks")
         staged = [stage_again(task) for task, row in zip(tasks, rows) if row.outlook.has_truth]
         if staged:
-            outline_mm = None
-            if session.board is not None and calibration.T_rig_board is not None:
-                board = session.board
-                outline_mm = board_outline(calibration.T_rig_board, board.squares, board.square_mm)
+            outline_mm = _session_outline(session.board, calibration.T_rig_board)
             write_drawing(out, Bench(cameras, _drawn(staged), outline_mm))
     return Plan(
         title=f"{session.name}: {len(rows)} whisks as recorded",
@@ -275,3 +266,20 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
         theta_deg=options.theta_deg,
         assumptions=(_AS_RECORDED,) if staged else (),
     )
+
+
+def _changes_of_session(cameras: Cameras, seen: Sequence[SeenTrial]) -> list[Change]:
+    """Return the changes to be tried; none where no whisk has a truth."""
+    points_mm = []
+    for trial in seen:
+        points_mm += [whisk.point_mm.value for whisk in trial.whisks if whisk.has_truth]
+    if not points_mm:
+        return []
+    return list_changes(cameras, None, np.mean(points_mm, axis=0), light=False)
+
+
+def _session_outline(board: Board | None, T_rig_board: np.ndarray | None) -> np.ndarray | None:
+    """Return the outline (4, 3), mm, of the board that stands on a session's rig, if one does."""
+    if board is None or T_rig_board is None:
+        return None
+    return board_outline(T_rig_board, board.squares, board.square_mm)

@@ -91,16 +91,7 @@ def as_staged(marched: MarchedWhisk, motor_rad: np.ndarray, time_s: np.ndarray) 
     """Return a whisk of the rig in frames at these motor angles (f,); its diameters are exact."""
     rod = marched.rod
     touch = marched.touch
-    bends = []
-    arcs_mm = []
-    for motor in motor_rad:
-        if motor > touch.motor_rad:
-            state = marched.forward.state_at(motor)
-            bends.append(_bend_rad(rod, state))
-            arcs_mm.append(state.arc_mm)
-        else:
-            bends.append(np.zeros(2))
-            arcs_mm.append(touch.arc_mm)
+    bend_rad, arc_mm = _bends_and_arcs(marched, motor_rad)
     wire = seen_rods.Wire(
         rod.shape, rod.length_mm, rod.diameter_mm, tip_diameter_mm=rod.tip_diameter_mm
     )
@@ -113,13 +104,29 @@ def as_staged(marched: MarchedWhisk, motor_rad: np.ndarray, time_s: np.ndarray) 
         axis=BarAxis(foot_mm, marched.bar.axis).upward(),
         motor_rad=np.asarray(motor_rad),
         time_s=np.asarray(time_s),
-        bend_rad=np.array(bends),
-        arc_mm=np.array(arcs_mm),
+        bend_rad=bend_rad,
+        arc_mm=arc_mm,
         rest_mm=KnownWhisk.rest_shape(share, rest_offset_mm),
         touch_rad=touch.motor_rad,
         contact_mm=touch.point_mm,
     )
     return StagedWhisk(marched, known)
+
+
+def _bends_and_arcs(marched: MarchedWhisk, motor_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return bends (f, 2), rad, and contact arcs (f,), mm, at motor angles (f,)."""
+    touch = marched.touch
+    bends = []
+    arcs_mm = []
+    for motor in motor_rad:
+        if motor > touch.motor_rad:
+            state = marched.forward.state_at(motor)
+            bends.append(_bend_rad(marched.rod, state))
+            arcs_mm.append(state.arc_mm)
+        else:
+            bends.append(np.zeros(2))
+            arcs_mm.append(touch.arc_mm)
+    return np.array(bends), np.array(arcs_mm)
 
 
 def _bend_rad(rod: Rod, state) -> np.ndarray:

@@ -2,16 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from vision.fit.problem import Problem, State
-from vision.geometry.camera import Camera
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, one_curve
 from vision.geometry.contact import BarAxis
 from vision.geometry.rods import Rods
+from vision.geometry.vision_settings import VisionSettings
+from vision.pictures.view import View
 from vision.truth.line_source import WhiskPlace
 from vision.truth.strategies import TouchByClearance
+from vision.truth.whisk_pictures import WhiskPictures
+from vision.wire.points import Observed
 
 # [rad] A camera that looks at the bar at less than this to its axis has it a third as long. Stated.
 _ALONG_RAD = np.radians(20.0)
@@ -46,9 +51,9 @@ class KnownWhisk:
         powers = np.vander(share, REST_POWERS, increasing=True)
         return np.linalg.lstsq(powers, offset_mm, rcond=None)[0].T
 
-    @property
+    @cached_property
     def frames_to_fit(self) -> list[int]:
-        """Return the frames that make the truth."""
+        """Return the frames (f,) that make the truth."""
         motor = dict(enumerate(self.motor_rad.tolist()))
         return TouchByClearance().frames_to_fit(motor, dict(enumerate(self.bend_rad)))
 
@@ -61,16 +66,51 @@ class KnownWhisk:
             )
         return curves
 
-    def place(self, frames: Sequence[int]) -> WhiskPlace:
-        """Return where wire and bar are in these frames."""
-        return WhiskPlace(self.axis, self.curves(frames), self.rods.bar.radius_mm)
+    @cached_property
+    def place(self) -> WhiskPlace:
+        """Return where wire and bar are in the frames that make the truth."""
+        curves = self.curves(self.frames_to_fit)
+        return WhiskPlace(self.axis, curves, self.rods.bar.radius_mm)
 
-    def is_touching(self, frames: Sequence[int]) -> np.ndarray:
-        """Return in which of these frames (f,) bool the whisker touches."""
-        return self.motor_rad[frames] > self.touch_rad
+    def pictured(
+        self, views: Sequence[View], cameras: Cameras, settings: VisionSettings
+    ) -> WhiskPictures:
+        """Return the whisk in views by these cameras, in the frames that all of them have."""
+        return WhiskPictures(
+            0,
+            range(len(self.motor_rad)),
+            self.time_s,
+            self.motor_rad,
+            tuple(views),
+            cameras,
+            self.rods,
+            None,
+            settings,
+        )
 
-    def state(self, problem: Problem, frames: Sequence[int]) -> State:
-        """Return the parameters of a fit to these frames."""
+    def problem(
+        self, cameras: Cameras, seen: Sequence[Observed], correlation: Sequence[float] = ()
+    ) -> Problem:
+        """Return the fit to the frames that make the truth.
+
+        correlation: by camera, of the errors of neighbouring points of the wire.
+        """
+        motor_rad = self.motor_rad[self.frames_to_fit]
+        touches = motor_rad > self.touch_rad
+        return Problem(
+            cameras,
+            self.rods,
+            self.axis,
+            motor_rad,
+            touches,
+            touches,
+            seen,
+            neighbour_correlation=correlation,
+        )
+
+    def state(self, problem: Problem) -> State:
+        """Return the parameters of a fit to the frames that make the truth."""
+        frames = self.frames_to_fit
         vector = np.zeros(problem.size)
         vector[problem.blocks.rest_shape.slice] = np.ravel(self.rest_mm)
         vector[problem.first_bend :] = self.bend_rad[frames][problem.bent].ravel()

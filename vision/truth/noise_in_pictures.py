@@ -18,10 +18,8 @@ from vision.touched.edges import measure_edges
 from vision.touched.line import BarLineEstimate, measure_bars
 from vision.touched.one_view import seen_from_one_side
 from vision.truth.known_whisk import KnownWhisk
-from vision.truth.line_source import WhiskPlace
 from vision.truth.predicted_lines import PredictedLines
 from vision.truth.traced_lines import TracedLines
-from vision.truth.whisk_pictures import WhiskPictures
 from vision.wire.points import Observed
 
 _USUAL = VisionSettings()
@@ -56,42 +54,28 @@ def line_noise_in_pictures(
 
     pictures: of each of the cameras, in their order, with frames `known.frames_to_fit`.
     """
-    frames = known.frames_to_fit
-    place = known.place(frames)
-    whisk = WhiskPictures(
-        0,
-        frames,
-        known.time_s,
-        known.motor_rad,
-        tuple(own.view(own.frames) for own in pictures),
-        cameras,
-        known.rods,
-        None,
-        settings,
-    )
-    on_wire = TracedLines(whisk).wire_points(place, last=True)
+    views = [own.view(own.frames) for own in pictures]
+    traced = TracedLines(known.pictured(views, cameras, settings))
+    on_wire = traced.wire_points(known.place, last=True)
     noise = {}
-    for name, sigmas_px in _bar_sigmas_px(known, pictures, place, settings).items():
+    for name, sigmas_px in _bar_sigmas_px(known, pictures, settings).items():
         noise[name] = LineNoise(float("nan"), 0.0, sigmas_px)
-    on_bar = PredictedLines(known, cameras, {}, noise).object_points(place, last=True)
+    on_bar = PredictedLines(known, cameras, {}, noise).object_points(known.place, last=True)
     seen = []
     for name in cameras.names:
         seen += on_wire[name]
         seen += on_bar[name]
-    return line_noise(_with_scatter(known, cameras, frames, seen))
+    return line_noise(_with_scatter(known, cameras, seen))
 
 
 def _bar_sigmas_px(
-    known: KnownWhisk,
-    pictures: Sequence[CameraPictures],
-    place: WhiskPlace,
-    settings: VisionSettings,
+    known: KnownWhisk, pictures: Sequence[CameraPictures], settings: VisionSettings
 ) -> dict[str, np.ndarray]:
     """Return by camera side and sigmas (k, 3) of its lines of the bar, as `LineNoise.bar_px`.
 
     The edges take the place of the middle where they locate the bar along the line of sight.
     """
-    radius_mm = known.rods.bar.radius_mm
+    place = known.place
     views = [own.view(dict.fromkeys(place.curves, own.with_bar)) for own in pictures]
     wires_px = {view.camera.name: place.wire_px(view.camera) for view in views}
     lines = _bar_middles(known, views, wires_px, settings)
@@ -100,12 +84,13 @@ def _bar_sigmas_px(
     found = {}
     for view in views:
         name = view.camera.name
-        rows = []
-        if name in lines:
-            rows = [[0.0, *lines[name].points.sigma_px]]
+        points = {}  # by side of the bar
         if name in lines and needs_edges:
-            edges = measure_edges(view, known.axis, radius_mm, wires_px[name], settings)
-            rows = [[side, *points.sigma_px] for side, points in edges.items()] or rows
+            radius_mm = known.rods.bar.radius_mm
+            points = measure_edges(view, known.axis, radius_mm, wires_px[name], settings)
+        if name in lines and not points:
+            points = {0: lines[name].points}
+        rows = [[side, *own.sigma_px] for side, own in points.items()]
         found[name] = np.array(rows, dtype=float).reshape(-1, 3)
     return found
 
@@ -124,21 +109,16 @@ def _bar_middles(
     return {name: line for name, line in lines.items() if line.has_edges}
 
 
-def _with_scatter(
-    known: KnownWhisk, cameras: Cameras, frames: Sequence[int], seen: Sequence[Observed]
-) -> Problem:
+def _with_scatter(known: KnownWhisk, cameras: Cameras, seen: Sequence[Observed]) -> Problem:
     """Return the fit's problem with sigmas as large as residuals show.
 
     They stay as stated where wire or bar is not seen, or the lines do not determine the fit.
     """
-    touches = known.is_touching(frames)
-    problem = Problem(
-        cameras, known.rods, known.axis, known.motor_rad[frames], touches, touches, seen
-    )
+    problem = known.problem(cameras, seen)
     if len({one.frame >= 0 for one in seen}) < 2:
         return problem
     try:
-        state, _ = solve(problem, known.state(problem, frames))
+        state, _ = solve(problem, known.state(problem))
         return inflated_by_residuals(problem, state)
     except np.linalg.LinAlgError:
         return problem

@@ -1,6 +1,6 @@
 """The truth that a known whisk would give, with its sigmas, by the fit's own covariance."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from vision.truth.sight import Hides, Sight, blank_view, find_sight
 from vision.truth.strategies import NEVER_TOUCHES, TouchByClearance, TouchByOnset, early
 from vision.truth.truth_rows import to_whisk
 from vision.truth.value import FIELDS
-from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.whisk_pictures import FittedWhisk
 
 _USUAL = VisionSettings()
 _ALL_BEHIND = Reason("all_cameras_behind", "all cameras have the whisker behind them")
@@ -112,10 +112,7 @@ def predict_truth(
     if not facing:
         return PredictedTruth(WhiskTruth(0, None, status=_ALL_BEHIND), {})
     cameras = cameras.subset(facing)
-    curves = known.curves(known.frames_to_fit)
-    sights = {}
-    for camera in cameras:
-        sights[camera.name] = find_sight(known, camera, curves, settings, hides)
+    sights = {camera.name: find_sight(known, camera, settings, hides) for camera in cameras}
     lines = PredictedLines(known, cameras, sights, noise)
     try:
         fitted = _fit(lines)
@@ -124,18 +121,9 @@ def predict_truth(
     except np.linalg.LinAlgError:
         return _without_truth(lines, NOT_CONVERGED)
     frames = range(len(known.motor_rad))
-    whisk = WhiskPictures(
-        0,
-        frames,
-        known.time_s,
-        known.motor_rad,
-        tuple(blank_view(camera, frames) for camera in cameras),
-        cameras,
-        known.rods,
-        None,
-        settings,
-    )
-    return PredictedTruth(to_whisk(whisk, fitted), sights, fitted)
+    views = [blank_view(camera, frames) for camera in cameras]
+    truth = to_whisk(known.pictured(views, cameras, settings), fitted)
+    return PredictedTruth(truth, sights, fitted)
 
 
 def _without_truth(lines: PredictedLines, status: Reason) -> PredictedTruth:
@@ -151,31 +139,20 @@ def _fit(lines: PredictedLines) -> FittedWhisk:
     """
     known = lines.known
     cameras = lines.cameras
-    frames = known.frames_to_fit
-    seen = lines.all_points(known.place(frames), last=True)
-    touches = known.is_touching(frames)
-    if not np.any(touches):
-        raise Refused(NEVER_TOUCHES, code="never_touches")
+    seen = lines.all_points(known.place, last=True)
     correlation = []
     for name in cameras.names:
         correlation.append(lines.noise[name].alike if name in lines.noise else 0.0)
-    problem = Problem(
-        cameras,
-        known.rods,
-        known.axis,
-        known.motor_rad[frames],
-        touches,
-        touches,
-        seen,
-        neighbour_correlation=correlation,
-    )
+    problem = known.problem(cameras, seen, correlation)
+    if not np.any(problem.touching):
+        raise Refused(NEVER_TOUCHES, code="never_touches")
     seeing_wire = {one.camera for one in seen if one.frame >= 0}
     is_by_edges = any(one.side for one in seen)
     if seen_from_one_side(cameras, known.axis) or (is_by_edges and len(seeing_wire) < 2):
-        problem, state = _part_by_onset(problem, known, frames)
+        problem, state = _part_by_onset(problem, known)
     else:
-        problem, state = _part_by_clearance(problem, known, frames)
-    return FittedWhisk.of(problem, state, _covariance(problem, state), frames)
+        problem, state = _part_by_clearance(problem, known)
+    return FittedWhisk.of(problem, state, _covariance(problem, state), known.frames_to_fit)
 
 
 def _covariance(problem: Problem, state: State) -> np.ndarray:
@@ -184,22 +161,18 @@ def _covariance(problem: Problem, state: State) -> np.ndarray:
     return np.linalg.inv(rows.T @ rows)
 
 
-def _part_by_clearance(
-    problem: Problem, known: KnownWhisk, frames: Sequence[int]
-) -> tuple[Problem, State]:
+def _part_by_clearance(problem: Problem, known: KnownWhisk) -> tuple[Problem, State]:
     """Return the problem with the frames that a fit would know to touch or to be free."""
-    state = known.state(problem, frames)
+    state = known.state(problem)
     covariance = _covariance(problem, state)
     touching, free = TouchByClearance().part_by_fit(problem, state, covariance)
     problem = replace(problem, touching=touching, bent=~free)
-    return problem, known.state(problem, frames)
+    return problem, known.state(problem)
 
 
-def _part_by_onset(
-    problem: Problem, known: KnownWhisk, frames: Sequence[int]
-) -> tuple[Problem, State]:
+def _part_by_onset(problem: Problem, known: KnownWhisk) -> tuple[Problem, State]:
     """Return the problem where only the onset of bending shows when the whisker touches."""
     free = early(problem.motor_rad)
     problem = replace(problem, touching=problem.touching & ~free, bent=~free)
-    state = known.state(problem, frames)
+    state = known.state(problem)
     return TouchByOnset().with_touch(problem, state, _covariance(problem, state))

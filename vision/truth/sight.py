@@ -56,11 +56,11 @@ def blank_view(camera: Camera, frames: Sequence[int]) -> View:
 def find_sight(
     known: KnownWhisk,
     camera: Camera,
-    curves: Mapping[int, Curves],
     settings: VisionSettings,
     hides: Hides | None = None,
 ) -> Sight:
-    """Find what a camera has in sight of a whisk in the frames of these curves."""
+    """Find what a camera has in sight of a whisk in the frames that make its truth."""
+    curves = known.place.curves
     pieces = wire_pieces(
         blank_view(camera, curves),
         curves,

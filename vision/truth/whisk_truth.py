@@ -13,6 +13,7 @@ from vision.fit.touch import begins_free
 from vision.geometry.centreline import Curves, one_curve
 from vision.geometry.contact import clearance
 from vision.geometry.refusals import Misled, Refused, TooFewFrames
+from vision.geometry.touched import Axis
 from vision.truth.line_source import LineSource, WhiskPlace
 from vision.truth.strategies import Strategy, Touch, early, strategies
 from vision.truth.traced_lines import TracedLines, blurs_px
@@ -30,7 +31,7 @@ _MOST_SCATTER_PX = 0.7
 
 
 @dataclass(frozen=True)
-class _Expected:
+class ExpectedWhisk:
     """What is expected before a pass, in f frames.
 
     place: of object and wire. rest_mm (2, 4): rest shape. bend_rad (f, 2), arcs_mm (f,): bends and
@@ -65,11 +66,11 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
 def _fit_by(whisk: WhiskPictures, strategy: Strategy) -> FittedWhisk:
     """Fit a whisk by one strategy. Raises Refused where it does not serve."""
     whisk, expected = _expect_coarsely(whisk, strategy.touch)
-    return _fit_lines(whisk, TracedLines(whisk, strategy.reader), expected, strategy.touch)
+    return fit_lines(whisk, TracedLines(whisk, strategy.reader), expected, strategy.touch)
 
 
-def _fit_lines(
-    whisk: WhiskPictures, lines: LineSource, expected: _Expected, touch: Touch
+def fit_lines(
+    whisk: WhiskPictures, lines: LineSource, expected: ExpectedWhisk, touch: Touch
 ) -> FittedWhisk:
     """Fit the lines of a whisk pass by pass, each time beside the curves of the pass before.
 
@@ -83,7 +84,7 @@ def _fit_lines(
         whisk = whisk.yielding_as(problem, state)
         _check_scatter(problem, state)
         touching, free = touch.part_by_fit(problem, state, covariance)
-        expected = _Expected(
+        expected = ExpectedWhisk(
             place=_fitted_place(whisk, problem, state),
             rest_mm=rest_shape(problem, state.vector),
             bend_rad=bends(problem, state.vector),
@@ -96,7 +97,7 @@ def _fit_lines(
     return FittedWhisk.of(problem, state, covariance, whisk.frames)
 
 
-def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Expected]:
+def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, ExpectedWhisk]:
     """Return the whisk in the frames to fit, and what coarse points say of them.
 
     Raises TooFewFrames where a thinned stroke has too few frames before touch.
@@ -123,7 +124,7 @@ def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures,
         touch_rad = float(np.mean(whisk.angles_rad[[last_free, first]]))
         whisk = whisk.yielding(came, touch_rad)
     place = WhiskPlace(axis, curves, whisk.bar_swept_mm, came)
-    return whisk, _Expected(place, rest, bend, np.array(arcs), touching, free)
+    return whisk, ExpectedWhisk(place, rest, bend, np.array(arcs), touching, free)
 
 
 def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarray]]:
@@ -155,7 +156,7 @@ def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndar
 
 
 def _fit(
-    whisk: WhiskPictures, expected: _Expected, seen: list[Observed], touch: Touch
+    whisk: WhiskPictures, expected: ExpectedWhisk, seen: list[Observed], touch: Touch
 ) -> tuple[Problem, State, np.ndarray]:
     """Fit all lines, with sigmas as large as residuals show.
 
@@ -195,20 +196,14 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     """Fit all frames before touch, about the object and the rest shape of a fit."""
     problem = fitted.problem
     vector = fitted.state.vector
-    wire = whisk.rods.wire
-    touched = {f for f, bent in zip(fitted.frames, problem.bent) if bent}
-    whisk = whisk.during([f for f in whisk.frames if f not in touched])
-    rest = rest_shape(problem, vector)
-    axis = bar_axis(problem, vector)
-    curves = {}
-    for f, motor_rad in whisk.motor.items():
-        curves[f] = one_curve(rest, np.zeros(2), wire.length_mm, motor_rad, wire)
-    place = WhiskPlace(axis, curves, whisk.bar_swept_mm)
+    bent = {f for f, is_bent in zip(fitted.frames, problem.bent) if is_bent}
+    whisk = whisk.during([f for f in whisk.frames if f not in bent])
+    place = _resting_place(whisk, bar_axis(problem, vector), rest_shape(problem, vector))
     lines = TracedLines(whisk, blur_px=blurs_px(whisk))
     seen = []
     for on_wire in lines.wire_points(place, last=True).values():
         seen += on_wire
-    nothing = np.zeros(len(curves), dtype=bool)
+    nothing = np.zeros(len(place.curves), dtype=bool)
     alone = replace(
         problem,
         motor_rad=whisk.angles_rad,
@@ -217,9 +212,19 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
         seen=seen,
         motion=whisk.motion,
     )
-    state = State(vector[: problem.first_bend], np.full(len(curves), 0.5 * wire.length_mm))
+    middle_mm = np.full(len(place.curves), 0.5 * whisk.rods.wire.length_mm)
+    state = State(vector[: problem.first_bend], middle_mm)
     state, _ = solve(alone, state, scales=[LAST_SCALE] * 3)
     return inflated_by_residuals(alone, state, _FREE_SHARED), state
+
+
+def _resting_place(whisk: WhiskPictures, axis: Axis, rest_mm: np.ndarray) -> WhiskPlace:
+    """Return where an object and a wire of this rest shape (2, 4) are that is nowhere bent."""
+    wire = whisk.rods.wire
+    curves = {}
+    for f, motor_rad in whisk.motor.items():
+        curves[f] = one_curve(rest_mm, np.zeros(2), wire.length_mm, motor_rad, wire)
+    return WhiskPlace(axis, curves, whisk.bar_swept_mm)
 
 
 def _fitted_place(whisk: WhiskPictures, problem: Problem, state: State) -> WhiskPlace:
@@ -234,7 +239,7 @@ def _fitted_place(whisk: WhiskPictures, problem: Problem, state: State) -> Whisk
     )
 
 
-def _begin(problem: Problem, expected: _Expected) -> State:
+def _begin(problem: Problem, expected: ExpectedWhisk) -> State:
     """Return the state that is expected, the object where the problem counts it from."""
     vector = np.zeros(problem.size)
     vector[problem.blocks.rest_shape.slice] = np.ravel(expected.rest_mm)

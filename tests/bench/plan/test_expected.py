@@ -110,9 +110,8 @@ def test_the_clamp_hides_what_it_stands_before(bench):
     staged, cameras = bench
     place = staged.known.contact_mm + 350.0 * staged.known.axis.direction
     above = moved(cameras["high"], staged, place)
-    curves = staged.known.curves(range(4))
-    behind = find_sight(staged.known, above, curves, VisionSettings(), Clamp.of(staged))
-    open_ = find_sight(staged.known, above, curves, VisionSettings())
+    behind = find_sight(staged.known, above, VisionSettings(), Clamp.of(staged))
+    open_ = find_sight(staged.known, above, VisionSettings())
     assert behind.hidden > 0.05 and open_.hidden == 0.0
     assert len(behind.pieces) < len(open_.pieces)
 
