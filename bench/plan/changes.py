@@ -108,14 +108,8 @@ def list_changes(
 
 def _changes(cameras: Cameras, target_mm: np.ndarray) -> Iterator[Change]:
     """Yield the changes with exact cameras."""
+    yield from _moves(cameras, target_mm)
     present = cameras.cameras
-    for number, camera in enumerate(present):
-        name = camera.name
-        for place_mm in _places(camera, target_mm):
-            moved = list(present)
-            moved[number] = aim_camera(camera, name, place_mm, target_mm)
-            words = f"camera {name} at {_place_text(place_mm)}"
-            yield Change("move", words, Cameras(tuple(moved)), {name: name})
     longer = Cameras(tuple(_with_longer_lens(camera) for camera in present))
     same = {name: name for name in cameras.names}
     yield Change("lens", f"lenses {_LENS:g} times as long", longer, same)
@@ -129,6 +123,17 @@ def _changes(cameras: Cameras, target_mm: np.ndarray) -> Iterator[Change]:
         third = aim_camera(present[0], new, place_mm, target_mm)
         words = f"a third camera at {_place_text(place_mm)}"
         yield Change("third", words, Cameras((*present, third)), {new: present[0].name})
+
+
+def _moves(cameras: Cameras, target_mm: np.ndarray) -> Iterator[Change]:
+    """Yield the changes by which one camera stands elsewhere."""
+    for number, camera in enumerate(cameras):
+        name = camera.name
+        for place_mm in _places(camera, target_mm):
+            moved = list(cameras)
+            moved[number] = aim_camera(camera, name, place_mm, target_mm)
+            words = f"camera {name} at {_place_text(place_mm)}"
+            yield Change("move", words, Cameras(tuple(moved)), {name: name})
 
 
 def _place_text(place_mm: np.ndarray) -> str:
@@ -205,23 +210,31 @@ def _calibrate(
     pose = PLACED if change.kind == "board" else 1
     if work is not None:
         return expected_cameras(change.cameras.cameras, work.improved(views, pose))
-    by_placement = np.zeros_like(present.covariance)
-    placement = None
-    if present.placement is not None:
-        by_placement = present.by_placement @ present.placement @ present.by_placement.T
-        placement = present.placement / pose**2
-    covariance = (present.covariance - by_placement) / views + by_placement / pose**2
-    indices = np.arange(len(covariance))
+    covariance, placement = _improved_covariance(present, views, pose)
     rows = []
     scales = []
     for camera in change.cameras:
         model = present[change.like.get(camera.name, camera.name)]
-        rows.append(indices[present.parameters_of(model.name)])
+        rows.append(np.arange(len(covariance))[present.parameters_of(model.name)])
         scales.append(_sigma_scale(model, camera, target_mm))
     row = np.concatenate(rows)
     scale = np.concatenate(scales)
     scaled = covariance[np.ix_(row, row)] * np.outer(scale, scale)
     return Cameras(change.cameras.cameras, scaled, placement)
+
+
+def _improved_covariance(
+    cameras: Cameras, views: int, pose: int
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return the covariances of cameras and of their placement, calibrated by more.
+
+    views, pose: so many times the views of the board, and its pose known so many times as well.
+    """
+    if cameras.placement is None:
+        return cameras.covariance / views, None
+    by_placement = cameras.by_placement @ cameras.placement @ cameras.by_placement.T
+    own = cameras.covariance - by_placement
+    return own / views + by_placement / pose**2, cameras.placement / pose**2
 
 
 def _sigma_scale(model: Camera, camera: Camera, target_mm: np.ndarray) -> np.ndarray:

@@ -81,7 +81,8 @@ def _draw_bench(axes: Axes, bench: Bench, side: tuple[int, int], title: str) -> 
         axes.fill(*bench.board_mm[:, side].T, color="#dddddd", label="board")
     for whisk in bench.staged:
         bar = whisk.known.axis
-        ends_mm = bar.point_mm + np.array([[-_BAR_MM], [_BAR_MM]]) * bar.direction
+        half_mm = _BAR_MM * bar.direction
+        ends_mm = np.array([bar.point_mm - half_mm, bar.point_mm + half_mm])
         axes.plot(*ends_mm[:, side].T, color="#999999", lw=1.5)
     first = bench.staged[0].known
     direction = np.array([np.cos(first.touch_rad), np.sin(first.touch_rad), 0.0])
@@ -89,27 +90,31 @@ def _draw_bench(axes: Axes, bench: Bench, side: tuple[int, int], title: str) -> 
     axes.plot(*wire_mm[:, side].T, color="black", lw=2)
     axes.plot(0, 0, "ks", ms=7)
     for number, camera in enumerate(bench.cameras):
-        _draw_camera(axes, camera, bench.contact_mm, side, _COLOURS[number % len(_COLOURS)])
+        corners_mm = _corners_at(camera, bench.contact_mm)
+        colour = _COLOURS[number % len(_COLOURS)]
+        _draw_camera(axes, camera, corners_mm[:, side], camera.centre_mm[list(side)], colour)
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set(xlabel=f"{'xyz'[side[0]]} / mm", ylabel=f"{'xyz'[side[1]]} / mm", title=title)
+    horizontal, vertical = ("xyz"[number] for number in side)
+    axes.set(xlabel=f"{horizontal} / mm", ylabel=f"{vertical} / mm", title=title)
 
 
-def _draw_camera(
-    axes: Axes, camera: Camera, contact_mm: np.ndarray, side: tuple[int, int], colour: str
-) -> None:
-    """Draw where a camera is, and the edges of its picture out to the contact."""
+def _corners_at(camera: Camera, point_mm: np.ndarray) -> np.ndarray:
+    """Return where rays through the corners of a picture are as far ahead as a point, (4, 3) mm."""
     width, height = camera.size_px
     corners_px = np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=float)
     rays = camera.rays(corners_px)
     ahead = camera.T_camera_rig[2, :3]
-    depth_mm = (contact_mm - camera.centre_mm) @ ahead
-    corners_mm = camera.centre_mm + rays * (depth_mm / (rays @ ahead))[:, None]
+    depth_mm = (point_mm - camera.centre_mm) @ ahead
+    return camera.centre_mm + rays * (depth_mm / (rays @ ahead))[:, None]
+
+
+def _draw_camera(
+    axes: Axes, camera: Camera, corners_mm: np.ndarray, centre_mm: np.ndarray, colour: str
+) -> None:
+    """Draw where a camera is (2,), and the edges of its picture out to the corners (4, 2)."""
     for corner_mm in corners_mm:
-        edge_mm = np.array([camera.centre_mm, corner_mm])
-        axes.plot(*edge_mm[:, side].T, color=colour, lw=0.6, alpha=0.6)
-    outline_mm = np.vstack([corners_mm, corners_mm[:1]])
-    axes.plot(*outline_mm[:, side].T, color=colour, lw=0.8)
-    centre_mm = camera.centre_mm[list(side)]
+        axes.plot(*np.array([centre_mm, corner_mm]).T, color=colour, lw=0.6, alpha=0.6)
+    axes.fill(*corners_mm.T, fill=False, edgecolor=colour, lw=0.8)
     axes.plot(*centre_mm, "o", color=colour, ms=7)
     axes.annotate(camera.name, centre_mm, xytext=(6, 6), textcoords="offset points", color=colour)
 
