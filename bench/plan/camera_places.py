@@ -17,16 +17,16 @@ from bench.rig.protocol_tables import CameraTable
 from vision.geometry.camera import Cameras
 from vision.truth.predicted_truth import predict_truth
 
-# [deg] From where cameras look: azimuth; 0 is beyond the tip, -90 the side that the whisker comes
+# [deg] Directions of cameras from the contact: azimuth; 0 is beyond the tip, -90 the side that the whisker comes
 # from. Stated.
 _AZIMUTHS_DEG = (-130.0, -90.0, -50.0, 60.0, 120.0)
-# [deg] From where cameras look: elevation. Stated.
+# [deg] Directions of cameras from the contact: elevation. Stated.
 _ELEVATIONS_DEG = (25.0, 60.0)
 # [1] Of the picture's width, filled by a whisker that is seen from its side. Stated.
 _FILLS = 0.7
 # [trials] Of the protocol, first to last, that places are judged by. Stated.
 _TRIALS = 2
-# [rad] A camera that looks nearer along the bar does not see it. Stated.
+# [rad] Least angle between line of sight and bar, by which the bar is seen. Stated.
 _LEAST_TO_BAR_RAD = np.radians(25.0)
 
 
@@ -35,7 +35,7 @@ def place_cameras(
 ) -> Protocol:
     """Return the protocol with a place for every camera.
 
-    target_mm (3,): where they look. Raises BadInput where no place gives all trials a truth.
+    target_mm (3,): what they are aimed at. Raises BadInput where no place gives all trials a truth.
     """
     if all(camera.position_mm is not None for camera in protocol.cameras):
         return protocol
@@ -82,7 +82,7 @@ def _rounded(place_mm: np.ndarray) -> tuple[float, ...]:
 
 
 def _is_beside_bar(direction: np.ndarray, staged: StagedWhisk) -> bool:
-    """Return whether a camera in this direction (3,) looks at the bar from its side."""
+    """Return whether a camera in this direction (3,) sees the bar from its side."""
     cosine = abs(direction @ staged.known.axis.direction)
     return bool(np.arccos(np.clip(cosine, 0.0, 1.0)) > _LEAST_TO_BAR_RAD)
 

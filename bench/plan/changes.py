@@ -62,7 +62,7 @@ class Change:
     ) -> dict[str, LineNoise]:
         """Return by camera the noise of its lines, from that on the present bench.
 
-        A camera that is new or elsewhere, and does not look along the bar, sees both rods.
+        A camera that is new or elsewhere sees both rods, unless its line of sight is along the bar.
         """
         found = {}
         for camera in self.cameras:

@@ -1,4 +1,4 @@
-"""A recorded session as a plan: each whisk as the cameras saw it, its sigmas expected beside those stated."""
+"""A recorded session as a plan: each whisk as the cameras saw it, its expected sigmas and those stated."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -37,7 +37,7 @@ from vision.geometry.refusals import Refused
 
 # [bars] In a drawing, at most. A layout.
 _MOST_DRAWN = 12
-# [deg] Largest pushing angle that a plan may be asked for. Stated.
+# [deg] Largest pushing angle of a plan. Stated.
 _MOST_THETA_DEG = 25.0
 _AS_RECORDED = (
     "Expected: rods and cameras where they were seen, the frames as recorded, an exact beam, and each "

@@ -18,7 +18,7 @@ from vision.truth.strategies import TouchByClearance
 from vision.truth.whisk_pictures import WhiskPictures
 from vision.wire.points import Observed
 
-# [rad] A camera that looks at the bar at less than this to its axis has it a third as long. Stated.
+# [rad] A camera whose line of sight is nearer to the bar's axis than this has it a third as long. Stated.
 _ALONG_RAD = np.radians(20.0)
 
 
@@ -128,5 +128,5 @@ class KnownWhisk:
         return float(np.arccos(np.clip(cosine, 0.0, 1.0)))
 
     def is_seen_along_bar(self, camera: Camera) -> bool:
-        """Return whether a camera looks so nearly along the bar that it hardly shows its edges."""
+        """Return whether a line of sight is so nearly along the bar that its edges hardly show."""
         return self.angle_to_bar_rad(camera) < _ALONG_RAD

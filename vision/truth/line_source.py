@@ -1,6 +1,6 @@
 """Where the line points of a whisk come from, which its fit does not know.
 
-A pass of the fit asks for points beside the curves of the pass before. They are traced in pictures
+A pass of the fit needs points near the curves of the pass before. They are traced in pictures
 (`vision.truth.traced_lines`), or predicted for a whisk that is known exactly
 (`vision.truth.predicted_lines`). A tracker that wrote its points to a file would be a third source.
 """

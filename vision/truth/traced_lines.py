@@ -31,7 +31,7 @@ BESIDE_BAR_PX = 4.0
 class TracedLines(LineSource):
     """The lines that a whisk's pictures show.
 
-    reader: reads the object; None where its points are not asked for. blur_px: of each camera's
+    reader: reads the object; None where its points are not needed. blur_px: of each camera's
     lens, by the pass before.
     """
 

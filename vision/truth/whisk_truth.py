@@ -1,6 +1,6 @@
 """One whisk: wire and object traced in all its frames and fitted together, by turns."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,7 +72,7 @@ def _fit_by(whisk: WhiskPictures, strategy: Strategy) -> FittedWhisk:
 def fit_lines(
     whisk: WhiskPictures, lines: LineSource, expected: ExpectedWhisk, touch: Touch
 ) -> FittedWhisk:
-    """Fit the lines of a whisk pass by pass, each time beside the curves of the pass before.
+    """Fit the lines of a whisk pass by pass, each time near the curves of the pass before.
 
     Raises Refused where the lines determine no touch.
     """
@@ -102,20 +102,13 @@ def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures,
 
     Raises TooFewFrames where a thinned stroke has too few frames before touch.
     """
-    axis = whisk.bar.axis
-    wire = whisk.rods.wire
     rest, coarse = coarse_shapes(whisk)
     if whisk.is_thinned and not begins_free(whisk.angles_rad, np.array(list(coarse.values()))):
         raise TooFewFrames("too few of the frames before touch were looked at")
     whisk = whisk.during(touch.frames_to_fit(whisk.motor, coarse))
     bend = np.array([coarse[f] for f in whisk.frames])
     touching, free = touch.part_by_bends(whisk.angles_rad, bend)
-    arcs = []
-    curves = {}
-    for f, own_bend in zip(whisk.frames, bend):
-        motor_rad = whisk.motor[f]
-        arcs.append(contact_arc(rest, own_bend, whisk.motor_rad[f], axis, wire))
-        curves[f] = one_curve(rest, own_bend, arcs[-1], motor_rad, wire)
+    curves, arcs_mm = coarse_curves(whisk, rest, coarse)
     came = np.zeros((1, 3)) if whisk.motion is None else whisk.motion.expected_mm
     if whisk.gives is not None:
         came = _given_way(whisk, list(curves.values()), touching)
@@ -123,8 +116,8 @@ def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures,
         last_free = np.flatnonzero(free[:first])[-1]
         touch_rad = float(np.mean(whisk.angles_rad[[last_free, first]]))
         whisk = whisk.yielding(came, touch_rad)
-    place = WhiskPlace(axis, curves, whisk.bar_swept_mm, came)
-    return whisk, ExpectedWhisk(place, rest, bend, np.array(arcs), touching, free)
+    place = WhiskPlace(whisk.bar.axis, curves, whisk.bar_swept_mm, came)
+    return whisk, ExpectedWhisk(place, rest, bend, arcs_mm, touching, free)
 
 
 def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarray]]:
@@ -140,6 +133,23 @@ def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarra
     free = np.array(whisk.frames)[early(whisk.angles_rad)]
     rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
     return rest, follow_bends(sights, axis, rest, whisk.motor)
+
+
+def coarse_curves(
+    whisk: WhiskPictures, rest_mm: np.ndarray, bend_rad: Mapping[int, np.ndarray]
+) -> tuple[dict[int, Curves], np.ndarray]:
+    """Return by frame the wire's centreline, and its contact arcs (f,), mm.
+
+    rest_mm (2, 4): rest shape. bend_rad: by frame the bend (2,).
+    """
+    wire = whisk.rods.wire
+    curves = {}
+    arcs_mm = []
+    for f, motor_rad in whisk.motor.items():
+        arc_mm = contact_arc(rest_mm, bend_rad[f], motor_rad, whisk.bar.axis, wire)
+        curves[f] = one_curve(rest_mm, bend_rad[f], arc_mm, motor_rad, wire)
+        arcs_mm.append(arc_mm)
+    return curves, np.array(arcs_mm)
 
 
 def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndarray) -> np.ndarray:
