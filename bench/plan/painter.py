@@ -25,7 +25,9 @@ from vision.truth.noise_in_pictures import CameraPictures, line_noise_in_picture
 
 # [corners] Of a board held up to a camera; fewer, and it would not be found. Stated.
 _FEWEST_CORNERS = 6
-_BOARD_PICTURE, _FRAME = 2, 3  # words of the random streams
+# Words of the random streams: a held board's picture, a frame.
+_BOARD_PICTURE = 2
+_FRAME = 3
 
 
 @dataclass(frozen=True, eq=False)
