@@ -44,7 +44,7 @@ from bench.trials.seeing import STANDARD, by_preset
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bench.plan.written import Plan
+    from bench.plan.plan_rows import Plan
 
 Folder = Path | str
 

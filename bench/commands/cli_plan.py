@@ -57,4 +57,4 @@ def _plan(options: argparse.Namespace) -> int:
     made = plan(
         options.what, options.out, wanted, workers=options.workers, progress=sys.stderr.isatty()
     )
-    return DOUBTFUL if made.doubtful else DONE
+    return DOUBTFUL if made.lacks_truth else DONE

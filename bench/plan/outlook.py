@@ -5,18 +5,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bench.plan.expected import Expected
-from bench.plan.sight import ALONG_RAD
-from vision.fit.covariance import variance_by_cause
 from vision.fit.line_noise import LineNoise
-from vision.truth.at_angle import scatter
-from vision.truth.records import WhiskTruth
+from vision.truth.predicted_truth import PredictedTruth
 
-# Quantities of a row by their columns: the fit's name, and what turns its unit into the column's.
-_DEG = float(np.degrees(1.0))
-AT_TOUCH = {"d_x_mm": ("d_x", 1.0), "touch_deg": ("touch", _DEG), "beta_deg": ("beta", _DEG)}
-AT_THETA = {"slip_mm": ("slip", 1.0), "phi_deg": ("phi", _DEG), "alpha_deg": ("alpha", _DEG)}
-QUANTITIES = (*AT_TOUCH, *AT_THETA)
+# The columns of a row, by vision's name of the quantity: at touch, then at a pushing angle.
+COLUMNS = {
+    "d_x": "d_x_mm",
+    "touch": "touch_deg",
+    "beta": "beta_deg",
+    "slip": "slip_mm",
+    "phi": "phi_deg",
+    "alpha": "alpha_deg",
+}
+QUANTITIES = tuple(COLUMNS.values())
 WORDS = {
     "wire": "scatter of the wire's line",
     "bar": "the bar's line",
@@ -27,14 +28,27 @@ WORDS = {
     "cameras": "the cameras' calibration",
     "placement": "where the rig board stands",
 }
-# What is said of a camera: shares of the wire, of the bar's stretch that its line is told from.
-_MUCH, _SOME, _LEAST_OF_BAR = 0.3, 0.1, 0.7
+# [1] Share of the wire outside a picture or behind the clamp, from which on it is said. Stated.
+_SOME = 0.1
+# [1] Share of the wire behind the bar, from which on it is said. Stated.
+_MUCH = 0.3
+# [1] Share of the bar's middle in a picture, below which it is said. Stated.
+_LEAST_OF_BAR = 0.7
+
+
+def in_unit(column: str, value: float) -> float:
+    """Return a value in mm or rad in the unit of a column."""
+    return value * float(np.degrees(1.0)) if column.endswith("_deg") else value
 
 
 @dataclass(frozen=True)
 class Outlook:
-    """One whisk as planned. sigma: by column, NaN where there is none; limits: by column, the cause of the largest part
-    of the variance, and that part; obstacles: sentences on cameras; status: why there is no truth, or a doubt."""
+    """What one whisk would give.
+
+    sigma: by column, NaN where there is none. limits: by column, the cause of the largest part of
+    the variance, and that part. obstacles: sentences on cameras. status: why there is no truth, or
+    a warning.
+    """
 
     sigma: Mapping[str, float] = field(
         default_factory=lambda: dict.fromkeys(QUANTITIES, float("nan"))
@@ -45,77 +59,54 @@ class Outlook:
 
     @property
     def has_truth(self) -> bool:
-        """Whether there would be a distance."""
+        """Return whether there would be a distance."""
         return bool(np.isfinite(self.sigma["d_x_mm"]))
 
 
-def outlook(found: Expected, lines: Mapping[str, LineNoise], theta_rad: float) -> Outlook:
-    """The row of a whisk; slip, φ and α at a pushing angle."""
-    truth = found.truth
-    said = tuple(obstacles(found, lines))
-    if not np.isfinite(truth.d_x_mm.value) or found.fitted is None:
-        return Outlook(status=truth.status, obstacles=said)
+def outlook(predicted: PredictedTruth, noise: Mapping[str, LineNoise], theta_rad: float) -> Outlook:
+    """Return what a whisk would give; slip, φ and α at a pushing angle."""
+    truth = predicted.truth
+    sentences = tuple(obstacles(predicted, noise))
+    if not predicted.is_known:
+        return Outlook(status=truth.status, obstacles=sentences)
+    limits = {}
+    for name, limit in predicted.largest_causes(theta_rad).items():
+        limits[COLUMNS[name]] = limit
     status = "; ".join(filter(None, [truth.status, truth.at(theta_rad).status]))
-    return Outlook(sigmas(truth, theta_rad), _limits(found, theta_rad), said, status)
+    return Outlook(sigmas(predicted, theta_rad), limits, sentences, status)
 
 
-def sigmas(truth: WhiskTruth, theta_rad: float) -> dict[str, float]:
-    """Sigmas by column; at an angle with the scatter of its frames, which the staged ones do not have."""
-    at = truth.at(theta_rad)
-    found = {
-        "d_x_mm": truth.d_x_mm,
-        "touch_deg": truth.touch_rad,
-        "beta_deg": truth.beta_rad,
-        "slip_mm": at.slip_mm,
-        "phi_deg": at.phi_rad,
-        "alpha_deg": at.alpha_rad,
-    }
-    one_fit = truth.smooth is not None and not at.status
-    expected = {
-        name: scatter(truth.smooth, key, theta_rad).expected if one_fit else 0.0
-        for name, (key, _) in AT_THETA.items()
-    }
-    return {
-        name: float(np.hypot(found[name].sigma, expected.get(name, 0.0))) * scale
-        for name, (_, scale) in (AT_TOUCH | AT_THETA).items()
-    }
+def sigmas(predicted: PredictedTruth, theta_rad: float) -> dict[str, float]:
+    """Return the sigma of each column; slip, φ and α at a pushing angle."""
+    found = {}
+    for name, sigma in predicted.sigmas(theta_rad).items():
+        found[COLUMNS[name]] = in_unit(COLUMNS[name], sigma)
+    return found
 
 
-def _limits(found: Expected, theta_rad: float) -> dict[str, tuple[str, float]]:
-    fitted = found.fitted
-    frame = int(
-        np.argmin(np.abs(fitted.problem.motor_rad - fitted.measured.whisk["touch"] - theta_rad))
-    )
-    gradients = {name: fitted.by_parameter.whisk[key] for name, (key, _) in AT_TOUCH.items()}
-    gradients |= {
-        name: fitted.by_parameter.frame[key][frame] for name, (key, _) in AT_THETA.items()
-    }
-    return {name: _largest(fitted, gradient) for name, gradient in gradients.items()}
-
-
-def _largest(fitted, gradient: np.ndarray) -> tuple[str, float]:
-    """The cause of the largest part of a variance, and that part."""
-    parts = variance_by_cause(fitted.problem, fitted.state, fitted.uncertainty, gradient)
-    parts = {name: part for name, part in parts.items() if np.isfinite(part)}
-    cause = max(parts, key=lambda name: parts[name])
-    return cause, float(parts[cause] / sum(parts.values()))
-
-
-def obstacles(found: Expected, lines: Mapping[str, LineNoise]) -> Iterator[str]:
-    """What keeps a camera from seeing the whole whisk, a sentence each."""
-    for name, sight in found.sights.items():
-        noise = lines.get(name)
-        if sight.to_bar_rad < ALONG_RAD:
-            yield f"camera {name} looks along the bar ({np.degrees(sight.to_bar_rad):.0f} deg to its axis)"
-        elif noise is not None and len(noise.bar_px) == 0:
+def obstacles(predicted: PredictedTruth, noise: Mapping[str, LineNoise]) -> Iterator[str]:
+    """Yield what keeps each camera from seeing the whole whisk, a sentence each."""
+    for name, sight in predicted.sights.items():
+        own = noise.get(name)
+        if sight.is_along_bar:
+            angle_deg = np.degrees(sight.angle_to_bar_rad)
+            yield f"camera {name} looks along the bar ({angle_deg:.0f} deg to its axis)"
+        elif own is not None and len(own.bar_px) == 0:
             yield f"camera {name} does not see the bar's edges"
         if sight.outside > _SOME:
-            yield f"camera {name} has {100 * sight.outside:.0f} % of the whisker outside its picture"
+            yield f"camera {name} has {_percent(sight.outside)} of the whisker outside its picture"
         if sight.bar_share < _LEAST_OF_BAR:
-            yield f"camera {name} has {100 * (1 - sight.bar_share):.0f} % of the bar's middle outside its picture"
-        if sight.by_bar > _MUCH and sight.bar_nearer:
-            yield f"camera {name} has the bar before {100 * sight.by_bar:.0f} % of the whisker"
+            missing = _percent(1 - sight.bar_share)
+            yield f"camera {name} has {missing} of the bar's middle outside its picture"
+        if sight.behind_bar > _MUCH and sight.is_bar_nearer:
+            yield f"camera {name} has the bar before {_percent(sight.behind_bar)} of the whisker"
         if sight.hidden > _SOME:
-            yield f"camera {name} has the bar's clamp before {100 * sight.hidden:.0f} % of the whisker"
-        if noise is not None and not np.isfinite(noise.wire_px):
+            hidden = _percent(sight.hidden)
+            yield f"camera {name} has the bar's clamp before {hidden} of the whisker"
+        if own is not None and not np.isfinite(own.wire_px):
             yield f"camera {name} does not see the whisker"
+
+
+def _percent(share: float) -> str:
+    """Return a share as text."""
+    return f"{100 * share:.0f} %"

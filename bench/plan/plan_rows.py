@@ -1,4 +1,4 @@
-"""A trial of a plan: what it would give on the bench as it is, and after each change that was tried."""
+"""A trial of a plan: what it would give on the bench as it is, and after each change that is tried."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,25 +6,23 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import msgspec
-import numpy as np
 
-from bench.plan.expected import expected
+from bench.plan.changes import LIGHT, Change
 from bench.plan.outlook import Outlook, outlook, sigmas
-from bench.plan.painted import Clamp, Painter
-from bench.plan.sight import Hides, nothing_hides
-from bench.plan.staged import Staged, of_run
-from bench.plan.tries import LIGHT, Try
+from bench.plan.painter import Clamp, Painter
+from bench.plan.staged import stage_run
 from bench.rig.protocol import Protocol, Run
 from vision.fit.line_noise import LineNoise
 from vision.geometry.camera import Cameras
-from vision.geometry.vision_settings import VisionSettings
+from vision.truth.predicted_truth import PredictedTruth, predict_truth
 
+# [1] Of a sigma, that is left where a change halves it. Derived.
 _HALF = 0.5
 
 
 @dataclass(frozen=True)
-class Tried:
-    """A change and the sigmas by column that it would leave; empty where there is still no truth."""
+class ChangedSigmas:
+    """The sigmas that a change would leave, by column; empty where there is no truth with it."""
 
     kind: str
     words: str
@@ -47,28 +45,66 @@ class Facts:
 
 @dataclass(frozen=True)
 class Row:
-    """A whisk of a plan; stated: sigmas by column that `evaluate` states, of a recorded session."""
+    """A whisk of a plan.
+
+    changes: what each change that is tried would leave. noise: by camera, of its lines. stated: of
+    a recorded session, the sigmas by column that `evaluate` states.
+    """
 
     facts: Facts
     outlook: Outlook
-    tried: tuple[Tried, ...] = ()
-    lines: Mapping[str, LineNoise] = field(default_factory=dict)
+    changes: tuple[ChangedSigmas, ...] = ()
+    noise: Mapping[str, LineNoise] = field(default_factory=dict)
     stated: Mapping[str, float] | None = None
 
-    def best(self, column: str = "d_x_mm") -> tuple[Tried, float] | None:
-        """The change that leaves least of a sigma, and what part of it; 0 where it gives a truth in the first place."""
-        known = [one for one in self.tried if one.sigma]
+    def best(self) -> tuple[ChangedSigmas, float] | None:
+        """Return the change that leaves least of d_x's sigma, and what share of it.
+
+        The share is 0 where there is a truth only with the change. None where no change gives one.
+        """
+        known = [change for change in self.changes if change.sigma]
         if not known:
             return None
-        best = min(known, key=lambda one: one.sigma[column])
-        return best, best.sigma[column] / self.outlook.sigma[
-            column
-        ] if self.outlook.has_truth else 0.0
+        best = min(known, key=lambda change: change.sigma["d_x_mm"])
+        if not self.outlook.has_truth:
+            return best, 0.0
+        return best, best.sigma["d_x_mm"] / self.outlook.sigma["d_x_mm"]
 
-    def halved(self, column: str = "d_x_mm") -> bool:
-        """Whether the best change halves a sigma, or gives a truth."""
-        best = self.best(column)
+    @property
+    def name(self) -> str:
+        """Return the trial, and the whisk where it is not the first."""
+        return self.facts.trial + (f" {self.facts.whisk}" if self.facts.whisk else "")
+
+    @property
+    def is_halved(self) -> bool:
+        """Return whether the best change halves the sigma of d_x, or gives a truth."""
+        best = self.best()
         return best is not None and best[1] <= _HALF
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What a plan says.
+
+    title: of what. cameras: a line on each. theta_deg: pushing angle of slip, φ and α.
+    assumptions: sentences on what it takes for granted.
+    """
+
+    title: str
+    cameras: tuple[str, ...]
+    rows: tuple[Row, ...]
+    theta_deg: float
+    assumptions: tuple[str, ...] = ()
+
+    @property
+    def is_recorded(self) -> bool:
+        """Return whether it is of a session that was recorded."""
+        return any(row.stated is not None for row in self.rows)
+
+    @property
+    def lacks_truth(self) -> bool:
+        """Return whether a trial has no truth."""
+        return not all(row.outlook.has_truth for row in self.rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,72 +114,72 @@ class RigTask:
     protocol: Protocol
     run: Run
     cameras: Cameras
-    tries: Sequence[Try]
+    changes: Sequence[Change]
     theta_rad: float
 
 
+def painter_of(protocol: Protocol) -> Painter:
+    """Return the painter of a protocol, which is kept while a process works on one plan."""
+    return _painter(msgspec.json.encode(protocol))
+
+
 @lru_cache(maxsize=2)
-def painter(protocol_json: bytes) -> Painter:
-    """The painted cameras of a protocol, kept while a process works on one plan."""
+def _painter(protocol_json: bytes) -> Painter:
+    """Return the painter of a protocol in JSON."""
     return Painter(msgspec.json.decode(protocol_json, type=Protocol))
 
 
-def painter_of(protocol: Protocol) -> Painter:
-    """The same of a protocol as it is."""
-    return painter(msgspec.json.encode(protocol))
+def _with_more_light(protocol: Protocol) -> Protocol:
+    """Return a protocol with LIGHT times the light at as much less gain.
 
-
-def brighter(protocol: Protocol) -> Protocol:
-    """LIGHT times the light at as much less gain: the sensor's noise falls so much, that of quanta by the root."""
-    pictures = protocol.pictures
-    less = {
-        "read_noise": pictures.read_noise / LIGHT,
-        "shot_noise": pictures.shot_noise / math.sqrt(LIGHT),
-    }
-    return msgspec.structs.replace(protocol, pictures=msgspec.structs.replace(pictures, **less))
+    The sensor's noise falls by that factor, that of quanta by its root.
+    """
+    pictures = msgspec.structs.replace(
+        protocol.pictures,
+        read_noise=protocol.pictures.read_noise / LIGHT,
+        shot_noise=protocol.pictures.shot_noise / math.sqrt(LIGHT),
+    )
+    return msgspec.structs.replace(protocol, pictures=pictures)
 
 
 def plan_run(task: RigTask) -> Row:
-    """A trial of a rig."""
-    run, table = task.run, task.run.table
-    facts = Facts(
-        run.name,
-        0,
-        table.purpose,
-        table.surface,
-        run.speed_deg_s,
-        run.beta_deg,
-        run.psi_deg,
-        run.d_x_mm,
-    )
+    """Return the row of a rig's trial."""
+    protocol = task.protocol
+    facts = _facts(task.run)
     try:
-        staged = of_run(task.protocol, run)
+        staged = stage_run(protocol, task.run)
     except ArithmeticError as problem:
-        found = f"the whisker slips off or buckles ({problem}); push less far or nearer the base"
-        return Row(facts, Outlook(status=found))
-    lines = painter_of(task.protocol).lines(staged, task.cameras)
+        status = f"the whisker slips off or buckles ({problem}); push less far or nearer the base"
+        return Row(facts, Outlook(status=status))
+    noise = painter_of(protocol).line_noise(staged, task.cameras)
+    predicted = predict_truth(staged.known, task.cameras, noise, Clamp.of(staged))
+    changes = []
+    for change in task.changes:
+        if change.light:
+            brighter = painter_of(_with_more_light(protocol))
+            changed = brighter.line_noise(staged, task.cameras)
+        else:
+            changed = change.line_noise(noise, staged.known)
+        after = predict_truth(staged.known, change.cameras, changed, Clamp.of(staged))
+        changes.append(changed_sigmas(change, after, task.theta_rad))
+    return Row(facts, outlook(predicted, noise, task.theta_rad), tuple(changes), noise)
 
-    def after(one: Try) -> Mapping[str, LineNoise]:
-        if one.light:
-            return painter_of(brighter(task.protocol)).lines(staged, task.cameras)
-        return one.lines(lines, staged.axis)
 
-    found = outlook(expected(staged, task.cameras, lines, Clamp.of(staged)), lines, task.theta_rad)
-    tried = [
-        tried_on(staged, one, after(one), task.theta_rad, Clamp.of(staged)) for one in task.tries
-    ]
-    return Row(facts, found, tuple(tried), lines)
+def _facts(run: Run) -> Facts:
+    """Return what is wanted of a trial."""
+    return Facts(
+        trial=run.name,
+        whisk=0,
+        purpose=run.table.purpose,
+        surface=run.table.surface,
+        speed_deg_s=run.speed_deg_s,
+        beta_deg=run.beta_deg,
+        psi_deg=run.psi_deg,
+        d_x_mm=run.d_x_mm,
+    )
 
 
-def tried_on(
-    staged: Staged,
-    one: Try,
-    lines: Mapping[str, LineNoise],
-    theta_rad: float,
-    hides: Hides = nothing_hides,
-    settings: VisionSettings | None = None,
-) -> Tried:
-    """A change on one whisk."""
-    truth = expected(staged, one.cameras, lines, hides, settings or VisionSettings()).truth
-    known = np.isfinite(truth.d_x_mm.value)
-    return Tried(one.kind, one.words, sigmas(truth, theta_rad) if known else {})
+def changed_sigmas(change: Change, predicted: PredictedTruth, theta_rad: float) -> ChangedSigmas:
+    """Return the sigmas of a truth that is predicted with a change."""
+    left = sigmas(predicted, theta_rad) if predicted.is_known else {}
+    return ChangedSigmas(change.kind, change.words, left)

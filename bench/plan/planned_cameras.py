@@ -8,6 +8,7 @@ import numpy as np
 from bench.rig import boards
 from bench.rig.pinhole import Camera as RigCamera
 from bench.rig.printed_board import Board as RigBoard
+from bench.rig.protocol_tables import BoardTable
 from vision.boards.corners import Corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.views import BoardViews, MeasuredPose
@@ -15,81 +16,95 @@ from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.rotation import apply
 
-_RIM_PX = 8.0  # a corner nearer to the picture's edge is not found
+# [px] A corner nearer to the picture's edge is not found. Stated.
+_RIM_PX = 8.0
 _VIEWS, _NOISE = range(2)  # words of the random streams
 
 
 @dataclass(frozen=True, eq=False)
 class BoardWork:
-    """What the cameras are calibrated from: the board, where it stands on the rig and how well that is known, views of
-    it held up for each camera, and sigma (px, an axis) of a corner by camera."""
+    """What cameras are calibrated from.
+
+    printed: the same board for the rig. on_rig: where it stands on the rig. views: of it held up to
+    each camera. corner_px: sigma of a corner along each axis, by camera.
+    """
 
     board: Board
+    printed: RigBoard
     on_rig: MeasuredPose
     views: int
     corner_px: Mapping[str, float]
 
-    def times(self, views: int, placed: int = 1) -> "BoardWork":
-        """The same with so many times the views, and its place known so many times as well."""
-        pose = self.on_rig
-        better = replace(pose, sigma_mm=pose.sigma_mm / placed, sigma_rad=pose.sigma_rad / placed)
-        return replace(self, views=views * self.views, on_rig=better)
+    def improved(self, views: int, pose: int) -> "BoardWork":
+        """Return the work with so many times the views, and the pose known so many times as well."""
+        on_rig = replace(
+            self.on_rig,
+            sigma_mm=self.on_rig.sigma_mm / pose,
+            sigma_rad=self.on_rig.sigma_rad / pose,
+        )
+        return replace(self, views=views * self.views, on_rig=on_rig)
 
-    def corner_of(self, camera: str) -> float:
-        """Sigma of a corner; of a camera that is not there yet, the largest."""
-        return self.corner_px.get(camera, max(self.corner_px.values()))
+    @property
+    def largest_corner_px(self) -> float:
+        """Return the sigma of a corner in the camera where it is largest."""
+        return max(self.corner_px.values())
 
 
 def expected_cameras(cameras: Sequence[Camera], work: BoardWork, seed: int = 0) -> Cameras:
-    """The cameras where they are, with the covariance that a calibration from such views states. Raises Refused where
-    the views would not do, saying what to record."""
-    boards_, rig, sizes = {}, {}, {}
+    """Return the cameras where they are, with the covariance that a calibration states.
+
+    Corners of a camera that is not there yet are as uncertain as the worst. Raises Refused where
+    the views would not do, saying what to record.
+    """
+    held = {}
+    standing = {}
+    sizes_px = {}
     for number, camera in enumerate(cameras):
         rng = np.random.default_rng([seed, _NOISE, number])
-        sigma = work.corner_of(camera.name)
-        held = _held(camera, work, number, seed)
-        boards_[camera.name] = [_corners(camera, work.board, pose, sigma, rng) for pose in held]
-        rig[camera.name] = _corners(camera, work.board, work.on_rig.T_rig_board, sigma, rng)
-        sizes[camera.name] = camera.size_px
-    found = calibrate_cameras(
-        BoardViews(boards_, sizes, rig), work.board, work.on_rig, triggered=True
-    ).cameras
+        sigma_px = work.corner_px.get(camera.name, work.largest_corner_px)
+        of_views = np.random.default_rng([seed, _VIEWS, number])
+        poses = boards.draw_poses(work.printed, as_rig_camera(camera), work.views, of_views)
+        held[camera.name] = [_corners(camera, work.board, pose, sigma_px, rng) for pose in poses]
+        on_rig = work.on_rig.T_rig_board
+        standing[camera.name] = _corners(camera, work.board, on_rig, sigma_px, rng)
+        sizes_px[camera.name] = camera.size_px
+    views = BoardViews(held, sizes_px, standing)
+    found = calibrate_cameras(views, work.board, work.on_rig, triggered=True).cameras
     return Cameras(tuple(cameras), found.covariance, found.placement)
 
 
-def _held(camera: Camera, work: BoardWork, number: int, seed: int) -> list[np.ndarray]:
-    """T_rig_board (3, 4) of each view."""
-    board = work.board
-    printed = RigBoard(
-        board.squares,
-        board.square_mm,
-        board.marker_mm,
-        board.dictionary,
-        board.legacy,
-        board.inverted,
-    )
-    return boards.draw_poses(
-        printed, rig_camera(camera), work.views, np.random.default_rng([seed, _VIEWS, number])
-    )
-
-
 def _corners(
-    camera: Camera, board: Board, T_rig_board: np.ndarray, sigma_px: float, rng
+    camera: Camera, board: Board, T_rig_board: np.ndarray, sigma_px: float, rng: np.random.Generator
 ) -> Corners:
-    """The corners that are in the picture, as found to sigma."""
+    """Draw the corners of a board that are found in a camera's picture."""
     px = camera.project(apply(T_rig_board, board.corners_mm))
-    there = np.all((px > _RIM_PX) & (px < np.array(camera.size_px) - 1 - _RIM_PX), axis=1)
-    found = px[there] + sigma_px * rng.standard_normal((int(there.sum()), 2))
-    return Corners(np.flatnonzero(there), found, np.full(len(found), sigma_px))
+    last_px = np.array(camera.size_px) - 1 - _RIM_PX
+    is_found = np.all((px > _RIM_PX) & (px < last_px), axis=1)
+    count = int(is_found.sum())
+    noise_px = sigma_px * rng.standard_normal((count, 2))
+    return Corners(np.flatnonzero(is_found), px[is_found] + noise_px, np.full(count, sigma_px))
 
 
-def rig_camera(camera: Camera) -> RigCamera:
-    """The same camera for the rig's painter."""
-    R, t = camera.T_camera_rig[:, :3], camera.T_camera_rig[:, 3]
+def as_rig_camera(camera: Camera) -> RigCamera:
+    """Return a camera for the rig's painter."""
+    R = camera.T_camera_rig[:, :3]
+    t = camera.T_camera_rig[:, 3]
     return RigCamera(camera.name, camera.size_px, camera.matrix, camera.distortion, R, t)
 
 
-def seen_camera(camera: RigCamera) -> Camera:
-    """The rig's camera for vision."""
+def as_seen_camera(camera: RigCamera) -> Camera:
+    """Return a camera of the rig for vision."""
     T = np.column_stack([camera.rotation, camera.translation_mm])
     return Camera(camera.name, camera.size_px, camera.matrix, camera.distortion, T)
+
+
+def as_board(table: BoardTable) -> Board:
+    """Return the board of a protocol for vision."""
+    return Board(
+        tuple(table.squares),
+        table.square_mm,
+        table.marker_mm,
+        table.dictionary,
+        table.legacy,
+        table.inverted,
+    )

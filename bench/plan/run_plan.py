@@ -13,15 +13,16 @@ from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.plan.painted import Painter
-from bench.plan.picture import Bench, board_outline, painted_views, write_picture
-from bench.plan.plan_rows import RigTask, Row, painter_of, plan_run
+from bench.plan.camera_places import place_cameras
+from bench.plan.changes import Change, list_changes
+from bench.plan.painter import Painter
+from bench.plan.plan_drawing import Bench, PaintedTrial, board_outline, write_drawing
+from bench.plan.plan_files import write_plan
+from bench.plan.plan_rows import Plan, RigTask, painter_of, plan_run
 from bench.plan.planned_cameras import BoardWork, expected_cameras
-from bench.plan.recorded import SeenTask, plan_seen, stage_again
-from bench.plan.staged import Staged, of_run
-from bench.plan.tries import Try, tries
-from bench.plan.where import place_cameras
-from bench.plan.written import Plan, write_plan
+from bench.plan.recorded_whisk import SeenTask, plan_seen, stage_again
+from bench.plan.staged import StagedWhisk, stage_run
+from bench.records.trial_result import SeenTrial
 from bench.rig import build
 from bench.rig.protocol import Protocol, load
 from bench.session.inside import check_outside
@@ -30,10 +31,14 @@ from bench.session.session_check import checked_session
 from bench.trials.of_session import placed_units, trials_with_whisks
 from bench.trials.trial_evaluation import see_unit
 from vision.calibration.views import MeasuredPose
+from vision.geometry.board import Board
 from vision.geometry.camera import Cameras
 from vision.geometry.refusals import Refused
 
-_MOST_DRAWN = 12  # bars in a drawing
+# [bars] In a drawing, at most. A layout.
+_MOST_DRAWN = 12
+# [deg] Largest pushing angle of a plan. Stated.
+_MOST_THETA_DEG = 25.0
 _AS_RECORDED = (
     "Expected: rods and cameras where they were seen, the frames as recorded, an exact beam, and each "
     "camera's lines as sure as they were in that whisk."
@@ -43,15 +48,20 @@ EXAMPLE = Path(__file__).with_name("example.toml")
 
 @dataclass(frozen=True)
 class Options:
-    """theta_deg: of slip, φ, α. changes: whether to try any. follow_links: a session's pictures may lie elsewhere."""
+    """The options of the verb. Refused where the angle is out of range.
+
+    theta_deg: of slip, φ, α. changes: whether to try any. follow_links: a session's pictures may
+    lie elsewhere.
+    """
 
     theta_deg: float = 3.0
     changes: bool = True
     follow_links: bool = False
 
     def __post_init__(self):
-        if not 0.0 < self.theta_deg <= 25.0:
-            raise BadInput(f"--theta-deg {self.theta_deg:g}: above 0, up to 25")
+        """Raise BadInput where the angle is out of range."""
+        if not 0.0 < self.theta_deg <= _MOST_THETA_DEG:
+            raise BadInput(f"--theta-deg {self.theta_deg:g}: above 0, up to {_MOST_THETA_DEG:g}")
 
 
 def plan(
@@ -63,7 +73,10 @@ def plan(
     progress: bool = False,
     announce: Callable[[str], object] = print,
 ) -> Plan:
-    """Plan a RIG.toml or a SESSION into the folder `out`. Raises BadInput. announce: is given the text."""
+    """Write the plan of a RIG.toml or a SESSION into the folder `out`, and return it.
+
+    announce: is given the text. Raises BadInput.
+    """
     make = plan_session if what.is_dir() else plan_rig
     with Workers(workers, progress) as pool:
         made = make(what, out, options, pool)
@@ -72,7 +85,43 @@ def plan(
 
 
 def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
-    """A rig as a protocol describes it. Raises BadInput."""
+    """Return the plan of a rig as a protocol describes it, and draw it. Raises BadInput."""
+    protocol = _load_rig(path)
+    staged = _stage_runs(protocol)
+    if not staged:
+        raise BadInput(
+            "the whisker slips off its bar in every trial; push less far (motor.after_deg)",
+            file=path,
+        )
+    whisks = list(staged.values())
+    target_mm = _mean_contact_mm(whisks)
+    try:
+        protocol = place_cameras(protocol, whisks, target_mm)
+        painter = painter_of(protocol)
+        work = _board_work(painter)
+        cameras = expected_cameras(painter.cameras, work)
+    except BadInput as bad:
+        raise BadInput(bad.reason, file=path) from None
+    except (Refused, ValueError, cv2.error) as problem:
+        raise _on_one_line(problem, path) from None
+    changes = list_changes(cameras, work, target_mm, light=True) if options.changes else ()
+    theta_rad = float(np.radians(options.theta_deg))
+    runs = protocol.runs()
+    tasks = [RigTask(protocol, run, cameras, changes, theta_rad) for run in runs]
+    rows = pool.run(plan_run, tasks, "trials")
+    with lock_output(out):
+        _draw_rig(out, painter, cameras, staged)
+    return Plan(
+        title=f"{protocol.name}: {len(runs)} trials planned",
+        cameras=tuple(_describe_cameras(cameras, whisks)),
+        rows=tuple(rows),
+        theta_deg=options.theta_deg,
+        assumptions=tuple(_assumptions(work)),
+    )
+
+
+def _load_rig(path: Path) -> Protocol:
+    """Load the protocol of a rig that can be planned. Raises BadInput."""
     if path.name == MANIFEST:
         raise BadInput(
             "is a recorded session's; give the session's folder, or a RIG.toml", file=path
@@ -81,76 +130,60 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
     if not protocol.cameras:
         raise BadInput("has no [[cameras]]: there is nothing to see by", file=path)
     if any(trial.object for trial in protocol.trials):
-        found = "how sure a ring, sphere or cone is seen is not planned"
-        raise BadInput(f"object: {found}; leave such trials out", file=path)
-    _check_can_be_built(protocol, path)
-    staged = dict(_staged(protocol))
-    if not staged:
         raise BadInput(
-            "the whisker slips off its bar in every trial; push less far (motor.after_deg)",
+            "object: how sure a ring, sphere or cone is seen is not planned; leave such trials out",
             file=path,
         )
-    target = np.mean([one.touch.point_mm for one in staged.values()], axis=0)
-    try:
-        protocol = place_cameras(protocol, list(staged.values()), target)
-        painter = painter_of(protocol)
-        work = _board_work(painter)
-        cameras = expected_cameras(painter.cameras, work)
-    except BadInput as bad:
-        raise BadInput(bad.reason, file=path) from None
-    except (Refused, ValueError, cv2.error) as problem:
-        raise BadInput(" ".join(str(problem).split()), file=path) from None
-    tried = tuple(tries(cameras, work, target, light=True)) if options.changes else ()
-    theta, runs = float(np.radians(options.theta_deg)), protocol.runs()
-    tasks = [RigTask(protocol, run, cameras, tried, theta) for run in runs]
-    rows = pool.run(plan_run, tasks, "trials")
-    with lock_output(out):
-        _draw_rig(out, protocol, painter, cameras, staged)
-    return Plan(
-        f"{protocol.name}: {len(runs)} trials planned",
-        tuple(_described(cameras, list(staged.values()))),
-        tuple(rows),
-        options.theta_deg,
-        tuple(_assumed(work)),
-        tried,
-    )
-
-
-def _check_can_be_built(protocol: Protocol, path: Path) -> None:
-    """Whisker, board, and the cameras that have a place, say themselves what is wrong with them."""
     placed = [camera for camera in protocol.cameras if camera.position_mm is not None]
-    try:
-        (
-            build.rod(protocol),
-            build.scene(protocol),
-            build.cameras(msgspec.structs.replace(protocol, cameras=placed)),
-        )
+    try:  # whisker, board, and the cameras that have a place say what is wrong with them
+        build.rod(protocol)
+        build.scene(protocol)
+        build.cameras(msgspec.structs.replace(protocol, cameras=placed))
     except (ValueError, cv2.error) as problem:
-        raise BadInput(" ".join(str(problem).split()), file=path) from None
+        raise _on_one_line(problem, path) from None
+    return protocol
 
 
-def _staged(protocol: Protocol) -> Iterator[tuple[str, Staged]]:
-    """The whisks of trials that can be staged, by trial; a protocol's many speeds are alike."""
+def _on_one_line(problem: Exception, path: Path) -> BadInput:
+    """Return what is wrong with a file, on one line."""
+    return BadInput(" ".join(str(problem).split()), file=path)
+
+
+def _stage_runs(protocol: Protocol) -> dict[str, StagedWhisk]:
+    """Return by trial the whisks that can be staged."""
+    staged = {}
     for run in protocol.runs():
         try:
-            yield run.name, of_run(protocol, run)
+            staged[run.name] = stage_run(protocol, run)
         except ArithmeticError:
             continue
+    return staged
+
+
+def _mean_contact_mm(staged: Sequence[StagedWhisk]) -> np.ndarray:
+    """Return the mean contact (3,) at first touch."""
+    return np.mean([whisk.known.contact_mm for whisk in staged], axis=0)
 
 
 def _board_work(painter: Painter) -> BoardWork:
-    """What the cameras would be calibrated from. Raises Refused, ValueError where board or light would not do."""
-    board = painter.protocol.board
-    sigma_rad = float(np.radians(board.pose_sigma_deg))
-    on_rig = MeasuredPose(build.T_rig_board(painter.protocol), board.pose_sigma_mm, sigma_rad)
-    return BoardWork(painter.board, on_rig, board.views, painter.corner_px())
+    """Return what the cameras would be calibrated from.
+
+    Raises Refused or ValueError where board or light would not do.
+    """
+    table = painter.protocol.board
+    on_rig = MeasuredPose(
+        build.T_rig_board(painter.protocol),
+        table.pose_sigma_mm,
+        float(np.radians(table.pose_sigma_deg)),
+    )
+    return BoardWork(painter.board, painter.printed, on_rig, table.views, painter.corner_px())
 
 
-def _assumed(work: BoardWork) -> Iterator[str]:
-    corner = max(work.corner_px.values())
+def _assumptions(work: BoardWork) -> Iterator[str]:
+    """Yield sentences on what the plan of a rig takes for granted."""
     yield (
-        f"Taken for granted: light and noise of the file, lines of wire and bar as sure as they are in pictures "
-        f"painted so; {work.views} views of the board a camera, corners to {corner:.3f} px."
+        "Taken for granted: light and noise of the file, lines of wire and bar as sure as they are in pictures "
+        f"painted so; {work.views} views of the board a camera, corners to {work.largest_corner_px:.3f} px."
     )
     yield (
         "Changes are tried with lines as sure, in pixels, as before; a camera that is new, or did not see the bar, "
@@ -158,47 +191,50 @@ def _assumed(work: BoardWork) -> Iterator[str]:
     )
 
 
-def _described(cameras: Cameras, staged: Sequence[Staged]) -> Iterator[str]:
-    """A line a camera."""
-    contact = np.mean([one.touch.point_mm for one in staged], axis=0)
+def _describe_cameras(cameras: Cameras, staged: Sequence[StagedWhisk]) -> Iterator[str]:
+    """Yield a line on each camera."""
+    contact_mm = _mean_contact_mm(staged)
     for camera in cameras:
-        away = contact - camera.centre_mm
-        distance = float(np.linalg.norm(away))
-        to_bar = [
-            np.degrees(np.arccos(abs(away @ one.axis.direction) / distance)) for one in staged
-        ]
-        at = "({:.0f}, {:.0f}, {:.0f})".format(*camera.centre_mm)
+        sight_mm = contact_mm - camera.centre_mm
+        distance_mm = float(np.linalg.norm(sight_mm))
+        to_bar_deg = []
+        for whisk in staged:
+            cosine = abs(sight_mm @ whisk.known.axis.direction) / distance_mm
+            to_bar_deg.append(np.degrees(np.arccos(cosine)))
+        place = "({:.0f}, {:.0f}, {:.0f})".format(*camera.centre_mm)
+        focal_px = camera.lens[0]
         yield (
-            f"camera {camera.name}: at {at} mm, {distance:.0f} mm from the contact, f {camera.lens[0]:.0f} px, "
-            f"{camera.size_px[0]} x {camera.size_px[1]} px, {distance / camera.lens[0]:.3f} mm a px there; "
-            f"{min(to_bar):.0f} to {max(to_bar):.0f} deg to the bars"
+            f"camera {camera.name}: at {place} mm, {distance_mm:.0f} mm from the contact, f {focal_px:.0f} px, "
+            f"{camera.size_px[0]} x {camera.size_px[1]} px, {distance_mm / focal_px:.3f} mm a px there; "
+            f"{min(to_bar_deg):.0f} to {max(to_bar_deg):.0f} deg to the bars"
         )
 
 
 def _draw_rig(
-    out: Path, protocol: Protocol, painter: Painter, cameras: Cameras, staged: dict[str, Staged]
+    out: Path, painter: Painter, cameras: Cameras, staged: dict[str, StagedWhisk]
 ) -> None:
-    name, shown = max(staged.items(), key=lambda one: abs(one[1].whisk.slope[0]))
-    views = painted_views(painter, shown)
+    """Write the drawing of a rig, and what each camera will see of the trial with the steepest bar."""
+    name = max(staged, key=lambda trial: abs(staged[trial].marched.slope[0]))
+    painted = PaintedTrial(name, staged[name], painter.last_frames(staged[name]))
     (out / "views").mkdir(parents=True, exist_ok=True)
-    for camera, picture in views.items():
+    for camera, picture in painted.pictures.items():
         with whole_file(out / "views" / f"{camera}.png") as temporary:
             temporary.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
-    board = protocol.board
-    outline = board_outline(build.T_rig_board(protocol), tuple(board.squares), board.square_mm)
-    write_picture(out, Bench(cameras, _few(staged.values()), outline), views, shown, name)
+    table = painter.protocol.board
+    T_rig_board = build.T_rig_board(painter.protocol)
+    outline_mm = board_outline(T_rig_board, tuple(table.squares), table.square_mm)
+    write_drawing(out, Bench(cameras, _drawn(staged.values()), outline_mm), painted)
 
 
-def _few(staged: Iterable[Staged]) -> list[Staged]:
-    """Not more than a drawing holds."""
-    every = list(staged)
-    return [
-        every[k] for k in np.unique(np.linspace(0, len(every) - 1, _MOST_DRAWN).round().astype(int))
-    ]
+def _drawn(staged: Iterable[StagedWhisk]) -> list[StagedWhisk]:
+    """Return as many of the whisks as a drawing holds, spread over all."""
+    whisks = list(staged)
+    places = np.linspace(0, len(whisks) - 1, _MOST_DRAWN).round().astype(int)
+    return [whisks[k] for k in np.unique(places).tolist()]
 
 
 def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
-    """A session as recorded. Raises BadInput."""
+    """Return the plan of a session as recorded, and draw it. Raises BadInput."""
     check_outside(out, path)
     doubts = Doubts()
     session = checked_session(path, doubts, follow_links=options.follow_links)
@@ -209,28 +245,41 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
     with lock_output(out):
         calibration, units = placed_units(session, trials, out, settings, pool, doubts)
         seen = pool.run(see_unit, units, "trials")
-        whisks = [
-            (unit.trial, trial, whisk) for unit, trial in zip(units, seen) for whisk in trial.whisks
-        ]
-        theta, known = settings.theta_rad, [whisk for *_, whisk in whisks if whisk.has_truth]
-        tried: tuple[Try, ...] = ()
-        if known and options.changes:
-            target = np.mean([whisk.point_mm.value for whisk in known], axis=0)
-            tried = tuple(tries(calibration.cameras, None, target, light=False))
-        tasks = [SeenTask(session, *one, calibration.cameras, tried, theta) for one in whisks]
-        rows: list[Row] = pool.run(plan_seen, tasks, "whisks")
+        cameras = calibration.cameras
+        changes = _changes_of_session(cameras, seen) if options.changes else ()
+        tasks = []
+        for unit, trial in zip(units, seen):
+            for whisk in trial.whisks:
+                task = SeenTask(
+                    session, unit.trial, trial, whisk, cameras, changes, settings.theta_rad
+                )
+                tasks.append(task)
+        rows = pool.run(plan_seen, tasks, "whisks")
         staged = [stage_again(task) for task, row in zip(tasks, rows) if row.outlook.has_truth]
         if staged:
-            board = session.board
-            stands = board is not None and calibration.T_rig_board is not None
-            outline = (
-                board_outline(calibration.T_rig_board, board.squares, board.square_mm)
-                if stands
-                else None
-            )
-            write_picture(out, Bench(calibration.cameras, _few(staged), outline), {}, None, "")
-    described = tuple(_described(calibration.cameras, staged)) if staged else ()
-    title = f"{session.name}: {len(rows)} whisks as recorded"
+            outline_mm = _session_outline(session.board, calibration.T_rig_board)
+            write_drawing(out, Bench(cameras, _drawn(staged), outline_mm))
     return Plan(
-        title, described, tuple(rows), options.theta_deg, (_AS_RECORDED,) if staged else (), tried
+        title=f"{session.name}: {len(rows)} whisks as recorded",
+        cameras=tuple(_describe_cameras(cameras, staged)) if staged else (),
+        rows=tuple(rows),
+        theta_deg=options.theta_deg,
+        assumptions=(_AS_RECORDED,) if staged else (),
     )
+
+
+def _changes_of_session(cameras: Cameras, seen: Sequence[SeenTrial]) -> list[Change]:
+    """Return the changes to be tried; none where no whisk has a truth."""
+    points_mm = []
+    for trial in seen:
+        points_mm += [whisk.point_mm.value for whisk in trial.whisks if whisk.has_truth]
+    if not points_mm:
+        return []
+    return list_changes(cameras, None, np.mean(points_mm, axis=0), light=False)
+
+
+def _session_outline(board: Board | None, T_rig_board: np.ndarray | None) -> np.ndarray | None:
+    """Return the outline (4, 3), mm, of the board that stands on a session's rig, if one does."""
+    if board is None or T_rig_board is None:
+        return None
+    return board_outline(T_rig_board, board.squares, board.square_mm)

@@ -1,4 +1,4 @@
-"""A whisk before any camera sees it: the rig's exact mechanics, in the terms in which vision fits a whisk."""
+"""A whisk before any camera sees it: the rig's exact mechanics, in the terms in which vision fits it."""
 
 import math
 from collections.abc import Sequence
@@ -15,82 +15,67 @@ from bench.rig.protocol import Protocol, Run
 from bench.rig.recording import Recording
 from bench.rig.stick_slip import Friction
 from vision.geometry import rods as seen_rods
-from vision.geometry.centreline import REST_POWERS
 from vision.geometry.contact import BarAxis
+from vision.truth.known_whisk import KnownWhisk
 
-_STEP_RAD = math.radians(0.1)  # of the mechanics between frames
-_SLOW_HZ = 100.0  # of signals that nobody looks at
+# [rad] Step of the mechanics between frames. Stated.
+_STEP_RAD = math.radians(0.1)
+# [Hz] Of signals, which no plan reads. Stated.
+_SLOW_HZ = 100.0
+# [points] Along the rod, to which its rest shape is fitted. Stated.
+_REST_POINTS = 50
 
 
 @dataclass(frozen=True, eq=False)
-class Staged:
-    """One whisk to be seen.
+class StagedWhisk:
+    """One whisk of a plan.
 
-    motor_rad, time_s (f,): of its frames; bend_rad (f, 2), arc_mm (f,): bend and contact in each, before touch 0 and
-    those of the touch; rest_mm (2, 4): the unbent whisker, as `vision.geometry.centreline` has it. recording: what
-    the rig paints it from, None of a session that was recorded.
+    marched: by the rig's mechanics. known: in vision's terms, in its frames. recording: what the
+    rig paints it from; None of a session that was recorded.
     """
 
-    whisk: MarchedWhisk
-    rods: seen_rods.Rods
-    motor_rad: np.ndarray
-    time_s: np.ndarray
-    bend_rad: np.ndarray
-    arc_mm: np.ndarray
-    rest_mm: np.ndarray
+    marched: MarchedWhisk
+    known: KnownWhisk
     recording: Recording | None = None
 
-    @property
-    def touch(self) -> Touch:
-        """First touch."""
-        return self.whisk.touch
 
-    @property
-    def foot_mm(self) -> np.ndarray:
-        """The point (3,) of the bar's axis opposite the first contact."""
-        return self.whisk.bar.foot_mm(self.touch.point_mm)
+def stage_run(protocol: Protocol, run: Run) -> StagedWhisk:
+    """Return a whisk of a protocol's trial, with everything exactly where it is wanted.
 
-    @property
-    def axis(self) -> BarAxis:
-        """The bar's axis, its point opposite the first contact."""
-        return BarAxis(self.foot_mm, self.whisk.bar.axis).upward()
-
-
-def of_run(protocol: Protocol, run: Run) -> Staged:
-    """A whisk of a protocol's trial, everything where it was wanted. Raises ArithmeticError where the whisker slips off
-    or buckles."""
-    plain = {
-        name: 0.0
-        for name in run.table.__struct_fields__
-        if name.endswith(("_scatter_deg", "_scatter_mm"))
-    }
-    table = msgspec.structs.replace(run.table, whisks=1, **plain)
+    Raises ArithmeticError where the whisker slips off or buckles.
+    """
+    exact = {}
+    for name in run.table.__struct_fields__:
+        if name.endswith(("_scatter_deg", "_scatter_mm")):
+            exact[name] = 0.0
+    table = msgspec.structs.replace(run.table, whisks=1, **exact)
     gauges = msgspec.structs.replace(
         protocol.gauges, vibration=False, filter_Hz=0.0, rate_Hz=_SLOW_HZ
     )
     friction = msgspec.structs.replace(protocol.friction, scatter=0.0, irregular=0.0)
     alone = msgspec.structs.replace(protocol, gauges=gauges, friction=friction)
-    made = Recording.make(
-        alone, msgspec.structs.replace(run, table=table), np.random.default_rng(0)
-    )
-    forth = ~made.frames.back
-    return replace(
-        staged(made.whisks[0], made.frames.motor_rad[forth], made.frames.time_s[forth]),
-        recording=made,
-    )
+    run = msgspec.structs.replace(run, table=table)
+    recording = Recording.make(alone, run, np.random.default_rng(0))
+    frames = recording.frames
+    forth = ~frames.back
+    whisk = as_staged(recording.whisks[0], frames.motor_rad[forth], frames.time_s[forth])
+    return replace(whisk, recording=recording)
 
 
-def on_bar(
+def stage_on_bar(
     rod: Rod,
     bar: Bar,
     touch: Touch,
     friction: float,
     motor_rad: Sequence[float],
     time_s: np.ndarray,
-) -> Staged:
-    """A whisk over these motor angles with one coefficient of friction. Raises ArithmeticError as `of_run`."""
+) -> StagedWhisk:
+    """Return a whisk with one coefficient of friction, in frames at these motor angles (f,).
+
+    Raises ArithmeticError where the whisker slips off or buckles.
+    """
     motor = np.asarray(motor_rad, dtype=float)
-    whisk = MarchedWhisk.run(
+    marched = MarchedWhisk.run(
         rod,
         bar,
         Friction(friction, friction),
@@ -99,45 +84,56 @@ def on_bar(
         step_rad=_STEP_RAD,
         stops_rad=motor,
     )
-    return staged(whisk, motor, time_s)
+    return as_staged(marched, motor, time_s)
 
 
-def staged(whisk: MarchedWhisk, motor_rad: np.ndarray, time_s: np.ndarray) -> Staged:
-    """A whisk of the rig in vision's terms, at the motor angles of the frames (f,); diameters are exact."""
-    states = [
-        whisk.forward.state_at(motor) if motor > whisk.touch.motor_rad else None
-        for motor in motor_rad
-    ]
-    bends = [np.zeros(2) if state is None else _bend(whisk.rod, state) for state in states]
-    arcs = [whisk.touch.arc_mm if state is None else state.arc_mm for state in states]
-    rod = whisk.rod
+def as_staged(marched: MarchedWhisk, motor_rad: np.ndarray, time_s: np.ndarray) -> StagedWhisk:
+    """Return a whisk of the rig in frames at these motor angles (f,); its diameters are exact."""
+    rod = marched.rod
+    touch = marched.touch
+    bend_rad, arc_mm = _bends_and_arcs(marched, motor_rad)
     wire = seen_rods.Wire(
         rod.shape, rod.length_mm, rod.diameter_mm, tip_diameter_mm=rod.tip_diameter_mm
     )
-    rods = seen_rods.Rods(wire, seen_rods.Bar(2.0 * whisk.bar.radius_mm))
-    return Staged(
-        whisk,
-        rods,
-        np.asarray(motor_rad),
-        np.asarray(time_s),
-        np.array(bends),
-        np.array(arcs),
-        _rest(rod),
+    bar = seen_rods.Bar(2.0 * marched.bar.radius_mm)
+    share = np.linspace(0.0, 1.0, _REST_POINTS)
+    rest_offset_mm = rod.rest.offset_mm(share * rod.length_mm)[:, 1:]
+    foot_mm = marched.bar.foot_mm(touch.point_mm)  # of the bar's axis, opposite the contact
+    known = KnownWhisk(
+        rods=seen_rods.Rods(wire, bar),
+        axis=BarAxis(foot_mm, marched.bar.axis).upward(),
+        motor_rad=np.asarray(motor_rad),
+        time_s=np.asarray(time_s),
+        bend_rad=bend_rad,
+        arc_mm=arc_mm,
+        rest_mm=KnownWhisk.rest_shape(share, rest_offset_mm),
+        touch_rad=touch.motor_rad,
+        contact_mm=touch.point_mm,
     )
+    return StagedWhisk(marched, known)
 
 
-def _bend(rod: Rod, state) -> np.ndarray:
-    """Tangent angle (2,) at the contact, across and along the rotation axis, hub frame."""
+def _bends_and_arcs(marched: MarchedWhisk, motor_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return bends (f, 2), rad, and contact arcs (f,), mm, at motor angles (f,)."""
+    touch = marched.touch
+    bends = []
+    arcs_mm = []
+    for motor in motor_rad:
+        if motor > touch.motor_rad:
+            state = marched.forward.state_at(motor)
+            bends.append(_bend_rad(marched.rod, state))
+            arcs_mm.append(state.arc_mm)
+        else:
+            bends.append(np.zeros(2))
+            arcs_mm.append(touch.arc_mm)
+    return np.array(bends), np.array(arcs_mm)
+
+
+def _bend_rad(rod: Rod, state) -> np.ndarray:
+    """Return the tangent angle (2,) at the contact, across and along the rotation axis, hub frame."""
     tangent = rotate_about_z(state.tangent, -state.motor_rad)
-    aside = tangent[1:] / np.linalg.norm(tangent) - rod.rest.slope(state.arc_mm)[1:]
-    size = float(np.linalg.norm(aside))
-    return aside * (math.asin(min(size, 1.0)) / size if size > 0.0 else 1.0)
-
-
-def _rest(rod: Rod) -> np.ndarray:
-    """The rod's rest shape as polynomials (2, 4) of the share of its length."""
-    share = np.linspace(0.0, 1.0, 50)
-    powers = np.vander(share, REST_POWERS, increasing=True)
-    return np.linalg.lstsq(powers, rod.rest.offset_mm(share * rod.length_mm)[:, 1:], rcond=None)[
-        0
-    ].T
+    deviation = tangent[1:] / np.linalg.norm(tangent) - rod.rest.slope(state.arc_mm)[1:]
+    sine = float(np.linalg.norm(deviation))
+    if sine == 0.0:
+        return deviation
+    return deviation * (math.asin(min(sine, 1.0)) / sine)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from bench.plan.planned_cameras import seen_camera
-from bench.plan.staged import Staged, of_run
+from bench.plan.planned_cameras import as_seen_camera
+from bench.plan.staged import StagedWhisk, stage_run
 from bench.rig import build
 from bench.rig.protocol import Protocol, load
 from tests.scenes.rig_sessions import protocol_file
@@ -27,11 +27,11 @@ def protocol_of(folder, text: str = BENCH) -> Protocol:
     return load(protocol_file(folder, text))
 
 
-def staged_of(protocol: Protocol) -> Staged:
+def staged_of(protocol: Protocol) -> StagedWhisk:
     """Its first trial."""
-    return of_run(protocol, protocol.runs()[0])
+    return stage_run(protocol, protocol.runs()[0])
 
 
 def cameras_of(protocol: Protocol) -> Cameras:
     """Its cameras, exact."""
-    return Cameras(tuple(seen_camera(camera) for camera in build.cameras(protocol)))
+    return Cameras(tuple(as_seen_camera(camera) for camera in build.cameras(protocol)))

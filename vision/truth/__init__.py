@@ -1,4 +1,5 @@
-"""A trial's pictures in, its truth out: `observe.observe_trial` is the only door that bench uses.
+"""A trial's pictures in, its truth out: `observe.observe_trial`.
 
-May import all of vision but calibration's commands.
+A whisk that is known exactly has the truth that it would give predicted by `predicted_truth.predict_truth`. May import all of
+vision but calibration's commands.
 """

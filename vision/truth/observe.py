@@ -14,13 +14,12 @@ import numpy as np
 
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
-from vision.fit.first_bends import contact_arc
 from vision.fit.motion import Gives, StatedVelocity
 from vision.fit.one_camera_less import contradiction
 from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import REST_POWERS, Curves, is_before, one_curve
+from vision.geometry.centreline import REST_POWERS, Curves, is_before
 from vision.geometry.counted import counted
 from vision.geometry.reasons import Reason, joined
 from vision.geometry.refusals import Misled, Refused, TooFewFrames
@@ -38,7 +37,7 @@ from vision.truth.trial_pictures import TrialPictures
 from vision.truth.truth_rows import to_whisk
 from vision.truth.value import Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
-from vision.truth.whisk_truth import coarse_shapes, fit_whisk, free_stroke
+from vision.truth.whisk_truth import coarse_curves, coarse_shapes, fit_whisk, free_stroke
 from vision.truth.wire_end import wire_ends
 from vision.truth.wire_width import wire_widths
 from vision.wire.one_sided import one_sided_lines
@@ -101,18 +100,12 @@ def wire_lines(
 
 def _coarse_curves(whisk: WhiskPictures) -> dict[int, Curves]:
     """Return the wire's centreline in each frame, coarsely."""
-    axis = whisk.bar.axis
-    wire = whisk.rods.wire
     try:
         rest, bends = coarse_shapes(whisk)
     except Refused:
         rest = np.zeros((2, REST_POWERS))
         bends = dict.fromkeys(whisk.frames, np.zeros(2))
-    curves = {}
-    for f, motor_rad in whisk.motor.items():
-        arc_mm = contact_arc(rest, bends[f], motor_rad, axis, wire)
-        curves[f] = one_curve(rest, bends[f], arc_mm, motor_rad, wire)
-    return curves
+    return coarse_curves(whisk, rest, bends)[0]
 
 
 @dataclass(frozen=True)

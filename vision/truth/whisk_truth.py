@@ -1,20 +1,12 @@
 """One whisk: wire and object traced in all its frames and fitted together, by turns."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vision.fit.first_bends import SwingPictures, contact_arc, find_rest, follow_bends
-from vision.fit.problem import (
-    Problem,
-    State,
-    bar_axis,
-    bends,
-    curves_of,
-    rest_shape,
-    shifts_mm,
-)
+from vision.fit.problem import Problem, State, bar_axis, bends, curves_of, rest_shape, shifts_mm
 from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.fit.touch import begins_free
@@ -22,55 +14,36 @@ from vision.geometry.centreline import Curves, one_curve
 from vision.geometry.contact import clearance
 from vision.geometry.refusals import Misled, Refused, TooFewFrames
 from vision.geometry.touched import Axis
-from vision.pictures.view import SATURATED, View
-from vision.truth.readers import ObjectReader, WhereAbout
+from vision.truth.line_source import LineSource, WhiskPlace
 from vision.truth.strategies import Strategy, Touch, early, strategies
+from vision.truth.traced_lines import TracedLines, blurs_px
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
-from vision.wire.bands import Pieces
-from vision.wire.one_sided import WireAppearance, seen_width
 from vision.wire.points import Observed
-from vision.wire.shading import Knots
-from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, wire_pieces
 
-# [mm] Between knots of the wire's shading: light and finish are much the same a centimetre
-# farther on. Study: thresholds.py truth.whisk _WIRE_KNOT_MM ….
-_WIRE_KNOT_MM = 12.0
-# [px] Beside the wire: three of a lens blur of a pixel. A piece that lacks a pixel within, for
-# another whisker's wire, gives no point: of those that lacked some the wire scattered by 0.09 px,
-# without them by 0.05. Study: arrays_seen.py.
-_EDGE_PX = 3.0
-# [px] Wire nearer to the bar's outline is mixed with it by the lens: four blurs. Study:
-# thresholds.py truth.whisk _BESIDE_BAR_PX ….
-BESIDE_BAR_PX = 4.0
 # [1] Least that a variance grows by, of the free stroke that places the rig: what changes slowly
 # over a wide stroke passes for the whisker's turn, which takes up what would show it as scatter.
 # Study: tests/bench/trials/test_placing_pictures.py.
 _FREE_SHARED = 4.0
 # [px] A camera whose points scatter by more sees another thing: where a wire is seen at all its
-# points lie on one line to a tenth of a pixel. Study: thresholds.py truth.whisk _MOST_SCATTER_PX
-# ….
+# points lie on one line to a tenth of a pixel. Study: thresholds.py
+# truth.whisk_truth _MOST_SCATTER_PX ….
 _MOST_SCATTER_PX = 0.7
 
 
 @dataclass(frozen=True)
-class _Expected:
+class ExpectedWhisk:
     """What is expected before a pass, in f frames.
 
-    axis: of the object. came_mm (f, 3): how far it is from there in each frame, if it moves.
-    rest_mm (2, 4): rest shape. bend_rad (f, 2), arcs_mm (f,): bends and contact arcs. curves: of
-    the wire, by frame. touching, free (f,) bool. blur_px: of each camera's lens, by the pass
-    before.
+    place: of object and wire. rest_mm (2, 4): rest shape. bend_rad (f, 2), arcs_mm (f,): bends and
+    contact arcs. touching, free (f,) bool.
     """
 
-    axis: Axis
-    came_mm: np.ndarray
+    place: WhiskPlace
     rest_mm: np.ndarray
     bend_rad: np.ndarray
     arcs_mm: np.ndarray
-    curves: Mapping[int, Curves]
     touching: np.ndarray
     free: np.ndarray
-    blur_px: Mapping[str, float] = field(default_factory=dict)
 
 
 def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
@@ -91,53 +64,51 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
 
 
 def _fit_by(whisk: WhiskPictures, strategy: Strategy) -> FittedWhisk:
-    """Fit a whisk by one strategy, pass by pass. Raises Refused where it does not serve."""
-    reader = strategy.reader
-    touch = strategy.touch
-    whisk, expected = _expect_coarsely(whisk, touch)
+    """Fit a whisk by one strategy. Raises Refused where it does not serve."""
+    whisk, expected = _expect_coarsely(whisk, strategy.touch)
+    return fit_lines(whisk, TracedLines(whisk, strategy.reader), expected, strategy.touch)
+
+
+def fit_lines(
+    whisk: WhiskPictures, lines: LineSource, expected: ExpectedWhisk, touch: Touch
+) -> FittedWhisk:
+    """Fit the lines of a whisk pass by pass, each time near the curves of the pass before.
+
+    Raises Refused where the lines determine no touch.
+    """
     for _ in range(whisk.settings.rounds):
-        seen = _trace_all(whisk, reader, expected, last=False)
+        seen = lines.all_points(expected.place, last=False)
         if len({one.camera for one in seen if one.frame >= 0}) < touch.fewest_cameras:
             raise Refused("a single camera sees wire and bar", code="single_camera")
         problem, state, covariance = _fit(whisk, expected, seen, touch)
         whisk = whisk.yielding_as(problem, state)
         _check_scatter(problem, state)
         touching, free = touch.part_by_fit(problem, state, covariance)
-        expected = _Expected(
-            axis=bar_axis(problem, state.vector).upward(),
-            came_mm=shifts_mm(problem, state.vector),
+        expected = ExpectedWhisk(
+            place=_fitted_place(whisk, problem, state),
             rest_mm=rest_shape(problem, state.vector),
             bend_rad=bends(problem, state.vector),
             arcs_mm=state.arcs_mm,
-            curves=_fitted_curves(problem, state, whisk.frames),
             touching=touching,
             free=free,
-            blur_px=_blurs_px(whisk),
         )
-    seen = _trace_all(whisk, reader, expected, last=True)
+    seen = lines.all_points(expected.place, last=True)
     problem, state, covariance = _fit(whisk, expected, seen, touch)
     return FittedWhisk.of(problem, state, covariance, whisk.frames)
 
 
-def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, _Expected]:
+def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, ExpectedWhisk]:
     """Return the whisk in the frames to fit, and what coarse points say of them.
 
     Raises TooFewFrames where a thinned stroke has too few frames before touch.
     """
-    axis = whisk.bar.axis
-    wire = whisk.rods.wire
     rest, coarse = coarse_shapes(whisk)
     if whisk.is_thinned and not begins_free(whisk.angles_rad, np.array(list(coarse.values()))):
         raise TooFewFrames("too few of the frames before touch were looked at")
     whisk = whisk.during(touch.frames_to_fit(whisk.motor, coarse))
     bend = np.array([coarse[f] for f in whisk.frames])
     touching, free = touch.part_by_bends(whisk.angles_rad, bend)
-    arcs = []
-    curves = {}
-    for f, own_bend in zip(whisk.frames, bend):
-        motor_rad = whisk.motor[f]
-        arcs.append(contact_arc(rest, own_bend, whisk.motor_rad[f], axis, wire))
-        curves[f] = one_curve(rest, own_bend, arcs[-1], motor_rad, wire)
+    curves, arcs_mm = coarse_curves(whisk, rest, coarse)
     came = np.zeros((1, 3)) if whisk.motion is None else whisk.motion.expected_mm
     if whisk.gives is not None:
         came = _given_way(whisk, list(curves.values()), touching)
@@ -145,8 +116,8 @@ def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures,
         last_free = np.flatnonzero(free[:first])[-1]
         touch_rad = float(np.mean(whisk.angles_rad[[last_free, first]]))
         whisk = whisk.yielding(came, touch_rad)
-    arcs = np.array(arcs)
-    return whisk, _Expected(axis, came, rest, bend, arcs, curves, touching, free)
+    place = WhiskPlace(whisk.bar.axis, curves, whisk.bar_swept_mm, came)
+    return whisk, ExpectedWhisk(place, rest, bend, arcs_mm, touching, free)
 
 
 def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarray]]:
@@ -164,6 +135,23 @@ def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarra
     return rest, follow_bends(sights, axis, rest, whisk.motor)
 
 
+def coarse_curves(
+    whisk: WhiskPictures, rest_mm: np.ndarray, bend_rad: Mapping[int, np.ndarray]
+) -> tuple[dict[int, Curves], np.ndarray]:
+    """Return by frame the wire's centreline, and its contact arcs (f,), mm.
+
+    rest_mm (2, 4): rest shape. bend_rad: by frame the bend (2,).
+    """
+    wire = whisk.rods.wire
+    curves = {}
+    arcs_mm = []
+    for f, motor_rad in whisk.motor.items():
+        arc_mm = contact_arc(rest_mm, bend_rad[f], motor_rad, whisk.bar.axis, wire)
+        curves[f] = one_curve(rest_mm, bend_rad[f], arc_mm, motor_rad, wire)
+        arcs_mm.append(arc_mm)
+    return curves, np.array(arcs_mm)
+
+
 def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndarray) -> np.ndarray:
     """Return how far (f, 3) the bar has come where it touches curves that have passed its place."""
     axis = whisk.bar.axis
@@ -178,7 +166,7 @@ def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndar
 
 
 def _fit(
-    whisk: WhiskPictures, expected: _Expected, seen: list[Observed], touch: Touch
+    whisk: WhiskPictures, expected: ExpectedWhisk, seen: list[Observed], touch: Touch
 ) -> tuple[Problem, State, np.ndarray]:
     """Fit all lines, with sigmas as large as residuals show.
 
@@ -187,7 +175,7 @@ def _fit(
     problem = Problem(
         whisk.cameras,
         whisk.rods,
-        expected.axis,
+        expected.place.axis,
         whisk.angles_rad,
         expected.touching,
         ~expected.free,
@@ -218,18 +206,14 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     """Fit all frames before touch, about the object and the rest shape of a fit."""
     problem = fitted.problem
     vector = fitted.state.vector
-    wire = whisk.rods.wire
-    touched = {f for f, bent in zip(fitted.frames, problem.bent) if bent}
-    whisk = whisk.during([f for f in whisk.frames if f not in touched])
-    rest = rest_shape(problem, vector)
-    axis = bar_axis(problem, vector)
-    curves = {}
-    for f, motor_rad in whisk.motor.items():
-        curves[f] = one_curve(rest, np.zeros(2), wire.length_mm, motor_rad, wire)
+    bent = {f for f, is_bent in zip(fitted.frames, problem.bent) if is_bent}
+    whisk = whisk.during([f for f in whisk.frames if f not in bent])
+    place = _resting_place(whisk, bar_axis(problem, vector), rest_shape(problem, vector))
+    lines = TracedLines(whisk, blur_px=blurs_px(whisk))
     seen = []
-    for view in whisk.views:
-        seen += trace_wire(whisk, view, axis, curves, _blurs_px(whisk))
-    nothing = np.zeros(len(curves), dtype=bool)
+    for on_wire in lines.wire_points(place, last=True).values():
+        seen += on_wire
+    nothing = np.zeros(len(place.curves), dtype=bool)
     alone = replace(
         problem,
         motor_rad=whisk.angles_rad,
@@ -238,105 +222,38 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
         seen=seen,
         motion=whisk.motion,
     )
-    state = State(vector[: problem.first_bend], np.full(len(curves), 0.5 * wire.length_mm))
+    middle_mm = np.full(len(place.curves), 0.5 * whisk.rods.wire.length_mm)
+    state = State(vector[: problem.first_bend], middle_mm)
     state, _ = solve(alone, state, scales=[LAST_SCALE] * 3)
     return inflated_by_residuals(alone, state, _FREE_SHARED), state
 
 
-def _fitted_curves(problem: Problem, state: State, frames: Sequence[int]) -> dict[int, Curves]:
-    """Return by frame the wire's centreline of a fit."""
-    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
-    return {f: curves.one(k) for k, f in enumerate(frames)}
+def _resting_place(whisk: WhiskPictures, axis: Axis, rest_mm: np.ndarray) -> WhiskPlace:
+    """Return where an object and a wire of this rest shape (2, 4) are that is nowhere bent."""
+    wire = whisk.rods.wire
+    curves = {}
+    for f, motor_rad in whisk.motor.items():
+        curves[f] = one_curve(rest_mm, np.zeros(2), wire.length_mm, motor_rad, wire)
+    return WhiskPlace(axis, curves, whisk.bar_swept_mm)
 
 
-def _blurs_px(whisk: WhiskPictures) -> dict[str, float]:
-    """Return the lens blur of each camera in which the wire was traced."""
-    return {name: light.blur_px for name, light in whisk.light.items()}
+def _fitted_place(whisk: WhiskPictures, problem: Problem, state: State) -> WhiskPlace:
+    """Return where a fit has object and wire."""
+    vector = state.vector
+    curves, _ = curves_of(problem, vector, state.arcs_mm)
+    return WhiskPlace(
+        axis=bar_axis(problem, vector).upward(),
+        curves={f: curves.one(k) for k, f in enumerate(whisk.frames)},
+        swept_mm=whisk.bar_swept_mm,
+        came_mm=shifts_mm(problem, vector),
+    )
 
 
-def _begin(problem: Problem, expected: _Expected) -> State:
+def _begin(problem: Problem, expected: ExpectedWhisk) -> State:
     """Return the state that is expected, the object where the problem counts it from."""
     vector = np.zeros(problem.size)
     vector[problem.blocks.rest_shape.slice] = np.ravel(expected.rest_mm)
     if problem.motion is not None and problem.motion.from_touch:
-        vector[problem.blocks.motion.slice] = problem.motion.values(expected.came_mm)
+        vector[problem.blocks.motion.slice] = problem.motion.values(expected.place.came_mm)
     vector[problem.first_bend :] = expected.bend_rad[problem.bent].ravel()
     return State(vector, np.asarray(expected.arcs_mm, dtype=float))
-
-
-def _trace_all(
-    whisk: WhiskPictures, reader: ObjectReader, expected: _Expected, *, last: bool
-) -> list[Observed]:
-    """Trace wire and object in all cameras. Raises Refused where one of them is seen in none."""
-    curves = expected.curves
-    wires_px = {}
-    for view in whisk.views:
-        lines_px = [view.camera.project(curve.points_mm) for curve in curves.values()]
-        wires_px[view.camera.name] = lines_px
-    about = WhereAbout(expected.axis, expected.came_mm, list(curves), wires_px)
-    lines = reader.read(about, last=last)
-    seen = []
-    for number, view in enumerate(whisk.views):
-        seen += trace_wire(whisk, view, expected.axis, curves, expected.blur_px, last=last)
-        for line in lines.get(view.camera.name, []):
-            seen.append(Observed(-1, number, line.points, line.side, line.frame))
-    require_both_rods(seen)
-    return seen
-
-
-def require_both_rods(seen: Sequence[Observed]) -> None:
-    """Raise Refused where wire or bar is seen in no camera."""
-    for rod, is_seen in (
-        ("wire clear of the bar", any(one.frame >= 0 for one in seen)),
-        ("bar clear of the wire", any(one.frame < 0 for one in seen)),
-    ):
-        if not is_seen:
-            raise Refused(f"no camera shows enough of the {rod}", code="rod_hidden")
-
-
-def trace_wire(
-    whisk: WhiskPictures,
-    view: View,
-    axis: Axis,
-    curves: Mapping[int, Curves],
-    seen_blur_px: Mapping[str, float] | None = None,
-    *,
-    last: bool = True,
-) -> list[Observed]:
-    """Trace the wire in one of a whisk's cameras near its curves by frame.
-
-    seen_blur_px: by camera, of the pass that gave the curves. Fills whisk.light with how the camera
-    sees the wire.
-    """
-    name = view.camera.name
-    pieces = clear_pieces(whisk, view, axis, curves)
-    if len(pieces) == 0:
-        return []
-    blur_px = (seen_blur_px or {}).get(name)
-    traced = trace(pieces, wire_knots(whisk), seen_blur_px=blur_px, last=last)
-    width = seen_width(traced.pieces, traced.blur_px)
-    whisk.light[name] = WireAppearance(traced.blur_px, width, float(np.sqrt(traced.misfit)))
-    points, source = to_points(traced)
-    return observed(points, source, whisk.cameras.names.index(name), list(curves))
-
-
-def clear_pieces(
-    whisk: WhiskPictures, view: View, axis: Axis, curves: Mapping[int, Curves]
-) -> Pieces:
-    """Cut out the wire near its curves, clear of clamp and object, in one of a whisk's cameras."""
-    settings = whisk.settings
-    pieces = wire_pieces(
-        view, curves, whisk.rods.wire, settings.wire_piece_px, settings.wire_margin_px
-    )
-    if view.others:
-        pieces = pieces.select(pieces.show_rod(_EDGE_PX))
-    pieces = pieces.below(SATURATED * view.full_scale)
-    middle_px, radius_px = axis.covering_discs(view.camera, whisk.bar_swept_mm)
-    is_clear = clear_of_bar(pieces, middle_px, radius_px, BESIDE_BAR_PX)
-    return pieces.select(is_clear & (pieces.place > NEAR_CLAMP_MM))
-
-
-def wire_knots(whisk: WhiskPictures) -> Knots:
-    """Return the knots between which the wire's shading is linear."""
-    length_mm = whisk.rods.wire.length_mm
-    return Knots.of_turning(np.arange(NEAR_CLAMP_MM, length_mm, _WIRE_KNOT_MM), whisk.motor)

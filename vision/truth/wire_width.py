@@ -3,9 +3,10 @@
 import numpy as np
 
 from vision.fit.problem import bar_axis
+from vision.truth.line_source import WhiskPlace
+from vision.truth.traced_lines import clear_pieces, wire_knots
 from vision.truth.value import Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
-from vision.truth.whisk_truth import clear_pieces, wire_knots
 from vision.wire.rod_width import log_width
 
 # [frames] From which the width is measured: the wire is before another background in each. Derived.
@@ -21,11 +22,12 @@ def wire_widths(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     """
     some = fitted.some_curves(_FRAMES)
     axis = bar_axis(fitted.problem, fitted.state.vector)
+    place = WhiskPlace(axis, some, whisk.bar_swept_mm)
     knots = wire_knots(whisk.during(list(some)))
     widths = {}
     for view in whisk.views:
         name = view.camera.name
-        pieces = clear_pieces(whisk, view, axis, some)
+        pieces = clear_pieces(whisk, view, place)
         log_ratio = log_width(pieces, whisk.light[name].blur_px, knots) if len(pieces) else None
         if log_ratio is None:
             continue

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.plan.expected import expected
+from bench.plan.changes import aim_camera
 from bench.plan.outlook import QUANTITIES, outlook
-from bench.plan.painted import Clamp
-from bench.plan.sight import curves_of, sight_of
-from bench.plan.tries import looking
+from bench.plan.painter import Clamp
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
 from vision.geometry.camera import Cameras
 from vision.geometry.vision_settings import VisionSettings
+from vision.truth.predicted_truth import predict_truth
+from vision.truth.sight import find_sight
 
 THETA_RAD = np.radians(3.0)
 
@@ -25,25 +25,26 @@ def bench(tmp_path_factory):
 
 def of(staged, cameras, noise=LINES):
     lines = dict.fromkeys(cameras.names, noise)
-    found = expected(staged, cameras, lines, Clamp.of(staged))
+    found = predict_truth(staged.known, cameras, lines, Clamp.of(staged))
     return found, outlook(found, lines, THETA_RAD)
 
 
 def moved(camera, staged, place_mm):
-    return looking(camera, camera.name, np.array(place_mm, dtype=float), staged.touch.point_mm)
+    return aim_camera(camera, camera.name, np.array(place_mm, dtype=float), staged.known.contact_mm)
 
 
 def test_values_are_those_staged(bench):
     staged, cameras = bench
     found, row = of(staged, cameras)
-    bar = staged.whisk.bar
-    assert found.truth.d_x_mm.value == pytest.approx(staged.touch.d_x_mm, abs=1e-6)
-    assert found.truth.touch_rad.value == pytest.approx(staged.touch.motor_rad, abs=1e-7)
+    marched = staged.marched
+    touch = marched.touch
+    assert found.truth.d_x_mm.value == pytest.approx(touch.d_x_mm, abs=1e-6)
+    assert found.truth.touch_rad.value == pytest.approx(touch.motor_rad, abs=1e-7)
     assert found.truth.beta_rad.value == pytest.approx(
-        bar.slope(staged.touch.motor_rad, staged.touch.point_mm)[0], abs=1e-9
+        marched.bar.slope(touch.motor_rad, touch.point_mm)[0], abs=1e-9
     )
     # the beam of the fit is one of small angles: within 0.3 µm of the exact rod, and of its contact (docs/truth.md)
-    slip = float(staged.whisk.slip_at(THETA_RAD))
+    slip = float(marched.slip_at(THETA_RAD))
     assert found.truth.at(THETA_RAD).slip_mm.value == pytest.approx(slip, abs=0.005)
     assert row.has_truth and not row.status
 
@@ -69,10 +70,10 @@ def test_limits_name_the_largest_part(bench):
 def in_a_plane(bench, angles_deg):
     """Both cameras in one plane through the bar, at these angles to it."""
     staged, cameras = bench
-    axis = staged.axis.direction
+    axis = staged.known.axis.direction
     aside = np.cross(axis, [1.0, 0.0, 0.0])
     places = [
-        staged.foot_mm + 350.0 * (np.cos(a) * axis + np.sin(a) * aside)
+        staged.known.axis.point_mm + 350.0 * (np.cos(a) * axis + np.sin(a) * aside)
         for a in np.radians(angles_deg)
     ]
     return Cameras(tuple(moved(camera, staged, place) for camera, place in zip(cameras, places)))
@@ -107,18 +108,24 @@ def test_a_whisker_outside_the_picture_is_said(bench):
 def test_the_clamp_hides_what_it_stands_before(bench):
     """From above, along the bar, its clamp covers the contact; with the clamp gone nothing is hidden."""
     staged, cameras = bench
-    place = staged.touch.point_mm + 350.0 * staged.axis.direction
+    place = staged.known.contact_mm + 350.0 * staged.known.axis.direction
     above = moved(cameras["high"], staged, place)
-    curves = curves_of(staged, range(4))
-    behind = sight_of(above, staged, curves, VisionSettings(), Clamp.of(staged))
-    open_ = sight_of(above, staged, curves, VisionSettings())
+    behind = find_sight(staged.known, above, VisionSettings(), Clamp.of(staged))
+    open_ = find_sight(staged.known, above, VisionSettings())
     assert behind.hidden > 0.05 and open_.hidden == 0.0
     assert len(behind.pieces) < len(open_.pieces)
 
 
 def test_a_stroke_that_starts_touching_has_no_truth(bench):
     staged, cameras = bench
-    late = staged.motor_rad > staged.touch.motor_rad
-    parts = ("motor_rad", "time_s", "bend_rad", "arc_mm")
-    _, row = of(replace(staged, **{name: getattr(staged, name)[late] for name in parts}), cameras)
+    known = staged.known
+    late = known.motor_rad > known.touch_rad
+    late_frames = replace(
+        known,
+        motor_rad=known.motor_rad[late],
+        time_s=known.time_s[late],
+        bend_rad=known.bend_rad[late],
+        arc_mm=known.arc_mm[late],
+    )
+    _, row = of(replace(staged, known=late_frames), cameras)
     assert not row.has_truth and "touches from the start" in row.status

@@ -10,11 +10,11 @@ from bench import api
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.commands import cli
-from bench.plan.expected import expected
 from bench.plan.outlook import QUANTITIES
-from bench.plan.recorded import SeenTask, plan_seen
+from bench.plan.plan_rows import Plan
+from bench.plan.plan_text import lines_of
+from bench.plan.recorded_whisk import SeenTask, plan_seen
 from bench.plan.run_plan import EXAMPLE, Options, plan
-from bench.plan.written import Plan, lines_of
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import Clock, SeenTrial, SeenWhisk
 from bench.rig.protocol import load
@@ -23,6 +23,7 @@ from bench.trials.seen import whisk_record
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
 from tests.scenes.rig_sessions import protocol_file, rows
 from vision.fit.line_noise import LineNoise
+from vision.truth.predicted_truth import predict_truth
 from vision.truth.records import WhiskTruth
 
 SMALL = """
@@ -69,7 +70,7 @@ def test_a_rig_is_planned_whole(planned):
     assert good.outlook.has_truth and all(
         0.0 < good.outlook.sigma[name] < 3.0 for name in QUANTITIES
     )
-    assert not bad.outlook.has_truth and "slips off" in bad.outlook.status and made.doubtful
+    assert not bad.outlook.has_truth and "slips off" in bad.outlook.status and made.lacks_truth
     first, second = rows(out / "plan.csv")
     assert float(first["d_x_sigma_mm"]) == pytest.approx(good.outlook.sigma["d_x_mm"], rel=1e-8)
     assert second["d_x_sigma_mm"] == ""
@@ -98,7 +99,7 @@ def test_a_recorded_whisk_beside_what_was_stated(tmp_path, steel_signals):
     """A whisk that is known as well as its staging lets it be is expected to be known so."""
     protocol = protocol_of(tmp_path)
     staged, cameras = staged_of(protocol), cameras_of(protocol)
-    truth = expected(staged, cameras, dict.fromkeys(cameras.names, LINES)).truth
+    truth = predict_truth(staged.known, cameras, dict.fromkeys(cameras.names, LINES)).truth
     session = load_session(steel_signals)
     seen = whisk_record(truth, Settings())
     assert seen.truth.lines["high"].wire_px == pytest.approx(LINES.wire_px)

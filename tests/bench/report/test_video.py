@@ -12,11 +12,11 @@ import pytest
 
 from bench.base.settings import Settings
 from bench.commands.cli import main
-from bench.plan.expected import expected
 from bench.records.trial_result import WhiskerFacts
 from bench.report.video import _wire, wire_between
 from bench.trials.seen import whisk_record
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
+from vision.truth.predicted_truth import predict_truth
 
 SIZE = (320, 180)
 CAMERA = {
@@ -112,7 +112,7 @@ def test_the_wire_drawn_is_the_one_that_was_fitted(tmp_path):
     """Through the contact in a frame of the fit, unbent in one that is not in it."""
     protocol = protocol_of(tmp_path)
     staged, cameras = staged_of(protocol), cameras_of(protocol)
-    truth = expected(staged, cameras, dict.fromkeys(cameras.names, LINES)).truth
+    truth = predict_truth(staged.known, cameras, dict.fromkeys(cameras.names, LINES)).truth
     whisk = whisk_record(truth, Settings())
     result = SimpleNamespace(whisker=WhiskerFacts("cylinder", 100.0, 1.0, 2945.0))
     last = len(whisk.frames.index) - 1

@@ -8,7 +8,7 @@ seen, each camera's lines worth what they were. painted: rigs are planned before
 their pictures, then simulated and evaluated. A whisk is a row of TABLE.csv with expected and stated sigmas; a session
 that is there is not looked at again. Prints how expected over stated is spread, by quantity, and in how many of all it
 is within 0.8 and 1.25; and what a point of the wire and an end of the bar's line were worth in the median
-(`bench.plan.tries.USUAL`).
+(`bench.plan.changes.USUAL`).
 """
 
 import csv
@@ -23,9 +23,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from bench.base.errors import BadInput
 from bench.base.workers import Workers
 from bench.plan.outlook import QUANTITIES
+from bench.plan.plan_files import SIGMAS, STATED
 from bench.plan.plan_rows import Row
 from bench.plan.run_plan import Options, plan_rig, plan_session
-from bench.plan.written import SIGMAS, STATED
 from bench.rig.simulate import simulate
 from tests.scenes.planned import TWO_CAMERAS
 from vision.geometry.refusals import Refused
@@ -74,7 +74,7 @@ def row_of(session: str, expected: Row, stated: Row) -> dict:
     """A row of the table. wire_px, bar_px: of the median camera, as recorded."""
     worth = [
         (noise.wire_px, np.median(noise.bar_px[:, 1:]))
-        for noise in stated.lines.values()
+        for noise in stated.noise.values()
         if len(noise.bar_px)
     ]
     wire_px, bar_px = np.median(worth, axis=0).tolist() if worth else (np.nan, np.nan)

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from tests.studies.accuracy.path_traced import see_scene
 from vision.fit.blocks import WIRE_OFFSET_PX
 from vision.geometry.silhouette import outline
-from vision.truth import whisk_truth as seeing
+from vision.truth import traced_lines as seeing
 
 _LENGTH_MM, _NODES = 100.0, 401
 
@@ -42,9 +42,9 @@ class Recorder:
     def __init__(self, touch_rad: float):
         self.touch_rad, self.rows, self._trace = touch_rad, {}, seeing.trace_wire
 
-    def __call__(self, whisk, view, axis, curves, *seen, **options):
-        found = self._trace(whisk, view, axis, curves, *seen, **options)
-        angles = [whisk.motor[frame] for frame in curves]
+    def __call__(self, whisk, view, place, **options):
+        found = self._trace(whisk, view, place, **options)
+        angles = [whisk.motor[frame] for frame in place.curves]
         free = [one.points for one in found if angles[one.frame] < self.touch_rad]
         if free:
             radius = float(whisk.rods.wire.radius_mm(0.5 * _LENGTH_MM))

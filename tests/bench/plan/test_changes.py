@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.plan import where
+from bench.plan import camera_places as where
+from bench.plan.changes import LIGHT, Change, list_changes
 from bench.plan.outlook import Outlook
-from bench.plan.plan_rows import Facts, Row, Tried, tried_on
-from bench.plan.tries import LIGHT, Try, tries
+from bench.plan.plan_rows import ChangedSigmas, Facts, Row, changed_sigmas
 from bench.rig.build import cameras as built
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
 from vision.geometry.camera import Cameras
-from vision.geometry.contact import BarAxis
+from vision.truth.predicted_truth import predict_truth
 
 THETA_RAD = np.radians(3.0)
 
@@ -25,13 +25,18 @@ def bench(tmp_path_factory):
     return protocol, staged_of(protocol), cameras_of(protocol)
 
 
-def by_kind(found: list[Try], kind: str) -> list[Try]:
+def by_kind(found: list[Change], kind: str) -> list[Change]:
     return [one for one in found if one.kind == kind]
+
+
+def changed(staged, change, lines):
+    predicted = predict_truth(staged.known, change.cameras, lines)
+    return changed_sigmas(change, predicted, THETA_RAD)
 
 
 def test_every_kind_of_change_is_tried(bench):
     _, staged, cameras = bench
-    found = tries(cameras, None, staged.touch.point_mm, light=True)
+    found = list_changes(cameras, None, staged.known.contact_mm, light=True)
     assert {one.kind for one in found} == {"move", "lens", "views", "third", "light"}
     assert len({one.words for one in found}) == len(found)
     assert f"{LIGHT:g} times the light" in by_kind(found, "light")[0].words
@@ -45,42 +50,45 @@ def test_every_kind_of_change_is_tried(bench):
         for name in one.like:
             camera = one.cameras[name]
             assert np.allclose(camera.rays(camera.lens[None, 2:4]), camera.T_camera_rig[2, :3])
-            away = staged.touch.point_mm - camera.centre_mm
+            away = staged.known.contact_mm - camera.centre_mm
             assert np.allclose(away / np.linalg.norm(away), camera.T_camera_rig[2, :3])
 
 
 def test_a_third_camera_helps_and_each_camera_keeps_its_lines(bench):
     _, staged, cameras = bench
     lines = dict.fromkeys(cameras.names, LINES)
-    as_is = tried_on(staged, Try("", "", cameras), lines, THETA_RAD)
-    third = by_kind(tries(cameras, None, staged.touch.point_mm, light=False), "third")[0]
-    after = third.lines(lines, staged.axis)
+    as_is = changed(staged, Change("", "", cameras), lines)
+    third = by_kind(list_changes(cameras, None, staged.known.contact_mm, light=False), "third")[0]
+    after = third.line_noise(lines, staged.known)
     assert set(after) == {*cameras.names, "third"}
-    assert tried_on(staged, third, after, THETA_RAD).sigma["d_x_mm"] < as_is.sigma["d_x_mm"]
+    assert changed(staged, third, after).sigma["d_x_mm"] < as_is.sigma["d_x_mm"]
 
 
 def test_only_a_camera_elsewhere_comes_to_see_the_bar(bench):
     """A longer lens does not turn a camera away from the bar's axis; nor does a place from which it looks along it."""
     _, staged, cameras = bench
     blind = replace(LINES, bar_px=np.zeros((0, 3)))
-    found = tries(cameras, None, staged.touch.point_mm, light=False)
+    found = list_changes(cameras, None, staged.known.contact_mm, light=False)
     lines = dict.fromkeys(cameras.names, blind)
     assert not any(
-        len(noise.bar_px) for noise in by_kind(found, "lens")[0].lines(lines, staged.axis).values()
+        len(noise.bar_px)
+        for noise in by_kind(found, "lens")[0].line_noise(lines, staged.known).values()
     )
     moved = by_kind(found, "move")[0]
     (name,) = moved.like
-    assert len(moved.lines(lines, staged.axis)[name].bar_px) == 1
-    along = BarAxis(staged.foot_mm, (moved.cameras[name].centre_mm - staged.foot_mm))
-    along = replace(along, direction=along.direction / np.linalg.norm(along.direction))
-    assert len(moved.lines(lines, along)[name].bar_px) == 0
+    assert len(moved.line_noise(lines, staged.known)[name].bar_px) == 1
+    axis = staged.known.axis
+    sight = moved.cameras[name].centre_mm - axis.point_mm
+    along = replace(axis, direction=sight / np.linalg.norm(sight))
+    seen_along = replace(staged.known, axis=along)
+    assert len(moved.line_noise(lines, seen_along)[name].bar_px) == 0
 
 
 def test_more_views_leave_less_of_the_cameras_own_uncertainty(bench):
     _, staged, cameras = bench
     sigmas = [*[0.3] * 4, *[1e-3] * 5, *[1e-4] * 3, *[0.05] * 3]
     known = Cameras(cameras.cameras, np.diag(np.tile(sigmas, 2)) ** 2)
-    found = tries(known, None, staged.touch.point_mm, light=False)
+    found = list_changes(known, None, staged.known.contact_mm, light=False)
     assert np.allclose(by_kind(found, "views")[0].cameras.covariance, known.covariance / 4.0)
     assert not by_kind(found, "board")  # no placement is told
 
@@ -91,7 +99,7 @@ def test_a_board_placed_better_leaves_less_of_what_all_cameras_share(bench):
     shared = cameras.by_placement @ placement @ cameras.by_placement.T
     own = 1e-6 * np.eye(len(shared))
     known = Cameras(cameras.cameras, own + shared, placement)
-    (better,) = by_kind(tries(known, None, staged.touch.point_mm, light=False), "board")
+    (better,) = by_kind(list_changes(known, None, staged.known.contact_mm, light=False), "board")
     assert np.allclose(better.cameras.covariance, own + shared / 16.0)
     assert np.allclose(better.cameras.placement, placement / 16.0)
 
@@ -102,7 +110,9 @@ def row(sigma_mm: float, tried: dict[str, float]) -> Row:
     return Row(
         facts,
         one,
-        tuple(Tried("", words, {"d_x_mm": mm} if mm else {}) for words, mm in tried.items()),
+        tuple(
+            ChangedSigmas("", words, {"d_x_mm": mm} if mm else {}) for words, mm in tried.items()
+        ),
     )
 
 
@@ -111,10 +121,10 @@ def test_the_best_change_and_whether_it_halves():
     assert (
         better.best()[0].words == "b"
         and better.best()[1] == pytest.approx(0.45)
-        and better.halved()
+        and better.is_halved
     )
-    assert not row(0.02, {"a": 0.015}).halved()
-    assert row(np.nan, {"a": 0.015}).halved()  # a truth at all
+    assert not row(0.02, {"a": 0.015}).is_halved
+    assert row(np.nan, {"a": 0.015}).is_halved  # a truth at all
     assert row(0.02, {"a": 0.0}).best() is None
 
 
@@ -127,7 +137,7 @@ def test_cameras_without_a_place_are_given_one(bench, monkeypatch):
     placed = where.place_cameras(
         msgspec.structs.replace(protocol, cameras=free[:1] + protocol.cameras[1:]),
         [staged],
-        staged.touch.point_mm,
+        staged.known.contact_mm,
     )
     assert placed.cameras[1] == protocol.cameras[1] and placed.cameras[0].position_mm is not None
     assert len(built(placed)) == 2
@@ -140,5 +150,5 @@ def test_cameras_that_see_nothing_anywhere_are_refused(bench, monkeypatch):
     alone = [msgspec.structs.replace(protocol.cameras[0], position_mm=None, size_px=(8, 8))]
     with pytest.raises(BadInput, match="no place"):
         where.place_cameras(
-            msgspec.structs.replace(protocol, cameras=alone), [staged], staged.touch.point_mm
+            msgspec.structs.replace(protocol, cameras=alone), [staged], staged.known.contact_mm
         )

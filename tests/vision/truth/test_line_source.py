@@ -1,0 +1,62 @@
+"""Where line points come from: the fit does not know it, and refuses where there are none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
+from vision.geometry.refusals import Refused
+from vision.geometry.vision_settings import VisionSettings
+from vision.truth.predicted_lines import PredictedLines
+from vision.truth.sight import blank_view, find_sight
+from vision.truth.strategies import TouchByClearance
+from vision.truth.whisk_truth import ExpectedWhisk, fit_lines
+
+SETTINGS = VisionSettings()
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    protocol = protocol_of(tmp_path_factory.mktemp("bench"))
+    return staged_of(protocol), cameras_of(protocol)
+
+
+def predicted_lines(known, cameras, noise=LINES):
+    sights = {camera.name: find_sight(known, camera, SETTINGS) for camera in cameras}
+    return PredictedLines(known, cameras, sights, dict.fromkeys(cameras.names, noise))
+
+
+def test_a_fit_to_predicted_lines_comes_back_to_the_whisk(bench):
+    """Its pictures are empty: all that it fits is what the source says. It begins a tenth of a millimetre and of each
+    bend beside the whisk, and ends within a hundredth of its sigmas, but for what the beam of the fit lacks."""
+    staged, cameras = bench
+    known = staged.known
+    frames = known.frames_to_fit
+    whisk = known.pictured([blank_view(c, frames) for c in cameras], cameras, SETTINGS)
+    touch = TouchByClearance()
+    touching, free = touch.part_by_bends(whisk.angles_rad, known.bend_rad[frames])
+    expected = ExpectedWhisk(
+        known.place,
+        known.rest_mm + 0.1,
+        0.9 * known.bend_rad[frames],
+        known.arc_mm[frames],
+        touching,
+        free,
+    )
+    fitted = fit_lines(whisk, predicted_lines(known, cameras), expected, touch)
+    for name, value in (
+        ("d_x", staged.marched.touch.d_x_mm),
+        ("touch", known.touch_rad),
+        ("beta", staged.marched.bar.slope(known.touch_rad, known.contact_mm)[0]),
+    ):
+        found = fitted.of_whisk(name)
+        assert abs(found.value - value) < 0.01 * found.sigma
+
+
+def test_lines_without_wire_or_bar_are_refused(bench):
+    staged, cameras = bench
+    known = staged.known
+    for noise in (replace(LINES, wire_px=np.nan), replace(LINES, bar_px=np.zeros((0, 3)))):
+        with pytest.raises(Refused, match="no camera shows enough of the"):
+            predicted_lines(known, cameras, noise).all_points(known.place, last=True)

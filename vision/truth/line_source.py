@@ -1,0 +1,80 @@
+"""Where the line points of a whisk come from, which its fit does not know.
+
+A pass of the fit needs points near the curves of the pass before. They are traced in pictures
+(`vision.truth.traced_lines`), or predicted for a whisk that is known exactly
+(`vision.truth.predicted_lines`). A tracker that wrote its points to a file would be a third source.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vision.geometry.camera import Camera
+from vision.geometry.centreline import Curves
+from vision.geometry.refusals import Refused
+from vision.geometry.touched import Axis
+from vision.wire.points import Observed
+
+
+@dataclass(frozen=True, eq=False)
+class WhiskPlace:
+    """Where object and wire are in f frames, by the pass before.
+
+    axis: of the object. curves: of the wire, by frame. swept_mm: radius about the axis within which
+    the object stays. came_mm (f, 3): how far it is from the axis in each frame, if it moves.
+    """
+
+    axis: Axis
+    curves: Mapping[int, Curves]
+    swept_mm: float
+    came_mm: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
+
+    def wire_px(self, camera: Camera) -> list[np.ndarray]:
+        """Return the wire's centreline (m, 2) in each frame of a camera."""
+        return [camera.project(curve.points_mm) for curve in self.curves.values()]
+
+
+class LineSource(ABC):
+    """What gives the line points of a whisk in all its cameras.
+
+    Points of the wire are numbered by their frame's position among the curves.
+    """
+
+    @abstractmethod
+    def wire_points(self, place: WhiskPlace, *, last: bool) -> dict[str, list[Observed]]:
+        """Return by camera, for each of them, the wire's points near its curves.
+
+        last: no pass follows.
+        """
+
+    @abstractmethod
+    def object_points(self, place: WhiskPlace, *, last: bool) -> dict[str, list[Observed]]:
+        """Return by camera the points of the object's outline; cameras without any may be absent.
+
+        last: no pass follows. Raises Refused where the object is not seen clearly.
+        """
+
+    def all_points(self, place: WhiskPlace, *, last: bool) -> list[Observed]:
+        """Return the points of wire and object, camera by camera.
+
+        Raises Refused where one of them is seen in no camera.
+        """
+        on_object = self.object_points(place, last=last)
+        seen = []
+        for name, on_wire in self.wire_points(place, last=last).items():
+            seen += on_wire
+            seen += on_object.get(name, [])
+        _require_both_rods(seen)
+        return seen
+
+
+def _require_both_rods(seen: Sequence[Observed]) -> None:
+    """Raise Refused where wire or bar is seen in no camera."""
+    for rod, is_seen in (
+        ("wire clear of the bar", any(one.frame >= 0 for one in seen)),
+        ("bar clear of the wire", any(one.frame < 0 for one in seen)),
+    ):
+        if not is_seen:
+            raise Refused(f"no camera shows enough of the {rod}", code="rod_hidden")

@@ -1,0 +1,124 @@
+"""The precision of each camera's lines of wire and bar, measured in pictures of a known whisk."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vision.fit.line_noise import LineNoise, line_noise
+from vision.fit.problem import Problem
+from vision.fit.scatter import inflated_by_residuals
+from vision.fit.solve import solve
+from vision.geometry.camera import Camera, Cameras
+from vision.geometry.refusals import Refused
+from vision.geometry.vision_settings import VisionSettings
+from vision.pictures.pixel_noise import measure_noise
+from vision.pictures.view import View
+from vision.touched.edges import measure_edges
+from vision.touched.line import BarLineEstimate, measure_bars
+from vision.touched.one_view import seen_from_one_side
+from vision.truth.known_whisk import KnownWhisk
+from vision.truth.predicted_lines import PredictedLines
+from vision.truth.traced_lines import TracedLines
+from vision.wire.points import Observed
+
+_USUAL = VisionSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class CameraPictures:
+    """Grey pictures (h, w) of a known whisk by one camera.
+
+    empty: two without wire and bar. with_bar: without the wire, free of noise. frames: by index.
+    """
+
+    camera: Camera
+    empty: tuple[np.ndarray, np.ndarray]
+    with_bar: np.ndarray
+    frames: Mapping[int, np.ndarray]
+
+    def view(self, frames: Mapping[int, np.ndarray]) -> View:
+        """Return frames with the background and the noise of the empty pictures."""
+        first, second = self.empty
+        return View(self.camera, frames, first.astype(float), measure_noise(first, second))
+
+
+def line_noise_in_pictures(
+    known: KnownWhisk,
+    pictures: Sequence[CameraPictures],
+    cameras: Cameras,
+    settings: VisionSettings = _USUAL,
+) -> dict[str, LineNoise]:
+    """Return by camera the noise that is stated of lines in such pictures, their scatter about the
+    fit included.
+
+    pictures: of each of the cameras, in their order, with frames `known.frames_to_fit`.
+    """
+    views = [own.view(own.frames) for own in pictures]
+    traced = TracedLines(known.pictured(views, cameras, settings))
+    on_wire = traced.wire_points(known.place, last=True)
+    noise = {}
+    for name, sigmas_px in _bar_sigmas_px(known, pictures, settings).items():
+        noise[name] = LineNoise(float("nan"), 0.0, sigmas_px)
+    on_bar = PredictedLines(known, cameras, {}, noise).object_points(known.place, last=True)
+    seen = []
+    for name in cameras.names:
+        seen += on_wire[name]
+        seen += on_bar[name]
+    return line_noise(_with_scatter(known, cameras, seen))
+
+
+def _bar_sigmas_px(
+    known: KnownWhisk, pictures: Sequence[CameraPictures], settings: VisionSettings
+) -> dict[str, np.ndarray]:
+    """Return by camera side and sigmas (k, 3) of its lines of the bar, as `LineNoise.bar_px`.
+
+    The edges take the place of the middle where they locate the bar along the line of sight.
+    """
+    place = known.place
+    views = [own.view(dict.fromkeys(place.curves, own.with_bar)) for own in pictures]
+    wires_px = {view.camera.name: place.wire_px(view.camera) for view in views}
+    lines = _bar_middles(known, views, wires_px, settings)
+    cameras = Cameras(tuple(view.camera for view in views))
+    needs_edges = len(lines) == 1 or seen_from_one_side(cameras, known.axis)
+    found = {}
+    for view in views:
+        name = view.camera.name
+        points = {}  # by side of the bar
+        if name in lines and needs_edges:
+            radius_mm = known.rods.bar.radius_mm
+            points = measure_edges(view, known.axis, radius_mm, wires_px[name], settings)
+        if name in lines and not points:
+            points = {0: lines[name].points}
+        rows = [[side, *own.sigma_px] for side, own in points.items()]
+        found[name] = np.array(rows, dtype=float).reshape(-1, 3)
+    return found
+
+
+def _bar_middles(
+    known: KnownWhisk,
+    views: Sequence[View],
+    wires_px: Mapping[str, Sequence[np.ndarray]],
+    settings: VisionSettings,
+) -> dict[str, BarLineEstimate]:
+    """Return by camera the middle of the bar, of cameras that show its edges."""
+    try:
+        lines = measure_bars(views, known.axis, known.rods.bar.radius_mm, wires_px, settings)
+    except Refused:
+        return {}
+    return {name: line for name, line in lines.items() if line.has_edges}
+
+
+def _with_scatter(known: KnownWhisk, cameras: Cameras, seen: Sequence[Observed]) -> Problem:
+    """Return the fit's problem with sigmas as large as residuals show.
+
+    They stay as stated where wire or bar is not seen, or the lines do not determine the fit.
+    """
+    problem = known.problem(cameras, seen)
+    if len({one.frame >= 0 for one in seen}) < 2:
+        return problem
+    try:
+        state, _ = solve(problem, known.state(problem))
+        return inflated_by_residuals(problem, state)
+    except np.linalg.LinAlgError:
+        return problem
