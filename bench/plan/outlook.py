@@ -9,6 +9,7 @@ from bench.plan.expected import Expected
 from bench.plan.sight import ALONG_RAD
 from vision.fit.covariance import variance_by_cause
 from vision.fit.line_noise import LineNoise
+from vision.geometry.reasons import joined
 from vision.truth.at_angle import scatter
 from vision.truth.records import WhiskTruth
 
@@ -55,7 +56,7 @@ def outlook(found: Expected, lines: Mapping[str, LineNoise], theta_rad: float) -
     said = tuple(obstacles(found, lines))
     if not np.isfinite(truth.d_x_mm.value) or found.fitted is None:
         return Outlook(status=truth.status, obstacles=said)
-    status = "; ".join(filter(None, [truth.status, truth.at(theta_rad).status]))
+    status = joined(truth.status, truth.at(theta_rad).status)
     return Outlook(sigmas(truth, theta_rad), _limits(found, theta_rad), said, status)
 
 
