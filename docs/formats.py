@@ -18,13 +18,13 @@ import inspect
 import re
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from bench.base.tables import SPEED, SURFACE, TRIAL, WHISK, Column, Table
+from bench.base.tables import SPEED, SURFACE, TRIAL, WHISK, Column, Table, sigma_name
 from bench.report.whisk_tables import WHISKS
 from bench.session.strict_toml import Keys
 
@@ -113,9 +113,19 @@ def _as_markdown(head: str, explained: Iterable[tuple[str, str]]) -> list[str]:
     """Return the lines of a table: a row for each run of names that one meaning explains."""
     lines = [f"| {head} | what |", "|---|---|"]
     for meaning, run in groupby(explained, key=lambda pair: pair[1]):
-        names = ", ".join(f"`{name}`" for name, _ in run)
-        lines.append(f"| {names} | {meaning} |")
+        lines.append(f"| {with_sigmas([name for name, _ in run])} | {meaning} |")
     return lines
+
+
+def with_sigmas(names: Sequence[str]) -> str:
+    """Return names in backticks; one before its sigma has ± in place of that."""
+    shown = []
+    for name in names:
+        if shown and name == sigma_name(shown[-1].strip("`")):
+            shown[-1] += "±"
+        else:
+            shown.append(f"`{name}`")
+    return ", ".join(shown)
 
 
 if __name__ == "__main__":
