@@ -67,7 +67,7 @@ def test_a_clock_at_one_speed_is_a_doubt_and_in_the_sigma_of_touch(rng):
     results = session(rng, [10.0] * 12, clock_s=0.004)
     shared = shared_touch(results)
     assert shared.chance < 1e-6
-    assert "record back strokes with frames, or another speed" in shared_doubt(shared)
+    assert shared_doubt(shared).codes == ("touch_apart",)
     for before, after in zip(results, with_shared_touch(results, shared)):
         one, other = (result.seen.whisks[0].touch_rad for result in (before, after))
         assert other.value == one.value  # what is felt moves no truth

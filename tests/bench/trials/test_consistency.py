@@ -255,5 +255,5 @@ def test_reversed_gauges_are_told_without_a_picture(trial):
     for beta_deg, apart in ((60.0, True), (-60.0, False), (None, False)):
         unit = SimpleNamespace(trial=replace(trial, beta_deg=beta_deg))
         found = _against_pictures(felt, unit, None, None, seen_whisk())
-        assert found.apart == apart and ("y reversed" in found.status) == apart
+        assert found.apart == apart and ("force_reversed" in found.status.codes) == apart
     assert nominal_slope(trial).sigma == pytest.approx(np.radians(3.0))
