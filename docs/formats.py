@@ -18,13 +18,14 @@ import inspect
 import re
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from bench.base.tables import Table
+from bench.base.tables import SPEED, SURFACE, TRIAL, WHISK, Column, Table, sigma_name
+from bench.report.whisk_tables import WHISKS
 from bench.session.strict_toml import Keys
 
 PAGE = Path(__file__).with_suffix(".md")
@@ -45,10 +46,13 @@ def named_parts(text: str) -> list[Table | type[Keys]]:
 
 
 def explained_keys(keys: type[Keys]) -> Iterator[tuple[str, str]]:
-    """Yield the keys of a table of a TOML file, each with its meaning; first those of its bases."""
+    """Yield the keys of a table of a TOML file, each with its meaning; first those of its bases,
+    which are explained where the bases are.
+    """
     for base in reversed(keys.__mro__):
         if issubclass(base, Keys) and base is not Keys:
-            yield from _own_keys(base)
+            for name, meaning in _own_keys(base):
+                yield name, meaning if base is keys else "see there"
 
 
 def _own_keys(keys: type[Keys]) -> Iterator[tuple[str, str]]:
@@ -82,9 +86,15 @@ def _section(declared: Table | type[Keys]) -> str:
     """Return the text on a table, or on the keys of a table of a TOML file."""
     if not isinstance(declared, Table):
         return "\n".join(_as_markdown("key", explained_keys(declared)))
-    rows = ((column.name, column.meaning) for column in declared.columns)
+    rows = ((column.name, _meaning(declared, column)) for column in declared.columns)
     lines = [f"### `{declared.file}`", "", *textwrap.wrap(declared.rows, 120), ""]
     return "\n".join([*lines, *_as_markdown("column", rows)])
+
+
+def _meaning(table: Table, column: Column) -> str:
+    """Return what a column means; of those of most tables, where that stands."""
+    is_elsewhere = column in WHISKS.columns and column in (TRIAL, WHISK, SURFACE, SPEED)
+    return f"as in {WHISKS.file}" if is_elsewhere and table is not WHISKS else column.meaning
 
 
 def _declared(name: str) -> list[Table | type[Keys]]:
@@ -103,9 +113,19 @@ def _as_markdown(head: str, explained: Iterable[tuple[str, str]]) -> list[str]:
     """Return the lines of a table: a row for each run of names that one meaning explains."""
     lines = [f"| {head} | what |", "|---|---|"]
     for meaning, run in groupby(explained, key=lambda pair: pair[1]):
-        names = ", ".join(f"`{name}`" for name, _ in run)
-        lines.append(f"| {names} | {meaning} |")
+        lines.append(f"| {with_sigmas([name for name, _ in run])} | {meaning} |")
     return lines
+
+
+def with_sigmas(names: Sequence[str]) -> str:
+    """Return names in backticks; one before its sigma has ± in place of that."""
+    shown = []
+    for name in names:
+        if shown and name == sigma_name(shown[-1].strip("`")):
+            shown[-1] += "±"
+        else:
+            shown.append(f"`{name}`")
+    return ", ".join(shown)
 
 
 if __name__ == "__main__":

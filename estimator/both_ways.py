@@ -20,12 +20,15 @@ import numpy as np
 from estimator import distance, first_order
 from estimator.beam import Beam
 from estimator.contact_state import felt_covariance
+from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
 
-ALIKE = "friction is not felt to turn round: there and back the moments are alike"
-NO_PUSH = "no push on one of both ways"
-NOWHERE = "the distance comes out nowhere on the whisker"
+ALIKE = NamedReason(
+    "ways_alike", "friction is not felt to turn round: there and back the moments are alike"
+)
+NO_PUSH = NamedReason("no_push_one_way", "no push on one of both ways")
+NOWHERE = NamedReason("distance_nowhere", "the distance comes out nowhere on the whisker")
 # [sigmas] Least difference of the moments: a direction within its noise determines no slope.
 _SURE_SIGMAS = 3.0
 # [rad] Largest friction angle considered: beyond those of the paper's surfaces.

@@ -248,4 +248,7 @@ def _reason(whisk, alpha_est, high):
     """Return the reason for having no distance, and the interval's open end where there is one."""
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
     reason = distance.why_not(*felt, alpha_est=alpha_est)
-    return f"{reason}; {NEARER.format(high)}" if high > 0 else reason
+    if high > 0:
+        nearer = NEARER.format(high)
+        return NamedReason(nearer.code, f"{reason}; {nearer}")
+    return reason

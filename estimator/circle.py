@@ -7,7 +7,24 @@ checks of settings and the equations' names, is `estimator.curvature`.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.domain import RIGHT_ANGLE, Numbers, elementwise, where_all
+from estimator.domain import (
+    ANGLE_NEGATIVE,
+    ANGLE_TOO_LARGE,
+    RIGHT_ANGLE,
+    VALUE_MISSING,
+    Numbers,
+    elementwise,
+    where_all,
+)
+from estimator.reasons import NamedReason
+
+RADIUS_NOT_POSITIVE = NamedReason("radius_not_positive", "the radius of curvature is not positive")
+FIRST_SLOPE_TOO_STEEP = NamedReason(
+    "first_slope_too_steep", "the slope beta_0 is 90 degrees or more"
+)
+OBJECT_PASSED = NamedReason(
+    "object_passed", "the whisker has passed the object: theta is 2 y_c or more"
+)
 
 
 def conditions(
@@ -17,14 +34,13 @@ def conditions(
     hold).
     """
     known = ~np.isnan(r_n) & np.isfinite(theta) & np.isfinite(beta_0)
-    passed = "the whisker has passed the object: theta is 2 y_c or more"
     return (
-        ("a measured value is missing or infinite", known),
-        ("the radius of curvature is not positive", r_n > 0),
-        ("the pushing angle is negative", theta >= 0),
-        ("the pushing angle is 90 degrees or more", theta < RIGHT_ANGLE),
-        ("the slope beta_0 is 90 degrees or more", np.abs(beta_0) < RIGHT_ANGLE),
-        (passed, theta / r_n < 2 * np.cos(beta_0)),
+        (VALUE_MISSING, known),
+        (RADIUS_NOT_POSITIVE, r_n > 0),
+        (ANGLE_NEGATIVE, theta >= 0),
+        (ANGLE_TOO_LARGE, theta < RIGHT_ANGLE),
+        (FIRST_SLOPE_TOO_STEEP, np.abs(beta_0) < RIGHT_ANGLE),
+        (OBJECT_PASSED, theta / r_n < 2 * np.cos(beta_0)),
     )
 
 

@@ -30,7 +30,10 @@ from estimator.domain import (
     first_failure,
     require_friction_angle,
 )
+from estimator.reasons import NamedReason
 from estimator.threshold import distance_error, slope_threshold
+
+SLIP_ANGLE_TOO_LARGE = NamedReason("slip_angle_too_large", "the slip angle reaches 90 degrees")
 
 __all__ = [
     "curvature_of_slip",
@@ -162,7 +165,7 @@ def why_not(
     r_n, theta, beta_0, alpha = (a.astype(float) for a in arguments)
     with np.errstate(all="ignore"):
         phi = circle.exact(r_n, theta, beta_0, alpha)[0]
-        passed = ("the slip angle reaches 90 degrees", np.isfinite(phi))
+        passed = (SLIP_ANGLE_TOO_LARGE, np.isfinite(phi))
         return first_failure((*circle.conditions(r_n, theta, beta_0), passed), r_n.shape)
 
 

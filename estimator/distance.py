@@ -13,7 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator.domain import (
+    ANGLE_TOO_LARGE,
+    NOT_PUSHING,
     RIGHT_ANGLE,
+    SLOPE_TOO_STEEP,
+    VALUE_MISSING,
     Numbers,
     elementwise,
     first_failure,
@@ -23,6 +27,14 @@ from estimator.domain import (
     where_all,
 )
 from estimator.double_range import across_slope, by_friction, by_slope, friction_share, harmonic
+from estimator.reasons import NamedReason
+
+ANGLE_NOT_POSITIVE = NamedReason("angle_not_positive", "the pushing angle is not positive")
+UP_THE_SLOPE = NamedReason(
+    "moments_up_slope", "m_y points up the slope beta, too strongly for a contact there"
+)
+BEYOND_FRICTION = NamedReason("beyond_friction", "phi + alpha_est is 90 degrees or more")
+OUT_OF_RANGE = NamedReason("distance_out_of_range", "the distance is beyond the range of a float")
 
 # ν(θ, |m|): the distance in mm for an angle and a moment, where nothing slips.
 NoSlip: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -273,7 +285,7 @@ def why_not(
                 d_x = with_friction(theta, m_y, m_z, alpha_est, stiffness)
             else:
                 d_x = known_slope(theta, m_y, m_z, slope, stiffness)
-            conditions += (("the distance is beyond the range of a float", np.isfinite(d_x)),)
+            conditions += ((OUT_OF_RANGE, np.isfinite(d_x)),)
         return first_failure(conditions, theta.shape)
 
 
@@ -284,13 +296,13 @@ def _conditions(theta, m_y, m_z, alpha_est=0.0, beta=0.0):
     finite = np.isfinite(theta) & np.isfinite(m_y) & np.isfinite(m_z) & np.isfinite(beta)
     downhill = across_slope(m_y, m_z, beta)[0] > 0
     return (
-        ("a measured value is missing or infinite", finite),
-        ("the pushing angle is not positive", theta > 0),
-        ("the pushing angle is 90 degrees or more", theta < RIGHT_ANGLE),
-        ("m_z is not positive: the whisker does not push towards the object", m_z > 0),
-        ("the slope beta is 90 degrees or more", np.abs(beta) < RIGHT_ANGLE),
-        ("m_y points up the slope beta, too strongly for a contact there", downhill),
-        ("phi + alpha_est is 90 degrees or more", friction_share(m_y, m_z, alpha_est)[0] > 0),
+        (VALUE_MISSING, finite),
+        (ANGLE_NOT_POSITIVE, theta > 0),
+        (ANGLE_TOO_LARGE, theta < RIGHT_ANGLE),
+        (NOT_PUSHING, m_z > 0),
+        (SLOPE_TOO_STEEP, np.abs(beta) < RIGHT_ANGLE),
+        (UP_THE_SLOPE, downhill),
+        (BEYOND_FRICTION, friction_share(m_y, m_z, alpha_est)[0] > 0),
     )
 
 

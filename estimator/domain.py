@@ -12,7 +12,17 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimator.reasons import NamedReason
+
 RIGHT_ANGLE = np.pi / 2
+# Why several equations have no result.
+VALUE_MISSING = NamedReason("value_missing", "a measured value is missing or infinite")
+ANGLE_NEGATIVE = NamedReason("angle_negative", "the pushing angle is negative")
+ANGLE_TOO_LARGE = NamedReason("angle_too_large", "the pushing angle is 90 degrees or more")
+SLOPE_TOO_STEEP = NamedReason("slope_too_steep", "the slope beta is 90 degrees or more")
+NOT_PUSHING = NamedReason(
+    "not_pushing", "m_z is not positive: the whisker does not push towards the object"
+)
 # The result of an equation: a float for scalars, an array of their common shape for arrays.
 Numbers: TypeAlias = float | np.ndarray
 
@@ -111,8 +121,8 @@ def first_failure(
     """Return the text of the first condition that does not hold, element by element; else an empty
     one.
 
-    `conditions` are pairs (what is wrong, mask of what must hold). Returns a str for shape (), else
-    an array of str.
+    `conditions` are pairs (what is wrong, mask of what must hold). Returns for shape () the text
+    itself, which keeps its code, else an array of str.
     """
     reasons = np.full(shape, "", dtype=object)
     for text, holds in conditions:

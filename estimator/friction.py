@@ -15,10 +15,12 @@ from estimator import slip
 from estimator.domain import (
     Numbers,
     elementwise,
+    first_failure,
     require_friction_angle,
     require_positive,
     require_sigma,
 )
+from estimator.reasons import NamedReason
 
 # What a fit may take as its observations: (13) and (14), or |m|² alone.
 READINGS = ("moments", "magnitude")
@@ -31,12 +33,19 @@ _SECTIONS = 45
 # [1] Two sums of squares are the same but for rounding if they differ by less than this share of
 # the data's own.
 _ROUNDING = 1e-14
-NEVER_SLIPPED = (
-    "no slope is steeper than the friction angle, so it is known only to be larger than all of them"
+NEVER_SLIPPED = NamedReason(
+    "never_slipped",
+    "no slope is steeper than the friction angle, so it is known only to be larger than all of "
+    "them",
 )
-VAGUE = "the data hardly hold the friction angle: its sigma is above 1 rad"
-AT_ZERO = "at the bound: the best friction angle is 0"
-ONE_SIDED = "the slip angle does not leave zero on both sides of the tilts: tilt further"
+VAGUE = NamedReason(
+    "friction_vague", "the data hardly hold the friction angle: its sigma is above 1 rad"
+)
+AT_ZERO = NamedReason("friction_at_zero", "at the bound: the best friction angle is 0")
+ONE_SIDED = NamedReason(
+    "tilts_one_sided",
+    "the slip angle does not leave zero on both sides of the tilts: tilt further",
+)
 
 
 @dataclass(frozen=True)
@@ -237,7 +246,7 @@ def _fit(alpha, sigma, freedom, residuals, never_slipped):
     """Assemble the fit: interval and status, and NaN where the data leave α open."""
     vague = ~(sigma < 1) & ~never_slipped
     at_zero = (alpha < _GRID[1] / 100) & ~vague
-    status = np.select([never_slipped, vague, at_zero], [NEVER_SLIPPED, VAGUE, AT_ZERO], "")
+    conditions = ((NEVER_SLIPPED, ~never_slipped), (VAGUE, ~vague), (AT_ZERO, ~at_zero))
     unknown = never_slipped | vague
     alpha = np.where(unknown, np.nan, alpha)
     sigma = np.where(unknown, np.nan, sigma)
@@ -248,7 +257,7 @@ def _fit(alpha, sigma, freedom, residuals, never_slipped):
         low_rad=_float_or_array(np.maximum(alpha - half_width, 0.0)),
         high_rad=_float_or_array(alpha + half_width),
         rms=_float_or_array(np.sqrt((residuals**2).mean(axis=-1))),
-        status=status if status.ndim else str(status),
+        status=first_failure(conditions, np.shape(alpha)),
         freedom=_float_or_array(freedom),
     )
 

@@ -13,7 +13,19 @@ from numpy.typing import ArrayLike
 
 from estimator import first_order
 from estimator.beam import Beam
-from estimator.domain import Numbers, elementwise, first_failure, where_all
+from estimator.domain import (
+    NOT_PUSHING,
+    VALUE_MISSING,
+    Numbers,
+    elementwise,
+    first_failure,
+    where_all,
+)
+from estimator.reasons import NamedReason
+
+FORCE_UNLIKE_MOMENT = NamedReason(
+    "force_unlike_moment", "the force at the base is not the one that its moment asks for"
+)
 
 # Iterations of the contact's deflection by its distance: each brings two orders of θ.
 _ITERATIONS = 3
@@ -131,7 +143,7 @@ def _conditions(m_y, m_z, f_x, f_y, f_z):
     finite = np.isfinite([m_y, m_z, f_x, f_y, f_z]).all(axis=0)
     power = f_y * m_z - f_z * m_y
     return (
-        ("a measured value is missing or infinite", finite),
-        ("m_z is not positive: the whisker does not push towards the object", m_z > 0),
-        ("the force at the base is not the one that its moment asks for", power > 0),
+        (VALUE_MISSING, finite),
+        (NOT_PUSHING, m_z > 0),
+        (FORCE_UNLIKE_MOMENT, power > 0),
     )

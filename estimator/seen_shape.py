@@ -23,15 +23,20 @@ from scipy.optimize import least_squares
 
 from estimator import load_cell
 from estimator.beam import Beam
+from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 
-FEW = "one camera shows too few points or frames of the whisker"
-NOT_PUSHED = "one camera does not see the whisker pushed as far as the pushing angle"
-PLANE_UNKNOWN = (
-    "force and give are not told: the camera looks aside, "
-    "and how the bend leaves the whisking plane is not known"
+FEW = NamedReason("whisker_points_few", "one camera shows too few points or frames of the whisker")
+NOT_PUSHED = NamedReason(
+    "pushing_angle_unseen",
+    "one camera does not see the whisker pushed as far as the pushing angle",
 )
-NO_END = "the seen shape does not tell where the bend ends"
+PLANE_UNKNOWN = NamedReason(
+    "bending_plane_unknown",
+    "force and give are not told: the camera looks aside, "
+    "and how the bend leaves the whisking plane is not known",
+)
+NO_END = NamedReason("bend_end_unseen", "the seen shape does not tell where the bend ends")
 # [mm] Prior sigma of the rest shape by powers of s/L: clamped off centre, clamp angle, set and sag,
 # change of curvature.
 _REST_MM = np.array([1.0, 8.0, 5.0, 2.0])

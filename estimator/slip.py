@@ -13,7 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator.domain import (
+    ANGLE_NEGATIVE,
+    ANGLE_TOO_LARGE,
     RIGHT_ANGLE,
+    SLOPE_TOO_STEEP,
+    VALUE_MISSING,
     Numbers,
     elementwise,
     first_failure,
@@ -22,6 +26,9 @@ from estimator.domain import (
     require_positive,
     where_all,
 )
+from estimator.reasons import NamedReason
+
+DISTANCE_NOT_POSITIVE = NamedReason("distance_not_positive", "the distance d_x is not positive")
 
 
 @elementwise
@@ -148,11 +155,11 @@ def _conditions(d_x, theta, beta):
     """Return pairs (what is wrong, mask of what must hold) of the domain."""
     finite = np.isfinite(d_x) & np.isfinite(theta) & np.isfinite(beta)
     return (
-        ("a measured value is missing or infinite", finite),
-        ("the distance d_x is not positive", d_x > 0),
-        ("the pushing angle is negative", theta >= 0),
-        ("the pushing angle is 90 degrees or more", theta < RIGHT_ANGLE),
-        ("the slope beta is 90 degrees or more", np.abs(beta) < RIGHT_ANGLE),
+        (VALUE_MISSING, finite),
+        (DISTANCE_NOT_POSITIVE, d_x > 0),
+        (ANGLE_NEGATIVE, theta >= 0),
+        (ANGLE_TOO_LARGE, theta < RIGHT_ANGLE),
+        (SLOPE_TOO_STEEP, np.abs(beta) < RIGHT_ANGLE),
     )
 
 

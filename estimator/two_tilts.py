@@ -22,6 +22,7 @@ import numpy as np
 from estimator import first_order
 from estimator.builtin import is_held
 from estimator.distance import felt_slip_angle
+from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
 
@@ -35,9 +36,11 @@ _DRAWN = 0.6
 # tests/studies/accuracy/two_tilts.py.
 _LARGE_LEFT = 1 / 3
 _DRAGGING_LEFT = 1 / 3
-ALIKE = "the whisks slip alike: no two of them tell friction from distance"
-NO_PUSH = "a whisk does not push: its m_z is not positive"
-BELOW_ZERO = "the friction angle came out below 0"
+ALIKE = NamedReason(
+    "whisks_slip_alike", "the whisks slip alike: no two of them tell friction from distance"
+)
+NO_PUSH = NamedReason("whisk_not_pushing", "a whisk does not push: its m_z is not positive")
+BELOW_ZERO = NamedReason("friction_below_zero", "the friction angle came out below 0")
 
 
 @dataclass(frozen=True, eq=False)

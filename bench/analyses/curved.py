@@ -15,6 +15,7 @@ from bench.analyses.analysis import Analysis, Run
 from bench.analyses.gave import OBJECT
 from bench.analyses.pooling import angle_cells, known_rows, measured, value_cells
 from bench.base.settings import TILT_SIGMA_RAD
+from bench.base.statuses import reason
 from bench.base.tables import TRIAL, WHISK, Column, Table, status, with_sigma
 from bench.records.trial_result import FeltAt, FeltWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
@@ -53,7 +54,6 @@ _HELD_SIGMAS = 2.0  # a slip angle within so many of its own is none: 95 % of wh
 # Of φ at touch: where it turns by more, terms to θ² are too few. Of nine pushes against a ball of 40 mm those within
 # 0.65 are off by 1.8 sigma at most, from 0.75 on by 2 to 7 (tests/bench/analyses/test_curved.py).
 _MOST_TURN = 0.6
-TOO_FEW = f"needs moments at {_FEWEST} pushing angles a degree apart: push further"
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ def curved(
     chosen = independent_angles(felt)
     count = len(chosen)
     if count < _FEWEST:
-        return Curved(count, status=TOO_FEW)
+        return Curved(count, status=reason("angles_few", least=_FEWEST))
     theta = np.array([at.theta_rad for at in chosen])
     m_y = np.array([at.m_y_Nmm.value for at in chosen])
     m_z = np.array([at.m_z_Nmm.value for at in chosen])
@@ -168,17 +168,16 @@ def curved(
     if not is_held and span > _MOST_TURN * abs(phi.value) + _HELD_SIGMAS * phi.sigma:
         if count > _FEWEST:
             return curved(chosen[:-1], whisker, alpha_rad, alpha_sigma_rad)
-        too_far = f"phi turns by {np.degrees(span):.0f} degrees: too far"
+        too_far = reason("phi_turns_far", degrees=np.degrees(span))
         return Curved(count, phi_0_rad=phi, status=too_far)
     distances = np.array([_distance(at, alpha_rad, whisker.beam) for at in chosen])
     if not np.isfinite(distances).all():
-        unknown = "(10) has no distance at all of the angles"
-        return Curved(count, phi_0_rad=phi, status=unknown)
+        return Curved(count, phi_0_rad=phi, status=reason("distances_missing"))
     d_x, creep = _at_touch(theta, distances[:, 0], distances[:, 1])
     alpha = Value(alpha_rad, alpha_sigma_rad)
     if is_held:
         radius = _radius(d_x.value, creep, 0.0, alpha, 0.0, whisker)
-        return Curved(count, radius, phi, status="does not slip sideways: no lateral curvature")
+        return Curved(count, radius, phi, status=reason("no_lateral_slip"))
     turned = _turned(d_x.value, phi.value, phi_rate, alpha_rad)
     radius = _radius(d_x.value, creep, phi.value, alpha, turned, whisker)
     lateral, printed = _lateral(phi.value, phi_rate, d_x.value, alpha_rad)

@@ -44,9 +44,8 @@ def _columns(quantity: str) -> tuple[str, str]:
 LEDGER = Table(
     "ledger",
     "A row a refinement and whisk: by how much each result would differ without it (without less "
-    "with), and that result's sigma. Effects on the truth are the fit's own linear sensitivities; "
-    "where they are many sigmas, they give a size. An empty effect is not known, and `status` says "
-    "why; the reason of an effect of 0 may stand there, too.",
+    "with), and that result's sigma. Effects on the truth are linear: of many sigmas they give a "
+    "size. `status` says why an effect is not known (empty) or 0.",
     (
         TRIAL,
         WHISK,
@@ -65,15 +64,14 @@ LEDGER = Table(
         Column("largest_over_sigma", "the largest of the effects, each over its sigma"),
         Column(
             "verdict",
-            '"needed": largest_over_sigma is above 0.1; "may be left out, kept": it is not, but '
-            "leaving the refinement out would save next to nothing, so no preset does; "
-            '"not known": one of the effects is not',
+            '"needed": largest_over_sigma is above 0.1; "may be left out, kept": it is not, and '
+            'leaving it out would save next to nothing; "not known": an effect is not',
             Kind.TEXT,
         ),
         Column(
             "cost_percent",
-            "what it costs at most, of a whisk's processor time as measured once "
-            "(`tests/studies/speed/refinements.py`); 0: below 0.1 %",
+            "share of a whisk's processor time at most (`tests/studies/speed/refinements.py`); "
+            "0: below 0.1 %",
         ),
         status("why an effect is 0 or not known"),
     ),

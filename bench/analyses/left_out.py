@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.analyses.alphas import felt_friction, seen_friction
 from bench.analyses.runs import GIVEN, KINETIC
+from bench.base.statuses import reason
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from bench.session.whisker import Whisker
@@ -132,20 +133,19 @@ class WhiskModel:
 def effect_on_truth(name: str, model: WhiskModel) -> LeftOut:
     """Return by how much the truth would differ without a refinement."""
     if not model.seen.has_truth:
-        return LeftOut(NAN, NAN, NAN, "no truth")
+        return LeftOut(NAN, NAN, NAN, reason("no_truth"))
     if name == "clock":
         return _effect_of_clock(model)
     if name in model.seen.truth.refinements:
         return model.seen.truth.refinements[name]
-    return LeftOut(NAN, NAN, NAN, "the fit does not tell") if name in _IN_VISION else LeftOut()
+    return LeftOut(NAN, NAN, NAN, reason("effect_not_fitted")) if name in _IN_VISION else LeftOut()
 
 
 def _effect_of_clock(model: WhiskModel) -> LeftOut:
     """Return the effect of the error of the frames' clock, as felt − seen shows it."""
     shared = model.shared
     if shared is None or not shared.tells_clock:
-        unknown = "at one speed and in one direction a clock is not told from a zero"
-        return LeftOut(0.0, NAN, 0.0, unknown)
+        return LeftOut(0.0, NAN, 0.0, reason("clock_like_zero"))
     late_s = shared.values[1]
     sigma_s = np.sqrt(shared.covariance[1, 1])
     why = f"felt − seen says {1e3 * late_s:+.2f} ± {1e3 * sigma_s:.2f} ms"
@@ -177,19 +177,19 @@ def _bar_radius(model: WhiskModel) -> EstimateEffect:
     share = first_order.rolling(
         model.theta_rad, reach_mm, model.phi_rad, model.alpha_rad, model.d_x_est_mm, model.left
     )
-    return _share_of_distance(model, share, "no bar diameter or friction angle is known")
+    return _share_of_distance(model, share, reason("bar_radius_unknown"))
 
 
 def _psi(model: WhiskModel) -> EstimateEffect:
     psi_rad = model.seen.psi_rad.value
     share = first_order.leaning(model.theta_rad, psi_rad, model.phi_rad, model.alpha_rad)
-    return _share_of_distance(model, share, "no tilt is known")
+    return _share_of_distance(model, share, reason("tilt_unknown"))
 
 
 def _along(model: WhiskModel) -> EstimateEffect:
     dragged = model.dragged if np.isfinite(model.seen.beta_rad.value) else NAN
     share = dragged * first_order.dragging(model.theta_rad, model.alpha_rad)
-    return _share_of_distance(model, share, "no slope is known")
+    return _share_of_distance(model, share, reason("slope_unknown"))
 
 
 def _share_of_distance(model: WhiskModel, share: float, unless: str) -> EstimateEffect:
@@ -220,13 +220,13 @@ def _cross_talk(model: WhiskModel) -> EstimateEffect:
     for row in model.felt.one_factor:
         if row.estimator == GIVEN:
             return EstimateEffect(0.0, row.d_x_est_mm.value - model.d_x_est_mm, row.status)
-    return EstimateEffect(0.0, NAN, "no gauges with one factor a channel are known")
+    return EstimateEffect(0.0, NAN, reason("factors_unknown"))
 
 
 def _drift(model: WhiskModel) -> EstimateEffect:
     drifted = model.felt.with_drift
     if drifted is None:
-        return EstimateEffect(why="no free stroke before and after the contact: none was taken out")
+        return EstimateEffect(why=reason("drift_not_removed"))
     touch_rad = drifted.touch_felt_rad - model.felt.touch_felt_rad.value
     return EstimateEffect(touch_rad, drifted.d_x_est_mm - model.d_x_est_mm)
 
@@ -235,7 +235,7 @@ def _kinetic(model: WhiskModel) -> EstimateEffect:
     for row in model.felt.estimates:
         if row.estimator == KINETIC:
             return EstimateEffect(0.0, model.d_x_est_mm - row.d_x_est_mm.value, row.status)
-    return EstimateEffect(why="the moments show no stick–slip")
+    return EstimateEffect(why=reason("no_stick_slip"))
 
 
 # Refinements that change the estimate: how they do. All others leave it as it is.

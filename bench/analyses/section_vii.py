@@ -18,6 +18,7 @@ from scipy.special import stdtrit
 from bench.analyses.explained import by_10
 from bench.analyses.pooling import grouped, measured
 from bench.base.settings import ALPHA_EST_SIGMA_DEG
+from bench.base.statuses import reason
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.whisker import Whisker
 from estimator.distance import felt_slip_angle
@@ -29,7 +30,6 @@ _FEWEST = 3  # whisks, or recordings: the least that scatter about a mean and a 
 _STEP_RAD = 1e-4  # of a derivative by differences: its error goes with the square
 # rad: the best of these is then refined
 _GRID_RAD = np.radians(np.arange(0.0, 45.0, 0.5))
-TOO_FEW = "needs more recordings than it has unknowns to say how well it is known"
 # of the variance that is the fit's own: with less, Student's t is the normal distribution
 _LEAST_SHARE = 1e-3
 _LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under any α
@@ -101,7 +101,7 @@ def by_tilting(of_surface: Sequence[Contact]) -> Way:
     known = [contact for contact in of_surface if np.isfinite(contact.beta_rad)]
     slopes = [contact.beta_rad for contact in known]
     if not (slopes and min(slopes) < 0 < max(slopes)):
-        return _unknown("tilting", "needs nominal slopes (beta_deg) of both signs")
+        return _unknown("tilting", reason("slopes_one_sided"))
 
     def fit(recordings: Sequence[Contact]) -> _Fit:
         """Fit the slip angles of tilts."""
@@ -116,8 +116,7 @@ def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
     """Return α by way 2: that under which distances scatter least as shares of themselves."""
     nominal = {contact.d_x_nominal_mm for contact in of_surface}
     if len(of_surface) < _FEWEST or len(nominal) != 1 or not np.isfinite(list(nominal)).all():
-        few = f"needs {_FEWEST} whisks or more at one nominal distance (d_x_mm)"
-        return _unknown("consistency", few)
+        return _unknown("consistency", reason("whisks_few", least=_FEWEST))
     return _by_object("consistency", of_surface, whisker, 0)
 
 
@@ -129,17 +128,16 @@ def by_smoothness(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
     """
     nominal = {contact.d_x_nominal_mm for contact in of_surface}
     if len(nominal) < 2 or not np.isfinite(list(nominal)).all():
-        few = "needs whisks at two nominal distances (d_x_mm) or more"
-        return _unknown("smoothness", few)
+        return _unknown("smoothness", reason("one_nominal_distance"))
     return _by_object("smoothness", of_surface, whisker, 1)
 
 
 def _by_object(name: str, of_surface: Sequence[Contact], whisker: Whisker, degree: int) -> Way:
     """Return α by way 2 with an object whose distance is a polynomial of this degree in height."""
     if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
-        return _unknown(name, "a whisk is no push against an object")
+        return _unknown(name, reason("no_push_on_object"))
     if np.ptp([abs(np.tan(contact.phi_rad)) for contact in of_surface]) < _LEAST_SPREAD:
-        return _unknown(name, "the whisks do not span two slip angles")
+        return _unknown(name, reason("slip_angles_alike"))
     return _with_shared(name, lambda some: _least_scatter(some, whisker, degree), of_surface)
 
 
@@ -166,7 +164,7 @@ def _with_shared(
     recordings = [_mean(some) for some in of_trials.values()]
     fit = fit_to(recordings)
     if fit.status or fit.freedom < 1:
-        return _unknown(name, fit.status or TOO_FEW)
+        return _unknown(name, fit.status or reason("recordings_few"))
     shared = []
     for cause in range(len(known[0].shared_Nmm)):
         moved = fit_to([contact.moved(cause) for contact in recordings])
@@ -223,8 +221,7 @@ def _least_scatter(some: Sequence[Contact], whisker: Whisker, degree: int) -> _F
     last = int(np.flatnonzero(np.isfinite(on_grid))[-1])
     best = int(np.nanargmin(on_grid))
     if best in (0, last):
-        bound_deg = np.degrees(_GRID_RAD[best])
-        status = f"at the bound of the search, {bound_deg:.1f}°: no angle between fits"
+        status = reason("friction_at_bound", bound_deg=np.degrees(_GRID_RAD[best]))
         return _Fit(np.nan, status=status)
     found = minimize_scalar(
         lambda alpha_rad: np.sum(residuals(np.array([alpha_rad])) ** 2),

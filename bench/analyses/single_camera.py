@@ -38,8 +38,8 @@ ONE_CAMERA = Table(
         Column("inside", "1 where 1.96 sigma of both hold that error, else 0"),
         *with_sigma(
             "moved_mm",
-            "how far the contact has gone the way it is pushed, by slip along a slope or because "
-            "the object gives way: the truth",
+            "motion of the contact the way it is pushed, by slip or as the object gives way: the "
+            "truth",
         ),
         *with_sigma("moved_est_mm", "the same by the one camera"),
         *with_sigma("force_N", "across the whisker in the whisking plane"),

@@ -17,6 +17,7 @@ from bench.analyses.gave import OBJECT, mean_give
 from bench.analyses.page_cells import cell_with_sigma, panel_cell
 from bench.analyses.pooling import grouped, measured, panel_title
 from bench.base.numbers import MISSING, number_range
+from bench.base.statuses import reason
 from bench.base.tables import SPEED, SURFACE, Column, Table, alike, status, with_sigma
 from bench.gauges.gauge_readings import NOMINAL_SHARE
 from bench.records.trial_result import FeltWhisk, TrialFacts, TrialResult, whisks
@@ -68,8 +69,8 @@ COMPLIANCE_SEEN = Table(
 )
 _LEAST_SHIFT_MM = 2.0  # nominal distances that differ by less are one distance set up again
 _HELD_SIGMAS = 3.0  # of φ felt: beyond, the contact slips sideways
-NOT_SOFT = "no softer than a rigid object within the noise"
-NO_PUSH = "no distance explains both compliances"
+NOT_SOFT = reason("not_soft")
+NO_PUSH = reason("compliances_contradict")
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,11 @@ from bench.array.cloud import Contact
 from bench.array.shape_verdict import FELT
 from bench.array.surface import STATED, Surface
 from bench.base.doubts import in_one_status
+from bench.base.statuses import reason
 from bench.base.tables import TRIAL, Column, Kind, Table, sigma_name, status, with_sigma
 from estimator.uncertainty import Z_95
 from vision.geometry.counted import counted
+from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.value import UNKNOWN, Value
 
 SIZE = Table(
@@ -111,7 +113,8 @@ def fit_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> FeltS
     fit = _Fit(contacts, surface)
     freedom = len(contacts) + distances - fit.count
     if freedom < 1:
-        return replace(unknown, status=f"too few, of {counted(distances, 'sound distance')}")
+        sound = counted(distances, "sound distance")
+        return replace(unknown, status=reason("contacts_few", distances=sound))
     root = np.linalg.cholesky(fit.covariance())
     found = least_squares(
         lambda parameters: np.linalg.solve(root, fit.residuals(parameters)),
@@ -121,18 +124,18 @@ def fit_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> FeltS
     )
     information = found.jac.T @ found.jac
     if not np.isfinite(information).all() or np.linalg.cond(information) > _MOST_CONDITION:
-        return replace(unknown, status="contacts leave the size open")
+        return replace(unknown, status=reason("size_open"))
     sigma = float(np.sqrt(np.linalg.inv(information)[-1, -1]))
     size = Value(unknown.stated + float(found.x[-1]), sigma)
     chance = float(chdtrc(freedom, 2 * found.cost))
     return replace(unknown, size=size, chance=chance, status=_status(size, chance))
 
 
-def _status(size: Value, chance: float) -> str:
+def _status(size: Value, chance: float) -> Reason:
     """Return what is doubtful of a fitted size."""
     if chance < _LEAST_CHANCE:
-        return f"contacts lie farther off such a surface than their sigmas let them (chance {chance:.1g})"
-    return "not told: the interval holds 0" if size.value < Z_95 * size.sigma else ""
+        return reason("contacts_off_surface", chance=chance)
+    return reason("size_may_be_zero") if size.value < Z_95 * size.sigma else NO_REASON
 
 
 class _Fit:

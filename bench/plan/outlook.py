@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vision.fit.line_noise import LineNoise
+from vision.geometry.reasons import joined
 from vision.truth.predicted_truth import PredictedTruth
 
 # The columns of a row, by vision's name of the quantity: at touch, then at a pushing angle.
@@ -72,7 +73,7 @@ def outlook(predicted: PredictedTruth, noise: Mapping[str, LineNoise], theta_rad
     limits = {}
     for name, limit in predicted.largest_causes(theta_rad).items():
         limits[COLUMNS[name]] = limit
-    status = "; ".join(filter(None, [truth.status, truth.at(theta_rad).status]))
+    status = joined(truth.status, truth.at(theta_rad).status)
     return Outlook(sigmas(predicted, theta_rad), limits, sentences, status)
 
 

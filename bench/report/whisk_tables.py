@@ -72,10 +72,9 @@ ESTIMATES = Table(
         Column(
             "estimator",
             "no_slip (2), with_friction (10), frictionless (12), corrected ((10) less the first "
-            "order of its error), with_friction_fitted and with_friction_seen ((10) with α fitted "
-            "to the other whisks, or as seen), with_friction_kinetic ((10) at the kinetic ends of "
-            "teeth, where the moments alone show stick–slip); with a load cell touch_alone, "
-            "moment_rate, force_and_moment; or one's own",
+            "order of its error), with_friction_fitted and with_friction_seen (α fitted to the "
+            "other whisks, or as seen), with_friction_kinetic (at the kinetic ends of teeth); with "
+            "a load cell touch_alone, moment_rate, force_and_moment; or one's own",
             Kind.TEXT,
         ),
         Column("alpha_est_deg", "the friction angle that it assumed"),

@@ -207,9 +207,8 @@ class TrialKeys(Keys, kw_only=True):
     # time of frame 0 on the signals' clock; the sigma enters the touch seen
     first_frame_s: float | None = None
     first_frame_sigma_s: float = 0.0
-    # −3 dB of the low-pass between gauges and converter, taken as a Butterworth of fourth order; 0:
-    # none. Its delay is taken out of touch felt. Left out: the paper's 800 Hz, and any delay from
-    # none to twice as much is in the sigma
+    # −3 dB of the low-pass before the converter, a Butterworth of fourth order; 0: none. Its delay
+    # is taken out of touch felt. Left out: the paper's 800 Hz, with a sigma
     gauge_filter_Hz: Filter | None = None
     # true: each way back is evaluated, too, and with the way there ([moving.md](moving.md))
     both_ways: bool = False

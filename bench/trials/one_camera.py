@@ -7,6 +7,7 @@ their own (`one_camera.csv`).
 
 from bench.base.errors import BadInput
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
+from bench.base.statuses import reason
 from bench.records.trial_result import ByOneCamera
 from bench.session.session import Session
 from bench.session.whisker import Whisker
@@ -15,7 +16,7 @@ from vision.truth.records import WhiskTruth
 from vision.truth.sight_lines import sights_of
 from vision.truth.value import Value
 
-NOT_SHOWN = "the camera shows nothing of this whisk's wire, or was left out"
+NOT_SHOWN = reason("wire_not_shown")
 
 
 def require_camera(session: Session, settings: Settings) -> None:

@@ -106,7 +106,8 @@ def test_no_number_where_there_is_no_touch(stroke, settings, status):
 
 def test_a_threshold_out_of_reach_is_told(stroke):
     s = stroke(np.random.default_rng(4))
-    assert "does not cross" in threshold_touch(*s.arrays, s.time_s, 5.0, threshold=99.0).status
+    touch = threshold_touch(*s.arrays, s.time_s, 5.0, threshold=99.0)
+    assert touch.status.code == "threshold_not_crossed"
 
 
 @pytest.mark.parametrize("cutoff_Hz, n", [(5.0, 4000), (45.0, 700), (900.0, 300), (5.0, 40)])

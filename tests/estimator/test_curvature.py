@@ -123,19 +123,19 @@ def test_curvature_and_radius_of_equation_15():
 
 
 @pytest.mark.parametrize(
-    "r_n, theta, beta_0, reason",
+    "r_n, theta, beta_0, code",
     [
-        (-1.0, 0.05, 0.5, "radius of curvature is not positive"),
-        (1.0, -0.05, 0.5, "angle is negative"),
-        (1.0, 2.0, 0.5, "90 degrees or more"),
-        (1.0, 0.05, 1.6, "slope beta_0"),
-        (0.1, 0.3, 1.0, "has passed the object"),
-        (0.1, 0.1, 1.0, "slip angle reaches 90"),
-        (np.nan, 0.05, 0.5, "missing"),
+        (-1.0, 0.05, 0.5, "radius_not_positive"),
+        (1.0, -0.05, 0.5, "angle_negative"),
+        (1.0, 2.0, 0.5, "angle_too_large"),
+        (1.0, 0.05, 1.6, "first_slope_too_steep"),
+        (0.1, 0.3, 1.0, "object_passed"),
+        (0.1, 0.1, 1.0, "slip_angle_too_large"),
+        (np.nan, 0.05, 0.5, "value_missing"),
     ],
 )
-def test_outside_the_domain_is_nan_with_a_reason(r_n, theta, beta_0, reason):
-    assert reason in curvature.why_not(r_n, theta, beta_0)
+def test_outside_the_domain_is_nan_with_a_reason(r_n, theta, beta_0, code):
+    assert curvature.why_not(r_n, theta, beta_0).code == code
     assert np.isnan(curvature.moments(r_n, theta, beta_0, 0.0)).all()
 
 

@@ -7,6 +7,7 @@ from estimator import friction, slip
 from estimator.friction import (
     AT_ZERO,
     NEVER_SLIPPED,
+    ONE_SIDED,
     Pushes,
     alpha_from_tilts,
     confidence,
@@ -208,7 +209,7 @@ def test_tilts_to_one_side_hold_no_angle():
     tilt = np.radians(np.arange(0, 60, 2.0))
     fit = alpha_from_tilts(tilt, slip.slip_angle(tilt, 0.3))
     assert np.isnan(fit.alpha_rad)
-    assert "both sides" in fit.status
+    assert fit.status == ONE_SIDED
 
 
 # ---- section VII, way 3: confidence from φ

@@ -7,6 +7,7 @@ import pytest
 
 from estimator import slip
 from estimator.beam import Beam
+from estimator.onset import NO_RISE
 from estimator.readings import force_at, rate_at
 from estimator.sensors import NO_CELL, NO_RATE, force_and_moment, moment_rate, touch_alone
 from estimator.signal import FeltTouch, felt_touch
@@ -82,7 +83,9 @@ def test_a_force_within_its_noise_leaves_a_near_end_alone():
 
 def test_beyond_the_tip_is_the_tip():
     far = force_and_moment(whisk(force=0.5 * FORCE), TOLD)
-    assert far.d_x_mm == BEAM.length_mm and "tip contact" in far.status and far.gradient is None
+    assert (
+        far.d_x_mm == BEAM.length_mm and far.status.code == "tip_contact" and far.gradient is None
+    )
 
 
 def test_what_was_not_recorded_is_a_reason():
@@ -92,10 +95,7 @@ def test_what_was_not_recorded_is_a_reason():
         NO_CELL,
     )
     reversed_cell = force_and_moment(whisk(force=-FORCE), TOLD)
-    assert (
-        np.isnan(reversed_cell.d_x_mm)
-        and "not the one that its moment asks for" in reversed_cell.status
-    )
+    assert np.isnan(reversed_cell.d_x_mm) and reversed_cell.status.code == "force_unlike_moment"
 
 
 def test_rate_and_force_scatter_as_stated(stroke, rng):
@@ -123,9 +123,9 @@ def _first(values, covariance) -> tuple[float, float]:
 
 def test_without_a_touch_nothing_is_read():
     none, angles, samples = (
-        FeltTouch.none("never touches"),
+        FeltTouch.none(NO_RISE),
         np.linspace(0, 0.1, 50),
         np.zeros((50, 3)),
     )
-    assert force_at(THETA, angles, samples, none).status == "never touches"
+    assert force_at(THETA, angles, samples, none).status == NO_RISE
     assert np.isnan(rate_at(THETA, angles, samples, none)[0]).all()

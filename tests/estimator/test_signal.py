@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimator import uncertainty
-from estimator.onset import FeltTouch
+from estimator.onset import NO_RISE, FeltTouch
 from estimator.signal import NOT_REACHED, felt_touch, moment_at
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -108,8 +108,8 @@ def test_beyond_the_stroke_there_is_no_moment(stroke):
 
 def test_without_touch_there_is_no_moment(stroke):
     s = stroke(np.random.default_rng(13))
-    at = moment_at(THETA, *s.arrays, FeltTouch.none("never touches"))
-    assert at.status == "never touches"
+    at = moment_at(THETA, *s.arrays, FeltTouch.none(NO_RISE))
+    assert at.status == NO_RISE
     assert np.isnan(at.values).all()
 
 

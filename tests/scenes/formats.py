@@ -4,19 +4,26 @@ import re
 from functools import cache
 from pathlib import Path
 
+from bench.base.tables import sigma_name
+
 DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "formats.md").read_text()
 
 
 @cache
 def documented(heading: str) -> list[str]:
-    """Names in backticks in the first column of the table below a heading; '.b' after 'a.c' is 'a.b'."""
+    """Return the names in backticks in the first column of the table below a heading.
+
+    '.b' after 'a.c' is 'a.b'; ± after a name stands for the name of its sigma.
+    """
     (section,) = re.findall(
         rf"^### {re.escape(heading)}\n(.*?)(?=^#|\Z)", DOCUMENT, flags=re.DOTALL | re.MULTILINE
     )
     names = []
     for row in re.findall(r"^\| (`.*?) \|", section, flags=re.MULTILINE):
-        for name in re.findall(r"`([^`]+)`", row):
+        for name, has_sigma in re.findall(r"`([^`]+)`(±?)", row):
             names.append(names[-1].rpartition(".")[0] + name if name.startswith(".") else name)
+            if has_sigma:
+                names.append(sigma_name(names[-1]))
     return names
 
 

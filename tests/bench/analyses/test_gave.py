@@ -9,18 +9,15 @@ from bench.analyses.gave import GivesWay, gave_at, give_seen, mean_give
 from bench.base.errors import BadInput
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import (
-    FeltTrial,
     FeltWhisk,
-    SeenTrial,
     SeenWhisk,
-    TrialFacts,
     TrialResult,
-    WhiskerFacts,
 )
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
+from tests.scenes.results import seen_whisk, trial_result
 from tests.scenes.rig_sessions import protocol_file, rows
-from vision.truth.records import GaveWay, WhiskTruth
+from vision.truth.records import GaveWay
 from vision.truth.value import UNKNOWN, Value
 
 THETA_RAD = np.radians([1.0, 2.0, 4.0])
@@ -36,10 +33,9 @@ def result(beta_deg=0.0, gave=GAVE) -> TrialResult:
         0.5 * np.array([-np.cos(beta), np.sin(beta)]),
     )
     m_y, m_z = (Value(float(m), 0.01) for m in across + along)
-    seen = SeenWhisk(WhiskTruth(0, d_x_mm=Value(60.0, 0.0), beta_rad=Value(beta, 0.0), gave=gave))
+    seen = seen_whisk(d_x_mm=Value(60.0, 0.0), beta_rad=Value(beta, 0.0), gave=gave)
     felt = FeltWhisk(0, m_y_Nmm=m_y, m_z_Nmm=m_z)
-    facts = TrialFacts("one", "measure", "foam", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 3000.0)
-    return TrialResult(*facts, 3.0, SeenTrial((seen,)), FeltTrial((felt,)), "", "")
+    return trial_result((seen,), (felt,), name="one", surface="foam")
 
 
 @pytest.mark.parametrize("beta_deg", [0.0, 40.0, -40.0])

@@ -122,10 +122,16 @@ def test_taper_drift_cross_talk_and_teeth_are_the_estimate_made_again():
 
 def test_what_no_row_has_is_missing_with_a_reason():
     found = by_name(result(50.0))
-    assert found["cross-talk"].verdict == NOT_KNOWN and "one factor" in found["cross-talk"].status
+    assert (
+        found["cross-talk"].verdict == NOT_KNOWN
+        and "factors_unknown" in found["cross-talk"].status.codes
+    )
     assert found["clock"].verdict == NOT_KNOWN and found["clock"].status
-    assert found["psi"].status.startswith("the fit does not tell")
-    assert found["drift"].effects["d_x_est_mm"] == 0 and "free stroke" in found["drift"].status
+    assert "effect_not_fitted" in found["psi"].status.codes
+    assert (
+        found["drift"].effects["d_x_est_mm"] == 0
+        and "drift_not_removed" in found["drift"].status.codes
+    )
 
 
 def test_summary_and_page_say_it(exact_run):

@@ -9,6 +9,7 @@ import pytest
 from bench.analyses import back_strokes as both_ways
 from bench.analyses import moving_objects as moving
 from bench.base.settings import Settings
+from bench.base.statuses import reason
 from bench.commands.evaluate import evaluate
 from bench.rig.simulate import simulate
 from tests.scenes.rig_sessions import protocol_file
@@ -101,7 +102,7 @@ def test_a_recording_without_a_way_back_says_so(tmp_path, exact_vision):
         tmp_path / "session", out, Settings(figures=False), workers=0, announce=lambda text: None
     )
     (row,) = table(out / both_ways.BOTH_WAYS.file)
-    assert row["status"] == "no way back was recorded" and row["d_x_est_mm"] == ""
+    assert row["status"] == reason("no_way_back") and row["d_x_est_mm"] == ""
 
 
 def test_sessions_of_standing_objects_have_neither(exact_run):

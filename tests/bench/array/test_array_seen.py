@@ -14,6 +14,7 @@ from bench.commands.evaluate import evaluate
 from bench.report.score import truth_of
 from bench.rig.simulate import simulate
 from bench.session.array_view import load_views
+from tests.scenes.results import codes
 from tests.scenes.rig_sessions import protocol_file
 
 # Two columns that stand before each other, one higher: their wires cross in both cameras' pictures.
@@ -73,7 +74,9 @@ def test_each_whisker_has_a_truth_that_is_true(session, out):
         true = truth_of(views[row["whisker"]], row["trial"], 0)
         for name in ("d_x_mm", "touch_deg", "beta_deg"):
             assert abs(row[name] - true[name]) < 4.0 * row[sigma_name(name)], name
-        assert row["d_x_sigma_mm"] < 0.3 and "may be that of" not in str(row["status"])
+        assert row["d_x_sigma_mm"] < 0.3 and "wire_of_another" not in codes(
+            out / "whiskers" / row["whisker"], row["trial"]
+        )
 
 
 def test_felt_contacts_lie_on_the_bar_that_is_seen(out):

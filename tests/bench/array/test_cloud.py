@@ -8,18 +8,13 @@ from bench.array.shape_verdict import surface_lines, surface_verdict
 from bench.array.surface import Surface
 from bench.records.trial_result import (
     EstimateRow,
-    FeltTrial,
     FeltWhisk,
-    SeenTrial,
-    SeenWhisk,
-    TrialFacts,
     TrialResult,
-    WhiskerFacts,
 )
 from bench.report.assembly import Z_C_MM
 from bench.session.session import Base
+from tests.scenes.results import trial_result
 from vision.geometry.rods import Wire
-from vision.truth.records import WhiskTruth
 from vision.truth.value import Value
 
 WIRE = Wire("cylinder", 100.0, 1.0)
@@ -34,14 +29,7 @@ def felt(d_x_mm=60.0, touch_rad=0.3, beta=0.5, status="") -> TrialResult:
     )
     touch, phi = Value(touch_rad, 0.004), Value(beta - ALPHA, 0.03)
     whisk = FeltWhisk(touch_felt_rad=touch, phi_felt_rad=phi, estimates=(row,), status=status)
-    facts = TrialFacts("t", "measure", "steel", 10.0, *[np.nan] * 3)
-    return TrialResult(
-        facts,
-        WhiskerFacts("cylinder", 100.0, 1.0, 2945.0, None),
-        3.0,
-        SeenTrial((SeenWhisk(WhiskTruth(0)),)),
-        FeltTrial((whisk,)),
-    )
+    return trial_result(felt=(whisk,))
 
 
 def cloud(result: TrialResult, surface: Surface | None = None, base: Base = BASE):

@@ -1,18 +1,15 @@
 """Whiskers that are exchanged feel their touches when each other's are seen."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from bench.array.exchanged_whiskers import exchanged
 from bench.records.trial_result import (
-    FeltTrial,
     FeltWhisk,
-    SeenTrial,
-    SeenWhisk,
-    TrialFacts,
     TrialResult,
-    WhiskerFacts,
 )
-from vision.truth.records import WhiskTruth
+from tests.scenes.results import seen_whisk, trial_result
 from vision.truth.value import NAN, Value
 
 SIGMA = 1e-4
@@ -20,16 +17,9 @@ SIGMA = 1e-4
 
 def result(seen_rad: float, felt_rad: float, shared_rad: float = 0.0) -> TrialResult:
     touch = Value(seen_rad, float(np.hypot(SIGMA, shared_rad)))
-    seen = SeenWhisk(WhiskTruth(0, touch_rad=touch), touch_shared_rad=shared_rad)
+    seen = replace(seen_whisk(touch_rad=touch), touch_shared_rad=shared_rad)
     felt = FeltWhisk(touch_felt_rad=Value(felt_rad, SIGMA))
-    facts = TrialFacts("t", "measure", "steel", 10.0)
-    return TrialResult(
-        facts,
-        WhiskerFacts("cylinder", 100.0, 1.0, 2945.0),
-        3.0,
-        SeenTrial((seen,)),
-        FeltTrial((felt,)),
-    )
+    return trial_result((seen,), (felt,))
 
 
 def lines(a: TrialResult, b: TrialResult) -> list[str]:

@@ -93,12 +93,12 @@ def test_sigmas_are_the_scatter(rng):
 
 def test_what_is_not_told_is_not_said(rng):
     contacts = drawn(BALL, rng, 0.0)
-    (line,) = size_lines([fit_size("t", contacts[:2], BALL)])
-    assert line == "t: sphere, 2 contacts: no size; too few, of 2 sound distances"
+    few = fit_size("t", contacts[:2], BALL)
+    assert few.status.codes == ("contacts_few",) and list(size_lines([few]))
     by_touch = fit_size("t", [replace(contact, status="odd") for contact in contacts], BALL)
     assert by_touch.distances == 0 and by_touch.size.value == pytest.approx(30.0, rel=1e-4)
     assert by_touch.size.sigma > fit_size("t", contacts, BALL).size.sigma
     contacts[0].point_mm[1] += 1.0
-    assert "farther off such a surface" in fit_size("t", contacts, BALL).status
+    assert fit_size("t", contacts, BALL).status.codes == ("contacts_off_surface",)
     seen = Surface("bar", np.zeros(3), UP, 3.0, source=SEEN)
     assert not fit_sizes(contacts, {"t": seen, "other": BALL})

@@ -10,14 +10,13 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
+from bench.base.statuses import reason
 from bench.base.workers import DIED, Workers
 from bench.commands.evaluate import evaluate
-from bench.records.trial_result import SeenWhisk
 from bench.report.whisk_tables import ESTIMATES, TRACK, WHISKS
 from bench.trials.trial_evaluation import evaluate_unit
 from tests.faults.interrupted import contents, full_disk
-from tests.scenes.results import table
-from vision.truth.records import WhiskTruth
+from tests.scenes.results import codes, seen_whisk, table
 
 TRUE_ALPHA = Settings(alpha_est_deg=10.5)
 
@@ -104,7 +103,7 @@ def test_one_gauge_factor_a_channel_costs_five_per_cent_at_60_degrees(steel):
 def test_no_gauge_trial_is_judged_by_gauges_fitted_to_it(steel):
     rows = {row["trial"]: row for row in table(steel / "whisks.csv")}
     for trial in ("gauge_roll0", "gauge_roll90"):
-        assert rows[trial]["m_z_Nmm"] == "" and "not judged" in rows[trial]["status"]
+        assert rows[trial]["m_z_Nmm"] == "" and "own_gauges" in codes(steel, trial)
         assert (trial, "with_friction") not in estimates(steel)
 
 
@@ -199,14 +198,14 @@ def test_a_session_without_pictures_is_evaluated_without_truth(without_pictures,
     assert run(without_pictures, out) == 0
     rows = table(out / "whisks.csv")
     assert all(
-        row["d_x_mm"] == "" and row["status"] == "no pictures" and row["cameras"] == "0"
+        row["d_x_mm"] == "" and row["status"] == reason("no_pictures") and row["cameras"] == "0"
         for row in rows
     )
     assert estimates(out)["b30_3", "with_friction"]["error_mm"] == ""
     assert float(estimates(out)["b30_3", "with_friction"]["d_x_est_mm"]) == pytest.approx(
         55.258, rel=0.015
     )
-    assert "no pictures" in (out / "summary.txt").read_text()
+    assert reason("no_pictures") in (out / "summary.txt").read_text()
 
 
 def test_a_whisker_that_never_touches_is_a_row_with_a_status(without_pictures, tmp_path):
@@ -218,7 +217,7 @@ def test_a_whisker_that_never_touches_is_a_row_with_a_status(without_pictures, t
     out = tmp_path / "out"
     assert run(without_pictures, out) == 1
     row = next(row for row in table(out / "whisks.csv") if row["trial"] == "b30_3")
-    assert "touch" in row["status"] and row["touch_felt_deg"] == "" and row["m_z_Nmm"] == ""
+    assert "no_rise" in codes(out, "b30_3") and row["touch_felt_deg"] == "" and row["m_z_Nmm"] == ""
     assert ("b60_4", "with_friction") in estimates(out)
 
 
@@ -264,8 +263,7 @@ def test_gauge_trials_without_truth_say_what_it_lacks(
     def see(session, trial, *rest):
         found = seen(session, trial, *rest)
         dark = tuple(
-            SeenWhisk(WhiskTruth(whisk.whisk), "the bar stands in the dark")
-            for whisk in found.whisks
+            seen_whisk(whisk.whisk, "the bar stands in the dark") for whisk in found.whisks
         )
         return replace(found, whisks=dark) if trial.purpose == "gauge" else found
 
@@ -355,9 +353,9 @@ def test_a_trial_whose_process_dies_is_told_and_tried_again(
         patched.setattr(Workers, "_finished", b30_dies)
         assert run(without_pictures, tmp_path / "out", plain) == 1
     rows = {row["trial"]: row for row in table(tmp_path / "out" / "whisks.csv")}
-    assert "died 3 times" in rows["b30_3"]["status"] and not rows["b30_3"]["d_x_mm"]
+    assert "trial_lost" in codes(tmp_path / "out", "b30_3") and not rows["b30_3"]["d_x_mm"]
     assert (
-        "died" not in rows["b60_4"]["status"]
+        "trial_lost" not in codes(tmp_path / "out", "b60_4")
         and "died 3 times" in (tmp_path / "out" / "summary.txt").read_text()
     )
     run(without_pictures, tmp_path / "out", plain)

@@ -128,4 +128,4 @@ def test_a_stroke_that_starts_touching_has_no_truth(bench):
         arc_mm=known.arc_mm[late],
     )
     _, row = of(replace(staged, known=late_frames), cameras)
-    assert not row.has_truth and "touches from the start" in row.status
+    assert not row.has_truth and "starts_touching" in row.status.codes

@@ -9,6 +9,7 @@ import pytest
 from bench import api
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
+from bench.base.statuses import reason
 from bench.commands import cli
 from bench.plan.outlook import QUANTITIES
 from bench.plan.plan_rows import Plan
@@ -16,15 +17,15 @@ from bench.plan.plan_text import lines_of
 from bench.plan.recorded_whisk import SeenTask, plan_seen
 from bench.plan.run_plan import EXAMPLE, Options, plan
 from bench.records.plain import from_plain, to_plain
-from bench.records.trial_result import Clock, SeenTrial, SeenWhisk
+from bench.records.trial_result import Clock, SeenTrial
 from bench.rig.protocol import load
 from bench.session.session import load_session
 from bench.trials.seen import whisk_record
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
+from tests.scenes.results import seen_whisk
 from tests.scenes.rig_sessions import protocol_file, rows
 from vision.fit.line_noise import LineNoise
 from vision.truth.predicted_truth import predict_truth
-from vision.truth.records import WhiskTruth
 
 SMALL = """
 name = "small"
@@ -118,12 +119,12 @@ def test_a_recorded_whisk_beside_what_was_stated(tmp_path, steel_signals):
 
 def test_a_whisk_without_truth_keeps_its_reason(steel_signals, tmp_path):
     session, protocol = load_session(steel_signals), protocol_of(tmp_path)
-    seen = SeenWhisk(WhiskTruth(0), "the whisker never touches")
+    seen = seen_whisk(0, reason("never_touches"))
     task = SeenTask(
         session, session.trials[0], SeenTrial((seen,)), seen, cameras_of(protocol), (), 0.05
     )
     row = plan_seen(task)
-    assert not row.outlook.has_truth and row.outlook.status == "the whisker never touches"
+    assert not row.outlook.has_truth and row.outlook.status.codes == ("never_touches",)
 
 
 def test_lines_come_back_from_a_file():

@@ -5,9 +5,11 @@ import json
 import numpy as np
 import pytest
 
+from bench.base.statuses import reason
 from bench.records.phases import STATIC, Angle, Phases
 from bench.records.plain import from_plain, to_plain
-from bench.records.trial_result import EstimateRow, FeltWhisk, SeenTrial, SeenWhisk, TrialFacts
+from bench.records.trial_result import EstimateRow, FeltWhisk, SeenTrial, TrialFacts
+from tests.scenes.results import seen_whisk
 from vision.truth.records import WhiskTruth
 from vision.truth.value import Value
 
@@ -56,7 +58,7 @@ def test_whole_records_come_back_with_all_that_vision_told(exact_record, steel_t
 
 
 def test_missing_is_nan_and_no_truth():
-    seen = there_and_back(SeenWhisk(WhiskTruth(1), "no pictures"))
+    seen = there_and_back(seen_whisk(1, reason("no_pictures")))
     assert np.isnan(seen.d_x_mm.value) and not seen.has_truth and seen.frames is None
 
 

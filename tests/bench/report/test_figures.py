@@ -14,13 +14,8 @@ from bench.base.drawing import is_drawn, save
 from bench.base.settings import Settings
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import (
-    FeltTrial,
-    FeltWhisk,
     SeenTrial,
     SeenWhisk,
-    TrialFacts,
-    TrialResult,
-    WhiskerFacts,
 )
 from bench.report.planes import contact_path, sensing_plane
 from bench.session.session import load_session
@@ -28,6 +23,7 @@ from bench.trials.estimate_errors import Judged
 from estimator import slip
 from estimator.beam import Beam
 from estimator.friction import Pushes, fit_alpha
+from tests.scenes.results import trial_result
 from vision.truth.value import Value
 
 C, THETA = 8835.7, np.radians(3.0)
@@ -115,13 +111,12 @@ def test_the_sensing_planes_triangle_closes(steep):
 
 
 def test_the_sensing_plane_can_be_drawn_for_either_side(steep):
-    facts = TrialFacts("t", "measure", "steel", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 2945.2)
     for sign in (1, -1):
         beta_rad = Value(sign * steep.beta_rad.value, steep.beta_rad.sigma)
         whisk = replace(steep, truth=replace(steep.truth, beta_rad=beta_rad))
         seen = SeenTrial((whisk,), bar_radius_mm=3.0, wire_radius_mm=0.5)
         axes = Figure().subplots()
-        result = TrialResult(*facts, 3.0, seen, FeltTrial((FeltWhisk(),)))
+        result = trial_result(seen)
         sensing_plane(axes, result, whisk, (np.radians(10.5), "fitted"))
         assert axes.get_title(loc="left").startswith("t, whisk 0")
 

@@ -3,18 +3,9 @@
 import numpy as np
 import pytest
 
-from bench.records.trial_result import (
-    FeltTrial,
-    FeltWhisk,
-    SeenTrial,
-    SeenWhisk,
-    TrialFacts,
-    TrialResult,
-    WhiskerFacts,
-)
 from bench.report.summary.shared import scatter_warnings, shared_distance, shared_lines
+from tests.scenes.results import seen_whisk, trial_result
 from vision.fit.covariance import CAUSES
-from vision.truth.records import WhiskTruth
 from vision.truth.value import Value
 
 SHARED_MM, OWN_MM = 0.008, 0.002
@@ -34,24 +25,16 @@ def session(rng, trials, a_trial, own_mm=OWN_MM):
         errors = off + own_mm * rng.standard_normal(a_trial)
         sigma = float(np.hypot(SHARED_MM, OWN_MM))
         whisks = [
-            SeenWhisk(
-                WhiskTruth(
-                    k,
-                    d_x_mm=Value(60.0 + e, sigma),
-                    budget=budget,
-                    touch_rad=Value(0.04),
-                    beta_rad=Value(0.5),
-                )
+            seen_whisk(
+                k,
+                d_x_mm=Value(60.0 + e, sigma),
+                budget=budget,
+                touch_rad=Value(0.04),
+                beta_rad=Value(0.5),
             )
             for k, e in enumerate(errors)
         ]
-        facts = (
-            TrialFacts("t", "measure", "steel", 10.0),
-            WhiskerFacts("cylinder", 100.0, 1.0, 3000.0),
-        )
-        results.append(
-            TrialResult(*facts, 3.0, SeenTrial(tuple(whisks)), FeltTrial((FeltWhisk(),) * a_trial))
-        )
+        results.append(trial_result(whisks))
     return results
 
 

