@@ -200,6 +200,20 @@ def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
     )
 
 
+@dataclass(frozen=True)
+class RunAccuracy:
+    """How well the truth of a run is known, and how far off each of its estimators is."""
+
+    truth: TruthUncertainty
+    estimators: tuple[Accuracy, ...]
+
+    @classmethod
+    def of_results(cls, results: Iterable[TrialResult]) -> "RunAccuracy":
+        """Return the accuracy over the measured whisks of these results."""
+        results = list(results)
+        return cls(truth_uncertainty(results), tuple(accuracies(results)))
+
+
 def _finite_median(values: Sequence[float]) -> float:
     """Return the median of the finite values; NaN where there are none."""
     finite = [value for value in values if math.isfinite(value)]

@@ -17,6 +17,7 @@ from bench.records.trial_result import (
     WhiskerFacts,
 )
 from bench.report.assembly import beam_rows, budget_rows
+from bench.report.estimator_accuracy import RunAccuracy
 from bench.report.run_facts import Section
 from bench.report.summary.compose import Summary
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
@@ -114,7 +115,7 @@ def test_the_screen_shows_the_verdict_and_what_is_doubtful(tmp_path):
 )
 def test_doubts_are_counted_apart_from_whisks(doubts, said):
     """Of one whisk there may be two."""
-    first, *_ = verdict("s", True, [result()], Settings(), doubts)
+    first, *_ = verdict("s", True, RunAccuracy.of_results([result()]), Settings(), doubts)
     assert first == f"s: the true distance is known for 1 of 1 measured whisk, to ± 0.01 mm; {said}"
 
 
