@@ -13,6 +13,7 @@ from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.at_angle import TruthAtAngle
 from vision.truth.records import FrameTruth, WhiskTruth
 from vision.truth.value import NAN, UNKNOWN, Value
+from vision.wire.one_sided import SeenWidth
 
 
 @dataclass(frozen=True)
@@ -190,9 +191,11 @@ class BackStroke:
 class SeenTrial:
     """The seen half of a trial; bar, radii and clock are missing where there are no pictures.
 
-    bar_looks: ratio of the bar's apparent to its stated diameter, by camera. back: the first
-    back stroke, where it was recorded and has a truth. ways_back: the way back of each whisk,
-    run backwards, where the trial evaluates them.
+    notes: lines on frames that were dropped, damaged, corrected or left out. bar_looks: ratio of the
+    bar's apparent to its stated diameter, by camera. one_sided_light: the width of the wire that is
+    seen, by camera that sees light from one side. back: the first back stroke, where it was recorded
+    and has a truth. ways_back: the way back of each whisk, run backwards, where the trial evaluates
+    them.
     """
 
     whisks: tuple[SeenWhisk, ...]
@@ -202,6 +205,7 @@ class SeenTrial:
     wire_radius_mm: float = NAN
     clock: Clock | None = None
     bar_looks: dict[str, Value] = field(default_factory=dict)
+    one_sided_light: dict[str, SeenWidth] = field(default_factory=dict)
     back: BackStroke | None = None
     ways_back: tuple[SeenWhisk, ...] = ()
 

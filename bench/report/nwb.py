@@ -90,11 +90,8 @@ def _nwb_file(record: RunRecord, session: Session, out: Path) -> "NWBFile":
 
 def _start(record: RunRecord, session: Session) -> datetime:
     """Return when the first signals were stored; 1970 where none were."""
-    stored_s = [0.0]
-    if record.recordings:
-        paths = [session.trial(name).signals_path for name in record.recordings]
-        stored_s = [path.stat().st_mtime for path in paths]
-    return datetime.fromtimestamp(min(stored_s), UTC)
+    stored_s = [session.trial(name).signals_path.stat().st_mtime for name in record.recordings]
+    return datetime.fromtimestamp(min(stored_s, default=0.0), UTC)
 
 
 def _series(session: Session, name: str) -> Iterator["TimeSeries"]:
