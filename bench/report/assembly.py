@@ -1,13 +1,12 @@
 """Rows of the tables on whisks, estimates and tracks from the trials' results."""
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.pooling import angle_cells, degrees, value_cells
 from bench.base.doubts import in_one_status
-from bench.base.tables import sigma_name
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.whisk_tables import BEAM, BUDGET, ESTIMATES, PLACE, TRACK, WHISKS
 from estimator.distance import cartesian, contact_point
@@ -63,7 +62,7 @@ def whisk_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
             row[name] = getattr(result.trial, name)
         for source, fields in ((seen, _SEEN), (felt, _FELT), (seen.at, _AT_ANGLE)):
             for column, field in fields.items():
-                row |= _value_cells(column, getattr(source, field, UNKNOWN))
+                row |= _cells(column, getattr(source, field, UNKNOWN))
         row |= _point_cells(seen.point_mm)
         row["cameras"] = seen.truth.cameras
         row["frames_used"] = seen.truth.frames_used
@@ -94,12 +93,12 @@ def beam_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
             continue
         row = _whisk_cells(result, seen)
         row["chance"] = beam.chance
-        row["theta_deg"] = math.degrees(beam.theta_rad)
+        row["theta_deg"] = degrees(beam.theta_rad)
         for quantity, unit in BEAM_UNITS.items():
             compared = getattr(beam, quantity)
             for part in ("beam", "spline", "difference_sigma"):
-                column = f"{quantity}_{part}_{unit}"
-                row[column] = _in_unit_of(column, getattr(compared, part))
+                value = getattr(compared, part)
+                row[f"{quantity}_{part}_{unit}"] = degrees(value) if unit == "deg" else value
         yield row
 
 
@@ -113,24 +112,16 @@ def _whisk_cells(result: TrialResult, seen: SeenWhisk) -> dict:
     return {"trial": result.trial.name, "whisk": seen.whisk}
 
 
-def _in_unit_of(column: str, value: float) -> float:
-    """Convert a value to the unit of its column: from rad, or as it is."""
-    return math.degrees(value) if column.endswith("_deg") else value
-
-
-def _value_cells(column: str, value: Value) -> dict[str, float]:
+def _cells(column: str, value: Value) -> dict[str, float]:
     """Return the cells of a value and of its sigma, in the unit of the column."""
-    return {
-        column: _in_unit_of(column, value.value),
-        sigma_name(column): _in_unit_of(column, value.sigma),
-    }
+    return angle_cells(column, value) if column.endswith("_deg") else value_cells(column, value)
 
 
 def _point_cells(point_mm: Value) -> dict[str, float]:
     """Return the cells of a point (3,) and of its sigmas; empty where there is none."""
     cells = {}
-    for column, value, sigma in zip(PLACE, point_mm.value.tolist(), point_mm.sigma.tolist()):
-        cells |= _value_cells(column, Value(value, sigma))
+    for column, value, sigma in zip(PLACE, point_mm.value, point_mm.sigma):
+        cells |= value_cells(column, Value(value, sigma))
     return cells
 
 
@@ -142,16 +133,16 @@ def estimate_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
             error_mm = estimate.d_x_est_mm.value - true_mm
             row = _whisk_cells(result, seen) | {
                 "estimator": estimate.estimator,
-                "alpha_est_deg": math.degrees(estimate.alpha_est_rad),
+                "alpha_est_deg": degrees(estimate.alpha_est_rad),
                 "d_x_est_sigma_alpha_exact_mm": estimate.d_x_est_sigma_alpha_exact_mm,
                 "d_x_est_low_mm": estimate.d_x_est_low_mm,
                 "d_x_est_high_mm": estimate.d_x_est_high_mm,
-                "beta_est_deg": math.degrees(estimate.beta_est_rad),
+                "beta_est_deg": degrees(estimate.beta_est_rad),
                 "error_mm": error_mm,
                 "error_percent": 100.0 * error_mm / true_mm,
                 "status": estimate.status,
             }
-            row |= _value_cells("d_x_est_mm", estimate.d_x_est_mm)
+            row |= _cells("d_x_est_mm", estimate.d_x_est_mm)
             yield row | _contact_cells(seen, felt, estimate)
 
 
@@ -161,14 +152,14 @@ def _contact_cells(seen: SeenWhisk, felt: FeltWhisk, estimate: EstimateRow) -> d
     They have its distance from the contact seen, and the errors of deflection and slip.
     """
     touch = felt.touch_felt_rad
-    cells = _value_cells("theta_c_deg", touch) | _value_cells("z_c_mm", Z_C_MM)
+    cells = _cells("theta_c_deg", touch) | _cells("z_c_mm", Z_C_MM)
     scale = estimate.d_x_est_mm.sigma * touch.sigma
     cells["r_theta_correlation"] = estimate.touch_covariance_mm_rad / scale
     cells["point_error_mm"] = point_error_mm(seen, felt, estimate)
     for quantity in ("d_y", "d_z", "slip"):
         found = getattr(estimate, f"{quantity}_est_mm")
         truth = getattr(seen.at, f"{quantity}_mm", UNKNOWN)
-        cells |= _value_cells(f"{quantity}_est_mm", found)
+        cells |= _cells(f"{quantity}_est_mm", found)
         cells[f"{quantity}_error_mm"] = found.value - truth.value
     return cells
 
@@ -190,14 +181,14 @@ def track_rows(result: TrialResult) -> Iterator[dict]:
                 "frame": int(frames.index[k]),
                 "whisk": seen.whisk,
                 "time_s": float(frames.time_s[k]),
-                "motor_deg": math.degrees(frames.motor_rad[k]),
-                "theta_deg": math.degrees(frames.theta_rad.value[k]),
+                "motor_deg": degrees(frames.motor_rad[k]),
+                "theta_deg": degrees(frames.theta_rad.value[k]),
                 "touching": int(frames.touching[k]),
                 "slip_mm": float(frames.slip_mm.value[k]),
                 "slip_sigma_mm": float(frames.slip_mm.sigma[k]),
                 "d_y_mm": float(frames.d_y_mm.value[k]),
                 "d_z_mm": float(frames.d_z_mm.value[k]),
-                "phi_seen_deg": math.degrees(frames.phi_rad.value[k]),
+                "phi_seen_deg": degrees(frames.phi_rad.value[k]),
                 "status": frames.status[k],
             }
             point_mm = Value(frames.point_mm.value[k], frames.point_mm.sigma[k])

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import bdtr
 
+from bench.analyses.pooling import grouped, rms
 from bench.base.drawing import label_of
 from bench.records.trial_result import TrialResult, whisks
 from bench.trials.estimate_errors import Judged, judge
@@ -27,7 +28,7 @@ Key = tuple[str, int, str]  # trial, whisk, estimator
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Hold the errors of one estimator over the measured whisks of a run.
+    """Errors of one estimator over the measured whisks of a run.
 
     with_truth: number of whisks whose true distance is known.
     judged: whisks with a truth and a distance that no warning about the recording speaks against.
@@ -76,12 +77,12 @@ class Accuracy:
     @property
     def rms_percent(self) -> float:
         """Return the RMS error, per cent of the truth; NaN where nothing is judged."""
-        return float(np.sqrt(np.mean(self.errors_percent**2))) if self.judged else math.nan
+        return rms(self.errors_percent)
 
     @property
     def rms_mm(self) -> float:
         """Return the RMS error, mm; NaN where nothing is judged."""
-        return float(np.sqrt(np.mean(self.errors_mm**2))) if self.judged else math.nan
+        return rms(self.errors_mm)
 
     @property
     def worst(self) -> Judged | None:
@@ -103,9 +104,8 @@ class Accuracy:
     @property
     def is_covered(self) -> bool:
         """Return whether as many 95 % intervals hold the truth as chance lets one expect."""
-        chance = bdtr(
-            self.intervals_holding, self.intervals, INTERVAL_SHARE
-        )  # of no more than these
+        # The probability that no more than these hold.
+        chance = bdtr(self.intervals_holding, self.intervals, INTERVAL_SHARE)
         return self.intervals > 0 and bool(chance >= LEAST_CHANCE)
 
     def is_worse_than(self, other: "Accuracy") -> bool:
@@ -128,10 +128,11 @@ def accuracies(results: Iterable[TrialResult]) -> list[Accuracy]:
     """Return the accuracy of each estimator, in the order in which the results name them."""
     results = list(results)
     intervals = _finite_intervals(results)
-    by_estimator: dict[str, list[Judged]] = {}
+    judged = []
     for one in judge(results):
         if one.purpose == "measure" and not one.one_factor and math.isfinite(one.d_x_mm):
-            by_estimator.setdefault(one.estimator, []).append(one)
+            judged.append(one)
+    by_estimator = grouped(judged, lambda one: one.estimator)
     return [_accuracy(name, mine, intervals) for name, mine in by_estimator.items()]
 
 
@@ -150,29 +151,40 @@ def _accuracy(
     name: str, mine: Sequence[Judged], intervals: dict[Key, tuple[float, float]]
 ) -> Accuracy:
     """Return the accuracy of one estimator from its whisks with a truth."""
-    answered = [one for one in mine if math.isfinite(one.error_percent)]
-    stated = 0
-    holding = 0
+    judged: list[Judged] = []
+    left_out: list[Judged] = []
+    without_distance: list[Judged] = []
+    warned: list[Judged] = []
+    held: list[bool] = []  # whether each interval holds the truth
     for one in mine:
+        has_distance = math.isfinite(one.error_percent)
+        if not has_distance:
+            without_distance.append(one)
+        elif one.doubtful:
+            left_out.append(one)
+        else:
+            judged.append(one)
+        if has_distance and one.status:
+            warned.append(one)
         interval = intervals.get((one.trial, one.whisk, name))
         if interval is not None and not one.doubtful:
-            stated += 1
-            holding += interval[0] <= one.d_x_mm <= interval[1]
+            low, high = interval
+            held.append(low <= one.d_x_mm <= high)
     return Accuracy(
         estimator=name,
         with_truth=len(mine),
-        judged=tuple(one for one in answered if not one.doubtful),
-        left_out=tuple(one for one in answered if one.doubtful),
-        without_distance=tuple(one for one in mine if not math.isfinite(one.error_percent)),
-        warned=tuple(one for one in answered if one.status),
-        intervals=stated,
-        intervals_holding=int(holding),
+        judged=tuple(judged),
+        left_out=tuple(left_out),
+        without_distance=tuple(without_distance),
+        warned=tuple(warned),
+        intervals=len(held),
+        intervals_holding=sum(held),
     )
 
 
 @dataclass(frozen=True)
 class TruthUncertainty:
-    """Hold the median standard deviations of the truth over the measured whisks that have one.
+    """Median standard deviations of the truth over the measured whisks that have one.
 
     known, measured: numbers of whisks with a truth and of all.
     """

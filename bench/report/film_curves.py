@@ -85,11 +85,7 @@ def _plot(panel: np.ndarray, theta_deg: np.ndarray, curve: Curve, k: int) -> Non
     x_axis = Limits.around(theta_deg, 56, width - 14)
     known = curve.values[np.isfinite(curve.values)]
     y_axis = Limits.around(np.append(known, 0.0), height - 26, 30)
-    for row, value in y_axis.ticks(3).items():
-        cv2.line(panel, (x_axis.low_px, row), (x_axis.high_px, row), _GRID, 1)
-        put_text(panel, value, (6, row + 4), _INK)
-    for column, value in x_axis.ticks(5).items():
-        put_text(panel, value, (column - 6, height - 8), _INK)
+    _draw_grid(panel, x_axis, y_axis)
     points = np.stack([x_axis.to_px(theta_deg), y_axis.to_px(curve.values)], axis=1)
     polyline(panel, points, _GREY)
     polyline(panel, points[: k + 1], _INK)
@@ -98,3 +94,12 @@ def _plot(panel: np.ndarray, theta_deg: np.ndarray, curve: Curve, k: int) -> Non
     value = f" = {curve.values[k]:.3f}" if np.isfinite(curve.values[k]) else ""
     title = f"{curve.name}{value}  at theta = {theta_deg[k]:.2f} deg"
     put_text(panel, title, (x_axis.low_px, 18), _INK)
+
+
+def _draw_grid(panel: np.ndarray, x_axis: Limits, y_axis: Limits) -> None:
+    """Draw a line at each tick of the upright axis, and the values of both axes' ticks."""
+    for row, value in y_axis.ticks(3).items():
+        cv2.line(panel, (x_axis.low_px, row), (x_axis.high_px, row), _GRID, 1)
+        put_text(panel, value, (6, row + 4), _INK)
+    for column, value in x_axis.ticks(5).items():
+        put_text(panel, value, (column - 6, panel.shape[0] - 8), _INK)

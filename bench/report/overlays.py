@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from bench.base.drawing import is_drawn, save_picture
-from bench.records.trial_result import SeenWhisk, TrialResult
+from bench.records.trial_result import Drawing, SeenWhisk, TrialResult
 from bench.report.painting import as_8_bit, polyline
 from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
@@ -61,16 +61,26 @@ def overlay(trial: Trial, whisk: SeenWhisk) -> Image.Image:
             panels.append(np.pad(panel, border, constant_values=255))
         rows.append(np.hstack(panels))
     picture = Image.fromarray(np.vstack(rows))
-    pen = ImageDraw.Draw(picture)
-    width, height = _PANEL_PX
-    for row, camera in enumerate(cameras):
-        top = row * (height + _TITLE_PX + _GAP_PX) + 3
-        for column, (moment, drawing) in enumerate(drawings.items()):
-            place = (column * (width + _GAP_PX), top)
-            angle = _theta(whisk, drawing.frame)
-            title = f"{camera}, frame {drawing.frame}, {_MOMENTS[moment]}: {angle}"
-            pen.text(place, title, fill=(0, 0, 0), font=_font())
+    _write_titles(ImageDraw.Draw(picture), cameras, drawings, whisk)
     return picture
+
+
+def _write_titles(
+    pen: ImageDraw.ImageDraw,
+    cameras: Sequence[str],
+    drawings: Mapping[str, Drawing],
+    whisk: SeenWhisk,
+) -> None:
+    """Write camera, frame and pushing angle above each panel. drawings: by the name of the moment."""
+    width, height = _PANEL_PX
+    for column, (moment, drawing) in enumerate(drawings.items()):
+        left = column * (width + _GAP_PX)
+        (theta_rad,) = whisk.frames.theta_rad.value[whisk.frames.index == drawing.frame]
+        angle = f"{np.degrees(theta_rad):+.2f}° past touch"
+        for row, camera in enumerate(cameras):
+            top = row * (height + _TITLE_PX + _GAP_PX) + 3
+            title = f"{camera}, frame {drawing.frame}, {_MOMENTS[moment]}: {angle}"
+            pen.text((left, top), title, fill=(0, 0, 0), font=_font())
 
 
 @lru_cache
@@ -80,12 +90,6 @@ def _font() -> ImageFont.FreeTypeFont:
 
     path = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
     return ImageFont.truetype(str(path), _FONT_PX)
-
-
-def _theta(whisk: SeenWhisk, frame: int) -> str:
-    """Return the pushing angle of a frame in words."""
-    (theta_rad,) = whisk.frames.theta_rad.value[whisk.frames.index == frame]
-    return f"{np.degrees(theta_rad):+.2f}° past touch"
 
 
 def _pictures(
@@ -111,17 +115,16 @@ def _panel(picture: np.ndarray | None, lines: Mapping[str, np.ndarray]) -> np.nd
     corner, scale = _whisker_view(grey.shape, lines["wire"])
     panel = _draw_view(grey, corner, scale, _PANEL_PX, lines)
     contact = np.asarray(lines["contact"], dtype=float)
-    if not np.isfinite(contact).all():
-        return panel
-    inset_scale = _INSET_PX / (2.0 * _AROUND_PX)
-    inset_size = (_INSET_PX, _INSET_PX)
-    inset = _draw_view(grey, contact - _AROUND_PX, inset_scale, inset_size, lines)
-    low = np.round(scale * (contact - _AROUND_PX - corner)).astype(int)
-    high = np.round(scale * (contact + _AROUND_PX - corner)).astype(int)
-    cv2.rectangle(panel, low.tolist(), high.tolist(), _WHITE, 1)
-    cv2.rectangle(inset, (0, 0), (_INSET_PX - 1, _INSET_PX - 1), _WHITE, 2)
-    place = slice(-_EDGE_PX - _INSET_PX, -_EDGE_PX)
-    panel[place, place] = inset
+    if np.isfinite(contact).all():
+        low = contact - _AROUND_PX
+        size = (_INSET_PX, _INSET_PX)
+        inset = _draw_view(grey, low, _INSET_PX / (2.0 * _AROUND_PX), size, lines)
+        cv2.rectangle(inset, (0, 0), (_INSET_PX - 1, _INSET_PX - 1), _WHITE, 2)
+        ends = np.stack([low, contact + _AROUND_PX])
+        start, end = np.round(scale * (ends - corner)).astype(int).tolist()
+        cv2.rectangle(panel, start, end, _WHITE, 1)
+        place = slice(-_EDGE_PX - _INSET_PX, -_EDGE_PX)
+        panel[place, place] = inset
     return panel
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.pooling import grouped, rms
 from bench.base.tables import sigma_name
 from bench.gauges.matrix import GaugeCalibration
 from bench.session.session import Session
@@ -51,9 +52,8 @@ class Score:
         if len(finite):
             coverage = f"{100 * np.mean(finite <= Z_95):5.0f} %   {finite.max():5.2f}"
         bias = np.mean(self.errors)
-        rms = np.sqrt(np.mean(self.errors**2))
         return (
-            f"{self.name:<28}{len(self.errors):5d}  {bias:+9.4f}  {rms:8.4f} {self.unit:<4}"
+            f"{self.name:<28}{len(self.errors):5d}  {bias:+9.4f}  {rms(self.errors):8.4f} {self.unit:<4}"
             f"{coverage}"
         )
 
@@ -73,16 +73,16 @@ def score_all(
 
     runs: each with its folder. gauges: of the first.
     """
-    by_name: dict[str, list[Score]] = {}
+    found: list[Score] = []
     try:
         for session, out in runs:
-            for one in _scores(session, out):
-                by_name.setdefault(one.name, []).append(one)
+            found += _scores(session, out)
         gauge_lines = list(_gauge_lines(runs[0][0], gauges))
     except (OSError, ValueError, KeyError, IndexError) as problem:
         return [f"the truth files cannot be read: {type(problem).__name__} {problem}"]
-    if not by_name:
+    if not found:
         return gauge_lines
+    by_name = grouped(found, lambda one: one.name)
     head = f"{'':<28}{'n':>5}  {'bias':>9}  {'RMS':>8}     in 95 %  most |z|"
     return [head, *(_joined(scores).line() for scores in by_name.values()), *gauge_lines]
 
@@ -116,11 +116,9 @@ def _scores(session: Session, out: Path) -> Iterator[Score]:
     for row, truth in truths:
         if row["trial"] in measured:
             true_mm[row["trial"], row["whisk"]] = truth.get("d_x_mm")
-    estimates: dict[str, list[Pair]] = {}
-    for row in _read_rows(out / "estimates.csv"):
-        pair = (row, true_mm.get((row["trial"], row["whisk"])))
-        estimates.setdefault(row["estimator"], []).append(pair)
-    for estimator, pairs in estimates.items():
+    estimates = grouped(_read_rows(out / "estimates.csv"), lambda row: row["estimator"])
+    for estimator, mine in estimates.items():
+        pairs = [(row, true_mm.get((row["trial"], row["whisk"]))) for row in mine]
         yield from _compare("d_x_est_mm", pairs, f"d_x by {estimator}")
 
 

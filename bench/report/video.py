@@ -33,6 +33,7 @@ _BAR = (74, 175, 77)
 _CONTACT = (28, 26, 228)
 _PATH = (142, 126, 31)
 _PAPER = (255, 255, 255)
+_NO_PICTURE = (60, 60, 60)
 _FRAMES_READ = 32  # at once
 _HALF_BAR_MM = 45.0
 _TITLE_PLACE = (12, 24)  # of a camera's picture, px
@@ -150,38 +151,45 @@ def _film(
 def _camera_picture(
     grey: np.ndarray | None, facts: CameraFacts, result: TrialResult, whisk: SeenWhisk, k: int
 ) -> np.ndarray:
-    """Draw one camera's picture, (h, _WIDTH_PX, 3), with what was found in the whisk's frame k."""
+    """Return one camera's picture, (h, _WIDTH_PX, 3), with what was found in the whisk's frame k."""
     width, height = facts.size_px
-    scale = _WIDTH_PX / width
-    size = (_WIDTH_PX, round(scale * height))
+    size = (_WIDTH_PX, round(_WIDTH_PX / width * height))
     if grey is None:
-        picture = np.full((size[1], size[0], 3), 60, np.uint8)
-        put_text(picture, f"{facts.name}: no picture", _TITLE_PLACE, _PAPER)
-        return picture
-    small = cv2.resize(as_8_bit(grey), size, interpolation=cv2.INTER_AREA)
-    picture = cv2.cvtColor(small, cv2.COLOR_GRAY2BGR)
+        picture = np.full((size[1], size[0], 3), _NO_PICTURE, np.uint8)
+        title = f"{facts.name}: no picture"
+    else:
+        small = cv2.resize(as_8_bit(grey), size, interpolation=cv2.INTER_AREA)
+        picture = cv2.cvtColor(small, cv2.COLOR_GRAY2BGR)
+        _draw_lines(picture, facts, result, whisk, k)
+        title = f"{facts.name}, frame {int(whisk.frames.index[k])}"
+    put_text(picture, title, _TITLE_PLACE, _PAPER)
+    return picture
+
+
+def _draw_lines(
+    picture: np.ndarray, facts: CameraFacts, result: TrialResult, whisk: SeenWhisk, k: int
+) -> None:
+    """Draw bar, wire, contact, and the contact's path up to frame k, into a camera's picture."""
     camera = Camera(
         facts.name, tuple(facts.size_px), facts.matrix, facts.distortion, facts.T_camera_rig
     )
+    scale = _WIDTH_PX / facts.size_px[0]
 
     def project(points_mm: np.ndarray) -> np.ndarray:
-        """Project points (n, 3) mm into the small picture; the centre of a pixel is whole."""
+        """Project points (n, 3) mm into the picture; the centre of a pixel is a whole number."""
         return scale * (camera.project(points_mm) + 0.5) - 0.5
 
     for edge in _bar_edges(camera, result.seen, whisk):
         polyline(picture, project(edge), _BAR)
-    frames = whisk.frames
-    contact_mm = frames.point_mm.value[k] if frames.touching[k] else None
+    points_mm = whisk.frames.point_mm.value[: k + 1]
+    touching = np.asarray(whisk.frames.touching[: k + 1], dtype=bool)
+    contact_mm = points_mm[k] if touching[k] else None
     polyline(picture, project(_wire(result, whisk, k, contact_mm)), _WIRE)
-    touching = np.asarray(frames.touching[: k + 1], dtype=bool)
-    path_mm = frames.point_mm.value[: k + 1][touching]
-    if len(path_mm) > 1:
-        polyline(picture, project(path_mm), _PATH)
+    if np.count_nonzero(touching) > 1:
+        polyline(picture, project(points_mm[touching]), _PATH)
     if contact_mm is not None:
         ((x, y),) = project(contact_mm[None])
         cv2.circle(picture, (round(x), round(y)), 5, _CONTACT, 1, cv2.LINE_AA)
-    put_text(picture, f"{facts.name}, frame {int(frames.index[k])}", _TITLE_PLACE, _PAPER)
-    return picture
 
 
 def _bar_edges(camera: Camera, seen: SeenTrial, whisk: SeenWhisk) -> list[np.ndarray]:

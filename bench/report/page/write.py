@@ -20,7 +20,7 @@ from bench.report.page.drawings import Drawings, draw
 from bench.report.page.gauge_tables import gauge_part
 from bench.report.page.methods import bibliography, methods
 from bench.report.page.rig_in_3d import ELLIPSOID_FACTOR, scene
-from bench.report.page.words import number, rows_of
+from bench.report.page.words import by_whisk, number, rows_of
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run_facts import CameraFacts, RunRecord
@@ -78,7 +78,7 @@ def page(out: Path, record: RunRecord, run: Finished) -> str:
     """Return the page as HTML. out: the folder of its pictures and of the analyses' tables."""
     rows = rows_of(run.results)
     estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
-    row_of = {(row.trial, row.seen.whisk): row for row in rows}
+    row_of = by_whisk(rows)
     drawn = scene(record, rows)
     drawings = Drawings()
     if record.settings.figures:
@@ -95,7 +95,7 @@ def page(out: Path, record: RunRecord, run: Finished) -> str:
         truth=run.accuracy.truth,
         doubts=list(zip(record.doubts, doubt_cures)),
         drawings=drawings,
-        together=page_tables(out),
+        page_tables=page_tables(out),
         scene=as_script(drawn),
         scene_known=bool(drawn["cameras"] or drawn["whisks"]),
         settings=settings,
