@@ -178,6 +178,14 @@ class BarLine:
     point_mm: np.ndarray
     direction: np.ndarray
 
+    def segment(self, near_mm: np.ndarray, half_mm: float, points: int = 2) -> np.ndarray:
+        """Return points (n, 3) of the axis, up to half_mm on either side of its place nearest to
+        a point (3,).
+        """
+        along_mm = (near_mm - self.point_mm) @ self.direction
+        places_mm = along_mm + np.linspace(-half_mm, half_mm, points)
+        return self.point_mm + places_mm[:, None] * self.direction
+
 
 @dataclass(frozen=True, eq=False)
 class BackStroke:

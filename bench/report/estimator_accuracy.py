@@ -127,35 +127,36 @@ class Accuracy:
 def accuracies(results: Iterable[TrialResult]) -> list[Accuracy]:
     """Return the accuracy of each estimator, in the order in which the results name them."""
     results = list(results)
-    intervals = _finite_intervals(results)
+    holding = _intervals_holding(results)
     judged = []
     for one in judge(results):
         if one.purpose == "measure" and not one.one_factor and math.isfinite(one.d_x_mm):
             judged.append(one)
     by_estimator = grouped(judged, lambda one: one.estimator)
-    return [_accuracy(name, mine, intervals) for name, mine in by_estimator.items()]
+    return [_accuracy(name, mine, holding) for name, mine in by_estimator.items()]
 
 
-def _finite_intervals(results: Sequence[TrialResult]) -> dict[Key, tuple[float, float]]:
-    """Return the 95 % interval (low, high) of each estimate in mm where both ends are known."""
-    intervals = {}
+def _intervals_holding(results: Sequence[TrialResult]) -> dict[Key, bool]:
+    """Return whether the 95 % interval of each estimate holds the truth, where both are known."""
+    holding = {}
     for result, seen, felt in whisks(results):
         for estimate in felt.estimates:
-            ends = (estimate.d_x_est_low_mm, estimate.d_x_est_high_mm)
-            if np.isfinite(ends).all():
-                intervals[result.trial.name, seen.whisk, estimate.estimator] = ends
-    return intervals
+            holds = estimate.holds(seen.d_x_mm.value)
+            if holds is not None:
+                holding[result.trial.name, seen.whisk, estimate.estimator] = holds
+    return holding
 
 
-def _accuracy(
-    name: str, mine: Sequence[Judged], intervals: dict[Key, tuple[float, float]]
-) -> Accuracy:
-    """Return the accuracy of one estimator from its whisks with a truth."""
+def _accuracy(name: str, mine: Sequence[Judged], holding: dict[Key, bool]) -> Accuracy:
+    """Return the accuracy of one estimator from its whisks with a truth.
+
+    holding: whether the interval of an estimate holds the truth.
+    """
     judged: list[Judged] = []
     left_out: list[Judged] = []
     without_distance: list[Judged] = []
     warned: list[Judged] = []
-    held: list[bool] = []  # whether each interval holds the truth
+    intervals: list[bool] = []  # whether each holds the truth
     for one in mine:
         has_distance = math.isfinite(one.error_percent)
         if not has_distance:
@@ -166,10 +167,9 @@ def _accuracy(
             judged.append(one)
         if has_distance and one.status:
             warned.append(one)
-        interval = intervals.get((one.trial, one.whisk, name))
-        if interval is not None and not one.doubtful:
-            low, high = interval
-            held.append(low <= one.d_x_mm <= high)
+        key = (one.trial, one.whisk, name)
+        if key in holding and not one.doubtful:
+            intervals.append(holding[key])
     return Accuracy(
         estimator=name,
         with_truth=len(mine),
@@ -177,8 +177,8 @@ def _accuracy(
         left_out=tuple(left_out),
         without_distance=tuple(without_distance),
         warned=tuple(warned),
-        intervals=len(held),
-        intervals_holding=sum(held),
+        intervals=len(intervals),
+        intervals_holding=sum(intervals),
     )
 
 

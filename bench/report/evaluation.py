@@ -53,7 +53,7 @@ class Evaluation(Finished):
 
 
 def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Settings) -> Finished:
-    """Bring the results together as they stand in trials/."""
+    """Return the results brought together, as they stand in trials/."""
     results = tuple(with_runs(results, whisker, settings))
     shared = shared_touch(results)
     doubt = shared_doubt(shared)

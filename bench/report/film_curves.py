@@ -20,14 +20,6 @@ _MARGIN = 0.06
 
 
 @dataclass(frozen=True)
-class Curve:
-    """A quantity over the motor angle: name with unit, a value a frame (n,), NaN where it is not known."""
-
-    name: str
-    values: np.ndarray
-
-
-@dataclass(frozen=True)
 class Limits:
     """Ends of an axis: in the quantity's unit, and the pixels that they have in a panel."""
 
@@ -63,36 +55,37 @@ def with_curves(picture: np.ndarray, whisk: SeenWhisk, k: int) -> np.ndarray:
     curves = _curves_of(whisk)
     width = strip.shape[1] // len(curves)
     theta_deg = np.degrees(whisk.frames.theta_rad.value)
-    for place, curve in enumerate(curves):
-        _plot(strip[:, place * width : (place + 1) * width], theta_deg, curve, k)
+    for place, (name, values) in enumerate(curves.items()):
+        panel = strip[:, place * width : (place + 1) * width]
+        _plot(panel, name, theta_deg, values, k)
     whole = np.vstack([picture, strip])
     height, width, _ = whole.shape
     return whole[: height // 2 * 2, : width // 2 * 2]  # coders want even sizes
 
 
-def _curves_of(whisk: SeenWhisk) -> tuple[Curve, ...]:
-    """Return the curves below the pictures: slip and force angle where the whisker touches."""
+def _curves_of(whisk: SeenWhisk) -> dict[str, np.ndarray]:
+    """Return slip and force angle (frames,) by name and unit, NaN where the whisker does not touch."""
     frames = whisk.frames
     touching = np.asarray(frames.touching, dtype=bool)
     slip_mm = np.where(touching, frames.slip_mm.value, np.nan)
     phi_deg = np.where(touching, np.degrees(frames.phi_rad.value), np.nan)
-    return Curve("slip [mm]", slip_mm), Curve("phi [deg]", phi_deg)
+    return {"slip [mm]": slip_mm, "phi [deg]": phi_deg}
 
 
-def _plot(panel: np.ndarray, theta_deg: np.ndarray, curve: Curve, k: int) -> None:
-    """Draw one curve into its panel (h, w, 3)."""
+def _plot(panel: np.ndarray, name: str, theta_deg: np.ndarray, values: np.ndarray, k: int) -> None:
+    """Draw values over the pushing angle (frames,) into their panel (h, w, 3)."""
     height, width, _ = panel.shape
     x_axis = Limits.around(theta_deg, 56, width - 14)
-    known = curve.values[np.isfinite(curve.values)]
+    known = values[np.isfinite(values)]
     y_axis = Limits.around(np.append(known, 0.0), height - 26, 30)
     _draw_grid(panel, x_axis, y_axis)
-    points = np.stack([x_axis.to_px(theta_deg), y_axis.to_px(curve.values)], axis=1)
+    points = np.stack([x_axis.to_px(theta_deg), y_axis.to_px(values)], axis=1)
     polyline(panel, points, _GREY)
     polyline(panel, points[: k + 1], _INK)
     now = round(points[k, 0])
     cv2.line(panel, (now, y_axis.high_px), (now, y_axis.low_px), _NOW, 1)
-    value = f" = {curve.values[k]:.3f}" if np.isfinite(curve.values[k]) else ""
-    title = f"{curve.name}{value}  at theta = {theta_deg[k]:.2f} deg"
+    value = f" = {values[k]:.3f}" if np.isfinite(values[k]) else ""
+    title = f"{name}{value}  at theta = {theta_deg[k]:.2f} deg"
     put_text(panel, title, (x_axis.low_px, 18), _INK)
 
 

@@ -23,7 +23,7 @@ _SAME_DISTANCE = 0.1
 
 
 def write_figure_8(outs: Sequence[Path], folder: Path) -> tuple[list[Path], list[str]]:
-    """Pool evaluated runs; write figure_8.png, .svg and .csv, each whole.
+    """Write figure_8.png, .svg and .csv of pooled runs, each whole.
 
     Returns the paths, and a line on α a panel. Raises BadInput where a folder is no evaluated run, is
     given twice, cannot be pooled with the first, or none of them holds a whisk.

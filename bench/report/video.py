@@ -196,10 +196,8 @@ def _bar_edges(camera: Camera, seen: SeenTrial, whisk: SeenWhisk) -> list[np.nda
     """Return both edges (n, 3) mm of the bar as a camera sees them; none where no bar is known."""
     if seen.bar is None or not whisk.has_truth:
         return []
-    along = seen.bar.direction
-    nearest = seen.bar.point_mm + ((whisk.point_mm.value - seen.bar.point_mm) @ along) * along
-    axis = nearest + np.linspace(-_HALF_BAR_MM, _HALF_BAR_MM, 20)[:, None] * along
-    normal = np.cross(along, nearest - camera.centre_mm)
+    axis = seen.bar.segment(whisk.point_mm.value, _HALF_BAR_MM, points=20)
+    normal = np.cross(seen.bar.direction, axis[0] - camera.centre_mm)
     across = seen.bar_radius_mm * normal / np.linalg.norm(normal)
     return [axis - across, axis + across]
 

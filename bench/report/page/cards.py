@@ -151,23 +151,27 @@ def _beam_changes(beam: BeamCheck) -> list[tuple[str, Value, str]]:
 def _estimate(row: Row, estimate: EstimateRow) -> tuple[str, ...]:
     """Return estimator, distance, 95 % interval, error in mm, in per cent, status."""
     truth = row.seen.d_x_mm
-    d_x = estimate.d_x_est_mm
     low = estimate.d_x_est_low_mm
     high = estimate.d_x_est_high_mm
     interval = MISSING
     if math.isfinite(low) and math.isfinite(high):
         interval = f"{number(low, 1)} to {number(high, 1)}"
-    error = d_x.value - truth.value
-    sigma = math.hypot(d_x.sigma, truth.sigma)
+    error = _less_truth(estimate, truth)
     percent = 100.0 / truth.value
     return (
         label_of(estimate.estimator),
-        value_text(d_x),
+        value_text(estimate.d_x_est_mm),
         interval,
-        with_sigma(error, sigma, sign=True),
-        with_sigma(percent * error, percent * sigma, sign=True),
+        with_sigma(error.value, error.sigma, sign=True),
+        with_sigma(percent * error.value, percent * error.sigma, sign=True),
         estimate.status,
     )
+
+
+def _less_truth(estimate: EstimateRow, truth: Value) -> Value:
+    """Return estimate less truth, mm."""
+    sigma = math.hypot(estimate.d_x_est_mm.sigma, truth.sigma)
+    return Value(estimate.d_x_est_mm.value - truth.value, sigma)
 
 
 def columns(estimators: list[str]) -> list[Cell]:
@@ -219,12 +223,11 @@ def _error(row: Row, estimator: str) -> Cell:
     """Return the error of one estimator, per cent of the true distance."""
     truth = row.seen.d_x_mm
     for estimate in row.felt.estimates:
-        d_x = estimate.d_x_est_mm
-        if estimate.estimator == estimator and math.isfinite(d_x.value - truth.value):
+        error = _less_truth(estimate, truth)
+        if estimate.estimator == estimator and math.isfinite(error.value):
             percent = 100.0 / truth.value
-            error = percent * (d_x.value - truth.value)
-            sigma = percent * math.hypot(d_x.sigma, truth.sigma)
-            return Cell(with_sigma(error, sigma, sign=True), error)
+            text = with_sigma(percent * error.value, percent * error.sigma, sign=True)
+            return Cell(text, percent * error.value)
     return Cell(MISSING, math.nan)
 
 
