@@ -111,6 +111,11 @@ def _scores(session: Session, out: Path) -> Iterator[Score]:
     for column in _IN_TRACK:
         yield from _compare(column, _frames(session, out, column), f"{column}, touching frames")
     yield from _friction(session, out)
+    yield from _estimates(session, out, truths)
+
+
+def _estimates(session: Session, out: Path, truths: Sequence[tuple[Row, dict]]) -> Iterator[Score]:
+    """Yield the score of each estimator's distances. truths: rows of whisks.csv with their truth."""
     measured = {trial.name for trial in session.trials if trial.purpose == "measure"}
     true_mm = {}
     for row, truth in truths:

@@ -73,9 +73,12 @@ def draw_sensing_plane(
     _draw_bar(axes, points)
     _draw_cone(axes, points, friction)
     _draw_whisker(axes, points, contact_path(whisk))
+    _draw_force(axes, points)
     _draw_deflection(axes, points)
     _draw_angles(axes, whisk, points)
     _draw_slip(axes, points)
+    _write_names(axes, points)
+    _write_values(axes, whisk)
     corners = np.array([_P0, points.contact, points.virtual])
     left, bottom = corners.min(axis=0) - _MARGIN_MM
     right, top = corners.max(axis=0) + _MARGIN_MM
@@ -84,16 +87,8 @@ def draw_sensing_plane(
     theta_deg = np.degrees(whisk.at.theta_rad)
     title = f"{result.trial.name}, whisk {whisk.whisk}, θ = {theta_deg:.2f}°"
     axes.set_title(title, loc="left")
-    axes.text(
-        0.98,
-        0.02,
-        _values(whisk),
-        transform=axes.transAxes,
-        ha="right",
-        va="bottom",
-        fontsize=8,
-        linespacing=1.5,
-        bbox={"fc": "white", "ec": "none", "alpha": 0.8},
+    axes.legend(
+        loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=7, columnspacing=1.2
     )
 
 
@@ -138,32 +133,38 @@ def _draw_cone(axes: Axes, points: PlanePoints, friction: tuple[float, str]) -> 
 
 
 def _draw_whisker(axes: Axes, points: PlanePoints, path: np.ndarray) -> None:
-    """Draw the whisker's section at P0, P and V with their names, the force, and the contact's path (n, 2)."""
-    contact = points.contact
-    virtual = points.virtual
+    """Draw the whisker's section at P0, P and V, and the contact's path (n, 2)."""
     radius = points.radius_mm
-    for place, fill in ((_P0, "white"), (contact, _WIRE)):
+    for place, fill in ((_P0, "white"), (points.contact, _WIRE)):
         axes.add_patch(Circle(place, radius, fc=fill, ec=_WIRE, lw=1.2, alpha=0.65, zorder=3))
-    axes.add_patch(Circle(virtual, radius, fc="none", ec=_WIRE, lw=1.0, ls=":", zorder=3))
+    axes.add_patch(Circle(points.virtual, radius, fc="none", ec=_WIRE, lw=1.0, ls=":", zorder=3))
     axes.plot(*path.T, "-o", color=_PATH, ms=2.5, lw=1.0, zorder=5, label="contact, frame by frame")
+
+
+def _draw_force(axes: Axes, points: PlanePoints) -> None:
+    """Draw the deflection from V to P as an arrow, and a line onward in its direction."""
     arrow = {"arrowstyle": "-|>", "color": _FORCE, "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", contact, virtual, arrowprops=arrow, zorder=4)
-    onward = contact + 0.5 * (contact - virtual)
-    _draw_line(axes, [contact, onward], color=_FORCE, lw=0.8, zorder=4)
+    axes.annotate("", points.contact, points.virtual, arrowprops=arrow, zorder=4)
+    onward = points.contact + 0.5 * (points.contact - points.virtual)
+    _draw_line(axes, [points.contact, onward], color=_FORCE, lw=0.8, zorder=4)
     axes.plot([], [], color=_FORCE, lw=1.6, label="deflection d, along the force")
-    # P's name stands beyond the slip and in the bar, where neither cone nor slip are.
+
+
+def _write_names(axes: Axes, points: PlanePoints) -> None:
+    """Write the names of P0, P and V beside them.
+
+    P's stands beyond the slip and in the bar, where neither cone nor slip are.
+    """
     slip = points.slip_direction
     into_bar = slip - 0.5 * points.normal
+    into_bar /= np.linalg.norm(into_bar)
     names = {
-        "P$_0$": -(radius + 0.32) * slip,
-        "P": contact + (radius + 0.28) * into_bar / np.linalg.norm(into_bar),
-        "V": virtual + np.array([0.55, -0.55]),
+        "P$_0$": -(points.radius_mm + 0.32) * slip,
+        "P": points.contact + (points.radius_mm + 0.28) * into_bar,
+        "V": points.virtual + np.array([0.55, -0.55]),
     }
     for name, place in names.items():
         axes.annotate(name, place, fontsize=10, zorder=6, **_CENTRED)
-    axes.legend(
-        loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=7, columnspacing=1.2
-    )
 
 
 def _draw_slip(axes: Axes, points: PlanePoints) -> None:
@@ -248,8 +249,8 @@ def _unit_vector(angle_deg: float) -> np.ndarray:
     return np.array([np.cos(angle_rad), np.sin(angle_rad)])
 
 
-def _values(whisk: SeenWhisk) -> str:
-    """Return the whisk's values with one sigma, a line each."""
+def _write_values(axes: Axes, whisk: SeenWhisk) -> None:
+    """Write the whisk's values with one sigma into a corner, a line each."""
     at = whisk.at
     quantities = [
         ("d$_x$", whisk.d_x_mm, 1.0, "mm", 3),
@@ -262,7 +263,17 @@ def _values(whisk: SeenWhisk) -> str:
     for name, of, scale, unit, digits in quantities:
         value = f"{scale * of.value:.{digits}f} ± {scale * of.sigma:.{digits}f}"
         lines.append(f"{name} = {value} {unit}")
-    return "\n".join(lines)
+    axes.text(
+        0.98,
+        0.02,
+        "\n".join(lines),
+        transform=axes.transAxes,
+        ha="right",
+        va="bottom",
+        fontsize=8,
+        linespacing=1.5,
+        bbox={"fc": "white", "ec": "none", "alpha": 0.8},
+    )
 
 
 def contact_path(whisk: SeenWhisk) -> np.ndarray:
