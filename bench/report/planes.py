@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from bench.base.drawing import is_drawn, save
 from bench.gauges.gauge_readings import reference_from_pictures
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.report.run_facts import plane_name
 from bench.report.sensing_plane import draw_sensing_plane
 from bench.session.whisker import Whisker
 
@@ -35,11 +36,6 @@ class Curve:
     colour: str
     label: str
     felt: tuple[float, float, float] | None = None
-
-
-def plane_name(trial: str, whisk: int) -> str:
-    """Return the name of a whisk's figure in the results' folder."""
-    return f"planes/{trial}_{whisk}.png"
 
 
 def draw_planes(

@@ -12,7 +12,7 @@ from bench.records.trial_result import EstimateRow
 from bench.report.assembly import status_of
 from bench.report.page.thumbnails import picture_source
 from bench.report.page.words import MISSING, Row, number, value_text, with_sigma
-from bench.report.planes import plane_name
+from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
 from vision.fit.beam_check import BeamCheck
 from vision.geometry.counted import counted
