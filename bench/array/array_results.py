@@ -24,6 +24,7 @@ from bench.base.tables import WHISKER
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import TrialResult, whisks
 from bench.report.assembly import estimate_rows, whisk_rows
+from bench.report.estimator_accuracy import RunAccuracy
 from bench.report.evaluation import Finished, finished
 from bench.report.pooled import read_run
 from bench.report.record import ARRAY, RUNS, read_record
@@ -196,7 +197,7 @@ def _summarise(
     title = f"{record.session}, {counted(len(runs), 'whisker')}"
     has_pictures = any(run.record.has_pictures for run in runs)
     settings = runs[0].record.settings
-    general = verdict(title, has_pictures, results, settings, len(doubtful))
+    general = verdict(title, has_pictures, RunAccuracy.of_results(results), settings, len(doubtful))
     files = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
     surface_title = "Surface: contacts from the object, mm (surface.csv)"
     size_title = "Size of the object by (10), its place free (size.csv)"

@@ -123,6 +123,7 @@ def _evaluate_whisker(
         results=whole.results,
         friction=whole.friction,
         alpha_est_sigma_rad=whole.alpha_est_sigma_rad,
+        doubt=whole.doubt,
         session=session,
         out=out,
         gauges=gauges,

@@ -13,6 +13,7 @@ from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.at_angle import TruthAtAngle
 from vision.truth.records import FrameTruth, WhiskTruth
 from vision.truth.value import NAN, UNKNOWN, Value
+from vision.wire.one_sided import SeenWidth
 
 
 @dataclass(frozen=True)
@@ -177,6 +178,14 @@ class BarLine:
     point_mm: np.ndarray
     direction: np.ndarray
 
+    def segment(self, near_mm: np.ndarray, half_mm: float, points: int = 2) -> np.ndarray:
+        """Return points (n, 3) of the axis, up to half_mm on either side of its place nearest to
+        a point (3,).
+        """
+        along_mm = (near_mm - self.point_mm) @ self.direction
+        places_mm = along_mm + np.linspace(-half_mm, half_mm, points)
+        return self.point_mm + places_mm[:, None] * self.direction
+
 
 @dataclass(frozen=True, eq=False)
 class BackStroke:
@@ -190,9 +199,11 @@ class BackStroke:
 class SeenTrial:
     """The seen half of a trial; bar, radii and clock are missing where there are no pictures.
 
-    bar_looks: ratio of the bar's apparent to its stated diameter, by camera. back: the first
-    back stroke, where it was recorded and has a truth. ways_back: the way back of each whisk,
-    run backwards, where the trial evaluates them.
+    notes: lines on frames that were dropped, damaged, corrected or left out. bar_looks: ratio of the
+    bar's apparent to its stated diameter, by camera. one_sided_light: the width of the wire that is
+    seen, by camera that sees light from one side. back: the first back stroke, where it was recorded
+    and has a truth. ways_back: the way back of each whisk, run backwards, where the trial evaluates
+    them.
     """
 
     whisks: tuple[SeenWhisk, ...]
@@ -202,6 +213,7 @@ class SeenTrial:
     wire_radius_mm: float = NAN
     clock: Clock | None = None
     bar_looks: dict[str, Value] = field(default_factory=dict)
+    one_sided_light: dict[str, SeenWidth] = field(default_factory=dict)
     back: BackStroke | None = None
     ways_back: tuple[SeenWhisk, ...] = ()
 

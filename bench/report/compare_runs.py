@@ -1,15 +1,15 @@
-"""`whisker-bench compare`: evaluated runs side by side, whisk by whisk: what changed, and by how many sigmas."""
+"""`whisker-bench compare`: by how many sigmas each whisk changed between evaluated runs."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from bench.base.drawing import label_of
 from bench.base.errors import BadInput
 from bench.base.tables import TRIAL, WHISK, Column, Kind, Table
-from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
-from bench.report.estimator_accuracy import accuracies
+from bench.records.trial_result import FeltWhisk, SeenWhisk, whisks
+from bench.report.estimator_accuracy import Accuracy
 from bench.report.evaluation import finished
 from bench.report.page.words import MISSING, number, with_sigma
 from bench.report.pooled import read_run
@@ -41,26 +41,25 @@ COMPARISON = Table(
     ),
 )
 DONE, CHANGED = 0, 1
-# A re-evaluated whisk that moves so far has another truth, or another estimate; less is within what was stated.
-_MATTERS_SIGMAS = 1.0
-# Of another day's whisk, by chance once in 370.
-_STANDS_OUT_SIGMAS = 3.0
-_MOST_SHOWN = 20  # lines in a terminal
+# [sigma] A whisk evaluated again that moves by more has another truth, or another estimate. Stated.
+_LEAST_SIGMAS_AGAIN = 1.0
+# [sigma] Of another recording's whisk, by chance once in 370. Derived.
+_LEAST_SIGMAS_ANEW = 3.0
+_MOST_LISTED = 20  # lines in a terminal
+_MOST_NAMED = 6  # whisks in a line
 _DEGREES = math.degrees(1.0)
-_SEEN: tuple[tuple[str, float, Callable[[SeenWhisk], Value]], ...] = (
-    ("d_x_mm", 1.0, lambda s: s.d_x_mm),
-    ("touch_deg", _DEGREES, lambda s: s.touch_rad),
-    ("beta_deg", _DEGREES, lambda s: s.beta_rad),
-    ("slip_mm", 1.0, lambda s: s.at.slip_mm if s.at is not None else UNKNOWN),
-)
+
+WhiskKey = tuple[str, int]  # trial, number of the whisk
+Pair = tuple[SeenWhisk, FeltWhisk]
 
 
 @dataclass(frozen=True)
 class Change:
-    """One quantity of one whisk in two runs. values: in the first run, and in `out`; NaN where it is not known.
+    """One quantity of one whisk in two runs.
 
-    sigma: of the difference. Where both are of one recording, their errors are mostly the same ones: it is then the
-    larger of the two stated. Of two recordings both count.
+    values: in the first run, and in `out`; NaN where it is not known. sigma: of the difference. Where
+    both are of one recording, their errors are mostly the same ones: it is then the larger of the two
+    stated. Of two recordings both count.
     """
 
     trial: str
@@ -72,164 +71,194 @@ class Change:
     same_recording: bool
 
     @property
+    def key(self) -> WhiskKey:
+        """Return trial and number of the whisk."""
+        return self.trial, self.whisk
+
+    @property
     def difference(self) -> float:
-        """Second less first."""
+        """Return the second value less the first."""
         return self.values[1] - self.values[0]
 
     @property
     def sigmas(self) -> float:
-        """The difference in sigmas; infinite where one of both, or its sigma, is not known."""
+        """Return the difference in sigmas; infinite where one of both, or its sigma, is not known."""
         if self.difference == 0:
             return 0.0
-        return (
-            self.difference / self.sigma
-            if math.isfinite(self.difference) and self.sigma > 0
-            else math.inf
-        )
+        if math.isfinite(self.difference) and self.sigma > 0:
+            return self.difference / self.sigma
+        return math.inf
 
     @property
     def matters(self) -> bool:
-        """Whether it is to be told."""
-        return abs(self.sigmas) > (_MATTERS_SIGMAS if self.same_recording else _STANDS_OUT_SIGMAS)
+        """Return whether the difference is more than the sigmas explain."""
+        least = _LEAST_SIGMAS_AGAIN if self.same_recording else _LEAST_SIGMAS_ANEW
+        return abs(self.sigmas) > least
 
 
 def compare_runs(outs: Sequence[Path], table: Path | None = None) -> tuple[list[str], int]:
-    """Lines on what changed from the first run to each of the others, and the exit code: 1 where anything that matters
-    did. table: a CSV file to write, a row a whisk and quantity. Raises BadInput where a folder is no run, or no whisk
-    stands in two of them."""
+    """Compare the first run with each of the others; return lines on what changed, and the exit code.
+
+    The code is 1 where anything changed that matters. table: a CSV file to write, a row a whisk and
+    quantity. Raises BadInput where a folder is no run, or no whisk stands in two of them.
+    """
     if len(outs) < 2:
         raise BadInput("is one run alone; give two or more", file=outs[0])
     if len({Path(out).resolve() for out in outs}) < len(outs):
         raise BadInput("is given twice; give each run once", file=outs[-1])
-    first, *others = (_read(Path(out)) for out in outs)
-    changes = [change for other in others for change in _changes(first, other)]
+    first, *others = [_EvaluatedRun.read(Path(out)) for out in outs]
+    changes: list[Change] = []
+    lines: list[str] = []
+    for other in others:
+        of_run = list(_changes(first, other))
+        changes += of_run
+        lines += _run_lines(first, other, of_run)
     if not changes:
-        raise BadInput(
-            f"shares no whisk with {outs[0]}: trials are told by their names", file=outs[1]
-        )
+        alone = f"shares no whisk with {outs[0]}: trials are told by their names"
+        raise BadInput(alone, file=outs[1])
     if table is not None:
-        COMPARISON.write_file(table, (_row(change, Path(outs[0])) for change in changes))
-    lines = [
-        line
-        for other in others
-        for line in _lines(first, other, [c for c in changes if c.out == other.out])
-    ]
+        COMPARISON.write_file(table, [_row(change, Path(outs[0])) for change in changes])
     lines += _accuracy_lines([first, *others])
-    return lines, CHANGED if any(c.matters for c in changes) else DONE
+    has_changed = any(change.matters for change in changes)
+    return lines, CHANGED if has_changed else DONE
 
 
 @dataclass(frozen=True)
-class _Run:
+class _EvaluatedRun:
+    """A run and its folder. recordings: hash of each trial's files. whisks: seen and felt."""
+
     out: Path
     recordings: dict[str, str]
-    results: tuple[TrialResult, ...]
+    accuracies: Sequence[Accuracy]
+    whisks: dict[WhiskKey, Pair]
 
-    def whisks(self) -> dict[tuple[str, int], tuple[SeenWhisk, FeltWhisk]]:
-        """By trial and number."""
-        return {
-            (result.trial.name, seen.whisk): (seen, felt)
-            for result, seen, felt in whisks(self.results)
-        }
+    @classmethod
+    def read(cls, out: Path) -> "_EvaluatedRun":
+        """Read the run of a folder. Raises BadInput where it is none."""
+        record = read_record(out)
+        run = finished(read_run(out), record.whisker, record.settings)
+        found = {}
+        for result, seen, felt in whisks(run.results):
+            found[result.trial.name, seen.whisk] = (seen, felt)
+        return cls(out, record.recordings, run.accuracy.estimators, found)
 
-
-def _read(out: Path) -> _Run:
-    record = read_record(out)
-    return _Run(
-        out, record.recordings, finished(read_run(out), record.whisker, record.settings).results
-    )
-
-
-def _changes(first: _Run, other: _Run) -> Iterator[Change]:
-    """Every quantity of a whisk that stands in both runs, where either knows it."""
-    theirs = other.whisks()
-    for key, mine in first.whisks().items():
-        same = key[0] in first.recordings and first.recordings.get(key[0]) == other.recordings.get(
-            key[0]
-        )
-        before, after = _quantities(*mine), _quantities(*theirs[key]) if key in theirs else {}
-        for name in (name for name in before if name in after):
-            a, b = before[name], after[name]
-            if math.isfinite(a.value) or math.isfinite(b.value):
-                yield Change(*key, name, other.out, (a.value, b.value), _sigma(a, b, same), same)
+    def has_recording_of(self, other: "_EvaluatedRun", trial: str) -> bool:
+        """Return whether a trial has the same files in both runs."""
+        ours = self.recordings.get(trial)
+        return ours is not None and ours == other.recordings.get(trial)
 
 
-def _sigma(a: Value, b: Value, same: bool) -> float:
-    finite = [v.sigma for v in (a, b) if math.isfinite(v.sigma)]
-    return max(finite, default=math.nan) if same else math.hypot(*finite)
+def _changes(first: _EvaluatedRun, other: _EvaluatedRun) -> Iterator[Change]:
+    """Yield every quantity of a whisk that stands in both runs, where either knows it."""
+    for key, pair in first.whisks.items():
+        if key not in other.whisks:
+            continue
+        trial, whisk = key
+        same = first.has_recording_of(other, trial)
+        after = _quantities(other.whisks[key])
+        for name, old in _quantities(pair).items():
+            new = after.get(name)
+            if new is None or not (math.isfinite(old.value) or math.isfinite(new.value)):
+                continue
+            values = (old.value, new.value)
+            yield Change(trial, whisk, name, other.out, values, _sigma(old, new, same), same)
 
 
-def _quantities(seen: SeenWhisk, felt: FeltWhisk) -> dict[str, Value]:
-    """By name, in the unit that it ends with."""
-    quantities = {name: _scaled(get(seen), scale) for name, scale, get in _SEEN}
-    quantities["touch_felt_deg"] = _scaled(felt.touch_felt_rad, _DEGREES)
-    return quantities | {
-        f"{answer.estimator}: d_x_est_mm": answer.d_x_est_mm for answer in felt.estimates
+def _sigma(old: Value, new: Value, same_recording: bool) -> float:
+    """Return the standard deviation of the difference of two values of a whisk."""
+    finite = [value.sigma for value in (old, new) if math.isfinite(value.sigma)]
+    if same_recording:
+        return max(finite, default=math.nan)
+    return math.hypot(*finite)
+
+
+def _quantities(pair: Pair) -> dict[str, Value]:
+    """Return the quantities of a whisk by name, in the unit that the name ends with."""
+    seen, felt = pair
+    slip_mm = seen.at.slip_mm if seen.at is not None else UNKNOWN
+    quantities = {
+        "d_x_mm": _scaled(seen.d_x_mm, 1.0),
+        "touch_deg": _scaled(seen.touch_rad, _DEGREES),
+        "beta_deg": _scaled(seen.beta_rad, _DEGREES),
+        "slip_mm": _scaled(slip_mm, 1.0),
+        "touch_felt_deg": _scaled(felt.touch_felt_rad, _DEGREES),
     }
+    for estimate in felt.estimates:
+        quantities[f"{estimate.estimator}: d_x_est_mm"] = estimate.d_x_est_mm
+    return quantities
 
 
 def _scaled(value: Value, scale: float) -> Value:
+    """Return a value and its sigma in another unit."""
     return Value(scale * float(value.value), scale * float(value.sigma))
 
 
 def _row(change: Change, reference: Path) -> dict:
+    """Return the row of COMPARISON. reference: folder of the first run."""
     return {
-        **{
-            name: getattr(change, name)
-            for name in ("trial", "whisk", "quantity", "difference", "sigma")
-        },
+        "trial": change.trial,
+        "whisk": change.whisk,
+        "quantity": change.quantity,
         "out": change.out,
         "reference": change.values[0],
         "value": change.values[1],
+        "difference": change.difference,
+        "sigma": change.sigma,
         "sigmas": change.sigmas,
         "same_recording": int(change.same_recording),
     }
 
 
-def _lines(first: _Run, other: _Run, changes: Sequence[Change]) -> Iterator[str]:
-    """Of one run against the first: counts, what is told by quantity, and the whisks that changed most."""
-    compared = {(c.trial, c.whisk) for c in changes}
-    same = len({(c.trial, c.whisk) for c in changes if c.same_recording})
-    yield f"{other.out} against {first.out}: {len(compared)} whisks in both, {same} of them of one recording"
-    alone = [
-        (run.out, set(run.whisks()) - set(rest.whisks()))
-        for run, rest in ((first, other), (other, first))
-    ]
-    yield from (f"  only in {out}: {_named(sorted(keys))}" for out, keys in alone if keys)
-    significant = sorted((c for c in changes if c.matters), key=lambda c: -abs(c.sigmas))
-    for change in significant[:_MOST_SHOWN]:
+def _run_lines(
+    first: _EvaluatedRun, other: _EvaluatedRun, changes: Sequence[Change]
+) -> Iterator[str]:
+    """Yield counts of one run against the first, and the quantities that changed most."""
+    compared = {change.key for change in changes}
+    same = {change.key for change in changes if change.same_recording}
+    yield f"{other.out} against {first.out}: {len(compared)} whisks in both, {len(same)} of them of one recording"
+    for run, rest in ((first, other), (other, first)):
+        alone = sorted(run.whisks.keys() - rest.whisks.keys())
+        if alone:
+            yield f"  only in {run.out}: {_names(alone)}"
+    significant = [change for change in changes if change.matters]
+    significant.sort(key=lambda change: -abs(change.sigmas))
+    for change in significant[:_MOST_LISTED]:
         yield f"  {_change_line(change)}"
-    if len(significant) > _MOST_SHOWN:
-        yield f"  … and {len(significant) - _MOST_SHOWN} more (--out FILE has all)"
-    quiet = max((abs(c.sigmas) for c in changes if not c.matters), default=0.0)
-    yield f"  {len(changes) - len(significant)} of {len(changes)} values moved by {quiet:.2f} sigma at most"
+    if len(significant) > _MOST_LISTED:
+        yield f"  … and {len(significant) - _MOST_LISTED} more (--out FILE has all)"
+    quiet = len(changes) - len(significant)
+    largest = max((abs(one.sigmas) for one in changes if not one.matters), default=0.0)
+    yield f"  {quiet} of {len(changes)} values moved by {largest:.2f} sigma at most"
 
 
-def _accuracy_lines(runs: Sequence[_Run]) -> Iterator[str]:
-    """RMS error of each estimator in each run."""
-    by_label = [{one.label: one for one in accuracies(run.results)} for run in runs]
-    names = list(dict.fromkeys(label for of_run in by_label for label in of_run))
-    if names:
+def _accuracy_lines(runs: Sequence[_EvaluatedRun]) -> Iterator[str]:
+    """Yield the RMS error of each estimator in each run."""
+    table: dict[str, list[str]] = {}  # by label, a cell a run
+    for place, run in enumerate(runs):
+        for accuracy in run.accuracies:
+            cells = table.setdefault(accuracy.label, [MISSING] * len(runs))
+            cells[place] = f"{number(accuracy.rms_percent)} ({len(accuracy.judged)})"
+    if table:
         yield "RMS error of d_x, % (whisks), in the order of the runs"
-    for name in names:
-        cells = (of_run.get(name) for of_run in by_label)
-        yield f"  {name:<24}" + "".join(
-            f"{f'{number(s.rms_percent)} ({len(s.judged)})' if s is not None else MISSING:>18}"
-            for s in cells
-        )
+    for label, cells in table.items():
+        yield f"  {label:<24}" + "".join(f"{cell:>18}" for cell in cells)
 
 
 def _change_line(change: Change) -> str:
+    """Return what changed by how much, in words."""
     name, _, unit = change.quantity.rpartition("_")
     estimator, _, quantity = name.rpartition(": ")
     what = f"{label_of(estimator)}, {quantity}" if estimator else quantity
     where = f"{change.trial}, whisk {change.whisk}: {what}"
+    before, after = change.values
     if not math.isfinite(change.difference):
-        gone = math.isfinite(change.values[0])
-        return f"{where} {'is no longer known' if gone else 'has become known'}"
-    moved = with_sigma(change.difference, change.sigma, sign=True)
-    return f"{where} {change.values[0]:.4g} → {change.values[1]:.4g} {unit}, {moved}, {change.sigmas:+.1f} sigma"
+        return f"{where} {'is no longer known' if math.isfinite(before) else 'has become known'}"
+    difference = with_sigma(change.difference, change.sigma, sign=True)
+    return f"{where} {before:.4g} → {after:.4g} {unit}, {difference}, {change.sigmas:+.1f} sigma"
 
 
-def _named(keys: Sequence[tuple[str, int]]) -> str:
-    names = [f"{trial} {whisk}" for trial, whisk in keys]
-    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
+def _names(keys: Sequence[WhiskKey]) -> str:
+    """Return the first whisks by trial and number, and how many more there are."""
+    names = ", ".join(f"{trial} {whisk}" for trial, whisk in keys[:_MOST_NAMED])
+    more = len(keys) - _MOST_NAMED
+    return f"{names} and {more} more" if more > 0 else names

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import bdtr
 
+from bench.analyses.pooling import grouped, rms
 from bench.base.drawing import label_of
 from bench.records.trial_result import TrialResult, whisks
 from bench.trials.estimate_errors import Judged, judge
@@ -27,7 +28,7 @@ Key = tuple[str, int, str]  # trial, whisk, estimator
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Hold the errors of one estimator over the measured whisks of a run.
+    """Errors of one estimator over the measured whisks of a run.
 
     with_truth: number of whisks whose true distance is known.
     judged: whisks with a truth and a distance that no warning about the recording speaks against.
@@ -76,12 +77,12 @@ class Accuracy:
     @property
     def rms_percent(self) -> float:
         """Return the RMS error, per cent of the truth; NaN where nothing is judged."""
-        return float(np.sqrt(np.mean(self.errors_percent**2))) if self.judged else math.nan
+        return rms(self.errors_percent)
 
     @property
     def rms_mm(self) -> float:
         """Return the RMS error, mm; NaN where nothing is judged."""
-        return float(np.sqrt(np.mean(self.errors_mm**2))) if self.judged else math.nan
+        return rms(self.errors_mm)
 
     @property
     def worst(self) -> Judged | None:
@@ -103,9 +104,8 @@ class Accuracy:
     @property
     def is_covered(self) -> bool:
         """Return whether as many 95 % intervals hold the truth as chance lets one expect."""
-        chance = bdtr(
-            self.intervals_holding, self.intervals, INTERVAL_SHARE
-        )  # of no more than these
+        # The probability that no more than these hold.
+        chance = bdtr(self.intervals_holding, self.intervals, INTERVAL_SHARE)
         return self.intervals > 0 and bool(chance >= LEAST_CHANCE)
 
     def is_worse_than(self, other: "Accuracy") -> bool:
@@ -127,52 +127,64 @@ class Accuracy:
 def accuracies(results: Iterable[TrialResult]) -> list[Accuracy]:
     """Return the accuracy of each estimator, in the order in which the results name them."""
     results = list(results)
-    intervals = _finite_intervals(results)
-    by_estimator: dict[str, list[Judged]] = {}
+    holding = _intervals_holding(results)
+    judged = []
     for one in judge(results):
         if one.purpose == "measure" and not one.one_factor and math.isfinite(one.d_x_mm):
-            by_estimator.setdefault(one.estimator, []).append(one)
-    return [_accuracy(name, mine, intervals) for name, mine in by_estimator.items()]
+            judged.append(one)
+    by_estimator = grouped(judged, lambda one: one.estimator)
+    return [_accuracy(name, mine, holding) for name, mine in by_estimator.items()]
 
 
-def _finite_intervals(results: Sequence[TrialResult]) -> dict[Key, tuple[float, float]]:
-    """Return the 95 % interval (low, high) of each estimate in mm where both ends are known."""
-    intervals = {}
+def _intervals_holding(results: Sequence[TrialResult]) -> dict[Key, bool]:
+    """Return whether the 95 % interval of each estimate holds the truth, where both are known."""
+    holding = {}
     for result, seen, felt in whisks(results):
         for estimate in felt.estimates:
-            ends = (estimate.d_x_est_low_mm, estimate.d_x_est_high_mm)
-            if np.isfinite(ends).all():
-                intervals[result.trial.name, seen.whisk, estimate.estimator] = ends
-    return intervals
+            holds = estimate.holds(seen.d_x_mm.value)
+            if holds is not None:
+                holding[result.trial.name, seen.whisk, estimate.estimator] = holds
+    return holding
 
 
-def _accuracy(
-    name: str, mine: Sequence[Judged], intervals: dict[Key, tuple[float, float]]
-) -> Accuracy:
-    """Return the accuracy of one estimator from its whisks with a truth."""
-    answered = [one for one in mine if math.isfinite(one.error_percent)]
-    stated = 0
-    holding = 0
+def _accuracy(name: str, mine: Sequence[Judged], holding: dict[Key, bool]) -> Accuracy:
+    """Return the accuracy of one estimator from its whisks with a truth.
+
+    holding: whether the interval of an estimate holds the truth.
+    """
+    judged: list[Judged] = []
+    left_out: list[Judged] = []
+    without_distance: list[Judged] = []
+    warned: list[Judged] = []
+    intervals: list[bool] = []  # whether each holds the truth
     for one in mine:
-        interval = intervals.get((one.trial, one.whisk, name))
-        if interval is not None and not one.doubtful:
-            stated += 1
-            holding += interval[0] <= one.d_x_mm <= interval[1]
+        has_distance = math.isfinite(one.error_percent)
+        if not has_distance:
+            without_distance.append(one)
+        elif one.doubtful:
+            left_out.append(one)
+        else:
+            judged.append(one)
+        if has_distance and one.status:
+            warned.append(one)
+        key = (one.trial, one.whisk, name)
+        if key in holding and not one.doubtful:
+            intervals.append(holding[key])
     return Accuracy(
         estimator=name,
         with_truth=len(mine),
-        judged=tuple(one for one in answered if not one.doubtful),
-        left_out=tuple(one for one in answered if one.doubtful),
-        without_distance=tuple(one for one in mine if not math.isfinite(one.error_percent)),
-        warned=tuple(one for one in answered if one.status),
-        intervals=stated,
-        intervals_holding=int(holding),
+        judged=tuple(judged),
+        left_out=tuple(left_out),
+        without_distance=tuple(without_distance),
+        warned=tuple(warned),
+        intervals=len(intervals),
+        intervals_holding=sum(intervals),
     )
 
 
 @dataclass(frozen=True)
 class TruthUncertainty:
-    """Hold the median standard deviations of the truth over the measured whisks that have one.
+    """Median standard deviations of the truth over the measured whisks that have one.
 
     known, measured: numbers of whisks with a truth and of all.
     """
@@ -198,6 +210,20 @@ def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
         beta_deg=math.degrees(_finite_median([seen.beta_rad.sigma for seen in known])),
         slip_mm=_finite_median(slips),
     )
+
+
+@dataclass(frozen=True)
+class RunAccuracy:
+    """How well the truth of a run is known, and how far off each of its estimators is."""
+
+    truth: TruthUncertainty
+    estimators: tuple[Accuracy, ...]
+
+    @classmethod
+    def of_results(cls, results: Iterable[TrialResult]) -> "RunAccuracy":
+        """Return the accuracy over the measured whisks of these results."""
+        results = list(results)
+        return cls(truth_uncertainty(results), tuple(accuracies(results)))
 
 
 def _finite_median(values: Sequence[float]) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from bench.analyses.analysis import Run
@@ -12,6 +13,7 @@ from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.certificate import Certificate
 from bench.gauges.matrix import GaugeCalibration
 from bench.records.trial_result import TrialResult
+from bench.report.estimator_accuracy import RunAccuracy
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
 from vision.geometry.reasons import Reason
@@ -27,9 +29,14 @@ class Finished(Run):
 
     doubt: Reason
 
+    @cached_property
+    def accuracy(self) -> RunAccuracy:
+        """Return how well the truth is known, and how far off each estimator is."""
+        return RunAccuracy.of_results(self.results)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Evaluation(Run):
+class Evaluation(Finished):
     """A run with what its report needs, its results in the folder `out`.
 
     calibration: the cameras as placed in the rig, with its notes. gauges: None where volts cannot become
@@ -46,7 +53,7 @@ class Evaluation(Run):
 
 
 def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Settings) -> Finished:
-    """Bring the results together as they stand in trials/."""
+    """Return the results brought together, as they stand in trials/."""
     results = tuple(with_runs(results, whisker, settings))
     shared = shared_touch(results)
     doubt = shared_doubt(shared)

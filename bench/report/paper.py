@@ -70,7 +70,7 @@ def _remove_links(figure: Figure) -> None:
 
 
 def _columns(figure: Figure) -> int:
-    """Panels side by side."""
+    """Return how many panels are side by side."""
     return max(
         (
             axes.get_subplotspec().get_gridspec().ncols

@@ -15,17 +15,18 @@ from estimator.beam import Beam
 
 TABLE = "whisks.csv"
 _AGAIN = "evaluate the session again into this folder"
-# A whisker's length, diameter and stiffness are written down alike on all days; this allows for rounding.
+# [1] A whisker's length, diameter and stiffness are written down alike on all days: rounding. Stated.
 _SAME_WHISKER = 1e-3
-# Fig. 8 is of one distance. |m| is scaled to it as 1/d_x, which takes out what a ruler leaves, not another set-up.
+# [1] Fig. 8 is of one distance: |m| is scaled to it as 1/d_x, which takes out the error of a ruler,
+# not another set-up. Stated.
 _SAME_DISTANCE = 0.1
 
 
 def write_figure_8(outs: Sequence[Path], folder: Path) -> tuple[list[Path], list[str]]:
-    """Pool evaluated runs; write figure_8.png, .svg and .csv, each whole. The paths, and a line on α a panel.
+    """Write figure_8.png, .svg and .csv of pooled runs, each whole.
 
-    Raises BadInput where a folder is no evaluated run, is given twice, cannot be pooled with the first, or none of them
-    holds a whisk.
+    Returns the paths, and a line on α a panel. Raises BadInput where a folder is no evaluated run, is
+    given twice, cannot be pooled with the first, or none of them holds a whisk.
     """
     fitted = pooled(outs)
     stem = Path(folder) / "figure_8"
@@ -36,15 +37,21 @@ def write_figure_8(outs: Sequence[Path], folder: Path) -> tuple[list[Path], list
 
 
 def pooled(outs: Sequence[Path]) -> list[Surface]:
-    """A Surface for each surface and speed, of the whisks of all runs. Raises BadInput as `write_figure_8` does."""
+    """Return a Surface for each surface and speed, of the whisks of all runs.
+
+    Raises BadInput as `write_figure_8` does.
+    """
     runs = [(Path(out), read_run(Path(out))) for out in outs]
-    (first, reference), *others = runs
+    first, reference = runs[0]
     _check_given_once(runs)
-    for out, results in others:
+    for out, results in runs[1:]:
         _check_alike(out, results[0], first, reference[0])
     beam = _beam(reference[0].whisker)
     _check_distances([(out, surfaces(results, beam)) for out, results in runs])
-    fitted = surfaces([result for _, results in runs for result in results], beam)
+    every = []
+    for _, results in runs:
+        every += results
+    fitted = surfaces(every, beam)
     if not fitted:
         found = "no whisk has moments with a slope and a distance, seen or nominal (beta_deg, d_x_mm in trial.toml)"
         raise BadInput(found, file=first)
@@ -52,29 +59,36 @@ def pooled(outs: Sequence[Path]) -> list[Surface]:
 
 
 def _beam(whisker: WhiskerFacts) -> Beam:
-    tip = None if whisker.tip_diameter_mm is None else whisker.tip_diameter_mm / whisker.diameter_mm
+    """Return the whisker as a beam."""
+    tip = None
+    if whisker.tip_diameter_mm is not None:
+        tip = whisker.tip_diameter_mm / whisker.diameter_mm
     return Beam.from_rigidity(whisker.EI_Nmm2, whisker.length_mm, whisker.shape, tip)
 
 
 def read_run(out: Path) -> list[TrialResult]:
-    """The results of a run's trials, in the order of its whisks.csv. Raises BadInput where it is no finished run, or
-    another one was stopped half-way in the same folder."""
+    """Read the results of a run's trials, in the order of its whisks.csv.
+
+    Raises BadInput where it is no finished run, or another one was stopped half-way in the same
+    folder.
+    """
     if not (out / TABLE).is_file():
-        raise BadInput(
-            f"is no evaluated run (there is no {TABLE} in it); give the OUT of `evaluate`", file=out
-        )
+        none = f"is no evaluated run (there is no {TABLE} in it); give the OUT of `evaluate`"
+        raise BadInput(none, file=out)
     results = [_result(out, trial) for trial in _trials(out / TABLE)]
     if not results:
         raise BadInput(f"holds no whisk ({TABLE} has no rows)", file=out)
-    said = (read_result(out / "run.json") or {}).get("results", {})
-    other = next((r.trial.name for r in results if r.hash != said.get(r.trial.name, r.hash)), None)
-    if other is not None:
-        found = f"trials/{other}.json is of a later run, which was not finished"
-        raise BadInput(f"{found}; {_AGAIN}", file=out)
+    recorded = (read_result(out / "run.json") or {}).get("results", {})
+    for result in results:
+        trial = result.trial.name
+        if result.hash != recorded.get(trial, result.hash):
+            later = f"trials/{trial}.json is of a later run, which was not finished"
+            raise BadInput(f"{later}; {_AGAIN}", file=out)
     return results
 
 
 def _trials(table: Path) -> list[str | None]:
+    """Return the names in the column `trial`, each once. Raise BadInput where the file is damaged."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             return list(dict.fromkeys(row.get("trial") for row in csv.DictReader(file)))
@@ -83,46 +97,58 @@ def _trials(table: Path) -> list[str | None]:
 
 
 def _result(out: Path, trial: str | None) -> TrialResult:
-    path = out / "trials" / f"{trial}.json"
-    kept = read_result(path)
-    if not kept:
-        raise BadInput(f"{path.relative_to(out)} is not there or damaged; {_AGAIN}", file=out)
+    """Read the result of a trial. Raise BadInput where it is not there, damaged or too old."""
+    name = f"trials/{trial}.json"
+    values = read_result(out / name)
+    if not values:
+        raise BadInput(f"{name} is not there or damaged; {_AGAIN}", file=out)
     try:
-        return from_plain(TrialResult, kept)
+        return from_plain(TrialResult, values)
     except ValueError:
-        raise BadInput(
-            f"{path.relative_to(out)} is of an older version; {_AGAIN}", file=out
-        ) from None
+        raise BadInput(f"{name} is of an older version; {_AGAIN}", file=out) from None
 
 
 def _check_given_once(runs: Sequence[tuple[Path, list[TrialResult]]]) -> None:
-    """A recording that is counted twice would look like two that agree. Raises BadInput."""
-    seen: dict[str, Path] = {}
+    """Raise BadInput where two runs hold the same recording.
+
+    A recording that is counted twice would look like two that agree.
+    """
+    run_of: dict[str, Path] = {}  # by hash
     for out, results in runs:
         for result in results:
-            if result.hash in seen:
-                found = f"holds the same recording as {seen[result.hash]} ({result.trial.name})"
+            if result.hash in run_of:
+                found = f"holds the same recording as {run_of[result.hash]} ({result.trial.name})"
                 raise BadInput(f"{found}; give each run once", file=out)
-        seen |= {result.hash: out for result in results}
+        for result in results:
+            run_of[result.hash] = out
 
 
 def _check_alike(out: Path, result: TrialResult, first: Path, reference: TrialResult) -> None:
-    """One whisker, one pushing angle. Raises BadInput."""
+    """Raise BadInput unless two runs are of one whisker, at one pushing angle."""
     if result.theta_deg != reference.theta_deg:
         found = f"was evaluated at θ = {result.theta_deg:g}°, {first} at {reference.theta_deg:g}°"
         raise BadInput(f"{found}; evaluate both at one --theta-deg", file=out)
     for name, ours in vars(result.whisker).items():
         theirs = getattr(reference.whisker, name)
-        exactly = isinstance(ours, str) or None in (ours, theirs)
-        alike = ours == theirs if exactly else abs(ours / theirs - 1.0) <= _SAME_WHISKER
-        if not alike:
-            ours, theirs = (f"{v:.6g}" if isinstance(v, float) else v for v in (ours, theirs))
-            found = f"is of another whisker: {name} is {ours}, in {first} {theirs}"
+        if not _is_alike(ours, theirs):
+            found = f"is of another whisker: {name} is {_text(ours)}, in {first} {_text(theirs)}"
             raise BadInput(f"{found}; whisks of different whiskers cannot be pooled", file=out)
 
 
+def _is_alike(ours: float | str | None, theirs: float | str | None) -> bool:
+    """Return whether a fact on two whiskers is the same, apart from rounding."""
+    if isinstance(ours, str) or ours is None or theirs is None:
+        return ours == theirs
+    return abs(ours / theirs - 1.0) <= _SAME_WHISKER
+
+
+def _text(fact: float | str | None) -> str:
+    """Return a fact on a whisker in words."""
+    return f"{fact:.6g}" if isinstance(fact, float) else str(fact)
+
+
 def _check_distances(runs: Sequence[tuple[Path, list[Surface]]]) -> None:
-    """One distance a panel. Raises BadInput."""
+    """Raise BadInput where the whisks of a panel are at different distances."""
     known: dict[tuple[str, float | None], tuple[Path, float]] = {}
     for out, fitted in runs:
         for surface in fitted:
@@ -130,7 +156,5 @@ def _check_distances(runs: Sequence[tuple[Path, list[Surface]]]) -> None:
             first, reference = known.setdefault(surface.panel, (out, d_x))
             if abs(d_x / reference - 1.0) > _SAME_DISTANCE:
                 found = f"{surface.title}: d_x is {d_x:.1f} mm, in {first} {reference:.1f} mm"
-                raise BadInput(
-                    f"{found}; whisks at distances {_SAME_DISTANCE:.0%} apart cannot be pooled",
-                    file=out,
-                )
+                apart = f"whisks at distances {_SAME_DISTANCE:.0%} apart cannot be pooled"
+                raise BadInput(f"{found}; {apart}", file=out)

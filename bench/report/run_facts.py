@@ -99,3 +99,8 @@ class RunRecord:
             if section.code == code:
                 return section.lines
         return ()
+
+
+def plane_name(trial: str, whisk: int) -> str:
+    """Return the name of a whisk's figure in the results' folder."""
+    return f"planes/{trial}_{whisk}.png"

@@ -103,12 +103,13 @@ def _see(
     missing = _missing_frames(frames.by_camera, times)
     return SeenTrial(
         tuple(seen),
-        notes=(*truth.notes, *missing, *dropped(times, frames.places), *frames.scene.notes),
+        notes=(*missing, *dropped(times, frames.places), *frames.scene.notes),
         bar=BarLine(truth.bar_point_mm, truth.bar_direction),
         bar_radius_mm=0.5 * trial.bar_diameter_mm,
         wire_radius_mm=0.5 * frames.rods.wire.diameter_mm,
         clock=Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
         bar_looks=truth.bar_looks,
+        one_sided_light=truth.one_sided_light,
         back=_back_stroke(back[0]) if 0 in back else None,
         ways_back=_ways_back(back, len(whisks), settings) if trial.both_ways else (),
     )

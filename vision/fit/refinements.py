@@ -232,7 +232,7 @@ def _one_sided(fit: Fit, light: Mapping[str, WireAppearance]) -> LeftOut:
     """
     off_px = {}
     for camera, name in enumerate(fit.problem.cameras.names):
-        if name in light and light[name].width.one_sided:
+        if name in light and light[name].width.is_one_sided:
             off_px[camera] = light[name].width.off_px
     if not off_px:
         return LeftOut(why="every camera sees both edges of the wire")

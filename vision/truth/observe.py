@@ -40,7 +40,7 @@ from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.whisk_truth import coarse_curves, coarse_shapes, fit_whisk, free_stroke
 from vision.truth.wire_end import wire_ends
 from vision.truth.wire_width import wire_widths
-from vision.wire.one_sided import one_sided_lines
+from vision.wire.one_sided import one_sided_widths
 from vision.wire.trace import lines_of
 
 # [frames] Of a whisk that every camera sees: two of free stroke, two that touch. Derived.
@@ -74,7 +74,7 @@ def observe_trial(
     bars = {}
     for name, width in measure_relative_widths(scene.found).items():
         bars[name] = Value(*width)
-    return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_lines(light), bars)
+    return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_widths(light), bars)
 
 
 def wire_lines(

@@ -13,6 +13,7 @@ from vision.geometry.base_lines import BaseLines
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.at_angle import Smooth, TruthAtAngle, at_angle
 from vision.truth.value import UNKNOWN, UNKNOWN_POINT, Value, WhileTouching
+from vision.wire.one_sided import SeenWidth
 
 _OPTIONAL = {"optional": True}  # a file has no key for it where it is None or empty
 
@@ -136,10 +137,12 @@ class WhiskTruth:
 class TrialTruth:
     """All whisks of a trial and the bar that they shared: a point (3,) of its axis, its direction
     (3,), and by camera its width in the pictures over the stated one.
+
+    one_sided_light: the width of the wire that is seen, by camera that sees light from one side.
     """
 
     bar_point_mm: np.ndarray
     bar_direction: np.ndarray
     whisks: tuple[WhiskTruth, ...]
-    notes: tuple[str, ...] = ()
+    one_sided_light: dict[str, SeenWidth] = field(default_factory=dict)
     bar_looks: dict[str, Value] = field(default_factory=dict)

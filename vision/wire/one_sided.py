@@ -41,14 +41,12 @@ class SeenWidth:
     off_px: float
 
     @property
-    def one_sided(self) -> bool:
+    def is_one_sided(self) -> bool:
         """Return whether an edge of the rod is not seen."""
         return self.seen_px < _ONE_SIDED * self.expected_px
 
     def line(self, camera: str) -> str:
-        """Return a line for the report; empty where both edges are seen."""
-        if not self.one_sided:
-            return ""
+        """Return a line for the report on a camera that sees one edge alone."""
         return (
             f"camera {camera} sees {self.seen_px:.1f} of the wire's {self.expected_px:.1f} px: light from one "
             f"side; the axis was taken {abs(self.off_px):.1f} px from the middle of what is seen, by the known "
@@ -106,12 +104,14 @@ class WireAppearance:
         )
 
 
-def one_sided_lines(whisks: Sequence[Mapping[str, WireAppearance]]) -> tuple[str, ...]:
-    """Return a line for each camera that sees light from one side, from the whisk in which it saw least."""
-    least: dict[str, WireAppearance] = {}
+def one_sided_widths(whisks: Sequence[Mapping[str, WireAppearance]]) -> dict[str, SeenWidth]:
+    """Return the least width by camera that sees light from one side.
+
+    whisks: how each camera sees the wire in each whisk.
+    """
+    least: dict[str, SeenWidth] = {}
     for whisk in whisks:
         for camera, appearance in whisk.items():
-            if camera not in least or appearance.width.seen_px < least[camera].width.seen_px:
-                least[camera] = appearance
-    lines = [appearance.width.line(camera) for camera, appearance in least.items()]
-    return tuple(line for line in lines if line)
+            if camera not in least or appearance.width.seen_px < least[camera].seen_px:
+                least[camera] = appearance.width
+    return {camera: width for camera, width in least.items() if width.is_one_sided}

@@ -11,12 +11,12 @@ from bench.gauges.felt import lateness
 from bench.records.trial_result import EstimateRow
 from bench.report.assembly import status_of
 from bench.report.page.thumbnails import picture_source
-from bench.report.page.words import MISSING, Row, number, told, with_sigma
-from bench.report.planes import plane_name
+from bench.report.page.words import MISSING, Row, number, value_text, with_sigma
+from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
 from vision.fit.beam_check import BeamCheck
 from vision.geometry.counted import counted
-from vision.truth.value import UNKNOWN
+from vision.truth.value import UNKNOWN, Value
 
 SOUND = "sound"
 _DEGREES = math.degrees(1.0)
@@ -100,67 +100,78 @@ def numbers(row: Row) -> list[tuple[str, str]]:
     """Return each quantity with one sigma; what is not known is left out."""
     seen = row.seen
     felt = row.felt
-    found = [
-        ("d_x", told(seen.d_x_mm), "mm"),
-        ("touch seen", told(seen.touch_rad, degrees=True), "°"),
-        ("touch felt", told(felt.touch_felt_rad, degrees=True), "°"),
-        ("slope β", told(seen.beta_rad, degrees=True), "°"),
-        ("tilt ψ", told(seen.psi_rad, degrees=True), "°"),
+    quantities = [
+        ("d_x", seen.d_x_mm, "mm"),
+        ("touch seen", seen.touch_rad, "°"),
+        ("touch felt", felt.touch_felt_rad, "°"),
+        ("slope β", seen.beta_rad, "°"),
+        ("tilt ψ", seen.psi_rad, "°"),
     ]
     if seen.at is not None:
-        found += [
-            ("slip σ at θ", told(seen.at.slip_mm), "mm"),
-            ("slip along the whisker", told(seen.at.longitudinal_slip_mm), "mm"),
-            ("deflection d_y", told(seen.at.d_y_mm), "mm"),
-            ("deflection d_z", told(seen.at.d_z_mm), "mm"),
-            ("force angle φ seen", told(seen.at.phi_rad, degrees=True), "°"),
-            ("friction angle α seen", told(seen.at.alpha_rad, degrees=True), "°"),
+        quantities += [
+            ("slip σ at θ", seen.at.slip_mm, "mm"),
+            ("slip along the whisker", seen.at.longitudinal_slip_mm, "mm"),
+            ("deflection d_y", seen.at.d_y_mm, "mm"),
+            ("deflection d_z", seen.at.d_z_mm, "mm"),
+            ("force angle φ seen", seen.at.phi_rad, "°"),
+            ("friction angle α seen", seen.at.alpha_rad, "°"),
         ]
-    found += [
-        ("moment m_y felt", told(felt.m_y_Nmm), "N·mm"),
-        ("moment m_z felt", told(felt.m_z_Nmm), "N·mm"),
-        ("force angle φ felt", told(felt.phi_felt_rad, degrees=True), "°"),
+    quantities += [
+        ("moment m_y felt", felt.m_y_Nmm, "N·mm"),
+        ("moment m_z felt", felt.m_z_Nmm, "N·mm"),
+        ("force angle φ felt", felt.phi_felt_rad, "°"),
     ]
     if seen.truth.beam is not None:
-        found += _beam_numbers(seen.truth.beam)
-    return [(name, f"{text} {unit}") for name, text, unit in found if text != MISSING]
+        quantities += _beam_changes(seen.truth.beam)
+    found = []
+    for name, value, unit in quantities:
+        text = value_text(value, degrees=unit == "°")
+        if text != MISSING:
+            found.append((name, f"{text} {unit}"))
+    if seen.truth.beam is not None:
+        chance = number(100.0 * seen.truth.beam.chance, 1)
+        if chance != MISSING:
+            found.append(("chance that a beam departs so far", f"{chance} %"))
+    return found
 
 
-def _beam_numbers(beam: BeamCheck) -> list[tuple[str, str, str]]:
+def _beam_changes(beam: BeamCheck) -> list[tuple[str, Value, str]]:
     """Return by how much a curve left free moves what the beam with a point load gives."""
-    compared = (
-        ("d_x", beam.d_x, 1.0, "mm"),
-        ("touch", beam.touch, _DEGREES, "°"),
-        ("slip", beam.slip, 1.0, "mm"),
-    )
-    numbers_found = []
-    for name, found, scale, unit in compared:
-        text = with_sigma(scale * (found.spline - found.beam), scale * found.difference_sigma)
-        numbers_found.append((f"{name} by a spline, less by the beam", text, unit))
-    chance = number(100.0 * beam.chance, 1)
-    return [*numbers_found, ("chance that a beam departs so far", chance, "%")]
+    changes = []
+    for name, compared, unit in (
+        ("d_x", beam.d_x, "mm"),
+        ("touch", beam.touch, "°"),
+        ("slip", beam.slip, "mm"),
+    ):
+        change = Value(compared.spline - compared.beam, compared.difference_sigma)
+        changes.append((f"{name} by a spline, less by the beam", change, unit))
+    return changes
 
 
 def _estimate(row: Row, estimate: EstimateRow) -> tuple[str, ...]:
     """Return estimator, distance, 95 % interval, error in mm, in per cent, status."""
     truth = row.seen.d_x_mm
-    d_x = estimate.d_x_est_mm
     low = estimate.d_x_est_low_mm
     high = estimate.d_x_est_high_mm
     interval = MISSING
     if math.isfinite(low) and math.isfinite(high):
         interval = f"{number(low, 1)} to {number(high, 1)}"
-    error = d_x.value - truth.value
-    sigma = math.hypot(d_x.sigma, truth.sigma)
+    error = _less_truth(estimate, truth)
     percent = 100.0 / truth.value
     return (
         label_of(estimate.estimator),
-        told(d_x),
+        value_text(estimate.d_x_est_mm),
         interval,
-        with_sigma(error, sigma, sign=True),
-        with_sigma(percent * error, percent * sigma, sign=True),
+        with_sigma(error.value, error.sigma, sign=True),
+        with_sigma(percent * error.value, percent * error.sigma, sign=True),
         estimate.status,
     )
+
+
+def _less_truth(estimate: EstimateRow, truth: Value) -> Value:
+    """Return estimate less truth, mm."""
+    sigma = math.hypot(estimate.d_x_est_mm.sigma, truth.sigma)
+    return Value(estimate.d_x_est_mm.value - truth.value, sigma)
 
 
 def columns(estimators: list[str]) -> list[Cell]:
@@ -187,18 +198,17 @@ def cells(row: Row, estimators: list[str]) -> list[Cell]:
     """Return the row of a whisk, in the columns' order, the trial's name apart."""
     seen = row.seen
     trial = row.result.trial
-    late = lateness(seen, row.felt)
-    alpha, alpha_sigma = seen_friction(seen)
     speed = math.nan if trial.speed_deg_s is None else trial.speed_deg_s
     slip = seen.at.slip_mm if seen.at is not None else UNKNOWN
+    alpha = Value(*seen_friction(seen))
     fixed = [
         Cell(trial.surface, wide=True),
         Cell(f"{speed:g}" if math.isfinite(speed) else MISSING, speed, wide=True),
-        _cell(told(seen.beta_rad, degrees=True), _DEGREES * seen.beta_rad.value),
-        _cell(told(seen.d_x_mm), seen.d_x_mm.value),
-        _cell(told(slip), slip.value, wide=True),
-        _cell(told(late, degrees=True), _DEGREES * late.value, wide=True),
-        _cell(with_sigma(_DEGREES * alpha, _DEGREES * alpha_sigma), _DEGREES * alpha, wide=True),
+        _value_cell(seen.beta_rad, degrees=True),
+        _value_cell(seen.d_x_mm),
+        _value_cell(slip, wide=True),
+        _value_cell(lateness(seen, row.felt), degrees=True, wide=True),
+        _value_cell(alpha, degrees=True, wide=True),
     ]
     errors = [_error(row, name) for name in estimators]
     return [*fixed, *errors, Cell(status_of(seen, row.felt) or SOUND)]
@@ -213,15 +223,15 @@ def _error(row: Row, estimator: str) -> Cell:
     """Return the error of one estimator, per cent of the true distance."""
     truth = row.seen.d_x_mm
     for estimate in row.felt.estimates:
-        d_x = estimate.d_x_est_mm
-        if estimate.estimator == estimator and math.isfinite(d_x.value - truth.value):
+        error = _less_truth(estimate, truth)
+        if estimate.estimator == estimator and math.isfinite(error.value):
             percent = 100.0 / truth.value
-            error = percent * (d_x.value - truth.value)
-            sigma = percent * math.hypot(d_x.sigma, truth.sigma)
-            return Cell(with_sigma(error, sigma, sign=True), error)
+            text = with_sigma(percent * error.value, percent * error.sigma, sign=True)
+            return Cell(text, percent * error.value)
     return Cell(MISSING, math.nan)
 
 
-def _cell(text: str, value: float, *, wide: bool = False) -> Cell:
-    """Return the cell of a number."""
-    return Cell(text, float(value), wide)
+def _value_cell(value: Value, *, degrees: bool = False, wide: bool = False) -> Cell:
+    """Return the cell of a value with its sigma, sorted by the value; an angle in degrees."""
+    scale = _DEGREES if degrees else 1.0
+    return Cell(value_text(value, degrees=degrees), float(scale * value.value), wide)

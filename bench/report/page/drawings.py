@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 
 from bench.analyses.analysis import Run
 from bench.base.drawing import style, svg_of
-from bench.report.page.words import Row
+from bench.report.page.words import Row, by_whisk
 from bench.report.run_facts import RunRecord
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def draw(record: RunRecord, rows: Sequence[Row], run: Run) -> Drawings:
 
 def inside(figure: "Figure", name: str, alt: str, rows: Sequence[Row]) -> Markup:
     """Return a figure as SVG inside the page. alt: for readers who do not see it."""
-    at = {(row.trial, row.seen.whisk): row for row in rows}
+    at = by_whisk(rows)
 
     def link(found: re.Match) -> str:
         row = at[unquote(found[1]), int(found[2])]

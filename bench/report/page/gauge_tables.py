@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.gauges.certificate import U95
-from bench.report.page.words import Row, number
+from bench.report.page.words import Row, by_whisk, number
 from bench.report.run_facts import GaugeFacts, GaugePoints
 
 
@@ -27,10 +27,13 @@ def gauge_part(facts: GaugeFacts | None, rows: Sequence[Row]) -> GaugePart | Non
     """Return what the page says of the gauges; None where there are none."""
     if facts is None:
         return None
-    at = {(row.trial, row.seen.whisk): row for row in rows}
-    points = [p for p in facts.points if (p.trial, p.whisk) in at]
-    whisks = tuple(_whisk(p, at[p.trial, p.whisk]) for p in points)
-    return GaugePart(facts.source, _coefficients(facts), whisks)
+    row_of = by_whisk(rows)
+    table = []
+    for points in facts.points:
+        row = row_of.get((points.trial, points.whisk))
+        if row is not None:
+            table.append(_whisk(points, row))
+    return GaugePart(facts.source, _coefficients(facts), tuple(table))
 
 
 def _coefficients(facts: GaugeFacts) -> tuple[tuple[str, ...], ...]:

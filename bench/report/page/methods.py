@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bench.analyses.friction_tables import SurfaceFriction
-from bench.records.trial_result import TrialResult
-from bench.report.estimator_accuracy import Accuracy, accuracies, truth_uncertainty
+from bench.report.estimator_accuracy import Accuracy
+from bench.report.evaluation import Finished
 from bench.report.page.words import MISSING, number, with_sigma
 from bench.report.run_facts import RunRecord
 
@@ -35,32 +35,30 @@ def bibliography(record: RunRecord) -> str:
     return f"{program}\n{_PAPER}"
 
 
-def methods(
-    record: RunRecord, results: Sequence[TrialResult], friction: Sequence[SurfaceFriction]
-) -> str:
+def methods(record: RunRecord, run: Finished) -> str:
     """Return two paragraphs and two tables, as Markdown."""
-    accuracy_of_all = accuracies(results)
+    accuracy_of_all = run.accuracy.estimators
     lines = [
         f"# Methods: {_escaped(record.session)}",
         "",
-        " ".join(_truth(record, results)),
+        " ".join(_truth(record, run)),
         "",
         " ".join(_estimates(record, accuracy_of_all)),
         "",
         *_accuracy_table(accuracy_of_all),
-        *_friction_table(friction),
+        *_friction_table(run.friction),
         "References: results.bib (solomon2008artificial, whiskerbench).",
         "",
     ]
     return "\n".join(lines)
 
 
-def _truth(record: RunRecord, results: Sequence[TrialResult]) -> Iterator[str]:
+def _truth(record: RunRecord, run: Finished) -> Iterator[str]:
     """Yield the sentences on the whisker, the cameras, and how well the truth is known."""
     whisker = record.whisker
-    truth = truth_uncertainty(results)
+    truth = run.accuracy.truth
     form = {"cylinder": "cylindrical", "cone": "conical", "tapered": "tapered"}[whisker.shape]
-    trials = {result.trial.name for result in results if result.trial.purpose == "measure"}
+    trials = {result.trial.name for result in run.results if result.trial.purpose == "measure"}
     yield (
         f"A {form} whisker of {whisker.diameter_mm:g} mm base diameter and {whisker.length_mm:g} mm length "
         f"(C = 3EI = {whisker.C_Nmm2:.0f} N·mm²) was pushed against a bar in {truth.measured} measured whisks of "

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.records.trial_result import BarLine, SeenWhisk
+from bench.records.trial_result import SeenWhisk
 from bench.report.page.words import Row
 from bench.report.run_facts import BoardFacts, CameraFacts, RunRecord
 
@@ -61,10 +61,13 @@ def _whisk(row: Row) -> dict:
     spread = np.linspace(0, len(frames.index) - 1, _MOST_FRAMES)
     chosen = np.unique(spread.round().astype(int))
     points = [_rounded(frames.point_mm.value[k]) if frames.touching[k] else None for k in chosen]
+    bar = None
+    if trial.bar is not None:
+        bar = _rounded(trial.bar.segment(seen.point_mm.value, _BAR_HALF_MM))
     return {
         "key": row.key,
         "name": row.name,
-        "bar": None if trial.bar is None else _bar(trial.bar, seen.point_mm.value),
+        "bar": bar,
         "radius": trial.bar_radius_mm,
         "touch": _rounded(seen.point_mm.value),
         "axes": _rounded(_ellipsoid(seen), 5),
@@ -84,14 +87,6 @@ def _ellipsoid(seen: SeenWhisk) -> np.ndarray:
         return np.diag(seen.point_mm.sigma)
     variances, directions = np.linalg.eigh(seen.truth.point_covariance_mm2)
     return np.sqrt(np.maximum(variances, 0.0))[:, None] * directions.T
-
-
-def _bar(bar: BarLine, contact_mm: np.ndarray) -> list:
-    """Return the ends of the piece of the bar's axis around the contact."""
-    along_mm = (contact_mm - bar.point_mm) @ bar.direction
-    nearest = bar.point_mm + along_mm * bar.direction
-    half = _BAR_HALF_MM * bar.direction
-    return _rounded([nearest - half, nearest + half])
 
 
 def _rounded(values, digits: int = 3) -> list:

@@ -15,26 +15,29 @@ _QUALITY = 62
 
 
 def picture_source(out: Path, name: str, whisks: int) -> str:
-    """What stands in `src` for a picture of the folder: itself as WebP, or where it is. Empty where it is not there."""
+    """Return the `src` of a picture of the folder: itself as WebP, or where it is.
+
+    Empty where it is not there. whisks: how many the page has.
+    """
     path = out / name
     if not path.is_file():
         return ""
     if whisks > MOST_INSIDE:
         return quote(name)
-    return "data:image/webp;base64," + b64encode(shrunk(path)).decode()
+    return "data:image/webp;base64," + b64encode(_as_webp(path)).decode()
 
 
-def shrunk(path: Path) -> bytes:
-    """The picture as WebP of at most MOST_BYTES, as wide as that allows."""
+def _as_webp(path: Path) -> bytes:
+    """Return the picture as WebP of at most MOST_BYTES, as wide as that allows."""
     with Image.open(path) as picture:
         whole = picture.convert("RGB")
     for width in _WIDTHS_PX:
         scale = min(1.0, width / whole.width)
-        small = whole.resize(
-            (round(scale * whole.width), round(scale * whole.height)), Image.Resampling.LANCZOS
-        )
+        size = (round(scale * whole.width), round(scale * whole.height))
         buffer = io.BytesIO()
-        small.save(buffer, "WEBP", quality=_QUALITY, method=2)
+        whole.resize(size, Image.Resampling.LANCZOS).save(
+            buffer, "WEBP", quality=_QUALITY, method=2
+        )
         if buffer.tell() <= MOST_BYTES:
             break
     return buffer.getvalue()

@@ -8,7 +8,7 @@ from bench.base.numbers import MISSING, number, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from vision.truth.value import Value
 
-__all__ = ["MISSING", "Row", "number", "rows_of", "told", "with_sigma"]
+__all__ = ["MISSING", "Row", "by_whisk", "number", "rows_of", "value_text", "with_sigma"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +33,18 @@ class Row:
 
 def rows_of(results: Iterable[TrialResult]) -> list[Row]:
     """Return all whisks in their order."""
-    return [Row(f"w{n}", *whisk) for n, whisk in enumerate(whisks(results))]
+    rows = []
+    for number_of, (result, seen, felt) in enumerate(whisks(results)):
+        rows.append(Row(f"w{number_of}", result, seen, felt))
+    return rows
 
 
-def told(value: Value, *, degrees: bool = False) -> str:
+def by_whisk(rows: Iterable[Row]) -> dict[tuple[str, int], Row]:
+    """Return the rows by trial and number of the whisk."""
+    return {(row.trial, row.seen.whisk): row for row in rows}
+
+
+def value_text(value: Value, *, degrees: bool = False) -> str:
     """Return a value with its sigma; an angle in degrees."""
     scale = math.degrees(1.0) if degrees else 1.0
     return with_sigma(scale * float(value.value), scale * float(value.sigma))

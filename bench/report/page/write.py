@@ -8,20 +8,19 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from bench.analyses.analysis import PageTable, Run
+from bench.analyses.analysis import PageTable
 from bench.analyses.catalogue import ANALYSES
 from bench.base.atomic import lock_output, write_whole
 from bench.base.results import plain
 from bench.base.settings import Seeing, Settings
 from bench.base.statuses import cure_of
-from bench.report.estimator_accuracy import accuracies, truth_uncertainty
-from bench.report.evaluation import finished
+from bench.report.evaluation import Finished, finished
 from bench.report.page.cards import card, cells, columns, is_flagged
 from bench.report.page.drawings import Drawings, draw
 from bench.report.page.gauge_tables import gauge_part
 from bench.report.page.methods import bibliography, methods
 from bench.report.page.rig_in_3d import ELLIPSOID_FACTOR, scene
-from bench.report.page.words import number, rows_of
+from bench.report.page.words import by_whisk, number, rows_of
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run_facts import CameraFacts, RunRecord
@@ -60,14 +59,14 @@ def report_again(out: Path, figure_formats: Sequence[str] = ()) -> list[Path]:
         return [*write_report(out, record, run), *figures]
 
 
-def write_report(out: Path, record: RunRecord, run: Run) -> list[Path]:
+def write_report(out: Path, record: RunRecord, run: Finished) -> list[Path]:
     """Write report.html, methods.md and results.bib, each whole; return their paths.
 
     The same results give the same bytes.
     """
     written = {
         REPORT: page(out, record, run),
-        METHODS: methods(record, run.results, run.friction),
+        METHODS: methods(record, run),
         BIBLIOGRAPHY: bibliography(record),
     }
     for name, text in written.items():
@@ -75,11 +74,11 @@ def write_report(out: Path, record: RunRecord, run: Run) -> list[Path]:
     return [out / name for name in written]
 
 
-def page(out: Path, record: RunRecord, run: Run) -> str:
+def page(out: Path, record: RunRecord, run: Finished) -> str:
     """Return the page as HTML. out: the folder of its pictures and of the analyses' tables."""
     rows = rows_of(run.results)
     estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
-    row_of = {(row.trial, row.seen.whisk): row for row in rows}
+    row_of = by_whisk(rows)
     drawn = scene(record, rows)
     drawings = Drawings()
     if record.settings.figures:
@@ -92,11 +91,11 @@ def page(out: Path, record: RunRecord, run: Run) -> str:
         rows=[(row, cells(row, estimators), is_flagged(row)) for row in rows],
         columns=columns(estimators),
         cards=[card(row, out, len(rows)) for row in rows],
-        accuracies=[(one, row_of.get(one.worst_at)) for one in accuracies(run.results)],
-        truth=truth_uncertainty(run.results),
+        accuracies=[(one, row_of.get(one.worst_at)) for one in run.accuracy.estimators],
+        truth=run.accuracy.truth,
         doubts=list(zip(record.doubts, doubt_cures)),
         drawings=drawings,
-        together=page_tables(out),
+        page_tables=page_tables(out),
         scene=as_script(drawn),
         scene_known=bool(drawn["cameras"] or drawn["whisks"]),
         settings=settings,

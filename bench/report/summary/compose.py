@@ -98,7 +98,7 @@ def summary_of(
     doubtful = (*evaluation.doubts, *scatter_warnings(results), *whisk_warnings(results))
     has_pictures = any(trial.camera_sources for trial in session.trials)
     spoken = (
-        *verdict(session.name, has_pictures, results, settings, len(doubtful)),
+        *verdict(session.name, has_pictures, evaluation.accuracy, settings, len(doubtful)),
         *gauge_source_lines(evaluation.gauges),
         *preset_lines(results, settings),
     )
@@ -153,7 +153,7 @@ def _sections_of_analyses(evaluation: Evaluation, findings: Findings) -> dict[st
         of_section = lines.setdefault(heading.code, [])
         of_section += analysis.lines(found)
         if isinstance(analysis, Friction):
-            of_section += known_friction_lines(evaluation.results, evaluation.settings)
+            of_section += known_friction_lines(evaluation.accuracy, evaluation.settings)
     return {code: _section(code, titles[code], lines[code]) for code in lines if code in titles}
 
 

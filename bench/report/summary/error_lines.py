@@ -23,16 +23,30 @@ def error_lines(judged: Sequence[Judged]) -> Iterator[str]:
     if not known:
         return
     by_factor = sorted(known, key=lambda one: one.one_factor)
-    columns = list(dict.fromkeys((one.estimator, one.one_factor) for one in by_factor))
-    names = [label_of(name) + (", one factor" if one else "") for name, one in columns]
-    widths = [max(_NARROWEST, len(name)) for name in names]
-    head = "  ".join(f"{name:>{width}}" for name, width in zip(names, widths))
-    yield f"{'trial':<18}{'whisk':>5}  {'β':>6}   {head}"
+    heads = {_column(one): _head(one) for one in by_factor}
+    yield f"{'trial':<18}{'whisk':>5}  {'β':>6}   {_in_columns(heads.values(), heads.values())}"
     for (trial, whisk), mine in grouped(known, lambda one: (one.trial, one.whisk)).items():
-        of_column = {(one.estimator, one.one_factor): one for one in mine}
-        errors = [_error(of_column.get(column)) for column in columns]
-        cells = "  ".join(f"{error:>{width}}" for error, width in zip(errors, widths))
+        errors = dict.fromkeys(heads, "-")
+        for one in mine:
+            errors[_column(one)] = f"{one.error_percent:+.2f} ± {one.error_sigma_percent:.2f}"
+        cells = _in_columns(heads.values(), errors.values())
         yield f"{trial:<18}{whisk:>5}  {mine[0].beta_deg:>5.1f}°   {cells}"
+
+
+def _column(judged: Judged) -> tuple[str, bool]:
+    """Return estimator and kind of gauges: what an error's column stands for."""
+    return judged.estimator, judged.one_factor
+
+
+def _head(judged: Judged) -> str:
+    """Return the head of the column that an error stands in."""
+    return label_of(judged.estimator) + (", one factor" if judged.one_factor else "")
+
+
+def _in_columns(heads: Iterable[str], cells: Iterable[str]) -> str:
+    """Return cells in columns as wide as their heads."""
+    padded = [f"{cell:>{max(_NARROWEST, len(head))}}" for head, cell in zip(heads, cells)]
+    return "  ".join(padded)
 
 
 def contact_lines(results: Iterable[TrialResult]) -> Iterator[str]:
@@ -60,10 +74,3 @@ def contact_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     if parts:
         errors = ", ".join(parts)
         yield f"the contact felt by (10), RMS of what it is off by: {errors} (estimates.csv)"
-
-
-def _error(judged: Judged | None) -> str:
-    """Return an error with its standard deviation, percent."""
-    if judged is None:
-        return "-"
-    return f"{judged.error_percent:+.2f} ± {judged.error_sigma_percent:.2f}"

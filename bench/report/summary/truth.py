@@ -7,14 +7,12 @@ import numpy as np
 
 from bench.gauges.felt import lateness
 from bench.records.trial_result import TrialResult, whisks
-from bench.report.assembly import beam_rows, budget_rows
+from bench.report.assembly import BEAM_UNITS, beam_rows, budget_rows
 from bench.trials.clocks import shared_touch
 from vision.fit.covariance import CAUSES
 from vision.truth.value import Value
 
 _LEAST_SHOWN_PERCENT = 0.5  # rounds to 0 %
-# Quantities of BEAM with their units.
-_BEAM_UNITS = {"d_x": "mm", "touch": "deg", "slip": "mm"}
 
 
 def truth_lines(results: Iterable[TrialResult]) -> Iterator[str]:
@@ -94,7 +92,7 @@ def beam_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     if not rows:
         return
     parts = []
-    for name, unit in _BEAM_UNITS.items():
+    for name, unit in BEAM_UNITS.items():
         changes = [row[f"{name}_spline_{unit}"] - row[f"{name}_beam_{unit}"] for row in rows]
         largest = int(np.argmax(np.abs(changes)))
         row = rows[largest]

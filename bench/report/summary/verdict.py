@@ -11,7 +11,7 @@ from bench.analyses.runs import FITTED, KINETIC, RUNS, SEEN
 from bench.base.settings import Seeing, Settings
 from bench.gauges.matrix import FROM_ALL, GaugeCalibration
 from bench.records.trial_result import TrialResult, whisks
-from bench.report.estimator_accuracy import Accuracy, accuracies, truth_uncertainty
+from bench.report.estimator_accuracy import Accuracy, RunAccuracy, TruthUncertainty
 from bench.trials.estimate_errors import Judged
 from vision.geometry.counted import counted
 
@@ -29,7 +29,7 @@ _ASSUMPTIONS = {
 def verdict(
     session: str,
     has_pictures: bool,
-    results: Sequence[TrialResult],
+    accuracy: RunAccuracy,
     settings: Settings,
     warnings: int,
 ) -> Iterator[str]:
@@ -37,8 +37,8 @@ def verdict(
 
     session: its name. has_pictures: whether it has any. warnings: how many lines are doubtful.
     """
-    yield _truth_line(session, has_pictures, results, warnings)
-    compared = [one for one in accuracies(results) if one.estimator not in RUNS]
+    yield _truth_line(session, has_pictures, accuracy.truth, warnings)
+    compared = [one for one in accuracy.estimators if one.estimator not in RUNS]
     for one in compared:
         yield accuracy_line(one, settings)
     judged = [one for one in compared if one.judged]
@@ -48,11 +48,8 @@ def verdict(
         yield "No verdict on the estimators: no whisk has both a truth and an estimate."
 
 
-def _truth_line(
-    session: str, has_pictures: bool, results: Sequence[TrialResult], warnings: int
-) -> str:
+def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warnings: int) -> str:
     """Return of how many whisks the truth is known, and how well."""
-    truth = truth_uncertainty(results)
     count = counted(truth.measured, "measured whisk")
     if not has_pictures:
         known = f"no pictures, so the true distance is not known; {count} felt"
@@ -173,8 +170,8 @@ def preset_lines(results: Iterable[TrialResult], settings: Settings) -> Iterator
         yield f"Pictures were looked at by the settings {settings.seeing.name}{chosen}."
 
 
-def known_friction_lines(results: Sequence[TrialResult], settings: Settings) -> Iterator[str]:
+def known_friction_lines(accuracy: RunAccuracy, settings: Settings) -> Iterator[str]:
     """Yield the accuracy of (10) with what is known of the friction, where anything is."""
-    for one in accuracies(results):
+    for one in accuracy.estimators:
         if one.estimator in (FITTED, SEEN, KINETIC) and one.judged:
             yield accuracy_line(one, settings)

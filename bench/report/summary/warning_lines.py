@@ -42,28 +42,21 @@ def whisk_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:
 
 def light_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     """Yield a line a camera that saw the wire lit from one side: the first trial's, and how many more."""
-    notes_of: dict[str, list[str]] = {}
+    lines: dict[str, list[str]] = {}  # by camera
     for result in results:
-        for note in filter(_is_of_light, result.seen.notes):
-            camera = note.split(" sees ")[0]
-            notes_of.setdefault(camera, []).append(f"{result.trial.name}: {note}")
-    for notes in notes_of.values():
-        more = len(notes) - 1
-        others = f" (and so in {counted(more, 'more trial')})" if more else ""
-        yield notes[0] + others
+        for camera, width in result.seen.one_sided_light.items():
+            line = f"{result.trial.name}: {width.line(camera)}"
+            lines.setdefault(camera, []).append(line)
+    for first, *others in lines.values():
+        more = f" (and so in {counted(len(others), 'more trial')})" if others else ""
+        yield first + more
 
 
 def frame_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     """Yield a line for frames that were dropped, damaged, made good or left out."""
     for result in results:
         for note in result.seen.notes:
-            if not _is_of_light(note):
-                yield f"{result.trial.name}: {note}"
-
-
-def _is_of_light(note: str) -> bool:
-    """Return whether a note is on light from one side."""
-    return " sees " in note
+            yield f"{result.trial.name}: {note}"
 
 
 def taken_as_exact(session: Session) -> Iterator[str]:

@@ -17,7 +17,7 @@ from bench.records.trial_result import (
     SeenTrial,
     SeenWhisk,
 )
-from bench.report.planes import contact_path, sensing_plane
+from bench.report.sensing_plane import contact_path, draw_sensing_plane
 from bench.session.session import load_session
 from bench.trials.estimate_errors import Judged
 from estimator import slip
@@ -117,7 +117,7 @@ def test_the_sensing_plane_can_be_drawn_for_either_side(steep):
         seen = SeenTrial((whisk,), bar_radius_mm=3.0, wire_radius_mm=0.5)
         axes = Figure().subplots()
         result = trial_result(seen)
-        sensing_plane(axes, result, whisk, (np.radians(10.5), "fitted"))
+        draw_sensing_plane(axes, result, whisk, (np.radians(10.5), "fitted"))
         assert axes.get_title(loc="left").startswith("t, whisk 0")
 
 

@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from bench.base.drawing import is_drawn, save_picture
-from bench.report.overlays import _PANEL_PX, _around, _drawn, _panel
+from bench.report.overlays import _PANEL_PX, _draw_view, _panel, _whisker_view
 from bench.report.painting import as_8_bit, polyline
 
 GREY = np.full((720, 1280), 100, np.uint16)
@@ -29,7 +29,7 @@ def is_at(picture: np.ndarray, place_px, colour) -> bool:
 @pytest.mark.parametrize("scale", [0.4, 1.0, 2.7])
 def test_lines_lie_where_they_were_found_at_any_scale(scale):
     corner = np.array([90.0, 300.0])
-    view = _drawn(as_8_bit(GREY), corner, scale, (900, 400), LINES)
+    view = _draw_view(as_8_bit(GREY), corner, scale, (900, 400), LINES)
     assert is_at(view, scale * (np.array([200.0, 360.0]) - corner), YELLOW)
     assert is_at(view, scale * (np.array([300.0, 320.0]) - corner), GREEN)
     assert is_at(view, scale * (np.array([340.0, 320.0]) - corner), GREEN)
@@ -41,13 +41,13 @@ def test_the_picture_lies_under_its_lines():
     grey = np.zeros((50, 60), np.uint8)
     grey[20, 30] = 255
     nowhere = {name: np.full_like(line, np.nan) for name, line in LINES.items()}
-    view = _drawn(grey, (25.0, 15.0), 3.0, (30, 30), nowhere)[..., 0]
+    view = _draw_view(grey, (25.0, 15.0), 3.0, (30, 30), nowhere)[..., 0]
     rows, columns = np.nonzero(view)
     assert len(rows) == 9 and rows.mean() == columns.mean() == 15.0
 
 
 def test_the_panel_holds_the_whisker_and_the_contact_enlarged():
-    corner, scale = _around(GREY.shape, LINES["wire"])
+    corner, scale = _whisker_view(GREY.shape, LINES["wire"])
     shown = scale * (LINES["wire"] - corner)
     assert np.all(shown >= 0) and np.all(shown <= _PANEL_PX)
     panel = _panel(GREY, LINES)

@@ -1,21 +1,26 @@
 """Lines of the summary that rest on a whisk's record alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
 from bench.base.settings import Settings
 from bench.gauges.felt import gauge_delay, lateness
+from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import (
     Clock,
     SeenTrial,
     TrialResult,
 )
 from bench.report.assembly import beam_rows, budget_rows
+from bench.report.estimator_accuracy import RunAccuracy
 from bench.report.run_facts import Section
 from bench.report.summary.compose import Summary
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
 from bench.report.summary.verdict import verdict
+from bench.report.summary.warning_lines import frame_lines, light_lines
 from bench.trials.estimates import as_felt
 from estimator.signal import FeltTouch
 from tests.scenes.results import seen_whisk, trial_result
@@ -23,6 +28,7 @@ from vision.fit.beam_check import BeamCheck, Compared
 from vision.fit.covariance import CAUSES
 from vision.geometry.counted import counted
 from vision.truth.value import Value
+from vision.wire.one_sided import SeenWidth
 
 
 def result(clock=None, **truth) -> TrialResult:
@@ -108,8 +114,26 @@ def test_the_screen_shows_the_verdict_and_what_is_doubtful(tmp_path):
 )
 def test_doubts_are_counted_apart_from_whisks(doubts, said):
     """Of one whisk there may be two."""
-    first, *_ = verdict("s", True, [result()], Settings(), doubts)
+    first, *_ = verdict("s", True, RunAccuracy.of_results([result()]), Settings(), doubts)
     assert first == f"s: the true distance is known for 1 of 1 measured whisk, to ± 0.01 mm; {said}"
+
+
+def test_light_from_one_side_is_one_line_a_camera_whatever_notes_say():
+    """The first trial's width is shown; a note on frames stays one, though it has the same words."""
+    by_trial = [
+        {"high": SeenWidth(3.1, 5.6, -1.4), "low": SeenWidth(2.0, 5.6, 1.0)},
+        {"high": SeenWidth(3.5, 5.6, -1.2)},
+    ]
+    note = "camera high sees nothing in 2 of 11 frames"
+    results = []
+    for light in by_trial:
+        seen = replace(result().seen, notes=(note,), one_sided_light=light)
+        results.append(from_plain(TrialResult, to_plain(replace(result(), seen=seen))))
+    high, low = light_lines(results)
+    assert high.startswith("t: camera high sees 3.1 of the wire's 5.6 px")
+    assert high.endswith("(and so in 1 more trial)")
+    assert low.startswith("t: camera low sees 2.0 of the wire's 5.6 px") and "more" not in low
+    assert list(frame_lines(results)) == [f"t: {note}"] * 2
 
 
 @pytest.mark.parametrize(("count", "said"), [(0, "0 frames"), (1, "1 frame"), (2, "2 frames")])

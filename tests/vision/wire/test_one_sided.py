@@ -5,7 +5,7 @@ import pytest
 
 from tests.studies.accuracy.lines import SCENES, errors, first_look
 from vision.fit.blocks import WIRE_OFFSET_PX
-from vision.wire.one_sided import SeenWidth, WireAppearance, one_sided_lines, seen_width
+from vision.wire.one_sided import SeenWidth, WireAppearance, one_sided_widths, seen_width
 from vision.wire.trace import to_points
 
 
@@ -24,7 +24,7 @@ def test_a_rod_seen_whole_is_as_wide_as_it_is(rng, name):
     width, _ = looked_at(name, rng)
     # bins of a quarter of a pixel in all, and 3.3 times the error of the blur, which is some 0.1 px
     assert width.seen_px == pytest.approx(5.6, abs=0.6)
-    assert not width.one_sided and width.line("high") == ""
+    assert not width.is_one_sided
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,7 @@ def test_a_rod_lit_from_one_side_is_seen_narrower_and_its_axis_is_found(rng, nam
     comes from the lit edge and the diameter, to what is stated: over five seeds -0.10 px at 45°, -0.20 to -0.23 at 15°.
     """
     width, sigmas = looked_at(name, rng)
-    assert width.one_sided
+    assert width.is_one_sided
     assert width.off_px < 0.45 * off_px
     assert abs(sigmas) < 2.0
 
@@ -46,8 +46,11 @@ def test_the_report_names_camera_and_width_once():
     narrow, whole = (
         WireAppearance(0.9, SeenWidth(*width)) for width in ((3.1, 5.6, -1.4), (5.5, 5.6, 0.0))
     )
-    (line,) = one_sided_lines([{"high": narrow, "low": whole}, {"high": whole}])
-    assert line.startswith("camera high sees 3.1 of the wire's 5.6 px: light from one side")
+    ((camera, width),) = one_sided_widths([{"high": narrow, "low": whole}, {"high": whole}]).items()
+    assert width == narrow.width
+    assert width.line(camera).startswith(
+        "camera high sees 3.1 of the wire's 5.6 px: light from one side"
+    )
 
 
 def test_light_that_is_not_explained_is_a_doubt():
