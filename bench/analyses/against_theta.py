@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import grouped, known_rows, measured, rms
 from bench.base.drawing import blank, colour_of, label_of
 from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table
@@ -75,7 +75,7 @@ class AgainstTheta(Analysis):
     figure_title = "Error and sigma against θ"
     figure_caption = "RMS over the sound whisks: solid the error, dashed the stated sigma. Small θ: noise; large: bending."
 
-    def compute(self, run: Run) -> ThetaErrors:
+    def compute(self, run: EvaluatedRun) -> ThetaErrors:
         """Return the errors of every estimator at every pushing angle."""
         return ThetaErrors(tuple(against_theta(run.results)), run.settings.theta_deg)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import angle_cells, as_cell, degrees, grouped, rms, value_cells
 from bench.base.doubts import in_one_status
 from bench.base.drawing import label_of
@@ -92,7 +92,7 @@ class BothWays(Analysis):
     in_every_run = False
     heading = Heading("both_ways", "Ways back (both_ways.csv)")
 
-    def compute(self, run: Run) -> list[WayBack]:
+    def compute(self, run: EvaluatedRun) -> list[WayBack]:
         """Return every estimate of every way back."""
         return ways_back(run.results)
 

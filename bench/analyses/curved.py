@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.gave import OBJECT
 from bench.analyses.pooling import angle_cells, known_rows, measured, value_cells
 from bench.base.settings import TILT_SIGMA_RAD
@@ -92,7 +92,7 @@ class Curvature(Analysis):
     tables = (CURVATURE,)
     heading = OBJECT
 
-    def compute(self, run: Run) -> list[CurvedWhisk]:
+    def compute(self, run: EvaluatedRun) -> list[CurvedWhisk]:
         """Return the curvature by every measured whisk with sound moments."""
         alpha_est = Value(run.settings.alpha_est_rad, run.alpha_est_sigma_rad)
         found = []

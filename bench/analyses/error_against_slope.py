@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.alphas import seen_friction
-from bench.analyses.analysis import Analysis, Run
-from bench.analyses.surfaces import Surface
+from bench.analyses.analysis import Analysis, EvaluatedRun
+from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import (
     SLOPES_DEG,
     blank,
@@ -44,11 +44,11 @@ class ErrorAgainstSlope(Analysis):
         "predict with the α that fits each surface. A hollow point is in doubt and not in the verdict."
     )
 
-    def compute(self, run: Run) -> Run:
+    def compute(self, run: EvaluatedRun) -> EvaluatedRun:
         """Return the run as it is: it holds what is drawn."""
         return run
 
-    def figure(self, found: Run) -> "Figure | None":
+    def figure(self, found: EvaluatedRun) -> "Figure | None":
         """Draw the errors; None where none is known."""
         judged = measured(found.results)
         fitted = [friction.surface for friction in found.friction]
@@ -65,7 +65,7 @@ class ErrorAgainstFriction(Analysis):
         "(10) errs."
     )
 
-    def compute(self, run: Run) -> list[tuple[float, Judged]]:
+    def compute(self, run: EvaluatedRun) -> list[tuple[float, Judged]]:
         """Return the errors of (10), each with the friction angle seen, deg."""
         return errors_with_friction(run.results)
 
@@ -80,7 +80,7 @@ def measured(results: Sequence[TrialResult]) -> list[Judged]:
 
 
 def error_against_slope(
-    judged: Sequence[Judged], fitted: Sequence[Surface], settings: Settings
+    judged: Sequence[Judged], fitted: Sequence[FittedSurface], settings: Settings
 ) -> "Figure":
     """Draw the error of d_x against slope, for every estimator, and on the right without (2).
 
@@ -148,7 +148,7 @@ def _limits(judged: Sequence[Judged]) -> tuple[float, float]:
 
 
 def _draw_prediction(
-    axes: "Axes", name: str, number: int, fitted: Sequence[Surface], settings: Settings
+    axes: "Axes", name: str, number: int, fitted: Sequence[FittedSurface], settings: Settings
 ) -> None:
     """Draw the error that (13), (14) predict for an estimator where the surface has its fitted α."""
     assumed_rad = {"frictionless": 0.0, "with_friction": settings.alpha_est_rad, "no_slip": 0.0}
@@ -173,7 +173,11 @@ def _draw_prediction(
 
 
 def _draw_errors(
-    axes: "Axes", judged: Sequence[Judged], number: int, fitted: Sequence[Surface], apart_deg: float
+    axes: "Axes",
+    judged: Sequence[Judged],
+    number: int,
+    fitted: Sequence[FittedSurface],
+    apart_deg: float,
 ) -> None:
     """Draw the errors of one estimator against the slope, a marker a surface.
 

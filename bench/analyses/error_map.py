@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.friction_tables import SurfaceFriction
 from bench.base.drawing import blank
 from bench.base.tables import Column, Kind, Table, alike
@@ -41,7 +41,7 @@ _STEEPEST_DEG = 82.5  # the map's edge, the upper end of the cell of 80°
 
 
 @dataclass(frozen=True)
-class Cell:
+class MapCell:
     """Whisks of alike slope and friction.
 
     beta_deg, alpha_deg: lower edges of the cell. errors, predicted (whisks,): percent.
@@ -65,7 +65,7 @@ class MeasuredMap:
     beam, d_x_mm: a whisker that tapers changes relative errors, here at the session's median distance.
     """
 
-    cells: tuple[Cell, ...]
+    cells: tuple[MapCell, ...]
     alpha_est_rad: float
     beam: Beam
     d_x_mm: float
@@ -89,7 +89,7 @@ class ErrorMap(Analysis):
     figure_title = "Error of (10) over slope and friction"
     figure_caption = "Points: measured. Colours: as (13), (14) predict."
 
-    def compute(self, run: Run) -> MeasuredMap:
+    def compute(self, run: EvaluatedRun) -> MeasuredMap:
         """Return the measured cells, and what the prediction needs."""
         alpha_est_rad = run.settings.alpha_est_rad
         cells = measured_cells(run.results, run.friction, alpha_est_rad)
@@ -146,7 +146,7 @@ def _predicted_percent(found: MeasuredMap, beta_rad, alpha_rad) -> np.ndarray:
 
 def measured_cells(
     results: Sequence[TrialResult], friction: Sequence[SurfaceFriction], alpha_est_rad: float
-) -> list[Cell]:
+) -> list[MapCell]:
     """Return the cells that hold a whisk, by slope and friction."""
     errors: dict[tuple[float, float], list[tuple[float, float]]] = {}
     half = 0.5 * _BETA_DEG
@@ -159,7 +159,7 @@ def measured_cells(
         on_cylinder = distance_error(np.radians(slope_deg), alpha_rad, alpha_est_rad)
         predicted = 100.0 * float(beam.error_share(d_x_mm, on_cylinder))
         errors.setdefault(edges, []).append((error, predicted))
-    return [Cell(*edges, *np.array(errors[edges]).T) for edges in sorted(errors)]
+    return [MapCell(*edges, *np.array(errors[edges]).T) for edges in sorted(errors)]
 
 
 def _edge(value: float, size: float) -> float:
@@ -187,7 +187,7 @@ def _whisks(
                 yield judged.beta_deg, alpha, judged.error_percent, beam, judged.d_x_mm
 
 
-def _row(cell: Cell) -> dict:
+def _row(cell: MapCell) -> dict:
     """Return the row of a cell."""
     count = len(cell.errors)
     return {
@@ -202,7 +202,7 @@ def _row(cell: Cell) -> dict:
     }
 
 
-def _title(cells: Sequence[Cell]) -> str:
+def _title(cells: Sequence[MapCell]) -> str:
     """Return on how many whisks the map rests, and that empty cells are empty."""
     counts = [len(cell.errors) for cell in cells]
     fewest = min(counts)
@@ -211,7 +211,7 @@ def _title(cells: Sequence[Cell]) -> str:
     return f"measured: {counted(sum(counts), 'whisk')}, {each}; blank: none"
 
 
-def _field(cells: Sequence[Cell], top: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _field(cells: Sequence[MapCell], top: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return mean errors (a, b), NaN where nothing was measured, and the cells' edges."""
     steepest = max(_STEEPEST_DEG, *(cell.beta_deg for cell in cells))
     beta = np.arange(-0.5 * _BETA_DEG, steepest + 1.5 * _BETA_DEG, _BETA_DEG)
@@ -224,7 +224,7 @@ def _field(cells: Sequence[Cell], top: float) -> tuple[np.ndarray, np.ndarray, n
     return field, beta, alpha
 
 
-def _write_errors(axes: "Axes", cells: Sequence[Cell], most: float) -> None:
+def _write_errors(axes: "Axes", cells: Sequence[MapCell], most: float) -> None:
     """Write each cell's mean error into it, light on the dark ends of the scale."""
     for cell in cells:
         text = f"{cell.error_percent:+.1f}".replace("-", "−").replace("−0.0", "0.0")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.alphas import seen_friction
-from bench.analyses.analysis import Analysis, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.pooling import angle_cells, known_rows
 from bench.base.drawing import blank
 from bench.base.tables import TRIAL, WHISK, Column, Table, with_sigma
@@ -62,7 +62,7 @@ class Explained(Analysis):
         "those seen, in this order."
     )
 
-    def compute(self, run: Run) -> list[dict]:
+    def compute(self, run: EvaluatedRun) -> list[dict]:
         """Return a row a whisk, and last the mean over those of which nothing is doubtful."""
         rows = list(explained_rows(run.results, run.whisker))
         if not rows:

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.pooling import angle_cells, degrees
-from bench.analyses.surfaces import Point, Surface
+from bench.analyses.surfaces import FittedSurface, SlopePoint
 from bench.base.drawing import SLOPES_DEG, blank, colour_of
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma
 from estimator.beam import moment_in_EI_per_metre
@@ -51,16 +51,16 @@ class Figure8(Analysis):
         "What was felt, |m| scaled to one d_x. Lines: (13), (14) with the α that fits the surface."
     )
 
-    def compute(self, run: Run) -> list[Surface]:
+    def compute(self, run: EvaluatedRun) -> list[FittedSurface]:
         """Return a panel for each surface and speed."""
         return [friction.surface for friction in run.friction]
 
-    def figure(self, found: Sequence[Surface]) -> "Figure | None":
+    def figure(self, found: Sequence[FittedSurface]) -> "Figure | None":
         """Draw a column for each surface and speed."""
         return figure_8(found) if found else None
 
 
-def figure_8(fitted: Sequence[Surface]) -> "Figure":
+def figure_8(fitted: Sequence[FittedSurface]) -> "Figure":
     """Draw a column for each surface and speed: |m| above, φ below."""
     columns = min(len(fitted), _MOST_COLUMNS)
     blocks = -(-len(fitted) // columns)
@@ -88,7 +88,7 @@ def figure_8(fitted: Sequence[Surface]) -> "Figure":
     return figure
 
 
-def rows(fitted: Sequence[Surface]) -> Iterator[dict]:
+def rows(fitted: Sequence[FittedSurface]) -> Iterator[dict]:
     """Yield the rows of FIGURE_8, one a point; |m| at the panel's common d_x. Fits are NaN where there is none.
 
     With one whisk a point, m_sd and phi_sd are its stated sigmas.
@@ -123,7 +123,7 @@ def _letter(number: int) -> str:
     return _LETTERS[number % len(_LETTERS)]
 
 
-def _fitted_curves(surface: Surface, beta_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _fitted_curves(surface: FittedSurface, beta_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return |m| [EI/m] and φ [°] of (13), (14) at the fitted α over slopes (n,).
 
     NaN where there is no fit.
@@ -138,7 +138,7 @@ def _fitted_curves(surface: Surface, beta_deg: np.ndarray) -> tuple[np.ndarray, 
     return moment_in_EI_per_metre(m, beam.rigidity_Nmm2), np.degrees(phi)
 
 
-def _draw_panel(top: "Axes", bottom: "Axes", surface: Surface, letter: str) -> None:
+def _draw_panel(top: "Axes", bottom: "Axes", surface: FittedSurface, letter: str) -> None:
     """Draw |m| above, φ below; negative slopes stand at their mirror image's place."""
     points = surface.points()
     EI = surface.beam.rigidity_Nmm2
@@ -185,7 +185,7 @@ def _draw_panel(top: "Axes", bottom: "Axes", surface: Surface, letter: str) -> N
     )
 
 
-def _meaning(points: Sequence[Point]) -> str:
+def _meaning(points: Sequence[SlopePoint]) -> str:
     """Return what points and their bars are."""
     most = max(point.whisks for point in points)
     return "one whisk each, ± its sigma" if most == 1 else f"mean ± SD of up to {most} whisks"

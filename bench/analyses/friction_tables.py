@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.analyses.alphas import UNKNOWN, WhiskAlphas, alphas_of, mean_alpha
-from bench.analyses.analysis import Analysis, Heading, PageTable, Run, read_rows
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, PageTable, read_rows
 from bench.analyses.page_cells import cell_with_sigma, panel_cell
 from bench.analyses.pooling import angle_cells, degrees, measured
 from bench.analyses.section_vii import (
@@ -18,7 +18,7 @@ from bench.analyses.section_vii import (
     contacts,
     weights,
 )
-from bench.analyses.surfaces import Surface, surfaces
+from bench.analyses.surfaces import FittedSurface, surfaces
 from bench.base.tables import SPEED, SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, with_sigma
 from bench.records.phases import KINETIC, STATIC, Phases
 from bench.records.trial_result import TrialResult
@@ -125,7 +125,7 @@ class SurfaceFriction:
     given, all whisks alike; error_rms_weighted_percent: weighted by confidence.
     """
 
-    surface: Surface
+    surface: FittedSurface
     whisks: tuple[WhiskAlphas, ...]
     ways: tuple[Way, ...]
     error_rms_percent: float
@@ -154,13 +154,13 @@ class FrictionResult:
     alpha_est_rad: float
 
 
-class Friction(Analysis):
+class FrictionAngles(Analysis):
     """How rough each surface is, seen and felt."""
 
     tables = (FRICTION, PHASES, SURFACES)
     heading = FRICTION_ANGLE
 
-    def compute(self, run: Run) -> FrictionResult:
+    def compute(self, run: EvaluatedRun) -> FrictionResult:
         """Return the friction angles of whisks and surfaces."""
         alphas = tuple(alphas_of(run.results))
         return FrictionResult(alphas, run.friction, run.settings.alpha_est_rad)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import grouped, panel_title, rms
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
@@ -46,7 +46,7 @@ class GivesWay(Analysis):
     in_every_run = False
     heading = OBJECT
 
-    def compute(self, run: Run) -> tuple[TrialResult, ...]:
+    def compute(self, run: EvaluatedRun) -> tuple[TrialResult, ...]:
         """Return the results as they are: they hold what was seen."""
         return run.results
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import as_cell, degrees, grouped, rms, value_cells
 from bench.base.drawing import blank, colour_of, label_of
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, status, with_sigma
@@ -93,7 +93,7 @@ class MovingObjects(Analysis):
     figure_name = "moving"
     needs_session = True
 
-    def compute(self, run: Run) -> list[Moved]:
+    def compute(self, run: EvaluatedRun) -> list[Moved]:
         """Return every estimate of every whisk with a truth whose object moved."""
         found = []
         for result, seen, felt in whisks(run.results):

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.analyses.alphas import seen_friction
-from bench.analyses.surfaces import Surface, surfaces
+from bench.analyses.surfaces import FittedSurface, surfaces
 from bench.analyses.turning_phi import turn, with_turn
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
 from bench.records.trial_result import (
@@ -42,7 +42,7 @@ RUNS = (FITTED, SEEN, KINETIC)
 ASSUMING = {GIVEN: with_friction, "corrected": corrected}  # take α_est as given
 
 
-def alpha_est_sigma(found: Iterable[Surface], settings: Settings) -> float:
+def alpha_est_sigma(found: Iterable[FittedSurface], settings: Settings) -> float:
     """Return how far α_est may be off in this session, rad, one sigma: as given, else by its surfaces.
 
     Root mean square of fitted less assumed α over the surfaces, among which the 5° that hold without any

@@ -51,7 +51,7 @@ def _unknown(name: str, status: str) -> Way:
 
 
 @dataclass(frozen=True)
-class Contact:
+class FeltContact:
     """What a robot has of one whisk: nominal slope and distance (NaN where not given), and what was felt.
 
     shared_Nmm (k, 2): what (m_y, m_z) change by at one sigma of each cause that all whisks have in common.
@@ -76,14 +76,14 @@ class Contact:
         return replace(self, m_y_Nmm=float(self.m_y_Nmm + by_y), m_z_Nmm=float(self.m_z_Nmm + by_z))
 
 
-def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) -> list[Contact]:
+def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) -> list[FeltContact]:
     """Return the measured whisks of one surface and speed that have sound moments."""
     found = []
     for result, _, felt in whisks(measured(results)):
         trial = result.trial
         if trial.panel != panel or not felt.has_moments or felt.apart:
             continue
-        contact = Contact(
+        contact = FeltContact(
             np.radians(trial.beta_nominal_deg),
             trial.d_x_nominal_mm,
             float(np.radians(result.theta_deg)),
@@ -96,23 +96,23 @@ def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) ->
     return found
 
 
-def by_tilting(of_surface: Sequence[Contact]) -> Way:
+def by_tilting(of_surface: Sequence[FeltContact]) -> Way:
     """Return α by way 1, from nominal slopes of both signs."""
     known = [contact for contact in of_surface if np.isfinite(contact.beta_rad)]
     slopes = [contact.beta_rad for contact in known]
     if not (slopes and min(slopes) < 0 < max(slopes)):
         return _unknown("tilting", "needs nominal slopes (beta_deg) of both signs")
 
-    def fit(recordings: Sequence[Contact]) -> _Fit:
+    def fit(recordings: Sequence[FeltContact]) -> _AlphaFit:
         """Fit the slip angles of tilts."""
         betas = [contact.beta_rad for contact in recordings]
         fitted = alpha_from_tilts(betas, [contact.phi_rad for contact in recordings])
-        return _Fit(fitted.alpha_rad, fitted.sigma_rad, fitted.freedom, fitted.status)
+        return _AlphaFit(fitted.alpha_rad, fitted.sigma_rad, fitted.freedom, fitted.status)
 
     return _with_shared("tilting", fit, known)
 
 
-def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
+def by_consistency(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
     """Return α by way 2: that under which distances scatter least as shares of themselves."""
     nominal = {contact.d_x_nominal_mm for contact in of_surface}
     if len(of_surface) < _FEWEST or len(nominal) != 1 or not np.isfinite(list(nominal)).all():
@@ -121,7 +121,7 @@ def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
     return _by_object("consistency", of_surface, whisker, 0)
 
 
-def by_smoothness(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
+def by_smoothness(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
     """Return α by way 2 of an object that is no edge at one distance: contacts lie on a straight one.
 
     Bars at several nominal distances stand for one straight edge that leans along the whisker, touched at heights that
@@ -134,7 +134,7 @@ def by_smoothness(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
     return _by_object("smoothness", of_surface, whisker, 1)
 
 
-def _by_object(name: str, of_surface: Sequence[Contact], whisker: Whisker, degree: int) -> Way:
+def _by_object(name: str, of_surface: Sequence[FeltContact], whisker: Whisker, degree: int) -> Way:
     """Return α by way 2 with an object whose distance is a polynomial of this degree in height."""
     if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
         return _unknown(name, "a whisk is no push against an object")
@@ -144,7 +144,7 @@ def _by_object(name: str, of_surface: Sequence[Contact], whisker: Whisker, degre
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _AlphaFit:
     """A fit of α to recordings, with its sigma by their residuals and the degrees of freedom of that."""
 
     alpha_rad: float
@@ -154,7 +154,7 @@ class _Fit:
 
 
 def _with_shared(
-    name: str, fit_to: Callable[[Sequence[Contact]], _Fit], known: Sequence[Contact]
+    name: str, fit_to: Callable[[Sequence[FeltContact]], _AlphaFit], known: Sequence[FeltContact]
 ) -> Way:
     """Return the way by a fit to recordings, with what all whisks share in its sigma.
 
@@ -177,7 +177,7 @@ def _with_shared(
     return Way(name, fit.alpha_rad, float(np.sqrt(variance) * stdtrit(freedom, 0.975) / Z_95))
 
 
-def _mean(some: Sequence[Contact]) -> Contact:
+def _mean(some: Sequence[FeltContact]) -> FeltContact:
     """Return the whisks of one recording as one."""
     return replace(
         some[0],
@@ -187,7 +187,7 @@ def _mean(some: Sequence[Contact]) -> Contact:
     )
 
 
-def _distances(some: Sequence[Contact], alphas_rad: np.ndarray, whisker: Whisker) -> np.ndarray:
+def _distances(some: Sequence[FeltContact], alphas_rad: np.ndarray, whisker: Whisker) -> np.ndarray:
     """Return d_x by (10), mm, (contacts, α); NaN where there is none."""
     theta = np.array([[contact.theta_rad] for contact in some])
     m_y = np.array([[contact.m_y_Nmm] for contact in some])
@@ -206,7 +206,7 @@ def _residuals(distances: np.ndarray, heights: np.ndarray, degree: int) -> np.nd
     return 1.0 - design @ np.linalg.lstsq(design, np.ones(len(distances)), rcond=None)[0]
 
 
-def _least_scatter(some: Sequence[Contact], whisker: Whisker, degree: int) -> _Fit:
+def _least_scatter(some: Sequence[FeltContact], whisker: Whisker, degree: int) -> _AlphaFit:
     """Fit the α at which the contacts lie least off an object.
 
     Where one of their distances ends, the search ends, and status says so. Sigma is that of a least-squares fit whose
@@ -225,7 +225,7 @@ def _least_scatter(some: Sequence[Contact], whisker: Whisker, degree: int) -> _F
     if best in (0, last):
         bound_deg = np.degrees(_GRID_RAD[best])
         status = f"at the bound of the search, {bound_deg:.1f}°: no angle between fits"
-        return _Fit(np.nan, status=status)
+        return _AlphaFit(np.nan, status=status)
     found = minimize_scalar(
         lambda alpha_rad: np.sum(residuals(np.array([alpha_rad])) ** 2),
         bounds=(_GRID_RAD[best - 1], _GRID_RAD[best + 1]),
@@ -235,11 +235,11 @@ def _least_scatter(some: Sequence[Contact], whisker: Whisker, degree: int) -> _F
     alpha_rad = float(found.x)
     freedom = len(some) - degree - 2  # the object's coefficients, and α
     if freedom < 1:
-        return _Fit(alpha_rad)
+        return _AlphaFit(alpha_rad)
     high, low = residuals(alpha_rad + _STEP_RAD * np.array([1.0, -1.0]))
     slope = (high - low) / (2.0 * _STEP_RAD)
     sigma = np.sqrt(found.fun / freedom / np.sum(slope**2))
-    return _Fit(alpha_rad, float(sigma), freedom)
+    return _AlphaFit(alpha_rad, float(sigma), freedom)
 
 
 def weights(phi_rad: Sequence[float], alpha_est_rad: float) -> np.ndarray:

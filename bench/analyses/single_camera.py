@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import angle_cells, as_cell, grouped, rms, value_cells
 from bench.base.doubts import in_one_status
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, status, with_sigma
@@ -101,7 +101,7 @@ class OneCamera(Analysis):
         "one_camera", "By one camera's pictures of its own trial, no gauge (one_camera.csv)"
     )
 
-    def compute(self, run: Run) -> list[ShapeSeen]:
+    def compute(self, run: EvaluatedRun) -> list[ShapeSeen]:
         """Return the shape of every whisk that was evaluated by one camera."""
         found = []
         for result, seen, _ in whisks(run.results):

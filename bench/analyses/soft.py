@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, PageTable, Run, read_rows
+from bench.analyses.analysis import Analysis, EvaluatedRun, PageTable, read_rows
 from bench.analyses.gave import OBJECT, mean_give
 from bench.analyses.page_cells import cell_with_sigma, panel_cell
 from bench.analyses.pooling import grouped, measured, panel_title
@@ -141,7 +141,7 @@ class Softness(Analysis):
     heading = OBJECT
     needs_session = True
 
-    def compute(self, run: Run) -> list[Soft]:
+    def compute(self, run: EvaluatedRun) -> list[Soft]:
         """Return what each two neighbouring nominal distances of a surface and speed give."""
         return soft_objects(run)
 
@@ -193,7 +193,7 @@ def _stiffness_cell(low: float, high: float) -> str:
     return f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"more than {low:.3g}"
 
 
-def soft_objects(run: Run) -> list[Soft]:
+def soft_objects(run: EvaluatedRun) -> list[Soft]:
     """Return the softness by each two neighbouring nominal distances of a surface and speed."""
     found = []
     alpha_est = Value(run.settings.alpha_est_rad, run.alpha_est_sigma_rad)

@@ -57,7 +57,7 @@ class Felt:
 
 
 @dataclass(frozen=True)
-class Point:
+class SlopePoint:
     """Whisks of one slope: mean and standard deviation, or the stated sigma of a single one."""
 
     beta_deg: float
@@ -69,7 +69,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Surface:
+class FittedSurface:
     """One panel of Fig. 8: whisks of one surface and speed, and the fitted α.
 
     fit: None where the whisks do not determine α.
@@ -111,7 +111,7 @@ class Surface:
         others = [felt for felt in self.felt if (felt.trial, felt.whisk) != (trial, whisk)]
         return _fit(others, self.beam)
 
-    def points(self) -> list[Point]:
+    def points(self) -> list[SlopePoint]:
         """Return the points of the figure: whisks of alike slope, |m| scaled to the common distance."""
         groups: list[list[Felt]] = []
         for felt in sorted(self.felt, key=lambda one: one.beta_deg):
@@ -122,18 +122,20 @@ class Surface:
         return [_point(group, self.common_d_x_mm, self.beam) for group in groups]
 
 
-def surfaces(results: Iterable[TrialResult], beam: Beam) -> list[Surface]:
-    """Return a Surface for each surface and speed among the trials that measure, in their order."""
+def surfaces(results: Iterable[TrialResult], beam: Beam) -> list[FittedSurface]:
+    """Return a FittedSurface for each surface and speed among the trials that measure, in their order."""
     groups: dict[tuple[str, float | None], list[Felt]] = {}
     for recording, result in enumerate(measured(results)):
         for _, seen, felt in whisks([result]):
             one = _felt(recording, result, seen, felt)
             if one is not None:
                 groups.setdefault(result.trial.panel, []).append(one)
-    return [Surface(*panel, tuple(felt), _fit(felt, beam), beam) for panel, felt in groups.items()]
+    return [
+        FittedSurface(*panel, tuple(felt), _fit(felt, beam), beam) for panel, felt in groups.items()
+    ]
 
 
-def friction_lines(fitted: Iterable[Surface]) -> Iterator[str]:
+def friction_lines(fitted: Iterable[FittedSurface]) -> Iterator[str]:
     """Yield a line a surface and speed: the fitted α, or why there is none."""
     for surface in fitted:
         count = counted(len(surface.felt), "whisk")
@@ -233,7 +235,7 @@ def _alphas_by_shared(pushes: Pushes, felt: Sequence[Felt]) -> np.ndarray:
     return fit_alpha(replace(pushes, m_y=m_y, m_z=m_z)).alpha_rad
 
 
-def _point(group: Sequence[Felt], d_x_mm: float, beam: Beam) -> Point:
+def _point(group: Sequence[Felt], d_x_mm: float, beam: Beam) -> SlopePoint:
     """Return the point of whisks of alike slope, |m| scaled to a distance."""
     distances_mm = [one.d_x_mm for one in group]
     scale = beam.as_cylinder_mm(distances_mm) / beam.as_cylinder_mm(d_x_mm)
@@ -242,5 +244,5 @@ def _point(group: Sequence[Felt], d_x_mm: float, beam: Beam) -> Point:
     beta_deg = float(np.mean([one.beta_deg for one in group]))
     if len(group) == 1:
         m_sigma = group[0].m_sigma_Nmm * scale[0]
-        return Point(beta_deg, 1, m[0], m_sigma, phi[0], group[0].phi_sigma_deg)
-    return Point(beta_deg, len(group), m.mean(), m.std(ddof=1), phi.mean(), phi.std(ddof=1))
+        return SlopePoint(beta_deg, 1, m[0], m_sigma, phi[0], group[0].phi_sigma_deg)
+    return SlopePoint(beta_deg, len(group), m.mean(), m.std(ddof=1), phi.mean(), phi.std(ddof=1))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, PageTable, Run, read_rows
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, PageTable, read_rows
 from bench.analyses.friction_tables import SurfaceFriction
 from bench.analyses.pooling import degrees, grouped, known_rows, measured, rms
 from bench.base.drawing import label_of
@@ -79,7 +79,7 @@ class Sensors(Analysis):
     tables = (SENSORS,)
     heading = Heading("sensors", "Sensors of Table I: error of d_x, RMS (sensors.csv)")
 
-    def compute(self, run: Run) -> list[SensorErrors]:
+    def compute(self, run: EvaluatedRun) -> list[SensorErrors]:
         """Return the errors of each sensor, surface and range of slopes."""
         return sensor_errors(run.results, run.friction)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, PageTable, Run, read_rows
+from bench.analyses.analysis import Analysis, EvaluatedRun, PageTable, read_rows
 from bench.analyses.friction_tables import FRICTION_ANGLE
 from bench.analyses.page_cells import cell_with_sigma, panel_cell
 from bench.analyses.pooling import degrees, measured, panel_title
@@ -88,7 +88,7 @@ class Tilts(Analysis):
     heading = FRICTION_ANGLE
     needs_session = True
 
-    def compute(self, run: Run) -> list[Tilted]:
+    def compute(self, run: EvaluatedRun) -> list[Tilted]:
         """Return each surface, speed and nominal distance with whisks at two slopes or more."""
         return tilted_whisks(run.session, run.results)
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.analyses.analysis import Run
+from bench.analyses.analysis import EvaluatedRun
 from bench.analyses.friction_tables import friction_of
 from bench.analyses.runs import alpha_est_sigma, with_runs
 from bench.base.settings import Settings
@@ -18,7 +18,7 @@ from vision.geometry.reasons import Reason
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Finished(Run):
+class Finished(EvaluatedRun):
     """Results of all trials, brought together.
 
     Each whisk has (10) by the session's friction, and the error of touch that all whisks share. doubt:
@@ -29,7 +29,7 @@ class Finished(Run):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Evaluation(Run):
+class Evaluation(EvaluatedRun):
     """A run with what its report needs, its results in the folder `out`.
 
     calibration: the cameras as placed in the rig, with its notes. gauges: None where volts cannot become

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bench.analyses.figure_8 import FIGURE_8, figure_8, rows
-from bench.analyses.surfaces import Surface, friction_lines, surfaces
+from bench.analyses.surfaces import FittedSurface, friction_lines, surfaces
 from bench.base.drawing import publish, style
 from bench.base.errors import BadInput
 from bench.base.results import read_result
@@ -35,8 +35,8 @@ def write_figure_8(outs: Sequence[Path], folder: Path) -> tuple[list[Path], list
     return [*paths, stem.with_suffix(".csv")], list(friction_lines(fitted))
 
 
-def pooled(outs: Sequence[Path]) -> list[Surface]:
-    """A Surface for each surface and speed, of the whisks of all runs. Raises BadInput as `write_figure_8` does."""
+def pooled(outs: Sequence[Path]) -> list[FittedSurface]:
+    """A FittedSurface for each surface and speed, of the whisks of all runs. Raises BadInput as `write_figure_8` does."""
     runs = [(Path(out), read_run(Path(out))) for out in outs]
     (first, reference), *others = runs
     _check_given_once(runs)
@@ -121,7 +121,7 @@ def _check_alike(out: Path, result: TrialResult, first: Path, reference: TrialRe
             raise BadInput(f"{found}; whisks of different whiskers cannot be pooled", file=out)
 
 
-def _check_distances(runs: Sequence[tuple[Path, list[Surface]]]) -> None:
+def _check_distances(runs: Sequence[tuple[Path, list[FittedSurface]]]) -> None:
     """One distance a panel. Raises BadInput."""
     known: dict[tuple[str, float | None], tuple[Path, float]] = {}
     for out, fitted in runs:

@@ -26,7 +26,7 @@ _NOTHING = np.zeros(2)
 
 
 @dataclass(frozen=True)
-class Agreement:
+class MomentAgreement:
     """χ² of felt less seen moments, 2 degrees of freedom, and its chance.
 
     cause: sentence on the fault where both disagree, '' where they agree. is_explained: a fault of
@@ -48,7 +48,7 @@ class Agreement:
         return Reason("gauge_fault" if self.is_explained else "shape_not_felt", sentence)
 
 
-def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> Agreement:
+def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> MomentAgreement:
     """Compare a whisk's felt moments with its seen ones, per radian of pushing.
 
     scale_sigma: share by which all moments may be wrong together, beyond that of the pairs: of C,
@@ -65,14 +65,14 @@ def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> Ag
     chi2 = difference.chi2
     chance = float(chdtrc(2, chi2))
     if chance >= LEAST_CHANCE:
-        return Agreement(chi2, chance)
+        return MomentAgreement(chi2, chance)
     causes = [*_exchanges(volts, gauges.matrix), *_turns(felt, seen)]
     for cause in _scales(volts, gauges.matrix):
         _, excess = difference.without(cause)
         if excess < 1.0:  # more would reverse a moment
             causes.append(cause)
     sentence = difference.explained_by(causes, _EXPLAINED)
-    return Agreement(chi2, chance, sentence or _UNEXPLAINED, is_explained=bool(sentence))
+    return MomentAgreement(chi2, chance, sentence or _UNEXPLAINED, is_explained=bool(sentence))
 
 
 def _covariance(pairs: Pairs, gauges: GaugeMatrix, weights: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ from bench.records.trial_result import (
     WithDrift,
 )
 from bench.session.signals import Signals
-from bench.trials.agreement import Agreement, agreement
+from bench.trials.agreement import MomentAgreement, agreement
 from bench.trials.consistency import check_friction_cone, nominal_slope
 from bench.trials.estimates import answers, as_felt, estimators, felt_at
 from bench.trials.gate import kinetic_of
@@ -223,7 +223,7 @@ def _against_pictures(
     return replace(felt, agreement_chi2=found.chi2, apart=bool(found.status), status=status)
 
 
-def against_shape(unit: Unit, readout: Readout, pairs: Pairs) -> Agreement:
+def against_shape(unit: Unit, readout: Readout, pairs: Pairs) -> MomentAgreement:
     """Compare felt moments with those of the seen shape.
 
     Moments that have newtons of their own also depend on how well the rigidity is known.

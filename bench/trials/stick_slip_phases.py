@@ -165,7 +165,7 @@ def felt_phases(
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
+class ContactRest:
     """A contact at rest between two jumps.
 
     from_rad, to_rad: pushing angles of its ends; to_rad is NaN where the record ends before the
@@ -204,7 +204,7 @@ def find_rests(
     beta_rad: float,
     d_x_mm: float,
     beam: Beam,
-) -> tuple[int, list[Rest]]:
+) -> tuple[int, list[ContactRest]]:
     """Return the number of jumps, and the rests between two of them; arguments as `felt_phases`."""
     good = np.isfinite(moments_Nmm).all(axis=1)
     time = time_s[good]
@@ -265,7 +265,7 @@ def _without_ringing(jumps: list[int], theta: np.ndarray, slip: np.ndarray) -> l
 
 def _rest(
     theta: np.ndarray, moments: np.ndarray, slip: np.ndarray, *, ends_in_jump: bool
-) -> Rest | None:
+) -> ContactRest | None:
     """Fit lines to the moments (n, 2) between two jumps; None where the contact does not rest."""
     inner = slice(_GUARD, len(theta) - _GUARD)
     if len(theta[inner]) < 2 * _FEWEST:
@@ -279,7 +279,7 @@ def _rest(
         return None
     residuals = columns - design @ lines
     variances = np.sum(residuals**2, axis=0)[:2] / (len(design) - 2)
-    return Rest(
+    return ContactRest(
         from_rad=float(theta[0]),
         to_rad=float(theta[-1]) if ends_in_jump else np.nan,
         middle_rad=float(middle),

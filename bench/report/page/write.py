@@ -8,7 +8,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from bench.analyses.analysis import PageTable, Run
+from bench.analyses.analysis import EvaluatedRun, PageTable
 from bench.analyses.catalogue import ANALYSES
 from bench.base.atomic import lock_output, write_whole
 from bench.base.results import plain
@@ -60,7 +60,7 @@ def report_again(out: Path, figure_formats: Sequence[str] = ()) -> list[Path]:
         return [*write_report(out, record, run), *figures]
 
 
-def write_report(out: Path, record: RunRecord, run: Run) -> list[Path]:
+def write_report(out: Path, record: RunRecord, run: EvaluatedRun) -> list[Path]:
     """Write report.html, methods.md and results.bib, each whole; return their paths.
 
     The same results give the same bytes.
@@ -75,7 +75,7 @@ def write_report(out: Path, record: RunRecord, run: Run) -> list[Path]:
     return [out / name for name in written]
 
 
-def page(out: Path, record: RunRecord, run: Run) -> str:
+def page(out: Path, record: RunRecord, run: EvaluatedRun) -> str:
     """Return the page as HTML. out: the folder of its pictures and of the analyses' tables."""
     rows = rows_of(run.results)
     estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
