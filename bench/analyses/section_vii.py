@@ -70,7 +70,7 @@ class FeltContact:
         """Return the slip angle (8)."""
         return felt_slip_angle(self.m_y_Nmm, self.m_z_Nmm)
 
-    def moved(self, cause: int) -> "Contact":
+    def moved(self, cause: int) -> "FeltContact":
         """Return the contact with one of the shared causes off by its sigma."""
         by_y, by_z = self.shared_Nmm[cause]
         return replace(self, m_y_Nmm=float(self.m_y_Nmm + by_y), m_z_Nmm=float(self.m_z_Nmm + by_z))
