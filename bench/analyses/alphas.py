@@ -117,6 +117,18 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
     beta = abs(seen.beta_rad.value)
     centred = d.across_y_mm - d.across_y_mm.mean()
     weights = centred / np.sum(centred**2)  # (frames,) of the slope of a line
+    alpha, slope = _straight_line(d, beta, weights)
+    # To first order an error of d_y acts as one of d_z times the slope; rows of z and y take turns.
+    gradient = np.stack([weights, -slope * weights], axis=1).ravel()  # (2 frames,)
+    slope_sigma = float(np.sqrt(gradient @ d.covariance @ gradient))
+    return alpha, float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
+
+
+def _straight_line(d: Deflection, beta: float, weights: np.ndarray) -> tuple[float, float]:
+    """Return α, rad, and the slope of d_z against d_y, without what bends that line.
+
+    weights (frames,): of the slope of a line. α is needed for that bend, and found in a few rounds.
+    """
     slope = float(weights @ d.across_z_mm)
     side = np.copysign(1.0, slope)
     heading_rad = _heading(d, d.theta_rad)
@@ -127,13 +139,7 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
         phi = slip_angle(d.theta_rad, beta, across_rad)
         bent_mm = d.across_y_mm * (np.tan(phi) - np.tan(beta - alpha))
         slope = float(weights @ (d.across_z_mm - side * bent_mm))
-    # To first order an error of d_y acts as one of d_z times the slope; rows of z and y take turns.
-    frames = len(weights)
-    by_z = np.eye(2 * frames)[0::2]
-    by_y = np.eye(2 * frames)[1::2]
-    gradient = weights @ (by_z - slope * by_y)
-    slope_sigma = float(np.sqrt(gradient @ d.covariance @ gradient))
-    return float(alpha), float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
+    return float(alpha), slope
 
 
 def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> tuple[float, float]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.analyses.alphas import seen_friction
 from bench.analyses.analysis import Analysis, EvaluatedRun
+from bench.analyses.pooling import grouped
 from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import (
     SLOPES_DEG,
@@ -89,23 +90,29 @@ def error_against_slope(
     figure = blank(9.6, 4.3)
     whole, near = figure.subplots(1, 2)
     judged = [j for j in judged if not j.one_factor or j.estimator == "with_friction"]
-    names = list(dict.fromkeys(j.estimator for j in judged))
-    without_2 = [name for name in names if name != "no_slip"]
-    for axes, drawn in ((whole, names), (near, without_2)):
-        for number, name in enumerate(drawn):
-            _draw_prediction(axes, name, number, fitted, settings)
-            mine = [j for j in judged if j.estimator == name]
-            apart_deg = _APART_DEG * (number - 0.5 * (len(drawn) - 1))
-            _draw_errors(axes, mine, number, fitted, apart_deg)
-        axes.axhline(0.0, color="0.6", lw=0.8, zorder=0)
-        axes.set(xlabel="slope β  [°]", xlim=(-2, 82))
+    without_2 = [j for j in judged if j.estimator != "no_slip"]
+    _draw_estimators(whole, judged, fitted, settings)
+    _draw_estimators(near, without_2, fitted, settings)
     whole.set(ylabel="error of d$_x$  [%]", title="every estimator")
     whole.set_ylim(*_limits([j for j in judged if not j.one_factor]))
     near.set(title="without (2)")
-    near.set_ylim(*_limits([j for j in judged if j.estimator != "no_slip"]))
+    near.set_ylim(*_limits(without_2))
     handles = {label: handle for handle, label in zip(*whole.get_legend_handles_labels())}
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3)
     return figure
+
+
+def _draw_estimators(
+    axes: "Axes", judged: Sequence[Judged], fitted: Sequence[FittedSurface], settings: Settings
+) -> None:
+    """Draw predicted and measured errors of all estimators against the slope."""
+    of_estimators = grouped(judged, lambda one: one.estimator)
+    for number, (name, mine) in enumerate(of_estimators.items()):
+        _draw_prediction(axes, name, number, fitted, settings)
+        apart_deg = _APART_DEG * (number - 0.5 * (len(of_estimators) - 1))
+        _draw_errors(axes, mine, number, fitted, apart_deg)
+    axes.axhline(0.0, color="0.6", lw=0.8, zorder=0)
+    axes.set(xlabel="slope β  [°]", xlim=(-2, 82))
 
 
 def errors_with_friction(results: Sequence[TrialResult]) -> list[tuple[float, Judged]]:

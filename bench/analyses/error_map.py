@@ -109,23 +109,11 @@ class ErrorMap(Analysis):
         left, right = drawing.subplots(1, 2, sharex=True, sharey=True)
         most = found.largest_percent
         top = found.highest_deg
+        colours = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
         measured, beta_deg, alpha_deg = _field(found.cells, top)
-        mesh = left.pcolormesh(beta_deg, alpha_deg, measured, cmap="RdBu_r", vmin=-most, vmax=most)
+        mesh = left.pcolormesh(beta_deg, alpha_deg, measured, **colours)
         _write_errors(left, found.cells, most)
-        slopes_deg, angles_deg = np.meshgrid(
-            np.linspace(0.0, _STEEPEST_DEG, 166), np.linspace(0.0, top, 121)
-        )
-        predicted = _predicted_percent(found, np.radians(slopes_deg), np.radians(angles_deg))
-        right.pcolormesh(
-            slopes_deg,
-            angles_deg,
-            np.clip(predicted, -most, most),
-            shading="nearest",
-            rasterized=True,
-            cmap="RdBu_r",
-            vmin=-most,
-            vmax=most,
-        )
+        _draw_prediction(right, found, colours)
         alpha_est_deg = np.degrees(found.alpha_est_rad)
         for axes, title in ((left, _title(found.cells)), (right, "predicted by (13), (14)")):
             axes.set(
@@ -138,10 +126,16 @@ class ErrorMap(Analysis):
         return drawing
 
 
-def _predicted_percent(found: MeasuredMap, beta_rad, alpha_rad) -> np.ndarray:
-    """Return the error of (10) by (13), (14), percent, over slopes and friction angles."""
-    error = distance_error(beta_rad, alpha_rad, found.alpha_est_rad)
-    return 100.0 * found.beam.error_share(found.d_x_mm, error)
+def _draw_prediction(axes: "Axes", found: MeasuredMap, colours: dict) -> None:
+    """Draw the error of (10) by (13), (14) over slopes and friction angles, in a scale of colours."""
+    beta_deg = np.linspace(0.0, _STEEPEST_DEG, 166)
+    alpha_deg = np.linspace(0.0, found.highest_deg, 121)
+    slopes_rad, angles_rad = np.meshgrid(np.radians(beta_deg), np.radians(alpha_deg))
+    error = distance_error(slopes_rad, angles_rad, found.alpha_est_rad)
+    percent = 100.0 * found.beam.error_share(found.d_x_mm, error)
+    most = found.largest_percent
+    clipped = np.clip(percent, -most, most)
+    axes.pcolormesh(beta_deg, alpha_deg, clipped, shading="nearest", rasterized=True, **colours)
 
 
 def measured_cells(

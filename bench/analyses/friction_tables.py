@@ -9,7 +9,7 @@ import numpy as np
 from bench.analyses.alphas import UNKNOWN, WhiskAlphas, alphas_of, mean_alpha
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, PageTable, read_rows
 from bench.analyses.page_cells import cell_with_sigma, panel_cell
-from bench.analyses.pooling import angle_cells, degrees, measured
+from bench.analyses.pooling import angle_cells, column, degrees, measured
 from bench.analyses.section_vii import (
     Way,
     by_consistency,
@@ -170,7 +170,7 @@ class FrictionAngles(Analysis):
         phi_rad = {}
         for one in found.surfaces:
             for felt in one.surface.felt:
-                phi_rad[felt.trial, felt.whisk] = np.radians(felt.phi_deg)
+                phi_rad[felt.key] = np.radians(felt.phi_deg)
         of_whisks = []
         for whisk in found.whisks:
             confidence = None
@@ -224,28 +224,26 @@ def friction_of(
     for surface in surfaces(results, whisker.beam):
         felt = contacts(results, surface.panel)
         ways = (by_tilting(felt), by_consistency(felt, whisker), by_smoothness(felt, whisker))
-        errors = []
-        phi_rad = []
-        for one in surface.felt:
-            error = error_percent.get((one.trial, one.whisk), np.nan)
-            if np.isfinite(error):
-                errors.append(error)
-                phi_rad.append(np.radians(one.phi_deg))
-        of_surface = tuple(alpha for alpha in alphas if alpha.panel == surface.panel)
+        errors = np.array([error_percent.get(one.key, np.nan) for one in surface.felt])
+        phi_rad = np.radians(column(surface.felt, "phi_deg"))
+        confidences = weights(phi_rad, alpha_est_rad)
         friction = SurfaceFriction(
             surface,
-            of_surface,
+            tuple(alpha for alpha in alphas if alpha.panel == surface.panel),
             ways,
             _weighted_rms(errors, np.ones(len(errors))),
-            _weighted_rms(errors, weights(phi_rad, alpha_est_rad)),
+            _weighted_rms(errors, confidences),
         )
         found.append(friction)
     return found
 
 
-def _weighted_rms(errors: Sequence[float], shares: np.ndarray) -> float:
-    """Return the root of the weighted mean square; NaN where no weight is left."""
-    if not (len(errors) and shares.sum() > 0):
+def _weighted_rms(errors: np.ndarray, shares: np.ndarray) -> float:
+    """Return the root of the weighted mean square of the known errors; NaN without any weight."""
+    known = np.isfinite(errors)
+    errors = errors[known]
+    shares = shares[known]
+    if not shares.sum() > 0:
         return np.nan
     return float(np.sqrt(shares @ np.square(errors) / shares.sum()))
 

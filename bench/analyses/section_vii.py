@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import stdtrit
 
 from bench.analyses.explained import by_10
-from bench.analyses.pooling import grouped, measured
+from bench.analyses.pooling import column, grouped, measured
 from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.whisker import Whisker
@@ -171,27 +171,32 @@ def _with_shared(
     for cause in range(len(known[0].shared_Nmm)):
         moved = fit_to([contact.moved(cause) for contact in recordings])
         shared.append(moved.alpha_rad - fit.alpha_rad)
-    variance = fit.sigma_rad**2 + np.sum(np.nan_to_num(shared) ** 2)
+    return Way(name, fit.alpha_rad, _sigma_with_shared(fit, np.array(shared)))
+
+
+def _sigma_with_shared(fit: _AlphaFit, shared_rad: np.ndarray) -> float:
+    """Return half the 95 % interval of a fit over 1.96, by its residuals and shared causes (k,)."""
+    variance = fit.sigma_rad**2 + np.sum(np.nan_to_num(shared_rad) ** 2)
     own = max(fit.sigma_rad**2 / variance, _LEAST_SHARE) if variance > 0 else 1.0
     freedom = np.floor(fit.freedom / own**2)
-    return Way(name, fit.alpha_rad, float(np.sqrt(variance) * stdtrit(freedom, 0.975) / Z_95))
+    return float(np.sqrt(variance) * stdtrit(freedom, 0.975) / Z_95)
 
 
 def _mean(some: Sequence[FeltContact]) -> FeltContact:
     """Return the whisks of one recording as one."""
     return replace(
         some[0],
-        m_y_Nmm=np.mean([contact.m_y_Nmm for contact in some]),
-        m_z_Nmm=np.mean([contact.m_z_Nmm for contact in some]),
-        shared_Nmm=np.mean([contact.shared_Nmm for contact in some], axis=0),
+        m_y_Nmm=column(some, "m_y_Nmm").mean(),
+        m_z_Nmm=column(some, "m_z_Nmm").mean(),
+        shared_Nmm=column(some, "shared_Nmm").mean(axis=0),
     )
 
 
 def _distances(some: Sequence[FeltContact], alphas_rad: np.ndarray, whisker: Whisker) -> np.ndarray:
     """Return d_x by (10), mm, (contacts, α); NaN where there is none."""
-    theta = np.array([[contact.theta_rad] for contact in some])
-    m_y = np.array([[contact.m_y_Nmm] for contact in some])
-    m_z = np.array([[contact.m_z_Nmm] for contact in some])
+    theta = column(some, "theta_rad")[:, None]
+    m_y = column(some, "m_y_Nmm")[:, None]
+    m_z = column(some, "m_z_Nmm")[:, None]
     return by_10(theta, m_y, m_z, alphas_rad, whisker)
 
 
@@ -212,7 +217,7 @@ def _least_scatter(some: Sequence[FeltContact], whisker: Whisker, degree: int) -
     Where one of their distances ends, the search ends, and status says so. Sigma is that of a least-squares fit whose
     residuals, all of one size, are what bars are set up wrong by.
     """
-    heights = np.array([contact.d_x_nominal_mm for contact in some])
+    heights = column(some, "d_x_nominal_mm")
 
     def residuals(alphas_rad: np.ndarray) -> np.ndarray:
         """Return residuals (α, contacts)."""

@@ -110,7 +110,8 @@ def soft_study(shape: str, count: int, seed: int) -> Score:
     for k in range(count):
         stiffness = np.inf if k % 4 == 0 else 10.0 ** rng.uniform(-1.0, 1.0)
         found = two_places(shape, stiffness, rng.uniform(5.0, 24.0), rng)
-        rows += [(one.give_mm_N - 1.0 / stiffness, one.give_sigma_mm_N) for one in found]
+        gives = [one.give_mm_N for one in found]
+        rows += [(give.value - 1.0 / stiffness, give.sigma) for give in gives]
     return Score(f"softness, {shape}", "mm/N", *np.array(rows).T)
 
 
