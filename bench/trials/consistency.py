@@ -101,7 +101,8 @@ def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board |
         return NO_REASON
     logs, variances = _logarithms(bar_looks)
     if not are_alike(logs, variances):
-        low, *_, high = np.exp(np.sort(logs))
+        low = np.exp(logs.min())
+        high = np.exp(logs.max())
         found = f"the bar looks {low:.2f} to {high:.2f} times as thick as said"
         sentence = f"{found}: check its diameter_mm, or something else is taken for it"
         return Reason("bar_width_unlike_stated", sentence)

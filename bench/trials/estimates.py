@@ -20,7 +20,7 @@ from estimator.distance import felt_slip_angle
 from estimator.signal import FeltTouch
 from estimator.uncertainty import Z_95, slip_angle_sigma
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
-from vision.geometry.reasons import as_reason, joined
+from vision.geometry.reasons import NO_REASON, Reason, as_reason, joined
 from vision.truth.value import Value
 
 UNKNOWN_RADII_MM = (math.nan, 0.0)  # of bar and whisker
