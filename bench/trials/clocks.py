@@ -91,13 +91,13 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
     if not len(strokes):
         return None
     difference, seen, felt, speed, delay = strokes.T
-    design = np.stack([np.ones_like(speed), speed], axis=1)  # (n, 2): zero, clock
+    design = np.vander(speed, 2, increasing=True)  # (n, 2): zero, clock
     # What moves the seen touch of one whisk (light, lenses, diameters) may move all; clocks and filter surely do.
     late = delay * speed
     Sigma = np.diag(felt**2 + seen**2) + np.outer(seen, seen) + np.outer(late, late)
-    weight = np.linalg.inv(Sigma)
-    information = design.T @ weight @ design
-    gradient = design.T @ weight @ difference
+    weighted = design.T @ np.linalg.inv(Sigma)
+    information = weighted @ design
+    gradient = weighted @ difference
     prior = _PRIOR**-2.0
     covariance = np.linalg.inv(information + np.diag(prior))
     zero_alone, clock_alone = gradient**2 / (np.diag(information) + prior)

@@ -90,10 +90,7 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
     """Return one whisk as felt; kind: of the signals."""
     readout, missing = readout_of(unit, kind)
     touch, whisk = _felt_whisk(unit, stroke, readout or Readout.bare())
-    status = whisk if isinstance(whisk, Reason) else missing
-    reaches = stroke.motor_rad.max() >= touch.motor_rad + unit.settings.theta_rad
-    if NOT_REACHED.code in status.codes and reaches:
-        status = SATURATED
+    status = _missing(unit, stroke, touch, whisk, missing)
     usable = None if status else whisk
     felt = as_felt(number, touch, usable, stroke.speed_rad_s, _delay_s(unit))
     felt = replace(felt, status=status, saturated=stroke.saturated)
@@ -111,6 +108,18 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
     )
     felt = _against_pictures(felt, unit, stroke, readout, seen)
     return _FeltStroke(unit, stroke, readout, touch).with_estimates(felt, usable)
+
+
+def _missing(
+    unit: Unit, stroke: FeltStroke, touch: FeltTouch, whisk: Whisk | Reason, without_readout: Reason
+) -> Reason:
+    """Return why a stroke has no moments at the wanted angle; NO_REASON where it has.
+
+    without_readout: why the channels are no moments.
+    """
+    status = whisk if isinstance(whisk, Reason) else without_readout
+    reaches = stroke.motor_rad.max() >= touch.motor_rad + unit.settings.theta_rad
+    return SATURATED if NOT_REACHED.code in status.codes and reaches else status
 
 
 def _felt_whisk(
