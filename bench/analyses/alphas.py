@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from bench.analyses.direction import slip_angle
+from bench.base.weighted import weighted_mean
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.trial_result import (
     Deflection,
@@ -188,14 +189,9 @@ def _heading(d: Deflection, theta_rad: float | np.ndarray) -> float | np.ndarray
 def mean_alpha(alphas: Iterable[tuple[float, float]]) -> tuple[float, float]:
     """Return the weighted mean of pairs (value, sigma) and its sigma, rad; NaN where none is known.
 
-    Cameras and gauges are common to all whisks, and how much of each sigma is theirs is not known: so it is
-    not divided by the number of whisks. Where the whisks scatter by more, the scatter of the mean counts.
+    Cameras and gauges are common to all whisks (`bench.base.weighted`).
     """
     known = np.array([pair for pair in alphas if np.isfinite(pair).all() and pair[1] > 0])
     if not len(known):
         return UNKNOWN
-    values, sigmas = known.T
-    weights = sigmas**-2.0 / np.sum(sigmas**-2.0)
-    mean = float(weights @ values)
-    scatter = np.sqrt(np.sum(weights**2 * (values - mean) ** 2)) if len(known) > 1 else 0.0
-    return mean, float(max(weights @ sigmas, scatter))
+    return weighted_mean(*known.T)

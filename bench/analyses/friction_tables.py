@@ -216,10 +216,7 @@ def friction_of(
 ) -> list[SurfaceFriction]:
     """Return the friction of every surface and speed among the trials that measure."""
     alphas = alphas_of(measured(results))
-    error_percent = {}
-    for judged in judge(results):
-        if judged.estimator == "with_friction" and not judged.one_factor:
-            error_percent[judged.trial, judged.whisk] = judged.error_percent
+    error_percent = _errors_by_10(results)
     found = []
     for surface in surfaces(results, whisker.beam):
         felt = contacts(results, surface.panel)
@@ -235,6 +232,15 @@ def friction_of(
             _weighted_rms(errors, confidences),
         )
         found.append(friction)
+    return found
+
+
+def _errors_by_10(results: Sequence[TrialResult]) -> dict[tuple[str, int], float]:
+    """Return the error of (10), percent, by trial and number of the whisk."""
+    found = {}
+    for judged in judge(results):
+        if judged.estimator == "with_friction" and not judged.one_factor:
+            found[judged.trial, judged.whisk] = judged.error_percent
     return found
 
 

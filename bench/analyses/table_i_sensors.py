@@ -133,7 +133,7 @@ def sensor_errors(
         if not (felt.sensors and seen.has_truth):
             continue
         answers = {row.estimator: row for row in (*felt.estimates, *felt.sensors)}
-        middle_deg = float(np.rint(abs(slope_deg(result, seen)) / _BETA_DEG) * _BETA_DEG)
+        middle_deg = _BETA_DEG * float(np.rint(abs(slope_deg(result, seen)) / _BETA_DEG))
         for order, name in enumerate(_ESTIMATORS):
             key = (result.trial.surface, middle_deg, order)
             percent.setdefault(key, []).append(_error_percent(answers[name], seen.d_x_mm))

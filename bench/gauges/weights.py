@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.base.errors import BadInput
+from bench.base.weighted import weighted_mean
 from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
@@ -55,13 +56,9 @@ def scale_by_weights(
     for trial in loaded:
         zero = zeros.get(trial.follicle_roll_deg, (zero_V, zero_sigma_V))
         found.append(_factor(trial, gauges, *zero))
-    factors, sigmas = np.array(found).T
-    shares = sigmas**-2.0 / np.sum(sigmas**-2.0)
-    factor = float(shares @ factors)
-    # Scales, balances and rulers may be common to all: their sigma is not divided by the number of weights.
-    scatter = np.sqrt(np.sum(shares**2 * (factors - factor) ** 2))
-    names = tuple(trial.name for trial in loaded)
-    return NewtonScale(factor, float(max(shares @ sigmas, scatter)), names)
+    # Scales, balances and rulers may be common to all weights.
+    factor, sigma = weighted_mean(*np.array(found).T)
+    return NewtonScale(factor, sigma, tuple(trial.name for trial in loaded))
 
 
 def _factor(

@@ -146,13 +146,7 @@ def session_of(
     trials: Collection[str] | None = None,
 ) -> Session:
     """Return the session of a manifest; options and errors are those of `load_session`."""
-    whisker, board, T_rig_board = doubts.each(
-        [
-            partial(_whisker, keys.whisker),
-            partial(_board, keys.board),
-            partial(_board_pose, keys.rig.T_rig_board),
-        ]
-    )
+    whisker, board, T_rig_board = _stated_bench(keys, doubts)
     bar_mm, bar_sigma_mm = _bar_diameter(keys.bar)
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
@@ -178,6 +172,19 @@ def session_of(
     _note_unused_cameras(session, keys.cameras, doubts)
     _check_cameras(session, doubts, lenses_known)
     return session
+
+
+def _stated_bench(
+    keys: manifest.SessionKeys, doubts: Doubts
+) -> tuple[Whisker | None, Board | None, np.ndarray | None]:
+    """Return whisker, board and T_rig_board (3, 4), each None where it is not stated."""
+    return doubts.each(
+        [
+            partial(_whisker, keys.whisker),
+            partial(_board, keys.board),
+            partial(_board_pose, keys.rig.T_rig_board),
+        ]
+    )
 
 
 def _bar_diameter(keys: manifest.BarKeys | None) -> tuple[float | None, float]:

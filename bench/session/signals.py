@@ -119,21 +119,16 @@ def read_signals(trial: Trial) -> Signals:
     table, duplicates = forward_in_time(table, TIME, shown)
     motor_deg, wraps = _unwrapped(table[MOTOR])
     _check_units(table, VOLTAGE if kind == "V" else MOMENT, channels, shown)
-    _check_forces(table, forces, shown)
-    dropped = {}
-    if duplicates:
-        dropped["duplicate rows"] = duplicates
-    if wraps:
-        dropped["encoder wraps"] = wraps
+    mended = {"duplicate rows": duplicates, "encoder wraps": wraps}
     return Signals(
         time_s=table[TIME],
         motor_rad=np.radians(motor_deg),
         y=table[channels[0]],
         z=table[channels[1]],
         kind=kind,
-        dropped=dropped,
+        dropped={cause: count for cause, count in mended.items() if count},
         warnings=_motor_warnings(table[TIME], motor_deg, trial, shown),
-        forces_N=np.column_stack([table[name] for name in forces]) if forces else None,
+        forces_N=_forces_N(table, forces, shown) if forces else None,
     )
 
 
@@ -148,10 +143,11 @@ def _kind_and_channels(table: NumberTable, shown: str) -> tuple[str, tuple[str, 
     return kind, channels
 
 
-def _check_forces(table: NumberTable, names: Sequence[str], shown: str) -> None:
-    """Raise BadInput where a force seems to be in another unit."""
+def _forces_N(table: NumberTable, names: Sequence[str], shown: str) -> np.ndarray:
+    """Return the forces (n, 3). Raise BadInput where one seems to be in another unit."""
     for name in names:
         FORCE.check(_extreme(table[name]), f"the largest {name}", shown)
+    return np.column_stack([table[name] for name in names])
 
 
 def _force_columns(table: NumberTable, shown: str) -> tuple[str, ...]:

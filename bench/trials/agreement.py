@@ -66,8 +66,11 @@ def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> Mo
     chance = float(chdtrc(2, chi2))
     if chance >= LEAST_CHANCE:
         return MomentAgreement(chi2, chance)
-    causes = [*_exchanges(volts, gauges.matrix), *_turns(felt, seen)]
-    causes += _possible_scales(difference, volts, gauges.matrix)
+    causes = [
+        *_exchanges(volts, gauges.matrix),
+        *_turns(felt, seen),
+        *_possible_scales(difference, volts, gauges.matrix),
+    ]
     sentence = difference.explained_by(causes, _EXPLAINED)
     return MomentAgreement(chi2, chance, sentence or _UNEXPLAINED, is_explained=bool(sentence))
 

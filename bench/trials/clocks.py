@@ -100,11 +100,12 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
     gradient = weighted @ difference
     prior = _PRIOR**-2.0
     covariance = np.linalg.inv(information + np.diag(prior))
+    values = covariance @ gradient
     zero_alone, clock_alone = gradient**2 / (np.diag(information) + prior)
     return SharedTouch(
-        covariance @ gradient,
+        values,
         covariance,
-        chance=float(chdtrc(2, gradient @ covariance @ gradient)),
+        chance=float(chdtrc(2, gradient @ values)),
         clock_preference=float(clock_alone - zero_alone),
         speeds_rad_s=speed,
     )

@@ -96,11 +96,9 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
     felt = replace(felt, status=status, saturated=stroke.saturated)
     if usable is None:
         return felt
-    if readout.is_gauged:
-        beyond = unit.gauges.beyond(readout.in_follicle(usable))
-        felt = replace(felt, status=Reason("beyond_calibration", beyond))
     felt = replace(
         felt,
+        status=_beyond_calibration(unit, readout, usable),
         shared_Nmm=readout.shared_Nmm(usable),
         phases=phases_of(unit.trial, stroke, touch, readout, seen, usable.beam),
         one_factor=_one_factor(unit, kind, stroke),
@@ -108,6 +106,13 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
     )
     felt = _against_pictures(felt, unit, stroke, readout, seen)
     return _FeltStroke(unit, stroke, readout, touch).with_estimates(felt, usable)
+
+
+def _beyond_calibration(unit: Unit, readout: Readout, whisk: Whisk) -> Reason:
+    """Return the status of moments larger than any that were calibrated; NO_REASON elsewhere."""
+    if not readout.is_gauged:
+        return NO_REASON
+    return Reason("beyond_calibration", unit.gauges.beyond(readout.in_follicle(whisk)))
 
 
 def _missing(

@@ -19,13 +19,14 @@ from bench.base.workers import Workers
 from bench.cameras.session_cameras import SessionCalibration, calibrate_session
 from bench.gauges.certificate import Certificate
 from bench.gauges.drift import drift_rate
-from bench.gauges.felt import strokes_of
+from bench.gauges.felt import FeltStroke, strokes_of
 from bench.gauges.fit import fit_gauges
 from bench.gauges.gauge_faults import Undetermined, check_alive
-from bench.gauges.gauge_readings import pairs_of
+from bench.gauges.gauge_readings import Pairs, pairs_of
 from bench.gauges.gauges_file import given_gauges
 from bench.gauges.matrix import FROM_ALL, GaugeCalibration
 from bench.gauges.reversal import reversals
+from bench.records.trial_result import SeenTrial
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
@@ -202,21 +203,28 @@ def fit_certificate(
     pairs = []
     seen = see_units(units, pool, "gauge trials", doubts)
     for unit, trial_seen, trial_strokes in zip(units, seen, strokes):
-        for whisk, stroke in zip(trial_seen.whisks, trial_strokes):
-            pairs.append(
-                pairs_of(unit.trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
-            )
-    pairs = tuple(p for p in pairs if p is not None)
+        pairs += _pairs(unit, trial_seen, trial_strokes, rate)
     return Certificate(
         session.name,
         session.whisker,
         fit_gauges(pairs),
-        pairs,
+        tuple(pairs),
         tuple(chain.from_iterable(strokes)),
         rate,
         tuple(back),
         roll_sigma_deg=max(unit.trial.follicle_roll_sigma_deg for unit in units),
     )
+
+
+def _pairs(
+    unit: Unit, seen: SeenTrial, strokes: Sequence[FeltStroke], rate: np.ndarray
+) -> Iterator[Pairs]:
+    """Yield the pairs of each whisk of a trial that has any; rate (2,): drift of the channels, V/s."""
+    theta_rad = unit.settings.theta_rad
+    for whisk, stroke in zip(seen.whisks, strokes):
+        pairs = pairs_of(unit.trial, whisk, stroke, rate, unit.session.whisker, theta_rad)
+        if pairs is not None:
+            yield pairs
 
 
 def _lacking_truth(units: Sequence[Unit]) -> Iterator[str]:

@@ -56,18 +56,26 @@ def seen_phases(frames: FrameTruth, beta_rad: float, d_x_mm: float) -> Phases:
     if len(theta) < _LEAST_FRAMES:
         return NO_PHASES
     slip = frames.slip_mm.value[touching]
-    sigma = frames.slip_mm.sigma[touching]
-    # One number an interval between frames, here and below.
-    free_step = np.abs(slip[:-1]) / theta[:-1] * np.diff(theta)
-    step_sigma = np.sqrt(2.0) * np.maximum(sigma[:-1], sigma[1:])
-    is_clear = free_step * _REST_SHARE > _SIGMAS * step_sigma
-    is_below = np.abs(np.diff(slip)) < _REST_SHARE * free_step
-    rests = is_below & is_clear
-    jumps = [run for run in _runs(~is_below & is_clear) if _is_jump(*run, rests)]
+    rests, moves = _rests_and_moves(theta, slip, frames.slip_mm.sigma[touching])
+    jumps = [run for run in _runs(moves) if _is_jump(*run, rests)]
     if not jumps or beta_rad == 0.0:
         return NO_PHASES
     angles = _seen_angles(frames, np.flatnonzero(touching), jumps, d_x_mm)
     return Phases(len(_runs(rests)), len(jumps), tuple(angles))
+
+
+def _rests_and_moves(
+    theta: np.ndarray, slip: np.ndarray, sigma: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return in which intervals between n frames the contact rests, and in which it moves (n − 1,).
+
+    In the others noise hides which.
+    """
+    free_step = np.abs(slip[:-1]) / theta[:-1] * np.diff(theta)
+    step_sigma = np.sqrt(2.0) * np.maximum(sigma[:-1], sigma[1:])
+    is_clear = free_step * _REST_SHARE > _SIGMAS * step_sigma
+    is_below = np.abs(np.diff(slip)) < _REST_SHARE * free_step
+    return is_below & is_clear, ~is_below & is_clear
 
 
 def _seen_angles(

@@ -57,14 +57,10 @@ class TrialFrames:
         times = frame_times(trial)
         by_camera = read_trial(trial, times)
         scene = still_scene(session, calibration, by_camera)
-        chosen = {}
-        for name, frames in scene.frames.items():
-            if name not in scene.left_out and settings.seeing.asks(name):
-                chosen[name] = frames
         others, itself = _own_apart(wires, session.base.name if session.base else "")
         velocity = trial.object_velocity_mm_s
         pictures = TrialPictures(
-            chosen,
+            _chosen_frames(scene, settings),
             times.time_s,
             # Frames before the first or after the last sample belong to no whisk.
             np.interp(times.time_s, signals.time_s, signals.motor_rad),
@@ -79,6 +75,15 @@ class TrialFrames:
         back = _back_frames(trial, signals, times)
         rods = Rods(session.whisker.wire, stated_object(trial))
         return cls(times, by_camera, scene, places, back, pictures, rods)
+
+
+def _chosen_frames(scene: StillScene, settings: Settings) -> dict[str, Mapping[int, np.ndarray]]:
+    """Return the frames of the cameras that stood still and that the settings name."""
+    chosen = {}
+    for name, frames in scene.frames.items():
+        if name not in scene.left_out and settings.seeing.asks(name):
+            chosen[name] = frames
+    return chosen
 
 
 def _own_apart(
