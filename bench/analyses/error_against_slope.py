@@ -12,6 +12,7 @@ from bench.analyses.pooling import grouped
 from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import (
     SLOPES_DEG,
+    add_legend,
     blank,
     colour_of,
     draw_whisks,
@@ -97,8 +98,7 @@ def error_against_slope(
     whole.set_ylim(*_limits([j for j in judged if not j.one_factor]))
     near.set(title="without (2)")
     near.set_ylim(*_limits(without_2))
-    handles = {label: handle for handle, label in zip(*whole.get_legend_handles_labels())}
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3)
+    add_legend(figure, 3)
     return figure
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.pooling import angle_cells, column, degrees
 from bench.analyses.surfaces import FittedSurface, SlopePoint
-from bench.base.drawing import SLOPES_DEG, blank, colour_of
+from bench.base.drawing import SLOPES_DEG, add_legend, blank, colour_of
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma
 from estimator.beam import moment_in_EI_per_metre
 from estimator.friction import curves
@@ -89,11 +89,7 @@ def figure_8(fitted: Sequence[FittedSurface]) -> "Figure":
         axes.set_ylim(bottom=0)
     for axes in grid[1::2, 0]:
         axes.set_ylabel("slip angle φ  [°]")
-    named = {}
-    for axes in grid.flat:
-        lines, labels = axes.get_legend_handles_labels()
-        named |= zip(labels, lines)
-    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=2)
+    add_legend(figure, 2)
     return figure
 
 

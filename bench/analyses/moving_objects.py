@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import as_cell, column, coverage, degrees, grouped, rms, value_cells
-from bench.base.drawing import blank, colour_of, label_of
+from bench.base.drawing import add_legend, blank, colour_of, label_of
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, status, with_sigma
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import EstimateRow, SeenWhisk, whisks
@@ -165,7 +165,7 @@ class MovingObjects(Analysis):
             xlabel="object's speed along the push  [% of the whisker's at the contact]",
             ylabel="error of d$_x$  [%]",
         )
-        drawing.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        add_legend(drawing, 3)
         return drawing
 
 

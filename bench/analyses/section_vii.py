@@ -241,10 +241,17 @@ def _least_scatter(some: Sequence[FeltContact], whisker: Whisker, degree: int) -
     freedom = len(some) - degree - 2  # the object's coefficients, and α
     if freedom < 1:
         return _AlphaFit(alpha_rad)
+    sigma = _fit_sigma(residuals, alpha_rad, found.fun / freedom)
+    return _AlphaFit(alpha_rad, sigma, freedom)
+
+
+def _fit_sigma(
+    residuals: Callable[[np.ndarray], np.ndarray], alpha_rad: float, variance: float
+) -> float:
+    """Return the standard deviation of a least-squares fit of α by the variance of its residuals."""
     high, low = residuals(alpha_rad + _STEP_RAD * np.array([1.0, -1.0]))
     slope = (high - low) / (2.0 * _STEP_RAD)
-    sigma = np.sqrt(found.fun / freedom / np.sum(slope**2))
-    return _AlphaFit(alpha_rad, float(sigma), freedom)
+    return float(np.sqrt(variance / np.sum(slope**2)))
 
 
 def weights(phi_rad: Sequence[float], alpha_est_rad: float) -> np.ndarray:

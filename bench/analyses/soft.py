@@ -286,21 +286,35 @@ def softness(
     if not np.isfinite(d_x):
         return replace(soft, status=NO_PUSH)
     give = compliance.give(d_x, k_theta[0], beam.C_Nmm2, taper)
-    own = compliance.two_distances_spread(
-        d_x, give, shift_mm, beam.C_Nmm2, near.sigma, far.sigma, soft.shift_sigma_mm, taper
-    )
     shared = []  # (k,) of each place
     for place in (near, far):
         shared.append(np.append(place.shared, _model_sigma(place, beam, theta_rad, alpha_est)))
-    moved = compliance.two_distances_moved(d_x, give, shift_mm, beam.C_Nmm2, *shared, taper)
-    d_x_sigma = float(np.hypot(own[0], np.linalg.norm(moved[0])))
-    give_sigma = float(np.hypot(own[1], np.linalg.norm(moved[1])))
+    d_x_sigma, give_sigma = _sigmas(soft, d_x, give, beam.C_Nmm2, taper, shared)
     return replace(
         soft,
         d_x_mm=Value(float(d_x), d_x_sigma),
         give_mm_N=Value(float(give), give_sigma),
         status=NOT_SOFT if give <= Z_95 * give_sigma else "",
     )
+
+
+def _sigmas(
+    soft: Soft, d_x: float, give: float, C: float, taper: float, shared: Sequence[np.ndarray]
+) -> tuple[float, float]:
+    """Return the standard deviations of distance and compliance by whisks at two places.
+
+    C: N·mm². taper: per mm. shared: changes (k,) of the near and of the far k_θ by each cause that
+    all whisks have in common.
+    """
+    near = soft.near
+    far = soft.far
+    own = compliance.two_distances_spread(
+        d_x, give, soft.shift_mm, C, near.sigma, far.sigma, soft.shift_sigma_mm, taper
+    )
+    moved = compliance.two_distances_moved(d_x, give, soft.shift_mm, C, *shared, taper)
+    d_x_sigma = np.hypot(own[0], np.linalg.norm(moved[0]))
+    give_sigma = np.hypot(own[1], np.linalg.norm(moved[1]))
+    return float(d_x_sigma), float(give_sigma)
 
 
 def _corrected(

@@ -133,7 +133,7 @@ def sensor_errors(
         if not (felt.sensors and seen.has_truth):
             continue
         answers = {row.estimator: row for row in (*felt.estimates, *felt.sensors)}
-        middle_deg = _BETA_DEG * float(np.rint(abs(slope_deg(result, seen)) / _BETA_DEG))
+        middle_deg = _middle_deg(slope_deg(result, seen))
         for order, name in enumerate(_ESTIMATORS):
             key = (result.trial.surface, middle_deg, order)
             percent.setdefault(key, []).append(_error_percent(answers[name], seen.d_x_mm))
@@ -143,6 +143,11 @@ def sensor_errors(
         alpha_deg = alphas_deg.get(surface, np.nan)
         found.append(_pooled(_ESTIMATORS[order], surface, middle_deg, alpha_deg, errors))
     return found
+
+
+def _middle_deg(slope: float) -> float:
+    """Return the middle of the range in which the size of a slope lies, degrees."""
+    return _BETA_DEG * float(np.rint(abs(slope) / _BETA_DEG))
 
 
 def _pooled(

@@ -112,6 +112,14 @@ def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board |
     sigma = float(np.hypot(factor_sigma / factor, trial.bar_diameter_sigma_mm / stated))
     if Difference.scalar(np.log(factor), sigma).is_chance:
         return NO_REASON
+    return _bar_width_reason(factor, sigma, stated, board)
+
+
+def _bar_width_reason(factor: float, sigma: float, stated: float, board: Board | None) -> Reason:
+    """Return the reason of a bar that appears `factor` times as thick as stated, mm.
+
+    sigma: of the factor, relative.
+    """
     found = f"the bar looks {factor:.2f} ± {sigma * factor:.2f} times as thick as said"
     cure = f"its diameter_mm would have to be some {stated * factor:.3g} for {stated:g}"
     if board is None:

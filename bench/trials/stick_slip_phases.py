@@ -287,19 +287,29 @@ def _rest(
     if len(theta[inner]) < 2 * _FEWEST:
         return None
     middle = theta.mean()
-    design = np.vander(theta[inner] - middle, 2, increasing=True)
     columns = np.column_stack([moments[inner], slip[inner]])  # |m_y|, m_z, slip
-    lines, _, _, _ = np.linalg.lstsq(design, columns, rcond=None)
+    lines, shape, variances = _fit_lines(theta[inner] - middle, columns)
     slip_mm, slip_per_rad = lines[:, 2]
     if slip_per_rad > _REST_SHARE * slip_mm / middle:
         return None
-    residuals = columns - design @ lines
-    variances = np.sum(residuals**2, axis=0)[:2] / (len(design) - 2)
     return ContactRest(
         from_rad=float(theta[0]),
         to_rad=float(theta[-1]) if ends_in_jump else np.nan,
         middle_rad=float(middle),
         lines=lines[:, :2],
-        shape=np.linalg.inv(design.T @ design),
-        variances=variances,
+        shape=shape,
+        variances=variances[:2],
     )
+
+
+def _fit_lines(x: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fit lines over x (n,) to k columns (n, k).
+
+    Returns value and slope (2, k), the shape (2, 2) of their covariance, and the variances (k,)
+    that it is multiplied by.
+    """
+    design = np.vander(x, 2, increasing=True)
+    lines, _, _, _ = np.linalg.lstsq(design, columns, rcond=None)
+    residuals = columns - design @ lines
+    variances = np.sum(residuals**2, axis=0) / (len(design) - 2)
+    return lines, np.linalg.inv(design.T @ design), variances

@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.base.doubts import in_one_status
 from bench.base.statuses import reason
-from bench.records.trial_result import SeenTrial, SeenWhisk
+from bench.records.trial_result import Drawing, SeenTrial, SeenWhisk
 from vision.fit.blocks import REST_PRIOR_MM
 from vision.pictures.others import Others, RodLines
 
@@ -61,10 +61,7 @@ def _checked(
         return whisk
     drawing = next(iter(whisk.overlay.values()))
     frame = drawing.frame
-    wires = {}  # (m, 2) px, by camera
-    for camera, lines in drawing.cameras.items():
-        if camera in straight:
-            wires[camera] = lines["wire"]
+    wires = _wires(drawing, straight)
     others = sorted(set().union(*straight.values()) - {own})
     taken = [name for name in others if _lies_on(wires, traced, frame, name)]
     offsets = [(0.0, own)]
@@ -81,6 +78,15 @@ def _checked(
         found.append(reason("wire_of_another", names=" or ".join(taken)))
     status = in_one_status(whisk.status, *found)
     return replace(whisk, status=status, contradicted=whisk.contradicted or bool(found))
+
+
+def _wires(drawing: Drawing, straight: Mapping[str, Others]) -> dict[str, np.ndarray]:
+    """Return the whisk's wire (m, 2), px, in each camera that has straight wires to compare."""
+    found = {}
+    for camera, lines in drawing.cameras.items():
+        if camera in straight:
+            found[camera] = lines["wire"]
+    return found
 
 
 def _base_offset(
