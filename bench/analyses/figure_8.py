@@ -52,6 +52,14 @@ _BARS = {
     "lw": 0,
     "zorder": 3,
 }
+# Text at a panel's foot.
+_NOTE = {
+    "xycoords": "axes fraction",
+    "fontsize": 7,
+    "color": "0.25",
+    "va": "bottom",
+    "linespacing": 1.5,
+}
 
 
 class Figure8(Analysis):
@@ -162,15 +170,8 @@ def _draw_panel(top: "Axes", bottom: "Axes", surface: FittedSurface, letter: str
     nominal = " (nominal)" if surface.felt[0].nominal else ""
     bottom.set(xlabel=f"slope β  [°]{nominal}", xlim=(-2, 82), ylim=(-3, 82))
     spread = 100.0 * float(np.median(m_sd_Nmm / m_Nmm))
-    top.annotate(
-        f"{fitted}|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)",
-        (0.04, 0.04),
-        xycoords="axes fraction",
-        fontsize=7,
-        color="0.25",
-        va="bottom",
-        linespacing=1.5,
-    )
+    scaled = f"|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)"
+    top.annotate(fitted + scaled, (0.04, 0.04), **_NOTE)
 
 
 def _draw_fit(top: "Axes", bottom: "Axes", surface: FittedSurface) -> str:

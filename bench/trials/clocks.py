@@ -92,10 +92,7 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
         return None
     difference, seen, felt, speed, delay = strokes.T
     design = np.vander(speed, 2, increasing=True)  # (n, 2): zero, clock
-    # What moves the seen touch of one whisk (light, lenses, diameters) may move all; clocks and filter surely do.
-    late = delay * speed
-    Sigma = np.diag(felt**2 + seen**2) + np.outer(seen, seen) + np.outer(late, late)
-    weighted = design.T @ np.linalg.inv(Sigma)
+    weighted = design.T @ np.linalg.inv(_covariance(seen, felt, delay * speed))
     information = weighted @ design
     gradient = weighted @ difference
     prior = _PRIOR**-2.0
@@ -109,6 +106,15 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
         clock_preference=float(clock_alone - zero_alone),
         speeds_rad_s=speed,
     )
+
+
+def _covariance(seen: np.ndarray, felt: np.ndarray, late: np.ndarray) -> np.ndarray:
+    """Return the covariance (n, n) of felt − seen by the sigmas (n,) of both and of clock and filter.
+
+    What moves the seen touch of one whisk (light, lenses, diameters) may move all; clocks and
+    filter surely do.
+    """
+    return np.diag(felt**2 + seen**2) + np.outer(seen, seen) + np.outer(late, late)
 
 
 def _strokes(results: Iterable[TrialResult]) -> Iterator[np.ndarray]:

@@ -256,14 +256,11 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
     sin = np.sin(theta)
     d_y = smooth.values["d_y"][chosen]
     frames = truth.frames
-    x, y, _ = frames.point_mm.value[frames.touching][chosen].T
-    touch = truth.touch_rad.value
     d_x = truth.d_x_mm.value
-    # Beyond the contact at touch, along the unbent whisker there.
-    beyond = np.cos(touch) * x + np.sin(touch) * y - d_x
+    beyond = _beyond_mm(truth)[chosen]
     return Deflection(
         theta_rad=theta,
-        motor_rad=touch + theta,
+        motor_rad=truth.touch_rad.value + theta,
         slip_mm=smooth.values["slip"][chosen],
         along_mm=d_x / cos - d_y * sin + beyond * cos,
         across_y_mm=d_y * cos + beyond * sin,
@@ -271,6 +268,17 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
         past_mm=beyond - frames.arc_mm[frames.touching][chosen],
         covariance=_deflection_covariance(smooth, chosen),
     )
+
+
+def _beyond_mm(truth: WhiskTruth) -> np.ndarray:
+    """Return how far the contact of each touching frame (n,) lies beyond that at touch.
+
+    Along the unbent whisker there.
+    """
+    frames = truth.frames
+    x, y, _ = frames.point_mm.value[frames.touching].T
+    touch = truth.touch_rad.value
+    return np.cos(touch) * x + np.sin(touch) * y - truth.d_x_mm.value
 
 
 def _deflection_covariance(smooth: Smooth, chosen: np.ndarray) -> np.ndarray:
