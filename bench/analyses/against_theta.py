@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
-from bench.analyses.pooling import grouped, known_rows, measured, rms
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
+from bench.analyses.pooling import column, grouped, known_rows, mean, rms, sound_measured_whisks
 from bench.base.drawing import blank, colour_of, label_of
 from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table
-from bench.records.trial_result import TrialResult, whisks
-from bench.trials.estimate_errors import is_sound
+from bench.records.trial_result import EstimateRow, TrialResult
 from vision.geometry.counted import counted
+from vision.truth.value import Value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,7 +75,7 @@ class AgainstTheta(Analysis):
     figure_title = "Error and sigma against θ"
     figure_caption = "RMS over the sound whisks: solid the error, dashed the stated sigma. Small θ: noise; large: bending."
 
-    def compute(self, run: Run) -> ThetaErrors:
+    def compute(self, run: EvaluatedRun) -> ThetaErrors:
         """Return the errors of every estimator at every pushing angle."""
         return ThetaErrors(tuple(against_theta(run.results)), run.settings.theta_deg)
 
@@ -86,7 +86,7 @@ class AgainstTheta(Analysis):
     def lines(self, found: ThetaErrors) -> Iterator[str]:
         """Yield a line an estimator: the θ of least error, and the error where the run's θ is."""
         for name, mine in grouped(found.at, lambda one: one.estimator).items():
-            least = least_error(found.at, name)
+            least = least_error(mine)
             if least is None:
                 continue
             at_own_theta = ""
@@ -112,34 +112,36 @@ class AgainstTheta(Analysis):
 def against_theta(results: Sequence[TrialResult]) -> list[AtTheta]:
     """Return the errors at each pushing angle, over measured whisks that are sound, seen and felt."""
     percent: dict[tuple[str, float], list[np.ndarray]] = {}
-    for _, seen, felt in whisks(measured(results)):
-        if not (seen.has_truth and is_sound(seen, felt)):
+    for _, seen, felt in sound_measured_whisks(results):
+        if not seen.has_truth:
             continue
-        truth = seen.d_x_mm
         for at in felt.by_theta:
             theta_deg = round(float(np.degrees(at.theta_rad)), 6)
             for row in at.estimates:
-                error_mm = row.d_x_est_mm.value - truth.value
-                sigma_mm = np.hypot(row.d_x_est_mm.sigma, truth.sigma)
-                exact_mm = np.hypot(row.d_x_est_sigma_alpha_exact_mm, truth.sigma)
-                shares = 100.0 / truth.value * np.array([error_mm, sigma_mm, exact_mm])
-                percent.setdefault((row.estimator, theta_deg), []).append(shares)
+                errors = _errors_percent(row, seen.d_x_mm)
+                percent.setdefault((row.estimator, theta_deg), []).append(errors)
     in_order = sorted(percent, key=lambda key: key[1])
     return [_pooled(*key, percent[key]) for key in in_order]
 
 
+def _errors_percent(row: EstimateRow, truth: Value) -> np.ndarray:
+    """Return error, its sigma, and that as if α_est were right (3,), percent of the truth."""
+    error_mm = row.d_x_est_mm.value - truth.value
+    sigma_mm = np.hypot(row.d_x_est_mm.sigma, truth.sigma)
+    exact_mm = np.hypot(row.d_x_est_sigma_alpha_exact_mm, truth.sigma)
+    return 100.0 / truth.value * np.array([error_mm, sigma_mm, exact_mm])
+
+
 def _pooled(estimator: str, theta_deg: float, percent: Sequence[np.ndarray]) -> AtTheta:
-    """Pool the errors of whisks and their two sigmas, percent (n, 3)."""
+    """Return the errors of one estimator and θ by those of its whisks, percent (n, 3)."""
     known, none = known_rows(percent, 3)
-    mean = float(known[:, 0].mean()) if len(known) else np.nan
-    return AtTheta(estimator, theta_deg, len(known), none, mean, *map(rms, known.T))
+    return AtTheta(estimator, theta_deg, len(known), none, mean(known[:, 0]), *map(rms, known.T))
 
 
-def least_error(rows: Sequence[AtTheta], estimator: str) -> AtTheta | None:
-    """Return where an estimator's RMS error is least, of the θ that nearly all its whisks reach."""
-    mine = [row for row in rows if row.estimator == estimator and row.whisks]
-    most = max((row.whisks for row in mine), default=0)
-    reached = [row for row in mine if row.whisks >= _FEWEST_SHARE * most]
+def least_error(rows: Sequence[AtTheta]) -> AtTheta | None:
+    """Return where one estimator's RMS error is least, of the θ that nearly all its whisks reach."""
+    most = max(row.whisks for row in rows)
+    reached = [row for row in rows if row.whisks and row.whisks >= _FEWEST_SHARE * most]
     return min(reached, key=lambda row: row.error_rms_percent, default=None)
 
 
@@ -148,18 +150,7 @@ def _draw(rows: Sequence[AtTheta]) -> "Figure":
     drawing = blank(5.6, 4.8)
     axes = drawing.subplots()
     for number, (name, mine) in enumerate(grouped(rows, lambda row: row.estimator).items()):
-        known = [row for row in mine if row.whisks]
-        colour = colour_of(name, number)
-        theta_deg = [row.theta_deg for row in known]
-        errors = [row.error_rms_percent for row in known]
-        sigmas = [row.error_sigma_percent for row in known]
-        exact_sigmas = [row.error_sigma_alpha_exact_percent for row in known]
-        axes.plot(theta_deg, errors, "o-", ms=3.5, color=colour, label=label_of(name))
-        axes.plot(theta_deg, sigmas, "--", lw=1.0, color=colour)
-        axes.plot(theta_deg, exact_sigmas, ":", lw=1.0, color=colour)
-        least = least_error(rows, name)
-        if least is not None:
-            axes.plot(least.theta_deg, least.error_rms_percent, "o", ms=9, mfc="none", mec=colour)
+        _draw_estimator(axes, mine, label_of(name), colour_of(name, number))
     axes.plot([], [], "--", lw=1.0, color="0.4", label="stated sigma")
     axes.plot([], [], ":", lw=1.0, color="0.4", label="sigma, α$_{est}$ exact")
     axes.plot([], [], "o", ms=9, mfc="none", mec="0.4", label="least error")
@@ -177,6 +168,20 @@ def _draw(rows: Sequence[AtTheta]) -> "Figure":
     axes.grid(alpha=0.25, which="major")
     _add_legend(drawing, axes, 3)
     return drawing
+
+
+def _draw_estimator(axes: "Axes", rows: Sequence[AtTheta], label: str, colour: str) -> None:
+    """Draw error and sigmas of one estimator over θ, with a ring where the error is least."""
+    known = [row for row in rows if row.whisks]
+    theta_deg = column(known, "theta_deg")
+    errors = column(known, "error_rms_percent")
+    axes.plot(theta_deg, errors, "o-", ms=3.5, color=colour, label=label)
+    axes.plot(theta_deg, column(known, "error_sigma_percent"), "--", lw=1.0, color=colour)
+    exact_sigmas = column(known, "error_sigma_alpha_exact_percent")
+    axes.plot(theta_deg, exact_sigmas, ":", lw=1.0, color=colour)
+    least = least_error(rows)
+    if least is not None:
+        axes.plot(least.theta_deg, least.error_rms_percent, "o", ms=9, mfc="none", mec=colour)
 
 
 def _add_legend(drawing: "Figure", axes: "Axes", styles: int) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from bench.analyses.direction import slip_angle
+from bench.base.weighted import weighted_mean
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.trial_result import (
     Deflection,
@@ -117,6 +118,18 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
     beta = abs(seen.beta_rad.value)
     centred = d.across_y_mm - d.across_y_mm.mean()
     weights = centred / np.sum(centred**2)  # (frames,) of the slope of a line
+    alpha, slope = _straight_line(d, beta, weights)
+    # To first order an error of d_y acts as one of d_z times the slope; rows of z and y take turns.
+    gradient = np.stack([weights, -slope * weights], axis=1).ravel()  # (2 frames,)
+    slope_sigma = float(np.sqrt(gradient @ d.covariance @ gradient))
+    return alpha, float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
+
+
+def _straight_line(d: Deflection, beta: float, weights: np.ndarray) -> tuple[float, float]:
+    """Return α, rad, and the slope of d_z against d_y, without what bends that line.
+
+    weights (frames,): of the slope of a line. α is needed for that bend, and found in a few rounds.
+    """
     slope = float(weights @ d.across_z_mm)
     side = np.copysign(1.0, slope)
     heading_rad = _heading(d, d.theta_rad)
@@ -127,13 +140,7 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
         phi = slip_angle(d.theta_rad, beta, across_rad)
         bent_mm = d.across_y_mm * (np.tan(phi) - np.tan(beta - alpha))
         slope = float(weights @ (d.across_z_mm - side * bent_mm))
-    # To first order an error of d_y acts as one of d_z times the slope; rows of z and y take turns.
-    frames = len(weights)
-    by_z = np.eye(2 * frames)[0::2]
-    by_y = np.eye(2 * frames)[1::2]
-    gradient = weights @ (by_z - slope * by_y)
-    slope_sigma = float(np.sqrt(gradient @ d.covariance @ gradient))
-    return float(alpha), float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
+    return float(alpha), slope
 
 
 def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> tuple[float, float]:
@@ -182,14 +189,9 @@ def _heading(d: Deflection, theta_rad: float | np.ndarray) -> float | np.ndarray
 def mean_alpha(alphas: Iterable[tuple[float, float]]) -> tuple[float, float]:
     """Return the weighted mean of pairs (value, sigma) and its sigma, rad; NaN where none is known.
 
-    Cameras and gauges are common to all whisks, and how much of each sigma is theirs is not known: so it is
-    not divided by the number of whisks. Where the whisks scatter by more, the scatter of the mean counts.
+    Cameras and gauges are common to all whisks (`bench.base.weighted`).
     """
     known = np.array([pair for pair in alphas if np.isfinite(pair).all() and pair[1] > 0])
     if not len(known):
         return UNKNOWN
-    values, sigmas = known.T
-    weights = sigmas**-2.0 / np.sum(sigmas**-2.0)
-    mean = float(weights @ values)
-    scatter = np.sqrt(np.sum(weights**2 * (values - mean) ** 2)) if len(known) > 1 else 0.0
-    return mean, float(max(weights @ sigmas, scatter))
+    return weighted_mean(*known.T)

@@ -30,7 +30,7 @@ _FIGURE_CODE = (*DRAWING, "bench/analyses")  # sources that a figure depends on
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Run:
+class EvaluatedRun:
     """The results of an evaluated session: all that an analysis is given.
 
     friction: of each surface and speed. alpha_est_sigma_rad: standard deviation of the assumed
@@ -81,7 +81,7 @@ class Analysis(ABC):
     needs_session: ClassVar[bool] = False
 
     @abstractmethod
-    def compute(self, run: Run) -> Any:
+    def compute(self, run: EvaluatedRun) -> Any:
         """Return what this analysis finds in a run, in the form that its other methods take."""
 
     def rows(self, found: Any) -> Mapping[Table, Iterable[dict]]:
@@ -114,7 +114,7 @@ class Analysis(ABC):
             if rows or self.in_every_run:
                 table.write(out, rows)
 
-    def draw(self, out: Path, run: Run, found: Any) -> list[str]:
+    def draw(self, out: Path, run: EvaluatedRun, found: Any) -> list[str]:
         """Write its figure into a folder; return the names of the files.
 
         The file has the hash of what it shows, and stays as it is where that has not changed.

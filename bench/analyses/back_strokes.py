@@ -8,13 +8,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
-from bench.analyses.pooling import angle_cells, as_cell, degrees, grouped, rms, value_cells
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
+from bench.analyses.pooling import (
+    angle_cells,
+    as_cell,
+    column,
+    coverage,
+    degrees,
+    grouped,
+    rms,
+    value_cells,
+)
 from bench.base.doubts import in_one_status
 from bench.base.drawing import label_of
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
-from vision.geometry.counted import counted
 from vision.truth.records import WhiskTruth
 from vision.truth.value import UNKNOWN, Value
 
@@ -92,7 +100,7 @@ class BothWays(Analysis):
     in_every_run = False
     heading = Heading("both_ways", "Ways back (both_ways.csv)")
 
-    def compute(self, run: Run) -> list[WayBack]:
+    def compute(self, run: EvaluatedRun) -> list[WayBack]:
         """Return every estimate of every way back."""
         return ways_back(run.results)
 
@@ -131,12 +139,9 @@ class BothWays(Analysis):
         """Yield a line an estimator, over the ways back whose truth is known."""
         known = [one for one in found if np.isfinite(one.error_mm)]
         for name, mine in grouped(known, lambda one: one.answer.estimator).items():
-            error_percent = rms(one.error_percent for one in mine)
-            inside = sum(bool(one.inside) for one in mine)
-            yield (
-                f"{label_of(name)}: error of d_x {error_percent:.2g} % RMS; its 95 % interval holds "
-                f"{inside} of {counted(len(mine), 'way')} back"
-            )
+            error_percent = rms(column(mine, "error_percent"))
+            held = coverage(mine, "way")
+            yield f"{label_of(name)}: error of d_x {error_percent:.2g} % RMS; {held} back"
 
 
 def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:

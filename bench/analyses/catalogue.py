@@ -8,7 +8,7 @@ from bench.analyses.error_against_slope import ErrorAgainstFriction, ErrorAgains
 from bench.analyses.error_map import ErrorMap
 from bench.analyses.explained import Explained
 from bench.analyses.figure_8 import Figure8
-from bench.analyses.friction_tables import Friction
+from bench.analyses.friction_tables import FrictionAngles
 from bench.analyses.gave import GivesWay
 from bench.analyses.ledger import Ledger
 from bench.analyses.moving_objects import MovingObjects
@@ -18,7 +18,7 @@ from bench.analyses.table_i_sensors import Sensors
 from bench.analyses.tilted import Tilts
 
 ANALYSES: tuple[Analysis, ...] = (
-    Friction(),
+    FrictionAngles(),
     Figure8(),
     ErrorAgainstSlope(),
     ErrorAgainstFriction(),

@@ -11,15 +11,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.gave import OBJECT
-from bench.analyses.pooling import angle_cells, known_rows, measured, value_cells
+from bench.analyses.pooling import (
+    angle_cells,
+    column,
+    known_rows,
+    sound_measured_whisks,
+    value_cells,
+)
 from bench.base.settings import TILT_SIGMA_RAD
 from bench.base.statuses import reason
 from bench.base.tables import TRIAL, WHISK, Column, Table, status, with_sigma
-from bench.records.trial_result import FeltAt, FeltWhisk, TrialResult, whisks
+from bench.records.trial_result import FeltAt, FeltWhisk, TrialResult
 from bench.session.whisker import Whisker
-from bench.trials.estimate_errors import is_sound
 from estimator import curvature, first_order
 from estimator.beam import Beam
 from estimator.domain import RIGHT_ANGLE
@@ -92,12 +97,12 @@ class Curvature(Analysis):
     tables = (CURVATURE,)
     heading = OBJECT
 
-    def compute(self, run: Run) -> list[CurvedWhisk]:
+    def compute(self, run: EvaluatedRun) -> list[CurvedWhisk]:
         """Return the curvature by every measured whisk with sound moments."""
         alpha_est = Value(run.settings.alpha_est_rad, run.alpha_est_sigma_rad)
         found = []
-        for result, seen, felt in whisks(measured(run.results)):
-            if felt.has_moments and is_sound(seen, felt):
+        for result, _, felt in sound_measured_whisks(run.results):
+            if felt.has_moments:
                 by_whisk = curved(felt.by_theta, run.whisker, alpha_est.value, alpha_est.sigma)
                 found.append(CurvedWhisk(result, felt, by_whisk))
         return found
@@ -120,21 +125,7 @@ class Curvature(Analysis):
 
     def lines(self, found: Sequence[CurvedWhisk]) -> Iterator[str]:
         """Yield the mean radius less the bar's own, and whisks whose object is curved sideways."""
-        errors = []
-        for one in found:
-            radius = one.curved.radius_mm
-            errors.append((radius.value - one.bar_radius_mm, radius.sigma))
-        known, _ = known_rows(errors, 2)
-        if len(known):
-            error_mm, sigma_mm = known.T
-            precision = np.sum(sigma_mm**-2.0)
-            mean_mm = sigma_mm**-2.0 / precision @ error_mm
-            inside = 100.0 * np.mean(np.abs(error_mm) < Z_95 * sigma_mm)
-            yield (
-                f"radius of the object in the whisking plane, by successive contacts of {len(known)} "
-                f"whisks, less the bar's own: {mean_mm:+.1f} ± {precision**-0.5:.1f} mm, 95 % "
-                f"intervals hold in {inside:.0f} % (curvature.csv)"
-            )
+        yield from _radius_lines(found)
         for one in found:
             lateral = one.curved.lateral_per_mm
             if abs(lateral.value) > Z_95 * lateral.sigma:
@@ -146,6 +137,26 @@ class Curvature(Analysis):
                 )
 
 
+def _radius_lines(found: Sequence[CurvedWhisk]) -> Iterator[str]:
+    """Yield a line on the weighted mean of radii less the bar's own, where any is known."""
+    errors = []
+    for one in found:
+        radius = one.curved.radius_mm
+        errors.append((radius.value - one.bar_radius_mm, radius.sigma))
+    known, _ = known_rows(errors, 2)
+    if not len(known):
+        return
+    error_mm, sigma_mm = known.T
+    precision = np.sum(sigma_mm**-2.0)
+    mean_mm = sigma_mm**-2.0 / precision @ error_mm
+    inside = 100.0 * np.mean(np.abs(error_mm) < Z_95 * sigma_mm)
+    yield (
+        f"radius of the object in the whisking plane, by successive contacts of {len(known)} "
+        f"whisks, less the bar's own: {mean_mm:+.1f} ± {precision**-0.5:.1f} mm, 95 % "
+        f"intervals hold in {inside:.0f} % (curvature.csv)"
+    )
+
+
 def curved(
     felt: Iterable[FeltAt], whisker: Whisker, alpha_rad: float, alpha_sigma_rad: float
 ) -> Curved:
@@ -155,33 +166,63 @@ def curved(
     angle and its standard deviation.
     """
     chosen = independent_angles(felt)
+    if len(chosen) < _FEWEST:
+        return Curved(len(chosen), status=reason("angles_few", least=_FEWEST))
+    slip = _slip_angle(chosen)
+    while slip.turns_far and len(chosen) > _FEWEST:
+        chosen = chosen[:-1]
+        slip = _slip_angle(chosen)
     count = len(chosen)
-    if count < _FEWEST:
-        return Curved(count, status=reason("angles_few", least=_FEWEST))
-    theta = np.array([at.theta_rad for at in chosen])
-    m_y = np.array([at.m_y_Nmm.value for at in chosen])
-    m_z = np.array([at.m_z_Nmm.value for at in chosen])
-    phis = np.arctan2(m_y, m_z)
-    phi, phi_rate = _at_touch(theta, phis, np.array([phi_sigma(at) for at in chosen]))
-    is_held = abs(phi.value) <= _HELD_SIGMAS * phi.sigma
-    span = float(np.ptp(phis))
-    if not is_held and span > _MOST_TURN * abs(phi.value) + _HELD_SIGMAS * phi.sigma:
-        if count > _FEWEST:
-            return curved(chosen[:-1], whisker, alpha_rad, alpha_sigma_rad)
-        too_far = reason("phi_turns_far", degrees=np.degrees(span))
+    phi = slip.at_touch
+    if slip.turns_far:
+        too_far = reason("phi_turns_far", degrees=np.degrees(slip.span_rad))
         return Curved(count, phi_0_rad=phi, status=too_far)
     distances = np.array([_distance(at, alpha_rad, whisker.beam) for at in chosen])
     if not np.isfinite(distances).all():
         return Curved(count, phi_0_rad=phi, status=reason("distances_missing"))
-    d_x, creep = _at_touch(theta, distances[:, 0], distances[:, 1])
+    d_x, creep = _at_touch(column(chosen, "theta_rad"), distances[:, 0], distances[:, 1])
     alpha = Value(alpha_rad, alpha_sigma_rad)
-    if is_held:
+    if slip.is_held:
         radius = _radius(d_x.value, creep, 0.0, alpha, 0.0, whisker)
         return Curved(count, radius, phi, status=reason("no_lateral_slip"))
-    turned = _turned(d_x.value, phi.value, phi_rate, alpha_rad)
+    turned = _turned(d_x.value, phi.value, slip.rate, alpha_rad)
     radius = _radius(d_x.value, creep, phi.value, alpha, turned, whisker)
-    lateral, printed = _lateral(phi.value, phi_rate, d_x.value, alpha_rad)
+    lateral, printed = _lateral(phi.value, slip.rate, d_x.value, alpha_rad)
     return Curved(count, radius, phi, lateral, printed)
+
+
+@dataclass(frozen=True)
+class _SlipAngle:
+    """φ over a push: at touch, rad, its rate with θ, and the span of its values, rad."""
+
+    at_touch: Value
+    rate: Value
+    span_rad: float
+
+    @property
+    def is_held(self) -> bool:
+        """Return whether φ may be none, so that the contact does not slip sideways."""
+        return abs(self.at_touch.value) <= _HELD_SIGMAS * self.at_touch.sigma
+
+    @property
+    def turns_far(self) -> bool:
+        """Return whether φ of a slipping contact turns by more than terms to θ² hold for."""
+        phi = self.at_touch
+        most_rad = _MOST_TURN * abs(phi.value) + _HELD_SIGMAS * phi.sigma
+        return not self.is_held and self.span_rad > most_rad
+
+
+def _slip_angle(felt: Sequence[FeltAt]) -> _SlipAngle:
+    """Return φ of a push by the moments at its pushing angles."""
+    phi = slip_angles(felt)
+    sigmas = np.array([phi_sigma(at) for at in felt])
+    at_touch, rate = _at_touch(column(felt, "theta_rad"), phi, sigmas)
+    return _SlipAngle(at_touch, rate, float(np.ptp(phi)))
+
+
+def slip_angles(felt: Sequence[FeltAt]) -> np.ndarray:
+    """Return φ (n,) by the moments at n pushing angles, rad."""
+    return np.arctan2(column(felt, "m_y_Nmm.value"), column(felt, "m_z_Nmm.value"))
 
 
 def independent_angles(felt: Iterable[FeltAt]) -> list[FeltAt]:

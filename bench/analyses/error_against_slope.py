@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.alphas import seen_friction
-from bench.analyses.analysis import Analysis, Run
-from bench.analyses.surfaces import Surface
+from bench.analyses.analysis import Analysis, EvaluatedRun
+from bench.analyses.pooling import grouped
+from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import (
     SLOPES_DEG,
+    add_legend,
     blank,
     colour_of,
     draw_whisks,
@@ -44,11 +46,11 @@ class ErrorAgainstSlope(Analysis):
         "predict with the α that fits each surface. A hollow point is in doubt and not in the verdict."
     )
 
-    def compute(self, run: Run) -> Run:
+    def compute(self, run: EvaluatedRun) -> EvaluatedRun:
         """Return the run as it is: it holds what is drawn."""
         return run
 
-    def figure(self, found: Run) -> "Figure | None":
+    def figure(self, found: EvaluatedRun) -> "Figure | None":
         """Draw the errors; None where none is known."""
         judged = measured(found.results)
         fitted = [friction.surface for friction in found.friction]
@@ -65,7 +67,7 @@ class ErrorAgainstFriction(Analysis):
         "(10) errs."
     )
 
-    def compute(self, run: Run) -> list[tuple[float, Judged]]:
+    def compute(self, run: EvaluatedRun) -> list[tuple[float, Judged]]:
         """Return the errors of (10), each with the friction angle seen, deg."""
         return errors_with_friction(run.results)
 
@@ -80,7 +82,7 @@ def measured(results: Sequence[TrialResult]) -> list[Judged]:
 
 
 def error_against_slope(
-    judged: Sequence[Judged], fitted: Sequence[Surface], settings: Settings
+    judged: Sequence[Judged], fitted: Sequence[FittedSurface], settings: Settings
 ) -> "Figure":
     """Draw the error of d_x against slope, for every estimator, and on the right without (2).
 
@@ -89,23 +91,28 @@ def error_against_slope(
     figure = blank(9.6, 4.3)
     whole, near = figure.subplots(1, 2)
     judged = [j for j in judged if not j.one_factor or j.estimator == "with_friction"]
-    names = list(dict.fromkeys(j.estimator for j in judged))
-    without_2 = [name for name in names if name != "no_slip"]
-    for axes, drawn in ((whole, names), (near, without_2)):
-        for number, name in enumerate(drawn):
-            _draw_prediction(axes, name, number, fitted, settings)
-            mine = [j for j in judged if j.estimator == name]
-            apart_deg = _APART_DEG * (number - 0.5 * (len(drawn) - 1))
-            _draw_errors(axes, mine, number, fitted, apart_deg)
-        axes.axhline(0.0, color="0.6", lw=0.8, zorder=0)
-        axes.set(xlabel="slope β  [°]", xlim=(-2, 82))
+    without_2 = [j for j in judged if j.estimator != "no_slip"]
+    _draw_estimators(whole, judged, fitted, settings)
+    _draw_estimators(near, without_2, fitted, settings)
     whole.set(ylabel="error of d$_x$  [%]", title="every estimator")
     whole.set_ylim(*_limits([j for j in judged if not j.one_factor]))
     near.set(title="without (2)")
-    near.set_ylim(*_limits([j for j in judged if j.estimator != "no_slip"]))
-    handles = {label: handle for handle, label in zip(*whole.get_legend_handles_labels())}
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3)
+    near.set_ylim(*_limits(without_2))
+    add_legend(figure, 3)
     return figure
+
+
+def _draw_estimators(
+    axes: "Axes", judged: Sequence[Judged], fitted: Sequence[FittedSurface], settings: Settings
+) -> None:
+    """Draw predicted and measured errors of all estimators against the slope."""
+    of_estimators = grouped(judged, lambda one: one.estimator)
+    for number, (name, mine) in enumerate(of_estimators.items()):
+        _draw_prediction(axes, name, number, fitted, settings)
+        apart_deg = _APART_DEG * (number - 0.5 * (len(of_estimators) - 1))
+        _draw_errors(axes, mine, number, fitted, apart_deg)
+    axes.axhline(0.0, color="0.6", lw=0.8, zorder=0)
+    axes.set(xlabel="slope β  [°]", xlim=(-2, 82))
 
 
 def errors_with_friction(results: Sequence[TrialResult]) -> list[tuple[float, Judged]]:
@@ -148,7 +155,7 @@ def _limits(judged: Sequence[Judged]) -> tuple[float, float]:
 
 
 def _draw_prediction(
-    axes: "Axes", name: str, number: int, fitted: Sequence[Surface], settings: Settings
+    axes: "Axes", name: str, number: int, fitted: Sequence[FittedSurface], settings: Settings
 ) -> None:
     """Draw the error that (13), (14) predict for an estimator where the surface has its fitted α."""
     assumed_rad = {"frictionless": 0.0, "with_friction": settings.alpha_est_rad, "no_slip": 0.0}
@@ -173,7 +180,11 @@ def _draw_prediction(
 
 
 def _draw_errors(
-    axes: "Axes", judged: Sequence[Judged], number: int, fitted: Sequence[Surface], apart_deg: float
+    axes: "Axes",
+    judged: Sequence[Judged],
+    number: int,
+    fitted: Sequence[FittedSurface],
+    apart_deg: float,
 ) -> None:
     """Draw the errors of one estimator against the slope, a marker a surface.
 

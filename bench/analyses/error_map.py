@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.friction_tables import SurfaceFriction
 from bench.base.drawing import blank
 from bench.base.tables import Column, Kind, Table, alike
@@ -41,7 +41,7 @@ _STEEPEST_DEG = 82.5  # the map's edge, the upper end of the cell of 80°
 
 
 @dataclass(frozen=True)
-class Cell:
+class MapCell:
     """Whisks of alike slope and friction.
 
     beta_deg, alpha_deg: lower edges of the cell. errors, predicted (whisks,): percent.
@@ -65,7 +65,7 @@ class MeasuredMap:
     beam, d_x_mm: a whisker that tapers changes relative errors, here at the session's median distance.
     """
 
-    cells: tuple[Cell, ...]
+    cells: tuple[MapCell, ...]
     alpha_est_rad: float
     beam: Beam
     d_x_mm: float
@@ -89,7 +89,7 @@ class ErrorMap(Analysis):
     figure_title = "Error of (10) over slope and friction"
     figure_caption = "Points: measured. Colours: as (13), (14) predict."
 
-    def compute(self, run: Run) -> MeasuredMap:
+    def compute(self, run: EvaluatedRun) -> MeasuredMap:
         """Return the measured cells, and what the prediction needs."""
         alpha_est_rad = run.settings.alpha_est_rad
         cells = measured_cells(run.results, run.friction, alpha_est_rad)
@@ -109,23 +109,11 @@ class ErrorMap(Analysis):
         left, right = drawing.subplots(1, 2, sharex=True, sharey=True)
         most = found.largest_percent
         top = found.highest_deg
+        colours = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
         measured, beta_deg, alpha_deg = _field(found.cells, top)
-        mesh = left.pcolormesh(beta_deg, alpha_deg, measured, cmap="RdBu_r", vmin=-most, vmax=most)
+        mesh = left.pcolormesh(beta_deg, alpha_deg, measured, **colours)
         _write_errors(left, found.cells, most)
-        slopes_deg, angles_deg = np.meshgrid(
-            np.linspace(0.0, _STEEPEST_DEG, 166), np.linspace(0.0, top, 121)
-        )
-        predicted = _predicted_percent(found, np.radians(slopes_deg), np.radians(angles_deg))
-        right.pcolormesh(
-            slopes_deg,
-            angles_deg,
-            np.clip(predicted, -most, most),
-            shading="nearest",
-            rasterized=True,
-            cmap="RdBu_r",
-            vmin=-most,
-            vmax=most,
-        )
+        _draw_prediction(right, found, colours)
         alpha_est_deg = np.degrees(found.alpha_est_rad)
         for axes, title in ((left, _title(found.cells)), (right, "predicted by (13), (14)")):
             axes.set(
@@ -138,15 +126,21 @@ class ErrorMap(Analysis):
         return drawing
 
 
-def _predicted_percent(found: MeasuredMap, beta_rad, alpha_rad) -> np.ndarray:
-    """Return the error of (10) by (13), (14), percent, over slopes and friction angles."""
-    error = distance_error(beta_rad, alpha_rad, found.alpha_est_rad)
-    return 100.0 * found.beam.error_share(found.d_x_mm, error)
+def _draw_prediction(axes: "Axes", found: MeasuredMap, colours: dict) -> None:
+    """Draw the error of (10) by (13), (14) over slopes and friction angles, in a scale of colours."""
+    beta_deg = np.linspace(0.0, _STEEPEST_DEG, 166)
+    alpha_deg = np.linspace(0.0, found.highest_deg, 121)
+    slopes_rad, angles_rad = np.meshgrid(np.radians(beta_deg), np.radians(alpha_deg))
+    error = distance_error(slopes_rad, angles_rad, found.alpha_est_rad)
+    percent = 100.0 * found.beam.error_share(found.d_x_mm, error)
+    most = found.largest_percent
+    clipped = np.clip(percent, -most, most)
+    axes.pcolormesh(beta_deg, alpha_deg, clipped, shading="nearest", rasterized=True, **colours)
 
 
 def measured_cells(
     results: Sequence[TrialResult], friction: Sequence[SurfaceFriction], alpha_est_rad: float
-) -> list[Cell]:
+) -> list[MapCell]:
     """Return the cells that hold a whisk, by slope and friction."""
     errors: dict[tuple[float, float], list[tuple[float, float]]] = {}
     half = 0.5 * _BETA_DEG
@@ -159,7 +153,7 @@ def measured_cells(
         on_cylinder = distance_error(np.radians(slope_deg), alpha_rad, alpha_est_rad)
         predicted = 100.0 * float(beam.error_share(d_x_mm, on_cylinder))
         errors.setdefault(edges, []).append((error, predicted))
-    return [Cell(*edges, *np.array(errors[edges]).T) for edges in sorted(errors)]
+    return [MapCell(*edges, *np.array(errors[edges]).T) for edges in sorted(errors)]
 
 
 def _edge(value: float, size: float) -> float:
@@ -187,7 +181,7 @@ def _whisks(
                 yield judged.beta_deg, alpha, judged.error_percent, beam, judged.d_x_mm
 
 
-def _row(cell: Cell) -> dict:
+def _row(cell: MapCell) -> dict:
     """Return the row of a cell."""
     count = len(cell.errors)
     return {
@@ -202,7 +196,7 @@ def _row(cell: Cell) -> dict:
     }
 
 
-def _title(cells: Sequence[Cell]) -> str:
+def _title(cells: Sequence[MapCell]) -> str:
     """Return on how many whisks the map rests, and that empty cells are empty."""
     counts = [len(cell.errors) for cell in cells]
     fewest = min(counts)
@@ -211,7 +205,7 @@ def _title(cells: Sequence[Cell]) -> str:
     return f"measured: {counted(sum(counts), 'whisk')}, {each}; blank: none"
 
 
-def _field(cells: Sequence[Cell], top: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _field(cells: Sequence[MapCell], top: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return mean errors (a, b), NaN where nothing was measured, and the cells' edges."""
     steepest = max(_STEEPEST_DEG, *(cell.beta_deg for cell in cells))
     beta = np.arange(-0.5 * _BETA_DEG, steepest + 1.5 * _BETA_DEG, _BETA_DEG)
@@ -224,7 +218,7 @@ def _field(cells: Sequence[Cell], top: float) -> tuple[np.ndarray, np.ndarray, n
     return field, beta, alpha
 
 
-def _write_errors(axes: "Axes", cells: Sequence[Cell], most: float) -> None:
+def _write_errors(axes: "Axes", cells: Sequence[MapCell], most: float) -> None:
     """Write each cell's mean error into it, light on the dark ends of the scale."""
     for cell in cells:
         text = f"{cell.error_percent:+.1f}".replace("-", "−").replace("−0.0", "0.0")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.alphas import seen_friction
-from bench.analyses.analysis import Analysis, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.pooling import angle_cells, known_rows
 from bench.base.drawing import blank
 from bench.base.tables import TRIAL, WHISK, Column, Table, with_sigma
@@ -23,6 +23,7 @@ from estimator.distance import with_friction
 from vision.truth.value import Value
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SHARES = ("by_touch_mm", "by_moments_mm", "by_alpha_mm", "remainder_mm")
@@ -62,7 +63,7 @@ class Explained(Analysis):
         "those seen, in this order."
     )
 
-    def compute(self, run: Run) -> list[dict]:
+    def compute(self, run: EvaluatedRun) -> list[dict]:
         """Return a row a whisk, and last the mean over those of which nothing is doubtful."""
         rows = list(explained_rows(run.results, run.whisker))
         if not rows:
@@ -86,14 +87,7 @@ class Explained(Analysis):
         axes = drawing.subplots()
         place = np.arange(count, dtype=float)
         place[-1] += 0.5
-        top = np.zeros(count)
-        bottom = np.zeros(count)
-        for name, (label, colour) in _LABELS.items():
-            share = np.nan_to_num(_percent(found, name))
-            start = np.where(share > 0, top, bottom)
-            axes.bar(place, share, bottom=start, color=colour, label=label, width=0.75)
-            top += np.maximum(share, 0.0)
-            bottom += np.minimum(share, 0.0)
+        _stack_shares(axes, place, found)
         axes.plot(place, _percent(found, "error_mm"), "k_", ms=9, mew=1.6, label="error of (10)")
         axes.axhline(0.0, color="0.3", lw=0.8)
         axes.set(
@@ -108,6 +102,18 @@ class Explained(Analysis):
             axes.set_xticks([place[-1]], [TOTAL], fontsize=7)
         drawing.legend(loc="outside lower center", ncols=3)
         return drawing
+
+
+def _stack_shares(axes: "Axes", place: np.ndarray, rows: Sequence[dict]) -> None:
+    """Draw each whisk's shares as bars at its place (n,), stacked away from zero to either side."""
+    top = np.zeros(len(rows))
+    bottom = np.zeros(len(rows))
+    for name, (label, colour) in _LABELS.items():
+        share = np.nan_to_num(_percent(rows, name))
+        start = np.where(share > 0, top, bottom)
+        axes.bar(place, share, bottom=start, color=colour, label=label, width=0.75)
+        top += np.maximum(share, 0.0)
+        bottom += np.minimum(share, 0.0)
 
 
 def explained_rows(results: Iterable[TrialResult], whisker: Whisker) -> Iterator[dict]:

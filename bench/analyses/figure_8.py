@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Run
-from bench.analyses.pooling import angle_cells, degrees
-from bench.analyses.surfaces import Point, Surface
-from bench.base.drawing import SLOPES_DEG, blank, colour_of
+from bench.analyses.analysis import Analysis, EvaluatedRun
+from bench.analyses.pooling import angle_cells, column, degrees
+from bench.analyses.surfaces import FittedSurface, SlopePoint
+from bench.base.drawing import SLOPES_DEG, add_legend, blank, colour_of
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma
 from estimator.beam import moment_in_EI_per_metre
 from estimator.friction import curves
@@ -40,6 +40,26 @@ FIGURE_8 = Table(
 )
 _MOST_COLUMNS = 4  # panels beside each other that can still be read on a page
 _LETTERS = "abcdefghijklmnopqrstuvwxyz"
+# Hollow points no larger than caps: bars of half a degree are seen.
+_BARS = {
+    "fmt": "o",
+    "ms": 3,
+    "mfc": "white",
+    "mew": 0.7,
+    "color": "black",
+    "capsize": 3.5,
+    "elinewidth": 1.0,
+    "lw": 0,
+    "zorder": 3,
+}
+# Text at a panel's foot.
+_NOTE = {
+    "xycoords": "axes fraction",
+    "fontsize": 7,
+    "color": "0.25",
+    "va": "bottom",
+    "linespacing": 1.5,
+}
 
 
 class Figure8(Analysis):
@@ -51,44 +71,37 @@ class Figure8(Analysis):
         "What was felt, |m| scaled to one d_x. Lines: (13), (14) with the α that fits the surface."
     )
 
-    def compute(self, run: Run) -> list[Surface]:
+    def compute(self, run: EvaluatedRun) -> list[FittedSurface]:
         """Return a panel for each surface and speed."""
         return [friction.surface for friction in run.friction]
 
-    def figure(self, found: Sequence[Surface]) -> "Figure | None":
+    def figure(self, found: Sequence[FittedSurface]) -> "Figure | None":
         """Draw a column for each surface and speed."""
         return figure_8(found) if found else None
 
 
-def figure_8(fitted: Sequence[Surface]) -> "Figure":
+def figure_8(fitted: Sequence[FittedSurface]) -> "Figure":
     """Draw a column for each surface and speed: |m| above, φ below."""
     columns = min(len(fitted), _MOST_COLUMNS)
     blocks = -(-len(fitted) // columns)
     figure = blank(1.2 + 3.2 * columns, 5.2 * blocks)
     grid = figure.subplots(2 * blocks, columns, sharex=True, sharey="row", squeeze=False)
-    for number in range(blocks * columns):
-        block, column = divmod(number, columns)
-        top = grid[2 * block, column]
-        bottom = grid[2 * block + 1, column]
-        if number < len(fitted):
-            _draw_panel(top, bottom, fitted[number], f"({_letter(number)})")
-        else:
-            top.set_visible(False)
-            bottom.set_visible(False)
+    tops = grid[::2].ravel()
+    bottoms = grid[1::2].ravel()
+    for number, surface in enumerate(fitted):
+        _draw_panel(tops[number], bottoms[number], surface, f"({_letter(number)})")
+    for axes in (*tops[len(fitted) :], *bottoms[len(fitted) :]):
+        axes.set_visible(False)
     for axes in grid[::2, 0]:  # once all panels of the row are drawn, which share their limits
         axes.set_ylabel("|m|  [EI/m]")
         axes.set_ylim(bottom=0)
     for axes in grid[1::2, 0]:
         axes.set_ylabel("slip angle φ  [°]")
-    named = {}
-    for axes in grid.flat:
-        lines, labels = axes.get_legend_handles_labels()
-        named |= zip(labels, lines)
-    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=2)
+    add_legend(figure, 2)
     return figure
 
 
-def rows(fitted: Sequence[Surface]) -> Iterator[dict]:
+def rows(fitted: Sequence[FittedSurface]) -> Iterator[dict]:
     """Yield the rows of FIGURE_8, one a point; |m| at the panel's common d_x. Fits are NaN where there is none.
 
     With one whisk a point, m_sd and phi_sd are its stated sigmas.
@@ -98,7 +111,7 @@ def rows(fitted: Sequence[Surface]) -> Iterator[dict]:
         EI = surface.beam.rigidity_Nmm2
         fit = surface.fit
         alpha = UNKNOWN if fit is None else Value(fit.alpha_rad, fit.sigma_rad)
-        m_fit, phi_fit_deg = _fitted_curves(surface, np.array([one.beta_deg for one in points]))
+        m_fit, phi_fit_deg = _fitted_curves(surface, column(points, "beta_deg"))
         for k, point in enumerate(points):
             yield {
                 "panel": _letter(number),
@@ -123,7 +136,7 @@ def _letter(number: int) -> str:
     return _LETTERS[number % len(_LETTERS)]
 
 
-def _fitted_curves(surface: Surface, beta_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _fitted_curves(surface: FittedSurface, beta_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return |m| [EI/m] and φ [°] of (13), (14) at the fitted α over slopes (n,).
 
     NaN where there is no fit.
@@ -138,54 +151,40 @@ def _fitted_curves(surface: Surface, beta_deg: np.ndarray) -> tuple[np.ndarray, 
     return moment_in_EI_per_metre(m, beam.rigidity_Nmm2), np.degrees(phi)
 
 
-def _draw_panel(top: "Axes", bottom: "Axes", surface: Surface, letter: str) -> None:
+def _draw_panel(top: "Axes", bottom: "Axes", surface: FittedSurface, letter: str) -> None:
     """Draw |m| above, φ below; negative slopes stand at their mirror image's place."""
     points = surface.points()
     EI = surface.beam.rigidity_Nmm2
-    beta_deg = [abs(point.beta_deg) for point in points]
-    m = [moment_in_EI_per_metre(point.m_Nmm, EI) for point in points]
-    m_sd = [moment_in_EI_per_metre(point.m_sd_Nmm, EI) for point in points]
-    phi_deg = [abs(point.phi_deg) for point in points]
-    phi_sd_deg = [point.phi_sd_deg for point in points]
-    # Hollow points no larger than caps: bars of half a degree are seen.
-    bars = {
-        "fmt": "o",
-        "ms": 3,
-        "mfc": "white",
-        "mew": 0.7,
-        "color": "black",
-        "capsize": 3.5,
-        "elinewidth": 1.0,
-        "lw": 0,
-        "zorder": 3,
-    }
-    top.errorbar(beta_deg, m, m_sd, **bars, label=_meaning(points))
-    bottom.errorbar(beta_deg, phi_deg, phi_sd_deg, **bars)
+    beta_deg = np.abs(column(points, "beta_deg"))
+    m_Nmm = column(points, "m_Nmm")
+    m_sd_Nmm = column(points, "m_sd_Nmm")
+    m = moment_in_EI_per_metre(m_Nmm, EI)
+    m_sd = moment_in_EI_per_metre(m_sd_Nmm, EI)
+    top.errorbar(beta_deg, m, m_sd, **_BARS, label=_meaning(points))
+    phi_deg = np.abs(column(points, "phi_deg"))
+    bottom.errorbar(beta_deg, phi_deg, column(points, "phi_sd_deg"), **_BARS)
     fitted = ""
     if surface.fit is not None:
-        m_fit, phi_fit_deg = _fitted_curves(surface, SLOPES_DEG)
-        colour = colour_of("with_friction")
-        label = "(13), (14) with the fitted α"
-        top.plot(SLOPES_DEG, m_fit, color=colour, lw=1.4, label=label)
-        bottom.plot(SLOPES_DEG, phi_fit_deg, color=colour, lw=1.4)
-        alpha_deg, sigma_deg = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
-        fitted = f"α = {alpha_deg:.2f} ± {sigma_deg:.2f}°\n"
+        fitted = _draw_fit(top, bottom, surface)
     top.set_title(f"{letter} {surface.title}", loc="left")
     nominal = " (nominal)" if surface.felt[0].nominal else ""
     bottom.set(xlabel=f"slope β  [°]{nominal}", xlim=(-2, 82), ylim=(-3, 82))
-    spread = 100.0 * float(np.median([point.m_sd_Nmm / point.m_Nmm for point in points]))
-    top.annotate(
-        f"{fitted}|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)",
-        (0.04, 0.04),
-        xycoords="axes fraction",
-        fontsize=7,
-        color="0.25",
-        va="bottom",
-        linespacing=1.5,
-    )
+    spread = 100.0 * float(np.median(m_sd_Nmm / m_Nmm))
+    scaled = f"|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)"
+    top.annotate(fitted + scaled, (0.04, 0.04), **_NOTE)
 
 
-def _meaning(points: Sequence[Point]) -> str:
+def _draw_fit(top: "Axes", bottom: "Axes", surface: FittedSurface) -> str:
+    """Draw |m| and φ of (13), (14) at the fitted α; return a line with that α."""
+    m_fit, phi_fit_deg = _fitted_curves(surface, SLOPES_DEG)
+    colour = colour_of("with_friction")
+    top.plot(SLOPES_DEG, m_fit, color=colour, lw=1.4, label="(13), (14) with the fitted α")
+    bottom.plot(SLOPES_DEG, phi_fit_deg, color=colour, lw=1.4)
+    alpha_deg, sigma_deg = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
+    return f"α = {alpha_deg:.2f} ± {sigma_deg:.2f}°\n"
+
+
+def _meaning(points: Sequence[SlopePoint]) -> str:
     """Return what points and their bars are."""
     most = max(point.whisks for point in points)
     return "one whisk each, ± its sigma" if most == 1 else f"mean ± SD of up to {most} whisks"

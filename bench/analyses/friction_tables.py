@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from bench.analyses.alphas import UNKNOWN, WhiskAlphas, alphas_of, mean_alpha
-from bench.analyses.analysis import Analysis, Heading, PageTable, Run, read_rows
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, PageTable, read_rows
 from bench.analyses.page_cells import cell_with_sigma, panel_cell
-from bench.analyses.pooling import angle_cells, degrees, measured
+from bench.analyses.pooling import angle_cells, column, degrees, measured
 from bench.analyses.section_vii import (
     Way,
     by_consistency,
@@ -18,7 +18,7 @@ from bench.analyses.section_vii import (
     contacts,
     weights,
 )
-from bench.analyses.surfaces import Surface, surfaces
+from bench.analyses.surfaces import FittedSurface, surfaces
 from bench.base.tables import SPEED, SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, with_sigma
 from bench.records.phases import KINETIC, STATIC, Phases
 from bench.records.trial_result import TrialResult
@@ -125,7 +125,7 @@ class SurfaceFriction:
     given, all whisks alike; error_rms_weighted_percent: weighted by confidence.
     """
 
-    surface: Surface
+    surface: FittedSurface
     whisks: tuple[WhiskAlphas, ...]
     ways: tuple[Way, ...]
     error_rms_percent: float
@@ -154,13 +154,13 @@ class FrictionResult:
     alpha_est_rad: float
 
 
-class Friction(Analysis):
+class FrictionAngles(Analysis):
     """How rough each surface is, seen and felt."""
 
     tables = (FRICTION, PHASES, SURFACES)
     heading = FRICTION_ANGLE
 
-    def compute(self, run: Run) -> FrictionResult:
+    def compute(self, run: EvaluatedRun) -> FrictionResult:
         """Return the friction angles of whisks and surfaces."""
         alphas = tuple(alphas_of(run.results))
         return FrictionResult(alphas, run.friction, run.settings.alpha_est_rad)
@@ -170,7 +170,7 @@ class Friction(Analysis):
         phi_rad = {}
         for one in found.surfaces:
             for felt in one.surface.felt:
-                phi_rad[felt.trial, felt.whisk] = np.radians(felt.phi_deg)
+                phi_rad[felt.key] = np.radians(felt.phi_deg)
         of_whisks = []
         for whisk in found.whisks:
             confidence = None
@@ -216,36 +216,40 @@ def friction_of(
 ) -> list[SurfaceFriction]:
     """Return the friction of every surface and speed among the trials that measure."""
     alphas = alphas_of(measured(results))
-    error_percent = {}
-    for judged in judge(results):
-        if judged.estimator == "with_friction" and not judged.one_factor:
-            error_percent[judged.trial, judged.whisk] = judged.error_percent
+    error_percent = _errors_by_10(results)
     found = []
     for surface in surfaces(results, whisker.beam):
         felt = contacts(results, surface.panel)
         ways = (by_tilting(felt), by_consistency(felt, whisker), by_smoothness(felt, whisker))
-        errors = []
-        phi_rad = []
-        for one in surface.felt:
-            error = error_percent.get((one.trial, one.whisk), np.nan)
-            if np.isfinite(error):
-                errors.append(error)
-                phi_rad.append(np.radians(one.phi_deg))
-        of_surface = tuple(alpha for alpha in alphas if alpha.panel == surface.panel)
+        errors = np.array([error_percent.get(one.key, np.nan) for one in surface.felt])
+        phi_rad = np.radians(column(surface.felt, "phi_deg"))
+        confidences = weights(phi_rad, alpha_est_rad)
         friction = SurfaceFriction(
             surface,
-            of_surface,
+            tuple(alpha for alpha in alphas if alpha.panel == surface.panel),
             ways,
             _weighted_rms(errors, np.ones(len(errors))),
-            _weighted_rms(errors, weights(phi_rad, alpha_est_rad)),
+            _weighted_rms(errors, confidences),
         )
         found.append(friction)
     return found
 
 
-def _weighted_rms(errors: Sequence[float], shares: np.ndarray) -> float:
-    """Return the root of the weighted mean square; NaN where no weight is left."""
-    if not (len(errors) and shares.sum() > 0):
+def _errors_by_10(results: Sequence[TrialResult]) -> dict[tuple[str, int], float]:
+    """Return the error of (10), percent, by trial and number of the whisk."""
+    found = {}
+    for judged in judge(results):
+        if judged.estimator == "with_friction" and not judged.one_factor:
+            found[judged.trial, judged.whisk] = judged.error_percent
+    return found
+
+
+def _weighted_rms(errors: np.ndarray, shares: np.ndarray) -> float:
+    """Return the root of the weighted mean square of the known errors; NaN without any weight."""
+    known = np.isfinite(errors)
+    errors = errors[known]
+    shares = shares[known]
+    if not shares.sum() > 0:
         return np.nan
     return float(np.sqrt(shares @ np.square(errors) / shares.sum()))
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
-from bench.analyses.pooling import grouped, panel_title, rms
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
+from bench.analyses.pooling import column, grouped, mean, panel_title, rms
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.trials.estimate_errors import is_sound
@@ -46,7 +46,7 @@ class GivesWay(Analysis):
     in_every_run = False
     heading = OBJECT
 
-    def compute(self, run: Run) -> tuple[TrialResult, ...]:
+    def compute(self, run: EvaluatedRun) -> tuple[TrialResult, ...]:
         """Return the results as they are: they hold what was seen."""
         return run.results
 
@@ -139,10 +139,11 @@ def mean_give(results: Sequence[TrialResult]) -> tuple[Value, int]:
     """
     gives = []
     for result, seen, felt in whisks(results):
-        if is_sound(seen, felt):
-            gives.append(give_seen(result, seen, felt))
-    gives = [give for give in gives if np.isfinite(give.value)]
+        if not is_sound(seen, felt):
+            continue
+        give = give_seen(result, seen, felt)
+        if np.isfinite(give.value):
+            gives.append(give)
     if not gives:
         return UNKNOWN, 0
-    mean = float(np.mean([give.value for give in gives]))
-    return Value(mean, rms(give.sigma for give in gives)), len(gives)
+    return Value(mean(column(gives, "value")), rms(column(gives, "sigma"))), len(gives)

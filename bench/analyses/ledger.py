@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.left_out import (
     COST_PERCENT,
     NAMES,
@@ -149,7 +149,7 @@ class Ledger(Analysis):
         "ledger", "Only what the scene requires: the effect of leaving it out (ledger.csv)"
     )
 
-    def compute(self, run: Run) -> list[Entry]:
+    def compute(self, run: EvaluatedRun) -> list[Entry]:
         """Return every refinement of every whisk."""
         return ledger(run.results, run.whisker)
 

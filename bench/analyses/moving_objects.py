@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
-from bench.analyses.pooling import as_cell, degrees, grouped, rms, value_cells
-from bench.base.drawing import blank, colour_of, label_of
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
+from bench.analyses.pooling import as_cell, column, coverage, degrees, grouped, rms, value_cells
+from bench.base.drawing import add_legend, blank, colour_of, label_of
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, status, with_sigma
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import EstimateRow, SeenWhisk, whisks
@@ -93,7 +93,7 @@ class MovingObjects(Analysis):
     figure_name = "moving"
     needs_session = True
 
-    def compute(self, run: Run) -> list[Moved]:
+    def compute(self, run: EvaluatedRun) -> list[Moved]:
         """Return every estimate of every whisk with a truth whose object moved."""
         found = []
         for result, seen, felt in whisks(run.results):
@@ -137,18 +137,15 @@ class MovingObjects(Analysis):
         known = [one for one in found if one.is_sound and np.isfinite(one.error_percent)]
         if not known:
             return
-        shares = [one.share_percent for one in known]
+        shares = column(known, "share_percent")
         number = len({(one.trial.name, one.seen.whisk) for one in known})
         yield (
             f"{counted(number, 'whisk')} against objects that moved along the push at "
             f"{min(shares):+.0f} to {max(shares):+.0f} % of the whisker's speed; error of d_x, RMS:"
         )
         for name, mine in grouped(known, lambda one: one.answer.estimator).items():
-            inside = sum(bool(one.inside) for one in mine)
-            yield (
-                f"  {label_of(name)}: {rms(one.error_percent for one in mine):.2g} %; its 95 % "
-                f"interval holds {inside} of {counted(len(mine), 'whisk')}"
-            )
+            error_percent = rms(column(mine, "error_percent"))
+            yield f"  {label_of(name)}: {error_percent:.2g} %; {coverage(mine, 'whisk')}"
 
     def figure(self, found: Sequence[Moved]) -> "Figure | None":
         """Draw the error of d_x over the object's speed along the push, estimator by estimator."""
@@ -159,8 +156,8 @@ class MovingObjects(Analysis):
         by_estimator = grouped(found, lambda one: one.answer.estimator)
         for number, (name, mine) in enumerate(by_estimator.items()):
             mine = sorted(mine, key=lambda one: one.share_percent)
-            shares = [one.share_percent for one in mine]
-            errors = [one.error_percent for one in mine]
+            shares = column(mine, "share_percent")
+            errors = column(mine, "error_percent")
             colour = colour_of(name, number)
             axes.plot(shares, errors, "o", ms=4, color=colour, label=label_of(name))
         axes.axhline(0.0, color="0.6", lw=0.8, zorder=0)
@@ -168,7 +165,7 @@ class MovingObjects(Analysis):
             xlabel="object's speed along the push  [% of the whisker's at the contact]",
             ylabel="error of d$_x$  [%]",
         )
-        drawing.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        add_legend(drawing, 3)
         return drawing
 
 

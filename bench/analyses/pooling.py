@@ -1,12 +1,15 @@
 """What analyses have in common: whisks by group, errors pooled over whisks, cells of a row."""
 
-from collections.abc import Callable, Hashable, Iterable
-from typing import TypeVar
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Sequence
+from operator import attrgetter
+from typing import Any, TypeVar
 
 import numpy as np
 
 from bench.base.tables import sigma_name
-from bench.records.trial_result import TrialResult
+from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.trials.estimate_errors import is_sound
+from vision.geometry.counted import counted
 from vision.truth.value import Value
 
 Item = TypeVar("Item")
@@ -26,10 +29,35 @@ def measured(results: Iterable[TrialResult]) -> list[TrialResult]:
     return [result for result in results if result.trial.purpose == "measure"]
 
 
+def sound_measured_whisks(
+    results: Iterable[TrialResult],
+) -> Iterator[tuple[TrialResult, SeenWhisk, FeltWhisk]]:
+    """Yield the whisks of trials that measure, seen and felt, of which nothing is doubtful."""
+    for result, seen, felt in whisks(measured(results)):
+        if is_sound(seen, felt):
+            yield result, seen, felt
+
+
+def column(items: Iterable[Any], name: str) -> np.ndarray:
+    """Return an attribute of all items, such as "d_x_mm.value", as an array (items, ...)."""
+    return np.array([*map(attrgetter(name), items)])
+
+
+def mean(values: Sequence[float]) -> float:
+    """Return the mean; NaN of nothing."""
+    return float(np.mean(values)) if len(values) else np.nan
+
+
 def rms(values: Iterable[float]) -> float:
     """Return the root mean square; NaN of nothing."""
     squares = np.square(list(values))
     return float(np.sqrt(np.mean(squares))) if len(squares) else np.nan
+
+
+def coverage(estimates: Collection[Any], noun: str) -> str:
+    """Return of how many estimates, each of one `noun`, the 95 % interval holds the truth."""
+    inside = sum(bool(one.inside) for one in estimates)
+    return f"its 95 % interval holds {inside} of {counted(len(estimates), noun)}"
 
 
 def known_rows(rows: Iterable[Iterable[float]], columns: int) -> tuple[np.ndarray, int]:

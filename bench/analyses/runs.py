@@ -8,13 +8,13 @@ judges. The run with α as seen is no estimate that a robot could make: it shows
 is known.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench.analyses.alphas import seen_friction
-from bench.analyses.surfaces import Surface, surfaces
+from bench.analyses.surfaces import FittedSurface, surfaces
 from bench.analyses.turning_phi import turn, with_turn
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
 from bench.records.trial_result import (
@@ -42,7 +42,7 @@ RUNS = (FITTED, SEEN, KINETIC)
 ASSUMING = {GIVEN: with_friction, "corrected": corrected}  # take α_est as given
 
 
-def alpha_est_sigma(found: Iterable[Surface], settings: Settings) -> float:
+def alpha_est_sigma(found: Iterable[FittedSurface], settings: Settings) -> float:
     """Return how far α_est may be off in this session, rad, one sigma: as given, else by its surfaces.
 
     Root mean square of fitted less assumed α over the surfaces, among which the 5° that hold without any
@@ -161,26 +161,31 @@ def _estimates(
     if not felt.estimates:
         return ()
     given = again.given(felt, again.theta_rad)
-    whisk = whisk_of(felt, again.theta_rad, again.beam)
-    runs = []
-    fitted = (fit.alpha_rad, fit.sigma_rad) if fit else (np.nan, np.nan)
-    for name, (alpha_rad, sigma_rad) in ((FITTED, fitted), (SEEN, seen_friction(seen))):
-        if np.isfinite(alpha_rad):
-            alpha = (max(alpha_rad, 0.0), sigma_rad)
-            runs.append(again.evaluate(name, with_friction, whisk, alpha))
-    if felt.kinetic is not None:
-        alpha_rad = next(row.alpha_est_rad for row in given if row.estimator == GIVEN)
-        alpha = (alpha_rad, again.alpha_est.sigma_rad)
-        kinetic = whisk_of(felt.kinetic, again.theta_rad, again.beam)
-        runs.append(again.evaluate(KINETIC, with_friction, kinetic, alpha))
     rate = turn(felt.by_theta)
     phi_rad = felt.phi_felt_rad.value
     rows = []
-    for row in (*given, *runs):
+    for row in (*given, *_runs(seen, felt, fit, again)):
         if row.estimator in ASSUMING or row.estimator in RUNS:
             row = with_turn(row, phi_rad, rate, again.theta_rad, again.beam.length_mm)
         rows.append(row)
     return tuple(rows)
+
+
+def _runs(
+    seen: SeenWhisk, felt: FeltWhisk, fit: FrictionFit | None, again: AskedAgain
+) -> Iterator[EstimateRow]:
+    """Yield (10) with α fitted and seen, where known, and at the kinetic ends, where there are any."""
+    whisk = whisk_of(felt, again.theta_rad, again.beam)
+    fitted = (fit.alpha_rad, fit.sigma_rad) if fit else (np.nan, np.nan)
+    for name, (alpha_rad, sigma_rad) in ((FITTED, fitted), (SEEN, seen_friction(seen))):
+        if np.isfinite(alpha_rad):
+            alpha = (max(alpha_rad, 0.0), sigma_rad)
+            yield again.evaluate(name, with_friction, whisk, alpha)
+    if felt.kinetic is not None:
+        alpha_rad = next(row.alpha_est_rad for row in felt.estimates if row.estimator == GIVEN)
+        alpha = (alpha_rad, again.alpha_est.sigma_rad)
+        kinetic = whisk_of(felt.kinetic, again.theta_rad, again.beam)
+        yield again.evaluate(KINETIC, with_friction, kinetic, alpha)
 
 
 def _radii_mm(result: TrialResult) -> tuple[float, float]:

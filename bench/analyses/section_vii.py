@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import stdtrit
 
 from bench.analyses.explained import by_10
-from bench.analyses.pooling import grouped, measured
+from bench.analyses.pooling import column, grouped, measured
 from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.base.statuses import reason
 from bench.records.trial_result import TrialResult, whisks
@@ -51,7 +51,7 @@ def _unknown(name: str, status: str) -> Way:
 
 
 @dataclass(frozen=True)
-class Contact:
+class FeltContact:
     """What a robot has of one whisk: nominal slope and distance (NaN where not given), and what was felt.
 
     shared_Nmm (k, 2): what (m_y, m_z) change by at one sigma of each cause that all whisks have in common.
@@ -70,20 +70,20 @@ class Contact:
         """Return the slip angle (8)."""
         return felt_slip_angle(self.m_y_Nmm, self.m_z_Nmm)
 
-    def moved(self, cause: int) -> "Contact":
+    def moved(self, cause: int) -> "FeltContact":
         """Return the contact with one of the shared causes off by its sigma."""
         by_y, by_z = self.shared_Nmm[cause]
         return replace(self, m_y_Nmm=float(self.m_y_Nmm + by_y), m_z_Nmm=float(self.m_z_Nmm + by_z))
 
 
-def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) -> list[Contact]:
+def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) -> list[FeltContact]:
     """Return the measured whisks of one surface and speed that have sound moments."""
     found = []
     for result, _, felt in whisks(measured(results)):
         trial = result.trial
         if trial.panel != panel or not felt.has_moments or felt.apart:
             continue
-        contact = Contact(
+        contact = FeltContact(
             np.radians(trial.beta_nominal_deg),
             trial.d_x_nominal_mm,
             float(np.radians(result.theta_deg)),
@@ -96,23 +96,23 @@ def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) ->
     return found
 
 
-def by_tilting(of_surface: Sequence[Contact]) -> Way:
+def by_tilting(of_surface: Sequence[FeltContact]) -> Way:
     """Return α by way 1, from nominal slopes of both signs."""
     known = [contact for contact in of_surface if np.isfinite(contact.beta_rad)]
     slopes = [contact.beta_rad for contact in known]
     if not (slopes and min(slopes) < 0 < max(slopes)):
         return _unknown("tilting", reason("slopes_one_sided"))
 
-    def fit(recordings: Sequence[Contact]) -> _Fit:
+    def fit(recordings: Sequence[FeltContact]) -> _AlphaFit:
         """Fit the slip angles of tilts."""
         betas = [contact.beta_rad for contact in recordings]
         fitted = alpha_from_tilts(betas, [contact.phi_rad for contact in recordings])
-        return _Fit(fitted.alpha_rad, fitted.sigma_rad, fitted.freedom, fitted.status)
+        return _AlphaFit(fitted.alpha_rad, fitted.sigma_rad, fitted.freedom, fitted.status)
 
     return _with_shared("tilting", fit, known)
 
 
-def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
+def by_consistency(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
     """Return α by way 2: that under which distances scatter least as shares of themselves."""
     nominal = {contact.d_x_nominal_mm for contact in of_surface}
     if len(of_surface) < _FEWEST or len(nominal) != 1 or not np.isfinite(list(nominal)).all():
@@ -120,7 +120,7 @@ def by_consistency(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
     return _by_object("consistency", of_surface, whisker, 0)
 
 
-def by_smoothness(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
+def by_smoothness(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
     """Return α by way 2 of an object that is no edge at one distance: contacts lie on a straight one.
 
     Bars at several nominal distances stand for one straight edge that leans along the whisker, touched at heights that
@@ -132,7 +132,7 @@ def by_smoothness(of_surface: Sequence[Contact], whisker: Whisker) -> Way:
     return _by_object("smoothness", of_surface, whisker, 1)
 
 
-def _by_object(name: str, of_surface: Sequence[Contact], whisker: Whisker, degree: int) -> Way:
+def _by_object(name: str, of_surface: Sequence[FeltContact], whisker: Whisker, degree: int) -> Way:
     """Return α by way 2 with an object whose distance is a polynomial of this degree in height."""
     if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
         return _unknown(name, reason("no_push_on_object"))
@@ -142,7 +142,7 @@ def _by_object(name: str, of_surface: Sequence[Contact], whisker: Whisker, degre
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _AlphaFit:
     """A fit of α to recordings, with its sigma by their residuals and the degrees of freedom of that."""
 
     alpha_rad: float
@@ -152,7 +152,7 @@ class _Fit:
 
 
 def _with_shared(
-    name: str, fit_to: Callable[[Sequence[Contact]], _Fit], known: Sequence[Contact]
+    name: str, fit_to: Callable[[Sequence[FeltContact]], _AlphaFit], known: Sequence[FeltContact]
 ) -> Way:
     """Return the way by a fit to recordings, with what all whisks share in its sigma.
 
@@ -169,27 +169,32 @@ def _with_shared(
     for cause in range(len(known[0].shared_Nmm)):
         moved = fit_to([contact.moved(cause) for contact in recordings])
         shared.append(moved.alpha_rad - fit.alpha_rad)
-    variance = fit.sigma_rad**2 + np.sum(np.nan_to_num(shared) ** 2)
+    return Way(name, fit.alpha_rad, _sigma_with_shared(fit, np.array(shared)))
+
+
+def _sigma_with_shared(fit: _AlphaFit, shared_rad: np.ndarray) -> float:
+    """Return half the 95 % interval of a fit over 1.96, by its residuals and shared causes (k,)."""
+    variance = fit.sigma_rad**2 + np.sum(np.nan_to_num(shared_rad) ** 2)
     own = max(fit.sigma_rad**2 / variance, _LEAST_SHARE) if variance > 0 else 1.0
     freedom = np.floor(fit.freedom / own**2)
-    return Way(name, fit.alpha_rad, float(np.sqrt(variance) * stdtrit(freedom, 0.975) / Z_95))
+    return float(np.sqrt(variance) * stdtrit(freedom, 0.975) / Z_95)
 
 
-def _mean(some: Sequence[Contact]) -> Contact:
+def _mean(some: Sequence[FeltContact]) -> FeltContact:
     """Return the whisks of one recording as one."""
     return replace(
         some[0],
-        m_y_Nmm=np.mean([contact.m_y_Nmm for contact in some]),
-        m_z_Nmm=np.mean([contact.m_z_Nmm for contact in some]),
-        shared_Nmm=np.mean([contact.shared_Nmm for contact in some], axis=0),
+        m_y_Nmm=column(some, "m_y_Nmm").mean(),
+        m_z_Nmm=column(some, "m_z_Nmm").mean(),
+        shared_Nmm=column(some, "shared_Nmm").mean(axis=0),
     )
 
 
-def _distances(some: Sequence[Contact], alphas_rad: np.ndarray, whisker: Whisker) -> np.ndarray:
+def _distances(some: Sequence[FeltContact], alphas_rad: np.ndarray, whisker: Whisker) -> np.ndarray:
     """Return d_x by (10), mm, (contacts, α); NaN where there is none."""
-    theta = np.array([[contact.theta_rad] for contact in some])
-    m_y = np.array([[contact.m_y_Nmm] for contact in some])
-    m_z = np.array([[contact.m_z_Nmm] for contact in some])
+    theta = column(some, "theta_rad")[:, None]
+    m_y = column(some, "m_y_Nmm")[:, None]
+    m_z = column(some, "m_z_Nmm")[:, None]
     return by_10(theta, m_y, m_z, alphas_rad, whisker)
 
 
@@ -204,13 +209,13 @@ def _residuals(distances: np.ndarray, heights: np.ndarray, degree: int) -> np.nd
     return 1.0 - design @ np.linalg.lstsq(design, np.ones(len(distances)), rcond=None)[0]
 
 
-def _least_scatter(some: Sequence[Contact], whisker: Whisker, degree: int) -> _Fit:
+def _least_scatter(some: Sequence[FeltContact], whisker: Whisker, degree: int) -> _AlphaFit:
     """Fit the α at which the contacts lie least off an object.
 
     Where one of their distances ends, the search ends, and status says so. Sigma is that of a least-squares fit whose
     residuals, all of one size, are what bars are set up wrong by.
     """
-    heights = np.array([contact.d_x_nominal_mm for contact in some])
+    heights = column(some, "d_x_nominal_mm")
 
     def residuals(alphas_rad: np.ndarray) -> np.ndarray:
         """Return residuals (α, contacts)."""
@@ -222,7 +227,7 @@ def _least_scatter(some: Sequence[Contact], whisker: Whisker, degree: int) -> _F
     best = int(np.nanargmin(on_grid))
     if best in (0, last):
         status = reason("friction_at_bound", bound_deg=np.degrees(_GRID_RAD[best]))
-        return _Fit(np.nan, status=status)
+        return _AlphaFit(np.nan, status=status)
     found = minimize_scalar(
         lambda alpha_rad: np.sum(residuals(np.array([alpha_rad])) ** 2),
         bounds=(_GRID_RAD[best - 1], _GRID_RAD[best + 1]),
@@ -232,11 +237,18 @@ def _least_scatter(some: Sequence[Contact], whisker: Whisker, degree: int) -> _F
     alpha_rad = float(found.x)
     freedom = len(some) - degree - 2  # the object's coefficients, and α
     if freedom < 1:
-        return _Fit(alpha_rad)
+        return _AlphaFit(alpha_rad)
+    sigma = _fit_sigma(residuals, alpha_rad, found.fun / freedom)
+    return _AlphaFit(alpha_rad, sigma, freedom)
+
+
+def _fit_sigma(
+    residuals: Callable[[np.ndarray], np.ndarray], alpha_rad: float, variance: float
+) -> float:
+    """Return the standard deviation of a least-squares fit of α by the variance of its residuals."""
     high, low = residuals(alpha_rad + _STEP_RAD * np.array([1.0, -1.0]))
     slope = (high - low) / (2.0 * _STEP_RAD)
-    sigma = np.sqrt(found.fun / freedom / np.sum(slope**2))
-    return _Fit(alpha_rad, float(sigma), freedom)
+    return float(np.sqrt(variance / np.sum(slope**2)))
 
 
 def weights(phi_rad: Sequence[float], alpha_est_rad: float) -> np.ndarray:

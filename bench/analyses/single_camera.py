@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, Run
-from bench.analyses.pooling import angle_cells, as_cell, grouped, rms, value_cells
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
+from bench.analyses.pooling import angle_cells, as_cell, column, coverage, grouped, rms, value_cells
 from bench.base.doubts import in_one_status
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, status, with_sigma
 from bench.records.trial_result import ByOneCamera, SeenWhisk, TrialResult, whisks
@@ -101,7 +101,7 @@ class OneCamera(Analysis):
         "one_camera", "By one camera's pictures of its own trial, no gauge (one_camera.csv)"
     )
 
-    def compute(self, run: Run) -> list[ShapeSeen]:
+    def compute(self, run: EvaluatedRun) -> list[ShapeSeen]:
         """Return the shape of every whisk that was evaluated by one camera."""
         found = []
         for result, seen, _ in whisks(run.results):
@@ -141,10 +141,9 @@ class OneCamera(Analysis):
             if not known:
                 yield f"{name}: none of {counted(len(mine), 'whisk')} has a distance"
                 continue
-            error_mm = rms(one.error_mm for one in known)
-            stated_mm = rms(one.error_sigma_mm for one in known)
-            inside = sum(bool(one.inside) for one in known)
+            error_mm = rms(column(known, "error_mm"))
+            stated_mm = rms(column(known, "error_sigma_mm"))
             yield (
-                f"{name}: d_x off by {error_mm:.2g} mm RMS (stated {stated_mm:.2g}); its 95 % interval "
-                f"holds {inside} of {counted(len(known), 'whisk')}"
+                f"{name}: d_x off by {error_mm:.2g} mm RMS (stated {stated_mm:.2g}); "
+                f"{coverage(known, 'whisk')}"
             )

@@ -2,7 +2,7 @@
 
 The whisker is moved along itself by a known shift, between trials of one surface and speed whose nominal distances
 (d_x_mm in trial.toml) differ. Only whisks that do not slip sideways serve, for the equation has no slip. No picture is
-looked at; where pictures show the object giving way, that stands in the same row (`bench.analyses.gave`).
+used; where pictures show the object giving way, that stands in the same row (`bench.analyses.gave`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,18 +12,23 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, PageTable, Run, read_rows
+from bench.analyses.analysis import Analysis, EvaluatedRun, PageTable, read_rows
 from bench.analyses.gave import OBJECT, mean_give
 from bench.analyses.page_cells import cell_with_sigma, panel_cell
-from bench.analyses.pooling import grouped, measured, panel_title
+from bench.analyses.pooling import (
+    grouped,
+    measured,
+    panel_title,
+    sound_measured_whisks,
+    value_cells,
+)
 from bench.base.numbers import MISSING, number_range
 from bench.base.statuses import reason
 from bench.base.tables import SPEED, SURFACE, Column, Table, alike, status, with_sigma
 from bench.gauges.gauge_readings import NOMINAL_SHARE
-from bench.records.trial_result import FeltWhisk, TrialFacts, TrialResult, whisks
+from bench.records.trial_result import FeltWhisk, TrialFacts, TrialResult
 from bench.session.session import Session
 from bench.session.whisker import Whisker
-from bench.trials.estimate_errors import is_sound
 from estimator import compliance, first_order
 from estimator.beam import Beam
 from estimator.uncertainty import Z_95, model_share
@@ -101,10 +106,8 @@ class Soft:
     speed_deg_s: float | None
     near: Place
     far: Place
-    d_x_mm: float
-    d_x_sigma_mm: float
-    give_mm_N: float
-    give_sigma_mm_N: float
+    d_x_mm: Value = UNKNOWN
+    give_mm_N: Value = UNKNOWN
     status: str = ""
     seen: Value = UNKNOWN
     whisks_seen: int = 0
@@ -115,19 +118,21 @@ class Soft:
         return self.far.nominal_mm - self.near.nominal_mm
 
     @property
+    def shift_sigma_mm(self) -> float:
+        """Return the standard deviation of that shift."""
+        return float(np.hypot(self.near.nominal_sigma_mm, self.far.nominal_sigma_mm))
+
+    @property
     def stiffness_N_mm(self) -> tuple[float, float, float]:
         """Return the stiffness and both ends of its 95 % interval.
 
         Infinite where the object gives way no more than a rigid one.
         """
-        if not np.isfinite(self.give_mm_N):
+        give = self.give_mm_N.value
+        if not np.isfinite(give):
             return np.nan, np.nan, np.nan
-        reach = Z_95 * self.give_sigma_mm_N
-        return (
-            _inverse(self.give_mm_N),
-            _inverse(self.give_mm_N + reach),
-            _inverse(self.give_mm_N - reach),
-        )
+        reach = Z_95 * self.give_mm_N.sigma
+        return _inverse(give), _inverse(give + reach), _inverse(give - reach)
 
 
 def _inverse(give_mm_N: float) -> float:
@@ -142,7 +147,7 @@ class Softness(Analysis):
     heading = OBJECT
     needs_session = True
 
-    def compute(self, run: Run) -> list[Soft]:
+    def compute(self, run: EvaluatedRun) -> list[Soft]:
         """Return what each two neighbouring nominal distances of a surface and speed give."""
         return soft_objects(run)
 
@@ -154,7 +159,9 @@ class Softness(Analysis):
     def lines(self, found: Sequence[Soft]) -> Iterator[str]:
         """Yield a line a pair of distances that says anything."""
         for soft in found:
-            if not np.isfinite(soft.give_mm_N):
+            d_x_mm = soft.d_x_mm
+            give = soft.give_mm_N
+            if not np.isfinite(give.value):
                 continue
             stiffness, low, high = soft.stiffness_N_mm
             if soft.status:
@@ -163,8 +170,8 @@ class Softness(Analysis):
                 verdict = f"stiffness {stiffness:.3g} N/mm ({low:.3g} to {high:.3g})"
             yield (
                 f"{panel_title(soft.surface, soft.speed_deg_s)}: two distances {soft.shift_mm:g} mm "
-                f"apart (section VII): gives way by {soft.give_mm_N:.3f} ± {soft.give_sigma_mm_N:.3f} "
-                f"mm/N: {verdict}; d_x {soft.d_x_mm:.2f} ± {soft.d_x_sigma_mm:.2f} mm"
+                f"apart (section VII): gives way by {give.value:.3f} ± {give.sigma:.3f} "
+                f"mm/N: {verdict}; d_x {d_x_mm.value:.2f} ± {d_x_mm.sigma:.2f} mm"
             )
 
     def page_table(self, out: Path) -> PageTable:
@@ -194,7 +201,7 @@ def _stiffness_cell(low: float, high: float) -> str:
     return f"{low:.3g} to {high:.3g}" if np.isfinite(high) else f"more than {low:.3g}"
 
 
-def soft_objects(run: Run) -> list[Soft]:
+def soft_objects(run: EvaluatedRun) -> list[Soft]:
     """Return the softness by each two neighbouring nominal distances of a surface and speed."""
     found = []
     alpha_est = Value(run.settings.alpha_est_rad, run.alpha_est_sigma_rad)
@@ -221,8 +228,8 @@ def _places(session: Session, results: Sequence[TrialResult]) -> list[Place]:
         by_ruler_mm = NOMINAL_SHARE * d_x_mm / np.sqrt(len(there))
         sigma_mm = max(session.trial(one.trial.name).d_x_sigma_mm for one in there) or by_ruler_mm
         held = []
-        for result, seen, felt in whisks(there):
-            if is_sound(seen, felt) and _is_held(felt):
+        for result, _, felt in sound_measured_whisks(there):
+            if _is_held(felt):
                 held.append(_compliance(result, felt))
         if held:
             places.append(_place(d_x_mm, sigma_mm, *map(np.array, zip(*held))))
@@ -270,27 +277,45 @@ def softness(
     beam = whisker.beam
     taper = beam.taper / whisker.length_mm
     shift_mm = far.nominal_mm - near.nominal_mm
-    corrected = []
-    shared = []
+    k_theta = []  # of near and far place, rad/(N·mm)
     for place in (near, far):
-        corrected.append(
+        k_theta.append(
             _corrected(place, whisker, trial.bar_diameter_mm, theta_rad, alpha_est.value)
         )
-        shared.append(np.append(place.shared, _model_sigma(place, beam, theta_rad, alpha_est)))
-    d_x, _ = compliance.two_distances(*corrected, shift_mm, beam.C_Nmm2, taper)
-    panel = (trial.surface, trial.speed_deg_s)
+    d_x, _ = compliance.two_distances(*k_theta, shift_mm, beam.C_Nmm2, taper)
+    soft = Soft(*trial.panel, near, far)
     if not np.isfinite(d_x):
-        return Soft(*panel, near, far, np.nan, np.nan, np.nan, np.nan, NO_PUSH)
-    give = compliance.give(d_x, corrected[0], beam.C_Nmm2, taper)
-    shift_sigma_mm = float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm))
-    own = compliance.two_distances_spread(
-        d_x, give, shift_mm, beam.C_Nmm2, near.sigma, far.sigma, shift_sigma_mm, taper
+        return replace(soft, status=NO_PUSH)
+    give = compliance.give(d_x, k_theta[0], beam.C_Nmm2, taper)
+    shared = []  # (k,) of each place
+    for place in (near, far):
+        shared.append(np.append(place.shared, _model_sigma(place, beam, theta_rad, alpha_est)))
+    d_x_sigma, give_sigma = _sigmas(soft, d_x, give, beam.C_Nmm2, taper, shared)
+    return replace(
+        soft,
+        d_x_mm=Value(float(d_x), d_x_sigma),
+        give_mm_N=Value(float(give), give_sigma),
+        status=NOT_SOFT if give <= Z_95 * give_sigma else "",
     )
-    moved = compliance.two_distances_moved(d_x, give, shift_mm, beam.C_Nmm2, *shared, taper)
-    d_x_sigma = float(np.hypot(own[0], np.linalg.norm(moved[0])))
-    give_sigma = float(np.hypot(own[1], np.linalg.norm(moved[1])))
-    status = NOT_SOFT if give <= Z_95 * give_sigma else ""
-    return Soft(*panel, near, far, float(d_x), d_x_sigma, float(give), give_sigma, status)
+
+
+def _sigmas(
+    soft: Soft, d_x: float, give: float, C: float, taper: float, shared: Sequence[np.ndarray]
+) -> tuple[float, float]:
+    """Return the standard deviations of distance and compliance by whisks at two places.
+
+    C: N·mm². taper: per mm. shared: changes (k,) of the near and of the far k_θ by each cause that
+    all whisks have in common.
+    """
+    near = soft.near
+    far = soft.far
+    own = compliance.two_distances_spread(
+        d_x, give, soft.shift_mm, C, near.sigma, far.sigma, soft.shift_sigma_mm, taper
+    )
+    moved = compliance.two_distances_moved(d_x, give, soft.shift_mm, C, *shared, taper)
+    d_x_sigma = np.hypot(own[0], np.linalg.norm(moved[0]))
+    give_sigma = np.hypot(own[1], np.linalg.norm(moved[1]))
+    return float(d_x_sigma), float(give_sigma)
 
 
 def _corrected(
@@ -340,11 +365,10 @@ def _row(soft: Soft) -> dict:
         "whisks_near": near.whisks,
         "whisks_far": far.whisks,
         "shift_mm": soft.shift_mm,
-        "shift_sigma_mm": float(np.hypot(near.nominal_sigma_mm, far.nominal_sigma_mm)),
-        "d_x_mm": soft.d_x_mm,
-        "d_x_sigma_mm": soft.d_x_sigma_mm,
-        "give_mm_N": soft.give_mm_N,
-        "give_sigma_mm_N": soft.give_sigma_mm_N,
+        "shift_sigma_mm": soft.shift_sigma_mm,
+        **value_cells("d_x_mm", soft.d_x_mm),
+        "give_mm_N": soft.give_mm_N.value,
+        "give_sigma_mm_N": soft.give_mm_N.sigma,
         "stiffness_N_mm": stiffness,
         "stiffness_low_N_mm": low,
         "stiffness_high_N_mm": high,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bench.analyses.alphas import BETA_BY_HAND_RAD
-from bench.analyses.pooling import measured, panel_title
+from bench.analyses.pooling import column, measured, panel_title
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.trials.estimate_errors import slope_deg
 from estimator.beam import Beam
@@ -44,6 +44,11 @@ class Felt:
     beta_sigma_rad: float = 0.0
 
     @property
+    def key(self) -> tuple[str, int]:
+        """Return trial and number of the whisk."""
+        return self.trial, self.whisk
+
+    @property
     def m_Nmm(self) -> float:
         """Return |m|."""
         return float(np.hypot(self.m_y_Nmm, self.m_z_Nmm))
@@ -57,7 +62,7 @@ class Felt:
 
 
 @dataclass(frozen=True)
-class Point:
+class SlopePoint:
     """Whisks of one slope: mean and standard deviation, or the stated sigma of a single one."""
 
     beta_deg: float
@@ -69,7 +74,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Surface:
+class FittedSurface:
     """One panel of Fig. 8: whisks of one surface and speed, and the fitted α.
 
     fit: None where the whisks do not determine α.
@@ -99,19 +104,19 @@ class Surface:
     @property
     def common_d_x_mm(self) -> float:
         """Return the distance to which moments are scaled for the figure, by (13), (14)."""
-        return float(np.median([felt.d_x_mm for felt in self.felt]))
+        return float(np.median(column(self.felt, "d_x_mm")))
 
     @property
     def theta_rad(self) -> float:
         """Return the pushing angle of the moments."""
-        return float(np.median([felt.theta_rad for felt in self.felt]))
+        return float(np.median(column(self.felt, "theta_rad")))
 
     def fit_without(self, trial: str, whisk: int) -> FrictionFit | None:
         """Fit α without one whisk; None where the others do not determine it."""
-        others = [felt for felt in self.felt if (felt.trial, felt.whisk) != (trial, whisk)]
+        others = [felt for felt in self.felt if felt.key != (trial, whisk)]
         return _fit(others, self.beam)
 
-    def points(self) -> list[Point]:
+    def points(self) -> list[SlopePoint]:
         """Return the points of the figure: whisks of alike slope, |m| scaled to the common distance."""
         groups: list[list[Felt]] = []
         for felt in sorted(self.felt, key=lambda one: one.beta_deg):
@@ -122,18 +127,20 @@ class Surface:
         return [_point(group, self.common_d_x_mm, self.beam) for group in groups]
 
 
-def surfaces(results: Iterable[TrialResult], beam: Beam) -> list[Surface]:
-    """Return a Surface for each surface and speed among the trials that measure, in their order."""
+def surfaces(results: Iterable[TrialResult], beam: Beam) -> list[FittedSurface]:
+    """Return a FittedSurface for each surface and speed among the trials that measure, in their order."""
     groups: dict[tuple[str, float | None], list[Felt]] = {}
     for recording, result in enumerate(measured(results)):
         for _, seen, felt in whisks([result]):
             one = _felt(recording, result, seen, felt)
             if one is not None:
                 groups.setdefault(result.trial.panel, []).append(one)
-    return [Surface(*panel, tuple(felt), _fit(felt, beam), beam) for panel, felt in groups.items()]
+    return [
+        FittedSurface(*panel, tuple(felt), _fit(felt, beam), beam) for panel, felt in groups.items()
+    ]
 
 
-def friction_lines(fitted: Iterable[Surface]) -> Iterator[str]:
+def friction_lines(fitted: Iterable[FittedSurface]) -> Iterator[str]:
     """Yield a line a surface and speed: the fitted α, or why there is none."""
     for surface in fitted:
         count = counted(len(surface.felt), "whisk")
@@ -176,21 +183,21 @@ def _fit(felt: Sequence[Felt], beam: Beam) -> FrictionFit | None:
     """Fit α; its sigma is half of the 95 % interval over 1.96. None where the whisks do not hold it."""
     if len(felt) < 2:
         return None
-    beta_rad = np.radians([one.beta_deg for one in felt])
+    beta_rad = np.radians(column(felt, "beta_deg"))
     pushes = Pushes(
         beta_rad,
-        m_y=np.array([one.m_y_Nmm for one in felt]),
-        m_z=np.array([one.m_z_Nmm for one in felt]),
-        d_x=beam.as_cylinder_mm(np.array([one.d_x_mm for one in felt])),
-        theta=np.array([one.theta_rad for one in felt]),
+        m_y=column(felt, "m_y_Nmm"),
+        m_z=column(felt, "m_z_Nmm"),
+        d_x=beam.as_cylinder_mm(column(felt, "d_x_mm")),
+        theta=column(felt, "theta_rad"),
         C=beam.C_Nmm2,
     )
-    sigma_y = np.array([one.m_y_sigma_Nmm for one in felt])
-    sigma_z = np.array([one.m_z_sigma_Nmm for one in felt])
+    sigma_y = column(felt, "m_y_sigma_Nmm")
+    sigma_z = column(felt, "m_z_sigma_Nmm")
     fit = fit_alpha(replace(pushes, sigma_y=sigma_y, sigma_z=sigma_z))
     if not np.isfinite(fit.alpha_rad):
         return None
-    recording = np.array([one.recording for one in felt])
+    recording = column(felt, "recording")
     slipping = np.abs(beta_rad) > fit.alpha_rad
     if len(set(recording[slipping])) < _MANY:
         return _widen(fit, _alphas_by_slopes(pushes, felt, recording))
@@ -201,7 +208,7 @@ def _fit(felt: Sequence[Felt], beam: Beam) -> FrictionFit | None:
 
 
 def _widen(fit: FrictionFit, others: np.ndarray) -> FrictionFit:
-    """Widen the fit's interval by other values of α (k,), each with one cause off by its sigma."""
+    """Return a fit whose interval is wider by other values of α (k,), each with one cause off by its sigma."""
     differences = np.nan_to_num(others - fit.alpha_rad)
     by_causes = Z_95 * np.linalg.norm(differences)
     reach = float(np.hypot(fit.high_rad - fit.alpha_rad, by_causes))
@@ -215,7 +222,7 @@ def _widen(fit: FrictionFit, others: np.ndarray) -> FrictionFit:
 
 def _alphas_by_slopes(pushes: Pushes, felt: Sequence[Felt], recording: np.ndarray) -> np.ndarray:
     """Return α (k,) with the slope of each of k recordings off by its sigma."""
-    sigmas = [one.beta_sigma_rad for one in felt]
+    sigmas = column(felt, "beta_sigma_rad")
     alphas = []
     for one in dict.fromkeys(recording):
         beta = pushes.beta + np.where(recording == one, sigmas, 0.0)
@@ -225,7 +232,7 @@ def _alphas_by_slopes(pushes: Pushes, felt: Sequence[Felt], recording: np.ndarra
 
 def _alphas_by_shared(pushes: Pushes, felt: Sequence[Felt]) -> np.ndarray:
     """Return α (k,) with each of k causes that all whisks have in common off by its sigma."""
-    shared = np.array([one.shared_Nmm for one in felt])  # (whisks, k, 2)
+    shared = column(felt, "shared_Nmm")  # (whisks, k, 2)
     if not shared.shape[1]:
         return np.zeros(0)
     m_y = pushes.m_y + shared[:, :, 0].T
@@ -233,14 +240,13 @@ def _alphas_by_shared(pushes: Pushes, felt: Sequence[Felt]) -> np.ndarray:
     return fit_alpha(replace(pushes, m_y=m_y, m_z=m_z)).alpha_rad
 
 
-def _point(group: Sequence[Felt], d_x_mm: float, beam: Beam) -> Point:
+def _point(group: Sequence[Felt], d_x_mm: float, beam: Beam) -> SlopePoint:
     """Return the point of whisks of alike slope, |m| scaled to a distance."""
-    distances_mm = [one.d_x_mm for one in group]
-    scale = beam.as_cylinder_mm(distances_mm) / beam.as_cylinder_mm(d_x_mm)
-    m = np.array([one.m_Nmm for one in group]) * scale
-    phi = np.array([one.phi_deg for one in group])
-    beta_deg = float(np.mean([one.beta_deg for one in group]))
+    scale = beam.as_cylinder_mm(column(group, "d_x_mm")) / beam.as_cylinder_mm(d_x_mm)
+    m = column(group, "m_Nmm") * scale
+    phi = column(group, "phi_deg")
+    beta_deg = float(np.mean(column(group, "beta_deg")))
     if len(group) == 1:
         m_sigma = group[0].m_sigma_Nmm * scale[0]
-        return Point(beta_deg, 1, m[0], m_sigma, phi[0], group[0].phi_sigma_deg)
-    return Point(beta_deg, len(group), m.mean(), m.std(ddof=1), phi.mean(), phi.std(ddof=1))
+        return SlopePoint(beta_deg, 1, m[0], m_sigma, phi[0], group[0].phi_sigma_deg)
+    return SlopePoint(beta_deg, len(group), m.mean(), m.std(ddof=1), phi.mean(), phi.std(ddof=1))

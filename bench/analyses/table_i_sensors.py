@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, Heading, PageTable, Run, read_rows
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, PageTable, read_rows
 from bench.analyses.friction_tables import SurfaceFriction
-from bench.analyses.pooling import degrees, grouped, known_rows, measured, rms
+from bench.analyses.pooling import degrees, grouped, known_rows, mean, rms, sound_measured_whisks
 from bench.base.drawing import label_of
 from bench.base.numbers import MISSING, number, number_range
 from bench.base.tables import SURFACE, WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
-from bench.records.trial_result import EstimateRow, TrialResult, whisks
-from bench.trials.estimate_errors import is_sound, slope_deg
+from bench.records.trial_result import EstimateRow, TrialResult
+from bench.trials.estimate_errors import slope_deg
 from vision.geometry.counted import counted
 from vision.truth.value import Value
 
@@ -79,7 +79,7 @@ class Sensors(Analysis):
     tables = (SENSORS,)
     heading = Heading("sensors", "Sensors of Table I: error of d_x, RMS (sensors.csv)")
 
-    def compute(self, run: Run) -> list[SensorErrors]:
+    def compute(self, run: EvaluatedRun) -> list[SensorErrors]:
         """Return the errors of each sensor, surface and range of slopes."""
         return sensor_errors(run.results, run.friction)
 
@@ -129,22 +129,25 @@ def sensor_errors(
 ) -> list[SensorErrors]:
     """Return the errors over measured whisks that are sound; none without a load cell."""
     percent: dict[tuple, list[tuple[float, float, float]]] = {}
-    for result, seen, felt in whisks(measured(results)):
-        if not (felt.sensors and seen.has_truth and is_sound(seen, felt)):
+    for result, seen, felt in sound_measured_whisks(results):
+        if not (felt.sensors and seen.has_truth):
             continue
         answers = {row.estimator: row for row in (*felt.estimates, *felt.sensors)}
-        middle_deg = float(np.rint(abs(slope_deg(result, seen)) / _BETA_DEG) * _BETA_DEG)
+        middle_deg = _middle_deg(slope_deg(result, seen))
         for order, name in enumerate(_ESTIMATORS):
             key = (result.trial.surface, middle_deg, order)
             percent.setdefault(key, []).append(_error_percent(answers[name], seen.d_x_mm))
     alphas_deg = _alphas_deg(friction)
     found = []
-    for key in sorted(percent):
-        surface, middle_deg, order = key
+    for (surface, middle_deg, order), errors in sorted(percent.items()):
         alpha_deg = alphas_deg.get(surface, np.nan)
-        pooled = _pooled(_ESTIMATORS[order], surface, middle_deg, alpha_deg, percent[key])
-        found.append(pooled)
+        found.append(_pooled(_ESTIMATORS[order], surface, middle_deg, alpha_deg, errors))
     return found
+
+
+def _middle_deg(slope: float) -> float:
+    """Return the middle of the range in which the size of a slope lies, degrees."""
+    return _BETA_DEG * float(np.rint(abs(slope) / _BETA_DEG))
 
 
 def _pooled(
@@ -168,10 +171,10 @@ def _pooled(
         alpha_deg,
         len(known),
         none,
-        error_mean_percent=float(errors.mean()) if len(known) else np.nan,
+        error_mean_percent=mean(errors),
         error_rms_percent=rms(errors),
         error_sigma_percent=rms(sigmas),
-        inside_percent=float(inside.mean()) if len(known) else np.nan,
+        inside_percent=mean(inside),
     )
 
 

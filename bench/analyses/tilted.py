@@ -1,7 +1,7 @@
 """Friction and distance without α_est, from whisks at several slopes of one surface: tilts.csv.
 
 A slope that was set anew stands for a base that was tilted: trials of one surface and speed at one nominal distance are
-solved together for that distance and α (`estimator.two_tilts`). No picture is looked at but for the error of the result.
+solved together for that distance and α (`estimator.two_tilts`). No picture is used but for the error of the result.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,17 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, PageTable, Run, read_rows
+from bench.analyses.analysis import Analysis, EvaluatedRun, PageTable, read_rows
 from bench.analyses.friction_tables import FRICTION_ANGLE
 from bench.analyses.page_cells import cell_with_sigma, panel_cell
-from bench.analyses.pooling import degrees, measured, panel_title
+from bench.analyses.pooling import degrees, panel_title, sound_measured_whisks
 from bench.analyses.runs import settings_without_alpha
 from bench.base.numbers import MISSING, number, number_range
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, status, with_sigma
 from bench.gauges.gauge_readings import NOMINAL_SHARE
-from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult
 from bench.session.session import Session
-from bench.trials.estimate_errors import is_sound
 from bench.trials.estimates import whisk_of
 from estimator.two_tilts import SharedContact, shared_contact
 from vision.geometry.counted import counted
@@ -88,7 +87,7 @@ class Tilts(Analysis):
     heading = FRICTION_ANGLE
     needs_session = True
 
-    def compute(self, run: Run) -> list[Tilted]:
+    def compute(self, run: EvaluatedRun) -> list[Tilted]:
         """Return each surface, speed and nominal distance with whisks at two slopes or more."""
         return tilted_whisks(run.session, run.results)
 
@@ -157,29 +156,40 @@ class Tilts(Analysis):
 def tilted_whisks(session: Session, results: Sequence[TrialResult]) -> list[Tilted]:
     """Solve each surface, speed and nominal distance with whisks at two slopes or more."""
     groups: dict[tuple, list[tuple[TrialResult, SeenWhisk, FeltWhisk]]] = {}
-    for whisk in whisks(measured(results)):
-        result, seen, felt = whisk
+    for result, seen, felt in sound_measured_whisks(results):
         trial = result.trial
         is_known = np.isfinite([trial.d_x_nominal_mm, trial.beta_nominal_deg]).all()
-        if is_known and felt.has_moments and is_sound(seen, felt):
-            groups.setdefault((*trial.panel, trial.d_x_nominal_mm), []).append(whisk)
+        if is_known and felt.has_moments:
+            place = (*trial.panel, trial.d_x_nominal_mm)
+            groups.setdefault(place, []).append((result, seen, felt))
     found = []
-    for (surface, speed_deg_s, nominal_mm), of_group in groups.items():
+    for place, of_group in groups.items():
         slopes_deg = [result.trial.beta_nominal_deg for result, _, _ in of_group]
-        if np.ptp(slopes_deg) < _LEAST_TILT_DEG:
-            continue
-        one = Tilted(
-            surface,
-            speed_deg_s,
-            nominal_mm,
-            trials=len({result.trial.name for result, _, _ in of_group}),
-            whisks=len(of_group),
-            beta_deg=(min(slopes_deg), max(slopes_deg)),
-            contact=_solve(session, nominal_mm, of_group),
-            d_x_true_mm=float(np.mean([seen.d_x_mm.value for _, seen, _ in of_group])),
-        )
-        found.append(one)
+        if np.ptp(slopes_deg) >= _LEAST_TILT_DEG:
+            beta_deg = (min(slopes_deg), max(slopes_deg))
+            found.append(_tilted(session, *place, beta_deg, of_group))
     return found
+
+
+def _tilted(
+    session: Session,
+    surface: str,
+    speed_deg_s: float | None,
+    nominal_mm: float,
+    beta_deg: tuple[float, float],
+    of_group: Sequence[tuple[TrialResult, SeenWhisk, FeltWhisk]],
+) -> Tilted:
+    """Return the distance and the friction angle of whisks at one place."""
+    return Tilted(
+        surface,
+        speed_deg_s,
+        nominal_mm,
+        trials=len({result.trial.name for result, _, _ in of_group}),
+        whisks=len(of_group),
+        beta_deg=beta_deg,
+        contact=_solve(session, nominal_mm, of_group),
+        d_x_true_mm=float(np.mean([seen.d_x_mm.value for _, seen, _ in of_group])),
+    )
 
 
 def _solve(session: Session, nominal_mm: float, of_group: Sequence[tuple]) -> SharedContact:

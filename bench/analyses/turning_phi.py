@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri, stdtrit
 
-from bench.analyses.curved import independent_angles, phi_sigma, weighted_fit
+from bench.analyses.curved import independent_angles, phi_sigma, slip_angles, weighted_fit
+from bench.analyses.pooling import column
 from bench.base.settings import TILT_SIGMA_RAD
 from bench.records.trial_result import EstimateRow, FeltAt
 from estimator.domain import RIGHT_ANGLE
@@ -35,11 +36,10 @@ def turn(felt: Sequence[FeltAt]) -> Value:
     freedom = len(chosen) - 3
     if len(chosen) < _FEWEST:
         return UNKNOWN
-    theta = np.array([at.theta_rad for at in chosen])
-    phi = np.array([np.arctan2(at.m_y_Nmm.value, at.m_z_Nmm.value) for at in chosen])
+    theta = column(chosen, "theta_rad")
     sigmas = np.array([phi_sigma(at) for at in chosen])
     columns = (theta, np.ones_like(theta), 1 / theta)
-    coefficients, covariance, chi_square = weighted_fit(columns, phi, sigmas)
+    coefficients, covariance, chi_square = weighted_fit(columns, slip_angles(chosen), sigmas)
     sigma = float(np.sqrt(covariance[0, 0]))
     if chi_square > chdtri(freedom, _CHANCE):
         sigma *= np.sqrt(chi_square / freedom) * _quantile(freedom) / _quantile(np.inf)
@@ -67,19 +67,25 @@ def with_turn(
     by_hand = 0.5 * np.cos(beta) * np.tan(TILT_SIGMA_RAD)
     share = theta_rad * np.sin(abs(phi)) / (np.cos(alpha) * np.cos(beta))  # of d_x, by a rate
     spread = float(np.hypot(rate.sigma, by_hand))
-    if not (abs(rate.value) > spread and np.isfinite(row.d_x_est_mm.value)):
+    d_x_mm = row.d_x_est_mm
+    size = abs(rate.value)
+    if not (size > spread and np.isfinite(d_x_mm.value)):
         return row
-    error = abs(rate.value) * share
-    widened = _widened(row, share * float(np.sqrt(rate.value**2 - spread**2)), length_mm)
-    is_sure = abs(rate.value) > _quantile(np.inf) * spread
-    if not (is_sure and error * row.d_x_est_mm.value > _MATTERS * row.d_x_est_mm.sigma):
+    widened = _widened(row, share * float(np.sqrt(size**2 - spread**2)), length_mm)
+    is_sure = size > _quantile(np.inf) * spread
+    if not (is_sure and size * share * d_x_mm.value > _MATTERS * d_x_mm.sigma):
         return widened
-    status = Reason(
-        "phi_turns",
-        f"phi turns by {np.degrees(rate.value * theta_rad):+.1f} deg over the push: the object leans along the "
-        f"whisker or is curved to the side, and (10) may be {100 * error:.0f} % off",
-    )
+    status = _turning_status(rate.value * theta_rad, size * share)
     return replace(widened, status=joined(row.status, status))
+
+
+def _turning_status(turn_rad: float, error_share: float) -> Reason:
+    """Return the status of a distance by (10) that may be off by a share because φ turns."""
+    return Reason(
+        "phi_turns",
+        f"phi turns by {np.degrees(turn_rad):+.1f} deg over the push: the object leans along the "
+        f"whisker or is curved to the side, and (10) may be {100 * error_share:.0f} % off",
+    )
 
 
 def _widened(row: EstimateRow, share: float, length_mm: float) -> EstimateRow:

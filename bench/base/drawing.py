@@ -106,6 +106,15 @@ def blank(width_in: float, height_in: float) -> "Figure":
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
+def add_legend(figure: "Figure", columns: int) -> None:
+    """Add a legend of all lines that have a label below the axes of a figure, an entry a label."""
+    named = {}
+    for axes in figure.axes:
+        for line, label in zip(*axes.get_legend_handles_labels()):
+            named.setdefault(label, line)
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=columns)
+
+
 def colour_of(estimator: str, number: int = 0) -> str:
     """Return the colour of an estimator: of a built-in one its own, of another by number."""
     return COLOURS.get(estimator, OTHER_COLOURS[number % len(OTHER_COLOURS)])

@@ -1,6 +1,6 @@
 """Every view of the board in a session: held before the cameras, standing on the rig, and in the trials' frames."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,6 +75,7 @@ def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
     every = max(1, len(chosen) // _SAMPLES)
 
     def find(frame: tuple[int, np.ndarray | None]) -> tuple[int, np.ndarray | None, Corners]:
+        """Return a frame with its view of the board."""
         index, grey = frame
         if grey is None or index not in chosen:
             return index, grey, Corners.none()
@@ -87,13 +88,18 @@ def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
             with_board.append(grey)
         elif not len(view) and len(without_board) < _SAMPLES and is_sample:
             without_board.append(grey)
-    if without_board and sum(fixes_pose(view, board) for view in views) < MIN_VIEWS:
-        reason = why_not_found(without_board, board)
-        if reason:
-            raise BadInput(reason, file=f"boards/{name}")
+    if sum(fixes_pose(view, board) for view in views) < MIN_VIEWS:
+        _require_no_reason(without_board, board, name)
     with refused_as_bad_input(f"boards/{name}"):
         check_marker_size(with_board, board)
     return views
+
+
+def _require_no_reason(greys: Sequence[np.ndarray], board: Board, name: str) -> None:
+    """Raise BadInput where grey pictures show another board than the stated one."""
+    reason = why_not_found(greys, board) if greys else ""
+    if reason:
+        raise BadInput(reason, file=f"boards/{name}")
 
 
 def sampled_frames(count: int) -> set[int]:

@@ -28,7 +28,7 @@ _MOST_SCATTER = 0.1
 
 
 def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[str]]:
-    """Return notes and warnings on how thick the bars look; none where the session has no bar.
+    """Return notes and warnings on the bars' apparent diameter; none where the session has no bar.
 
     cameras: in the rig frame. Raises BadInput at the wrong scale.
     """
@@ -41,19 +41,24 @@ def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[str
     # at a wrong scale the bar is not where the whisker would touch it, and another thing may pass for it
     scatter = np.std(shares, ddof=1) if len(shares) > 1 else _UNCONFIRMED
     if scatter > _UNCONFIRMED:
-        seen = (
-            f"bars look {min(shares):.2f} to {max(shares):.2f} times as thick as given, so they are "
-            "hardly seen where square_mm and T_rig_board have the whisker"
-        )
-        if scatter > _MOST_SCATTER:
-            cure = "measure a square of the board and enter it, then check T_rig_board"
-            raise BadInput(f"{seen}: {cure}", file="session.toml")
-        return [], [f"Second length: {seen}: check both"]
+        return [], [_scatter_warning(shares, scatter)]
     share = float(np.median(shares))
     sigma = float(np.hypot(SIGMA_SHARE, scatter) / np.sqrt(len(shares)))
     _check_bar_diameter(session, trials, share, sigma)
     looks = f"bars look {share:.3f} ± {sigma:.3f} times as thick as given"
     return [f"Second length: {looks}; square_mm can be right."], []
+
+
+def _scatter_warning(shares: np.ndarray, scatter: float) -> str:
+    """Return the warning on bars whose apparent diameters scatter. Raises BadInput where by much."""
+    seen = (
+        f"bars look {min(shares):.2f} to {max(shares):.2f} times as thick as given, so they are "
+        "hardly seen where square_mm and T_rig_board have the whisker"
+    )
+    if scatter > _MOST_SCATTER:
+        cure = "measure a square of the board and enter it, then check T_rig_board"
+        raise BadInput(f"{seen}: {cure}", file="session.toml")
+    return f"Second length: {seen}: check both"
 
 
 def _has_measurable_bar(trial: Trial, session: Session) -> bool:
@@ -65,7 +70,7 @@ def _has_measurable_bar(trial: Trial, session: Session) -> bool:
 def _check_bar_diameter(
     session: Session, trials: list[Trial], share: float, share_sigma: float
 ) -> None:
-    """Raise BadInput where bars look another share of their given diameter than sigmas allow."""
+    """Raise BadInput where bars appear another share of their given diameter than sigmas allow."""
     given_mm = trials[0].bar_diameter_mm
     given_sigma_mm = max(trial.bar_diameter_sigma_mm for trial in trials)
     diameter = (share * given_mm, share_sigma * share * given_mm, given_mm, given_sigma_mm)

@@ -151,18 +151,24 @@ def _from_boards(session: Session, folder: Path) -> tuple[Cameras, list[str], np
     digests.keep()
     kept = read_result(folder / "cameras.json")
     if not (kept and kept.get("hash") == key and (folder / "cameras.toml").is_file()):
-        views = read_board_views(session)
-        made = calibrate_from(session, views)
-        board = board_in_world(session, views)
-        cameras, T_rig_board, note = on_the_rig(session, made.cameras, board)
-        lengths, warnings = check_scale(session, cameras)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_cameras(folder / "cameras.toml", cameras)
-        notes = [*report_lines(made), *([note] if note else []), *lengths, *warnings]
-        kept = plain({"hash": key, "notes": notes, "T_rig_board": T_rig_board})
-        write_result(folder / "cameras.json", kept)
+        kept = _calibrate_into(session, folder, key)
     T_rig_board = None if kept["T_rig_board"] is None else np.array(kept["T_rig_board"])
     return read_cameras(folder / "cameras.toml"), kept["notes"], T_rig_board
+
+
+def _calibrate_into(session: Session, folder: Path, key: str) -> dict:
+    """Calibrate the cameras and write them into `folder`; return what cameras.json then holds."""
+    views = read_board_views(session)
+    made = calibrate_from(session, views)
+    board = board_in_world(session, views)
+    cameras, T_rig_board, note = on_the_rig(session, made.cameras, board)
+    lengths, warnings = check_scale(session, cameras)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_cameras(folder / "cameras.toml", cameras)
+    notes = [*report_lines(made), *([note] if note else []), *lengths, *warnings]
+    kept = plain({"hash": key, "notes": notes, "T_rig_board": T_rig_board})
+    write_result(folder / "cameras.json", kept)
+    return kept
 
 
 def on_the_rig(

@@ -84,12 +84,9 @@ class Certificate:
         full_scale = self.gauges.full_scale_Nmm[axis]
         share = self.moments[driven, axis] / full_scale
         residual = self.residuals[driven, axis] / full_scale
-        design = np.stack([share, share * np.abs(share)], axis=1)
-        coefficients, squares, *_ = np.linalg.lstsq(design, residual, rcond=None)
-        scatter = np.sqrt(squares[0] / (len(residual) - 2)) if len(squares) else 0.0
-        sigma = scatter * np.sqrt(np.linalg.inv(design.T @ design)[1, 1])
+        curvature, sigma = _curvature(share, residual)
         # a parabola b s² is b/4 from its chord at half scale
-        return 25.0 * abs(coefficients[1]), 25.0 * U95 * sigma
+        return 25.0 * abs(curvature), 25.0 * U95 * sigma
 
     def repeatability_percent(self) -> float | None:
         """Return the scatter of the gain over whisks in one position of the follicle, % (one SD).
@@ -154,12 +151,16 @@ class Certificate:
         hysteresis, returned = in_percent(self.reversals, self.gauges.all.matrix, full_scale)
         yield f"Hysteresis, friction along the rod included: {_of_full_scale(hysteresis)}"
         yield f"Zero return: {_of_full_scale(returned)}"
+        yield from self._scatter()
+        yield ""
+
+    def _scatter(self) -> Iterator[str]:
+        """Yield the lines on residuals and drift."""
         rms = np.sqrt(np.mean(self.residuals**2, axis=0))
-        share = 100.0 * rms / full_scale
+        share = 100.0 * rms / self.gauges.full_scale_Nmm
         yield f"Residuals, RMS: m_y {rms[0]:.4f} N·mm ({share[0]:.2f} %), m_z {rms[1]:.4f} N·mm ({share[1]:.2f} %)"
         drift = 1e3 * self.drift_rate
         yield f"Drift allowed for, from the free strokes: y {drift[0]:.2g}, z {drift[1]:.2g} mV/s"
-        yield ""
 
     def _basis(self) -> Iterator[str]:
         """Yield the lines on what the coefficients rest on."""
@@ -200,6 +201,14 @@ class Certificate:
         yield f"{C:.1f} ± {U95 * C_sigma:.1f} N·mm², E = {E:.2f} ± {U95 * E_sigma:.2f} GPa. C cancels between"
         yield "calibration and estimate: an error of E never shows in a distance. The rod is held by one force;"
         yield "friction along it is anything from 0 to 0.4 of the normal force."
+
+
+def _curvature(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Return b of y = a x + b x |x| over points (n,), and its sigma by their scatter."""
+    design = np.stack([x, x * np.abs(x)], axis=1)
+    coefficients, squares, *_ = np.linalg.lstsq(design, y, rcond=None)
+    scatter = np.sqrt(squares[0] / (len(y) - 2)) if len(squares) else 0.0
+    return coefficients[1], scatter * np.sqrt(np.linalg.inv(design.T @ design)[1, 1])
 
 
 def _of_full_scale(percent: np.ndarray | None) -> str:

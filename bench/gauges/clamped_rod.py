@@ -66,11 +66,7 @@ def _equilibrium(
     force = np.ones(len(x))
     angle = np.zeros((len(x), _NODES))  # of the tangent, rad
     for _ in range(_ROUNDS):
-        points = _along(arc, _unit(angle))  # (2, n, nodes) mm
-        force_direction = _force_direction(angle[:, -1], friction)
-        lever = _cross(points[..., -1:] - points, force_direction[..., None])
-        arc_to_node = 0.5 * arc[:, None] * (1.0 + _POINTS)
-        bend = _along(arc, lever / rigidity_Nmm2(arc_to_node))  # angle per newton
+        bend = _bend(arc, angle, rigidity_Nmm2, friction)
         force = _force_for(bend, arc, direction, force)
         before = angle
         angle = force[:, None] * bend
@@ -78,6 +74,17 @@ def _equilibrium(
         if np.max(np.abs(angle - before)) < _CONVERGED_RAD:
             break
     return force, angle[:, -1]
+
+
+def _bend(
+    arc: np.ndarray, angle: np.ndarray, rigidity_Nmm2: Callable, friction: np.ndarray
+) -> np.ndarray:
+    """Return the tangent's angle per newton (n, nodes) of rods of arc lengths (n,) and these angles."""
+    points = _along(arc, _unit(angle))  # (2, n, nodes) mm
+    force_direction = _force_direction(angle[:, -1], friction)
+    lever = _cross(points[..., -1:] - points, force_direction[..., None])
+    arc_to_node = 0.5 * arc[:, None] * (1.0 + _POINTS)
+    return _along(arc, lever / rigidity_Nmm2(arc_to_node))
 
 
 def _force_for(

@@ -169,11 +169,8 @@ def strokes_of(
             lowpassed[cutoff_Hz][where],
             forces_N=None if signals.forces_N is None else signals.forces_N[where],
         )
-        back = slice(where.stop, end)
         if level:
-            stroke = _levelled(
-                stroke, signals.time_s[back], signals.motor_rad[back], channels[back]
-            )
+            stroke = _levelled(stroke, signals, channels, slice(where.stop, end))
         strokes.append(stroke)
     return strokes
 
@@ -220,15 +217,16 @@ def _cutoff_Hz(signals: Signals, where: slice, trial: Trial, settings: Settings)
 
 
 def _levelled(
-    stroke: FeltStroke, time_s: np.ndarray, motor_rad: np.ndarray, channels: np.ndarray
+    stroke: FeltStroke, signals: Signals, channels: np.ndarray, back: slice
 ) -> FeltStroke:
     """Return the stroke without the drift of its zero from before the touch to after the way back.
 
-    time_s, motor_rad (b,), channels (b, 2): the way back. The stroke is returned as it is where
-    either is too short.
+    channels (n, 2): of the whole recording. back: samples of the way back. The stroke is returned
+    as it is where either is too short.
     """
-    if len(time_s) < _LEAST_FREE:
+    if back.stop - back.start < _LEAST_FREE:
         return stroke
+    motor_rad = signals.motor_rad[back]
     touch = stroke.touch()
     if touch.status:
         return stroke
@@ -238,8 +236,8 @@ def _levelled(
     if min(before.sum(), after.sum()) < _LEAST_FREE:
         return stroke
     start_s = stroke.time_s[before].mean()
-    duration_s = time_s[after].mean() - start_s
-    change = np.nanmean(channels[after], axis=0) - np.nanmean(stroke.channels[before], axis=0)
+    duration_s = signals.time_s[back][after].mean() - start_s
+    change = np.nanmean(channels[back][after], axis=0) - np.nanmean(stroke.channels[before], axis=0)
     return stroke._less(np.outer(stroke.time_s - start_s, change / duration_s))
 
 

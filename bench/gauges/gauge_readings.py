@@ -1,4 +1,4 @@
-"""Readings of a gauge trial's whisk: moments known from the deflection seen, and the volts beside them.
+"""Readings of a gauge trial's whisk: moments known from the deflection seen, and the volts read with them.
 
 Where a session has no pictures the deflection is that of a nominal bar held still, from the angle of felt touch.
 """
@@ -152,7 +152,7 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
 def _share_along_rod(across: np.ndarray, along: np.ndarray, slip: np.ndarray) -> np.ndarray:
     """Return the share (n,) of the sliding that goes along the rod.
 
-    That is the arc's excess over its chord, 0.6 w²/x, beside the slip across.
+    It is the arc's excess over its chord, 0.6 w²/x; the slip across is the rest.
     """
     drawn = 0.6 * np.sum(across**2, axis=1) / along
     return drawn / np.hypot(drawn, slip)
@@ -164,10 +164,12 @@ def _with_friction(
     """Return moments (n, 2) in the hub's axes, and their change per unit of the friction coefficient."""
     size = np.linalg.norm(across, axis=1)
 
-    def rigidity(arc):
+    def rigidity(arc: np.ndarray) -> np.ndarray:
+        """Return EI (n,) at arc lengths (n,), N·mm²."""
         return rigidity_at(arc, whisker.EI_Nmm2, whisker.length_mm, whisker.beam.taper)
 
     def direction_times(moment: np.ndarray) -> np.ndarray:
+        """Return moments (n, 2) of these sizes (n,)."""
         return (moment / size)[:, None] * across
 
     rough = moment_at_clamp(along, size, rigidity, -_FRICTION * share)
@@ -197,11 +199,7 @@ def reference_from_nominal(
         return None
     theta = _NOMINAL_THETA_RAD
     radii_mm = 0.5 * trial.bar_diameter_mm + float(whisker.wire.radius_mm(trial.d_x_mm))
-    x = trial.d_x_mm - radii_mm * np.sin(theta / 2)
-    y = radii_mm * (1.0 - np.cos(theta / 2))
-    along = x * np.cos(theta) + y * np.sin(theta)
-    across = np.zeros((len(theta), 2))
-    across[:, 1] = x * np.sin(theta) - y * np.cos(theta)
+    along, across = _nominal_contacts(theta, trial.d_x_mm, radii_mm)
     moments, by_friction = _with_friction(along, across, np.ones_like(theta), whisker)
     by_touch = touch.sigma_rad * moments / theta[:, None]
     return ReferenceMoments(
@@ -213,6 +211,20 @@ def reference_from_nominal(
         _common_cause(by_touch) + _common_cause(_FRICTION_SIGMA * by_friction),
         scale_sigma=trial.d_x_sigma_mm / trial.d_x_mm or NOMINAL_SHARE,
     )
+
+
+def _nominal_contacts(
+    theta: np.ndarray, d_x_mm: float, radii_mm: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return where contacts lie along (n,) and across (n, 2) the hub's axis at pushing angles (n,).
+
+    The whisker's middle is the sum of the radii away from that of the bar.
+    """
+    x = d_x_mm - radii_mm * np.sin(theta / 2)
+    y = radii_mm * (1.0 - np.cos(theta / 2))
+    across = np.zeros((len(theta), 2))
+    across[:, 1] = x * np.sin(theta) - y * np.cos(theta)
+    return x * np.cos(theta) + y * np.sin(theta), across
 
 
 def _paired(
@@ -230,6 +242,7 @@ def _paired(
     seen, is reached before a touch is felt. rigid_Nmm: the paper's moment at that angle.
     """
     late = reference.late_rad
+    roll_rad = np.radians(trial.follicle_roll_deg)
     felt_theta = reference.motor_rad + late.value - touch.motor_rad  # (n,)
     wanted = reference.touch_rad + theta_rad + late.value - touch.motor_rad
     kept, readings = _readings(stroke, touch, felt_theta, reference.motor_rad)
@@ -237,9 +250,8 @@ def _paired(
         return None
     theta = felt_theta[kept]
     rows = (2 * kept[:, None] + np.arange(2)).ravel()
-    moments, covariance = _in_follicle(
-        trial, reference.moments[kept], reference.covariance[np.ix_(rows, rows)]
-    )
+    covariance = reference.covariance[np.ix_(rows, rows)]
+    moments, covariance = _in_follicle(trial, reference.moments[kept], covariance)
     volts = np.array([reading.values for reading in readings])
     by_delay = volts / theta[:, None] * late.sigma
     return Pairs(
@@ -251,7 +263,7 @@ def _paired(
         moments_covariance=covariance,
         volts=volts,
         volts_covariance=_volts_covariance(readings, theta, touch) + _common_cause(by_delay),
-        paper_moment=to_follicle(np.radians(trial.follicle_roll_deg)) @ [0.0, rigid_Nmm],
+        paper_moment=to_follicle(roll_rad) @ [0.0, rigid_Nmm],
         paper_volts=stroke.at(wanted, touch).values,
         scale_sigma=reference.scale_sigma,
     )

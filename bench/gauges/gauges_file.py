@@ -109,15 +109,17 @@ def write_gauges(
     }
     if gauges.one_factor is not None and np.isfinite(gauges.one_factor.matrix).all():
         document["one_factor_Nmm_per_V"] = np.diag(gauges.one_factor.matrix)
-    without = {}
-    for name, rest in gauges.without.items():
-        without[name] = {}
-        if rest is not None:
-            tables = {"matrix_Nmm_per_V": rest.matrix, "covariance": rest.covariance}
-            without[name] = _as_lists(tables)
+    without = {name: _coefficients(rest) for name, rest in gauges.without.items()}
     comments = "".join(f"# {line}".rstrip() + "\n" for line in header)
     tables = _as_lists(document) | {"without": without}
     write_whole(path, f"{comments}\n{tomli_w.dumps(tables)}")
+
+
+def _coefficients(rest: GaugeMatrix | None) -> dict[str, list]:
+    """Return coefficients without one trial as TOML has them; nothing where they are not fixed."""
+    if rest is None:
+        return {}
+    return _as_lists({"matrix_Nmm_per_V": rest.matrix, "covariance": rest.covariance})
 
 
 def _as_lists(arrays: Mapping[str, np.ndarray | float]) -> dict[str, list | float]:

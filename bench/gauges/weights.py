@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.base.errors import BadInput
+from bench.base.weighted import weighted_mean
 from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
@@ -51,30 +52,20 @@ def scale_by_weights(
     if not loaded:
         return None
     zeros = {t.follicle_roll_deg: _mean_volts(t) for t in weights if not t.force_N}
-    factors = np.empty(len(loaded))
-    sigmas = np.empty(len(loaded))
-    for k, trial in enumerate(loaded):
-        zero, zero_sigma = zeros.get(trial.follicle_roll_deg, (zero_V, zero_sigma_V))
-        factors[k], sigmas[k] = _factor(trial, gauges, zero, zero_sigma)
-    shares = sigmas**-2.0 / np.sum(sigmas**-2.0)
-    factor = float(shares @ factors)
-    # Scales, balances and rulers may be common to all: their sigma is not divided by the number of weights.
-    scatter = np.sqrt(np.sum(shares**2 * (factors - factor) ** 2))
-    names = tuple(trial.name for trial in loaded)
-    return NewtonScale(factor, float(max(shares @ sigmas, scatter)), names)
+    found = []
+    for trial in loaded:
+        zero = zeros.get(trial.follicle_roll_deg, (zero_V, zero_sigma_V))
+        found.append(_factor(trial, gauges, *zero))
+    # Scales, balances and rulers may be common to all weights.
+    factor, sigma = weighted_mean(*np.array(found).T)
+    return NewtonScale(factor, sigma, tuple(trial.name for trial in loaded))
 
 
 def _factor(
     trial: Trial, gauges: GaugeMatrix, zero_V: np.ndarray, zero_sigma_V: np.ndarray
 ) -> tuple[float, float]:
     """Return factor and sigma of one weight: along the moment that it should give."""
-    mean_V, mean_sigma_V = _mean_volts(trial)
-    volts = mean_V - zero_V
-    variances = mean_sigma_V**2 + np.asarray(zero_sigma_V) ** 2
-    direction = to_follicle(np.radians(trial.follicle_roll_deg)) @ [-1.0, 0.0]
-    felt_Nmm = float(direction @ gauges.matrix @ volts)
-    covariance = gauges.matrix @ np.diag(variances) @ gauges.matrix.T + gauges.covariance_at(volts)
-    felt_sigma_Nmm = float(np.sqrt(direction @ covariance @ direction))
+    felt_Nmm, felt_sigma_Nmm = _felt_moment(trial, gauges, zero_V, zero_sigma_V)
     moment_Nmm = trial.force_N * trial.at_mm
     if felt_Nmm < _LEAST_SIGMAS * felt_sigma_Nmm:
         hung = f"{trial.force_N:g} N at {trial.at_mm:g} mm"
@@ -87,6 +78,19 @@ def _factor(
     by_place = trial.at_sigma_mm / trial.at_mm
     share = float(np.linalg.norm([by_force, by_place, felt_sigma_Nmm / felt_Nmm]))
     return moment_Nmm / felt_Nmm, moment_Nmm / felt_Nmm * share
+
+
+def _felt_moment(
+    trial: Trial, gauges: GaugeMatrix, zero_V: np.ndarray, zero_sigma_V: np.ndarray
+) -> tuple[float, float]:
+    """Return the moment felt of a weight that hangs along rig −z, N·mm, and its sigma."""
+    mean_V, mean_sigma_V = _mean_volts(trial)
+    volts = mean_V - zero_V
+    variances = mean_sigma_V**2 + np.asarray(zero_sigma_V) ** 2
+    direction = to_follicle(np.radians(trial.follicle_roll_deg)) @ [-1.0, 0.0]
+    felt_Nmm = float(direction @ gauges.matrix @ volts)
+    covariance = gauges.matrix @ np.diag(variances) @ gauges.matrix.T + gauges.covariance_at(volts)
+    return felt_Nmm, float(np.sqrt(direction @ covariance @ direction))
 
 
 def _mean_volts(trial: Trial) -> tuple[np.ndarray, np.ndarray]:

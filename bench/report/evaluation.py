@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from bench.analyses.analysis import Run
+from bench.analyses.analysis import EvaluatedRun
 from bench.analyses.friction_tables import friction_of
 from bench.analyses.runs import alpha_est_sigma, with_runs
 from bench.base.settings import Settings
@@ -20,7 +20,7 @@ from vision.geometry.reasons import Reason
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Finished(Run):
+class Finished(EvaluatedRun):
     """Results of all trials, brought together.
 
     Each whisk has (10) by the session's friction, and the error of touch that all whisks share. doubt:

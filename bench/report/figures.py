@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from bench.analyses.surfaces import Surface
+from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import blank, draw_whisks, style, whisk_url
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.settings import Settings
@@ -48,7 +48,7 @@ def draw_trials(evaluation: Evaluation, pool: Workers) -> list[str]:
 
 
 def _friction_of(
-    result: TrialResult, fitted: Sequence[Surface], settings: Settings
+    result: TrialResult, fitted: Sequence[FittedSurface], settings: Settings
 ) -> tuple[float, str]:
     """Return half the opening of the friction cone to draw, rad, and where it comes from."""
     for surface in fitted:

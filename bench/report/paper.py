@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 
-from bench.analyses.analysis import Run
+from bench.analyses.analysis import EvaluatedRun
 from bench.analyses.catalogue import ANALYSES
 from bench.base.drawing import paper_style, publish
 
@@ -28,7 +28,7 @@ class SessionFigure:
     drawing: Figure
 
 
-def session_figures(run: Run) -> list[SessionFigure]:
+def session_figures(run: EvaluatedRun) -> list[SessionFigure]:
     """Draw all figures that results without a session allow."""
     figures = []
     for analysis in ANALYSES:
@@ -42,7 +42,7 @@ def session_figures(run: Run) -> list[SessionFigure]:
     return figures
 
 
-def write_paper_figures(out: Path, run: Run, formats: Sequence[str]) -> list[Path]:
+def write_paper_figures(out: Path, run: EvaluatedRun, formats: Sequence[str]) -> list[Path]:
     """Write the figures into out/figures, as wide as one column or both of a journal.
 
     formats: of `drawing.FORMATS`. Returns the paths written.

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bench.analyses.figure_8 import FIGURE_8, figure_8, rows
-from bench.analyses.surfaces import Surface, friction_lines, surfaces
+from bench.analyses.surfaces import FittedSurface, friction_lines, surfaces
 from bench.base.drawing import publish, style
 from bench.base.errors import BadInput
 from bench.base.results import read_result
@@ -36,8 +36,8 @@ def write_figure_8(outs: Sequence[Path], folder: Path) -> tuple[list[Path], list
     return [*paths, stem.with_suffix(".csv")], list(friction_lines(fitted))
 
 
-def pooled(outs: Sequence[Path]) -> list[Surface]:
-    """Return a Surface for each surface and speed, of the whisks of all runs.
+def pooled(outs: Sequence[Path]) -> list[FittedSurface]:
+    """Return a panel for each surface and speed, of the whisks of all runs.
 
     Raises BadInput as `write_figure_8` does.
     """
@@ -147,7 +147,7 @@ def _text(fact: float | str | None) -> str:
     return f"{fact:.6g}" if isinstance(fact, float) else str(fact)
 
 
-def _check_distances(runs: Sequence[tuple[Path, list[Surface]]]) -> None:
+def _check_distances(runs: Sequence[tuple[Path, list[FittedSurface]]]) -> None:
     """Raise BadInput where the whisks of a panel are at different distances."""
     known: dict[tuple[str, float | None], tuple[Path, float]] = {}
     for out, fitted in runs:

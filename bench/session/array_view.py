@@ -158,15 +158,27 @@ def _channels(trial: Trial, keys: manifest.ArrayWhiskerKeys) -> DaqFile:
         for column, name in named.items():
             channels[column] = replace(channels.get(column, Channel("")), channel=name)
         return replace(trial.daq, channels=channels)
-    file = trial.signals_path.name
-    in_file = column_names(trial.signals_path, trial.shown(file))
-    tagged = {column: f"{column}@{keys.name}" for column in (MOTOR, *_OWN)}
-    columns = {TIME: TIME, MOTOR: MOTOR}
-    columns |= {column: name for column, name in tagged.items() if name in in_file}
-    columns |= named
+    columns = _tagged_columns(trial, keys.name) | named
     if not any(column in columns for column in (*VOLTS, *MOMENTS)):
-        columns |= {column: tagged[column] for column in VOLTS}
-    return DaqFile(file, None, {column: Channel(name) for column, name in columns.items()})
+        columns |= {column: _tagged(column, keys.name) for column in VOLTS}
+    channels = {column: Channel(name) for column, name in columns.items()}
+    return DaqFile(trial.signals_path.name, None, channels)
+
+
+def _tagged(column: str, whisker: str) -> str:
+    """Return the name of a whisker's own column in signals.csv."""
+    return f"{column}@{whisker}"
+
+
+def _tagged_columns(trial: Trial, whisker: str) -> dict[str, str]:
+    """Return time and motor angle, and a whisker's own columns in signals.csv, by what they are."""
+    path = trial.signals_path
+    in_file = column_names(path, trial.shown(path.name))
+    columns = {TIME: TIME, MOTOR: MOTOR}
+    for column in (MOTOR, *_OWN):
+        if _tagged(column, whisker) in in_file:
+            columns[column] = _tagged(column, whisker)
+    return columns
 
 
 def _check_motors(bases: Sequence[Base], channels: Mapping[str, DaqFile]) -> None:

@@ -179,8 +179,8 @@ def merge_times(
     every = np.sort(np.concatenate(list(times_s.values())))
     usual_steps = [np.median(np.diff(times)) for times in times_s.values() if len(times) > 1]
     gaps = np.diff(every) > min(usual_steps, default=np.inf) / 2
-    firsts = np.concatenate([[0], np.flatnonzero(gaps) + 1])  # of each frame, in `every`
-    lasts = np.concatenate([firsts[1:], [len(every)]]) - 1
+    firsts = np.append(0, np.flatnonzero(gaps) + 1)  # of each frame, in `every`
+    lasts = np.append(firsts[1:], len(every)) - 1
     picture = {}
     for name, times in times_s.items():
         frame = np.searchsorted(every[firsts], times, side="right") - 1

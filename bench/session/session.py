@@ -146,25 +146,17 @@ def session_of(
     trials: Collection[str] | None = None,
 ) -> Session:
     """Return the session of a manifest; options and errors are those of `load_session`."""
-    whisker, board, T_rig_board = doubts.each(
-        [
-            partial(_whisker, keys.whisker),
-            partial(_board, keys.board),
-            partial(_board_pose, keys.rig.T_rig_board),
-        ]
-    )
-    bar = keys.bar
+    whisker, board, T_rig_board = _stated_bench(keys, doubts)
+    bar_mm, bar_sigma_mm = _bar_diameter(keys.bar)
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
-    found = _by_surface(_trials(path, keys, doubts, trials), keys.surfaces)
-    if trials is None:
-        _note_unused_surfaces(found, keys.surfaces, doubts)
+    found = _ordered_trials(path, keys, doubts, trials)
     session = Session(
         path=path,
         name=keys.name or path.resolve().name,
         whisker=whisker,
-        bar_diameter_mm=bar.diameter_mm if bar else None,
-        bar_diameter_sigma_mm=bar.diameter_sigma_mm if bar else 0.0,
+        bar_diameter_mm=bar_mm,
+        bar_diameter_sigma_mm=bar_sigma_mm,
         board=board,
         T_rig_board=T_rig_board,
         T_rig_board_sigma_mm=keys.rig.T_rig_board_sigma_mm,
@@ -180,6 +172,34 @@ def session_of(
     _note_unused_cameras(session, keys.cameras, doubts)
     _check_cameras(session, doubts, lenses_known)
     return session
+
+
+def _stated_bench(
+    keys: manifest.SessionKeys, doubts: Doubts
+) -> tuple[Whisker | None, Board | None, np.ndarray | None]:
+    """Return whisker, board and T_rig_board (3, 4), each None where it is not stated."""
+    return doubts.each(
+        [
+            partial(_whisker, keys.whisker),
+            partial(_board, keys.board),
+            partial(_board_pose, keys.rig.T_rig_board),
+        ]
+    )
+
+
+def _bar_diameter(keys: manifest.BarKeys | None) -> tuple[float | None, float]:
+    """Return the bar's diameter by [bar] and its sigma, mm; None and 0 without that table."""
+    return (None, 0.0) if keys is None else (keys.diameter_mm, keys.diameter_sigma_mm)
+
+
+def _ordered_trials(
+    path: Path, keys: manifest.SessionKeys, doubts: Doubts, names: Collection[str] | None
+) -> tuple[Trial, ...]:
+    """Return the trials of these names, None for all, in the session's order of surfaces."""
+    found = _by_surface(_trials(path, keys, doubts, names), keys.surfaces)
+    if names is None:
+        _note_unused_surfaces(found, keys.surfaces, doubts)
+    return found
 
 
 def read_manifest(path: Path, doubts: Doubts, follow_links: bool) -> manifest.SessionKeys:

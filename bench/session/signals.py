@@ -1,6 +1,6 @@
 """signals.csv of a trial: the one place where degrees become radians and units are questioned."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -108,7 +108,7 @@ def read_signals(trial: Trial) -> Signals:
     """Read and check a trial's signals.csv.
 
     Raises BadInput naming file and row: what `read_table` refuses, missing columns, times that
-    stand still or go back, and values that look like another unit (milliseconds, radians,
+    stand still or go back, and values of another unit (milliseconds, radians,
     millivolts).
     """
     path = trial.signals_path
@@ -119,8 +119,6 @@ def read_signals(trial: Trial) -> Signals:
     table, duplicates = forward_in_time(table, TIME, shown)
     motor_deg, wraps = _unwrapped(table[MOTOR])
     _check_units(table, VOLTAGE if kind == "V" else MOMENT, channels, shown)
-    for name in forces:
-        FORCE.check(_extreme(table[name]), f"the largest {name}", shown)
     mended = {"duplicate rows": duplicates, "encoder wraps": wraps}
     return Signals(
         time_s=table[TIME],
@@ -130,7 +128,7 @@ def read_signals(trial: Trial) -> Signals:
         kind=kind,
         dropped={cause: count for cause, count in mended.items() if count},
         warnings=_motor_warnings(table[TIME], motor_deg, trial, shown),
-        forces_N=np.column_stack([table[name] for name in forces]) if forces else None,
+        forces_N=_forces_N(table, forces, shown) if forces else None,
     )
 
 
@@ -143,6 +141,13 @@ def _kind_and_channels(table: NumberTable, shown: str) -> tuple[str, tuple[str, 
     kind, channels = ("Nmm", MOMENTS) if has_moments else ("V", VOLTS)
     require_columns(table, (TIME, MOTOR, *channels), shown)
     return kind, channels
+
+
+def _forces_N(table: NumberTable, names: Sequence[str], shown: str) -> np.ndarray:
+    """Return the forces (n, 3). Raise BadInput where one seems to be in another unit."""
+    for name in names:
+        FORCE.check(_extreme(table[name]), f"the largest {name}", shown)
+    return np.column_stack([table[name] for name in names])
 
 
 def _force_columns(table: NumberTable, shown: str) -> tuple[str, ...]:
@@ -162,7 +167,7 @@ def _unwrapped(motor_deg: np.ndarray) -> tuple[np.ndarray, int]:
 def _check_units(
     table: NumberTable, channel_range: PlausibleRange, channels: tuple[str, str], shown: str
 ) -> None:
-    """Raise BadInput where times or channels look like another unit."""
+    """Raise BadInput where times or channels seem to be in another unit."""
     if len(table) < 2:
         raise BadInput("has one row; a recording has many", file=shown)
     SAMPLING_STEP.check(float(np.median(np.diff(table[TIME]))), f"the usual step of {TIME}", shown)

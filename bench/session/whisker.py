@@ -38,7 +38,7 @@ class Whisker:
 
     @property
     def wire(self) -> Wire:
-        """Return the rod that the cameras look for."""
+        """Return the rod that the cameras see."""
         return Wire(
             self.shape,
             self.length_mm,

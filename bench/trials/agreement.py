@@ -26,7 +26,7 @@ _NOTHING = np.zeros(2)
 
 
 @dataclass(frozen=True)
-class Agreement:
+class MomentAgreement:
     """χ² of felt less seen moments, 2 degrees of freedom, and its chance.
 
     cause: sentence on the fault where both disagree, '' where they agree. is_explained: a fault of
@@ -48,7 +48,7 @@ class Agreement:
         return Reason("gauge_fault" if self.is_explained else "shape_not_felt", sentence)
 
 
-def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> Agreement:
+def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> MomentAgreement:
     """Compare a whisk's felt moments with its seen ones, per radian of pushing.
 
     scale_sigma: share by which all moments may be wrong together, beyond that of the pairs: of C,
@@ -65,14 +65,14 @@ def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> Ag
     chi2 = difference.chi2
     chance = float(chdtrc(2, chi2))
     if chance >= LEAST_CHANCE:
-        return Agreement(chi2, chance)
-    causes = [*_exchanges(volts, gauges.matrix), *_turns(felt, seen)]
-    for cause in _scales(volts, gauges.matrix):
-        _, excess = difference.without(cause)
-        if excess < 1.0:  # more would reverse a moment
-            causes.append(cause)
+        return MomentAgreement(chi2, chance)
+    causes = [
+        *_exchanges(volts, gauges.matrix),
+        *_turns(felt, seen),
+        *_possible_scales(difference, volts, gauges.matrix),
+    ]
     sentence = difference.explained_by(causes, _EXPLAINED)
-    return Agreement(chi2, chance, sentence or _UNEXPLAINED, is_explained=bool(sentence))
+    return MomentAgreement(chi2, chance, sentence or _UNEXPLAINED, is_explained=bool(sentence))
 
 
 def _covariance(pairs: Pairs, gauges: GaugeMatrix, weights: np.ndarray) -> np.ndarray:
@@ -98,10 +98,21 @@ def _exchanges(volts: np.ndarray, matrix: np.ndarray) -> Iterator[Cause]:
 def _turns(felt: np.ndarray, seen: np.ndarray) -> Iterator[Cause]:
     """Yield the fault of a follicle that is turned otherwise than stated."""
     turn = np.arctan2(felt[0] * seen[1] - felt[1] * seen[0], felt @ seen)
-    c, s = np.cos(turn), np.sin(turn)
-    turned = np.array([[c, -s], [s, c]]) @ felt
+    cos = np.cos(turn)
+    sin = np.sin(turn)
+    turned = np.array([[cos, -sin], [sin, cos]]) @ felt
     by = f"{np.degrees(turn):+.1f}° more than stated"
     yield Cause(constant_message(f"the follicle looks turned by {by}"), felt - turned, None, 1)
+
+
+def _possible_scales(
+    difference: Difference, volts: np.ndarray, matrix: np.ndarray
+) -> Iterator[Cause]:
+    """Yield the faults of scale that would explain a difference without reversing a moment."""
+    for cause in _scales(volts, matrix):
+        _, excess = difference.without(cause)
+        if excess < 1.0:
+            yield cause
 
 
 def _scales(volts: np.ndarray, matrix: np.ndarray) -> Iterator[Cause]:

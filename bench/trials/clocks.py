@@ -91,23 +91,30 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
     if not len(strokes):
         return None
     difference, seen, felt, speed, delay = strokes.T
-    design = np.stack([np.ones_like(speed), speed], axis=1)  # (n, 2): zero, clock
-    # What moves the seen touch of one whisk (light, lenses, diameters) may move all; clocks and filter surely do.
-    late = delay * speed
-    Sigma = np.diag(felt**2 + seen**2) + np.outer(seen, seen) + np.outer(late, late)
-    weight = np.linalg.inv(Sigma)
-    information = design.T @ weight @ design
-    gradient = design.T @ weight @ difference
+    design = np.vander(speed, 2, increasing=True)  # (n, 2): zero, clock
+    weighted = design.T @ np.linalg.inv(_covariance(seen, felt, delay * speed))
+    information = weighted @ design
+    gradient = weighted @ difference
     prior = _PRIOR**-2.0
     covariance = np.linalg.inv(information + np.diag(prior))
+    values = covariance @ gradient
     zero_alone, clock_alone = gradient**2 / (np.diag(information) + prior)
     return SharedTouch(
-        covariance @ gradient,
+        values,
         covariance,
-        chance=float(chdtrc(2, gradient @ covariance @ gradient)),
+        chance=float(chdtrc(2, gradient @ values)),
         clock_preference=float(clock_alone - zero_alone),
         speeds_rad_s=speed,
     )
+
+
+def _covariance(seen: np.ndarray, felt: np.ndarray, late: np.ndarray) -> np.ndarray:
+    """Return the covariance (n, n) of felt − seen by the sigmas (n,) of both and of clock and filter.
+
+    What moves the seen touch of one whisk (light, lenses, diameters) may move all; clocks and
+    filter surely do.
+    """
+    return np.diag(felt**2 + seen**2) + np.outer(seen, seen) + np.outer(late, late)
 
 
 def _strokes(results: Iterable[TrialResult]) -> Iterator[np.ndarray]:

@@ -29,6 +29,10 @@ _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
 # does to metal or plastic; the paper's is 0.43 (Fig. 8, sandpaper).
 _STEEPEST_FRICTION_RAD = np.radians(45.0)
 
+_LOST = "a frame before frame {} looks lost; pictures after it have the times of the one before"
+_ADDED = "a frame too many before frame {}; pictures after it have the times of the next"
+_REPEATED = "frame {} looks the same as the one before it"
+
 
 def check_turns(turns: Turns | None, speed_rad_s: float) -> Reason:
     """Compare the whisker's turn from frame to frame with the motor's (encoder).
@@ -57,19 +61,14 @@ def _turn_causes(turns: Turns, speed_rad_s: float) -> Iterator[Cause]:
     behind = -np.diff(motor, prepend=2.0 * motor[0] - motor[1])
     yield Cause(_scale_message, nothing, motor - motor.mean(), 1)
     for k in range(1, count):
-        later = np.arange(count) >= k
-        alone = np.arange(count) == k
+        later = (np.arange(count) >= k).astype(float)
+        alone = (np.arange(count) == k).astype(float)
         frame = int(turns.index[k])
-        lost = f"a frame before frame {frame} looks lost; pictures after it have the times of the one before"
-        added = (
-            f"a frame too many before frame {frame}; pictures after it have the times of the next"
-        )
-        repeated = f"frame {frame} looks the same as the one before it"
-        yield Cause(constant_message(lost), ahead * later, None, 1)
-        yield Cause(constant_message(added), behind * later, None, 1)
-        yield Cause(constant_message(repeated), behind * alone, None, 1)
-        yield Cause(_jump_message(motor[k]), nothing, later.astype(float), 2)
-        yield Cause(_time_message(frame, speed_rad_s), nothing, alone.astype(float), 2)
+        yield Cause(constant_message(_LOST.format(frame)), ahead * later, None, 1)
+        yield Cause(constant_message(_ADDED.format(frame)), behind * later, None, 1)
+        yield Cause(constant_message(_REPEATED.format(frame)), behind * alone, None, 1)
+        yield Cause(_jump_message(motor[k]), nothing, later, 2)
+        yield Cause(_time_message(frame, speed_rad_s), nothing, alone, 2)
 
 
 def _scale_message(size: float) -> str:
@@ -102,8 +101,9 @@ def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board |
         return NO_REASON
     logs, variances = _logarithms(bar_looks)
     if not are_alike(logs, variances):
-        ratios = [one.value for one in bar_looks.values()]
-        found = f"the bar looks {min(ratios):.2f} to {max(ratios):.2f} times as thick as said"
+        low = np.exp(logs.min())
+        high = np.exp(logs.max())
+        found = f"the bar looks {low:.2f} to {high:.2f} times as thick as said"
         sentence = f"{found}: check its diameter_mm, or something else is taken for it"
         return Reason("bar_width_unlike_stated", sentence)
     pairs = {name: (one.value, one.sigma) for name, one in bar_looks.items()}
@@ -112,14 +112,21 @@ def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board |
     sigma = float(np.hypot(factor_sigma / factor, trial.bar_diameter_sigma_mm / stated))
     if Difference.scalar(np.log(factor), sigma).is_chance:
         return NO_REASON
-    if board:
-        scale = f"square_mm some {board.square_mm / factor:.3g} for {board.square_mm:g}"
-    else:
-        scale = "the cameras' scale"
+    return _bar_width_reason(factor, sigma, stated, board)
+
+
+def _bar_width_reason(factor: float, sigma: float, stated: float, board: Board | None) -> Reason:
+    """Return the reason of a bar that appears `factor` times as thick as stated, mm.
+
+    sigma: of the factor, relative.
+    """
     found = f"the bar looks {factor:.2f} ± {sigma * factor:.2f} times as thick as said"
-    cure = f"its diameter_mm would have to be some {stated * factor:.3g} for {stated:g}, or {scale}"
-    sentence = f"{found}: {cure}"
-    return Reason("bar_width_unlike_board" if board else "bar_width_unlike_stated", sentence)
+    cure = f"its diameter_mm would have to be some {stated * factor:.3g} for {stated:g}"
+    if board is None:
+        sentence = f"{found}: {cure}, or the cameras' scale"
+        return Reason("bar_width_unlike_stated", sentence)
+    square = f"square_mm some {board.square_mm / factor:.3g} for {board.square_mm:g}"
+    return Reason("bar_width_unlike_board", f"{found}: {cure}, or {square}")
 
 
 def check_wire_width(ratios: Mapping[str, Value], whisker: Whisker) -> Reason:

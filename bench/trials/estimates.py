@@ -20,7 +20,7 @@ from estimator.distance import felt_slip_angle
 from estimator.signal import FeltTouch
 from estimator.uncertainty import Z_95, slip_angle_sigma
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
-from vision.geometry.reasons import as_reason, joined
+from vision.geometry.reasons import NO_REASON, Reason, as_reason, joined
 from vision.truth.value import Value
 
 UNKNOWN_RADII_MM = (math.nan, 0.0)  # of bar and whisker
@@ -228,12 +228,19 @@ def _checked(estimate: Estimate, length_mm: float) -> Estimate:
         sigma = math.nan
     if d_x > length_mm and not status:
         warnings.append(reason("past_whisker", d_x_mm=d_x, length_mm=length_mm))
-    deflection, deflection_sigma = estimate.deflection_mm, estimate.deflection_sigma_mm
-    if deflection is not None and not _is_measured(deflection, deflection_sigma):
-        given = f"{deflection} ± {deflection_sigma} mm"
-        warnings.append(reason("deflection_impossible", given=given))
-        estimate = replace(estimate, deflection_mm=None, deflection_sigma_mm=None)
+    estimate, without_deflection = _checked_deflection(estimate)
+    warnings.append(without_deflection)
     return replace(estimate, d_x_mm=d_x, sigma_mm=sigma, status=joined(status, *warnings))
+
+
+def _checked_deflection(estimate: Estimate) -> tuple[Estimate, Reason]:
+    """Return the estimate without a deflection that is none, and the reason where it had one."""
+    deflection = estimate.deflection_mm
+    sigma = estimate.deflection_sigma_mm
+    if deflection is None or _is_measured(deflection, sigma):
+        return estimate, NO_REASON
+    why_none = reason("deflection_impossible", given=f"{deflection} ± {sigma} mm")
+    return replace(estimate, deflection_mm=None, deflection_sigma_mm=None), why_none
 
 
 def _is_measured(pair: ArrayLike, sigmas: ArrayLike) -> bool:

@@ -28,7 +28,7 @@ from bench.records.trial_result import (
     WithDrift,
 )
 from bench.session.signals import Signals
-from bench.trials.agreement import Agreement, agreement
+from bench.trials.agreement import MomentAgreement, agreement
 from bench.trials.consistency import check_friction_cone, nominal_slope
 from bench.trials.estimates import answers, as_felt, estimators, felt_at
 from bench.trials.gate import kinetic_of
@@ -90,20 +90,15 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
     """Return one whisk as felt; kind: of the signals."""
     readout, missing = readout_of(unit, kind)
     touch, whisk = _felt_whisk(unit, stroke, readout or Readout.bare())
-    status = whisk if isinstance(whisk, Reason) else missing
-    reaches = stroke.motor_rad.max() >= touch.motor_rad + unit.settings.theta_rad
-    if NOT_REACHED.code in status.codes and reaches:
-        status = SATURATED
+    status = _missing(unit, stroke, touch, whisk, missing)
     usable = None if status else whisk
     felt = as_felt(number, touch, usable, stroke.speed_rad_s, _delay_s(unit))
     felt = replace(felt, status=status, saturated=stroke.saturated)
     if usable is None:
         return felt
-    if readout.is_gauged:
-        beyond = unit.gauges.beyond(readout.in_follicle(usable))
-        felt = replace(felt, status=Reason("beyond_calibration", beyond))
     felt = replace(
         felt,
+        status=_beyond_calibration(unit, readout, usable),
         shared_Nmm=readout.shared_Nmm(usable),
         phases=phases_of(unit.trial, stroke, touch, readout, seen, usable.beam),
         one_factor=_one_factor(unit, kind, stroke),
@@ -111,6 +106,25 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
     )
     felt = _against_pictures(felt, unit, stroke, readout, seen)
     return _FeltStroke(unit, stroke, readout, touch).with_estimates(felt, usable)
+
+
+def _beyond_calibration(unit: Unit, readout: Readout, whisk: Whisk) -> Reason:
+    """Return the status of moments larger than any that were calibrated; NO_REASON elsewhere."""
+    if not readout.is_gauged:
+        return NO_REASON
+    return Reason("beyond_calibration", unit.gauges.beyond(readout.in_follicle(whisk)))
+
+
+def _missing(
+    unit: Unit, stroke: FeltStroke, touch: FeltTouch, whisk: Whisk | Reason, without_readout: Reason
+) -> Reason:
+    """Return why a stroke has no moments at the wanted angle; NO_REASON where it has.
+
+    without_readout: why the channels are no moments.
+    """
+    status = whisk if isinstance(whisk, Reason) else without_readout
+    reaches = stroke.motor_rad.max() >= touch.motor_rad + unit.settings.theta_rad
+    return SATURATED if NOT_REACHED.code in status.codes and reaches else status
 
 
 def _felt_whisk(
@@ -223,7 +237,7 @@ def _against_pictures(
     return replace(felt, agreement_chi2=found.chi2, apart=bool(found.status), status=status)
 
 
-def against_shape(unit: Unit, readout: Readout, pairs: Pairs) -> Agreement:
+def against_shape(unit: Unit, readout: Readout, pairs: Pairs) -> MomentAgreement:
     """Compare felt moments with those of the seen shape.
 
     Moments that have newtons of their own also depend on how well the rigidity is known.

@@ -5,6 +5,7 @@ no angle to assume. Right after a jump it lies on the kinetic one. Slope and dis
 shows, are those of (9) and (10): no picture and no manifest.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from bench.gauges.felt import FeltStroke
 from bench.records.trial_result import EstimateRow, FeltAt
 from bench.trials.estimates import felt_at
 from bench.trials.readout import Readout
-from bench.trials.stick_slip_phases import find_rests
+from bench.trials.stick_slip_phases import ContactRest, find_rests
 from estimator.signal import FeltTouch
 from estimator.whisk import Whisk
 
@@ -51,18 +52,24 @@ def kinetic_end(
         return None
     _, rests = find_rests(time_s, theta_rad, moments_Nmm, beta_rad, d_x_mm, whisk.beam)
     theta = whisk.theta_at_rad
-    per_rad = []  # (|m_y|, m_z) per radian where a rest begins
-    for rest in rests:
-        if _FROM_SHARE * theta < rest.from_rad < _TO_SHARE * theta:
-            moments, _ = rest.moments_at(rest.from_rad)
-            per_rad.append(moments / rest.from_rad)
+    per_rad = _moments_per_rad(rests, theta)
     if len(per_rad) < _FEWEST:
         return None
     m_y, m_z = np.mean(per_rad, axis=0) * theta
-    scatter = np.cov(np.array(per_rad).T) / len(per_rad)
+    scatter = np.cov(per_rad.T) / len(per_rad)
     return replace(
         whisk,
         m_y_at_Nmm=float(np.sign(beta_rad)) * float(m_y),
         m_z_at_Nmm=float(m_z),
         covariance_at=whisk.covariance_at + scatter * theta**2,
     )
+
+
+def _moments_per_rad(rests: Sequence[ContactRest], theta_rad: float) -> np.ndarray:
+    """Return (|m_y|, m_z) per radian (n, 2) where n rests near the wanted angle begin."""
+    found = []
+    for rest in rests:
+        if _FROM_SHARE * theta_rad < rest.from_rad < _TO_SHARE * theta_rad:
+            moments, _ = rest.moments_at(rest.from_rad)
+            found.append(moments / rest.from_rad)
+    return np.array(found)

@@ -5,7 +5,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +19,14 @@ from bench.base.workers import Workers
 from bench.cameras.session_cameras import SessionCalibration, calibrate_session
 from bench.gauges.certificate import Certificate
 from bench.gauges.drift import drift_rate
-from bench.gauges.felt import strokes_of
+from bench.gauges.felt import FeltStroke, strokes_of
 from bench.gauges.fit import fit_gauges
 from bench.gauges.gauge_faults import Undetermined, check_alive
-from bench.gauges.gauge_readings import pairs_of
+from bench.gauges.gauge_readings import Pairs, pairs_of
 from bench.gauges.gauges_file import given_gauges
 from bench.gauges.matrix import FROM_ALL, GaugeCalibration
 from bench.gauges.reversal import reversals
+from bench.records.trial_result import SeenTrial
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
@@ -155,11 +156,13 @@ def session_gauges(
     """
     gauges = given_gauges(units[0].session)
     from_all = units[0].settings.gauges_from_all
-    chosen, others = [], []
+    chosen = []
+    others = []
     for unit in units:
-        serves = from_all or unit.trial.purpose == "gauge"
-        (chosen if serves else others).append(unit)
-    chosen = [unit for unit in chosen if _has_volts(unit)]
+        if not (from_all or unit.trial.purpose == "gauge"):
+            others.append(unit)
+        elif _has_volts(unit):
+            chosen.append(unit)
     if gauges is not None or not chosen:
         return gauges, None
     try:
@@ -188,30 +191,40 @@ def fit_certificate(
     rate (2,): drift of the channels, V/s. Raises Undetermined where the trials do not fix the
     coefficients, BadInput where a channel is dead, swapped or reversed.
     """
-    session, settings = units[0].session, units[0].settings
-    signals = [read_signals(unit.trial) for unit in units]
-    strokes = [strokes_of(one, unit.trial, settings) for one, unit in zip(signals, units)]
-    for trial_strokes in strokes:
-        check_alive(trial_strokes)
-    pairs, back = [], []
+    session = units[0].session
+    settings = units[0].settings
+    strokes = []  # of each unit
+    back = []
+    for unit in units:
+        signals = read_signals(unit.trial)
+        strokes.append(strokes_of(signals, unit.trial, settings))
+        check_alive(strokes[-1])
+        back += reversals(unit.trial, signals, settings)
+    pairs = []
     seen = see_units(units, pool, "gauge trials", doubts)
-    for unit, one, trial_seen, trial_strokes in zip(units, signals, seen, strokes):
-        back += reversals(unit.trial, one, settings)
-        for whisk, stroke in zip(trial_seen.whisks, trial_strokes):
-            pairs.append(
-                pairs_of(unit.trial, whisk, stroke, rate, session.whisker, settings.theta_rad)
-            )
-    pairs = tuple(p for p in pairs if p is not None)
+    for unit, trial_seen, trial_strokes in zip(units, seen, strokes):
+        pairs += _pairs(unit, trial_seen, trial_strokes, rate)
     return Certificate(
         session.name,
         session.whisker,
         fit_gauges(pairs),
-        pairs,
-        tuple(stroke for trial_strokes in strokes for stroke in trial_strokes),
+        tuple(pairs),
+        tuple(chain.from_iterable(strokes)),
         rate,
         tuple(back),
         roll_sigma_deg=max(unit.trial.follicle_roll_sigma_deg for unit in units),
     )
+
+
+def _pairs(
+    unit: Unit, seen: SeenTrial, strokes: Sequence[FeltStroke], rate: np.ndarray
+) -> Iterator[Pairs]:
+    """Yield the pairs of each whisk of a trial that has any; rate (2,): drift of the channels, V/s."""
+    theta_rad = unit.settings.theta_rad
+    for whisk, stroke in zip(seen.whisks, strokes):
+        pairs = pairs_of(unit.trial, whisk, stroke, rate, unit.session.whisker, theta_rad)
+        if pairs is not None:
+            yield pairs
 
 
 def _lacking_truth(units: Sequence[Unit]) -> Iterator[str]:

@@ -71,9 +71,7 @@ def place_rig(
             placed_here, placement = _converge(calibration, board, chosen, pool, doubts)
     except Refused as refusal:
         if strokes_only:
-            cure = "record free strokes of some 10 degrees, or measure T_rig_board"
-            sentence = f"T_rig_board is missing, and {refusal}: {cure}"
-            raise BadInput(sentence, file="trials") from None
+            raise _without_rig_frame(refusal) from None
         if isinstance(refusal, _Unread):
             doubts.notes += _turning_elsewhere(session, calibration)
         return calibration.with_notes(f"The free strokes do not tell where the rig is: {refusal}")
@@ -83,6 +81,12 @@ def place_rig(
         doubts.note(Reason("board_misplaced", placement.alarm))
     notes = placement.notes[:1] if stays or strokes_only else placement.notes
     return placed_here.with_notes(*notes, *[_STAYS] * stays)
+
+
+def _without_rig_frame(refusal: Refused) -> BadInput:
+    """Return the error of a session without T_rig_board whose free strokes do not give the rig frame."""
+    cure = "record free strokes of some 10 degrees, or measure T_rig_board"
+    return BadInput(f"T_rig_board is missing, and {refusal}: {cure}", file="trials")
 
 
 def _with_scale_alarm(

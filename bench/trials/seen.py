@@ -38,6 +38,7 @@ from bench.trials.trial_frames import TrialFrames
 from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
 from vision.pictures.others import Others
+from vision.truth.at_angle import Smooth
 from vision.truth.observe import observe_trial
 from vision.truth.records import TrialTruth, WhiskTruth
 
@@ -100,19 +101,25 @@ def _see(
         record = whisk_record(whisk, settings, warnings, contradictions)
         alone = by_one_camera(whisk, session.whisker, settings)
         seen.append(replace(record, looked=name, by_one_camera=alone))
-    missing = _missing_frames(frames.by_camera, times)
     return SeenTrial(
         tuple(seen),
-        notes=(*missing, *dropped(times, frames.places), *frames.scene.notes),
+        notes=_notes(frames),
         bar=BarLine(truth.bar_point_mm, truth.bar_direction),
         bar_radius_mm=0.5 * trial.bar_diameter_mm,
         wire_radius_mm=0.5 * frames.rods.wire.diameter_mm,
         clock=Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
         bar_looks=truth.bar_looks,
         one_sided_light=truth.one_sided_light,
-        back=_back_stroke(back[0]) if 0 in back else None,
+        back=_back_stroke(back.get(0)),
         ways_back=_ways_back(back, len(whisks), settings) if trial.both_ways else (),
     )
+
+
+def _notes(frames: TrialFrames) -> tuple[str, ...]:
+    """Return the notes of a trial: on missing frames, on what was left out, and on the scene."""
+    missing = _missing_frames(frames.by_camera, frames.times)
+    lost = dropped(frames.times, frames.places)
+    return (*missing, *lost, *frames.scene.notes)
 
 
 def _observe(
@@ -191,9 +198,9 @@ def _ways_back(
     return tuple(seen)
 
 
-def _back_stroke(truth: WhiskTruth) -> BackStroke | None:
-    """Return touch and speed of a back stroke; None where it has no truth."""
-    if not np.isfinite(truth.touch_rad.value):
+def _back_stroke(truth: WhiskTruth | None) -> BackStroke | None:
+    """Return touch and speed of a back stroke; None where there is none or it has no truth."""
+    if truth is None or not np.isfinite(truth.touch_rad.value):
         return None
     return BackStroke(truth.touch_rad, motor_speed(truth.frames))
 
@@ -246,27 +253,42 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
     count = len(smooth.theta_rad)
     chosen = np.unique(np.linspace(0, count - 1, _MOST_DEFLECTIONS).round().astype(int))
     theta = smooth.theta_rad[chosen]
+    cos = np.cos(theta)
+    sin = np.sin(theta)
     d_y = smooth.values["d_y"][chosen]
-    d_z = smooth.values["d_z"][chosen]
     frames = truth.frames
-    x, y, _ = frames.point_mm.value[frames.touching][chosen].T
-    touch = truth.touch_rad.value
     d_x = truth.d_x_mm.value
-    # Beyond the contact at touch, along the unbent whisker there.
-    beyond = np.cos(touch) * x + np.sin(touch) * y - d_x
-    by_z = smooth.jacobians["d_z"][chosen]  # (frames, parameters)
-    by_y = np.cos(theta)[:, None] * smooth.jacobians["d_y"][chosen]
-    jacobian = np.stack([by_z, by_y], axis=1).reshape(2 * len(chosen), -1)
+    beyond = _beyond_mm(truth)[chosen]
     return Deflection(
         theta_rad=theta,
-        motor_rad=touch + theta,
+        motor_rad=truth.touch_rad.value + theta,
         slip_mm=smooth.values["slip"][chosen],
-        along_mm=d_x / np.cos(theta) - d_y * np.sin(theta) + beyond * np.cos(theta),
-        across_y_mm=d_y * np.cos(theta) + beyond * np.sin(theta),
-        across_z_mm=d_z,
+        along_mm=d_x / cos - d_y * sin + beyond * cos,
+        across_y_mm=d_y * cos + beyond * sin,
+        across_z_mm=smooth.values["d_z"][chosen],
         past_mm=beyond - frames.arc_mm[frames.touching][chosen],
-        covariance=jacobian @ smooth.covariance @ jacobian.T,
+        covariance=_deflection_covariance(smooth, chosen),
     )
+
+
+def _beyond_mm(truth: WhiskTruth) -> np.ndarray:
+    """Return how far the contact of each touching frame (n,) lies beyond that at touch.
+
+    Along the unbent whisker there.
+    """
+    frames = truth.frames
+    x, y, _ = frames.point_mm.value[frames.touching].T
+    touch = truth.touch_rad.value
+    return np.cos(touch) * x + np.sin(touch) * y - truth.d_x_mm.value
+
+
+def _deflection_covariance(smooth: Smooth, chosen: np.ndarray) -> np.ndarray:
+    """Return the covariance (2n, 2n) of across_z_mm and across_y_mm, in turns, of n chosen frames."""
+    cos = np.cos(smooth.theta_rad[chosen])[:, None]
+    by_z = smooth.jacobians["d_z"][chosen]  # (frames, parameters)
+    by_y = cos * smooth.jacobians["d_y"][chosen]
+    jacobian = np.stack([by_z, by_y], axis=1).reshape(2 * len(chosen), -1)
+    return jacobian @ smooth.covariance @ jacobian.T
 
 
 def _overlay(truth: WhiskTruth, theta_rad: float) -> dict[str, Drawing]:

@@ -56,19 +56,26 @@ def seen_phases(frames: FrameTruth, beta_rad: float, d_x_mm: float) -> Phases:
     if len(theta) < _LEAST_FRAMES:
         return NO_PHASES
     slip = frames.slip_mm.value[touching]
-    sigma = frames.slip_mm.sigma[touching]
-    # One number an interval between frames, here and below.
-    step = np.diff(slip) * np.sign(beta_rad)
-    free_step = np.abs(slip[:-1]) / theta[:-1] * np.diff(theta)
-    step_sigma = np.sqrt(2.0) * np.maximum(sigma[:-1], sigma[1:])
-    is_clear = free_step * _REST_SHARE > _SIGMAS * step_sigma
-    is_below = np.abs(step) < _REST_SHARE * free_step
-    rests = is_below & is_clear
-    jumps = [run for run in _runs(~is_below & is_clear) if _is_jump(*run, rests)]
-    if not jumps:
+    rests, moves = _rests_and_moves(theta, slip, frames.slip_mm.sigma[touching])
+    jumps = [run for run in _runs(moves) if _is_jump(*run, rests)]
+    if not jumps or beta_rad == 0.0:
         return NO_PHASES
     angles = _seen_angles(frames, np.flatnonzero(touching), jumps, d_x_mm)
     return Phases(len(_runs(rests)), len(jumps), tuple(angles))
+
+
+def _rests_and_moves(
+    theta: np.ndarray, slip: np.ndarray, sigma: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return in which intervals between n frames the contact rests, and in which it moves (n − 1,).
+
+    In the others noise hides which.
+    """
+    free_step = np.abs(slip[:-1]) / theta[:-1] * np.diff(theta)
+    step_sigma = np.sqrt(2.0) * np.maximum(sigma[:-1], sigma[1:])
+    is_clear = free_step * _REST_SHARE > _SIGMAS * step_sigma
+    is_below = np.abs(np.diff(slip)) < _REST_SHARE * free_step
+    return is_below & is_clear, ~is_below & is_clear
 
 
 def _seen_angles(
@@ -82,17 +89,16 @@ def _seen_angles(
     theta = frames.theta_rad.value[index]
     d_y = frames.d_y_mm.value[index]
     d_z = frames.d_z_mm.value[index]
-    alpha = frames.alpha_rad.value[index]
-    alpha_sigma = frames.alpha_rad.sigma[index]
     turning = np.abs(d_z) * d_x_mm / (d_y**2 + d_z**2)  # dα/dθ of a contact at rest
     angles = []
     for first, last in jumps:
         middle = float(0.5 * (theta[first] + theta[last]))
         width = theta[last] - theta[first]
         for kind, k, half in ((STATIC, first, 0.5), (KINETIC, last, -0.5)):
-            value = float(alpha[k] + half * width * turning[k])
-            spread = float(np.hypot(alpha_sigma[k], turning[k] * width / np.sqrt(12.0)))
-            angles.append(Angle(kind, middle, value, spread))
+            alpha = frames.alpha_rad.value[index[k]] + half * width * turning[k]
+            by_width = turning[k] * width / np.sqrt(12.0)
+            spread = np.hypot(frames.alpha_rad.sigma[index[k]], by_width)
+            angles.append(Angle(kind, middle, float(alpha), float(spread)))
     return angles
 
 
@@ -165,7 +171,7 @@ def felt_phases(
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
+class ContactRest:
     """A contact at rest between two jumps.
 
     from_rad, to_rad: pushing angles of its ends; to_rad is NaN where the record ends before the
@@ -204,17 +210,13 @@ def find_rests(
     beta_rad: float,
     d_x_mm: float,
     beam: Beam,
-) -> tuple[int, list[Rest]]:
+) -> tuple[int, list[ContactRest]]:
     """Return the number of jumps, and the rests between two of them; arguments as `felt_phases`."""
     good = np.isfinite(moments_Nmm).all(axis=1)
-    time = time_s[good]
     theta = theta_rad[good]
     moments = moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0]
-    slope = abs(beta_rad)
-    mm_per_Nmm = d_x_mm / beam.moment_Nmm(1.0, d_x_mm)
-    along = moments @ [np.cos(slope), -np.sin(slope)]
-    slip = mm_per_Nmm * along + d_x_mm * np.sin(slope) * theta
-    jumps = _jumps(time, theta, slip)
+    slip = _slip_mm(theta, moments, abs(beta_rad), d_x_mm, beam)
+    jumps = _jumps(time_s[good], theta, slip)
     rests = []
     for first, last in pairwise([*jumps, len(theta)]):
         part = slice(first, last)
@@ -224,15 +226,21 @@ def find_rests(
     return len(jumps), rests
 
 
+def _slip_mm(
+    theta: np.ndarray, moments: np.ndarray, slope_rad: float, d_x_mm: float, beam: Beam
+) -> np.ndarray:
+    """Return the slip (n,) along a bar of slope |β| by |m_y| and m_z (n, 2) at pushing angles (n,)."""
+    mm_per_Nmm = d_x_mm / beam.moment_Nmm(1.0, d_x_mm)
+    along = moments @ [np.cos(slope_rad), -np.sin(slope_rad)]
+    return mm_per_Nmm * along + d_x_mm * np.sin(slope_rad) * theta
+
+
 def _jumps(time: np.ndarray, theta: np.ndarray, slip: np.ndarray) -> list[int]:
     """Return the samples at which the slip steps up, relative to one line before and after it."""
     rate = (len(time) - 1) / (time[-1] - time[0])
     speed = np.ptp(theta) / np.ptp(time)
     half = int(np.clip(min(_WINDOW_RAD / speed, _WINDOW_S) * rate, _FEWEST, _MOST))
-    at = np.arange(-half, half) + 0.5
-    design = np.stack([np.ones_like(at), at, at > 0], axis=1)
-    kernel = np.linalg.pinv(design)[2]
-    step = np.convolve(slip, kernel[::-1], mode="same")
+    step = _steps(slip, half)
     free = step[theta < -_FIRST_RAD / 2][half:-half]
     if len(free) < 4 * half:
         return []
@@ -241,6 +249,14 @@ def _jumps(time: np.ndarray, theta: np.ndarray, slip: np.ndarray) -> list[int]:
     is_jump[:half] = False
     is_jump[-half:] = False
     return _without_ringing(np.flatnonzero(is_jump).tolist(), theta, slip)
+
+
+def _steps(slip: np.ndarray, half: int) -> np.ndarray:
+    """Return by how much the slip steps up at each sample, fitted to a line over `half` on each side."""
+    at = np.arange(-half, half) + 0.5
+    design = np.stack([np.ones_like(at), at, at > 0], axis=1)
+    kernel = np.linalg.pinv(design)[2]
+    return np.convolve(slip, kernel[::-1], mode="same")
 
 
 def _without_ringing(jumps: list[int], theta: np.ndarray, slip: np.ndarray) -> list[int]:
@@ -265,25 +281,35 @@ def _without_ringing(jumps: list[int], theta: np.ndarray, slip: np.ndarray) -> l
 
 def _rest(
     theta: np.ndarray, moments: np.ndarray, slip: np.ndarray, *, ends_in_jump: bool
-) -> Rest | None:
+) -> ContactRest | None:
     """Fit lines to the moments (n, 2) between two jumps; None where the contact does not rest."""
     inner = slice(_GUARD, len(theta) - _GUARD)
     if len(theta[inner]) < 2 * _FEWEST:
         return None
     middle = theta.mean()
-    design = np.stack([np.ones_like(theta[inner]), theta[inner] - middle], axis=1)
     columns = np.column_stack([moments[inner], slip[inner]])  # |m_y|, m_z, slip
-    lines, _, _, _ = np.linalg.lstsq(design, columns, rcond=None)
+    lines, shape, variances = _fit_lines(theta[inner] - middle, columns)
     slip_mm, slip_per_rad = lines[:, 2]
     if slip_per_rad > _REST_SHARE * slip_mm / middle:
         return None
-    residuals = columns - design @ lines
-    variances = np.sum(residuals**2, axis=0)[:2] / (len(design) - 2)
-    return Rest(
+    return ContactRest(
         from_rad=float(theta[0]),
         to_rad=float(theta[-1]) if ends_in_jump else np.nan,
         middle_rad=float(middle),
         lines=lines[:, :2],
-        shape=np.linalg.inv(design.T @ design),
-        variances=variances,
+        shape=shape,
+        variances=variances[:2],
     )
+
+
+def _fit_lines(x: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fit lines over x (n,) to k columns (n, k).
+
+    Returns value and slope (2, k), the shape (2, 2) of their covariance, and the variances (k,)
+    that it is multiplied by.
+    """
+    design = np.vander(x, 2, increasing=True)
+    lines, _, _, _ = np.linalg.lstsq(design, columns, rcond=None)
+    residuals = columns - design @ lines
+    variances = np.sum(residuals**2, axis=0) / (len(design) - 2)
+    return lines, np.linalg.inv(design.T @ design), variances

@@ -17,7 +17,7 @@ from bench.trials.still_scene import StillScene, still_scene
 from vision.geometry.forms import touched_object
 from vision.geometry.rods import Bar, Rods
 from vision.geometry.touched import StatedSizes, Touched
-from vision.pictures.others import Others
+from vision.pictures.others import Others, RodLines
 from vision.truth.trial_pictures import TrialPictures
 
 _FEWEST_BACK = 6  # frames of a back stroke: two free ones, two that touch, and two about the touch
@@ -57,14 +57,10 @@ class TrialFrames:
         times = frame_times(trial)
         by_camera = read_trial(trial, times)
         scene = still_scene(session, calibration, by_camera)
-        chosen = {}
-        for name, frames in scene.frames.items():
-            if name not in scene.left_out and settings.seeing.asks(name):
-                chosen[name] = frames
+        others, itself = _own_apart(wires, session.base.name if session.base else "")
         velocity = trial.object_velocity_mm_s
-        own = session.base.name if session.base else ""
         pictures = TrialPictures(
-            chosen,
+            _chosen_frames(scene, settings),
             times.time_s,
             # Frames before the first or after the last sample belong to no whisk.
             np.interp(times.time_s, signals.time_s, signals.motor_rad),
@@ -72,8 +68,8 @@ class TrialFrames:
             object_velocity_mm_s=np.array(velocity) if velocity else None,
             object_velocity_sigma_mm_s=trial.object_velocity_sigma_mm_s,
             object_gives_way=trial.object_gives_way,
-            others={camera: _without(some, own) for camera, some in wires.items()},
-            itself={camera: some[own] for camera, some in wires.items() if own in some},
+            others=others,
+            itself=itself,
         )
         places = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
         back = _back_frames(trial, signals, times)
@@ -81,9 +77,26 @@ class TrialFrames:
         return cls(times, by_camera, scene, places, back, pictures, rods)
 
 
-def _without(wires: Others, name: str) -> Others:
-    """Return all wires but the one of that name."""
-    return {other: lines for other, lines in wires.items() if other != name}
+def _chosen_frames(scene: StillScene, settings: Settings) -> dict[str, Mapping[int, np.ndarray]]:
+    """Return the frames of the cameras that stood still and that the settings name."""
+    chosen = {}
+    for name, frames in scene.frames.items():
+        if name not in scene.left_out and settings.seeing.asks(name):
+            chosen[name] = frames
+    return chosen
+
+
+def _own_apart(
+    wires: Mapping[str, Others], own: str
+) -> tuple[dict[str, Others], dict[str, RodLines]]:
+    """Return by camera the wires of the other whiskers, and the whisker's own where it is there."""
+    others = {}
+    itself = {}
+    for camera, lines in wires.items():
+        others[camera] = {name: rods for name, rods in lines.items() if name != own}
+        if own in lines:
+            itself[camera] = lines[own]
+    return others, itself
 
 
 def stated_object(trial: Trial) -> Touched:

@@ -9,9 +9,8 @@ import numpy as np
 
 from bench.base.doubts import in_one_status
 from bench.base.statuses import reason
-from bench.records.trial_result import SeenTrial, SeenWhisk
+from bench.records.trial_result import Drawing, SeenTrial, SeenWhisk
 from vision.fit.blocks import REST_PRIOR_MM
-from vision.geometry.reasons import NO_REASON
 from vision.pictures.others import Others, RodLines
 
 _MOSTLY = 0.5  # of a wire's length: of two wires in one place most is, of two that cross little
@@ -61,24 +60,33 @@ def _checked(
     if not whisk.overlay:
         return whisk
     drawing = next(iter(whisk.overlay.values()))
-    wires = {}  # (m, 2) px, by camera
-    for camera, lines in drawing.cameras.items():
-        if camera in straight:
-            wires[camera] = lines["wire"]
+    frame = drawing.frame
+    wires = _wires(drawing, straight)
     others = sorted(set().union(*straight.values()) - {own})
-    taken = [name for name in others if _lies_on(wires, traced, drawing.frame, name)]
-    offset_mm, nearest = 0.0, own
+    taken = [name for name in others if _lies_on(wires, traced, frame, name)]
+    offsets = [(0.0, own)]
     for camera, wire in wires.items():
-        found = _base_offset(wire, straight[camera], drawing.frame, own, radius_mm)
-        offset_mm, nearest = max((offset_mm, nearest), found)
+        offsets.append(_base_offset(wire, straight[camera], frame, own, radius_mm))
+    offset_mm, nearest = max(offsets)
     is_off_base = offset_mm > _MOST_BESIDE_MM
     if is_off_base and nearest not in (own, *taken):
         taken.append(nearest)
-    off_base = reason("wire_off_its_base", beside_mm=offset_mm) if is_off_base else NO_REASON
-    of_another = reason("wire_of_another", names=" or ".join(taken)) if taken else NO_REASON
-    status = in_one_status(whisk.status, off_base, of_another)
-    is_wrong = is_off_base or bool(taken)
-    return replace(whisk, status=status, contradicted=whisk.contradicted or is_wrong)
+    found = []
+    if is_off_base:
+        found.append(reason("wire_off_its_base", beside_mm=offset_mm))
+    if taken:
+        found.append(reason("wire_of_another", names=" or ".join(taken)))
+    status = in_one_status(whisk.status, *found)
+    return replace(whisk, status=status, contradicted=whisk.contradicted or bool(found))
+
+
+def _wires(drawing: Drawing, straight: Mapping[str, Others]) -> dict[str, np.ndarray]:
+    """Return the whisk's wire (m, 2), px, in each camera that has straight wires to compare."""
+    found = {}
+    for camera, lines in drawing.cameras.items():
+        if camera in straight:
+            found[camera] = lines["wire"]
+    return found
 
 
 def _base_offset(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from bench.analyses import direction
-from bench.analyses.analysis import Run
+from bench.analyses.analysis import EvaluatedRun
 from bench.analyses.friction_tables import friction_of
 from bench.base.results import plain
 from bench.base.settings import Settings
@@ -26,10 +26,10 @@ FREE_FRAME = {
 PHI_SIGMA = np.radians(0.3)
 
 
-def run_of(*results: TrialResult, session=None) -> Run:
+def run_of(*results: TrialResult, session=None) -> EvaluatedRun:
     """Return a run of these results, with α_est = 10°."""
     settings = Settings()
-    return Run(
+    return EvaluatedRun(
         whisker=WHISKER,
         settings=settings,
         results=results,

@@ -8,7 +8,7 @@ from urllib.parse import unquote
 
 from markupsafe import Markup, escape
 
-from bench.analyses.analysis import Run
+from bench.analyses.analysis import EvaluatedRun
 from bench.base.drawing import style, svg_of
 from bench.report.page.words import Row, by_whisk
 from bench.report.run_facts import RunRecord
@@ -42,7 +42,7 @@ class Drawings:
     gauge_residuals: Markup | None = None
 
 
-def draw(record: RunRecord, rows: Sequence[Row], run: Run) -> Drawings:
+def draw(record: RunRecord, rows: Sequence[Row], run: EvaluatedRun) -> Drawings:
     """Return all drawings that the results allow."""
     from bench.report.figures import gauge_residuals, variance_of_truth  # with all of matplotlib
     from bench.report.paper import session_figures

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.analyses.analysis import Analysis
-from bench.analyses.friction_tables import Friction
+from bench.analyses.friction_tables import FrictionAngles
 from bench.report.evaluation import Evaluation
 from bench.report.run_facts import Section
 from bench.report.run_tables import RUN_TABLES
@@ -152,7 +152,7 @@ def _sections_of_analyses(evaluation: Evaluation, findings: Findings) -> dict[st
         titles[heading.code] = heading.title
         of_section = lines.setdefault(heading.code, [])
         of_section += analysis.lines(found)
-        if isinstance(analysis, Friction):
+        if isinstance(analysis, FrictionAngles):
             of_section += known_friction_lines(evaluation.accuracy, evaluation.settings)
     return {code: _section(code, titles[code], lines[code]) for code in lines if code in titles}
 

@@ -47,7 +47,7 @@ def test_errors_are_pooled_angle_by_angle_over_sound_whisks():
     assert first.error_rms_percent == pytest.approx(np.sqrt(2.5))
     assert first.error_sigma_percent == pytest.approx(100 * np.hypot(0.3, 0.01) / 60)
     assert first.error_sigma_alpha_exact_percent == pytest.approx(100 * np.hypot(0.1, 0.01) / 60)
-    assert least_error([first, second], "with_friction") is second
+    assert least_error([first, second]) is second
     (line,) = AgainstTheta().lines(ThetaErrors((first, second), 1.0))
     assert "least error at θ = 3°, 0.50 % RMS over 2 whisks" in line and "at 1° 1.58 %" in line
 
@@ -57,7 +57,7 @@ def test_an_angle_that_few_whisks_reach_is_not_the_least_error():
     rows = against_theta(
         [with_errors(result(20.0), far), *[with_errors(result(40.0), {1.0: 0.6})] * 3]
     )
-    assert least_error(rows, "with_friction").theta_deg == 1.0
+    assert least_error(rows).theta_deg == 1.0
 
 
 def test_a_distance_that_is_none_is_counted_and_drawn_around():

@@ -8,9 +8,15 @@ import pytest
 
 from bench.analyses.alphas import felt_friction, mean_alpha, seen_friction
 from bench.analyses.direction import slip_angle
-from bench.analyses.friction_tables import Friction, friction_of
+from bench.analyses.friction_tables import FrictionAngles, friction_of
 from bench.analyses.runs import FITTED, SEEN, _rescaled, with_runs
-from bench.analyses.section_vii import Contact, by_consistency, by_smoothness, by_tilting, weights
+from bench.analyses.section_vii import (
+    FeltContact,
+    by_consistency,
+    by_smoothness,
+    by_tilting,
+    weights,
+)
 from bench.base.settings import Settings
 from bench.records.trial_result import EstimateRow
 from bench.report.assembly import estimate_rows
@@ -101,18 +107,18 @@ def test_every_way_finds_the_friction_angle(tmp_path):
     for name in ("seen", "felt", "least_squares", "tilting", "consistency"):
         assert np.degrees(surface.alpha(name)[0]) == pytest.approx(14.0, abs=0.06), name
     assert surface.error_rms_weighted_percent < 0.5 * surface.error_rms_percent
-    of_run = Friction().compute(run_of(*results))
-    Friction().write(tmp_path, of_run)
+    of_run = FrictionAngles().compute(run_of(*results))
+    FrictionAngles().write(tmp_path, of_run)
     with (tmp_path / "surfaces.csv").open(newline="") as file:
         (row,) = csv.DictReader(file)
     assert float(row["alpha_felt_deg"]) == pytest.approx(14.0, abs=1e-6)
     assert row["alpha_static_felt_deg"] == ""  # it only slides
-    assert any("tilting" in line for line in Friction().lines(of_run))
+    assert any("tilting" in line for line in FrictionAngles().lines(of_run))
 
 
-def contact(beta_deg, d_x_nominal_mm=60.0) -> Contact:
+def contact(beta_deg, d_x_nominal_mm=60.0) -> FeltContact:
     m_y, m_z = slip.moments(60.0, THETA, np.radians(beta_deg), ALPHA, C)
-    return Contact(
+    return FeltContact(
         np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, NOTHING_SHARED, f"b{beta_deg}"
     )
 
@@ -235,13 +241,13 @@ def test_smoothness_finds_the_friction_of_bars_along_one_edge(shape):
     assert by_smoothness(level, whisker).status.codes == ("one_nominal_distance",)
 
 
-def along(beta_deg: float, d_x: float, whisker: Whisker) -> Contact:
+def along(beta_deg: float, d_x: float, whisker: Whisker) -> FeltContact:
     """A contact of a bar at this slope and distance, in a recording of its own."""
     beta = np.radians(beta_deg)
     m_y, m_z = slip.moments(
         whisker.beam.as_cylinder_mm(d_x), THETA, beta, ALPHA, whisker.beam.C_Nmm2
     )
-    return Contact(beta, d_x, THETA, m_y, m_z, NOTHING_SHARED, f"b{beta_deg:g}")
+    return FeltContact(beta, d_x, THETA, m_y, m_z, NOTHING_SHARED, f"b{beta_deg:g}")
 
 
 def test_ones_own_estimate_takes_the_sessions_sigma_of_alpha():

@@ -47,10 +47,10 @@ def test_two_places_tell_the_stiffness_to_what_is_corrected(shape, tip):
     """At θ = 1e-4 what (2) leaves out is nothing."""
     whisker = Whisker(shape, 100.0, 1.0, youngs_modulus_GPa=60.0, tip_diameter_mm=tip)
     found = softness(whisker, FACTS, *places(0.5, whisker=whisker), 1e-4, FRICTIONLESS)
-    assert found.give_mm_N == pytest.approx(2.0, abs=1e-3)
+    assert found.give_mm_N.value == pytest.approx(2.0, abs=1e-3)
     k, low, high = found.stiffness_N_mm
     assert low < k < high and k == pytest.approx(0.5, rel=1e-3)
-    assert found.d_x_mm == pytest.approx(45.0, abs=1e-2)
+    assert found.d_x_mm.value == pytest.approx(45.0, abs=1e-2)
 
 
 def test_a_rigid_object_is_only_stiffer_than_something():

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from bench.analyses.error_against_slope import error_against_slope
 from bench.analyses.figure_8 import figure_8
-from bench.analyses.surfaces import Felt, Surface
+from bench.analyses.surfaces import Felt, FittedSurface
 from bench.base.drawing import is_drawn, save
 from bench.base.settings import Settings
 from bench.records.plain import from_plain, to_plain
@@ -29,14 +29,14 @@ from vision.truth.value import Value
 C, THETA = 8835.7, np.radians(3.0)
 
 
-def surface(name="steel", alpha_deg=10.5, slopes=(0, 20, 40, -60)) -> Surface:
+def surface(name="steel", alpha_deg=10.5, slopes=(0, 20, 40, -60)) -> FittedSurface:
     beta = np.radians(slopes)
     m_y, m_z = slip.moments(60.0, THETA, beta, np.radians(alpha_deg), C)
     felt = tuple(
         Felt(b, 60.0, THETA, y, z, 0.02, 0.02, np.degrees(np.arctan2(y, z)), 0.2, False)
         for b, y, z in zip(slopes, m_y, m_z)
     )
-    return Surface(
+    return FittedSurface(
         name, 10.0, felt, fit_alpha(Pushes(beta, m_y, m_z, 60.0, THETA, C)), Beam(C, 100.0)
     )
 

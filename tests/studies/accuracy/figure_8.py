@@ -26,7 +26,7 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.analyses.surfaces import Surface
+from bench.analyses.surfaces import FittedSurface
 from bench.commands import cli
 from bench.commands.options import DONE, DOUBTFUL
 from bench.records.trial_result import TrialResult
@@ -56,7 +56,7 @@ class Whisk:
 class Panel:
     """One panel of the figure and its whisks."""
 
-    surface: Surface
+    surface: FittedSurface
     whisks: tuple[Whisk, ...]
 
     def line(self) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.analyses.section_vii import Contact, by_consistency, by_smoothness, by_tilting
+from bench.analyses.section_vii import FeltContact, by_consistency, by_smoothness, by_tilting
 from bench.analyses.soft import Place, Soft, softness
 from bench.records.trial_result import TrialFacts
 from bench.report.score import Score
@@ -41,7 +41,9 @@ ALPHA_EST_DEG, ALPHA_EST_SIGMA_DEG = 12.0, 5.0  # as assumed
 WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=E_GPA)
 
 
-def session(alpha_deg: float, rng: np.random.Generator, places_mm=(D_X_MM,)) -> Iterator[Contact]:
+def session(
+    alpha_deg: float, rng: np.random.Generator, places_mm=(D_X_MM,)
+) -> Iterator[FeltContact]:
     """The contacts of a session, at nominal distances that take turns."""
     rod, _ = rod_and_beam("cylinder")
     gauges = np.eye(2) + GAUGE_SHARE * rng.normal(size=(2, 2))
@@ -55,7 +57,7 @@ def session(alpha_deg: float, rng: np.random.Generator, places_mm=(D_X_MM,)) -> 
         for _ in range(WHISKS):
             m_y, m_z = gauges @ exact + NOISE_NMM * rng.normal(size=2)
             shared = GAUGE_SHARE * np.kron(np.eye(2), [[m_y], [m_z]])
-            yield Contact(
+            yield FeltContact(
                 np.radians(beta_deg), nominal, THETA_RAD, m_y, m_z, shared, f"b{beta_deg}"
             )
 
@@ -108,7 +110,8 @@ def soft_study(shape: str, count: int, seed: int) -> Score:
     for k in range(count):
         stiffness = np.inf if k % 4 == 0 else 10.0 ** rng.uniform(-1.0, 1.0)
         found = two_places(shape, stiffness, rng.uniform(5.0, 24.0), rng)
-        rows += [(one.give_mm_N - 1.0 / stiffness, one.give_sigma_mm_N) for one in found]
+        gives = [one.give_mm_N for one in found]
+        rows += [(give.value - 1.0 / stiffness, give.sigma) for give in gives]
     return Score(f"softness, {shape}", "mm/N", *np.array(rows).T)
 
 

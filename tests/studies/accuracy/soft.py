@@ -96,7 +96,7 @@ def two_distances(stiffness_N_mm: float, near_m_z: float) -> float:
     )
     whisker = Whisker("cylinder", LENGTH_MM, DIAMETER_MM, youngs_modulus_GPa=E_GPA)
     facts = TrialFacts("soft", "measure", "soft", 10.0, bar_diameter_mm=2 * RADIUS_MM)
-    return softness(whisker, facts, *places, THETA_RAD, Value(ALPHA_RAD, 0.0)).give_mm_N
+    return softness(whisker, facts, *places, THETA_RAD, Value(ALPHA_RAD, 0.0)).give_mm_N.value
 
 
 def lines(cells: dict) -> list[str]:
