@@ -61,57 +61,67 @@ def read_band(
     point to the same side of the direction in which `place` grows, however that lies in the picture.
     """
     along = 0 if np.ptp(curve_px[:, 0]) >= np.ptp(curve_px[:, 1]) else 1
-    across = 1 - along
     order = np.argsort(curve_px[:, along])
     curve = curve_px[order]
-    place = np.asarray(place)[order]
-    radius = np.asarray(radius_px)[order]
-    ends = np.round(curve[[0, -1], along])
-    first, last = np.clip(ends, 0, grey.shape[across] - 1).astype(int)
-    step = np.arange(first, last + 1)
-    middle = np.interp(step, curve[:, along], curve[:, across])
+    knots = curve[:, along]
+    step = _steps_between(knots[0], knots[-1], grey.shape[1 - along])
+    middle = np.interp(step, knots, curve[:, 1 - along])
+    line = np.round(middle).astype(int)[:, None] + np.arange(-half_width_px, half_width_px + 1)
+
+    pixels = _BandPixels(along, step, line)
+    levels = pixels.values(grey)
+    if hidden is not None:
+        levels[pixels.values(hidden) > 0] = np.nan
+
     slope = np.gradient(middle) if len(step) > 1 else np.zeros(len(step))
     cosine = 1.0 / np.hypot(1.0, slope)
-    line = np.round(middle).astype(int)[:, None] + np.arange(-half_width_px, half_width_px + 1)
-    offset = (line - middle[:, None]) * cosine[:, None]
-
-    foot = np.empty((len(step), 2))
-    foot[:, along] = step
-    foot[:, across] = middle
-    normal = np.empty((len(step), 2))
-    normal[:, along] = -slope * cosine
-    normal[:, across] = cosine
-
-    pictures = [picture for picture in (grey, background, still) if picture is not None]
-    pixels = _pick(pictures, step, line, along)
-    if hidden is not None:
-        pixels[0][_pick([hidden], step, line, along)[0] > 0] = np.nan
+    place = np.asarray(place)[order]
     side = 1.0 if (along == 0) == (place[-1] >= place[0]) else -1.0
     return Band(
-        offset_px=side * offset,
-        grey=pixels[0],
-        background=pixels[1],
-        foot_px=foot,
-        normal=side * normal,
-        place=np.interp(step, curve[:, along], place),
-        radius_px=np.interp(step, curve[:, along], radius),
-        still=pixels[2] if still is not None else None,
+        offset_px=side * (line - middle[:, None]) * cosine[:, None],
+        grey=levels,
+        background=pixels.values(background),
+        foot_px=pixels.as_xy(step, middle),
+        normal=side * pixels.as_xy(-slope * cosine, cosine),
+        place=np.interp(step, knots, place),
+        radius_px=np.interp(step, knots, np.asarray(radius_px)[order]),
+        still=None if still is None else pixels.values(still),
     )
 
 
-def _pick(
-    pictures: Sequence[np.ndarray], step: np.ndarray, line: np.ndarray, along: int
-) -> list[np.ndarray]:
-    """Return the values (n, k) of pictures of one size at a band's pixels; NaN outside them."""
-    size = pictures[0].shape[along]
-    outside = (line < 0) | (line >= size)
-    line = np.clip(line, 0, size - 1)
-    at = (line, step[:, None]) if along == 0 else (step[:, None], line)
-    values = [picture[at].astype(float) for picture in pictures]
-    if np.any(outside):
-        for one in values:
-            one[outside] = np.nan
-    return values
+def _steps_between(first: float, last: float, size: int) -> np.ndarray:
+    """Return the whole pixels (n,) from first to last along an axis of so many pixels."""
+    ends = np.clip(np.round([first, last]), 0, size - 1).astype(int)
+    return np.arange(ends[0], ends[1] + 1)
+
+
+@dataclass(frozen=True)
+class _BandPixels:
+    """Pixels of a band: at n steps along one axis of the picture, k pixels along the other.
+
+    along: 0 where the band runs along x, 1 along y. step (n,), line (n, k): pixels on the two axes.
+    """
+
+    along: int
+    step: np.ndarray
+    line: np.ndarray
+
+    def values(self, picture: np.ndarray) -> np.ndarray:
+        """Return the values (n, k) of a picture at the pixels; NaN outside it."""
+        size = picture.shape[self.along]
+        line = np.clip(self.line, 0, size - 1)
+        step = self.step[:, None]
+        at = (line, step) if self.along == 0 else (step, line)
+        values = picture[at].astype(float)
+        values[line != self.line] = np.nan
+        return values
+
+    def as_xy(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
+        """Return vectors (n, 2) in x and y of their parts (n,) along the band's axis and across it."""
+        parts = (along, across) if self.along == 0 else (across, along)
+        return np.stack(parts, axis=1)
+
+
 
 
 @dataclass(frozen=True)
@@ -188,8 +198,11 @@ def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
         return _no_pieces()
     joined = {}
     for name in Band.__dataclass_fields__:
-        parts = [getattr(band, name)[: count * length_px] for band, count in zip(bands, counts)]
-        joined[name] = np.concatenate([part for part in parts if len(part)])
+        parts = []
+        for band, count in zip(bands, counts):
+            if count:
+                parts.append(getattr(band, name)[: count * length_px])
+        joined[name] = np.concatenate(parts)
     return _cut(Band(**joined), length_px, noise, np.repeat(np.arange(len(bands)), counts))
 
 
@@ -215,30 +228,34 @@ def _no_pieces() -> Pieces:
 def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray) -> Pieces:
     """Cut one band, of a whole number of segments, into segments; source (s,): of each."""
     count = len(source)
-    offset = band.offset_px.reshape(count, -1)
-    grey = band.grey.reshape(count, -1)
-    background = band.background.reshape(count, -1)
-    still = band.still.reshape(count, -1)
-    if still.size:
-        slope = np.zeros(offset.shape)
-        curvature = np.zeros(offset.shape)
+    is_known = np.isfinite(band.grey) & np.isfinite(band.background)  # (n, k)
+    if band.still.size:
+        slope = np.zeros(is_known.shape)
+        curvature = np.zeros(is_known.shape)
+        still = np.where(is_known, band.still, 0.0).reshape(count, -1)
     else:
-        slope, curvature = (change.reshape(count, -1) for change in _derivatives(band))
-    in_picture = np.isfinite(grey) & np.isfinite(background)
-    sigma = noise.sigma(np.where(in_picture, grey, 0.0))
-    if still.size:
-        still = np.where(in_picture, still, 0.0)
+        slope, curvature = _derivatives(band)
+        still = None
+
+    def known(values: np.ndarray) -> np.ndarray:
+        """Return values (n, k) by segment (s, p), 0 where a pixel is not known."""
+        return np.where(is_known, values, 0.0).reshape(count, -1)
+
+    def middle(values: np.ndarray) -> np.ndarray:
+        """Return the mean (s, …) over each segment of values (n, …)."""
+        return values.reshape(count, length_px, *values.shape[1:]).mean(axis=1)
+
     return Pieces(
-        offset_px=offset,
-        grey=np.where(in_picture, grey, 0.0),
-        background=np.where(in_picture, background, 0.0),
-        slope=np.where(in_picture, slope, 0.0),
-        curvature=np.where(in_picture, curvature, 0.0),
-        weight=np.where(in_picture, 1.0 / sigma, 0.0),
-        place=band.place.reshape(count, length_px).mean(axis=1),
-        radius_px=band.radius_px.reshape(count, length_px).mean(axis=1),
-        foot_px=band.foot_px.reshape(count, length_px, -1).mean(axis=1),
-        normal=band.normal.reshape(count, length_px, -1).mean(axis=1),
+        offset_px=band.offset_px.reshape(count, -1),
+        grey=known(band.grey),
+        background=known(band.background),
+        slope=known(slope),
+        curvature=known(curvature),
+        weight=known(1.0 / noise.sigma(np.where(is_known, band.grey, 0.0))),
+        place=middle(band.place),
+        radius_px=middle(band.radius_px),
+        foot_px=middle(band.foot_px),
+        normal=middle(band.normal),
         source=source,
         still=still,
     )
