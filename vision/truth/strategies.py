@@ -2,7 +2,7 @@
 
 Two cameras whose sights cross locate bar and wire in space: the bar's middle is enough, and touch
 is where their clearance ends. To one camera, or to several on one side, the bar is as far away as
-it looks wide, and the wire touches when it begins to bend.
+it appears wide, and the wire touches when it begins to bend.
 """
 
 from abc import ABC, abstractmethod

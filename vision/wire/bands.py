@@ -14,12 +14,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import correlate1d
 
+from vision.geometry.rows import Rows
 from vision.pictures.pixel_noise import Noise
+
+# [1] Twelve times the first derivative by five points. A formula, no threshold.
+_FIRST_DIFFERENCE = (1.0, -8.0, 0.0, 8.0, -1.0)
+# [1] Twelve times the second derivative by five points. A formula, no threshold.
+_SECOND_DIFFERENCE = (-1.0, 16.0, -30.0, 16.0, -1.0)
 
 
 @dataclass(frozen=True)
-class Band:
+class Band(Rows):
     """Hold the pixels near a predicted curve: n steps along it, k pixels across.
 
     offset_px (n, k): signed distance of each pixel from the curve along its normal.
@@ -60,39 +67,73 @@ def read_band(
     No pixel is interpolated and none is read twice, so that their noise stays independent. Normals
     point to the same side of the direction in which `place` grows, however that lies in the picture.
     """
-    along = 0 if np.ptp(curve_px[:, 0]) >= np.ptp(curve_px[:, 1]) else 1
-    order = np.argsort(curve_px[:, along])
-    curve = curve_px[order]
-    knots = curve[:, along]
-    step = _steps_between(knots[0], knots[-1], grey.shape[1 - along])
-    middle = np.interp(step, knots, curve[:, 1 - along])
-    line = np.round(middle).astype(int)[:, None] + np.arange(-half_width_px, half_width_px + 1)
-
-    pixels = _BandPixels(along, step, line)
+    path = _Path.along_curve(curve_px, place, radius_px, grey.shape)
+    pixels = path.pixels(half_width_px)
     levels = pixels.values(grey)
     if hidden is not None:
         levels[pixels.values(hidden) > 0] = np.nan
-
-    slope = np.gradient(middle) if len(step) > 1 else np.zeros(len(step))
-    cosine = 1.0 / np.hypot(1.0, slope)
-    place = np.asarray(place)[order]
-    side = 1.0 if (along == 0) == (place[-1] >= place[0]) else -1.0
+    across_px = pixels.line - path.middle[:, None]
+    cosine = 1.0 / np.hypot(1.0, path.slope)
     return Band(
-        offset_px=side * (line - middle[:, None]) * cosine[:, None],
+        offset_px=path.side * across_px * cosine[:, None],
         grey=levels,
         background=pixels.values(background),
-        foot_px=pixels.as_xy(step, middle),
-        normal=side * pixels.as_xy(-slope * cosine, cosine),
-        place=np.interp(step, knots, place),
-        radius_px=np.interp(step, knots, np.asarray(radius_px)[order]),
+        foot_px=path.as_xy(path.step, path.middle),
+        normal=path.side * path.as_xy(-path.slope * cosine, cosine),
+        place=path.place,
+        radius_px=path.radius_px,
         still=None if still is None else pixels.values(still),
     )
 
 
-def _steps_between(first: float, last: float, size: int) -> np.ndarray:
-    """Return the whole pixels (n,) from first to last along an axis of so many pixels."""
-    ends = np.clip(np.round([first, last]), 0, size - 1).astype(int)
-    return np.arange(ends[0], ends[1] + 1)
+@dataclass(frozen=True)
+class _Path:
+    """A curve at n whole pixels of the axis of the picture that it runs along.
+
+    along: 0 where that axis is x, 1 where it is y. step (n,): pixels on that axis. middle (n,): the
+    curve on the other axis, px. place, radius_px (n,): as of `Band`.
+    """
+
+    along: int
+    step: np.ndarray
+    middle: np.ndarray
+    place: np.ndarray
+    radius_px: np.ndarray
+
+    @staticmethod
+    def along_curve(
+        curve_px: np.ndarray, place: np.ndarray, radius_px: np.ndarray, shape: tuple[int, ...]
+    ) -> "_Path":
+        """Return the path of a curve (m, 2) within a picture of this shape (h, w)."""
+        along = 0 if np.ptp(curve_px[:, 0]) >= np.ptp(curve_px[:, 1]) else 1
+        order = np.argsort(curve_px[:, along])
+        knots = curve_px[order, along]
+        first, last = np.clip(np.round(knots[[0, -1]]), 0, shape[1 - along] - 1).astype(int)
+        step = np.arange(first, last + 1)
+        others = (curve_px[:, 1 - along], np.asarray(place), np.asarray(radius_px))
+        at_steps = [np.interp(step, knots, values[order]) for values in others]
+        return _Path(along, step, *at_steps)
+
+    @property
+    def slope(self) -> np.ndarray:
+        """Return the slope (n,) of the curve against the axis."""
+        return np.gradient(self.middle) if len(self.step) > 1 else np.zeros(len(self.step))
+
+    @property
+    def side(self) -> float:
+        """Return 1 where the axis's own normals lie as normals of a band shall, else -1."""
+        return 1.0 if (self.along == 0) == (self.place[-1] >= self.place[0]) else -1.0
+
+    def as_xy(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
+        """Return vectors (n, 2) in x and y of their parts (n,) along the axis and across it."""
+        parts = (along, across) if self.along == 0 else (across, along)
+        return np.stack(parts, axis=1)
+
+    def pixels(self, half_width_px: int) -> "_BandPixels":
+        """Return the pixels within so many of the curve, across the axis."""
+        across = np.arange(-half_width_px, half_width_px + 1)
+        line = np.round(self.middle).astype(int)[:, None] + across
+        return _BandPixels(self.along, self.step, line)
 
 
 @dataclass(frozen=True)
@@ -108,24 +149,16 @@ class _BandPixels:
 
     def values(self, picture: np.ndarray) -> np.ndarray:
         """Return the values (n, k) of a picture at the pixels; NaN outside it."""
-        size = picture.shape[self.along]
-        line = np.clip(self.line, 0, size - 1)
+        line = np.clip(self.line, 0, picture.shape[self.along] - 1)
         step = self.step[:, None]
         at = (line, step) if self.along == 0 else (step, line)
         values = picture[at].astype(float)
         values[line != self.line] = np.nan
         return values
 
-    def as_xy(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
-        """Return vectors (n, 2) in x and y of their parts (n,) along the band's axis and across it."""
-        parts = (along, across) if self.along == 0 else (across, along)
-        return np.stack(parts, axis=1)
-
-
-
 
 @dataclass(frozen=True)
-class Pieces:
+class Pieces(Rows):
     """Hold short segments of bands, all of one size: s segments of p pixels each.
 
     offset_px, grey, background (s, p): as in `Band`.
@@ -160,10 +193,6 @@ class Pieces:
         """Return the degrees of freedom (s,): pixels less position, and background's gain and offset."""
         return np.maximum((self.weight > 0).sum(axis=1) - 3, 1)
 
-    def select(self, keep: np.ndarray | slice) -> "Pieces":
-        """Return the segments where keep (s,) holds, at these indices, or of a slice."""
-        return Pieces(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
-
     def columns(self, keep: np.ndarray | slice) -> "Pieces":
         """Return the segments with those of their pixels where keep (p,) holds, or of a slice."""
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")
@@ -194,48 +223,29 @@ def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
     shading, and slopes and curvatures are 0.
     """
     counts = [len(band.place) // length_px for band in bands]
-    if not any(counts):
+    whole = []
+    for band, count in zip(bands, counts):
+        if count:
+            whole.append(band.select(slice(count * length_px)))
+    if not whole:
         return _no_pieces()
-    joined = {}
-    for name in Band.__dataclass_fields__:
-        parts = []
-        for band, count in zip(bands, counts):
-            if count:
-                parts.append(getattr(band, name)[: count * length_px])
-        joined[name] = np.concatenate(parts)
-    return _cut(Band(**joined), length_px, noise, np.repeat(np.arange(len(bands)), counts))
+    return _cut(Band.join(whole), length_px, noise, np.repeat(np.arange(len(bands)), counts))
 
 
 def _no_pieces() -> Pieces:
     """Return no segments."""
     pixels = np.zeros((0, 1))
-    return Pieces(
-        offset_px=pixels,
-        grey=pixels,
-        background=pixels,
-        slope=pixels,
-        curvature=pixels,
-        weight=pixels,
-        place=np.zeros(0),
-        radius_px=np.zeros(0),
-        foot_px=np.zeros((0, 2)),
-        normal=np.zeros((0, 2)),
-        source=np.zeros(0, dtype=int),
-        still=pixels,
-    )
+    none = np.zeros(0)
+    vectors = np.zeros((0, 2))
+    source = np.zeros(0, dtype=int)
+    return Pieces(*[pixels] * 6, none, none, vectors, vectors, source, pixels)
 
 
 def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray) -> Pieces:
     """Cut one band, of a whole number of segments, into segments; source (s,): of each."""
     count = len(source)
     is_known = np.isfinite(band.grey) & np.isfinite(band.background)  # (n, k)
-    if band.still.size:
-        slope = np.zeros(is_known.shape)
-        curvature = np.zeros(is_known.shape)
-        still = np.where(is_known, band.still, 0.0).reshape(count, -1)
-    else:
-        slope, curvature = _derivatives(band)
-        still = None
+    slope, curvature = _derivatives(band)
 
     def known(values: np.ndarray) -> np.ndarray:
         """Return values (n, k) by segment (s, p), 0 where a pixel is not known."""
@@ -257,24 +267,20 @@ def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray) -> Pieces
         foot_px=middle(band.foot_px),
         normal=middle(band.normal),
         source=source,
-        still=still,
+        still=known(band.still) if band.still.size else None,
     )
 
 
 def _derivatives(band: Band) -> tuple[np.ndarray, np.ndarray]:
     """Return slope and curvature (n, k) of the background across the rod, per px and per px².
 
-    They are 0 at the band's borders. By five points: three would lose a sixth of the slope of an
-    edge blurred by a pixel.
+    They are 0 throughout a band with another background. By five points: three would lose a sixth
+    of the slope of an edge blurred by a pixel.
     """
-    pitch = band.offset_px[:, 1:2] - band.offset_px[:, :1]
+    if band.still.size:
+        return np.zeros(band.grey.shape), np.zeros(band.grey.shape)
+    pitch_px = band.offset_px[:, 1:2] - band.offset_px[:, :1]
     behind = np.nan_to_num(band.background)
-    width = behind.shape[1]
-    wide = np.pad(behind, ((0, 0), (2, 2)), mode="edge")
-    two_before = wide[:, :width]
-    before = wide[:, 1 : 1 + width]
-    after = wide[:, 3 : 3 + width]
-    two_after = wide[:, 4 : 4 + width]
-    slope = (8.0 * (after - before) - (two_after - two_before)) / (12.0 * pitch)
-    curvature = 16.0 * (after + before) - (two_after + two_before) - 30.0 * behind
-    return slope, curvature / (12.0 * pitch**2)
+    slope = correlate1d(behind, _FIRST_DIFFERENCE, axis=1, mode="nearest")
+    curvature = correlate1d(behind, _SECOND_DIFFERENCE, axis=1, mode="nearest")
+    return slope / (12.0 * pitch_px), curvature / (12.0 * pitch_px**2)
