@@ -114,7 +114,7 @@ def _instant_steps(normal: Normal, step: np.ndarray, view_steps: np.ndarray) -> 
 def _eliminate_views(
     equations: Equations, free: np.ndarray, damping: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Eliminate the views' poses by the Schur complement.
+    """Reduce the equations to the globals: eliminate the views' poses by the Schur complement.
 
     Returns the reduced matrix (F, F) and gradient (F,) of the free globals, C⁻¹Bᵀ (6 V, F) and
     C⁻¹c (6 V,).

@@ -265,7 +265,8 @@ def _board_motion(state: BundleState, seen: Sightings) -> _Motion:
 
 
 def _turn_by_poses(turn: np.ndarray, J: np.ndarray, by_path: np.ndarray) -> np.ndarray:
-    """Return the derivatives (n, 3, 3, 3) of turns by w of the view's own pose, and of its neighbours.
+    """Return the derivatives (n, 3, 3, 3) of turns by w of the view's own pose, and of its
+    neighbours.
 
     log(Exp(w) X) grows by J⁻¹ w, log(X Exp(-w)) by -J⁻ᵀ w, J being that of log X.
     turn (n, 3, 3). J (n, 3, 3): of its logarithm. by_path (n, 2, 3, 3): the share of the path to

@@ -145,7 +145,9 @@ def _checked_reports(
 
 
 def _place(cameras: Cameras, on_rig: MeasuredPose | None) -> Cameras:
-    """Return the cameras with the covariance of their place in the rig frame, where that was measured."""
+    """Return the cameras with the covariance of their place in the rig frame, where that was
+    measured.
+    """
     if on_rig is None:
         return cameras
     placement = by_board(on_rig.T_rig_board, on_rig.sigma_mm, on_rig.sigma_rad)

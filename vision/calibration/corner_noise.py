@@ -114,7 +114,9 @@ def adjust_with_noise(
 def _adjust_robustly(
     state: BundleState, seen: Sightings, corners_mm: np.ndarray, priors: Priors, error: np.ndarray
 ) -> tuple[Solution, np.ndarray, Priors]:
-    """Adjust robustly with model errors (C,) px; also return the errors and the priors learnt by it."""
+    """Adjust robustly with model errors (C,) px; also return the errors and the priors learnt by
+    it.
+    """
     solution = adjust_bundle(
         state, _with_error(seen, error), corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4
     )

@@ -246,7 +246,9 @@ def _pitch_errors_mm(
 
 
 def _pitches(points_mm: np.ndarray, axis: int) -> np.ndarray:
-    """Return the distances (n,) between neighbours of a grid of points (…, 3) along one of its axes."""
+    """Return the distances (n,) between neighbours of a grid of points (…, 3) along one of its
+    axes.
+    """
     return np.linalg.norm(np.diff(points_mm, axis=axis), axis=-1).ravel()
 
 

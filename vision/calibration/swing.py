@@ -43,7 +43,8 @@ def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
 def _combine(
     strokes: Sequence[BaseLines], placements: Sequence[Placement]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean step (6,) of placements by a stroke each, weighted by precision, and its covariance.
+    """Return the mean step (6,) of placements by a stroke each, weighted by precision, and its
+    covariance.
 
     What the lines of a stroke share (light, lenses) all strokes share: their mean has as much of it
     as one.

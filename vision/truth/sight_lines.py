@@ -63,7 +63,9 @@ def sights_of(problem: Problem, name: str) -> Sights | None:
 
 
 def _points_in(problem: Problem, name: str) -> tuple[np.ndarray, LinePoints | None]:
-    """Return the frame (n,) of each line point of the wire in one camera, and the points; None of none."""
+    """Return the frame (n,) of each line point of the wire in one camera, and the points; None of
+    none.
+    """
     number = problem.cameras.index(name)
     frames = []
     points = []
@@ -77,7 +79,9 @@ def _points_in(problem: Problem, name: str) -> tuple[np.ndarray, LinePoints | No
 
 
 def _shared_px(problem: Problem, name: str, points: LinePoints, motor_rad) -> np.ndarray:
-    """Return how far (n, k) px points move along their normals with one sigma of each cause they share."""
+    """Return how far (n, k) px points move along their normals with one sigma of each cause they
+    share.
+    """
     modes = wire_modes(problem.wire.length_mm, points.place, motor_rad, problem.motor_rad)
     by_camera_px = _by_camera(problem, name, points, motor_rad)
     return np.concatenate([WIRE_MODES_PX * modes, points.shared_px, by_camera_px], axis=1)

@@ -236,14 +236,13 @@ def _strategies_of_bar(axis: BarAxis, whisk: WhiskPictures) -> list[Strategy]:
     """
     radius_mm = whisk.rods.bar.radius_mm
     seeing = [view for view in whisk.views if view.camera.name in whisk.bar.seen_by]
+    edges = BarEdges(seeing or whisk.views, radius_mm, whisk.settings)
     if seen_from_one_side(whisk.cameras, axis):
-        return [
-            Strategy(BarEdges(seeing or whisk.views, radius_mm, whisk.settings), TouchByOnset())
-        ]
+        return [Strategy(edges, TouchByOnset())]
     if len(seeing) == 1:
         return [
-            Strategy(BarEdges(seeing, radius_mm, whisk.settings), touch)
-            for touch in (TouchByClearance(fewest_cameras=2), TouchByOnset())
+            Strategy(edges, TouchByClearance(fewest_cameras=2)),
+            Strategy(BarEdges(seeing, radius_mm, whisk.settings), TouchByOnset()),
         ]
     return [Strategy(BarMiddles(whisk.views, radius_mm, whisk.settings), TouchByClearance())]
 

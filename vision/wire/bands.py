@@ -61,7 +61,8 @@ def read_band(
     hidden: np.ndarray | None = None,
     still: np.ndarray | None = None,
 ) -> Band:
-    """Read the pixels within half_width_px of a curve (m, 2), one step a pixel of the axis it runs along.
+    """Read the pixels within half_width_px of a curve (m, 2), one step a pixel of the axis it runs
+    along.
 
     hidden (h, w) bool: pixels that show something else. still (h, w): another background.
     No pixel is interpolated and none is read twice, so that their noise stays independent. Normals
@@ -190,7 +191,9 @@ class Pieces(Rows):
 
     @property
     def freedom(self) -> np.ndarray:
-        """Return the degrees of freedom (s,): pixels less position, and background's gain and offset."""
+        """Return the degrees of freedom (s,): pixels less position, and background's gain and
+        offset.
+        """
         return np.maximum((self.weight > 0).sum(axis=1) - 3, 1)
 
     def columns(self, keep: np.ndarray | slice) -> "Pieces":
@@ -217,7 +220,7 @@ class Pieces(Rows):
 
 
 def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
-    """Cut bands into segments of length_px steps; what is left over at a band's end is not used.
+    """Split bands into segments of length_px steps; what is left over at a band's end is not used.
 
     Either all bands have a second background (`still`) or none has. Where they have, the pass fits no
     shading, and slopes and curvatures are 0.
@@ -242,7 +245,7 @@ def _no_pieces() -> Pieces:
 
 
 def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray) -> Pieces:
-    """Cut one band, of a whole number of segments, into segments; source (s,): of each."""
+    """Split one band, of a whole number of segments, into segments; source (s,): of each."""
     count = len(source)
     is_known = np.isfinite(band.grey) & np.isfinite(band.background)  # (n, k)
     slope, curvature = _derivatives(band)

@@ -1,4 +1,6 @@
-"""Fewer numbers for a first pass: pixels of a segment that lie equally far from the axis are averaged."""
+"""Fewer numbers for a first pass: pixels of a segment that lie equally far from the axis are
+averaged.
+"""
 
 from dataclasses import replace
 
@@ -13,7 +15,8 @@ _LEAST_BLUR_SHARE = 0.25
 
 
 def binned(pieces: Pieces, width_px: float) -> tuple[Pieces, float]:
-    """Return the segments with pixels of one offset averaged, and the variance of offsets in a bin, px².
+    """Return the segments with pixels of one offset averaged, and the variance of offsets in a bin,
+    px².
 
     Pixels count by their squared weights. All but the blur is linear in what is averaged; a bin
     blurs by as much as the offsets in it vary (see `without`).
@@ -32,7 +35,9 @@ def binned(pieces: Pieces, width_px: float) -> tuple[Pieces, float]:
 
 
 def _bins(offset_px: np.ndarray, width_px: float) -> tuple[np.ndarray, int]:
-    """Return the bin of each pixel (s, p), counted through all segments, and the bins a segment has."""
+    """Return the bin of each pixel (s, p), counted through all segments, and the bins a segment
+    has.
+    """
     bins = np.floor(offset_px / width_px)
     bins -= np.min(bins, axis=1, keepdims=True)
     count = int(bins.max(initial=0)) + 1

@@ -62,7 +62,8 @@ class Votes:
         return self.share.shape[1] // 2
 
     def points(self, shift_px: np.ndarray) -> LinePoints:
-        """Return the middle of each segment's votes near a curve, shift_px (s,) off the predicted one.
+        """Return the middle of each segment's votes near a curve, shift_px (s,) off the predicted
+        one.
 
         A segment that what stands still explains has no votes: a lens cap differs from the picture
         without rods everywhere.
@@ -77,7 +78,9 @@ class Votes:
         return LinePoints(px, self.pieces.normal, _SIGMA_PX / np.sqrt(vote), self.pieces.place)
 
     def _squared_votes(self, shifts_px: np.ndarray) -> np.ndarray:
-        """Return the squared votes (s, n) at whole shifts (s, n): weak ones far from the strongest are no wire."""
+        """Return the squared votes (s, n) at whole shifts (s, n): weak ones far from the strongest
+        are no wire.
+        """
         reach = self.reach_px
         column = np.clip(shifts_px + reach, 0, 2 * reach)
         share = np.take_along_axis(self.changed, column, axis=1)
@@ -88,7 +91,8 @@ class Votes:
 def likely_curve(
     seen: Sequence[Votes], shapes_px: np.ndarray, grids: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, bool]:
-    """Find the curve with most votes of all segments, and whether it surely has more than noise gives.
+    """Find the curve with most votes of all segments, and whether it surely has more than noise
+    gives.
 
     A curve is a sum of shapes (s, k), with coefficients (k,) from the grids; s: segments in all.
     Of equal ones that nearest to the predicted curve is returned.
@@ -169,14 +173,17 @@ def _share(energy: np.ndarray, width_px: int) -> np.ndarray:
 
 
 def _places(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, int]:
-    """Return of each pixel its column, a px wide, among those of all segments, and columns a segment."""
+    """Return of each pixel its column, a px wide, among those of all segments, and columns a
+    segment.
+    """
     count = 2 * reach_px + 1
     column = np.clip(np.rint(pieces.offset_px).astype(int) + reach_px, 0, count - 1)
     return column + count * np.arange(len(pieces))[:, None], count
 
 
 def _unexplained(pieces: Pieces, background: np.ndarray, variance_share: float) -> np.ndarray:
-    """Return the residual (s, p), over its noise, of a background with a gain and an offset a segment.
+    """Return the residual (s, p), over its noise, of a background with a gain and an offset a
+    segment.
 
     variance_share: the part of one picture's variance that the background has.
     """

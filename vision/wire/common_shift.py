@@ -50,7 +50,8 @@ EVIDENCE_COUNTS = 0.5
 
 
 def common_spread_px(task: ShadedSegments, robust: np.ndarray, blur_px: float) -> float:
-    """Return the RMS of all common shifts, each by its probability, from where the segments lie, px.
+    """Return the RMS of all common shifts, each by its probability, from where the segments lie,
+    px.
 
     robust (s,): weight of each segment. blur_px: found where they lie.
     """
@@ -100,7 +101,9 @@ def evidences_of(
 
 
 def _contrasts(pieces: Pieces, models: Sequence[tuple[float, float]]) -> np.ndarray:
-    """Return the contrast (models,) of the rod, as many times as thick as each model says, grey levels."""
+    """Return the contrast (models,) of the rod, as many times as thick as each model says, grey
+    levels.
+    """
     contrasts = []
     for wider, _ in models:
         contrasts.append(contrast_of(replace(pieces, radius_px=wider * pieces.radius_px)))
@@ -117,9 +120,11 @@ def _three_along(knots: Knots) -> Knots:
 def _evidences(
     normal: Normal, own: np.ndarray, contrast: np.ndarray, no_chance: float
 ) -> np.ndarray:
-    """Return minus twice the log evidence (g,) of g normal equations, coefficients of the best strength.
+    """Return minus twice the log evidence (g,) of g normal equations, coefficients of the best
+    strength.
 
-    own (knots,): inverse variances of a coefficient over its strength's. contrast (g,): grey levels.
+    own (knots,): inverse variances of a coefficient over its strength's. contrast (g,): grey
+    levels.
     """
     terms = normal.right.shape[1] // len(own)
     strength = contrast[:, None] * WAVE_SHARE[:terms]
@@ -144,7 +149,8 @@ def _bound(strength: np.ndarray, contrast: np.ndarray) -> np.ndarray:
 def _integrate(normal: Normal, stiff: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Integrate out the coefficients of g normal equations, with prior precisions stiff (g, size).
 
-    Returned are minus twice the log evidence (g,), and the coefficients' expected squares (g, size).
+    Returned are minus twice the log evidence (g,), and the coefficients' expected squares (g,
+    size).
     """
     root = normal.left.copy()
     diagonal = np.einsum("gii->gi", root)

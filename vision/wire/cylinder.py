@@ -1,4 +1,5 @@
-"""The picture of a shaded cylinder: its radiance round the rod, seen from the side and blurred by the lens.
+"""The picture of a shaded cylinder: its radiance round the rod, seen from the side and blurred by
+the lens.
 
 Each shading function of the angle round the rod has a blurred profile across the picture. Profiles
 are integrated once for each ratio of half-width and blur, tabulated (`_tables`), and looked up for
@@ -67,7 +68,8 @@ def shading_basis(
 def _interpolation(
     offset: np.ndarray, weight: np.ndarray, rows_per_radius: float, count: int
 ) -> csr_array:
-    """Return the matrix (pixels, count) that interpolates a table of count rows at offsets, in radii.
+    """Return the matrix (pixels, count) that interpolates a table of count rows at offsets, in
+    radii.
 
     Its rows are multiplied by the weights of the pixels.
     """
@@ -140,7 +142,8 @@ def _between(table: np.ndarray, place: np.ndarray, step: int, part: np.ndarray) 
 
 
 def rim_bells(offset_px: np.ndarray, radius_px: np.ndarray | float, blur_px: float) -> np.ndarray:
-    """Return slope and curvature (…, 2) of the blurred share that the rod covers, in units of the blur.
+    """Return slope and curvature (…, 2) of the blurred share that the rod covers, in units of the
+    blur.
 
     With z, the distance from an edge over the blur, these are the normal density of z and z times it;
     those of the edge at negative offset are subtracted from the other's.
@@ -180,7 +183,9 @@ def _places(
 
 
 def _table(ratio: float, terms: int) -> tuple[float, np.ndarray]:
-    """Return rows per radius, and the table (n, terms + 2) for this radius over blur; 0 lies in the middle."""
+    """Return rows per radius, and the table (n, terms + 2) for this radius over blur; 0 lies in the
+    middle.
+    """
     step, share = divmod(np.log(ratio) / _RATIO_STEP, 1.0)
     rows_per_radius, one, other = _tables(int(step), terms)
     return rows_per_radius, one + share * (other - one)
@@ -188,7 +193,8 @@ def _table(ratio: float, terms: int) -> tuple[float, np.ndarray]:
 
 @lru_cache(maxsize=512)
 def _tables(step: int, terms: int) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return rows per radius, and tables (n, terms + 2) at this step of log(radius / blur) and the next.
+    """Return rows per radius, and tables (n, terms + 2) at this step of log(radius / blur) and the
+    next.
 
     Rows are counted in radii, for then edges coincide and only their blur differs: 5e-4 of the
     contrast between rows and steps.

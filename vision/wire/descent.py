@@ -189,7 +189,8 @@ class Point:
 class Step:
     """Hold a step of positions (s,), px, and of the blur's logarithm.
 
-    gain_shared, gain_each: by how much chi² is expected to fall by what all share, and by positions.
+    gain_shared, gain_each: by how much chi² is expected to fall by what all share, and by
+    positions.
     """
 
     shift_px: np.ndarray
@@ -240,7 +241,9 @@ class Arrow:
         )
 
     def solve(self, damping: float) -> Shared:
-        """Return the solution a step farther on, with the sensitivity of positions to what all share."""
+        """Return the solution a step farther on, with the sensitivity of positions to what all
+        share.
+        """
         point = self.point
         step = self.step(damping)
         own = self.cross / self.power[:, None]

@@ -22,7 +22,9 @@ _LEAST_BACKGROUND_SHARE = 0.2
 
 
 class GatheredEquations:
-    """Normal equations of the shading coefficients of all knots, for many shifts and models at once."""
+    """Normal equations of the shading coefficients of all knots, for many shifts and models at
+    once.
+    """
 
     def __init__(
         self,
@@ -74,7 +76,8 @@ class GatheredEquations:
 
 
 def exactly_if_needed(compute: Callable[[bool], np.ndarray]) -> np.ndarray:
-    """Return `compute(False)` from summed pixels, or `compute(True)` from each pixel where that fails.
+    """Return `compute(False)` from summed pixels, or `compute(True)` from each pixel where that
+    fails.
 
     Summed pixels may leave a matrix that is not positive definite, which raises LinAlgError.
     """

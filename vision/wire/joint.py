@@ -1,4 +1,5 @@
-"""Positions of all of a rod's segments in one camera, its shading and the lens blur, solved together.
+"""Positions of all of a rod's segments in one camera, its shading and the lens blur, solved
+together.
 
 What all segments share, shading and blur, can stand in for a shift that they share too. Solved in
 turns, the two creep along the valley between them and stop where they began. Here they are one
@@ -31,7 +32,8 @@ _SPREAD_SEGMENTS = 120
 
 @dataclass(frozen=True)
 class Solved(Shared):
-    """Hold of each segment by itself, too, all (s,): own_sigma_px by its own noise, chi2 per pixel, contrast.
+    """Hold of each segment by itself, too, all (s,): own_sigma_px by its own noise, chi2 per pixel,
+    contrast.
 
     widened_px2 (s, 2): by how much its blur² is above that of all, and sigma.
     """

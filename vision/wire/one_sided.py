@@ -111,7 +111,9 @@ class WireAppearance:
 
 
 def one_sided_lines(whisks: Sequence[Mapping[str, WireAppearance]]) -> tuple[str, ...]:
-    """Return a line for each camera that sees light from one side, from the whisk in which it saw least."""
+    """Return a line for each camera that sees light from one side, from the whisk in which it saw
+    least.
+    """
     least: dict[str, WireAppearance] = {}
     for whisk in whisks:
         for camera, appearance in whisk.items():

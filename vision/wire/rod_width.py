@@ -57,7 +57,9 @@ def log_width(pieces: Pieces, blur_px: float, knots: Knots) -> tuple[float, floa
 
 
 def _mean_and_sigma(places: np.ndarray, evidences: np.ndarray) -> tuple[float, float]:
-    """Return mean and sigma of the density whose minus twice logarithm is known at some places (n,)."""
+    """Return mean and sigma of the density whose minus twice logarithm is known at some places
+    (n,).
+    """
     fine = np.linspace(places[0], places[-1], _FINE)
     values = CubicSpline(places, evidences)(fine)
     density = np.exp(-0.5 * (values - values.min()))
@@ -68,7 +70,8 @@ def _mean_and_sigma(places: np.ndarray, evidences: np.ndarray) -> tuple[float, f
 def _evidences_of_widths(
     task: ShadedSegments, logs: np.ndarray, log_blurs: np.ndarray, no_chance: float
 ) -> np.ndarray:
-    """Return minus twice the log evidence (w,) of widths, at the best common shift and blur of each.
+    """Return minus twice the log evidence (w,) of widths, at the best common shift and blur of
+    each.
 
     logs (w,): logarithms of widths. log_blurs (b,): of blurs over the expected one.
     """

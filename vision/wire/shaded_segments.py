@@ -1,4 +1,6 @@
-"""A rod's segments in one camera, with what is known beforehand of their shading and of the lens blur."""
+"""A rod's segments in one camera, with what is known beforehand of their shading and of the lens
+blur.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property

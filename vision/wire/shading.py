@@ -1,4 +1,5 @@
-"""The rod's own shading, shared by all segments of a camera, and the position of each segment under it.
+"""The rod's own shading, shared by all segments of a camera, and the position of each segment under
+it.
 
 The rod is a lit cylinder. Its radiance round the rod is a short Fourier series (`cylinder.py`)
 whose coefficients vary slowly along the rod and as it turns: they are known at knots, and between
@@ -87,7 +88,8 @@ class Knots:
 class Shading:
     """Hold the radiance round the rod.
 
-    coefficients (k m, terms): at each knot, of 1, sin t, cos t, …, in grey levels. blur_px: of the lens.
+    coefficients (k m, terms): at each knot, of 1, sin t, cos t, …, in grey levels. blur_px: of the
+    lens.
     """
 
     knots: Knots
@@ -137,7 +139,8 @@ def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots) -> tup
 
 
 class Equations:
-    """Normal equations of each segment for its shading, the background's gain and offset eliminated.
+    """Normal equations of each segment for its shading, the background's gain and offset
+    eliminated.
 
     gram (s, terms, terms), moment (s, terms): matrix and right side.
     power (s,): the squares that the background leaves unexplained.
@@ -179,7 +182,8 @@ class Equations:
         return self.power + np.einsum("st,st->s", coefficients, predicted - 2.0 * self.moment)
 
     def linearised(self, coefficients: np.ndarray) -> "PositionEquations":
-        """Return how segments of this shading, coefficients (s, terms), depend on position and blur.
+        """Return how segments of this shading, coefficients (s, terms), depend on position and
+        blur.
 
         Light that the rod hides near a border of the background (`_hidden_light`) is held fixed.
         """
@@ -202,7 +206,8 @@ class Equations:
         return PositionEquations(by_shading, gram, np.sqrt(np.sum(covered**2, axis=1)))
 
     def _gain_by_cover(self, residual: np.ndarray) -> np.ndarray:
-        """Return what each pixel (s, p) loses of the background where the rod covers all of it, negated.
+        """Return what each pixel (s, p) loses of the background where the rod covers all of it,
+        negated.
 
         residual (s, p): what the rod's light leaves of the grey level, by weight.
         """
@@ -215,7 +220,9 @@ class Equations:
     def _derivatives(
         self, coefficients: np.ndarray, by_cover: np.ndarray, residual: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives (s, 3, p) by position and by the blur's logarithm, and the residual."""
+        """Return the derivatives (s, 3, p) by position and by the blur's logarithm, and the
+        residual.
+        """
         near = self._near
         slopes, curvatures = slopes_of(near.offset_px, near.radius_px, self.blur_px, coefficients)
         derivatives = np.empty((len(near), 3, residual.shape[1]))
@@ -252,7 +259,9 @@ class PositionEquations:
         return np.clip(self.gram[:, 0, 2] / self.power, -LONGEST_PX, LONGEST_PX)
 
     def own_sigma_px(self, chi2: np.ndarray) -> np.ndarray:
-        """Return the sigma (s,) of each segment's position by itself, where it leaves chi2 (s,) per pixel."""
+        """Return the sigma (s,) of each segment's position by itself, where it leaves chi2 (s,) per
+        pixel.
+        """
         return np.sqrt(np.maximum(chi2, 1.0) / self.power)
 
 
@@ -274,7 +283,8 @@ def _weighted_columns(pieces: Pieces, blur_px: float, terms: int) -> np.ndarray:
 
 
 def _split_off_background(pieces: Pieces, blur_px: float) -> tuple[Pieces, np.ndarray]:
-    """Return the segments without the columns of pixels at both ends that no light of the rod reaches.
+    """Return the segments without the columns of pixels at both ends that no light of the rod
+    reaches.
 
     Also returned are the products (s, 3, 3) of these pixels' background, 1 and grey level with each
     other, by squared weight.
@@ -337,5 +347,7 @@ def contrast_of(pieces: Pieces) -> float:
 
 
 def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
-    """Return the prior sigma (terms,) of the shading's coefficients, by the rod's contrast, grey levels."""
+    """Return the prior sigma (terms,) of the shading's coefficients, by the rod's contrast, grey
+    levels.
+    """
     return contrast_of(pieces) * WAVE_SHARE[:terms]

@@ -65,7 +65,8 @@ def _keep_apart(starts: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _evidences(task: ShadedSegments, log_blurs: np.ndarray, each_pixel: bool) -> np.ndarray:
-    """Return minus twice the log evidence (shifts, blurs) of all segments moved by each start's shift.
+    """Return minus twice the log evidence (shifts, blurs) of all segments moved by each start's
+    shift.
 
     See `Point.evidence`; each_pixel: see `GatheredEquations`.
     """

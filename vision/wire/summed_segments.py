@@ -1,4 +1,5 @@
-"""Normal equations of a rod's shading at many common shifts, blurs and widths, from pixels summed once.
+"""Normal equations of a rod's shading at many common shifts, blurs and widths, from pixels summed
+once.
 
 A segment of the rod is a few hundred pixels. Its normal equations need sums over these pixels of
 products such as background × grey level, times functions of the pixel's distance from the axis
@@ -106,7 +107,9 @@ class SummedSegments:
         return left.reshape(models, knots * terms, -1)
 
     def _right(self, by_grey: np.ndarray) -> np.ndarray:
-        """Return the right sides (models, size) of the shading's products with grey levels (s, models, terms)."""
+        """Return the right sides (models, size) of the shading's products with grey levels (s,
+        models, terms).
+        """
         segments, models, terms = by_grey.shape
         right = self._weighted_knots.T @ by_grey.reshape(segments, -1)
         right = right.reshape(-1, models, terms).transpose(1, 0, 2)
@@ -142,7 +145,9 @@ class SummedSegments:
         return np.concatenate(products, axis=2) / root[..., None]
 
     def _squared_background(self, behind: np.ndarray) -> np.ndarray:
-        """Return the squares (s, models) of the background that is seen, factors behind (3, d, models)."""
+        """Return the squares (s, models) of the background that is seen, factors behind (3, d,
+        models).
+        """
         squares = []
         for i, j in _BACKGROUND_PAIRS:
             squares.append(behind[i] * behind[j] * (1.0 + (i != j)))
@@ -164,7 +169,9 @@ class SummedSegments:
         return (products - of_gain * by_gain[..., :-1]) / np.sqrt(left_by_gain + WEAK)
 
     def _sum(self, sums: np.ndarray, functions: np.ndarray) -> np.ndarray:
-        """Return the sums (s, models, k) over distances of sums (s, d) times functions (d, models, k)."""
+        """Return the sums (s, models, k) over distances of sums (s, d) times functions (d, models,
+        k).
+        """
         flat = sums @ functions.reshape(len(functions), -1)
         return flat.reshape(len(sums), functions.shape[1], -1)
 
@@ -190,7 +197,9 @@ class _Shapes:
         models: Sequence[tuple[float, float]],
         terms: int,
     ) -> "_Shapes":
-        """Return the pictures of a rod of a half-width, times as much and blurred as each model says."""
+        """Return the pictures of a rod of a half-width, times as much and blurred as each model
+        says.
+        """
         shapes = []
         for wider, blur_px in models:
             shapes.append(profiles(distance_px, wider * radius_px, blur_px, terms))
@@ -239,7 +248,8 @@ def _pixel_products(pieces: Pieces) -> np.ndarray:
 
 
 def _spread_to_nearest(place: np.ndarray, count: int) -> csc_array:
-    """Return the matrix (s count, s p) that gives each pixel's value to the nearest four of count rows.
+    """Return the matrix (s count, s p) that gives each pixel's value to the nearest four of count
+    rows.
 
     place (s, p): of each pixel, counted in rows.
     """
@@ -252,7 +262,9 @@ def _spread_to_nearest(place: np.ndarray, count: int) -> csc_array:
 
 
 def _cubic_weights(t: np.ndarray) -> np.ndarray:
-    """Return the weights (n, 4) by which the cubic through values at -1, 0, 1 and 2 gives that at t (n,)."""
+    """Return the weights (n, 4) by which the cubic through values at -1, 0, 1 and 2 gives that at t
+    (n,).
+    """
     weights = np.empty((len(t), 4))
     weights[:, 0] = -t * (t - 1.0) * (t - 2.0) / 6.0
     weights[:, 1] = (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0

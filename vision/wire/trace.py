@@ -80,14 +80,18 @@ def lines_of(camera: Camera, wire: Wire, curves: Mapping[int, Curves]) -> RodLin
 
 
 def _hidden(view: View, frame: int) -> np.ndarray | None:
-    """Return the pixels (h, w) bool of a frame that other rods may cover; None where there are none."""
+    """Return the pixels (h, w) bool of a frame that other rods may cover; None where there are
+    none.
+    """
     return mask_rods(view.others, frame, view.frames[frame].shape)
 
 
 def _outlines(
     camera: Camera, curves: Mapping[int, Curves], wire: Wire
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return arc (n,) in mm, and middle (f, n, 2) and half-width (f, n) in px of the wire in f frames."""
+    """Return arc (n,) in mm, and middle (f, n, 2) and half-width (f, n) in px of the wire in f
+    frames.
+    """
     arc = np.linspace(2.0, wire.length_mm - 1.0, _NODES)
     points, tangents = _joined(curves.values()).at(arc)  # (f, n, 3)
     directions = tangents / np.linalg.norm(tangents, axis=-1, keepdims=True)
