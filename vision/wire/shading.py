@@ -182,28 +182,34 @@ class Equations:
         return self.power + np.einsum("st,st->s", coefficients, predicted - 2.0 * self.moment)
 
     def linearised(self, coefficients: np.ndarray) -> "PositionEquations":
-        """Return how segments of this shading, coefficients (s, terms), depend on position and
-        blur.
+        """Return how segments of this shading, coefficients (s, terms), depend on position and blur.
 
         Light that the rod hides near a border of the background (`_hidden_light`) is held fixed.
         """
-        columns = self._columns
         terms = coefficients.shape[1]
-        seen = columns[..., -1]
-        residual = seen - (columns[..., :terms] @ coefficients[..., None])[..., 0]
+        seen = self._columns[..., -1]
+        residual = seen - (self._columns[..., :terms] @ coefficients[..., None])[..., 0]
         by_cover = self._gain_by_cover(residual)
         derivatives = self._derivatives(coefficients, by_cover, residual)
+        mixed, gram = self._products(derivatives)
+        covered = residual - seen - self._columns[..., 0] * by_cover
+        contrast = np.sqrt(np.sum(covered**2, axis=1))
+        return PositionEquations(mixed[:, :2, :terms], gram, contrast)
 
-        # normal equations of the derivatives, the pixels far off added, gain and offset eliminated
-        mixed = derivatives @ columns
+    def _products(self, derivatives: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the products of derivatives (s, 3, p) with the columns, and with each other.
+
+        The pixels far off are added to those of the residual, the last of the three; the background's
+        gain and offset are eliminated.
+        """
+        mixed = derivatives @ self._columns
         gram = derivatives @ derivatives.transpose(0, 2, 1)
         mixed[:, 2, -3:] += self._far[:, 2]
         gram[:, 2, 2] += self._far[:, 2, 2]
-        reduced = mixed[..., -3:-1] @ self._inverse
-        gram -= reduced @ mixed[..., -3:-1].transpose(0, 2, 1)
-        by_shading = (mixed - reduced @ self._by_background)[:, :2, :terms]
-        covered = residual - seen - columns[..., 0] * by_cover
-        return PositionEquations(by_shading, gram, np.sqrt(np.sum(covered**2, axis=1)))
+        by_background = mixed[..., -3:-1]
+        reduced = by_background @ self._inverse
+        gram -= reduced @ by_background.transpose(0, 2, 1)
+        return mixed - reduced @ self._by_background, gram
 
     def _gain_by_cover(self, residual: np.ndarray) -> np.ndarray:
         """Return what each pixel (s, p) loses of the background where the rod covers all of it,
