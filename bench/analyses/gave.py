@@ -80,8 +80,8 @@ def _rows(results: Sequence[TrialResult]) -> Iterator[dict]:
                 "theta_deg": float(np.degrees(gave.theta_rad[k])),
                 "gave_mm": float(gave.normal_mm.value[k]),
                 "gave_sigma_mm": float(gave.normal_mm.sigma[k]),
-                "gave_aside_mm": float(gave.aside_mm.value[k]),
-                "gave_aside_sigma_mm": float(gave.aside_mm.sigma[k]),
+                "gave_aside_mm": float(gave.lateral_mm.value[k]),
+                "gave_aside_sigma_mm": float(gave.lateral_mm.sigma[k]),
             }
 
 

@@ -108,7 +108,7 @@ def _see(
         bar_radius_mm=0.5 * trial.bar_diameter_mm,
         wire_radius_mm=0.5 * frames.rods.wire.diameter_mm,
         clock=Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
-        bar_looks=truth.bar_looks,
+        bar_looks=truth.bar_widths,
         one_sided_light=truth.one_sided_light,
         back=_back_stroke(back.get(0)),
         ways_back=_ways_back(back, len(whisks), settings) if trial.both_ways else (),
@@ -147,9 +147,9 @@ def _with_clock(preset: Seeing, clock_sigma_s: float) -> Seeing:
 
 def _trial_contradictions(truth: TrialTruth, session: Session, trial: Trial) -> list[Reason]:
     """Return how the pictures contradict the stated diameters of bar and whisker."""
-    wire_looks = next((whisk.looks for whisk in truth.whisks if whisk.looks), {})
+    wire_looks = next((whisk.widths for whisk in truth.whisks if whisk.widths), {})
     return [
-        check_bar_width(truth.bar_looks, trial, session.board),
+        check_bar_width(truth.bar_widths, trial, session.board),
         check_wire_width(wire_looks, session.whisker),
     ]
 
@@ -236,7 +236,7 @@ def whisk_record(
     if truth.frames:
         contradictions.append(check_turns(truth.turns, motor_speed(truth.frames)))
     return SeenWhisk(
-        truth=replace(truth, overlay={}, ends={}, looks={}, smooth=None, problem=None),
+        truth=replace(truth, overlay={}, ends={}, widths={}, smooth=None, problem=None),
         status=in_one_status(truth.status, at.status, *contradictions, *warnings),
         at=at,
         deflection=_deflection(truth),

@@ -14,6 +14,7 @@ import numpy as np
 from vision.boards.saddle import Saddles, fit_saddles
 from vision.geometry.board import Board
 from vision.geometry.refusals import Refused
+from vision.geometry.rows import Rows
 
 # [corners] Fewer fix no plane, so that edges at a corner have no direction. Derived.
 MIN_CORNERS = 4
@@ -30,7 +31,7 @@ _BRIGHTEST_PERCENT = 99.9
 
 
 @dataclass(frozen=True, eq=False)
-class Corners:
+class Corners(Rows):
     """Corners of one board in one picture.
 
     ids (n,). px (n, 2). sigma_px (n,): one standard deviation per axis. Raises Refused where these
@@ -55,10 +56,6 @@ class Corners:
 
     def __len__(self) -> int:
         return len(self.ids)
-
-    def chosen(self, which: np.ndarray) -> "Corners":
-        """Return some of the corners, by a mask or by their indices."""
-        return Corners(self.ids[which], self.px[which], self.sigma_px[which])
 
 
 def find_corners(grey: np.ndarray, board: Board) -> Corners:

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.geometry.rows import Rows
+
 # [px] Reach along the edges. A lens bends an edge by k1 x t²/f over the distance t, which moves
 # the corner by a third of that at the arm's end: at 24 px 0.003 px for k1 = −0.1, f = 2000 px, x
 # = 0.3, and 0.03 px in the corners of a webcam with k1 = −0.33. Shorter is noisier: drawn corners
@@ -21,7 +23,7 @@ _BAND_PX = 6.0
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class Windows(Rows):
     """The pixels along each corner's edges, padded to k of them with weight 0.
 
     anchor (n, 2): whole px. offset (n, 2, k): whole px from the anchor, x and y. grey (n, k).
@@ -32,10 +34,6 @@ class Windows:
     offset: np.ndarray
     grey: np.ndarray
     weight: np.ndarray
-
-    def select(self, rows: np.ndarray) -> "Windows":
-        """Return the windows of some corners, by their indices."""
-        return Windows(self.anchor[rows], self.offset[rows], self.grey[rows], self.weight[rows])
 
     def on_grid(self, values: np.ndarray) -> np.ndarray:
         """Return values (n, m, k) of the pixels on square grids (n, m, side, side).
@@ -55,10 +53,7 @@ def cut_windows(
 ) -> Windows:
     """Return the pixels that show the two edges of each corner; arguments as of `fit_saddles`."""
     longest_px = np.linalg.norm(frames, axis=1).max()
-    reach = int(np.ceil(min(REACH_PX, _ARM_SQUARES * longest_px)))
-    span = np.arange(-reach, reach + 1)
-    grid = np.stack(np.meshgrid(span, span)).reshape(2, -1)  # (2, cells) px, x and y
-    grid = grid[:, np.sum(grid**2, axis=0) <= reach**2]
+    grid = _disc(int(np.ceil(min(REACH_PX, _ARM_SQUARES * longest_px))))
     anchor = np.round(px_guess).astype(int)
     place = anchor[:, :, None] + grid  # (n, 2, cells) px
     last = np.array(grey.shape[::-1])[:, None] - 1
@@ -69,6 +64,13 @@ def cut_windows(
     offset = np.swapaxes(grid[:, order], 0, 1)
     column, row = np.clip(anchor[:, :, None] + offset, 0, last).swapaxes(0, 1)
     return Windows(anchor, offset, grey[row, column].astype(float), weight)
+
+
+def _disc(reach: int) -> np.ndarray:
+    """Return the whole pixels (2, cells), x and y, within reach of 0."""
+    span = np.arange(-reach, reach + 1)
+    grid = np.stack(np.meshgrid(span, span)).reshape(2, -1)
+    return grid[:, np.sum(grid**2, axis=0) <= reach**2]
 
 
 def _used_first(is_used: np.ndarray) -> np.ndarray:

@@ -185,21 +185,19 @@ def _levenberg_marquardt(windows: Windows, start: np.ndarray) -> tuple[np.ndarra
     """
     fit = _evaluate(windows, start.copy())
     damping = np.full(len(start), 1e-3)
-    active = np.arange(len(start))
+    converged = np.zeros(len(start), dtype=bool)
     for _ in range(_ITERATIONS):
-        step = _solve(fit.normal[active], fit.gradient[active], damping[active])
+        active = np.flatnonzero(~converged)
+        if not len(active):
+            break
+        step = fit.step(active, damping)
         trial_p = fit.p[active] + step
         trial_p[:, BLUR] = np.clip(trial_p[:, BLUR], *np.log(_BLUR_SEARCH_PX))
         trial = _evaluate(windows.select(active), trial_p)
         is_better = trial.cost <= fit.cost[active]
-        for values, trial_values in zip(fit, trial):
-            values[active[is_better]] = trial_values[is_better]
+        fit.accept(active, trial, is_better)
         damping[active] *= np.where(is_better, 0.2, 10.0)
-        active = active[np.linalg.norm(step[:, PLACE], axis=1) >= _CONVERGED_PX]
-        if not len(active):
-            break
-    converged = np.ones(len(start), dtype=bool)
-    converged[active] = False
+        converged[active] = np.linalg.norm(step[:, PLACE], axis=1) < _CONVERGED_PX
     return fit.p, converged
 
 
@@ -210,6 +208,15 @@ class _Fit(NamedTuple):
     cost: np.ndarray
     normal: np.ndarray
     gradient: np.ndarray
+
+    def step(self, rows: np.ndarray, damping: np.ndarray) -> np.ndarray:
+        """Return Marquardt's step (m, 10) of some corners."""
+        return _solve(self.normal[rows], self.gradient[rows], damping[rows])
+
+    def accept(self, rows: np.ndarray, trial: "_Fit", is_better: np.ndarray) -> None:
+        """Take over the corners that are better in a trial of some corners (m,), in place."""
+        for values, trial_values in zip(self, trial):
+            values[rows[is_better]] = trial_values[is_better]
 
 
 def _evaluate(windows: Windows, p: np.ndarray) -> _Fit:

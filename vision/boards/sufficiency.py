@@ -63,7 +63,7 @@ def without_strays(view: Corners, board: Board) -> Corners:
         return Corners.none()
     limit_px = max(_STRAY_PX, _STRAY_SHARE * float(np.ptp(view.px, axis=0).max()))
     H, is_near = cv2.findHomography(board.corners_mm[view.ids, :2], view.px, cv2.RANSAC, limit_px)
-    return Corners.none() if H is None else view.chosen(is_near.ravel().astype(bool))
+    return Corners.none() if H is None else view.select(is_near.ravel().astype(bool))
 
 
 def fixes_pose(view: Corners, board: Board) -> bool:

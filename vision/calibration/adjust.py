@@ -96,21 +96,25 @@ def _solve_step(
     np.einsum("ii->i", reduced)[...] += damping * np.diag(normal.equations.A)[free]
     step = np.zeros(len(free))
     step[free] = _solve_scaled(reduced, gradient)
-    view_steps = Cc - CB @ step[free]
+    view_steps = (Cc - CB @ step[free]).reshape(-1, N_VIEW)
+    return step, view_steps, _instant_steps(normal, step, view_steps)
 
+
+def _instant_steps(normal: Normal, step: np.ndarray, view_steps: np.ndarray) -> np.ndarray:
+    """Return the steps (V, C) of the pictures' instants that go with those of globals and views."""
     shots = normal.shots
     instants = normal.instants
-    others = np.hstack([step[shots.columns], view_steps[shots.poses]])  # (s, p)
+    others = np.hstack([step[shots.columns], view_steps.ravel()[shots.poses]])  # (s, p)
     gradient = instants.gradient - np.sum(instants.coupling * others, axis=1)
-    instant_steps = np.zeros((len(view_steps) // N_VIEW, len(free) // N_CAMERA))
+    instant_steps = np.zeros((len(view_steps), len(step) // N_CAMERA))
     instant_steps[shots.view, shots.camera] = gradient / instants.precision
-    return step, view_steps.reshape(-1, N_VIEW), instant_steps
+    return instant_steps
 
 
 def _eliminate_views(
     equations: Equations, free: np.ndarray, damping: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Eliminate the views' poses by the Schur complement.
+    """Reduce the equations to the globals: eliminate the views' poses by the Schur complement.
 
     Returns the reduced matrix (F, F) and gradient (F,) of the free globals, C⁻¹Bᵀ (6 V, F) and
     C⁻¹c (6 V,).

@@ -19,6 +19,7 @@ import numpy as np
 from vision.calibration.board_motion import Trajectory
 from vision.geometry import lens as lens_model
 from vision.geometry.rotation import exp_rotation, left_jacobian, skew
+from vision.geometry.rows import Rows
 
 CAMERA_COLUMNS = (
     *lens_model.LENS_TERMS,
@@ -42,7 +43,7 @@ CLOCK = 15
 
 
 @dataclass(frozen=True, eq=False)
-class Sightings:
+class Sightings(Rows):
     """The corners that were seen, a row each, sorted by view and camera.
 
     camera, view, corner (n,): indices. px (n, 2). sigma_px (n,). time_s (n,): of the picture after
@@ -58,17 +59,6 @@ class Sightings:
 
     def __len__(self) -> int:
         return len(self.camera)
-
-    def chosen(self, which: np.ndarray) -> "Sightings":
-        """Return the rows of a mask or an index array, in their order."""
-        return Sightings(
-            self.camera[which],
-            self.view[which],
-            self.corner[which],
-            self.px[which],
-            self.sigma_px[which],
-            self.time_s[which],
-        )
 
     def shot_starts(self) -> np.ndarray:
         """Return the first row of each shot, a shot being one camera's picture of one view."""
@@ -172,13 +162,10 @@ def predict(
 
     by_world = by_x @ R_camera
     by_turn = -by_world @ skew(turned)  # Exp(w) y = y + w × y to first order
-    by_time = by_turn @ motion.turn_rate[:, :, None] + by_world @ motion.shift_rate_mm_s[:, :, None]
+    by_camera = [by_lens, -by_x @ skew(in_camera), by_x, motion.by_time(by_turn, by_world)]
     by_print = by_world @ motion.turn @ R_board @ by_board[seen.corner]
-    columns = [by_lens, -by_x @ skew(in_camera), by_x, by_time, by_print]
-    for pose in range(motion.shift_by_poses.shape[1]):
-        columns.append(by_turn @ motion.turn_by_poses[:, pose])
-        columns.append(by_world * motion.shift_by_poses[:, pose, None, None])
-    return px, np.concatenate(columns, axis=2)
+    by_views = motion.by_poses(by_turn, by_world)
+    return px, np.concatenate([*by_camera, by_print, *by_views], axis=2)
 
 
 def _printed_board(board: np.ndarray, corners_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -236,28 +223,54 @@ class _Motion(NamedTuple):
         eye = np.broadcast_to(np.eye(3), (count, 3, 3))
         return _Motion(eye, still, still, still, eye[:, None], np.ones((count, 1)))
 
+    def by_time(self, by_turn: np.ndarray, by_shift: np.ndarray) -> np.ndarray:
+        """Return the derivative (n, 2, 1) of pixels by the time of their picture, px/s.
+
+        by_turn, by_shift (n, 2, 3): their derivatives by the board's turn and shift.
+        """
+        turning = by_turn @ self.turn_rate[:, :, None]
+        return turning + by_shift @ self.shift_rate_mm_s[:, :, None]
+
+    def by_poses(self, by_turn: np.ndarray, by_shift: np.ndarray) -> list[np.ndarray]:
+        """Return the derivatives (n, 2, 3) of pixels by w and v of each of p poses in turn."""
+        columns = []
+        for pose in range(self.shift_by_poses.shape[1]):
+            columns.append(by_turn @ self.turn_by_poses[:, pose])
+            columns.append(by_shift * self.shift_by_poses[:, pose, None, None])
+        return columns
+
 
 def _board_motion(state: BundleState, seen: Sightings) -> _Motion:
     """Return how the board moved from the time of each sighting's view to that of its picture."""
     if state.trajectory is None:
         return _Motion.none(len(seen))
     view = seen.view
-    paths = state.trajectory.paths(state.T_world_board)  # (V, 2, 6)
-    inverse = np.linalg.inv(left_jacobian(paths[:, :, :3]))  # (V, 2, 3, 3)
     elapsed_s = seen.time_s + state.instants[view, seen.camera] + state.clock[seen.camera]
     shares, rates = state.trajectory.shares(view, elapsed_s)  # (n, 2)
+    paths = state.trajectory.paths(state.T_world_board)  # (V, 2, 6)
     path = np.einsum("nk,nki->ni", shares, paths[view])
     rate = np.einsum("nk,nki->ni", rates, paths[view])
     turn = exp_rotation(path[:, :3])
     J = left_jacobian(path[:, :3])
-    # log(Exp(w) X) grows by J⁻¹ w, log(X Exp(-w)) by -J⁻ᵀ w, J being that of log X.
+    inverse = np.linalg.inv(left_jacobian(paths[:, :, :3]))  # (V, 2, 3, 3)
     by_path = inverse[view] * shares[:, :, None, None]
-    by_own = turn - J @ by_path.sum(axis=1).swapaxes(1, 2)
     return _Motion(
         turn=turn,
         shift_mm=path[:, 3:],
         turn_rate=np.einsum("nij,nj->ni", J, rate[:, :3]),
         shift_rate_mm_s=rate[:, 3:],
-        turn_by_poses=np.concatenate([by_own[:, None], J[:, None] @ by_path], axis=1),
+        turn_by_poses=_turn_by_poses(turn, J, by_path),
         shift_by_poses=np.column_stack([1.0 - shares.sum(axis=1), shares]),
     )
+
+
+def _turn_by_poses(turn: np.ndarray, J: np.ndarray, by_path: np.ndarray) -> np.ndarray:
+    """Return the derivatives (n, 3, 3, 3) of turns by w of the view's own pose, and of its
+    neighbours.
+
+    log(Exp(w) X) grows by J⁻¹ w, log(X Exp(-w)) by -J⁻ᵀ w, J being that of log X.
+    turn (n, 3, 3). J (n, 3, 3): of its logarithm. by_path (n, 2, 3, 3): the share of the path to
+    each neighbour, times J⁻¹ of that path.
+    """
+    by_own = turn - J @ by_path.sum(axis=1).swapaxes(1, 2)
+    return np.concatenate([by_own[:, None], J[:, None] @ by_path], axis=1)

@@ -30,7 +30,7 @@ from vision.boards.sufficiency import (
 )
 from vision.calibration.adjust import adjust_bundle
 from vision.calibration.bundle import N_CAMERA, POSE, BundleState, Priors
-from vision.calibration.corner_noise import Adjustment, adjust_with_noise
+from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
 from vision.calibration.layout import Alone, Layout, gather
 from vision.calibration.place import by_board
@@ -54,7 +54,7 @@ class CameraReport:
     """The data of one camera's calibration, and its residuals.
 
     views, corners: used; left_out: corners beyond the rejection limit. rms_px: of the kept
-    residuals. error_px: model error per axis beside the corners' own sigma. coverage: share of the
+    residuals. error_px: model error per axis in addition to the corners' own sigma. coverage: share of the
     picture within the hull of all corners. depth_ratio: farthest to nearest corner. tilt_deg:
     largest tilt of the board. intrinsics_sigma: (9,), of fx fy cx cy k1 k2 p1 p2 k3.
     """
@@ -109,34 +109,49 @@ def calibrate_cameras(
     alone = {name: _alone(name, views, board, on_rig is not None) for name in views.boards}
     standing = _standing(views, board) if on_rig else None
     joint = JointInput(alone, standing, board, on_rig, views.times_s, triggered).adjust()
-    adjustment, warp_notes = _with_warp(joint.layout, joint.adjustment, board)
-    notes = [*joint.notes, *warp_notes]
+    adjustment, notes = _with_warp(joint.layout, joint.adjustment, board)
     if not triggered:
         check_errors(alone, adjustment.error_px)
     if joint.timing is not None:
         notes.append(timing_note(alone, joint.timing))
-    cameras = as_cameras(alone, views.sizes_px, adjustment)
     if not adjustment.solution.converged:
         raise Refused(
             "the adjustment of the cameras did not come to rest: record more views, well spread and tilted"
         )
-    if on_rig is not None:
-        placement = by_board(on_rig.T_rig_board, on_rig.sigma_mm, on_rig.sigma_rad).covariance
-        cameras = replace(cameras, placement=placement)
-    reports = []
-    for c, camera in enumerate(alone.values()):
-        reports.append(_report(c, cameras, camera, adjustment, board))
-    used = {name: camera.views.values() for name, camera in alone.items()}
-    check_lenses(cameras, reports, used)
+    cameras = _place(as_cameras(alone, views.sizes_px, adjustment), on_rig)
+    reports = _checked_reports(cameras, alone, adjustment, board)
     check_work(cameras, alone, standing, work_points_mm)
     return Calibration(
         cameras=cameras,
-        report=tuple(reports),
-        notes=tuple(notes),
+        report=reports,
+        notes=(*joint.notes, *notes),
         timing=joint.timing,
         board=adjustment.solution.state.board,
         together=joint.layout.trajectory is not None,
     )
+
+
+def _checked_reports(
+    cameras: Cameras, alone: Mapping[str, Alone], adjustment: Adjustment, board: Board
+) -> tuple[CameraReport, ...]:
+    """Return a report of each camera; raise Refused where its views do not determine its lens."""
+    reports = []
+    used = {}
+    for c, (name, camera) in enumerate(alone.items()):
+        reports.append(_report(c, cameras, camera, adjustment, board))
+        used[name] = camera.views.values()
+    check_lenses(cameras, reports, used)
+    return tuple(reports)
+
+
+def _place(cameras: Cameras, on_rig: MeasuredPose | None) -> Cameras:
+    """Return the cameras with the covariance of their place in the rig frame, where that was
+    measured.
+    """
+    if on_rig is None:
+        return cameras
+    placement = by_board(on_rig.T_rig_board, on_rig.sigma_mm, on_rig.sigma_rad)
+    return replace(cameras, placement=placement.covariance)
 
 
 def _standing(views: BoardViews, board: Board) -> dict[str, Corners]:
@@ -164,17 +179,16 @@ def _alone(name: str, views: BoardViews, board: Board, with_rig: bool) -> Alone:
     check_views(name, usable.values(), board)
     if with_rig:
         check_rig_view(name, None if rig_view is None else without_strays(rig_view, board), board)
-    adjustment = calibrate_alone(list(usable.values()), board, size_px, coarse=True)
+    adjustment = calibrate_alone(list(usable.values()), board, size_px)
     state = adjustment.solution.state
     poses = dict(zip(usable, state.T_world_board))
     return Alone(state.lens[0], float(adjustment.error_px[0]), usable, poses)
 
 
-def calibrate_alone(
-    views: Sequence[Corners], board: Board, size_px: tuple[int, int], *, coarse: bool = False
-) -> Adjustment:
-    """Calibrate one camera by itself, the world being the camera's frame. coarse: robustly, as a
-    start for more.
+def calibrate_alone(views: Sequence[Corners], board: Board, size_px: tuple[int, int]) -> Adjustment:
+    """Calibrate one camera by itself, robustly, as a start for more.
+
+    The world is the camera's frame.
     """
     lens = first_lens(views, board.corners_mm, size_px)
     poses = np.array([board_pose(view, board.corners_mm, lens) for view in views])
@@ -182,7 +196,7 @@ def calibrate_alone(
     priors = lens_priors(1, len(views))
     priors.free[POSE] = False
     seen = gather([(0, k, view) for k, view in enumerate(views)])
-    return adjust_with_noise(state, seen, board.corners_mm, priors, coarse=coarse)
+    return adjust_coarse(state, seen, board.corners_mm, priors)
 
 
 def _with_warp(layout: Layout, flat: Adjustment, board: Board) -> tuple[Adjustment, list[str]]:
@@ -192,7 +206,7 @@ def _with_warp(layout: Layout, flat: Adjustment, board: Board) -> tuple[Adjustme
     Returns the adjustment and notes.
     """
     priors = allow_warp(flat.priors)
-    kept = flat.seen.chosen(flat.kept)
+    kept = flat.seen.select(flat.kept)
     warped = adjust_bundle(flat.solution.state, kept, board.corners_mm, priors, tolerance=1e-6)
     if flat.solution.cost - warped.cost < _WARP_GAIN:
         return flat, []

@@ -6,7 +6,7 @@ uncertainties, so the lenses are taken as exact; their world is not the rig, whe
 board on the rig places them (`place_on_rig`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -80,11 +80,6 @@ def _camera(name: str, table: dict, unit_mm: float) -> Camera:
         raise Refused(
             f"camera {name} has a fisheye lens, which the five-term lens here does not describe"
         )
-    distortion = np.array(table["distortions"], dtype=float).ravel()
-    if len(distortion) > 5 and np.any(distortion[5:]):
-        raise Refused(
-            f"camera {name} has {len(distortion)} distortion terms; up to five (k1 k2 p1 p2 k3) are read"
-        )
     rotation = np.array(table["rotation"], dtype=float)
     R = rotation if rotation.shape == (3, 3) else exp_rotation(rotation.ravel())
     shift_mm = unit_mm * np.array(table["translation"], dtype=float).ravel()
@@ -92,10 +87,20 @@ def _camera(name: str, table: dict, unit_mm: float) -> Camera:
         name=name,
         size_px=tuple(table["size"]),
         matrix=table["matrix"],
-        distortion=np.append(distortion, np.zeros(5))[:5],
+        distortion=_distortion(name, table["distortions"]),
         T_camera_rig=np.column_stack([R, shift_mm]),
         rms_px=float(table.get("error", np.nan)),
     )
+
+
+def _distortion(name: str, terms: Sequence[float]) -> np.ndarray:
+    """Return k1, k2, p1, p2 and k3 of a camera's distortion; raise Refused where it has more terms."""
+    distortion = np.array(terms, dtype=float).ravel()
+    if np.any(distortion[5:]):
+        raise Refused(
+            f"camera {name} has {len(distortion)} distortion terms; up to five (k1 k2 p1 p2 k3) are read"
+        )
+    return np.append(distortion, np.zeros(5))[:5]
 
 
 def place_on_rig(

@@ -74,6 +74,20 @@ class Adjustment:
         return float(np.sqrt(np.mean(np.sum(residual_px**2, axis=1))))
 
 
+def adjust_coarse(
+    state: BundleState, seen: Sightings, corners_mm: np.ndarray, priors: Priors
+) -> Adjustment:
+    """Adjust robustly and once, to see how large each camera's model error is.
+
+    Raises Refused where the views contradict each other from the start.
+    """
+    error = np.full(len(state.lens), _FIRST_ERROR_PX)
+    solution, error, priors = _adjust_robustly(state, seen, corners_mm, priors, error)
+    kept = np.ones(len(seen), dtype=bool)
+    weighted = _with_error(seen, np.full(len(state.lens), _FIRST_ERROR_PX))
+    return Adjustment(solution, weighted, kept, solution.residual_px, error, priors)
+
+
 def adjust_with_noise(
     state: BundleState,
     seen: Sightings,
@@ -82,36 +96,37 @@ def adjust_with_noise(
     *,
     error_px: np.ndarray | None = None,
     rounds: int | None = None,
-    coarse: bool = False,
 ) -> Adjustment:
     """Adjust robustly, learn each camera's model error, drop outliers once, and adjust by least
     squares.
 
     Where the state has a trajectory, priors.late_sigma_s is where the search for each camera's
     scatter of instants begins. error_px (C,): model errors to begin with. rounds: of learning the
-    noise anew, where it is nearly known. coarse: adjust robustly and once only, to see how large
-    the errors are. Raises Refused where no corner agrees with the others.
+    noise anew, where it is nearly known. Raises Refused where no corner agrees with the others.
     """
-    moving = state.trajectory is not None
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
-    for _ in range(rounds or (_ROUNDS_MOVING if moving else _ROUNDS)):
-        weighted = _with_error(seen, error)
-        solution = adjust_bundle(
-            state, weighted, corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4
-        )
-        if not np.isfinite(solution.cost):
-            raise Refused(
-                "the views contradict each other from the start: is this the board as described?"
-            )
+    for _ in range(rounds or (_ROUNDS if state.trajectory is None else _ROUNDS_MOVING)):
+        solution, error, priors = _adjust_robustly(state, seen, corners_mm, priors, error)
         state = solution.state
-        error = _error_by_median(solution.residual_px, seen, len(error))
-        if moving:
-            priors = _with_lateness(priors, state, seen)
-        if coarse:
-            kept = np.ones(len(seen), dtype=bool)
-            return Adjustment(solution, weighted, kept, solution.residual_px, error, priors)
-
     return _without_outliers(solution, seen, corners_mm, priors, error)
+
+
+def _adjust_robustly(
+    state: BundleState, seen: Sightings, corners_mm: np.ndarray, priors: Priors, error: np.ndarray
+) -> tuple[Solution, np.ndarray, Priors]:
+    """Adjust robustly with model errors (C,) px; also return the errors and the priors learnt by
+    it.
+    """
+    solution = adjust_bundle(
+        state, _with_error(seen, error), corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4
+    )
+    if not np.isfinite(solution.cost):
+        raise Refused(
+            "the views contradict each other from the start: is this the board as described?"
+        )
+    if state.trajectory is not None:
+        priors = _with_lateness(priors, solution.state, seen)
+    return solution, _error_by_median(solution.residual_px, seen, len(error)), priors
 
 
 def _without_outliers(
@@ -128,7 +143,7 @@ def _without_outliers(
     for _ in range(2):
         error = _error_by_mean(residual_px, seen, kept, error, priors)
         weighted = _with_error(seen, error)
-        solution = adjust_bundle(solution.state, weighted.chosen(kept), corners_mm, priors)
+        solution = adjust_bundle(solution.state, weighted.select(kept), corners_mm, priors)
         residual_px = seen.px - predict(solution.state, seen, corners_mm)[0]
     solution = replace(solution, residual_px=residual_px)
     return Adjustment(solution, weighted, kept, residual_px, error, priors)

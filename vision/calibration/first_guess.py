@@ -51,7 +51,9 @@ def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
 
 
 def _focal_equations(view: Corners, corners_mm: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
-    """Return rows (2, 2): coefficient · (width/f)² = constant, of one view; none without homography."""
+    """Return rows (2, 2): coefficient · (width/f)² = constant, of one view; none without
+    homography.
+    """
     width = size_px[0]
     picture = (view.px - 0.5 * (np.array(size_px) - 1)) / width  # in widths, from the middle
     H, _ = cv2.findHomography(corners_mm[view.ids, :2], picture, 0)

@@ -83,29 +83,21 @@ def held_out(
     together: the views of one index are of one board; by default as the calibration found it.
     """
     cameras = calibration.cameras
-    together = calibration.together if together is None else together
-    usable = {camera.name: _alone(camera, views[camera.name], board) for camera in cameras}
+    usable = {}
     alone_px = {}
     for camera in cameras:
-        alone_px[camera.name] = _alone_px(camera, usable[camera.name], is_held, board)
+        alone = _alone(camera, views[camera.name], board)
+        usable[camera.name] = alone
+        alone_px[camera.name] = _alone_px(camera, alone, is_held, board)
+    together = calibration.together if together is None else together
     if not together or len(cameras) < 2:
         return HeldOut(alone_px)
     poses = np.array([camera.T_camera_rig for camera in cameras])
     layout = lay_out(usable, poses, together=True, times_s=times_s)
-    held_views = np.array([is_held[k] for k in layout.index])
-    rows = held_views[layout.seen.view] & _is_shared(layout)  # (n,) corners
+    rows = _held_rows(layout, is_held)
     if not rows.any():
         return HeldOut(alone_px)
-    fits = _JointFits(calibration, layout, board, rows)
-    timed = calibration.timing is not None
-    return HeldOut(
-        alone_px,
-        at_once=fits.at_once(),
-        offsets=fits.offsets() if timed else None,
-        instants=fits.instants() if timed else None,
-        views=len(np.unique(layout.seen.view[rows])),
-        corners=int(rows.sum()),
-    )
+    return _JointFits(calibration, layout, board, rows).errors(alone_px)
 
 
 def _alone(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
@@ -133,11 +125,12 @@ def _alone_px(camera: Camera, alone: Alone, is_held: Sequence[bool], board: Boar
     return _rms(solution.residual_px)
 
 
-def _is_shared(layout: Layout) -> np.ndarray:
-    """Return the mask (n,) of corners in views that more than one camera has."""
+def _held_rows(layout: Layout, is_held: Sequence[bool]) -> np.ndarray:
+    """Return the mask (n,) of corners in held views that more than one camera has."""
     starts = layout.seen.shot_starts()
     pictures = np.bincount(layout.seen.view[starts], minlength=len(layout.index))
-    return pictures[layout.seen.view] > 1
+    held_views = np.asarray(is_held)[layout.index] & (pictures > 1)
+    return held_views[layout.seen.view]
 
 
 def _pose_priors(n_cameras: int, n_views: int) -> Priors:
@@ -163,6 +156,18 @@ class _JointFits:
     layout: Layout
     board: Board
     rows: np.ndarray
+
+    def errors(self, alone_px: Mapping[str, float]) -> HeldOut:
+        """Return the errors of each camera alone with those by every account."""
+        is_timed = self.calibration.timing is not None
+        return HeldOut(
+            alone_px,
+            at_once=self.at_once(),
+            offsets=self.offsets() if is_timed else None,
+            instants=self.instants() if is_timed else None,
+            views=len(np.unique(self.layout.seen.view[self.rows])),
+            corners=int(self.rows.sum()),
+        )
 
     def at_once(self) -> Agreement:
         """Return the agreement with all pictures of a view as of one instant."""
@@ -225,22 +230,26 @@ def _pitch_errors_mm(
     """Return the distances of neighbouring corners, triangulated by all cameras that see them, less
     the pitch.
     """
-    seen = layout.seen
-    columns = board.squares[0] - 1
-    shape = (len(layout.index), board.squares[1] - 1, columns)
+    columns, lines = (squares - 1 for squares in board.squares)
+    count = len(layout.index) * lines * columns
+    place = layout.seen.view * lines * columns + layout.seen.corner  # (n,) among all corners
     by_camera = {}
+    sigma = {}
     for c, name in enumerate(cameras.names):
-        own = rows & (seen.camera == c)
-        grid = np.full((*shape, 2), np.nan)
-        grid[seen.view[own], seen.corner[own] // columns, seen.corner[own] % columns] = px[own]
-        by_camera[name] = grid.reshape(-1, 2)
-    sigma = {name: np.ones(len(points)) for name, points in by_camera.items()}
-    points_mm = triangulate(cameras, by_camera, sigma).mm.reshape(*shape, 3)
-    pitches = []
-    for axis in (2, 1):
-        pitches.append(np.linalg.norm(np.diff(points_mm, axis=axis), axis=-1).ravel())
-    errors_mm = np.concatenate(pitches) - board.square_mm
+        own = rows & (layout.seen.camera == c)
+        by_camera[name] = np.full((count, 2), np.nan)
+        by_camera[name][place[own]] = px[own]
+        sigma[name] = np.ones(count)
+    points_mm = triangulate(cameras, by_camera, sigma).mm.reshape(-1, lines, columns, 3)
+    errors_mm = np.append(_pitches(points_mm, 2), _pitches(points_mm, 1)) - board.square_mm
     return errors_mm[np.isfinite(errors_mm)]
+
+
+def _pitches(points_mm: np.ndarray, axis: int) -> np.ndarray:
+    """Return the distances (n,) between neighbours of a grid of points (…, 3) along one of its
+    axes.
+    """
+    return np.linalg.norm(np.diff(points_mm, axis=axis), axis=-1).ravel()
 
 
 def _rms(vectors: np.ndarray) -> float:

@@ -77,7 +77,7 @@ class _Shot(NamedTuple):
     time_s: float = np.nan
 
 
-def looked_at_once(cameras: Mapping[str, Alone]) -> bool:
+def saw_board_at_once(cameras: Mapping[str, Alone]) -> bool:
     """Return whether views of one index are of one instant, to within a hand's motion.
 
     Else they are each camera's own series.
@@ -118,24 +118,31 @@ def lay_out(
     instant, or of times_s[camera][index] where given.
     """
     views = _group_shots(cameras, together, times_s if together else None)
+    T_world_board = [_world_pose(group, T_camera_world) for group in views]
     if standing is not None:
-        on_rig = [_Shot(c, -1, standing[name]) for c, name in enumerate(cameras)]
-        views = [on_rig, *views]
-    shots = []
-    T_world_board = []
-    for view, group in enumerate(views):
-        shots += [(shot.camera, view, shot.corners) for shot in group]
-        is_on_rig = group[0].index < 0
-        T_world_board.append(T_rig_board if is_on_rig else _world_pose(group, T_camera_world))
+        views.insert(0, [_Shot(c, -1, standing[name]) for c, name in enumerate(cameras)])
+        T_world_board.insert(0, T_rig_board)
     lenses = np.array([alone.lens for alone in cameras.values()])
     state = BundleState(lenses, np.asarray(T_camera_world), np.array(T_world_board))
     index = np.array([group[0].index for group in views])
-    if not together:
-        return Layout(gather(shots), state, None, index)
+    trajectory = elapsed_s = None
+    if together:
+        trajectory, elapsed_s = _in_time(views, _rank_by_views(cameras))
+    return Layout(gather(_numbered(views), elapsed_s), state, trajectory, index)
+
+
+def _numbered(views: Sequence[Sequence[_Shot]]) -> list[tuple[int, int, Corners]]:
+    """Return camera, view and corners of all shots."""
+    shots = []
+    for view, group in enumerate(views):
+        shots += [(shot.camera, view, shot.corners) for shot in group]
+    return shots
+
+
+def _rank_by_views(cameras: Mapping[str, Alone]) -> np.ndarray:
+    """Return the rank (C,) of each camera, 0 for the one with most views."""
     counts = [-len(alone.views) for alone in cameras.values()]
-    rank = np.argsort(np.argsort(counts, kind="stable"))
-    trajectory, elapsed_s = _in_time(views, rank)
-    return Layout(gather(shots, elapsed_s), state, trajectory, index)
+    return np.argsort(np.argsort(counts, kind="stable"))
 
 
 def _group_shots(

@@ -14,7 +14,7 @@ import numpy as np
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.newton import cauchy_weights
 from vision.pictures.change import HALF, change_confidence
-from vision.pictures.pixel_noise import measure_noise
+from vision.pictures.pixel_noise import Noise, measure_noise
 
 # [share of the stroke] A frame is compared with such as are farther away: there the whisker stands
 # elsewhere. Set by eye. Study: tests/bench/trials/test_placing_pictures.py.
@@ -78,6 +78,12 @@ class _Plane:
     normal: np.ndarray
     ray: np.ndarray
 
+    def middle_along(self, point_mm: np.ndarray, direction: np.ndarray) -> float:
+        """Return how far along a line through a point (3,) its visible middle lies, mm."""
+        across = self.ray - (self.ray @ direction) * direction
+        depth_mm = (point_mm - self.centre_mm) @ across / (across @ across)
+        return (self.centre_mm + depth_mm * self.ray - point_mm) @ direction
+
 
 def moving_lines(
     frames: Mapping[str, Mapping[int, np.ndarray]], motor_rad: Mapping[int, float], cameras: Cameras
@@ -116,15 +122,20 @@ def _planes(
     far_rad = _ELSEWHERE * np.ptp([motor_rad[frame] for frame in small])
     planes = {}
     for frame, grey in small.items():
-        others = [g for g in small if abs(motor_rad[g] - motor_rad[frame]) >= far_rad]
-        if not others:
-            continue
-        chosen = np.unique(np.linspace(0, len(others) - 1, _MOST_OTHERS).astype(int))
-        changes = [change_confidence(grey, small[others[k]], noise) for k in chosen]
-        plane = _strongest_plane(camera, np.min(changes, axis=0))
+        elsewhere = []
+        for other in small:
+            if abs(motor_rad[other] - motor_rad[frame]) >= far_rad:
+                elsewhere.append(small[other])
+        plane = _strongest_plane(camera, _change(grey, elsewhere, noise)) if elsewhere else None
         if plane is not None:
             planes[frame] = plane
     return planes
+
+
+def _change(grey: np.ndarray, others: Sequence[np.ndarray], noise: Noise) -> np.ndarray:
+    """Return by how much a picture (h, w) surely differs from a choice of others, the least of all."""
+    chosen = np.unique(np.linspace(0, len(others) - 1, _MOST_OTHERS).astype(int))
+    return np.min([change_confidence(grey, others[k], noise) for k in chosen], axis=0)
 
 
 def _strongest_plane(camera: Camera, change: np.ndarray) -> _Plane | None:
@@ -184,16 +195,12 @@ def _intersection(planes: Sequence[_Plane]) -> tuple[np.ndarray, np.ndarray] | N
     """
     if len(planes) < 2:
         return None
-    centres = np.array([plane.centre_mm for plane in planes])
     normals = np.array([plane.normal for plane in planes])
-    rays = np.array([plane.ray for plane in planes])
+    offsets_mm = [plane.normal @ plane.centre_mm for plane in planes]
     _, strength, axes = np.linalg.svd(normals)
     if strength[1] < np.sqrt(2) * np.sin(0.5 * _LEAST_ANGLE_RAD):
         return None
     direction = axes[2]
-    point = np.linalg.lstsq(normals, np.sum(normals * centres, axis=1), rcond=None)[0]
-    # Along the line, to where the cameras have the middle of it.
-    across = rays - (rays @ direction)[:, None] * direction
-    depth_mm = np.sum((point - centres) * across, axis=1) / np.sum(across**2, axis=1)
-    middles = centres + depth_mm[:, None] * rays
-    return point + np.median((middles - point) @ direction) * direction, direction
+    point = np.linalg.lstsq(normals, offsets_mm, rcond=None)[0]
+    along_mm = [plane.middle_along(point, direction) for plane in planes]
+    return point + np.median(along_mm) * direction, direction

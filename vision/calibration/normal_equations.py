@@ -47,6 +47,12 @@ class Instants(NamedTuple):
     gradient: np.ndarray
     coupling: np.ndarray
 
+    @staticmethod
+    def none(pictures: int, parameters: int) -> "Instants":
+        """Return the equations of pictures that have no instants of their own."""
+        coupling = np.zeros((pictures, parameters))
+        return Instants(np.ones(pictures), np.zeros(pictures), coupling)
+
 
 class Equations(NamedTuple):
     """The normal equations: A (G, G), a (G,) of the globals; B (G, 6 V); C, c (6 V,) of the views.
@@ -84,15 +90,14 @@ def normal_equations(
         return Normal(np.inf, residual_px)
     loss, weight = _cauchy(squared, width)
     root = np.sqrt(weight) / seen.sigma_px
-    rows = np.concatenate([J, residual_px[:, :, None]], axis=2) * root[:, None, None]
+    rows = np.dstack([J, residual_px]) * root[:, None, None]
     shots = _shots(state, seen)
     blocks = _shot_blocks(rows, seen.shot_starts())
-    instants, instants_cost = _eliminate_instants(blocks, shots, state, priors)
+    instants, cost = _eliminate_instants(blocks, shots, state, priors)
     equations = _assemble(blocks, shots, state)
-    priors_cost = _add_priors(equations, state, priors)
+    cost += np.sum(loss) + _add_priors(equations, state, priors)
     _hold(equations, np.repeat(~priors.view_free, N_VIEW))
-    cost = float(np.sum(loss) + instants_cost + priors_cost)
-    return Normal(cost, residual_px, shots, instants, equations)
+    return Normal(float(cost), residual_px, shots, instants, equations)
 
 
 def _cauchy(squared: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
@@ -143,13 +148,11 @@ def _eliminate_instants(
     Returns the eliminated equations, and the cost of the instants' priors. A picture that gives its
     view its time has no instant of its own.
     """
-    is_free = np.zeros(len(blocks), dtype=bool)
-    late_s = np.zeros(len(blocks))
-    prior = np.ones(len(blocks))  # precision, 1/s²
-    if state.trajectory is not None and priors.late_sigma_s is not None:
-        is_free = ~state.trajectory.is_reference(shots.view, shots.camera)
-        late_s = state.instants[shots.view, shots.camera]
-        prior = priors.late_sigma_s[shots.camera] ** -2.0
+    if state.trajectory is None or priors.late_sigma_s is None:
+        return Instants.none(*blocks.shape[:2]), 0.0
+    is_free = ~state.trajectory.is_reference(shots.view, shots.camera)
+    late_s = state.instants[shots.view, shots.camera]
+    prior = priors.late_sigma_s[shots.camera] ** -2.0  # precision, 1/s²
     precision = blocks[:, CLOCK, CLOCK] + prior
     gradient = is_free * (blocks[:, CLOCK, -1] - prior * late_s)
     coupling = is_free[:, None] * blocks[:, :, CLOCK]
@@ -160,20 +163,27 @@ def _eliminate_instants(
 
 def _assemble(blocks: np.ndarray, shots: Shots, state: BundleState) -> Equations:
     """Add up the blocks (s, p, p + 1) of all pictures where their parameters stand."""
-    columns = shots.columns
-    poses = shots.poses
     size = N_CAMERA * len(state.lens) + N_BOARD
     size_views = N_VIEW * len(state.T_world_board)
-    A = np.zeros((size, size))
-    a = np.zeros(size)
-    B = np.zeros((size, size_views))
-    c = np.zeros(size_views)
-    np.add.at(A, (columns[:, :, None], columns[:, None]), blocks[:, :_GLOBAL, :_GLOBAL])
-    np.add.at(a, columns, blocks[:, :_GLOBAL, -1])
-    np.add.at(B, (columns[:, :, None], poses[:, None]), blocks[:, :_GLOBAL, _GLOBAL:-1])
-    np.add.at(c, poses, blocks[:, _GLOBAL:, -1])
-    C = _lower_band(blocks[:, _GLOBAL:, _GLOBAL:-1], poses, size_views)
-    return Equations(A, a, B, C, c)
+    columns = shots.columns
+    poses = shots.poses
+    rows = blocks[:, :_GLOBAL]
+    by_globals = (columns[:, :, None], columns[:, None])
+    by_views = (columns[:, :, None], poses[:, None])
+    return Equations(
+        A=_sum_at((size, size), by_globals, rows[:, :, :_GLOBAL]),
+        a=_sum_at(size, columns, rows[:, :, -1]),
+        B=_sum_at((size, size_views), by_views, rows[:, :, _GLOBAL:-1]),
+        C=_lower_band(blocks[:, _GLOBAL:, _GLOBAL:-1], poses, size_views),
+        c=_sum_at(size_views, poses, blocks[:, _GLOBAL:, -1]),
+    )
+
+
+def _sum_at(shape, index, values: np.ndarray) -> np.ndarray:
+    """Return an array of this shape with the values added up at their indices, 0 elsewhere."""
+    total = np.zeros(shape)
+    np.add.at(total, index, values)
+    return total
 
 
 def _lower_band(blocks: np.ndarray, poses: np.ndarray, size: int) -> np.ndarray:
@@ -181,9 +191,8 @@ def _lower_band(blocks: np.ndarray, poses: np.ndarray, size: int) -> np.ndarray:
     below = poses[:, :, None] - poses[:, None]  # rows below the diagonal
     column = np.broadcast_to(poses[:, None], below.shape)
     is_lower = below >= 0
-    band = np.zeros((below.max() + 1, size))
-    np.add.at(band, (below[is_lower], column[is_lower]), blocks[is_lower])
-    return band
+    index = (below[is_lower], column[is_lower])
+    return _sum_at((below.max() + 1, size), index, blocks[is_lower])
 
 
 def _add_priors(equations: Equations, state: BundleState, priors: Priors) -> float:

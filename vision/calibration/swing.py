@@ -24,9 +24,6 @@ _MIN_FRAMES = 4
 def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
     """Return the placement by several free strokes. Raises Refused where none of them is wide
     enough.
-
-    What the lines of a stroke share (light, lenses) all strokes share: their mean has as much of it
-    as one.
     """
     usable = []
     for lines in strokes:
@@ -36,19 +33,32 @@ def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
         widest = max(strokes, key=lambda lines: len(lines.motor_rad), default=None)
         raise _too_few(widest)
     placements = [by_swing(lines) for lines in usable]
-    information = [np.linalg.inv(placement.covariance) for placement in placements]
-    total = np.linalg.inv(sum(information))
+    step, covariance = _combine(usable, placements)
+    widths = [lines.width_rad for lines in usable]
+    rise_rad = float(np.mean([placement.rise_rad for placement in placements]))
+    combined = Placement(step, covariance, rise_rad, max(widths))
+    return replace(combined, notes=(_note(widths, combined),))
+
+
+def _combine(
+    strokes: Sequence[BaseLines], placements: Sequence[Placement]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean step (6,) of placements by a stroke each, weighted by precision, and its
+    covariance.
+
+    What the lines of a stroke share (light, lenses) all strokes share: their mean has as much of it
+    as one.
+    """
+    precisions = [np.linalg.inv(placement.covariance) for placement in placements]
+    total = np.linalg.inv(sum(precisions))
     step = np.zeros(6)
-    covariance = np.mean([lines.shared_covariance for lines in usable], axis=0)
-    for lines, placement, precision in zip(usable, placements, information):
+    covariance = np.mean([lines.shared_covariance for lines in strokes], axis=0)
+    for lines, placement, precision in zip(strokes, placements, precisions):
         gain = total @ precision
         step += gain @ placement.step
         own = placement.covariance - lines.shared_covariance
         covariance += gain @ own @ gain.T
-    widths = [lines.width_rad for lines in usable]
-    rise_rad = float(np.mean([placement.rise_rad for placement in placements]))
-    combined = Placement(step, 0.5 * (covariance + covariance.T), rise_rad, max(widths))
-    return replace(combined, notes=(_note(widths, combined),))
+    return step, 0.5 * (covariance + covariance.T)
 
 
 def by_swing(lines: BaseLines) -> Placement:

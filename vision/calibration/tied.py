@@ -23,8 +23,8 @@ from vision.calibration.bundle import (
     BundleState,
     Priors,
 )
-from vision.calibration.corner_noise import Adjustment, adjust_with_noise
-from vision.calibration.layout import Alone, Layout, lay_out, looked_at_once, place_cameras
+from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
+from vision.calibration.layout import Alone, Layout, lay_out, place_cameras, saw_board_at_once
 from vision.calibration.views import MeasuredPose
 from vision.geometry.board import Board
 from vision.geometry.refusals import Refused
@@ -96,7 +96,7 @@ class JointInput:
         where each camera by itself explains its views far better, they are its own. Raises Refused
         where nothing else determines how the cameras stand to each other.
         """
-        if not looked_at_once(self.alone):
+        if not saw_board_at_once(self.alone):
             return self._adjust(self._layout(together=False))
         try:
             joint = self._adjust(self._layout(together=True))
@@ -154,7 +154,7 @@ class JointInput:
         first = layout.first
         priors = _priors(first, self.board, self.on_rig)
         if layout.trajectory is not None and not self.triggered and len(self.alone) > 1:
-            coarse = adjust_with_noise(first, layout.seen, corners_mm, priors, coarse=True)
+            coarse = adjust_coarse(first, layout.seen, corners_mm, priors)
             own_px = self._own_errors_px()
             first = coarse.solution.state
             if np.median(coarse.error_px / np.maximum(own_px, _LEAST_ERROR_PX)) >= _DISAGREE:

@@ -19,7 +19,7 @@ from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
 from vision.wire.bands import Band, Pieces, cut_pieces, read_band
 from vision.wire.cylinder import WAVES
-from vision.wire.shading import Knots, fit_shading, locate
+from vision.wire.shading import Knots, fit_shading
 
 # [mm] The line is handed on as two points, this far to either side: a layout.
 ARM_MM = 20.0
@@ -136,7 +136,7 @@ def of_bar_alone(pieces: Pieces, align: Callable[[Pieces], Pieces], knots: Knots
     for _ in range(_PASSES):
         aligned = align(pieces)
         shading = fit_shading(aligned, 1.0, WAVES, knots)[0]
-        misfit = locate(aligned, shading, rounds=1).chi2
+        misfit = shading.misfit(aligned)
         is_bar = misfit < _WORST_MISFIT * max(float(np.median(misfit)), 1.0)
         if np.all(is_bar) or np.sum(is_bar) < FEWEST_PIECES:
             break

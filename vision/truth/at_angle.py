@@ -75,13 +75,20 @@ def at_angle(smooth: Smooth | None, theta_rad: float, without: Reason) -> TruthA
     if theta_rad > largest_rad + _BEYOND_RAD or theta_rad <= 0:
         sentence = f"pushed to {np.degrees(largest_rad):.2f} deg only"
         return TruthAtAngle(theta_rad=theta_rad, status=Reason("pushed_short", sentence))
-    if not _slip_jumps(smooth, theta_rad):
-        values = {field: _smooth_value(smooth, name, theta_rad) for name, field in FIELDS.items()}
-        return TruthAtAngle(theta_rad=theta_rad, **values)
+    if _slip_jumps(smooth, theta_rad):
+        return _in_jump(smooth, theta_rad)
+    values = {}
+    for name, field in FIELDS.items():
+        values[field] = _smooth_value(smooth, name, theta_rad)
+    return TruthAtAngle(theta_rad=theta_rad, **values)
+
+
+def _in_jump(smooth: Smooth, theta_rad: float) -> TruthAtAngle:
+    """Return the quantities at a pushing angle near which slip jumps, with the status that says so."""
     frames = _frames_around(smooth, theta_rad)
-    values = {
-        field: _value_in_jump(smooth, name, theta_rad, frames) for name, field in FIELDS.items()
-    }
+    values = {}
+    for name, field in FIELDS.items():
+        values[field] = _value_in_jump(smooth, name, theta_rad, frames)
     first, last = np.degrees(smooth.theta_rad[frames][[0, -1]])
     sentence = f"slips in jumps: seen at {first:.2f} and {last:.2f} deg"
     return TruthAtAngle(theta_rad=theta_rad, **values, status=Reason("slips_in_jumps", sentence))
@@ -133,21 +140,30 @@ def _value_in_jump(smooth: Smooth, name: str, theta_rad: float, frames: np.ndarr
     """Return a quantity where slip is anywhere between these frames (k,), by its linear dependence
     on angle and slip nearby.
     """
-    slip = smooth.values["slip"]
-    values = smooth.values[name]
-    near = _near(smooth.theta_rad - theta_rad)
-    columns = [np.ones(len(slip)), smooth.theta_rad - theta_rad, slip]
-    design = np.column_stack(columns)[near]
-    coefficients, *_ = np.linalg.lstsq(design, values[near])
+    coefficients, residual_variance = _linear_in_slip(smooth, name, theta_rad)
     _, by_angle, by_slip = coefficients
-    freedom = max(len(design) - design.shape[1], 1)
-    residual_variance = np.sum((values[near] - design @ coefficients) ** 2) / freedom
     rows = smooth.jacobians[name][frames] + by_angle * smooth.touch_jacobian
     sigma = np.max(propagated_sigma(rows, smooth.covariance))
-    half_mm = 0.5 * float(np.ptp(slip[frames]))
-    value = coefficients @ [1.0, 0.0, np.min(slip[frames]) + half_mm]
+    slip_mm = smooth.values["slip"][frames]
+    half_mm = 0.5 * float(np.ptp(slip_mm))
+    value = coefficients @ [1.0, 0.0, np.min(slip_mm) + half_mm]
     variance = (by_slip * half_mm) ** 2 + residual_variance + sigma**2
     return Value(float(value), float(np.sqrt(variance)))
+
+
+def _linear_in_slip(smooth: Smooth, name: str, theta_rad: float) -> tuple[np.ndarray, float]:
+    """Fit a quantity near theta by a constant, the angle beyond theta and the slip.
+
+    Returned are the coefficients (3,) and the variance of the residuals.
+    """
+    angle_rad = smooth.theta_rad - theta_rad
+    near = _near(angle_rad)
+    columns = [np.ones(len(angle_rad)), angle_rad, smooth.values["slip"]]
+    design = np.column_stack(columns)[near]
+    values = smooth.values[name][near]
+    coefficients, *_ = np.linalg.lstsq(design, values)
+    freedom = max(len(design) - design.shape[1], 1)
+    return coefficients, np.sum((values - design @ coefficients) ** 2) / freedom
 
 
 def _local_fit(theta, at):
@@ -201,9 +217,7 @@ def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
     jumps are in no frame's sigma, but between the frames.
 
     Teeth go from one friction angle to another: the force's angle jumps by as much in all of them,
-    and lengths by as much for their pushing angle. Frames are weighted by their precision. With
-    weights W and the projection M off the curve, a scatter of τ in all of them leaves τ² tr(M W²),
-    with tr(M W²)² / tr((M W²)²) degrees of freedom.
+    and lengths by as much for their pushing angle. Frames are weighted by their precision.
     """
     near = _near(smooth.theta_rad - theta_rad, _FEWEST_FOR_SCATTER) & (smooth.theta_rad > 0)
     degree = _degree(int(np.sum(near)))
@@ -212,10 +226,20 @@ def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
     size = 1.0 / _share(smooth, name, theta_rad)[near]
     rows = size[:, None] * smooth.jacobians[name][near]
     covariance = rows @ smooth.covariance @ rows.T
+    curve = np.vander(smooth.theta_rad[near] / theta_rad - 1.0, degree + 1)
+    return _scatter_about(curve, size * smooth.values[name][near], covariance)
+
+
+def _scatter_about(curve: np.ndarray, values: np.ndarray, covariance: np.ndarray) -> Scatter:
+    """Return the scatter of values (n,) of this covariance (n, n) about a curve, columns (n, k).
+
+    With weights W and the projection M off the curve, a scatter of τ in all of them leaves τ²
+    tr(M W²), with tr(M W²)² / tr((M W²)²) degrees of freedom.
+    """
     weights = 1.0 / np.sqrt(np.diag(covariance))
-    design = weights[:, None] * np.vander(smooth.theta_rad[near] / theta_rad - 1.0, degree + 1)
+    design = weights[:, None] * curve
     M = np.eye(len(design)) - design @ np.linalg.pinv(design)
-    residual = M @ (weights * size * smooth.values[name][near])
+    residual = M @ (weights * values)
     noise = np.sum(M * np.outer(weights, weights) * covariance)
     MW2 = M * weights**2
     total = np.trace(MW2)

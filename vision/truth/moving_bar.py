@@ -50,6 +50,8 @@ class BarInFrames(ObjectReader):
 
 def in_one_frame(views: Sequence[View], frame: int) -> list[View]:
     """Return the views that show a frame, with that frame alone."""
-    return [
-        replace(view, frames={frame: view.frames[frame]}) for view in views if frame in view.frames
-    ]
+    showing = []
+    for view in views:
+        if frame in view.frames:
+            showing.append(replace(view, frames={frame: view.frames[frame]}))
+    return showing

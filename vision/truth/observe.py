@@ -7,7 +7,7 @@
 Nothing here knows of a gauge.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -282,31 +282,35 @@ def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     """Return the truth of a fitted whisk, with its checks and the whisker's base before touch."""
     whisk = whisk.yielding_as(fitted.problem, fitted.state)
     truth = to_whisk(whisk, fitted)
-    light = [Reason("light_unexplained", one.doubt(name)) for name, one in whisk.light.items()]
     checks_beam = whisk.settings.check_beam
     beam = _check_beam(fitted) if checks_beam else None
+    status = joined(truth.status, *_warnings(whisk, fitted, beam))
     # Before the free stroke is traced, which changes whisk.light.
     refinements = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
-    is_first = whisk.number == 0
     free = (fitted.problem, fitted.state)
     if len(fitted.frames) < len(whisk.frames):
         free = free_stroke(whisk, fitted)
     return replace(
         truth,
         refinements=refinements,
-        status=joined(
-            truth.status,
-            Reason("cameras_contradict", contradiction(fitted.one_less)),
-            Reason("no_beam", beam.alarm if beam else ""),
-            *light,
-            *whisk.left_out,
-        ),
+        status=status,
         turns=frame_turns(fitted.problem, fitted.state, fitted.frames),
         base=base_lines(*free, fitted.uncertainty.lens),
         ends=wire_ends(whisk, fitted),
-        looks=wire_widths(whisk, fitted) if checks_beam and is_first else {},
+        widths=wire_widths(whisk, fitted) if checks_beam and whisk.number == 0 else {},
         beam=beam,
     )
+
+
+def _warnings(
+    whisk: WhiskPictures, fitted: FittedWhisk, beam: BeamCheck | None
+) -> Iterator[Reason]:
+    """Yield the reasons, some empty, for which the truth of a fitted whisk may be wrong."""
+    yield Reason("cameras_contradict", contradiction(fitted.one_less))
+    yield Reason("no_beam", beam.alarm if beam else "")
+    for name, appearance in whisk.light.items():
+        yield Reason("light_unexplained", appearance.warning(name))
+    yield from whisk.left_out
 
 
 def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut]:

@@ -1,7 +1,7 @@
 """How the edges of the touched object are read, pass by pass, in the pictures of one whisk.
 
 A reader keeps what it measured in the pass before: from that a fine measurement begins. A straight
-bar is read by its middle; by its two edges as well, where its distance is that at which it looks
+bar is read by its middle; by its two edges as well, where its distance is that at which it appears
 as wide as it is. Any other object is read by its silhouette. Which reader an object has is chosen
 in `vision.truth.strategies`.
 """

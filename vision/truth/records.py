@@ -55,14 +55,14 @@ class WireShape:
 class GaveWay:
     """The displacement of a bar that gives way, in each touching frame (n,).
 
-    index: of the frame. theta_rad: pushing angle. normal_mm: away from the contact. aside_mm:
+    index: of the frame. theta_rad: pushing angle. normal_mm: away from the contact. lateral_mm:
     across that direction and the bar, where springs need not move it.
     """
 
     index: np.ndarray
     theta_rad: np.ndarray
     normal_mm: Value
-    aside_mm: Value
+    lateral_mm: Value
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class WhiskTruth:
     whisker's base in the frames before touch. beam: the comparison with a curve that is no beam.
     turns: the whisker's rotation in each frame of the fit beyond the motor's. refinements: what the
     truth would be without each part of the model, by name. lines: the precision of each camera's
-    lines. ends: by camera how far from its base, mm, the whisker is seen to end; looks: its width
+    lines. ends: by camera how far from its base, mm, the whisker is seen to end; widths: its width
     in the pictures over the stated one, of a trial's first whisk. point_covariance_mm2 (3, 3): of
     point_mm. shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of an object
     that moves, as seen; None where it stands. gave: of one that gives way. rounded: one that is no
@@ -120,7 +120,7 @@ class WhiskTruth:
     refinements: dict[str, LeftOut] = field(default_factory=dict)
     lines: dict[str, LineNoise] = field(default_factory=dict)
     ends: dict[str, Value] = field(default_factory=dict, metadata=_OPTIONAL)
-    looks: dict[str, Value] = field(default_factory=dict, metadata=_OPTIONAL)
+    widths: dict[str, Value] = field(default_factory=dict, metadata=_OPTIONAL)
     point_covariance_mm2: np.ndarray | None = None
     shape: WireShape | None = None
     velocity_mm_s: Value | None = None
@@ -145,4 +145,4 @@ class TrialTruth:
     bar_direction: np.ndarray
     whisks: tuple[WhiskTruth, ...]
     one_sided_light: dict[str, SeenWidth] = field(default_factory=dict)
-    bar_looks: dict[str, Value] = field(default_factory=dict)
+    bar_widths: dict[str, Value] = field(default_factory=dict)

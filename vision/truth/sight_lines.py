@@ -5,7 +5,6 @@ The places in the pictures came from all cameras; what is measured there is the 
 Nothing else of the fit is here.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,25 +41,16 @@ def sights_of(problem: Problem, name: str) -> Sights | None:
     """
     if name not in problem.cameras:
         return None
-    camera = problem.cameras[name]
-    number = problem.cameras.index(name)
-    seen = [one for one in problem.seen if one.camera == number and one.frame >= 0]
-    seen = [one for one in seen if len(one.points)]
-    if not seen:
+    frame, points = _points_in(problem, name)
+    if not len(frame):
         return None
-    frame = np.concatenate([np.full(len(one.points), one.frame) for one in seen])
-    points = _join([one.points for one in seen])
-
+    camera = problem.cameras[name]
     sight = camera.rays(points.px)
     along = points.normal @ [[0.0, 1.0], [-1.0, 0.0]]  # the normals turned by 90 degrees
     across = np.cross(sight, camera.rays(points.px + along))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     rad_per_px = np.einsum("ni,ni->n", across, camera.rays(points.px + points.normal) - sight)
-
-    motor_rad = problem.motor_rad[frame]
-    modes = wire_modes(problem.wire.length_mm, points.place, motor_rad, problem.motor_rad)
-    by_camera_px = _by_camera(problem, name, points, motor_rad)
-    shared_px = np.concatenate([WIRE_MODES_PX * modes, points.shared_px, by_camera_px], axis=1)
+    shared_px = _shared_px(problem, name, points, problem.motor_rad[frame])
     return Sights(
         motor_rad=problem.motor_rad,
         frame=frame,
@@ -72,12 +62,29 @@ def sights_of(problem: Problem, name: str) -> Sights | None:
     )
 
 
-def _join(points: Sequence[LinePoints]) -> LinePoints:
-    """Return the line points of several frames as one."""
-    joined = {}
-    for name in LinePoints.__dataclass_fields__:
-        joined[name] = np.concatenate([getattr(one, name) for one in points])
-    return LinePoints(**joined)
+def _points_in(problem: Problem, name: str) -> tuple[np.ndarray, LinePoints | None]:
+    """Return the frame (n,) of each line point of the wire in one camera, and the points; None of
+    none.
+    """
+    number = problem.cameras.index(name)
+    frames = []
+    points = []
+    for one in problem.seen:
+        if one.camera == number and one.frame >= 0 and len(one.points):
+            frames.append(np.full(len(one.points), one.frame))
+            points.append(one.points)
+    if not points:
+        return np.zeros(0, dtype=int), None
+    return np.concatenate(frames), LinePoints.join(points)
+
+
+def _shared_px(problem: Problem, name: str, points: LinePoints, motor_rad) -> np.ndarray:
+    """Return how far (n, k) px points move along their normals with one sigma of each cause they
+    share.
+    """
+    modes = wire_modes(problem.wire.length_mm, points.place, motor_rad, problem.motor_rad)
+    by_camera_px = _by_camera(problem, name, points, motor_rad)
+    return np.concatenate([WIRE_MODES_PX * modes, points.shared_px, by_camera_px], axis=1)
 
 
 def _by_camera(problem: Problem, name: str, points: LinePoints, motor_rad) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 Two cameras whose sights cross locate bar and wire in space: the bar's middle is enough, and touch
 is where their clearance ends. To one camera, or to several on one side, the bar is as far away as
-it looks wide, and the wire touches when it begins to bend.
+it appears wide, and the wire touches when it begins to bend.
 """
 
 from abc import ABC, abstractmethod
@@ -236,14 +236,13 @@ def _strategies_of_bar(axis: BarAxis, whisk: WhiskPictures) -> list[Strategy]:
     """
     radius_mm = whisk.rods.bar.radius_mm
     seeing = [view for view in whisk.views if view.camera.name in whisk.bar.seen_by]
+    edges = BarEdges(seeing or whisk.views, radius_mm, whisk.settings)
     if seen_from_one_side(whisk.cameras, axis):
-        return [
-            Strategy(BarEdges(seeing or whisk.views, radius_mm, whisk.settings), TouchByOnset())
-        ]
+        return [Strategy(edges, TouchByOnset())]
     if len(seeing) == 1:
         return [
-            Strategy(BarEdges(seeing, radius_mm, whisk.settings), touch)
-            for touch in (TouchByClearance(fewest_cameras=2), TouchByOnset())
+            Strategy(edges, TouchByClearance(fewest_cameras=2)),
+            Strategy(BarEdges(seeing, radius_mm, whisk.settings), TouchByOnset()),
         ]
     return [Strategy(BarMiddles(whisk.views, radius_mm, whisk.settings), TouchByClearance())]
 

@@ -16,7 +16,7 @@ from vision.geometry.touched import Axis, Touched
 from vision.pictures.pyramid import full_px
 from vision.truth.at_angle import Smooth
 from vision.truth.records import FrameTruth, GaveWay, SeenObject, WhiskTruth, WireShape
-from vision.truth.value import FIELDS, Value
+from vision.truth.value import FIELDS, Value, propagated_sigma
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 # [frame intervals] Of the median one, beyond which a frame was lost: between one and two.
@@ -130,26 +130,32 @@ def _gave(fitted: FittedWhisk) -> GaveWay:
 
     It is counted away from the contact and across that.
     """
-    problem = fitted.problem
-    vector = fitted.state.vector
-    own = problem.blocks.motion.slice
-    touching = problem.touching
-    axis = bar_axes(problem, vector)
+    touching = fitted.problem.touching
+    axis = bar_axes(fitted.problem, fitted.state.vector)
     direction = axis.direction[0]
-    contact = np.stack([fitted.measured.frame[name] for name in _VECTORS], axis=1)
-    normal = (axis.point_mm - contact) @ (np.eye(3) - np.outer(direction, direction))
+    normal = (axis.point_mm - _contacts_mm(fitted)) @ (np.eye(3) - np.outer(direction, direction))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    came_mm = shifts_mm(problem, vector)
-    by_motion = problem.motion.by_values(vector[own])  # (k, f, 3)
-    covariance = fitted.covariance[own, own]
-    parts = []
-    for way in (normal, np.cross(direction, normal)):
-        rows = np.einsum("kfi,fi->fk", by_motion, way)[touching]
-        sigma = np.sqrt(np.einsum("fk,kl,fl->f", rows, covariance, rows))
-        parts.append(Value(np.sum(came_mm * way, axis=1)[touching], sigma))
-    normal_mm, aside_mm = parts
-    theta_rad = problem.motor_rad[touching] - float(fitted.measured.whisk["touch"])
-    return GaveWay(np.array(fitted.frames)[touching], theta_rad, normal_mm, aside_mm)
+    return GaveWay(
+        index=np.array(fitted.frames)[touching],
+        theta_rad=fitted.problem.motor_rad[touching] - float(fitted.measured.whisk["touch"]),
+        normal_mm=_came(fitted, normal),
+        lateral_mm=_came(fitted, np.cross(direction, normal)),
+    )
+
+
+def _came(fitted: FittedWhisk, way: np.ndarray) -> Value:
+    """Return how far the bar has come along unit vectors (f, 3), in each touching frame, mm."""
+    problem = fitted.problem
+    own = problem.blocks.motion.slice
+    by_motion = problem.motion.by_values(fitted.state.vector[own])  # (k, f, 3)
+    rows = np.einsum("kfi,fi->fk", by_motion, way)[problem.touching]
+    came_mm = np.sum(shifts_mm(problem, fitted.state.vector) * way, axis=1)[problem.touching]
+    return Value(came_mm, propagated_sigma(rows, fitted.covariance[own, own]))
+
+
+def _contacts_mm(fitted: FittedWhisk) -> np.ndarray:
+    """Return the contact (f, 3), mm, in each of the fit's frames."""
+    return np.stack([fitted.measured.frame[name] for name in _VECTORS], axis=1)
 
 
 def _touch(whisk: WhiskPictures, fitted: FittedWhisk) -> Value:
@@ -237,22 +243,24 @@ def _frames(whisk: WhiskPictures, fitted: FittedWhisk, touch: Value) -> FrameTru
     position = {f: k for k, f in enumerate(fitted.frames)}
     rows = np.array([position.get(f, -1) for f in whisk.indices])
     touching = (rows >= 0) & fitted.problem.touching[rows]
-    columns = {}
-    for name in (*_VECTORS, *FIELDS):
-        values = fitted.of_frames(name)
-        value = _column(values.value, rows, touching)
-        columns[name] = Value(value, _column(values.sigma, rows, touching))
-    motor = whisk.motor_rad[indices]
+
+    def column(name: str) -> Value:
+        """Return a quantity of the fit's frames for the rows of the whisk."""
+        found = fitted.of_frames(name)
+        value = _column(found.value, rows, touching)
+        return Value(value, _column(found.sigma, rows, touching))
+
+    motor_rad = whisk.motor_rad[indices]
     return FrameTruth(
         index=indices,
         time_s=whisk.time_s[indices],
-        motor_rad=motor,
+        motor_rad=motor_rad,
         touching=touching,
-        theta_rad=Value(motor - touch.value, np.full(len(indices), touch.sigma)),
-        point_mm=_stacked([columns[name] for name in _VECTORS]),
+        theta_rad=Value(motor_rad - touch.value, np.full(len(indices), touch.sigma)),
+        point_mm=_stacked([column(name) for name in _VECTORS]),
         arc_mm=_column(fitted.measured.frame["arc"], rows, touching),
         status=_statuses(whisk, fitted, rows),
-        **{field: columns[name] for name, field in FIELDS.items()},
+        **{field: column(name) for name, field in FIELDS.items()},
     )
 
 
@@ -290,23 +298,33 @@ def _overlay(
     whisk: WhiskPictures, fitted: FittedWhisk
 ) -> dict[int, dict[str, dict[str, np.ndarray]]]:
     """Return per frame and camera the wire, the object's two edges (m, 2) and the contact (2,) px."""
-    curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
-    axes = bar_axes(fitted.problem, fitted.state.vector)
-    contacts = np.stack([fitted.measured.frame[name] for name in _VECTORS], axis=1)
-    scale = whisk.settings.picture_scale
     drawn: dict = {int(f): {} for f in fitted.frames}
     for view in whisk.views:
-        camera = view.camera
-        edges_px = _edges_px(axes, camera, whisk.rods.bar.radius_mm)
-        for k, f in enumerate(fitted.frames):
-            left, right = edges_px[min(k, len(edges_px) - 1)]
-            lines = {
-                "wire": camera.project(curves.points_mm[k]),
-                "bar_left": left,
-                "bar_right": right,
-                "contact": camera.project(contacts[k : k + 1])[0],
+        for f, lines in zip(fitted.frames, _overlay_in(view.camera, whisk, fitted)):
+            drawn[int(f)][view.camera.name] = lines
+    return drawn
+
+
+def _overlay_in(
+    camera: Camera, whisk: WhiskPictures, fitted: FittedWhisk
+) -> list[dict[str, np.ndarray]]:
+    """Return what `_overlay` draws in one camera, by frame of the fit, in px of the full picture."""
+    scale = whisk.settings.picture_scale
+    curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
+    axes = bar_axes(fitted.problem, fitted.state.vector)
+    edges_px = _edges_px(axes, camera, whisk.rods.bar.radius_mm)
+    contacts_px = camera.project(_contacts_mm(fitted))
+    drawn = []
+    for k in range(len(fitted.frames)):
+        left, right = edges_px[min(k, len(edges_px) - 1)]
+        drawn.append(
+            {
+                "wire": full_px(camera.project(curves.points_mm[k]), scale),
+                "bar_left": full_px(left, scale),
+                "bar_right": full_px(right, scale),
+                "contact": full_px(contacts_px[k], scale),
             }
-            drawn[int(f)][camera.name] = {name: full_px(px, scale) for name, px in lines.items()}
+        )
     return drawn
 
 

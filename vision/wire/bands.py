@@ -14,12 +14,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import correlate1d
 
+from vision.geometry.rows import Rows
 from vision.pictures.pixel_noise import Noise
+
+# [1] Twelve times the first derivative by five points. A formula, no threshold.
+_FIRST_DIFFERENCE = (1.0, -8.0, 0.0, 8.0, -1.0)
+# [1] Twelve times the second derivative by five points. A formula, no threshold.
+_SECOND_DIFFERENCE = (-1.0, 16.0, -30.0, 16.0, -1.0)
 
 
 @dataclass(frozen=True)
-class Band:
+class Band(Rows):
     """Hold the pixels near a predicted curve: n steps along it, k pixels across.
 
     offset_px (n, k): signed distance of each pixel from the curve along its normal.
@@ -54,68 +61,105 @@ def read_band(
     hidden: np.ndarray | None = None,
     still: np.ndarray | None = None,
 ) -> Band:
-    """Read the pixels within half_width_px of a curve (m, 2), one step a pixel of the axis it runs along.
+    """Read the pixels within half_width_px of a curve (m, 2), one step a pixel of the axis it runs
+    along.
 
     hidden (h, w) bool: pixels that show something else. still (h, w): another background.
     No pixel is interpolated and none is read twice, so that their noise stays independent. Normals
     point to the same side of the direction in which `place` grows, however that lies in the picture.
     """
-    along = 0 if np.ptp(curve_px[:, 0]) >= np.ptp(curve_px[:, 1]) else 1
-    across = 1 - along
-    order = np.argsort(curve_px[:, along])
-    curve = curve_px[order]
-    place = np.asarray(place)[order]
-    radius = np.asarray(radius_px)[order]
-    ends = np.round(curve[[0, -1], along])
-    first, last = np.clip(ends, 0, grey.shape[across] - 1).astype(int)
-    step = np.arange(first, last + 1)
-    middle = np.interp(step, curve[:, along], curve[:, across])
-    slope = np.gradient(middle) if len(step) > 1 else np.zeros(len(step))
-    cosine = 1.0 / np.hypot(1.0, slope)
-    line = np.round(middle).astype(int)[:, None] + np.arange(-half_width_px, half_width_px + 1)
-    offset = (line - middle[:, None]) * cosine[:, None]
-
-    foot = np.empty((len(step), 2))
-    foot[:, along] = step
-    foot[:, across] = middle
-    normal = np.empty((len(step), 2))
-    normal[:, along] = -slope * cosine
-    normal[:, across] = cosine
-
-    pictures = [picture for picture in (grey, background, still) if picture is not None]
-    pixels = _pick(pictures, step, line, along)
+    path = _Path.along_curve(curve_px, place, radius_px, grey.shape)
+    pixels = path.pixels(half_width_px)
+    levels = pixels.values(grey)
     if hidden is not None:
-        pixels[0][_pick([hidden], step, line, along)[0] > 0] = np.nan
-    side = 1.0 if (along == 0) == (place[-1] >= place[0]) else -1.0
+        levels[pixels.values(hidden) > 0] = np.nan
+    across_px = pixels.line - path.middle[:, None]
+    cosine = 1.0 / np.hypot(1.0, path.slope)
     return Band(
-        offset_px=side * offset,
-        grey=pixels[0],
-        background=pixels[1],
-        foot_px=foot,
-        normal=side * normal,
-        place=np.interp(step, curve[:, along], place),
-        radius_px=np.interp(step, curve[:, along], radius),
-        still=pixels[2] if still is not None else None,
+        offset_px=path.side * across_px * cosine[:, None],
+        grey=levels,
+        background=pixels.values(background),
+        foot_px=path.as_xy(path.step, path.middle),
+        normal=path.side * path.as_xy(-path.slope * cosine, cosine),
+        place=path.place,
+        radius_px=path.radius_px,
+        still=None if still is None else pixels.values(still),
     )
 
 
-def _pick(
-    pictures: Sequence[np.ndarray], step: np.ndarray, line: np.ndarray, along: int
-) -> list[np.ndarray]:
-    """Return the values (n, k) of pictures of one size at a band's pixels; NaN outside them."""
-    size = pictures[0].shape[along]
-    outside = (line < 0) | (line >= size)
-    line = np.clip(line, 0, size - 1)
-    at = (line, step[:, None]) if along == 0 else (step[:, None], line)
-    values = [picture[at].astype(float) for picture in pictures]
-    if np.any(outside):
-        for one in values:
-            one[outside] = np.nan
-    return values
+@dataclass(frozen=True)
+class _Path:
+    """A curve at n whole pixels of the axis of the picture that it runs along.
+
+    along: 0 where that axis is x, 1 where it is y. step (n,): pixels on that axis. middle (n,): the
+    curve on the other axis, px. place, radius_px (n,): as of `Band`.
+    """
+
+    along: int
+    step: np.ndarray
+    middle: np.ndarray
+    place: np.ndarray
+    radius_px: np.ndarray
+
+    @staticmethod
+    def along_curve(
+        curve_px: np.ndarray, place: np.ndarray, radius_px: np.ndarray, shape: tuple[int, ...]
+    ) -> "_Path":
+        """Return the path of a curve (m, 2) within a picture of this shape (h, w)."""
+        along = 0 if np.ptp(curve_px[:, 0]) >= np.ptp(curve_px[:, 1]) else 1
+        order = np.argsort(curve_px[:, along])
+        knots = curve_px[order, along]
+        first, last = np.clip(np.round(knots[[0, -1]]), 0, shape[1 - along] - 1).astype(int)
+        step = np.arange(first, last + 1)
+        others = (curve_px[:, 1 - along], np.asarray(place), np.asarray(radius_px))
+        at_steps = [np.interp(step, knots, values[order]) for values in others]
+        return _Path(along, step, *at_steps)
+
+    @property
+    def slope(self) -> np.ndarray:
+        """Return the slope (n,) of the curve against the axis."""
+        return np.gradient(self.middle) if len(self.step) > 1 else np.zeros(len(self.step))
+
+    @property
+    def side(self) -> float:
+        """Return 1 where the axis's own normals lie as normals of a band shall, else -1."""
+        return 1.0 if (self.along == 0) == (self.place[-1] >= self.place[0]) else -1.0
+
+    def as_xy(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
+        """Return vectors (n, 2) in x and y of their parts (n,) along the axis and across it."""
+        parts = (along, across) if self.along == 0 else (across, along)
+        return np.stack(parts, axis=1)
+
+    def pixels(self, half_width_px: int) -> "_BandPixels":
+        """Return the pixels within so many of the curve, across the axis."""
+        across = np.arange(-half_width_px, half_width_px + 1)
+        line = np.round(self.middle).astype(int)[:, None] + across
+        return _BandPixels(self.along, self.step, line)
 
 
 @dataclass(frozen=True)
-class Pieces:
+class _BandPixels:
+    """Pixels of a band: at n steps along one axis of the picture, k pixels along the other.
+
+    along: 0 where the band runs along x, 1 along y. step (n,), line (n, k): pixels on the two axes.
+    """
+
+    along: int
+    step: np.ndarray
+    line: np.ndarray
+
+    def values(self, picture: np.ndarray) -> np.ndarray:
+        """Return the values (n, k) of a picture at the pixels; NaN outside it."""
+        line = np.clip(self.line, 0, picture.shape[self.along] - 1)
+        step = self.step[:, None]
+        at = (line, step) if self.along == 0 else (step, line)
+        values = picture[at].astype(float)
+        values[line != self.line] = np.nan
+        return values
+
+
+@dataclass(frozen=True)
+class Pieces(Rows):
     """Hold short segments of bands, all of one size: s segments of p pixels each.
 
     offset_px, grey, background (s, p): as in `Band`.
@@ -147,12 +191,10 @@ class Pieces:
 
     @property
     def freedom(self) -> np.ndarray:
-        """Return the degrees of freedom (s,): pixels less position, and background's gain and offset."""
+        """Return the degrees of freedom (s,): pixels less position, and background's gain and
+        offset.
+        """
         return np.maximum((self.weight > 0).sum(axis=1) - 3, 1)
-
-    def select(self, keep: np.ndarray | slice) -> "Pieces":
-        """Return the segments where keep (s,) holds, at these indices, or of a slice."""
-        return Pieces(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
     def columns(self, keep: np.ndarray | slice) -> "Pieces":
         """Return the segments with those of their pixels where keep (p,) holds, or of a slice."""
@@ -178,86 +220,70 @@ class Pieces:
 
 
 def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
-    """Cut bands into segments of length_px steps; what is left over at a band's end is not used.
+    """Split bands into segments of length_px steps; what is left over at a band's end is not used.
 
     Either all bands have a second background (`still`) or none has. Where they have, the pass fits no
     shading, and slopes and curvatures are 0.
     """
     counts = [len(band.place) // length_px for band in bands]
-    if not any(counts):
+    whole = []
+    for band, count in zip(bands, counts):
+        if count:
+            whole.append(band.select(slice(count * length_px)))
+    if not whole:
         return _no_pieces()
-    joined = {}
-    for name in Band.__dataclass_fields__:
-        parts = [getattr(band, name)[: count * length_px] for band, count in zip(bands, counts)]
-        joined[name] = np.concatenate([part for part in parts if len(part)])
-    return _cut(Band(**joined), length_px, noise, np.repeat(np.arange(len(bands)), counts))
+    return _cut(Band.join(whole), length_px, noise, np.repeat(np.arange(len(bands)), counts))
 
 
 def _no_pieces() -> Pieces:
     """Return no segments."""
     pixels = np.zeros((0, 1))
-    return Pieces(
-        offset_px=pixels,
-        grey=pixels,
-        background=pixels,
-        slope=pixels,
-        curvature=pixels,
-        weight=pixels,
-        place=np.zeros(0),
-        radius_px=np.zeros(0),
-        foot_px=np.zeros((0, 2)),
-        normal=np.zeros((0, 2)),
-        source=np.zeros(0, dtype=int),
-        still=pixels,
-    )
+    none = np.zeros(0)
+    vectors = np.zeros((0, 2))
+    source = np.zeros(0, dtype=int)
+    return Pieces(*[pixels] * 6, none, none, vectors, vectors, source, pixels)
 
 
 def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray) -> Pieces:
-    """Cut one band, of a whole number of segments, into segments; source (s,): of each."""
+    """Split one band, of a whole number of segments, into segments; source (s,): of each."""
     count = len(source)
-    offset = band.offset_px.reshape(count, -1)
-    grey = band.grey.reshape(count, -1)
-    background = band.background.reshape(count, -1)
-    still = band.still.reshape(count, -1)
-    if still.size:
-        slope = np.zeros(offset.shape)
-        curvature = np.zeros(offset.shape)
-    else:
-        slope, curvature = (change.reshape(count, -1) for change in _derivatives(band))
-    in_picture = np.isfinite(grey) & np.isfinite(background)
-    sigma = noise.sigma(np.where(in_picture, grey, 0.0))
-    if still.size:
-        still = np.where(in_picture, still, 0.0)
+    is_known = np.isfinite(band.grey) & np.isfinite(band.background)  # (n, k)
+    slope, curvature = _derivatives(band)
+
+    def known(values: np.ndarray) -> np.ndarray:
+        """Return values (n, k) by segment (s, p), 0 where a pixel is not known."""
+        return np.where(is_known, values, 0.0).reshape(count, -1)
+
+    def middle(values: np.ndarray) -> np.ndarray:
+        """Return the mean (s, …) over each segment of values (n, …)."""
+        return values.reshape(count, length_px, *values.shape[1:]).mean(axis=1)
+
     return Pieces(
-        offset_px=offset,
-        grey=np.where(in_picture, grey, 0.0),
-        background=np.where(in_picture, background, 0.0),
-        slope=np.where(in_picture, slope, 0.0),
-        curvature=np.where(in_picture, curvature, 0.0),
-        weight=np.where(in_picture, 1.0 / sigma, 0.0),
-        place=band.place.reshape(count, length_px).mean(axis=1),
-        radius_px=band.radius_px.reshape(count, length_px).mean(axis=1),
-        foot_px=band.foot_px.reshape(count, length_px, -1).mean(axis=1),
-        normal=band.normal.reshape(count, length_px, -1).mean(axis=1),
+        offset_px=band.offset_px.reshape(count, -1),
+        grey=known(band.grey),
+        background=known(band.background),
+        slope=known(slope),
+        curvature=known(curvature),
+        weight=known(1.0 / noise.sigma(np.where(is_known, band.grey, 0.0))),
+        place=middle(band.place),
+        radius_px=middle(band.radius_px),
+        foot_px=middle(band.foot_px),
+        normal=middle(band.normal),
         source=source,
-        still=still,
+        still=known(band.still) if band.still.size else None,
     )
 
 
 def _derivatives(band: Band) -> tuple[np.ndarray, np.ndarray]:
     """Return slope and curvature (n, k) of the background across the rod, per px and per px².
 
-    They are 0 at the band's borders. By five points: three would lose a sixth of the slope of an
-    edge blurred by a pixel.
+    They are 0 throughout a band with another background. By five points: three would lose a sixth
+    of the slope of an edge blurred by a pixel.
     """
-    pitch = band.offset_px[:, 1:2] - band.offset_px[:, :1]
+    if band.still.size:
+        return np.zeros(band.grey.shape), np.zeros(band.grey.shape)
+    pitch_px = band.offset_px[:, 1:2] - band.offset_px[:, :1]
     behind = np.nan_to_num(band.background)
-    width = behind.shape[1]
-    wide = np.pad(behind, ((0, 0), (2, 2)), mode="edge")
-    two_before = wide[:, :width]
-    before = wide[:, 1 : 1 + width]
-    after = wide[:, 3 : 3 + width]
-    two_after = wide[:, 4 : 4 + width]
-    slope = (8.0 * (after - before) - (two_after - two_before)) / (12.0 * pitch)
-    curvature = 16.0 * (after + before) - (two_after + two_before) - 30.0 * behind
-    return slope, curvature / (12.0 * pitch**2)
+    slope = correlate1d(behind, _FIRST_DIFFERENCE, axis=1, mode="nearest")
+    curvature = correlate1d(behind, _SECOND_DIFFERENCE, axis=1, mode="nearest")
+    return slope / (12.0 * pitch_px), curvature / (12.0 * pitch_px**2)

@@ -62,18 +62,14 @@ class Votes:
         return self.share.shape[1] // 2
 
     def points(self, shift_px: np.ndarray) -> LinePoints:
-        """Return the middle of each segment's votes near a curve, shift_px (s,) off the predicted one.
+        """Return the middle of each segment's votes near a curve, shift_px (s,) off the predicted
+        one.
 
         A segment that what stands still explains has no votes: a lens cap differs from the picture
         without rods everywhere.
         """
-        reach = self.reach_px
         near = np.rint(shift_px).astype(int)[:, None] + np.arange(-_NEAR_PX, _NEAR_PX + 1)
-        column = np.clip(near + reach, 0, 2 * reach)
-        share = np.take_along_axis(self.changed, column, axis=1)
-        # squared: weak votes far from the strongest are no wire
-        share = np.where(np.abs(near) <= reach, share, 0.0) ** 2
-        share = np.where(np.any(self.share > 0.0, axis=1, keepdims=True), share, 0.0)
+        share = self._squared_votes(near)
         total = np.sum(share, axis=1)
         mean = np.sum(share * near, axis=1) / np.maximum(total, 1e-12)
         shift = np.where(total > 0.0, mean, shift_px)
@@ -81,30 +77,56 @@ class Votes:
         vote = np.sqrt(np.max(share, axis=1, initial=_LEAST_VOTE**2))
         return LinePoints(px, self.pieces.normal, _SIGMA_PX / np.sqrt(vote), self.pieces.place)
 
+    def _squared_votes(self, shifts_px: np.ndarray) -> np.ndarray:
+        """Return the squared votes (s, n) at whole shifts (s, n): weak ones far from the strongest
+        are no wire.
+        """
+        reach = self.reach_px
+        column = np.clip(shifts_px + reach, 0, 2 * reach)
+        share = np.take_along_axis(self.changed, column, axis=1)
+        has_votes = np.any(self.share > 0.0, axis=1, keepdims=True)
+        return np.where((np.abs(shifts_px) <= reach) & has_votes, share, 0.0) ** 2
+
 
 def likely_curve(
     seen: Sequence[Votes], shapes_px: np.ndarray, grids: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, bool]:
-    """Find the curve with most votes of all segments, and whether it surely has more than noise gives.
+    """Find the curve with most votes of all segments, and whether it surely has more than noise
+    gives.
 
     A curve is a sum of shapes (s, k), with coefficients (k,) from the grids; s: segments in all.
     Of equal ones that nearest to the predicted curve is returned.
     """
-    coefficients = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, len(grids))
     share = np.concatenate([one.share for one in seen])
     if len(share) == 0:
         return np.zeros(len(grids)), False
-    padded = np.pad(share, ((0, 0), (1, 1)))
-    reach = seen[0].reach_px
-    widest = [max(grid[-1], 1e-12) for grid in grids]
-    total = -_LEAST_VOTE * np.sum((coefficients / widest) ** 2, axis=1)
-    for row, shape in zip(padded, shapes_px):
-        column = np.rint(coefficients @ shape).astype(int) + reach + 1
-        total += row.take(column, mode="clip")
+    coefficients = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, len(grids))
+    widest = np.maximum([grid[-1] for grid in grids], 1e-12)
+    total = _votes_of_curves(share, coefficients, shapes_px)
+    total -= _LEAST_VOTE * np.sum((coefficients / widest) ** 2, axis=1)
     best = int(np.argmax(total))
+    return coefficients[best], bool(total[best] > _most_by_noise(share))
+
+
+def _most_by_noise(share: np.ndarray) -> float:
+    """Return the votes that no curve through noise has; share (s, 2 reach + 1): see `Votes`."""
     expected = len(share) * np.mean(share)
-    scatter = np.sqrt(len(share)) * np.std(share)
-    return coefficients[best], bool(total[best] > expected + _SURE_SIGMAS * scatter)
+    return expected + _SURE_SIGMAS * np.sqrt(len(share)) * np.std(share)
+
+
+def _votes_of_curves(
+    share: np.ndarray, coefficients: np.ndarray, shapes_px: np.ndarray
+) -> np.ndarray:
+    """Return the votes (c,) of curves, coefficients (c, k) of shapes (s, k); none beyond the reach.
+
+    share (s, 2 reach + 1): see `Votes`.
+    """
+    total = np.zeros(len(coefficients))
+    middle = share.shape[1] // 2 + 1
+    for row, shape in zip(np.pad(share, ((0, 0), (1, 1))), shapes_px):
+        column = np.rint(coefficients @ shape).astype(int) + middle
+        total += row.take(column, mode="clip")
+    return total
 
 
 def votes(pieces: Pieces, still_share: float, reach_px: int) -> Votes:
@@ -151,30 +173,26 @@ def _share(energy: np.ndarray, width_px: int) -> np.ndarray:
 
 
 def _places(pieces: Pieces, reach_px: int) -> tuple[np.ndarray, int]:
-    """Return of each pixel its column, a px wide, among those of all segments, and columns a segment."""
+    """Return of each pixel its column, a px wide, among those of all segments, and columns a
+    segment.
+    """
     count = 2 * reach_px + 1
     column = np.clip(np.rint(pieces.offset_px).astype(int) + reach_px, 0, count - 1)
     return column + count * np.arange(len(pieces))[:, None], count
 
 
 def _unexplained(pieces: Pieces, background: np.ndarray, variance_share: float) -> np.ndarray:
-    """Return the residual (s, p), over its noise, of a background with a gain and an offset a segment.
+    """Return the residual (s, p), over its noise, of a background with a gain and an offset a
+    segment.
 
     variance_share: the part of one picture's variance that the background has.
     """
-    columns = np.stack([background, np.ones_like(background), pieces.grey], axis=1)
-    columns = columns * pieces.weight[:, None]
-    normal = columns @ columns.transpose(0, 2, 1)
-    a = normal[:, 0, 0] + _WEAK
-    b = normal[:, 0, 1]
-    d = normal[:, 1, 1] + _WEAK
-    by_background = normal[:, 0, 2]
-    by_one = normal[:, 1, 2]
-    determinant = a * d - b * b
-    gain = ((d * by_background - b * by_one) / determinant)[:, None]
-    offset = ((a * by_one - b * by_background) / determinant)[:, None]
-    is_plain = np.abs(gain - 1.0) < _PLAIN_GAIN
-    gain = np.where(is_plain, gain, 1.0)
-    offset = np.where(is_plain, offset, 0.0)
-    residual = columns[:, 2] - gain * columns[:, 0] - offset * columns[:, 1]
-    return residual / np.sqrt(1.0 + variance_share * gain**2)
+    behind = np.stack([background, np.ones_like(background)], axis=2) * pieces.weight[..., None]
+    grey = pieces.grey * pieces.weight
+    normal = behind.transpose(0, 2, 1) @ behind + _WEAK * np.eye(2)
+    right = behind.transpose(0, 2, 1) @ grey[..., None]
+    fit = np.linalg.solve(normal, right)  # (s, 2, 1)
+    is_plain = np.abs(fit[:, :1] - 1.0) < _PLAIN_GAIN
+    fit = np.where(is_plain, fit, [[1.0], [0.0]])
+    residual = grey - (behind @ fit)[..., 0]
+    return residual / np.sqrt(1.0 + variance_share * fit[:, 0] ** 2)

@@ -8,6 +8,7 @@ shifts is then computed on a grid, for it often is not Gaussian.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -15,7 +16,9 @@ from scipy.linalg.lapack import dtrtri
 
 from vision.wire.bands import Pieces
 from vision.wire.gathered import GatheredEquations, exactly_if_needed
+from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import WAVE_SHARE, Knots, between_knots, contrast_of
+from vision.wire.summed_segments import Normal
 
 # [1] Of the widest shift: the grid below. Derived.
 _PARTS = np.linspace(-1.0, 1.0, 15)
@@ -46,24 +49,16 @@ NO_CHANCE = 200.0
 EVIDENCE_COUNTS = 0.5
 
 
-def common_spread_px(
-    pieces: Pieces,
-    blur_px: float,
-    terms: int,
-    knots: Knots,
-    robust: np.ndarray,
-    blur_prior: tuple[float, float],
-) -> float:
-    """Return the RMS of all common shifts, each by its probability, from where the segments lie, px.
+def common_spread_px(task: ShadedSegments, robust: np.ndarray, blur_px: float) -> float:
+    """Return the RMS of all common shifts, each by its probability, from where the segments lie,
+    px.
 
-    terms, robust: see `evidences_of`. blur_px: found where they lie. blur_prior: blur, px, and sigma
-    of its logarithm.
+    robust (s,): weight of each segment. blur_px: found where they lie.
     """
     blurs_px = blur_px * np.exp(_LOG_BLURS)
-    found = evidences_of(pieces, _SHIFTS_PX, blurs_px, terms, knots, robust, NO_CHANCE)
+    found = evidences_of(task, robust, _SHIFTS_PX, blurs_px, no_chance=NO_CHANCE)
     evidences = EVIDENCE_COUNTS * found[0]
-    prior_px, prior_sigma = blur_prior
-    evidences += ((_LOG_BLURS + np.log(blur_px / prior_px)) / prior_sigma) ** 2
+    evidences += task.blur_deviation(np.log(blurs_px)) ** 2
     shift = np.linspace(_SHIFTS_PX[0], _SHIFTS_PX[-1], _FINE)
     log_blur = np.linspace(_LOG_BLURS[0], _LOG_BLURS[-1], _FINE)
     fine = RectBivariateSpline(_SHIFTS_PX, _LOG_BLURS, evidences)(shift, log_blur)
@@ -72,94 +67,99 @@ def common_spread_px(
 
 
 def evidences_of(
-    pieces: Pieces,
+    task: ShadedSegments,
+    robust: np.ndarray,
     shifts_px: np.ndarray,
     blurs_px: np.ndarray,
-    terms: int,
-    knots: Knots,
-    robust: np.ndarray,
-    no_chance: float = np.inf,
+    *,
     wider: Sequence[float] = (1.0,),
+    no_chance: float = np.inf,
 ) -> np.ndarray:
     """Return minus twice the log evidence (w, m, b) of widths, common shifts and blurs.
 
-    wider (w,): how many times as thick the rods are. shifts_px (m,), blurs_px (b,).
-    terms: number of shading functions, at the first, middle and last of the knots along the rod; each
-    coefficient is as strong as is most probable. robust (s,): weight of each segment. no_chance: those
-    above the least by so much need not be computed to the end.
+    The shading has knots at the first, middle and last place along the rod; each coefficient is as
+    strong as is most probable. The prior of the blur is not counted.
+    robust (s,): weight of each segment. shifts_px (m,), blurs_px (b,). wider (w,): how many times as
+    thick the rods are. no_chance: those above the least by so much need not be computed to the end.
     """
-    last = len(knots.place_mm) - 1
-    places = knots.place_mm[sorted({0, len(knots.place_mm) // 2, last})]
-    knots = Knots(places, knots.turn_rad, knots.turns)
+    pieces = task.pieces
+    knots = _three_along(task.knots)
     # knots are mixed so that each coefficient of a mixture has a variance of its own
     own, mixing = np.linalg.eigh(between_knots(knots))
     knot_weights = knots.weights(pieces) @ mixing
-    models = []
-    contrasts = []
-    for factor in wider:
-        thick = replace(pieces, radius_px=factor * pieces.radius_px)
-        contrasts.append(contrast_of(thick))
-        models += [(factor, blur_px) for blur_px in blurs_px]
-    contrast = np.tile(np.repeat(contrasts, len(blurs_px)), len(shifts_px))
+    models = list(product(wider, blurs_px))
+    contrast = np.tile(_contrasts(pieces, models), len(shifts_px))
 
     def compute(each_pixel: bool) -> np.ndarray:
         """Return the evidences (m w b,), from summed pixels or from each pixel."""
         gathered = GatheredEquations(pieces, knot_weights, robust, each_pixel=each_pixel)
-        left, right, power = gathered.normal(shifts_px, models, terms)
-        left = left.reshape(-1, *left.shape[2:])
-        right = right.reshape(-1, *right.shape[2:])
-        return _evidences(left, right, power.ravel(), own, contrast, no_chance)
+        normal = gathered.normal(shifts_px, models, task.terms).flattened()
+        return _evidences(normal, own, contrast, no_chance)
 
     evidences = exactly_if_needed(compute)
     return evidences.reshape(len(shifts_px), len(wider), len(blurs_px)).transpose(1, 0, 2)
 
 
-def _evidences(
-    left: np.ndarray,
-    right: np.ndarray,
-    power: np.ndarray,
-    own: np.ndarray,
-    contrast: np.ndarray,
-    no_chance: float,
-) -> np.ndarray:
-    """Return minus twice the log evidence (g,) of g normal equations, coefficients of the best strength.
-
-    own (knots,): inverse variances of a coefficient over its strength's. contrast (g,): grey levels.
+def _contrasts(pieces: Pieces, models: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Return the contrast (models,) of the rod, as many times as thick as each model says, grey
+    levels.
     """
-    count = len(own)
-    terms = left.shape[1] // count
+    contrasts = []
+    for wider, _ in models:
+        contrasts.append(contrast_of(replace(pieces, radius_px=wider * pieces.radius_px)))
+    return np.array(contrasts)
+
+
+def _three_along(knots: Knots) -> Knots:
+    """Return the first, middle and last of the knots along the rod, at all of its turns."""
+    last = len(knots.place_mm) - 1
+    chosen = sorted({0, len(knots.place_mm) // 2, last})
+    return Knots(knots.place_mm[chosen], knots.turn_rad, knots.turns)
+
+
+def _evidences(
+    normal: Normal, own: np.ndarray, contrast: np.ndarray, no_chance: float
+) -> np.ndarray:
+    """Return minus twice the log evidence (g,) of g normal equations, coefficients of the best
+    strength.
+
+    own (knots,): inverse variances of a coefficient over its strength's. contrast (g,): grey
+    levels.
+    """
+    terms = normal.right.shape[1] // len(own)
     strength = contrast[:, None] * WAVE_SHARE[:terms]
-    low = contrast[:, None] * _LEAST_STRENGTH
-    high = contrast[:, None] * _MOST_STRENGTH
-    evidences = np.empty(len(left))
-    some = np.arange(len(left))
+    evidences = np.empty(len(contrast))
+    some = np.arange(len(contrast))
     for number in range(_ROUNDS + 1):
-        stiff = (own[:, None] * strength[some, None] ** -2.0).reshape(len(some), -1)
-        found, variances, log_det = _most_probable(left[some], right[some], stiff)
-        explained = np.sum(right[some] * found, axis=1)
-        log_prior = np.sum(np.log(stiff), axis=1)
-        evidences[some] = power[some] - explained + log_det - log_prior
-        squares = own @ (found**2 + variances).reshape(-1, count, terms)
-        fitted = np.clip(np.sqrt(squares / count), low[some], high[some])
-        strength[some, 1:] = fitted[:, 1:]
+        stiff = own[:, None] * strength[some, None] ** -2.0  # (some, knots, terms)
+        evidences[some], squares = _integrate(normal.select(some), stiff.reshape(len(some), -1))
+        mean_squares = own @ squares.reshape(stiff.shape) / len(own)
+        strength[some, 1:] = _bound(np.sqrt(mean_squares[:, 1:]), contrast[some])
         if number >= _FIRST_ROUNDS:
             some = some[evidences[some] < evidences.min() + no_chance]
     return evidences
 
 
-def _most_probable(
-    left: np.ndarray, right: np.ndarray, stiff: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Solve g normal equations with priors of these inverse variances (g, size).
+def _bound(strength: np.ndarray, contrast: np.ndarray) -> np.ndarray:
+    """Return strengths (g, terms) within what the contrasts (g,) allow, grey levels."""
+    level = contrast[:, None]
+    return np.clip(strength, _LEAST_STRENGTH * level, _MOST_STRENGTH * level)
 
-    Returned are the coefficients (g, size), their variances (g, size), and the log (g,) of each
-    matrix's determinant.
+
+def _integrate(normal: Normal, stiff: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Integrate out the coefficients of g normal equations, with prior precisions stiff (g, size).
+
+    Returned are minus twice the log evidence (g,), and the coefficients' expected squares (g,
+    size).
     """
-    root = left.copy()
+    root = normal.left.copy()
     diagonal = np.einsum("gii->gi", root)
     diagonal += stiff
     root = np.linalg.cholesky(root)
     inverse = np.array([dtrtri(one.T)[0] for one in root])  # of the roots' transposes
-    found = (inverse @ (right[:, None] @ inverse).transpose(0, 2, 1))[..., 0]
-    log_det = 2.0 * np.sum(np.log(np.einsum("gii->gi", root)), axis=1)
-    return found, np.sum(inverse**2, axis=2), log_det
+    found = (inverse @ (normal.right[:, None] @ inverse).transpose(0, 2, 1))[..., 0]
+    explained = np.sum(normal.right * found, axis=1)
+    log_posterior = 2.0 * np.sum(np.log(np.einsum("gii->gi", root)), axis=1)
+    log_prior = np.sum(np.log(stiff), axis=1)
+    evidence = normal.power - explained + log_posterior - log_prior
+    return evidence, found**2 + np.sum(inverse**2, axis=2)

@@ -1,4 +1,5 @@
-"""The picture of a shaded cylinder: its radiance round the rod, seen from the side and blurred by the lens.
+"""The picture of a shaded cylinder: its radiance round the rod, seen from the side and blurred by
+the lens.
 
 Each shading function of the angle round the rod has a blurred profile across the picture. Profiles
 are integrated once for each ratio of half-width and blur, tabulated (`_tables`), and looked up for
@@ -59,7 +60,20 @@ def shading_basis(
             )
         return values
     rows_per_radius, table = _table(ratio, terms)
-    before, part = _places(offset_px / radius_px, rows_per_radius, len(table))
+    between = _interpolation(offset_px / radius_px, weight, rows_per_radius, len(table))
+    wide = np.pad(table, ((0, 0), (0, room)))
+    return (between @ wide).reshape(*offset_px.shape, wide.shape[1])
+
+
+def _interpolation(
+    offset: np.ndarray, weight: np.ndarray, rows_per_radius: float, count: int
+) -> csr_array:
+    """Return the matrix (pixels, count) that interpolates a table of count rows at offsets, in
+    radii.
+
+    Its rows are multiplied by the weights of the pixels.
+    """
+    before, part = _places(offset, rows_per_radius, count)
     shares = np.empty((*before.shape, 2))
     np.multiply(part, weight, out=shares[..., 1])
     np.subtract(weight, shares[..., 1], out=shares[..., 0])
@@ -67,10 +81,7 @@ def shading_basis(
     places[..., 0] = before
     places[..., 1] = before + 1
     ends = np.arange(0, shares.size + 1, 2, dtype=np.int32)
-    between = csr_array((shares.ravel(), places.ravel(), ends), shape=(before.size, len(table)))
-    wide = np.zeros((len(table), table.shape[1] + room))
-    wide[:, : table.shape[1]] = table
-    return (between @ wide).reshape(*before.shape, wide.shape[1])
+    return csr_array((shares.ravel(), places.ravel(), ends), shape=(before.size, count))
 
 
 def profiles(offset_px: np.ndarray, radius_px: float, blur_px: float, terms: int) -> np.ndarray:
@@ -94,34 +105,45 @@ def slopes_of(
     offset_px (s, p), radius_px (s,); coefficients (s, terms): radiance in terms of `round_the_rod`.
     """
     ratio = _common_ratio(radius_px, blur_px)
+    if ratio is not None:
+        return _slopes_of_alike(offset_px, radius_px[:, None], ratio, coefficients)
     slopes = np.empty((2, *offset_px.shape))
     curvatures = np.empty((2, *offset_px.shape))
-    if ratio is None:
-        for some in alike(radius_px):
-            slopes[:, some], curvatures[:, some] = slopes_of(
-                offset_px[some], radius_px[some], blur_px, coefficients[some]
-            )
-        return slopes, curvatures
-    radius_px = radius_px[:, None]
+    for some in alike(radius_px):
+        slopes[:, some], curvatures[:, some] = slopes_of(
+            offset_px[some], radius_px[some], blur_px, coefficients[some]
+        )
+    return slopes, curvatures
+
+
+def _slopes_of_alike(
+    offset_px: np.ndarray, radius_px: np.ndarray, ratio: float, coefficients: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return `slopes_of` cylinders of nearly one radius (s, 1), which is `ratio` blurs."""
     count, terms = coefficients.shape
     rows_per_radius, table = _table(ratio, terms)
     before, part = _places(offset_px / radius_px, rows_per_radius, len(table))
     own_column = before * count + np.arange(count)[:, None]  # of a table with a column a cylinder
     change = table[:, :terms]
-    for found in (slopes, curvatures):
+    found = []
+    for _ in range(2):
         change = np.gradient(change, axis=0)
-        light = change @ coefficients.T
-        here = light.take(own_column)
-        found[0] = here + part * (light.take(own_column + count) - here)
-        cover = change[:, 0]
-        here = cover.take(before)
-        found[1] = here + part * (cover.take(before + 1) - here)
+        of_light = _between(change @ coefficients.T, own_column, count, part)
+        of_cover = _between(change[:, 0], before, 1, part)
+        found.append(np.stack([of_light, of_cover]))
     rows_per_px = rows_per_radius / radius_px
-    return slopes * rows_per_px, curvatures * rows_per_px**2
+    return found[0] * rows_per_px, found[1] * rows_per_px**2
+
+
+def _between(table: np.ndarray, place: np.ndarray, step: int, part: np.ndarray) -> np.ndarray:
+    """Return a flat table's values between places (…) and those a step on, `part` (…) of the way."""
+    here = table.take(place)
+    return here + part * (table.take(place + step) - here)
 
 
 def rim_bells(offset_px: np.ndarray, radius_px: np.ndarray | float, blur_px: float) -> np.ndarray:
-    """Return slope and curvature (…, 2) of the blurred share that the rod covers, in units of the blur.
+    """Return slope and curvature (…, 2) of the blurred share that the rod covers, in units of the
+    blur.
 
     With z, the distance from an edge over the blur, these are the normal density of z and z times it;
     those of the edge at negative offset are subtracted from the other's.
@@ -161,7 +183,9 @@ def _places(
 
 
 def _table(ratio: float, terms: int) -> tuple[float, np.ndarray]:
-    """Return rows per radius, and the table (n, terms + 2) for this radius over blur; 0 lies in the middle."""
+    """Return rows per radius, and the table (n, terms + 2) for this radius over blur; 0 lies in the
+    middle.
+    """
     step, share = divmod(np.log(ratio) / _RATIO_STEP, 1.0)
     rows_per_radius, one, other = _tables(int(step), terms)
     return rows_per_radius, one + share * (other - one)
@@ -169,7 +193,8 @@ def _table(ratio: float, terms: int) -> tuple[float, np.ndarray]:
 
 @lru_cache(maxsize=512)
 def _tables(step: int, terms: int) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return rows per radius, and tables (n, terms + 2) at this step of log(radius / blur) and the next.
+    """Return rows per radius, and tables (n, terms + 2) at this step of log(radius / blur) and the
+    next.
 
     Rows are counted in radii, for then edges coincide and only their blur differs: 5e-4 of the
     contrast between rows and steps.

@@ -60,24 +60,28 @@ def seen_width(pieces: Pieces, blur_px: float) -> SeenWidth:
     The segments lie where the rod was found; blur_px: of the lens.
     """
     width_px = 2.0 * float(np.median(pieces.radius_px))
-    reach = 0.5 * width_px + 3.0 * blur_px
-    use = (pieces.weight > 0) & (np.abs(pieces.offset_px) < reach)
-    bins = np.floor((pieces.offset_px[use] + reach) * _BINS_PER_PX).astype(int)
-    size = int(np.ceil(2 * reach * _BINS_PER_PX)) + 1
+    reach_px = 0.5 * width_px + 3.0 * blur_px
+    seen = np.flatnonzero(_seen_bins(pieces, reach_px))
+    if len(seen) == 0:
+        return SeenWidth(0.0, width_px, 0.0)
+    low = seen[0] / _BINS_PER_PX - reach_px
+    high = (seen[-1] + 1) / _BINS_PER_PX - reach_px
+    seen_px = max(float(high - low) - 2 * _REACH_BLURS * blur_px, 0.0)
+    return SeenWidth(seen_px, width_px, 0.5 * float(low + high))
+
+
+def _seen_bins(pieces: Pieces, reach_px: float) -> np.ndarray:
+    """Return in which bins across, from -reach_px on, the segments differ from their background."""
+    use = (pieces.weight > 0) & (np.abs(pieces.offset_px) < reach_px)
+    bins = np.floor((pieces.offset_px[use] + reach_px) * _BINS_PER_PX).astype(int)
+    size = int(np.ceil(2 * reach_px * _BINS_PER_PX)) + 1
     count = np.maximum(np.bincount(bins, minlength=size), 1)
     variance = pieces.weight[use] ** -2.0
     squares = (pieces.grey - pieces.background)[use] ** 2 - variance
     power = np.bincount(bins, squares, minlength=size) / count
     noise = np.bincount(bins, variance, minlength=size) / count * np.sqrt(2.0 / count)
     strength = np.sqrt(np.maximum(power, 0.0))
-    is_seen = (power > _LEAST_SIGMAS * noise) & (strength > _LEAST_SHARE * strength.max())
-    seen = np.flatnonzero(is_seen)
-    if len(seen) == 0:
-        return SeenWidth(0.0, width_px, 0.0)
-    low = seen[0] / _BINS_PER_PX - reach
-    high = (seen[-1] + 1) / _BINS_PER_PX - reach
-    seen_px = max(float(high - low) - 2 * _REACH_BLURS * blur_px, 0.0)
-    return SeenWidth(seen_px, width_px, 0.5 * float(low + high))
+    return (power > _LEAST_SIGMAS * noise) & (strength > _LEAST_SHARE * strength.max())
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ class WireAppearance:
     width: SeenWidth
     misfit: float = 0.0
 
-    def doubt(self, camera: str) -> str:
+    def warning(self, camera: str) -> str:
         """Return a sentence where the wire's light is not explained, else an empty text.
 
         Its line may then be anywhere near.

@@ -4,13 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.geometry.rows import Rows
+
 # [causes] Number of shared causes of error that line points carry. Before an even background these
 # hold 93 to 100 % of the variance that segments share; the rest goes into sigma_px. Study: starts.py.
 SHARED = 4
 
 
 @dataclass(frozen=True)
-class LinePoints:
+class LinePoints(Rows):
     """Hold points of a rod's axis in one picture.
 
     px (n, 2). normal (n, 2): unit. sigma_px (n,): along the normal. place (n,): mm along the rod.
@@ -34,10 +36,6 @@ class LinePoints:
 
     def __len__(self) -> int:
         return len(self.place)
-
-    def select(self, keep: np.ndarray) -> "LinePoints":
-        """Return the points where keep (n,) holds."""
-        return LinePoints(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True)

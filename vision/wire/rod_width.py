@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from vision.wire.bands import Pieces
 from vision.wire.binned import binned
 from vision.wire.common_shift import EVIDENCE_COUNTS, NO_CHANCE, evidences_of
-from vision.wire.joint import BLUR_SIGMA, ShadedSegments
+from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import Knots
 from vision.wire.trace import BIN_PX, WIRE_WAVES
 
@@ -43,43 +43,43 @@ def log_width(pieces: Pieces, blur_px: float, knots: Knots) -> tuple[float, floa
     """
     some = pieces.select(slice(None, None, 1 + len(pieces) // _MOST_SEGMENTS))
     averaged, _ = binned(some, BIN_PX)
-    pieces = ShadedSegments(averaged, WIRE_WAVES, knots, blur_px).tempered().pieces
-    coarse = _evidences_of_widths(pieces, _LOG_WIDTHS, np.zeros(1), blur_px, knots, NO_CHANCE)
+    task = ShadedSegments(averaged, WIRE_WAVES, knots, blur_px).tempered()
+    coarse = _evidences_of_widths(task, _LOG_WIDTHS, np.zeros(1), NO_CHANCE)
     best = float(_LOG_WIDTHS[np.argmin(coarse)])
     if best in _LOG_WIDTHS[[0, -1]]:
         return None
     if best == 0.0:
         return 0.0, 0.5 * _STEP
     logs = best + _NEAR
-    evidences = _evidences_of_widths(pieces, logs, _LOG_BLURS, blur_px, knots, np.inf)
-    misfit = max(1.0, evidences.min() / max(int(np.sum(pieces.weight > 0)), 1))
-    fine = np.linspace(logs[0], logs[-1], _FINE)
-    spline = CubicSpline(logs, EVIDENCE_COUNTS / misfit * (evidences - evidences.min()))
-    values = spline(fine)
-    probability = np.exp(-0.5 * (values - values.min()))
-    mean = float(np.average(fine, weights=probability))
-    return mean, float(np.sqrt(np.average((fine - mean) ** 2, weights=probability)))
+    evidences = _evidences_of_widths(task, logs, _LOG_BLURS, np.inf)
+    misfit = max(1.0, evidences.min() / max(int(np.sum(task.pieces.weight > 0)), 1))
+    return _mean_and_sigma(logs, EVIDENCE_COUNTS / misfit * (evidences - evidences.min()))
+
+
+def _mean_and_sigma(places: np.ndarray, evidences: np.ndarray) -> tuple[float, float]:
+    """Return mean and sigma of the density whose minus twice logarithm is known at some places
+    (n,).
+    """
+    fine = np.linspace(places[0], places[-1], _FINE)
+    values = CubicSpline(places, evidences)(fine)
+    density = np.exp(-0.5 * (values - values.min()))
+    mean = float(np.average(fine, weights=density))
+    return mean, float(np.sqrt(np.average((fine - mean) ** 2, weights=density)))
 
 
 def _evidences_of_widths(
-    pieces: Pieces,
-    logs: np.ndarray,
-    log_blurs: np.ndarray,
-    blur_px: float,
-    knots: Knots,
-    no_chance: float,
+    task: ShadedSegments, logs: np.ndarray, log_blurs: np.ndarray, no_chance: float
 ) -> np.ndarray:
-    """Return minus twice the log evidence (w,) of widths, at the best common shift and blur of each."""
+    """Return minus twice the log evidence (w,) of widths, at the best common shift and blur of
+    each.
+
+    logs (w,): logarithms of widths. log_blurs (b,): of blurs over the expected one.
+    """
+    every = np.ones(len(task.pieces))
+    blurs_px = task.blur_px * np.exp(log_blurs)
     evidences = evidences_of(
-        pieces,
-        _SHIFTS_PX,
-        blur_px * np.exp(log_blurs),
-        WIRE_WAVES,
-        knots,
-        np.ones(len(pieces)),
-        no_chance,
-        np.exp(logs),
+        task, every, _SHIFTS_PX, blurs_px, wider=np.exp(logs), no_chance=no_chance
     )
-    evidences += (log_blurs / BLUR_SIGMA) ** 2
+    evidences += (log_blurs / task.blur_sigma) ** 2
     fine = np.linspace(_SHIFTS_PX[0], _SHIFTS_PX[-1], _FINE)
     return np.min(CubicSpline(_SHIFTS_PX, evidences, axis=1)(fine), axis=(1, 2))

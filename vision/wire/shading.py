@@ -1,4 +1,5 @@
-"""The rod's own shading, shared by all segments of a camera, and the position of each segment under it.
+"""The rod's own shading, shared by all segments of a camera, and the position of each segment under
+it.
 
 The rod is a lit cylinder. Its radiance round the rod is a short Fourier series (`cylinder.py`)
 whose coefficients vary slowly along the rod and as it turns: they are known at knots, and between
@@ -87,16 +88,18 @@ class Knots:
 class Shading:
     """Hold the radiance round the rod.
 
-    coefficients (k m, terms): at each knot, of 1, sin t, cos t, …, in grey levels. blur_px: of the lens.
+    coefficients (k m, terms): at each knot, of 1, sin t, cos t, …, in grey levels. blur_px: of the
+    lens.
     """
 
     knots: Knots
     coefficients: np.ndarray
     blur_px: float
 
-    def of(self, pieces: Pieces) -> np.ndarray:
-        """Return the coefficients (s, terms) of each segment."""
-        return self.knots.weights(pieces) @ self.coefficients
+    def misfit(self, pieces: Pieces) -> np.ndarray:
+        """Return the chi² per degree of freedom (s,) that segments leave where they lie."""
+        equations = Equations(pieces, self.blur_px, self.coefficients.shape[1])
+        return equations.chi2(self.knots.weights(pieces) @ self.coefficients) / pieces.freedom
 
 
 def _linear_weights(place: np.ndarray, knots: np.ndarray) -> np.ndarray:
@@ -122,42 +125,22 @@ def _hidden_light(pieces: Pieces, bells: np.ndarray, blur_px: float) -> np.ndarr
     return by_slope - by_curvature
 
 
-def fit_shading(
-    pieces: Pieces,
-    blur_px: float,
-    terms: int,
-    knots: Knots,
-    robust: np.ndarray | None = None,
-    prior: np.ndarray | None = None,
-) -> tuple[Shading, float]:
-    """Return the most probable radiance of segments where they lie, and its misfit per pixel.
-
-    robust (s,): weight of each segment. prior (terms,): sigma of each coefficient in grey levels
-    (`wave_prior`), by which coefficients are also nearly the same at neighbouring knots; None
-    leaves them free. The misfit is chi², and with a prior minus twice the log evidence: what a
-    shift of the rod and a change of its shading explain alike does not count for the shading.
-    """
+def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots) -> tuple[Shading, float]:
+    """Fit the radiance of segments where they lie; also return chi² per pixel."""
     equations = Equations(pieces, blur_px, terms)
-    if robust is None:
-        robust = np.ones(len(pieces))
-    left, right = equations.shared(knots.weights(pieces), robust)
-    if prior is None:
-        stiff = _RIDGE * np.trace(left) / len(left) * np.eye(len(left))
-    else:
-        stiff = stiffness(prior, knots)
-    factors = lu_factor(left + stiff, check_finite=False)
-    found = lu_solve(factors, right, check_finite=False)
-    misfit = float(robust @ equations.power - 2.0 * right @ found + found @ left @ found)
-    if prior is not None:
-        log_determinant = np.sum(np.log(np.abs(np.diag(factors[0]))))
-        misfit += float(found @ stiff @ found + log_determinant)
-    pixels = float((pieces.weight > 0).sum(axis=1) @ robust)
+    every = np.ones(len(pieces))
+    left, right = equations.shared(knots.weights(pieces), every)
+    ridge = _RIDGE * np.trace(left) / len(left) * np.eye(len(left))
+    found = lu_solve(lu_factor(left + ridge, check_finite=False), right, check_finite=False)
+    chi2 = float(every @ equations.power - 2.0 * right @ found + found @ left @ found)
+    pixels = float(np.sum(pieces.weight > 0))
     shading = Shading(knots, found.reshape(len(knots), terms), blur_px)
-    return shading, misfit / max(1.0, pixels)
+    return shading, chi2 / max(1.0, pixels)
 
 
 class Equations:
-    """Normal equations of each segment for its shading, the background's gain and offset eliminated.
+    """Normal equations of each segment for its shading, the background's gain and offset
+    eliminated.
 
     gram (s, terms, terms), moment (s, terms): matrix and right side.
     power (s,): the squares that the background leaves unexplained.
@@ -166,20 +149,10 @@ class Equations:
     def __init__(self, pieces: Pieces, blur_px: float, terms: int):
         self.pieces = pieces
         self.blur_px = blur_px
-        near, self._far = _split_off_background(pieces, blur_px)
-        self._near = near
-        # columns (s, p, terms + 3), times the weight: shading functions, background, 1, grey level
-        columns = shading_basis(
-            near.offset_px, near.radius_px[:, None], blur_px, terms, near.weight, 1
-        )
-        hidden = _hidden_light(near, columns[..., -3:-1], blur_px)
-        uncovered = near.weight - columns[..., 0]
-        columns[..., -3] = uncovered * near.background + hidden
-        columns[..., -2] = uncovered
-        columns[..., -1] = near.grey * near.weight
-        self._columns = columns
+        self._near, self._far = _split_off_background(pieces, blur_px)
+        self._columns = _weighted_columns(self._near, blur_px, terms)
 
-        normal = columns.transpose(0, 2, 1) @ columns
+        normal = self._columns.transpose(0, 2, 1) @ self._columns
         normal[:, -3:, -3:] += self._far
         self._by_background = normal[:, -3:-1]  # (s, 2, terms + 3): gain and offset with all
         self._inverse = _inverse_of_two(self._by_background[:, :, -3:-1] + WEAK * np.eye(2))
@@ -213,18 +186,50 @@ class Equations:
 
         Light that the rod hides near a border of the background (`_hidden_light`) is held fixed.
         """
-        near = self._near
-        columns = self._columns
         terms = coefficients.shape[1]
-        seen = columns[..., -1]
-        behind = columns[..., -3:-1]
-        residual = seen - (columns[..., :terms] @ coefficients[..., None])[..., 0]
+        seen = self._columns[..., -1]
+        residual = seen - (self._columns[..., :terms] @ coefficients[..., None])[..., 0]
+        by_cover = self._gain_by_cover(residual)
+        derivatives = self._derivatives(coefficients, by_cover, residual)
+        mixed, gram = self._products(derivatives)
+        covered = residual - seen - self._columns[..., 0] * by_cover
+        contrast = np.sqrt(np.sum(covered**2, axis=1))
+        return PositionEquations(mixed[:, :2, :terms], gram, contrast)
+
+    def _products(self, derivatives: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the products of derivatives (s, 3, p) with the columns, and with each other.
+
+        The pixels far off are added to those of the residual, the last of the three; the background's
+        gain and offset are eliminated.
+        """
+        mixed = derivatives @ self._columns
+        gram = derivatives @ derivatives.transpose(0, 2, 1)
+        mixed[:, 2, -3:] += self._far[:, 2]
+        gram[:, 2, 2] += self._far[:, 2, 2]
+        by_background = mixed[..., -3:-1]
+        reduced = by_background @ self._inverse
+        gram -= reduced @ by_background.transpose(0, 2, 1)
+        return mixed - reduced @ self._by_background, gram
+
+    def _gain_by_cover(self, residual: np.ndarray) -> np.ndarray:
+        """Return what each pixel (s, p) loses of the background where the rod covers all of it,
+        negated.
+
+        residual (s, p): what the rod's light leaves of the grey level, by weight.
+        """
+        behind = self._columns[..., -3:-1]
         far_residual = self._far[:, :2, 2:]  # no light of the rod there
         by_behind = behind.transpose(0, 2, 1) @ residual[..., None] + far_residual
         gain_offset = self._inverse @ by_behind  # (s, 2, 1)
-        # what a pixel gains in light where the rod covers more of it
-        by_cover = -(gain_offset[:, 0] * near.background + gain_offset[:, 1])
+        return -(gain_offset[:, 0] * self._near.background + gain_offset[:, 1])
 
+    def _derivatives(
+        self, coefficients: np.ndarray, by_cover: np.ndarray, residual: np.ndarray
+    ) -> np.ndarray:
+        """Return the derivatives (s, 3, p) by position and by the blur's logarithm, and the
+        residual.
+        """
+        near = self._near
         slopes, curvatures = slopes_of(near.offset_px, near.radius_px, self.blur_px, coefficients)
         derivatives = np.empty((len(near), 3, residual.shape[1]))
         derivatives[:, 0] = -(slopes[0] + slopes[1] * by_cover)
@@ -232,16 +237,7 @@ class Equations:
         derivatives[:, 1] = self.blur_px**2 * (curvatures[0] + curvatures[1] * by_cover)
         derivatives[:, :2] *= near.weight[:, None]
         derivatives[:, 2] = residual
-
-        mixed = derivatives @ columns
-        gram = derivatives @ derivatives.transpose(0, 2, 1)
-        mixed[:, 2, -3:] += self._far[:, 2]
-        gram[:, 2, 2] += self._far[:, 2, 2]
-        reduced = mixed[..., -3:-1] @ self._inverse
-        gram -= reduced @ mixed[..., -3:-1].transpose(0, 2, 1)
-        by_shading = (mixed - reduced @ self._by_background)[:, :2, :terms]
-        covered = residual - seen - columns[..., 0] * by_cover
-        return PositionEquations(by_shading, gram, np.sqrt(np.sum(covered**2, axis=1)))
+        return derivatives
 
 
 @dataclass(frozen=True)
@@ -251,7 +247,7 @@ class PositionEquations:
     Gain and offset of the background are eliminated.
     rod (s, 2, terms): products of the two derivatives with those by the shading's coefficients.
     gram (s, 3, 3): products of the two derivatives and the residual with each other.
-    contrast (s,): see `Located`.
+    contrast (s,): signal of the rod against its background over the noise, over the whole segment.
     """
 
     rod: np.ndarray
@@ -269,12 +265,32 @@ class PositionEquations:
         return np.clip(self.gram[:, 0, 2] / self.power, -LONGEST_PX, LONGEST_PX)
 
     def own_sigma_px(self, chi2: np.ndarray) -> np.ndarray:
-        """Return the sigma (s,) of each segment's position by itself, where it leaves chi2 (s,) per pixel."""
+        """Return the sigma (s,) of each segment's position by itself, where it leaves chi2 (s,) per
+        pixel.
+        """
         return np.sqrt(np.maximum(chi2, 1.0) / self.power)
 
 
+def _weighted_columns(pieces: Pieces, blur_px: float, terms: int) -> np.ndarray:
+    """Return what segments are made of, (s, p, terms + 3), times the weight of each pixel.
+
+    The columns are the shading functions, what the rod leaves open of the background and of 1, and
+    the grey level.
+    """
+    columns = shading_basis(
+        pieces.offset_px, pieces.radius_px[:, None], blur_px, terms, pieces.weight, 1
+    )
+    hidden = _hidden_light(pieces, columns[..., -3:-1], blur_px)
+    uncovered = pieces.weight - columns[..., 0]
+    columns[..., -3] = uncovered * pieces.background + hidden
+    columns[..., -2] = uncovered
+    columns[..., -1] = pieces.grey * pieces.weight
+    return columns
+
+
 def _split_off_background(pieces: Pieces, blur_px: float) -> tuple[Pieces, np.ndarray]:
-    """Return the segments without the columns of pixels at both ends that no light of the rod reaches.
+    """Return the segments without the columns of pixels at both ends that no light of the rod
+    reaches.
 
     Also returned are the products (s, 3, 3) of these pixels' background, 1 and grey level with each
     other, by squared weight.
@@ -337,40 +353,7 @@ def contrast_of(pieces: Pieces) -> float:
 
 
 def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
-    """Return the prior sigma (terms,) of the shading's coefficients, by the rod's contrast, grey levels."""
+    """Return the prior sigma (terms,) of the shading's coefficients, by the rod's contrast, grey
+    levels.
+    """
     return contrast_of(pieces) * WAVE_SHARE[:terms]
-
-
-@dataclass(frozen=True)
-class Located:
-    """Hold where each segment lies.
-
-    shift_px, sigma_px (s,): along the normal. chi2 (s,): per pixel.
-    contrast (s,): signal of the rod against its background over the noise, over the whole segment.
-    shared_px (s, k): by how much each moves with one sigma of each of k independent causes that all
-    share (light and lens), not counted in sigma_px.
-    widened_px2 (s, 2): by how much its blur² is above that of all, and sigma.
-    """
-
-    shift_px: np.ndarray
-    sigma_px: np.ndarray
-    chi2: np.ndarray
-    contrast: np.ndarray
-    shared_px: np.ndarray | None = None
-    widened_px2: np.ndarray | None = None
-
-
-def locate(pieces: Pieces, shading: Shading, rounds: int = 3, limit_px: float = 1.5) -> Located:
-    """Find the position of each segment by Gauss–Newton, the rod's shading known.
-
-    The background's gain and offset stay free. Sigma, misfit and contrast are those of the last
-    round, before its step. No segment moves by more than limit_px.
-    """
-    coefficients = shading.of(pieces)
-    shift = np.zeros(len(pieces))
-    for _ in range(rounds):
-        equations = Equations(pieces.moved(shift), shading.blur_px, coefficients.shape[1])
-        linear = equations.linearised(coefficients)
-        shift = np.clip(shift + linear.step_px, -limit_px, limit_px)
-    chi2 = linear.gram[:, 2, 2] / pieces.freedom
-    return Located(shift, linear.own_sigma_px(chi2), chi2, linear.contrast)

@@ -4,7 +4,7 @@
 them, and `to_points` makes line points with sigmas of those that can be trusted.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,9 +17,10 @@ from vision.pictures.others import RodLines, mask_rods
 from vision.pictures.view import View
 from vision.wire.bands import Pieces, cut_pieces, read_band
 from vision.wire.binned import binned, without
-from vision.wire.joint import BLUR_SIGMA, ShadedSegments, settled, solve_jointly
+from vision.wire.joint import Solved, settle, solve_jointly
 from vision.wire.points import SHARED, LinePoints, Observed
-from vision.wire.shading import Knots, Located
+from vision.wire.shaded_segments import ShadedSegments
+from vision.wire.shading import Knots
 
 # [mm] Hub and set-screw hide or shade the wire up to here. Stated.
 NEAR_CLAMP_MM = 6.0
@@ -79,30 +80,35 @@ def lines_of(camera: Camera, wire: Wire, curves: Mapping[int, Curves]) -> RodLin
 
 
 def _hidden(view: View, frame: int) -> np.ndarray | None:
-    """Return the pixels (h, w) bool of a frame that other rods may cover; None where there are none."""
+    """Return the pixels (h, w) bool of a frame that other rods may cover; None where there are
+    none.
+    """
     return mask_rods(view.others, frame, view.frames[frame].shape)
 
 
 def _outlines(
     camera: Camera, curves: Mapping[int, Curves], wire: Wire
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return arc (n,) in mm, and middle (f, n, 2) and half-width (f, n) in px of the wire in f frames."""
-    frames = list(curves.values())
+    """Return arc (n,) in mm, and middle (f, n, 2) and half-width (f, n) in px of the wire in f
+    frames.
+    """
     arc = np.linspace(2.0, wire.length_mm - 1.0, _NODES)
-    all_curves = Curves(
-        frames[0].arc_mm,
-        np.stack([curve.points_mm for curve in frames]),
-        np.stack([curve.tangents for curve in frames]),
-    )
-    points, tangents = all_curves.at(arc)
+    points, tangents = _joined(curves.values()).at(arc)  # (f, n, 3)
     directions = tangents / np.linalg.norm(tangents, axis=-1, keepdims=True)
-    radii_mm = np.tile(wire.radius_mm(arc), len(frames))
-    one, other = edges(camera, points.reshape(-1, 3), directions.reshape(-1, 3), radii_mm)
-    one = one.reshape(len(frames), _NODES, 2)
-    other = other.reshape(len(frames), _NODES, 2)
+    radii_mm = np.tile(wire.radius_mm(arc), len(curves))
+    sides = edges(camera, points.reshape(-1, 3), directions.reshape(-1, 3), radii_mm)
+    one, other = np.reshape(sides, (2, len(curves), _NODES, 2))
     middle = 0.5 * (one + other)
     half_px = 0.5 * np.abs(np.sum((one - other) * normals(middle), axis=-1))
     return arc, middle, half_px
+
+
+def _joined(curves: Collection[Curves]) -> Curves:
+    """Return curves with nodes at the same arcs as one."""
+    arc_mm = next(iter(curves)).arc_mm
+    points = np.stack([curve.points_mm for curve in curves])
+    tangents = np.stack([curve.tangents for curve in curves])
+    return Curves(arc_mm, points, tangents)
 
 
 def clear_of_bar(
@@ -122,66 +128,56 @@ class Traced:
     """Hold segments brought to where the rod is, what is known of each, and the lens blur in px."""
 
     pieces: Pieces
-    located: Located
+    solved: Solved
     blur_px: float
 
     @property
     def misfit(self) -> float:
         """Return the median chi² per pixel."""
-        return float(np.median(self.located.chi2))
+        return float(np.median(self.solved.chi2))
 
 
 def trace(
     pieces: Pieces,
     knots: Knots,
     blur_px: float = _BLUR_PX,
-    blur_sigma: float = BLUR_SIGMA,
-    terms: int = WIRE_WAVES,
     *,
     seen_blur_px: float | None = None,
     last: bool = True,
 ) -> Traced:
     """Find where the rod lies in segments that are a few pixels off at most.
 
-    blur_px, blur_sigma: prior of the lens blur, and of its logarithm. seen_blur_px: the blur of an
-    earlier pass that predicted these segments, which are then some tenths of a pixel off at most.
+    blur_px: prior of the lens blur. seen_blur_px: the blur of an earlier pass that predicted these
+    segments, which are then some tenths of a pixel off at most.
     last: this is the last pass. Averaged pixels serve for all but the last step of the last pass.
     """
     averaged, variance_px2 = binned(pieces, BIN_PX)
     prior_px = float(np.hypot(blur_px, np.sqrt(variance_px2)))
     if seen_blur_px is not None:
         seen_blur_px = float(np.hypot(seen_blur_px, np.sqrt(variance_px2)))
-    task = ShadedSegments(averaged, terms, knots, prior_px, blur_sigma, seen_blur_px)
+    task = ShadedSegments(averaged, WIRE_WAVES, knots, prior_px, seen_blur_px=seen_blur_px)
     solved = solve_jointly(task, last=last)
     blur_px = without(solved.blur_px, variance_px2)
     if last:
-        task = ShadedSegments(pieces, terms, knots, blur_px, blur_sigma)
-        solved = settled(task, replace(solved, blur_px=blur_px))
-    located = Located(
-        shift_px=np.zeros(len(pieces)),
-        sigma_px=solved.own_sigma_px,
-        chi2=solved.chi2,
-        contrast=solved.contrast,
-        shared_px=solved.shared_px,
-        widened_px2=solved.widened_px2,
-    )
-    return Traced(pieces.moved(solved.shift_px), located, blur_px)
+        task = ShadedSegments(pieces, WIRE_WAVES, knots, blur_px)
+        solved = settle(task, replace(solved, blur_px=blur_px))
+    return Traced(pieces.moved(solved.shift_px), solved, blur_px)
 
 
 def to_points(traced: Traced) -> tuple[LinePoints, np.ndarray]:
     """Return the line points that can be trusted, and the source of each; sigmas hold the misfit."""
     pieces = traced.pieces
-    located = traced.located
+    solved = traced.solved
     most_chi2 = _WORST_MISFIT * max(traced.misfit, _LEAST_MEDIAN_MISFIT)
-    good = (located.chi2 < most_chi2) & (located.sigma_px < _WORST_SIGMA_PX)
-    shared_px, rest_px = _leading_causes(located.shared_px)
+    good = (solved.chi2 < most_chi2) & (solved.own_sigma_px < _WORST_SIGMA_PX)
+    shared_px, rest_px = _leading_causes(solved.shared_px)
     points = LinePoints(
         px=pieces.foot_px,
         normal=pieces.normal,
-        sigma_px=np.hypot(located.sigma_px, rest_px),
+        sigma_px=np.hypot(solved.own_sigma_px, rest_px),
         place=pieces.place,
         shared_px=shared_px,
-        widened_px2=located.widened_px2,
+        widened_px2=solved.widened_px2,
     )
     return points.select(good), pieces.source[good]
 

@@ -126,7 +126,7 @@ def looked_twice(background, frames, off_px: float, phase_rad: float) -> Traced:
 
 def whole_sigma_px(traced: Traced) -> np.ndarray:
     """Sigma (s,) of each piece alone, what it shares with others included."""
-    return np.hypot(traced.located.sigma_px, np.linalg.norm(traced.located.shared_px, axis=1))
+    return np.hypot(traced.solved.own_sigma_px, np.linalg.norm(traced.solved.shared_px, axis=1))
 
 
 def errors(traced: Traced) -> np.ndarray:
@@ -154,7 +154,7 @@ def main() -> None:
             first = np.concatenate([errors(looked_once(*one, *off)) for one in pictures])
             located = [looked_twice(*one, *off) for one in pictures]
             error = np.concatenate([errors(one) for one in located])
-            own = np.concatenate([one.located.sigma_px for one in located])
+            own = np.concatenate([one.solved.own_sigma_px for one in located])
             sigma = np.concatenate([whole_sigma_px(one) for one in located])
             begin = error if begin is None else begin
             moved = np.abs(error - begin) / sigma

@@ -89,7 +89,7 @@ def test_nothing_is_found_where_nothing_is():
 
 def test_chosen_keeps_rows_together():
     three = Corners([4, 5, 6], [[1, 2], [3, 4], [5, 6]], [0.1, 0.2, 0.3])
-    two = three.chosen(np.array([True, False, True]))
+    two = three.select(np.array([True, False, True]))
     assert (two.ids.tolist(), two.px.tolist(), two.sigma_px.tolist()) == (
         [4, 6],
         [[1, 2], [5, 6]],

@@ -181,8 +181,8 @@ def test_work_outside_all_views_is_refused(recording, rng):
         [[x, 0.0, 0.0] for x in np.linspace(100, 140, 5)]
     )  # in the picture, right of every view
     boards, rig = recording.seen(SIGMA_PX, rng)
-    left = {n: [v.chosen(v.px[:, 0] < 700) for v in views] for n, views in boards.items()}
-    rig = {n: v.chosen(v.px[:, 0] < 700) for n, v in rig.items()}
+    left = {n: [v.select(v.px[:, 0] < 700) for v in views] for n, views in boards.items()}
+    rig = {n: v.select(v.px[:, 0] < 700) for n, v in rig.items()}
     with pytest.raises(
         Refused, match=r"whisker and bar will be lies outside .* at the right of the picture"
     ):

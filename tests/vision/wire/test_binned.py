@@ -9,8 +9,9 @@ from tests.studies.speed.tracer import KNOTS, NOISE, rough_bands, wire_frames
 from vision.pictures.pixel_noise import Noise
 from vision.wire.bands import cut_pieces
 from vision.wire.binned import binned, without
+from vision.wire.common_shift import evidences_of
 from vision.wire.cylinder import WAVES
-from vision.wire.shading import fit_shading, wave_prior
+from vision.wire.shaded_segments import ShadedSegments
 
 
 @pytest.fixture(scope="module")
@@ -45,10 +46,9 @@ def test_pixels_outside_the_picture_count_for_nothing(pieces):
 def test_averaged_pieces_are_explained_best_by_the_same_blur(pieces):
     """By a blur that is larger by what the bins add; `without` takes it off again."""
     few, variance = binned(pieces, 0.25)
-    blurs = np.arange(0.6, 1.4, 0.05)
-    prior = wave_prior(pieces, WAVES)
+    blurs, every = np.arange(0.6, 1.4, 0.05), np.ones(len(pieces))
     best = [
-        blurs[np.argmin([fit_shading(p, blur, WAVES, KNOTS, prior=prior)[1] for blur in blurs])]
+        blurs[np.argmin(evidences_of(ShadedSegments(p, WAVES, KNOTS, 0.8), every, [0.0], blurs))]
         for p in (pieces, few)
     ]
     assert without(best[1], variance) == pytest.approx(

@@ -12,6 +12,7 @@ from vision.wire.bands import cut_pieces
 from vision.wire.binned import binned
 from vision.wire.common_shift import evidences_of
 from vision.wire.gathered import GatheredEquations
+from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import Equations
 from vision.wire.trace import BIN_PX, WIRE_WAVES
 
@@ -59,9 +60,10 @@ def test_pieces_that_show_no_background_are_asked_pixel_by_pixel(pieces):
 
 def test_shifts_are_as_probable_by_gathered_pixels(pieces, monkeypatch):
     shifts, blurs, robust = np.linspace(-0.3, 0.3, 7), np.array([BLUR_PX]), np.ones(len(pieces))
-    gathered = evidences_of(pieces, shifts, blurs, WIRE_WAVES, KNOTS, robust)
+    task = ShadedSegments(pieces, WIRE_WAVES, KNOTS, BLUR_PX)
+    gathered = evidences_of(task, robust, shifts, blurs)
     monkeypatch.setattr("vision.wire.gathered._LEAST_BACKGROUND_SHARE", 1.0)
-    pixels = evidences_of(pieces, shifts, blurs, WIRE_WAVES, KNOTS, robust)
+    pixels = evidences_of(task, robust, shifts, blurs)
     assert np.ptp(pixels) > 100.0
     assert np.allclose(
         gathered - gathered.min(), pixels - pixels.min(), atol=3.0 + 0.02 * np.ptp(pixels)

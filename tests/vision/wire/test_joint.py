@@ -5,7 +5,8 @@ import pytest
 
 from vision.wire.bands import Pieces
 from vision.wire.cylinder import shading_basis
-from vision.wire.joint import ShadedSegments, solve_jointly
+from vision.wire.joint import solve_jointly
+from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import Knots, stiffness, wave_prior
 
 FRAMES, PLACES, TERMS, BLUR_PX, NOISE = 6, np.arange(5.0, 100.0, 10.0), 5, 0.9, 2.0

@@ -13,7 +13,7 @@ def looked_at(name, rng):
     """Width seen in one of the drawn scenes, and the mean error of the axis found there over what is stated of it."""
     *_, seen = first_look(SCENES[name], rng, off_px=0.3)
     points, source = to_points(seen)
-    stated = np.hypot(np.median(np.linalg.norm(seen.located.shared_px, axis=1)), WIRE_OFFSET_PX)
+    stated = np.hypot(np.median(np.linalg.norm(seen.solved.shared_px, axis=1)), WIRE_OFFSET_PX)
     return seen_width(seen.pieces, seen.blur_px), float(
         np.mean(errors(SCENES[name], points, source))
     ) / stated
@@ -55,5 +55,5 @@ def test_the_report_names_camera_and_width_once():
 
 def test_light_that_is_not_explained_is_a_doubt():
     width = SeenWidth(5.5, 5.6, 0.0)
-    assert not WireAppearance(0.9, width, misfit=5.0).doubt("low")
-    assert WireAppearance(0.9, width, misfit=10.1).doubt("low")
+    assert not WireAppearance(0.9, width, misfit=5.0).warning("low")
+    assert WireAppearance(0.9, width, misfit=10.1).warning("low")

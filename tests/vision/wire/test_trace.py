@@ -65,7 +65,7 @@ def test_a_wire_is_found_again_from_a_curve_that_is_off_as_a_whole(rng, name):
     points, source = to_points(traced)
     off = errors(scene, points, source)
     for third in np.array_split(np.argsort(points.place), 3):
-        sigma = np.linalg.norm(np.mean(traced.located.shared_px[third], axis=0))
+        sigma = np.linalg.norm(np.mean(traced.solved.shared_px[third], axis=0))
         assert sigma < 0.12 and abs(np.mean(off[third])) < 0.02 + 3 * sigma
 
 

@@ -1,0 +1,266 @@
+"""Damped Gauss–Newton for the positions of all segments, their shading and the lens blur together.
+
+The normal matrix has the form of an arrow: one position for each segment, and one block of what all
+share, some hundred unknowns, to which it is reduced (Schur's complement). The shading is linear, so
+that at each step it is the most probable one at these positions and this blur (variable projection:
+Golub and Pereyra 1973, in Kaufman's form).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from vision.wire.shaded_segments import ShadedSegments
+from vision.wire.shading import (
+    LEAST_POWER,
+    LONGEST_PX,
+    Equations,
+    PositionEquations,
+    stiffness,
+    wave_prior,
+)
+
+# [steps] Gauss–Newton takes 4 to 10. Set by eye. Study: starts.py.
+_MOST_STEPS = 40
+# [1] Longest step of the blur's logarithm. Set by eye. Study: starts.py.
+_LONGEST_LOG = 0.3
+# [px] A segment that goes farther sees something else. Set by eye. Study: starts.py.
+_FARTHEST_PX = 4.0
+# [1] First damping, of the median segment's information: 1e-6 to 1e-2 take 4 to 10 steps alike.
+# Study: starts.py.
+_DAMPING = 1e-3
+# [1] Damping at which the descent ends. Study: starts.py.
+_MOST_DAMPING = 1e3
+# [1] Damping is multiplied by this after a step that does not help. The solution does not depend
+# on it. Derived.
+_DAMPING_UP = 10.0
+# [1] Damping is divided by this after a step that helps. The solution does not depend on it. Derived.
+_DAMPING_DOWN = 5.0
+# [1] Below this share of the first damping there is none. The solution does not depend on it. Derived.
+_LEAST_DAMPING_SHARE = 1e-2
+# [chi²] The descent ends where a step would gain less by what all share, which it moves by a
+# seventh of a sigma at most. Study: starts.py.
+_CONVERGED_SHARED = 0.02
+# [chi²] And less in the mean by a segment's own position: 0.03 sigma. Study: starts.py.
+_CONVERGED_EACH = 1e-3
+
+
+@dataclass(frozen=True)
+class Shared:
+    """Hold what all segments share, and where they lie by it.
+
+    shift_px (s,): positions. shared_px (s, k): by how much each moves with one sigma of each of k
+    independent causes that all share. coefficients (s, terms): the shading of each.
+    evidence: minus twice the log evidence of positions and blur, the shading integrated out.
+    """
+
+    shift_px: np.ndarray
+    shared_px: np.ndarray
+    coefficients: np.ndarray
+    blur_px: float
+    evidence: float
+
+
+def descend(here: "Point", coarse: float = 1.0) -> Shared:
+    """Descend from a point by damped Gauss–Newton, with the segments' weights as they are there.
+
+    Weights that changed at each step would let segments that a shift spoils count ever less.
+    coarse: factor on what a step may still gain where the descent ends. The last step is taken
+    without evaluating the point that it leads to.
+    """
+    arrow = Arrow(here)
+    damping = _DAMPING
+    for _ in range(_MOST_STEPS):
+        step = arrow.step(damping)
+        gains_each = coarse * _CONVERGED_EACH * len(here.shift_px)
+        if step.gain_shared < coarse * _CONVERGED_SHARED and step.gain_each < gains_each:
+            break
+        there = here.moved(step.shift_px, step.log_blur)
+        if there.misfit > here.misfit:
+            damping = max(_DAMPING_UP * damping, _DAMPING)
+            if damping > _MOST_DAMPING:
+                break
+            continue
+        is_damped = damping > _LEAST_DAMPING_SHARE * _DAMPING
+        damping = damping / _DAMPING_DOWN if is_damped else 0.0
+        here = there
+        arrow = Arrow(here)
+    return arrow.solve(damping)
+
+
+@dataclass(frozen=True)
+class Point:
+    """Hold positions and blur, and the most probable shading there.
+
+    left: normal matrix (size, size) of the shading. coefficients (s, terms): of each segment.
+    chi2 (s,): of each segment. misfit: all chi² by weight, and what the priors add.
+    stiff (size, size): prior of the shading. robust (s,): weight of each segment.
+    """
+
+    task: ShadedSegments
+    shift_px: np.ndarray
+    log_blur: float
+    robust: np.ndarray
+    stiff: np.ndarray
+    equations: Equations
+    left: np.ndarray
+    coefficients: np.ndarray
+    chi2: np.ndarray
+    misfit: float
+
+    @classmethod
+    def at(
+        cls,
+        task: ShadedSegments,
+        shift_px: np.ndarray,
+        log_blur: float,
+        robust: np.ndarray,
+        stiff: np.ndarray | None = None,
+        equations: Equations | None = None,
+    ) -> "Point":
+        """Return the point at these positions and this blur.
+
+        stiff: the shading's prior, by the contrast seen here where None. equations: where they are
+        known already.
+        """
+        if equations is None:
+            equations = Equations(task.pieces.moved(shift_px), float(np.exp(log_blur)), task.terms)
+        if stiff is None:
+            stiff = stiffness(wave_prior(equations.pieces, task.terms), task.knots)
+        weights = task.knot_weights
+        left, right = equations.shared(weights, robust)
+        left += stiff
+        shared = cho_solve(cho_factor(left, check_finite=False), right, check_finite=False)
+        coefficients = weights @ shared.reshape(weights.shape[1], task.terms)
+        chi2 = equations.chi2(coefficients)
+        of_priors = shared @ stiff @ shared + task.blur_deviation(log_blur) ** 2
+        misfit = float(robust @ chi2 + of_priors)
+        return cls(
+            task, shift_px, log_blur, robust, stiff, equations, left, coefficients, chi2, misfit
+        )
+
+    @classmethod
+    def at_common_shift(
+        cls,
+        task: ShadedSegments,
+        shift_px: float,
+        log_blur: float,
+        robust: np.ndarray | None = None,
+    ) -> "Point":
+        """Return the point where all segments have one shift, px, under this blur.
+
+        robust (s,): weight of each segment; None: all count alike.
+        """
+        every = np.ones(len(task.pieces))
+        return cls.at(task, shift_px * every, log_blur, every if robust is None else robust)
+
+    @property
+    def evidence(self) -> float:
+        """Return minus twice the log evidence of positions and blur, the shading integrated out."""
+        log_posterior = np.linalg.slogdet(self.left)[1]
+        log_prior = np.linalg.slogdet(self.stiff)[1]
+        return float(self.misfit + log_posterior - log_prior)
+
+    def moved(self, step_px: np.ndarray, log_blur_step: float) -> "Point":
+        """Return the point a step farther on, with the weights of this one."""
+        shift = self.shift_px + np.clip(step_px, -LONGEST_PX, LONGEST_PX)
+        return self.at(
+            self.task,
+            np.clip(shift, -_FARTHEST_PX, _FARTHEST_PX),
+            self.log_blur + float(np.clip(log_blur_step, -_LONGEST_LOG, _LONGEST_LOG)),
+            self.robust,
+            self.stiff,
+        )
+
+    def weighted(self) -> "Point":
+        """Return the point with the segments weighed by their misfit.
+
+        Those well above the median hardly count. What all leave beyond noise is an error of the
+        model: where that is large the priors count for as much as where noise is.
+        """
+        misfit = self.chi2 / self.task.pieces.freedom
+        usual = max(float(np.median(misfit)), 1e-9)
+        robust = 1.0 / np.maximum(misfit / usual, 1.0) ** 2 / max(usual, 1.0)
+        return self.at(self.task, self.shift_px, self.log_blur, robust, equations=self.equations)
+
+
+@dataclass(frozen=True)
+class Step:
+    """Hold a step of positions (s,), px, and of the blur's logarithm.
+
+    gain_shared, gain_each: by how much chi² is expected to fall by what all share, and by
+    positions.
+    """
+
+    shift_px: np.ndarray
+    log_blur: float
+    gain_shared: float
+    gain_each: float
+
+
+class Arrow:
+    """Normal equations at a point: a diagonal of positions, and a block of what all share.
+
+    power, right (s,): matrix and right side of each segment's position.
+    cross (s, size + 1): positions with shading and blur. shared (size + 1, size + 1): shading and blur.
+    log_blur_right: right side of the blur; that of the shading is 0 at its most probable value.
+    """
+
+    def __init__(self, point: Point):
+        task = point.task
+        linear = point.equations.linearised(point.coefficients)
+        by_shading = task.knot_weights[:, :, None] * linear.rod[:, None, 0]
+        by_shading = by_shading.reshape(len(by_shading), -1)
+        self.point = point
+        self.power = linear.power
+        self.right = linear.gram[:, 0, 2]
+        self.cross = np.concatenate([by_shading, linear.gram[:, 0, 1:2]], axis=1)
+        self.shared = _shared_block(point, linear)
+        from_prior = task.blur_deviation(point.log_blur) / task.blur_sigma
+        self.log_blur_right = point.robust @ linear.gram[:, 1, 2] - from_prior
+
+    def step(self, damping: float) -> Step:
+        """Return the damped Gauss–Newton step, by Schur's complement of the positions."""
+        robust = self.point.robust
+        power = robust * self.power
+        power = power + damping * np.median(power) + LEAST_POWER
+        cross = robust[:, None] * self.cross
+        right = robust * self.right
+        own = cross / power[:, None]
+        left = self.shared - cross.T @ own
+        left[-1, -1] += damping * self.shared[-1, -1]
+        shared_right = -own.T @ right
+        shared_right[-1] += self.log_blur_right
+        shared = cho_solve(cho_factor(left, check_finite=False), shared_right, check_finite=False)
+        return Step(
+            shift_px=(right - cross @ shared) / power,
+            log_blur=float(shared[-1]),
+            gain_shared=float(shared_right @ shared),
+            gain_each=float(right @ (right / power)),
+        )
+
+    def solve(self, damping: float) -> Shared:
+        """Return the solution a step farther on, with the sensitivity of positions to what all
+        share.
+        """
+        point = self.point
+        step = self.step(damping)
+        own = self.cross / self.power[:, None]
+        left = self.shared - (point.robust[:, None] * self.cross).T @ own
+        log_blur = point.log_blur + np.clip(step.log_blur, -_LONGEST_LOG, _LONGEST_LOG)
+        return Shared(
+            shift_px=point.shift_px + np.clip(step.shift_px, -LONGEST_PX, LONGEST_PX),
+            shared_px=np.linalg.solve(np.linalg.cholesky(left), own.T).T,
+            coefficients=point.coefficients,
+            blur_px=float(np.exp(log_blur)),
+            evidence=point.evidence,
+        )
+
+
+def _shared_block(point: Point, linear: PositionEquations) -> np.ndarray:
+    """Return the normal matrix (size + 1, size + 1) of shading and, last, the blur's logarithm."""
+    weighted_knots = point.task.knot_weights * point.robust[:, None]
+    by_shading = (weighted_knots.T @ linear.rod[:, 1]).ravel()
+    of_blur = point.robust @ linear.gram[:, 1, 1] + point.task.blur_sigma**-2.0
+    return np.block([[point.left, by_shading[:, None]], [by_shading[None], of_blur]])
