@@ -7,9 +7,9 @@ import argparse
 from pathlib import Path
 
 from bench.base.doubts import Doubts
-from bench.commands.calibrate_gauges import calibrate_gauges, chosen_trials
 from bench.gauges.certificate import page
 from bench.session.session_check import checked_session
+from bench.workflows.gauge_calibration import calibrate_gauges, chosen_trials
 
 HERE = Path(__file__).resolve().parent
 

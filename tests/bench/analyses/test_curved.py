@@ -8,10 +8,10 @@ import pytest
 from bench.analyses.curved import TOO_FEW, curved
 from bench.analyses.turning_phi import turn, with_turn
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate
 from bench.records.trial_result import EstimateRow, FeltAt
 from bench.rig.simulate import simulate
 from bench.session.whisker import Whisker
+from bench.workflows.session_evaluation import evaluate
 from estimator import curvature
 from tests.scenes.rig_sessions import protocol_file
 from vision.truth.value import Value

@@ -27,7 +27,7 @@ import numpy as np  # noqa: E402
 
 from bench.analyses.left_out import NAMES  # noqa: E402
 from bench.base.settings import Settings  # noqa: E402
-from bench.commands.evaluate import evaluate  # noqa: E402
+from bench.workflows.session_evaluation import evaluate  # noqa: E402
 from vision.fit.blocks import BAR_PRIOR, REST_PRIOR_MM  # noqa: E402
 from vision.geometry.centreline import REST_POWERS, centrelines, rotation_z, simpson, tangent_growth  # noqa: E402
 from vision.geometry.rods import Wire  # noqa: E402

@@ -7,9 +7,9 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.commands import robot, robot_trade
-from bench.commands.robot import Answer, Converter
-from bench.commands.robot_trade import front, pooled, trade_lines
+from bench.workflows import robot_answers, robot_trade
+from bench.workflows.robot_answers import Answer, Converter
+from bench.workflows.robot_trade import front, pooled, trade_lines
 
 RATE_HZ = 2000.0
 
@@ -47,8 +47,10 @@ def test_a_cut_off_beyond_half_the_rate_is_none():
 def test_the_window_ends_where_the_push_does(push_deg, speed_deg_s):
     """θ and half its window, as `estimator.signal.moment_at` takes it, are the push."""
     push, speed = np.radians([push_deg, speed_deg_s])
-    theta = robot._theta_rad(push, speed)
-    half = min(max(robot.HALF_WINDOW_RAD, speed * robot.HUM_PERIOD_S / 2), 0.9 * theta)
+    theta = robot_answers._theta_rad(push, speed)
+    half = min(
+        max(robot_answers.HALF_WINDOW_RAD, speed * robot_answers.HUM_PERIOD_S / 2), 0.9 * theta
+    )
     assert theta + half == pytest.approx(push)
 
 
@@ -87,7 +89,7 @@ def test_the_front_is_what_no_other_beats():
 
 def test_a_recorded_session(steel_signals, exact_vision, monkeypatch, tmp_path):
     """b60_4: pushed further, (10) errs by less; its filter's delay is in the time; a coarse rate finds no touch."""
-    monkeypatch.setattr(robot, "PUSHES_DEG", (1.0, 3.0, 30.0))
+    monkeypatch.setattr(robot_answers, "PUSHES_DEG", (1.0, 3.0, 30.0))
     monkeypatch.setattr(
         robot_trade, "CONVERTERS", (Converter(), Converter(cutoff_Hz=20.0), Converter(every=100))
     )

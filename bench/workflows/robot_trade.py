@@ -22,13 +22,13 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
 from bench.base.workers import Workers
-from bench.commands.robot import Converter, Task, answered, range_of
 from bench.report.evaluation import finished
 from bench.session.inside import check_outside
 from bench.session.session_check import checked_session
 from bench.session.signals import read_signals
 from bench.trials.lost import evaluate_units
 from bench.trials.of_session import placed_units, require_some, trials_with_whisks, with_gauges
+from bench.workflows.robot_answers import Converter, Task, answered, range_of
 
 FIGURE = "robot_trade"
 AS_RECORDED = Converter()

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from bench.base.doubts import Doubts
-from bench.commands.check import look_ahead
 from bench.session.frame_times import FrameTimes
 from bench.session.session_check import checked_session
+from bench.workflows.preflight import look_ahead
 from tests.scenes.faults import FAULTS, TRIAL, change_picture
 
 

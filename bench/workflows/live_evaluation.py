@@ -13,11 +13,11 @@ from pathlib import Path
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.commands.evaluate import DONE, evaluate
 from bench.session.footage import visible
 from bench.session.inside import check_outside
 from bench.session.session_check import checked_views
 from bench.trials.estimates import estimators
+from bench.workflows.session_evaluation import DONE, evaluate
 from vision.geometry.refusals import Refused
 
 _ANEW = (
