@@ -7,7 +7,6 @@ time of the functions that carry each refinement, with all that they call; of pa
 derivatives' columns. Of large bending it is what centrelines take longer than those of a beam of small angles, timed
 beside each other; of the others what a plainer model would do in their place is not taken off, so that the numbers are
 bounds from above. The time of a whisk is all of seeing and feeling, apart from calibration and tables.
-`bench.analyses.left_out.COST_PERCENT` holds these numbers, rounded up.
 """
 
 import cProfile
