@@ -109,7 +109,7 @@ class Run:
         from bench.report.paper import session_figures
 
         with style():
-            return session_figures(self.results())
+            return {one.name: one.drawing for one in session_figures(self.results())}
 
 
 @dataclass(frozen=True, eq=False)

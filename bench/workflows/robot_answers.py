@@ -1,13 +1,13 @@
-"""What a robot would have answered, and when: the recorded signals of a whisk seen through another converter.
+"""Estimates of a robot, and when it has them: recorded whisks through another filter and converter.
 
-A robot has no sample of the future. Its filter is causal, and at the time of its answer the stroke ends: felt touch,
-zero and moments are made of what came before. Nothing that follows the contact takes out a drift. The time counts from
-the touch as seen.
+A robot has no sample of the future. Its filter is causal, and the stroke ends when it estimates:
+felt touch, zero and moments are made of what came before. Nothing that follows the contact takes
+out a drift. The time counts from the touch as seen.
 """
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi
@@ -32,13 +32,18 @@ from estimator.whisk import Whisk
 PUSHES_DEG = (0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0)
 _ORDER = 4  # of the filter (Butterworth), as ahead of the paper's converter
 _DELAY = 2.6131 / (2.0 * math.pi)  # of such a filter for slow signals, over its cut-off
-_PART = 1.9  # of a small push, whose window is from θ/10 to 1.9 θ
+# [1] Push over the pushing angle θ where the push is small: there the window is from θ/10 to 1.9 θ
+# (`estimator.signal.moment_at`). Stated.
+_SMALL_PUSH = 1.9
 
 
 @dataclass(frozen=True)
 class Converter:
-    """What stands between gauges and robot: a low-pass (None: as recorded), one sample in `every`, and bits over the
-    range that the session's signals fill (None: as recorded)."""
+    """What stands between gauges and robot; None leaves a property as recorded.
+
+    cutoff_Hz: of a low-pass. every: one sample in so many is kept. bits: over the range that the
+    session's signals fill.
+    """
 
     cutoff_Hz: float | None = None
     every: int = 1
@@ -46,29 +51,36 @@ class Converter:
 
     @property
     def delay_s(self) -> float:
-        """By which the filter makes all that is felt late."""
+        """Return the time by which the filter delays slow signals."""
         return _DELAY / self.cutoff_Hz if self.cutoff_Hz else 0.0
 
-    def passes(self, rate_Hz: float) -> bool:
-        """Whether there is such a filter, and less to be had than was recorded."""
+    def can_filter(self, rate_Hz: float) -> bool:
+        """Return whether the filter passes less than was recorded at this sample rate."""
         return self.cutoff_Hz is None or self.cutoff_Hz < rate_Hz / 2
 
-    def converted(self, channels: np.ndarray, rate_Hz: float, range_V: np.ndarray) -> np.ndarray:
-        """Channels (n, 2), filtered and rounded; not thinned. range_V (2,): what the bits are spread over."""
+    def convert(self, channels: np.ndarray, rate_Hz: float, range_V: np.ndarray) -> np.ndarray:
+        """Return the channels (n, 2) filtered and rounded, every sample of them.
+
+        range_V (2,): what the bits are spread over.
+        """
         if self.cutoff_Hz:
             sections = butter(_ORDER, self.cutoff_Hz, fs=rate_Hz, output="sos")
-            begin = sosfilt_zi(sections)[:, :, None] * channels[0]
-            channels, _ = sosfilt(sections, channels, axis=0, zi=begin)
+            at_rest = sosfilt_zi(sections)[:, :, None] * channels[0]
+            channels, _ = sosfilt(sections, channels, axis=0, zi=at_rest)
         if self.bits:
-            step = range_V / 2.0**self.bits
-            channels = np.round(channels / step) * step
+            step_V = range_V / 2.0**self.bits
+            channels = np.round(channels / step_V) * step_V
         return channels
 
 
 @dataclass(frozen=True)
 class Answer:
-    """One estimator's answer about a whisk that was pushed by so much, seconds since touch: the error to be expected by
-    (13), (14) and docs/maps.md, the error and the noise's sigma as stated (NaN: no distance), all in % of the truth."""
+    """One estimator's distance for a whisk through a converter, in % of the true distance.
+
+    push_deg: of the motor since touch. time_s: from touch to the estimate. expected_percent: the
+    error by (13), (14) and docs/maps.md. error_percent: measured; noise_percent: its stated sigma;
+    NaN without a distance.
+    """
 
     estimator: str
     converter: Converter
@@ -83,7 +95,10 @@ class Answer:
 
 @dataclass(frozen=True)
 class Task:
-    """A trial to be answered by each converter."""
+    """A trial whose whisks are estimated through each converter.
+
+    range_V (2,): what the bits of a converter are spread over.
+    """
 
     unit: Unit
     result: TrialResult
@@ -91,122 +106,181 @@ class Task:
     range_V: np.ndarray
 
 
+@dataclass(frozen=True)
+class _ConvertedWhisk:
+    """A whisk whose truth is sound, and its stroke through a converter."""
+
+    task: Task
+    readout: Readout
+    seen: SeenWhisk
+    converter: Converter
+    stroke: FeltStroke
+    rate_Hz: float
+
+    @property
+    def touch_s(self) -> float:
+        """Return the time of the touch as seen; NaN where the motor does not come so far."""
+        return _time_at(self.stroke, self.seen.touch_rad.value)
+
+    @property
+    def radii_mm(self) -> tuple[float, float]:
+        """Return the radii of bar and whisker."""
+        bar_mm = 0.5 * self.task.result.trial.bar_diameter_mm
+        return bar_mm, 0.5 * self.task.unit.session.whisker.diameter_mm
+
+
 def range_of(signals: Signals) -> np.ndarray:
-    """What the channels span (2,)."""
+    """Return the range (2,) of the channels."""
     return np.nan_to_num(np.ptp(_channels(signals), axis=0))
 
 
 def _channels(signals: Signals) -> np.ndarray:
+    """Return both channels (n, 2)."""
     return np.stack([signals.y, signals.z], axis=1)
 
 
-def answered(task: Task) -> list[Answer]:
-    """All answers about the measured whisks whose truth is sound; of a saturated stroke there are none."""
+def answers_of_trial(task: Task) -> list[Answer]:
+    """Return all answers about the measured whisks of a trial whose truth is sound.
+
+    Of a saturated stroke there are none.
+    """
     signals = read_signals(task.unit.trial)
     readout, _ = readout_of(task.unit, signals.kind)
     if readout is None or task.result.trial.purpose != "measure":
         return []
-    felt = task.result.felt.whisks
-    whisks = zip(forward_strokes(signals), task.result.seen.whisks, felt)
-    sound = [(where, seen) for where, seen, own in whisks if seen.has_truth and is_sound(seen, own)]
-    converters = [converter for converter in task.converters if converter.passes(signals.rate_Hz)]
-    found = (
-        _of_whisk(task, signals, readout, converter, *whisk)
-        for converter in converters
-        for whisk in sound
-    )
-    return [answer for of_whisk in found for answer in of_whisk]
+    strokes = forward_strokes(signals)
+    seen_whisks = task.result.seen.whisks
+    felt_whisks = task.result.felt.whisks
+    found = []
+    for converter in task.converters:
+        if not converter.can_filter(signals.rate_Hz):
+            continue
+        for where, seen, felt in zip(strokes, seen_whisks, felt_whisks):
+            if not seen.has_truth or not is_sound(seen, felt):
+                continue
+            stroke = _convert_stroke(signals, where, converter, task.range_V)
+            if stroke is not None:
+                rate_Hz = signals.rate_Hz / converter.every
+                whisk = _ConvertedWhisk(task, readout, seen, converter, stroke, rate_Hz)
+                found += _answers_of_whisk(whisk)
+    return found
 
 
-def _of_whisk(
-    task: Task,
-    signals: Signals,
-    readout: Readout,
-    converter: Converter,
-    where: slice,
-    seen: SeenWhisk,
-) -> Iterator[Answer]:
-    """Of one stroke as this converter gives it, cut at each push."""
-    raw = _channels(signals)[: where.stop]
-    raw[where] = off_the_rails(raw[where]) if signals.kind == "V" else raw[where]
+def _convert_stroke(
+    signals: Signals, where: slice, converter: Converter, range_V: np.ndarray
+) -> FeltStroke | None:
+    """Return a stroke as the converter gives it; None where a sample is saturated or missing."""
+    raw = _channels(signals)[: where.stop]  # from the recording's begin: the filter is causal
+    if signals.kind == "V":
+        raw[where] = off_the_rails(raw[where])
     if not np.isfinite(raw).all():
-        return
-    own = converter.converted(raw, signals.rate_Hz, task.range_V)[where][:: converter.every]
-    time_s, motor = (
-        values[where][:: converter.every] for values in (signals.time_s, signals.motor_rad)
-    )
-    stroke = FeltStroke(time_s, motor, own, own)
-    rate_Hz = signals.rate_Hz / converter.every
+        return None
+    channels = converter.convert(raw, signals.rate_Hz, range_V)[where][:: converter.every]
+    time_s = signals.time_s[where][:: converter.every]
+    motor_rad = signals.motor_rad[where][:: converter.every]
+    return FeltStroke(time_s, motor_rad, channels, channels)
+
+
+def _answers_of_whisk(whisk: _ConvertedWhisk) -> Iterator[Answer]:
+    """Yield the answers about a whisk at each push that its stroke reaches."""
+    stroke = whisk.stroke
     for push_deg in PUSHES_DEG:
-        end_s = _time_at(stroke, seen.touch_rad.value + math.radians(push_deg)) + converter.delay_s
-        if not end_s <= time_s[-1]:
+        push_rad = math.radians(push_deg)
+        pushed_s = _time_at(stroke, whisk.seen.touch_rad.value + push_rad)
+        end_s = pushed_s + whisk.converter.delay_s
+        if not end_s <= stroke.time_s[-1]:  # NaN, too
             return
-        now = time_s <= end_s
-        cut = replace(
-            stroke, time_s=time_s[now], motor_rad=motor[now], channels=own[now], filtered=own[now]
-        )
-        late_s = end_s - _time_at(stroke, seen.touch_rad.value) + 1.0 / rate_Hz
-        about = converter, math.degrees(stroke.speed_rad_s), rate_Hz, push_deg, late_s
-        theta_rad = _theta_rad(math.radians(push_deg), stroke.speed_rad_s)
-        yield from _answers(task, readout, cut, theta_rad, seen, about)
+        now = stroke.time_s <= end_s
+        channels = stroke.channels[now]
+        cut = FeltStroke(stroke.time_s[now], stroke.motor_rad[now], channels, channels)
+        time_s = end_s - whisk.touch_s + 1.0 / whisk.rate_Hz
+        theta_rad = _theta_rad(push_rad, stroke.speed_rad_s)
+        yield from _answers_at(whisk, cut, theta_rad, push_deg, time_s)
 
 
 def _time_at(stroke: FeltStroke, motor_rad: float) -> float:
-    """When the motor is there; NaN where it does not come so far."""
+    """Return when the motor is at an angle, s; NaN where it does not come so far."""
     if not stroke.motor_rad[0] <= motor_rad <= stroke.motor_rad.max():
         return math.nan
     return float(np.interp(motor_rad, np.maximum.accumulate(stroke.motor_rad), stroke.time_s))
 
 
 def _theta_rad(push_rad: float, speed_rad_s: float) -> float:
-    """The pushing angle whose window (`estimator.signal.moment_at`) ends where the push does."""
-    half = max(HALF_WINDOW_RAD, speed_rad_s * HUM_PERIOD_S / 2)
-    return max(push_rad - half, push_rad / _PART)
+    """Return the pushing angle whose window (`estimator.signal.moment_at`) ends with the push."""
+    half_rad = max(HALF_WINDOW_RAD, speed_rad_s * HUM_PERIOD_S / 2)
+    return max(push_rad - half_rad, push_rad / _SMALL_PUSH)
 
 
-def _answers(
-    task: Task,
-    readout: Readout,
-    stroke: FeltStroke,
-    theta_rad: float,
-    seen: SeenWhisk,
-    about: tuple,
+def _answers_at(
+    whisk: _ConvertedWhisk, cut: FeltStroke, theta_rad: float, push_deg: float, time_s: float
 ) -> Iterator[Answer]:
-    settings, beam = task.unit.settings, task.unit.session.whisker.beam
-    asked = estimators(settings.estimators)
-    radii_mm = 0.5 * task.result.trial.bar_diameter_mm, 0.5 * task.unit.session.whisker.diameter_mm
-    _, whisk = felt_whisk(stroke, readout, task.unit.drift_rate, beam, theta_rad)
-    rows = () if isinstance(whisk, str) else answers(whisk, asked, settings, radii_mm)
-    found, d_x = {row.estimator: row for row in rows}, seen.d_x_mm.value
-    for row in answers(
-        _expected(seen, theta_rad, sum(radii_mm), settings, beam), asked, settings, radii_mm
-    ):
-        expected = 100.0 * (row.d_x_est_mm.value / d_x - 1.0)
+    """Yield each estimator's answer from a stroke that is cut at a push."""
+    unit = whisk.task.unit
+    settings = unit.settings
+    by_name = estimators(settings.estimators)
+    beam = unit.session.whisker.beam
+    _, felt = felt_whisk(cut, whisk.readout, unit.drift_rate, beam, theta_rad)
+    measured = {}
+    if isinstance(felt, Whisk):
+        rows = answers(felt, by_name, settings, whisk.radii_mm)
+        measured = {row.estimator: row for row in rows}
+    d_x_mm = whisk.seen.d_x_mm.value
+    model = _expected_whisk(whisk.seen, theta_rad, sum(whisk.radii_mm), settings, beam)
+    for expected in answers(model, by_name, settings, whisk.radii_mm):
+        row = measured.get(expected.estimator)
+        error_percent = math.nan
+        noise_percent = math.nan
+        if row is not None:
+            error_percent = _error_percent(row, d_x_mm)
+            noise_percent = 100.0 * row.d_x_est_sigma_alpha_exact_mm / d_x_mm
         yield Answer(
-            row.estimator, *about, expected, *_error_and_noise(found.get(row.estimator), d_x)
+            estimator=expected.estimator,
+            converter=whisk.converter,
+            speed_deg_s=math.degrees(whisk.stroke.speed_rad_s),
+            rate_Hz=whisk.rate_Hz,
+            push_deg=push_deg,
+            time_s=time_s,
+            expected_percent=_error_percent(expected, d_x_mm),
+            error_percent=error_percent,
+            noise_percent=noise_percent,
         )
 
 
-def _error_and_noise(row: EstimateRow | None, d_x_mm: float) -> tuple[float, float]:
-    """Of an answer, in % of the truth; NaN where there is none."""
-    if row is None:
-        return math.nan, math.nan
-    return 100.0 * (
-        row.d_x_est_mm.value / d_x_mm - 1.0
-    ), 100.0 * row.d_x_est_sigma_alpha_exact_mm / d_x_mm
+def _error_percent(row: EstimateRow, d_x_mm: float) -> float:
+    """Return an estimate's error in % of the true distance."""
+    return 100.0 * (row.d_x_est_mm.value / d_x_mm - 1.0)
 
 
-def _expected(
+def _expected_whisk(
     seen: SeenWhisk, theta_rad: float, reach_mm: float, settings: Settings, beam: Beam
 ) -> Whisk:
-    """The whisk as (13) and (14) have it for the slope and friction seen, with the first order of what they leave out."""
-    alpha, beta, d_x = seen_friction(seen)[0], seen.beta_rad.value, seen.d_x_mm.value
-    alpha = max(alpha, 0.0) if np.isfinite(alpha) else settings.alpha_est_rad
-    phi, left = float(slip_angle(beta, alpha)), 1.0 - beam.taper * d_x / beam.length_mm
-    share = first_order.leaning(theta_rad, seen.psi_rad.value, phi, alpha)
+    """Return the whisk that (13) and (14) predict for the slope and friction seen.
+
+    What they leave out changes its moments to first order (docs/maps.md). reach_mm: radii of bar
+    and whisker together, NaN where not known.
+    """
+    d_x_mm = seen.d_x_mm.value
+    beta_rad = seen.beta_rad.value
+    alpha_rad, _ = seen_friction(seen)
+    alpha_rad = max(alpha_rad, 0.0) if np.isfinite(alpha_rad) else settings.alpha_est_rad
+    phi_rad = float(slip_angle(beta_rad, alpha_rad))
+    share = first_order.leaning(theta_rad, seen.psi_rad.value, phi_rad, alpha_rad)
     if np.isfinite(reach_mm):
-        share += first_order.rolling(theta_rad, reach_mm, phi, alpha, d_x, left)
-    felt = np.array(
-        moments(float(beam.as_cylinder_mm(d_x)), theta_rad, beta, alpha, beam.C_Nmm2)
-    ) / (1.0 + share)
-    return Whisk(*(np.zeros(0),) * 4, theta_rad, *felt.tolist(), np.zeros((2, 2)), 0.0, beam)
+        left = 1.0 - beam.taper * d_x_mm / beam.length_mm  # of the base's diameter
+        share += first_order.rolling(theta_rad, reach_mm, phi_rad, alpha_rad, d_x_mm, left)
+    as_cylinder_mm = float(beam.as_cylinder_mm(d_x_mm))
+    moments_Nmm = np.array(moments(as_cylinder_mm, theta_rad, beta_rad, alpha_rad, beam.C_Nmm2))
+    m_y_Nmm, m_z_Nmm = (moments_Nmm / (1.0 + share)).tolist()
+    no_samples = np.zeros(0)
+    return Whisk(
+        time_s=no_samples,
+        theta_rad=no_samples,
+        m_y_Nmm=no_samples,
+        m_z_Nmm=no_samples,
+        theta_at_rad=theta_rad,
+        m_y_at_Nmm=m_y_Nmm,
+        m_z_at_Nmm=m_z_Nmm,
+        covariance_at=np.zeros((2, 2)),
+        theta_sigma_rad=0.0,
+        beam=beam,
+    )

@@ -28,7 +28,7 @@ from bench.session.session_check import checked_session
 from bench.session.signals import read_signals
 from bench.trials.lost import evaluate_units
 from bench.trials.of_session import placed_units, require_some, trials_with_whisks, with_gauges
-from bench.workflows.robot_answers import Converter, Task, answered, range_of
+from bench.workflows.robot_answers import Converter, Task, answers_of_trial, range_of
 
 FIGURE = "robot_trade"
 AS_RECORDED = Converter()
@@ -123,7 +123,9 @@ def robot_trade(
             [range_of(read_signals(unit.trial)) for unit in chosen], axis=0, initial=0.0
         )
         tasks = [Task(unit, result, CONVERTERS, range_V) for unit, result in zip(chosen, results)]
-        answers = [answer for found in pool.run(answered, tasks, "answers") for answer in found]
+        answers = [
+            answer for found in pool.run(answers_of_trial, tasks, "answers") for answer in found
+        ]
     if not answers:
         raise BadInput(
             "no whisk has both a sound truth and moments; evaluate says why", file=session_path

@@ -19,26 +19,26 @@ def test_a_filter_makes_a_ramp_late_by_its_delay():
     time_s = np.arange(4000) / RATE_HZ
     ramp = np.stack([time_s, 3.0 * time_s], axis=1)
     converter = Converter(cutoff_Hz=20.0)
-    late = converter.converted(ramp, RATE_HZ, np.ones(2))
+    late = converter.convert(ramp, RATE_HZ, np.ones(2))
     np.testing.assert_allclose(
         late[-1], ramp[-1] - np.array([1.0, 3.0]) * converter.delay_s, rtol=1e-3
     )
-    still = converter.converted(np.full((50, 2), 0.7), RATE_HZ, np.ones(2))
+    still = converter.convert(np.full((50, 2), 0.7), RATE_HZ, np.ones(2))
     np.testing.assert_allclose(still, 0.7)  # it has been settled before
 
 
 def test_bits_round_to_their_step_of_the_range():
     rng = np.random.default_rng(1)
     own = rng.uniform(-1, 1, (500, 2))
-    rounded = Converter(bits=6).converted(own, RATE_HZ, np.array([2.0, 4.0]))
+    rounded = Converter(bits=6).convert(own, RATE_HZ, np.array([2.0, 4.0]))
     assert np.abs(rounded - own).max(axis=0) == pytest.approx([1 / 64, 2 / 64], rel=0.02)
     assert len(np.unique(rounded[:, 0])) <= 65
 
 
 def test_a_cut_off_beyond_half_the_rate_is_none():
-    assert not Converter(cutoff_Hz=1000.0).passes(RATE_HZ) and Converter(cutoff_Hz=400.0).passes(
-        RATE_HZ
-    )
+    assert not Converter(cutoff_Hz=1000.0).can_filter(RATE_HZ) and Converter(
+        cutoff_Hz=400.0
+    ).can_filter(RATE_HZ)
 
 
 @pytest.mark.parametrize(
