@@ -1,5 +1,6 @@
 """`whisker-bench calibrate gauges`: gauges.toml from a session's gauge trials, with its certificate."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -30,44 +31,43 @@ def calibrate_gauges_command(
     progress: bool = False,
     follow_links: bool = False,
 ) -> int:
-    """Calibrate, write `out` (TOML) and its certificate beside it as PDF, print it.
+    """Calibrate the gauges, write `out` (TOML) and its certificate beside it as PDF, and print it.
 
-    Returns 0, or 1 where the session is doubtful. every_trial: all trials with whisks, not only those marked "gauge".
-    Raises BadInput.
+    Return 0, or 1 with warnings. every_trial: all trials with whisks, not only those marked
+    "gauge". Raise BadInput.
     """
     doubts = Doubts()
     loaded = checked_session(session, doubts, follow_links=follow_links)
-    certificate = calibrate_gauges(
-        loaded, chosen_trials(loaded, every_trial), doubts, workers=workers, progress=progress
-    )
+    trials = trials_to_use(loaded, every_trial)
+    certificate = calibrate_gauges(loaded, trials, doubts, workers=workers, progress=progress)
     header = certificate.lines()
-    write_gauges(out, certificate.gauges, zeros(certificate.strokes), certificate.stiffness, header)
+    zeros = zeros_of(certificate.strokes)
+    write_gauges(out, certificate.gauges, zeros, certificate.stiffness, header)
     with whole_file(out.with_suffix(".pdf")) as temporary:
-        page(certificate).savefig(
-            temporary, metadata={"CreationDate": None, "Producer": None, "Creator": None}
-        )
-    print(
-        "\n".join(
-            [
-                *header,
-                "",
-                *(f"doubtful: {note}" for note in doubts.notes),
-                f"written: {out}, {out.stem}.pdf",
-            ]
-        )
-    )
+        undated = {"CreationDate": None, "Producer": None, "Creator": None}
+        page(certificate).savefig(temporary, metadata=undated)
+    print(*header, "", sep="\n")
+    for note in doubts.notes:
+        print(f"doubtful: {note}")
+    print(f"written: {out}, {out.stem}.pdf")
     return 1 if doubts.notes else 0
 
 
-def chosen_trials(session: Session, every_trial: bool) -> list[Trial]:
-    """Trials with volts that the coefficients may rest on. Raises BadInput where there is none."""
+def trials_to_use(session: Session, every_trial: bool) -> list[Trial]:
+    """Return the trials with volts that the coefficients are fitted to.
+
+    every_trial: not only those marked "gauge". Raise BadInput where there is none.
+    """
     if all(read_signals(trial).kind == "Nmm" for trial in session.trials):
         raise BadInput(
             "all signals.csv hold moments already (m_y_Nmm,m_z_Nmm): no gauge to calibrate",
             file="trials",
         )
-    wanted = ("gauge", "measure") if every_trial else ("gauge",)
-    trials = [t for t in session.trials if t.purpose in wanted and read_signals(t).kind == "V"]
+    purposes = ("gauge", "measure") if every_trial else ("gauge",)
+    trials = []
+    for trial in session.trials:
+        if trial.purpose in purposes and read_signals(trial).kind == "V":
+            trials.append(trial)
     if not trials:
         raise BadInput(
             'no trial with volts is marked purpose = "gauge"; mark them, or give --all',
@@ -84,24 +84,28 @@ def calibrate_gauges(
     workers: int = 1,
     progress: bool = False,
 ) -> Certificate:
-    """Coefficients from what the cameras and the gauges show of these trials. Raises BadInput."""
-    settings, names = Settings(), {trial.name for trial in trials}
+    """Fit the coefficients to what cameras and gauges show of these trials; return their
+    certificate.
+
+    The session's weight trials set its newtons. Raise BadInput.
+    """
+    names = {trial.name for trial in trials}
+    recorded = trials_with_whisks(session)
     with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
-        every = trials_with_whisks(session)
-        _, units = placed_units(session, every, Path(folder), settings, pool, doubts)
-        rate, _ = session_drift(units, pool)
-        made = fit_certificate(
-            [unit for unit in units if unit.trial.name in names], rate, pool, doubts
-        )
-    return made.in_newtons_of(
-        scale_by_weights(session.trials, made.gauges.all, *zeros(made.strokes))
-    )
+        _, units = placed_units(session, recorded, Path(folder), Settings(), pool, doubts)
+        drift_rate, _ = session_drift(units, pool)
+        chosen = [unit for unit in units if unit.trial.name in names]
+        certificate = fit_certificate(chosen, drift_rate, pool, doubts)
+    zero_V, scatter_V = zeros_of(certificate.strokes)
+    gauges = certificate.gauges.all
+    weighed = scale_by_weights(session.trials, gauges, zero_V, scatter_V)
+    return certificate.in_newtons_of(weighed)
 
 
-def zeros(strokes: tuple[FeltStroke, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Mean zero (2,) of the free strokes and the scatter of one, in volts."""
-    levels = np.array(
-        [touch.offset for touch in (stroke.touch() for stroke in strokes) if not touch.status]
-    )
-    scatter = levels.std(axis=0, ddof=1) if len(levels) > 1 else np.zeros(2)
-    return levels.mean(axis=0), scatter
+def zeros_of(strokes: Sequence[FeltStroke]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean zero (2,) of the free strokes and its standard deviation (2,), in volts."""
+    touches = [stroke.touch() for stroke in strokes]
+    levels_V = np.array([touch.offset for touch in touches if not touch.status])
+    if len(levels_V) < 2:
+        return levels_V.mean(axis=0), np.zeros(2)
+    return levels_V.mean(axis=0), levels_V.std(axis=0, ddof=1)

@@ -9,7 +9,7 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.workflows import robot_answers, robot_trade
 from bench.workflows.robot_answers import Answer, Converter
-from bench.workflows.robot_trade import front, pooled, trade_lines
+from bench.workflows.robot_trade import front, pool_answers, trade_lines
 
 RATE_HZ = 2000.0
 
@@ -63,7 +63,7 @@ def answer(error: float, time_s: float, estimator: str = "with_friction", **othe
 def test_bias_and_scatter_over_the_whisks():
     """Errors of 1 and 3 %: mean 2, scatter 1, RMS √5; expected 1 and 1 with a noise of 0.75: RMS 1.25."""
     nothing = answer(math.nan, 0.3, noise_percent=math.nan)
-    (point,) = pooled([answer(1.0, 0.3), answer(3.0, 0.3), nothing])
+    (point,) = pool_answers([answer(1.0, 0.3), answer(3.0, 0.3), nothing])
     assert (point.whisks, point.none, point.time_ms) == (2, 1, 300.0)
     measured = point.error_mean_percent, point.error_sd_percent, point.error_rms_percent
     assert measured == pytest.approx((2.0, 1.0, math.sqrt(5.0)))
@@ -72,18 +72,18 @@ def test_bias_and_scatter_over_the_whisks():
 
 def test_the_front_is_what_no_other_beats():
     pushed = {1.0: (0.1, 4.0), 2.0: (0.2, 2.0), 3.0: (0.3, 3.0), 4.0: (0.4, 1.0)}
-    points = pooled(
+    points = pool_answers(
         [answer(error, time_s, push_deg=push) for push, (time_s, error) in pushed.items()]
     )
-    assert front(points) == [True, True, False, True]
-    few = pooled(
+    assert front(points).tolist() == [True, True, False, True]
+    few = pool_answers(
         [
             *(answer(2.0, 0.3) for _ in range(4)),
             answer(0.1, 0.1, push_deg=1.0),
             *(answer(math.nan, 0.1, push_deg=1.0) for _ in range(3)),
         ]
     )
-    assert front(few) == [True, False]  # one of four whisks is another question
+    assert front(few).tolist() == [True, False]  # one of four whisks is another question
     assert len(list(trade_lines(points))) == 4
 
 
