@@ -41,7 +41,8 @@ def run(options: argparse.Namespace) -> int:
 
     single_thread()  # before NumPy is imported
     from bench.base.settings import Settings
-    from bench.workflows.robot_trade import robot_trade, trade_lines
+    from bench.workflows.robot_points import trade_lines
+    from bench.workflows.robot_trade import robot_trade
 
     settings = Settings(
         alpha_est_deg=options.alpha_est_deg,

@@ -77,33 +77,51 @@ def look_ahead(session: Session, doubts: Doubts) -> None:
     """
     if session.cameras_toml is None and session.board is not None:
         with doubts.guard():  # one board for all cameras: its first fault is enough
-            for name in session.board_sources:
-                for line in _board_warnings(session, name):
-                    doubts.note(line)
+            for name, source in session.board_sources.items():
+                _check_board_views(source, name, session.board)
+                picture = session.rig_pictures.get(name)
+                if picture is not None:
+                    _check_rig_board(picture, session.board, doubts)
     if session.whisker is not None:
         with doubts.guard():
             given_gauges(session)
-    rig: dict[str, np.ndarray | None] = {}
+    rig: dict[str, np.ndarray] = {}
     for name, picture in session.rig_pictures.items():
         with doubts.guard():
             rig[name] = rig_picture(picture)
     pushes_V: list[np.ndarray] = []
     for trial in session.trials:
-        if trial.purpose == "weight":
-            continue
-        with doubts.guard():
-            signals = read_signals(trial)
-            strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
-            if trial.purpose == "gauge" and signals.kind == "V":
-                pushes_V += _pushes_V(strokes)
-            # all of them first: a refusal says more than warnings of the same trial
-            for line in list(_trial_warnings(trial, signals, strokes, rig)):
-                doubts.note(f"{trial.place}: {line}")
+        if trial.purpose != "weight":
+            with doubts.guard():
+                signals = read_signals(trial)
+                strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
+                if trial.purpose == "gauge" and signals.kind == "V":
+                    pushes_V += _pushes_V(strokes)
+                _check_trial(trial, signals, strokes, rig, doubts)
     has_own_gauges = session.gauges_toml is not None or session.gauges is not None
     if not has_own_gauges and pushes_V and not in_two_directions(np.array(pushes_V)):
         doubts.note(
             f"trials: the gauge trials push in one direction, which does not fix both channels; {RECORD}"
         )
+
+
+def _check_trial(
+    trial: Trial,
+    signals: Signals,
+    strokes: Sequence[FeltStroke],
+    rig: dict[str, np.ndarray],
+    doubts: Doubts,
+) -> None:
+    """Add the warnings of a trial to `doubts`. rig: pictures of the rig, by camera. Raise
+    BadInput."""
+    times = frame_times(trial)
+    lines = [
+        *_gauge_warnings(strokes),
+        *_stroke_warnings(signals, strokes, times),
+        *_scene_warnings(trial, times, rig),
+    ]
+    for line in lines:
+        doubts.note(f"{trial.place}: {line}")
 
 
 def _pushes_V(strokes: Sequence[FeltStroke]) -> Iterator[np.ndarray]:
@@ -122,53 +140,39 @@ def _spread(count: int, wanted: int) -> list[int]:
     return np.unique(np.linspace(0, count - 1, wanted).astype(int)).tolist()
 
 
-def _board_warnings(session: Session, name: str) -> Iterator[str]:
-    """Yield a line where a camera's picture of the board on the rig is blurred.
-
-    Raise BadInput where the camera has too few views, where its board is not found as entered, or
-    not on the rig.
-    """
-    source = session.board_sources[name]
+def _check_board_views(source: Path, camera: str, board: Board) -> None:
+    """Raise BadInput where a camera has too few views, or its board is not found as entered."""
+    place = f"boards/{camera}"
     count = frame_count(source)
     if count < MIN_VIEWS:
         few = f"has {counted(count, 'view')}, {MIN_VIEWS} are the least and 15 are good"
-        raise BadInput(few, file=f"boards/{name}")
+        raise BadInput(few, file=place)
     frames = read_frames(source, _spread(count, _BOARD_PICTURES))
     greys = [grey for grey in frames.values() if grey is not None]
-    if not any(in_threads(lambda grey: _shows_board(grey, session.board), greys)):
+    if not any(in_threads(lambda grey: _shows_board(grey, board), greys)):
         none = f"the board is found in none of {counted(len(greys), 'picture')}"
-        raise BadInput(why_not_found(greys, session.board) or none, file=f"boards/{name}")
-    picture = session.rig_pictures.get(name)
-    grey = None if picture is None else rig_picture(picture)
-    if grey is None:
-        return
-    if len(find_corners(grey, session.board)) < MIN_CORNERS:
+        raise BadInput(why_not_found(greys, board) or none, file=place)
+
+
+def _check_rig_board(picture: Path, board: Board, doubts: Doubts) -> None:
+    """Add a warning where a camera's picture of the board on the rig is blurred.
+
+    Raise BadInput where the board is not in it.
+    """
+    place = f"boards/rig/{picture.name}"
+    grey = rig_picture(picture)
+    if len(find_corners(grey, board)) < MIN_CORNERS:
         hint = "the board must stand in view of every camera"
-        raise BadInput(
-            f"the board on the rig is not seen; {hint}", file=f"boards/rig/{picture.name}"
-        )
-    blur_px = edge_blur_px(grey, session.board)
+        raise BadInput(f"the board on the rig is not seen; {hint}", file=place)
+    blur_px = edge_blur_px(grey, board)
     if blur_px > _LARGEST_BLUR_PX:
         blurred = f"edges are blurred by {blur_px:.1f} px, {_LARGEST_BLUR_PX:g} is a lot"
-        yield f"boards/rig/{picture.name}: {blurred}: focus on the whisker, or let the camera rest"
+        doubts.note(f"{place}: {blurred}: focus on the whisker, or let the camera rest")
 
 
 def _shows_board(grey: np.ndarray, board: Board) -> bool:
     """Return whether a picture shows enough corners of the board for its pose."""
     return fixes_pose(find_corners(grey, board), board)
-
-
-def _trial_warnings(
-    trial: Trial,
-    signals: Signals,
-    strokes: Sequence[FeltStroke],
-    rig: dict[str, np.ndarray | None],
-) -> Iterator[str]:
-    """Yield a line for each fault of a trial. rig: pictures of the rig, by camera."""
-    times = frame_times(trial)
-    yield from _gauge_warnings(strokes)
-    yield from _stroke_warnings(signals, strokes, times)
-    yield from _scene_warnings(trial, times, rig)
 
 
 def _gauge_warnings(strokes: Sequence[FeltStroke]) -> Iterator[str]:
@@ -210,9 +214,7 @@ def _stroke_warnings(
             yield f"whisk {number} has {counted(free, 'frame')} before touch, {FEWEST_FREE} are needed"
 
 
-def _scene_warnings(
-    trial: Trial, times: FrameTimes, rig: dict[str, np.ndarray | None]
-) -> Iterator[str]:
+def _scene_warnings(trial: Trial, times: FrameTimes, rig: dict[str, np.ndarray]) -> Iterator[str]:
     """Yield a line for each camera whose scene is not the rig picture's, or whose exposure
     changes."""
     if not len(times):

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from bench.analyses.alphas import seen_friction
-from bench.base.settings import Settings
 from bench.gauges.felt import FeltStroke
 from bench.records.trial_result import EstimateRow, SeenWhisk, TrialResult
 from bench.session.rails import off_the_rails
@@ -24,7 +23,6 @@ from bench.trials.felt_trial import readout_of
 from bench.trials.readout import Readout, felt_whisk
 from bench.trials.unit import Unit
 from estimator import first_order
-from estimator.beam import Beam
 from estimator.signal import HALF_WINDOW_RAD, HUM_PERIOD_S
 from estimator.slip import moments, slip_angle
 from estimator.whisk import Whisk
@@ -215,18 +213,9 @@ def _answers_at(
     whisk: _ConvertedWhisk, cut: FeltStroke, theta_rad: float, push_deg: float, time_s: float
 ) -> Iterator[Answer]:
     """Yield each estimator's answer from a stroke that is cut at a push."""
-    unit = whisk.task.unit
-    settings = unit.settings
-    by_name = estimators(settings.estimators)
-    beam = unit.session.whisker.beam
-    _, felt = felt_whisk(cut, whisk.readout, unit.drift_rate, beam, theta_rad)
-    measured = {}
-    if isinstance(felt, Whisk):
-        rows = answers(felt, by_name, settings, whisk.radii_mm)
-        measured = {row.estimator: row for row in rows}
     d_x_mm = whisk.seen.d_x_mm.value
-    model = _expected_whisk(whisk.seen, theta_rad, sum(whisk.radii_mm), settings, beam)
-    for expected in answers(model, by_name, settings, whisk.radii_mm):
+    measured = {row.estimator: row for row in _measured_rows(whisk, cut, theta_rad)}
+    for expected in _estimate(whisk, _expected_whisk(whisk, theta_rad)):
         row = measured.get(expected.estimator)
         error_percent = math.nan
         noise_percent = math.nan
@@ -246,23 +235,43 @@ def _answers_at(
         )
 
 
+def _measured_rows(
+    whisk: _ConvertedWhisk, cut: FeltStroke, theta_rad: float
+) -> tuple[EstimateRow, ...]:
+    """Return each estimator's row from a stroke that is cut at a push; none where it does not hold
+    the whisk."""
+    unit = whisk.task.unit
+    beam = unit.session.whisker.beam
+    _, felt = felt_whisk(cut, whisk.readout, unit.drift_rate, beam, theta_rad)
+    return _estimate(whisk, felt) if isinstance(felt, Whisk) else ()
+
+
+def _estimate(whisk: _ConvertedWhisk, felt: Whisk) -> tuple[EstimateRow, ...]:
+    """Return each estimator's row."""
+    settings = whisk.task.unit.settings
+    return answers(felt, estimators(settings.estimators), settings, whisk.radii_mm)
+
+
 def _error_percent(row: EstimateRow, d_x_mm: float) -> float:
     """Return an estimate's error in % of the true distance."""
     return 100.0 * (row.d_x_est_mm.value / d_x_mm - 1.0)
 
 
-def _expected_whisk(
-    seen: SeenWhisk, theta_rad: float, reach_mm: float, settings: Settings, beam: Beam
-) -> Whisk:
+def _expected_whisk(whisk: _ConvertedWhisk, theta_rad: float) -> Whisk:
     """Return the whisk that (13) and (14) predict for the slope and friction seen.
 
-    What they leave out changes its moments to first order (docs/maps.md). reach_mm: radii of bar
-    and whisker together, NaN where not known.
+    What they leave out changes its moments to first order (docs/maps.md).
     """
+    seen = whisk.seen
+    beam = whisk.task.unit.session.whisker.beam
+    reach_mm = sum(whisk.radii_mm)  # NaN where the bar's diameter is not known
     d_x_mm = seen.d_x_mm.value
     beta_rad = seen.beta_rad.value
     alpha_rad, _ = seen_friction(seen)
-    alpha_rad = max(alpha_rad, 0.0) if np.isfinite(alpha_rad) else settings.alpha_est_rad
+    if np.isfinite(alpha_rad):
+        alpha_rad = max(alpha_rad, 0.0)
+    else:
+        alpha_rad = whisk.task.unit.settings.alpha_est_rad
     phi_rad = float(slip_angle(beta_rad, alpha_rad))
     share = first_order.leaning(theta_rad, seen.psi_rad.value, phi_rad, alpha_rad)
     if np.isfinite(reach_mm):

@@ -6,11 +6,9 @@ counts: what a clock adds is never negative. Errors are against the known truth 
 simulated, else against the preset `fine`.
 """
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -24,8 +22,6 @@ from bench.base.errors import BadInput
 from bench.base.settings import Seeing, Settings
 from bench.base.tables import Column, Kind, Table
 from bench.base.workers import Workers
-from bench.records.trial_result import SeenTrial, TrialResult
-from bench.report.figures import draw_trial
 from bench.report.score import truth_of
 from bench.session.inside import check_outside
 from bench.session.session import Session
@@ -33,10 +29,10 @@ from bench.session.session_check import checked_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.trials.of_session import placed_units, trials_with_whisks, with_gauges
 from bench.trials.seeing import PRESETS, STANDARD, as_toml, by_preset
-from bench.trials.seen import see_trial
 from bench.trials.trial_evaluation import trial_result
 from bench.trials.unit import Unit
 from bench.workflows.pareto import pareto_front
+from bench.workflows.seeing_times import draw_all, see_all, time_work
 from estimator.uncertainty import Z_95
 
 TRADEOFF = Table(
@@ -130,14 +126,6 @@ class Trade:
         }
 
 
-@dataclass(frozen=True)
-class Timing:
-    """Least seconds of processor and of wall time that some work took."""
-
-    cpu_s: float
-    wall_s: float
-
-
 def tradeoff(
     path: Path,
     out: Path,
@@ -156,17 +144,15 @@ def tradeoff(
     doubts = Doubts()
     session = checked_session(path, doubts, follow_links=settings.follow_links)
     recorded = trials_with_whisks(session)
-    names = set()
-    for trial in recorded:
-        if settings.takes(trial.name) and trial.camera_sources:
-            names.add(trial.name)
+    wanted = [trial for trial in recorded if settings.takes(trial.name) and trial.camera_sources]
+    names = {trial.name for trial in wanted}
     if not names:
         raise BadInput(f"--trials {settings.trials}: no trial with pictures has such a name")
     with lock_output(out), Workers(1, progress) as pool:
         _, units = placed_units(session, recorded, out, settings, pool, doubts)
         *_, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if unit.trial.name in names]
-        ladder = list(settings_to_try(tuple(chosen[0].trial.camera_sources)))
+        ladder = list(settings_to_try(tuple(wanted[0].camera_sources)))
         trades = []
         for seeing in tqdm(ladder, desc="settings", disable=not progress, leave=False):
             trades.append(_time_seeing(chosen, seeing, repeats))
@@ -202,7 +188,7 @@ def front(trades: Sequence[Trade]) -> np.ndarray:
 def _time_seeing(units: Sequence[Unit], seeing: Seeing, repeats: int) -> Trade:
     """Time one setting over the trials, decoding included; the errors are NaN as yet."""
     settings = Settings(seeing=seeing)
-    seen, timing = _time(lambda: _see_all(units, settings), repeats)
+    seen, timing = time_work(lambda: see_all(units, settings), repeats)
     distances = [whisk.d_x_mm for trial in seen for whisk in trial.whisks]
     d_x_mm = np.array([distance.value for distance in distances], dtype=float)
     sigma_mm = np.array([distance.sigma for distance in distances], dtype=float)
@@ -211,19 +197,10 @@ def _time_seeing(units: Sequence[Unit], seeing: Seeing, repeats: int) -> Trade:
     return Trade(seeing, timing.cpu_s / count, timing.wall_s / count, d_x_mm, sigma_mm, errors_mm)
 
 
-def _see_all(units: Sequence[Unit], settings: Settings) -> list[SeenTrial]:
-    """Evaluate the pictures of all trials."""
-    seen = []
-    for unit in units:
-        signals = read_signals(unit.trial)
-        seen.append(see_trial(unit.session, unit.trial, signals, unit.calibration, settings))
-    return seen
-
-
 def _time_drawing(units: Sequence[Unit], standard: Trade, repeats: int) -> Trade:
     """Return the standard with the seconds of drawing all figures of the trials added to its own."""
     results = [(unit, trial_result(unit)) for unit in units]
-    _, timing = _time(lambda: _draw_all(results), repeats)
+    _, timing = time_work(lambda: draw_all(results), repeats)
     count = len(standard.d_x_mm)
     return replace(
         standard,
@@ -231,27 +208,6 @@ def _time_drawing(units: Sequence[Unit], standard: Trade, repeats: int) -> Trade
         cpu_s=standard.cpu_s + timing.cpu_s / count,
         wall_s=standard.wall_s + timing.wall_s / count,
     )
-
-
-def _draw_all(results: Sequence[tuple[Unit, TrialResult]]) -> None:
-    """Draw sensing planes and overlays into a folder that is removed."""
-    with TemporaryDirectory() as folder:
-        for unit, result in results:
-            alpha = (unit.settings.alpha_est_rad, "assumed")
-            draw_trial((unit.trial, result, alpha, Path(folder)))
-
-
-def _time(work: Callable[[], list | None], repeats: int) -> tuple[list | None, Timing]:
-    """Return what the work gives, and the least seconds that it took."""
-    cpu_s = []
-    wall_s = []
-    for _ in range(repeats):
-        cpu_start = time.process_time()
-        wall_start = time.perf_counter()
-        made = work()
-        cpu_s.append(time.process_time() - cpu_start)
-        wall_s.append(time.perf_counter() - wall_start)
-    return made, Timing(min(cpu_s), min(wall_s))
 
 
 def _with_errors(session: Session, units: Sequence[Unit], trades: Sequence[Trade]) -> list[Trade]:

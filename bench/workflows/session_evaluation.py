@@ -46,11 +46,11 @@ def evaluate(
     verdict_alone: bool = False,
     trials: Collection[str] | None = None,
 ) -> int:
-    """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful.
+    """Evaluate a session into the folder `out`. Return 0, or 1 with warnings.
 
     dask: address of a Dask cluster's scheduler, in place of `workers`. figure_formats: of figures for a
     paper, drawn besides the others. announce: is given what is to be seen at a glance, or of that the
-    verdict alone. trials: names of those that the session is taken to have; None: all. Raises BadInput.
+    verdict alone. trials: names of those that the session is taken to have; None: all. Raise BadInput.
     """
     estimators(settings.estimators)
     if dask is not None:  # its workers stand elsewhere

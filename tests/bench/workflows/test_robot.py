@@ -7,9 +7,9 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.workflows import robot_answers, robot_trade
+from bench.workflows import robot_answers, robot_points, robot_trade
 from bench.workflows.robot_answers import Answer, Converter
-from bench.workflows.robot_trade import front, pool_answers, trade_lines
+from bench.workflows.robot_points import front, pool_answers, trade_lines
 
 RATE_HZ = 2000.0
 
@@ -96,7 +96,7 @@ def test_a_recorded_session(steel_signals, exact_vision, monkeypatch, tmp_path):
     robot_trade.robot_trade(
         steel_signals, tmp_path, Settings(trials="b60_4", alpha_est_deg=10.5), workers=0
     )
-    table = robot_trade.ROBOT_TRADE.read(tmp_path)
+    table = robot_points.ROBOT_TRADE.read(tmp_path)
     ten = table[table["estimator"] == "with_friction"]
     near, far = (
         ten[np.isnan(ten["cutoff_Hz"]) & (ten["rate_Hz"] == RATE_HZ) & (ten["push_deg"] == d)]
