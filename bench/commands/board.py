@@ -2,7 +2,7 @@
 
 import argparse
 
-from bench.commands.options import DONE, Verbs, add_out, add_verb, squares
+from bench.commands.options import DONE, Verbs, add_out, add_verb, parse_squares
 
 
 def add(verbs: Verbs) -> None:
@@ -17,7 +17,7 @@ def add(verbs: Verbs) -> None:
     add_out(verb, "FILE", "PDF to write")
     verb.add_argument(
         "--squares",
-        type=squares,
+        type=parse_squares,
         default=(8, 6),
         metavar="NxM",
         help="along x and y (default 8x6)",

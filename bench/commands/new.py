@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from bench.commands.options import DONE, Verbs, add_session, add_verb, squares
+from bench.commands.options import DONE, Verbs, add_session, add_verb, parse_squares
 
 _NUMBERS = {
     "--whisker-length-mm": "from base to tip",
@@ -29,7 +29,11 @@ def add(verbs: Verbs) -> None:
     for option, what in _NUMBERS.items():
         verb.add_argument(option, type=float, metavar="X", help=what)
     verb.add_argument(
-        "--squares", type=squares, default=(8, 6), metavar="NxM", help="of the board (default 8x6)"
+        "--squares",
+        type=parse_squares,
+        default=(8, 6),
+        metavar="NxM",
+        help="of the board (default 8x6)",
     )
     verb.add_argument(
         "--dictionary",

@@ -85,7 +85,7 @@ def add_out(verb: argparse.ArgumentParser, metavar: str, what: str) -> None:
 def add_workers(verb: argparse._ActionsContainer) -> None:
     """Add --workers."""
     verb.add_argument(
-        "--workers", type=count, default=1, metavar="N", help="processes to use (default 1)"
+        "--workers", type=parse_count, default=1, metavar="N", help="processes to use (default 1)"
     )
 
 
@@ -121,14 +121,14 @@ def add_figure_format(verb: argparse.ArgumentParser) -> None:
     )
 
 
-def count(text: str) -> int:
+def parse_count(text: str) -> int:
     """Return a whole number from 1. Raise ArgumentTypeError for any other text."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
     return int(text)
 
 
-def squares(text: str) -> tuple[int, int]:
+def parse_squares(text: str) -> tuple[int, int]:
     """Return a board's counts of squares along x and y. Raise ArgumentTypeError for other text."""
     counts = text.lower().split("x")
     if len(counts) != 2 or not all(one.isdecimal() and int(one) > 1 for one in counts):

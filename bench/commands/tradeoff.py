@@ -9,7 +9,7 @@ from bench.commands.options import (
     add_recorded,
     add_trials,
     add_verb,
-    count,
+    parse_count,
     shows_progress,
 )
 
@@ -27,7 +27,11 @@ def add(verbs: Verbs) -> None:
     add_out(verb, "OUT", "folder for the table, the plot and the settings files")
     add_trials(verb)
     verb.add_argument(
-        "--repeats", type=count, default=2, metavar="N", help="how often each is timed (default 2)"
+        "--repeats",
+        type=parse_count,
+        default=2,
+        metavar="N",
+        help="how often each is timed (default 2)",
     )
 
 

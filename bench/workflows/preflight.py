@@ -1,6 +1,6 @@
 """`whisker-bench check`: all that `evaluate` would refuse or warn of and that is found within seconds.
 
-Files are read whole; of pictures a few are looked at: two of each board series, five of each trial.
+Files are read whole; of pictures a few are evaluated: two of each board series, five of each trial.
 """
 
 from collections.abc import Iterator, Sequence
@@ -55,7 +55,7 @@ def check(path: Path, progress: bool, *, follow_links: bool = False) -> int:
         session = views[0]
         find_damage(session, doubts, each=bar)
         for view in views:
-            look_ahead(view, doubts)
+            check_contents(view, doubts)
     for line in dict.fromkeys(doubts.refusals):
         print(f"bad: {line}")
     for line in dict.fromkeys(doubts.notes):
@@ -70,7 +70,7 @@ def check(path: Path, progress: bool, *, follow_links: bool = False) -> int:
     return 0
 
 
-def look_ahead(session: Session, doubts: Doubts) -> None:
+def check_contents(session: Session, doubts: Doubts) -> None:
     """Check boards, gauges, strokes, frames and scene of a session whose files are sound.
 
     What is found is added to `doubts`.
