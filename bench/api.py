@@ -14,15 +14,16 @@ Examples:
     >>> sorted(run.figures())
     ['fig8']
 
-`session` and `out` are folders, as on the command line, which is made of these functions. Bad input raises
-`bench.base.errors.BadInput` or `vision.geometry.refusals.Refused`, whose text is the line that the command line shows.
+`session` and `out` are folders, as on the command line. Bad input raises
+`bench.base.errors.BadInput` or `vision.geometry.refusals.Refused`, whose text is the line that the
+command line shows.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from bench.array.array_results import folder_of, is_array, read_array_record, wr
 from bench.base.atomic import lock_output
 from bench.base.drawing import style
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate as _evaluate
+from bench.base.tables import Table
 from bench.report.evaluation import Finished, finished
 from bench.report.page.write import report_again
 from bench.report.pooled import read_run
@@ -40,6 +41,7 @@ from bench.report.run_facts import RunRecord
 from bench.report.run_tables import RUN_TABLES as TABLES
 from bench.report.whisk_tables import TRACK
 from bench.trials.seeing import STANDARD, by_preset
+from bench.workflows import session_evaluation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,70 +49,75 @@ if TYPE_CHECKING:
     from bench.plan.plan_rows import Plan
 
 Folder = Path | str
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """An evaluated session. Each table is a structured array (rows,) whose fields are the columns of docs/formats.md:
-    NaN is a number that is missing, '' a text. doubtful: whether anything is."""
+    """An evaluated session.
+
+    out: its folder. record: what run.json says. Each table is a structured array (rows,) whose
+    fields are the columns of docs/formats.md: NaN is a number that is missing, '' a text.
+    """
 
     out: Path
     record: RunRecord
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """How good each estimator is, in sentences."""
+        """Return how good each estimator is, in sentences."""
         return self.record.verdict
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What is doubtful, a line each."""
+        """Return the warnings, a line each."""
         return self.record.doubts
 
     @property
     def doubtful(self) -> bool:
-        """Whether anything is doubtful; the command line's exit code is then 1."""
+        """Return whether there is any warning; the command line's exit code is then 1."""
         return bool(self.doubts)
 
     @property
     def whisks(self) -> np.ndarray:
-        """A row a whisk: truth and moments, with sigmas."""
+        """Return a row a whisk: truth and moments, with sigmas."""
         return self.table("whisks")
 
     @property
     def estimates(self) -> np.ndarray:
-        """A row a whisk and estimator."""
+        """Return a row a whisk and estimator."""
         return self.table("estimates")
 
     def table(self, name: str) -> np.ndarray:
-        """A table by its name, one of TABLES. Raises KeyError for another."""
-        if name not in TABLES:
-            raise KeyError(f"{name!r} is no table; there are {', '.join(TABLES)}")
-        return TABLES[name].read(self.out)
+        """Return a table by its name, one of TABLES. Raise KeyError for another."""
+        return _read_table(TABLES, name, self.out)
 
     def track(self, trial: str) -> np.ndarray:
-        """A row a frame of a trial. Raises KeyError where there is no such trial."""
+        """Return a row a frame of a trial. Raise KeyError where there is no such trial."""
         if trial not in self.record.recordings:
-            raise KeyError(
-                f"there is no trial {trial!r}; there are {', '.join(self.record.recordings)}"
-            )
+            names = ", ".join(self.record.recordings)
+            raise KeyError(f"there is no trial {trial!r}; there are {names}")
         return TRACK.read_file(self.out / "track" / f"{trial}.csv")
 
     def results(self) -> Finished:
-        """Everything of every whisk as typed records (`bench.records.trial_result`), and the friction of each surface."""
+        """Return everything of every whisk as typed records (`bench.records.trial_result`), and
+        the friction of each surface."""
         return finished(read_run(self.out), self.record.whisker, self.record.settings)
 
     def figures(self) -> dict[str, "Figure"]:
-        """The session's figures by name, to change and save as one likes."""
+        """Return the session's figures by name, to change and save as one likes."""
         from bench.report.paper import session_figures
 
         with style():
-            return session_figures(self.results())
+            return {one.name: one.drawing for one in session_figures(self.results())}
 
 
 @dataclass(frozen=True, eq=False)
 class ArrayRun:
-    """An evaluated session of several whiskers: verdict and doubts of all; whiskers: each one's own run, by name."""
+    """An evaluated session of several whiskers.
+
+    verdict, doubts: of all of them. whiskers: each one's own run, by its name.
+    """
 
     out: Path
     verdict: tuple[str, ...]
@@ -119,14 +126,20 @@ class ArrayRun:
 
     @property
     def doubtful(self) -> bool:
-        """Whether anything is doubtful; the command line's exit code is then 1."""
+        """Return whether there is any warning; the command line's exit code is then 1."""
         return bool(self.doubts)
 
     def table(self, name: str) -> np.ndarray:
-        """A table of all whiskers by its name: whisks, estimates or surface. Raises KeyError for another."""
-        if name not in ARRAY_TABLES:
-            raise KeyError(f"{name!r} is no table; there are {', '.join(ARRAY_TABLES)}")
-        return ARRAY_TABLES[name].read(self.out)
+        """Return a table of all whiskers: whisks, estimates or surface. Raise KeyError for
+        another name."""
+        return _read_table(ARRAY_TABLES, name, self.out)
+
+
+def _read_table(tables: Mapping[str, Table], name: str, out: Path) -> np.ndarray:
+    """Return the table of this name from a run's folder. Raise KeyError where there is none."""
+    if name not in tables:
+        raise KeyError(f"{name!r} is no table; there are {', '.join(tables)}")
+    return tables[name].read(out)
 
 
 def evaluate(
@@ -150,10 +163,12 @@ def evaluate(
     dask: str | None = None,
     figure_formats: Sequence[str] = (),
 ) -> Run | ArrayRun:
-    """Evaluate a session into a folder, as `whisker-bench evaluate` does, without a word on the screen.
+    """Evaluate a session into a folder, as `whisker-bench evaluate` does, without a word on the
+    screen; return the run.
 
-    The options are those of the command line; workers: 0 works in this process. More are processes of their own, which
-    read the script that asks for them: it does so below `if __name__ == "__main__":`. Raises BadInput, Refused.
+    The options are those of the command line. workers: 0 works in this process. More are processes
+    of their own, which read the script that asks for them: it does so below
+    `if __name__ == "__main__":`. Raise BadInput, Refused.
     """
     settings = Settings(
         theta_deg=theta_deg,
@@ -170,34 +185,28 @@ def evaluate(
         follow_links=follow_links,
         one_camera=one_camera,
     )
-    return evaluate_with(Path(session), Path(out), settings, workers, figure_formats, dask=dask)
-
-
-def evaluate_with(
-    session: Path,
-    out: Path,
-    settings: Settings,
-    workers: int = 1,
-    figure_formats: Sequence[str] = (),
-    **shown: Any,
-) -> Run | ArrayRun:
-    """The same with the options in one object. shown: progress, announce and dask of
-    `bench.commands.evaluate.evaluate`."""
-    quiet = {"announce": logging.getLogger(__name__).info}
-    _evaluate(
-        session, out, settings, workers=workers, figure_formats=figure_formats, **quiet | shown
+    session_evaluation.evaluate(
+        Path(session),
+        Path(out),
+        settings,
+        workers=workers,
+        dask=dask,
+        figure_formats=figure_formats,
+        announce=_log.info,
     )
     return read(out)
 
 
 def read(out: Folder) -> Run | ArrayRun:
-    """A run that was evaluated before. Raises BadInput where the folder is none."""
+    """Read a run that was evaluated before. Raise BadInput where the folder holds none."""
     out = Path(out)
     if not is_array(out):
         return Run(out, read_record(out))
     array = read_array_record(out)
-    folders = {base.name: folder_of(out, base.name) for base in array.bases}
-    whiskers = {name: Run(folder, read_record(folder)) for name, folder in folders.items()}
+    whiskers = {}
+    for base in array.bases:
+        folder = folder_of(out, base.name)
+        whiskers[base.name] = Run(folder, read_record(folder))
     return ArrayRun(out, array.verdict, array.doubtful, whiskers)
 
 
@@ -210,29 +219,30 @@ def plan(
     follow_links: bool = False,
     workers: int = 0,
 ) -> "Plan":
-    """Plan a RIG.toml, or a recorded session, into a folder, as `whisker-bench plan` does: a row a trial, with expected
-    sigmas, limits and changes. workers: as of `evaluate`. Raises BadInput."""
-    from bench.plan import (
-        run_plan as planning,
-    )  # with the rig and all that paints: other verbs do without
+    """Plan a RIG.toml, or a recorded session, into a folder, as `whisker-bench plan` does; return
+    the plan.
 
-    quiet, options = (
-        logging.getLogger(__name__).info,
-        planning.Options(theta_deg, changes, follow_links),
-    )
-    return planning.plan(Path(what), Path(out), options, workers=workers, announce=quiet)
+    It has a row a trial, with expected sigmas, limits and changes. workers: as of `evaluate`.
+    Raise BadInput.
+    """
+    from bench.plan import run_plan  # with the rig and all that paints: other verbs do without
+
+    options = run_plan.Options(theta_deg, changes, follow_links)
+    return run_plan.plan(Path(what), Path(out), options, workers=workers, announce=_log.info)
 
 
 def report(out: Folder, figure_formats: Sequence[str] = ()) -> list[Path]:
-    """report.html, methods.md and results.bib again, and figures for a paper in these formats ("png", "pdf", "svg").
-    The paths written. Raises BadInput where the folder is no run."""
+    """Write report.html, methods.md and results.bib again; return the paths written.
+
+    figure_formats: of figures for a paper, too ("png", "pdf", "svg"). Raise BadInput where the
+    folder is no run.
+    """
     out = Path(out)
     if not is_array(out):
         return report_again(out, figure_formats)
-    names = [base.name for base in read_array_record(out).bases]
-    written = [
-        path for name in names for path in report_again(folder_of(out, name), figure_formats)
-    ]
+    written = []
+    for base in read_array_record(out).bases:
+        written += report_again(folder_of(out, base.name), figure_formats)
     with lock_output(out):
         write_array(out)
     return [*written, out / "report.html"]

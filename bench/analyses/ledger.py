@@ -2,7 +2,7 @@
 
 Each row says by how much truth, felt touch and estimate would differ without the refinement, and their sigmas. What
 is less than a tenth of every sigma may be left out: it adds no more than a two-hundredth to an error. It is kept even
-so, at every preset, for leaving it out would save next to nothing: the row says what it costs.
+so, at every preset.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,6 @@ import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.left_out import (
-    COST_PERCENT,
     NAMES,
     WhiskModel,
     effect_on_estimate,
@@ -65,13 +64,8 @@ LEDGER = Table(
         Column(
             "verdict",
             '"needed": largest_over_sigma is above 0.1; "may be left out, kept": it is not, and '
-            'leaving it out would save next to nothing; "not known": an effect is not',
+            'every preset has the refinement even so; "not known": one of the effects is not',
             Kind.TEXT,
-        ),
-        Column(
-            "cost_percent",
-            "share of a whisk's processor time at most (`tests/studies/speed/refinements.py`); "
-            "0: below 0.1 %",
         ),
         status("why an effect is 0 or not known"),
     ),
@@ -131,7 +125,6 @@ class Entry:
             "refinement": self.refinement,
             "largest_over_sigma": self.largest,
             "verdict": self.verdict,
-            "cost_percent": COST_PERCENT[self.refinement],
             "status": self.status,
         }
         for name in QUANTITIES:
@@ -210,12 +203,7 @@ def _verdict_of_all(entries: Sequence[Entry]) -> str:
         return f"{NOT_KNOWN}: {entries[0].status}"
     worst = max(known, key=lambda entry: entry.largest)
     needed = sum(entry.verdict == NEEDED for entry in known)
-    if needed:
-        verdict = f"{NEEDED} in {needed} of {len(known)}"
-    else:
-        percent = COST_PERCENT[worst.refinement]
-        cost = f"{percent:g} % of the time at most" if percent else "no cost"
-        verdict = f"{MAY_GO} at {cost}"
+    verdict = f"{NEEDED} in {needed} of {len(known)}" if needed else MAY_GO
     if not worst.largest:
         reason = f" ({worst.status})" if worst.status else ""
         return f"{verdict}: no effect{reason}"

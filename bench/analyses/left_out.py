@@ -36,18 +36,6 @@ NAMES = (
 )
 # Refinements of the fit to the pictures; the others change no picture's model.
 _IN_VISION = (*NAMES[: NAMES.index("gauges' delay")], "one-sided light")
-# What each costs at most, percent of a whisk's processor time; 0 where it is below 0.1 (`tests/studies/speed/refinements.py`,
-# two whisks and two gauge trials of fixtures/small-session).
-COST_PERCENT = dict.fromkeys(NAMES, 0.0) | {
-    "large bending": 0.7,
-    "bar radius": 0.2,
-    "psi": 0.6,
-    "taper": 0.8,
-    "sag and set": 2.3,
-    **dict.fromkeys(LENS_TERMS, 1.8),
-    "cross-talk": 0.8,
-    "one-sided light": 0.3,
-}
 
 
 @dataclass(frozen=True)

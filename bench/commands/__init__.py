@@ -1,4 +1,4 @@
-"""The verbs: one module each, on the command line and for Python.
+"""The command line: one module for each verb, with its options and its run; cli.py lists them.
 
 May import all of bench; nothing of bench imports it.
 """

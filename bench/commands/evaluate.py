@@ -1,179 +1,211 @@
-"""The main job: a recorded session in; truth, estimates and their errors out."""
+"""The verb `evaluate`: the main job (bench/workflows/session_evaluation.py), or with --watch again and again."""
 
-from collections.abc import Callable, Collection, Sequence
+import argparse
+import os
+import sys
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from bench.analyses.catalogue import ANALYSES
-from bench.base.atomic import lock_output, write_whole
-from bench.base.doubts import Doubts
-from bench.base.settings import Settings
-from bench.base.workers import Workers
-from bench.report.assembly import write_tables
-from bench.report.evaluation import Evaluation, finished
-from bench.report.summary.compose import Summary
-from bench.session.inside import check_outside
-from bench.session.session import Session
-from bench.session.session_check import checked_views
-from bench.session.trial import Trial
-from bench.trials.estimates import estimators
-from bench.trials.exchanged_signals import exchanged_signals
-from bench.trials.lost import evaluate_units
-from bench.trials.of_session import (
-    first_units,
-    require_some,
-    trials_with_whisks,
-    units_in_rig,
-    with_gauges,
+from bench.base.errors import BadInput
+from bench.commands.options import (
+    Verbs,
+    add_alpha_est,
+    add_figure_format,
+    add_out,
+    add_recorded,
+    add_trials,
+    add_verb,
+    add_workers,
+    shows_progress,
 )
-from bench.trials.one_camera import require_camera
-from bench.trials.side_by_side import array_units
-from bench.trials.unit import Unit
 
-DONE = 0
-DOUBTFUL = 1
+if TYPE_CHECKING:
+    from bench.base.settings import Seeing, Settings
 
 
-def evaluate(
-    session_path: Path,
-    out: Path,
-    settings: Settings,
-    *,
-    workers: int = 1,
-    dask: str | None = None,
-    progress: bool = False,
-    figure_formats: Sequence[str] = (),
-    announce: Callable[[str], object] = print,
-    verdict_alone: bool = False,
-    trials: Collection[str] | None = None,
-) -> int:
-    """Evaluate a session into the folder `out`. Returns 0, or 1 where something is doubtful.
-
-    dask: address of a Dask cluster's scheduler, in place of `workers`. figure_formats: of figures for a
-    paper, drawn besides the others. announce: is given what is to be seen at a glance, or of that the
-    verdict alone. trials: names of those that the session is taken to have; None: all. Raises BadInput.
-    """
-    estimators(settings.estimators)
-    if dask is not None:  # its workers stand elsewhere
-        session_path = session_path.absolute()
-        out = out.absolute()
-    check_outside(out, session_path)
-    doubts = Doubts()
-    views = checked_views(session_path, doubts, trials, follow_links=settings.follow_links)
-    require_camera(views[0], settings)
-    recorded = [trials_with_whisks(view) for view in views]
-    require_some(recorded[0], settings)
-    with lock_output(out), _workers(dask, workers, out, progress) as pool:
-        if views[0].base is None:
-            units = first_units(views[0], recorded[0], out, settings)
-            summary = _evaluate_whisker(
-                views[0], units, out, settings, pool, doubts, figure_formats
-            )
-        else:
-            summary = _evaluate_array(views, recorded, out, settings, pool, doubts, figure_formats)
-    announce("\n".join(summary.verdict) if verdict_alone else summary.on_screen(out))
-    return DOUBTFUL if summary.doubtful else DONE
-
-
-def _evaluate_array(
-    views: Sequence[Session],
-    recorded: Sequence[Sequence[Trial]],
-    out: Path,
-    settings: Settings,
-    pool: Workers,
-    doubts: Doubts,
-    figure_formats: Sequence[str],
-) -> Summary:
-    """Evaluate each whisker of an array as a run of its own, and then all whiskers together."""
-    from bench.array.array_results import array_record, folder_of, write_array, write_array_record
-    from bench.report.score import score_all
-
-    folders = [folder_of(out, view.base.name) for view in views]
-    units_of_views = array_units(views, recorded, out, folders, settings, pool)
-    for view, folder, units in zip(views, folders, units_of_views):
-        with lock_output(folder):
-            _evaluate_whisker(view, units, folder, settings, pool, Doubts(), figure_formats)
-    scores = score_all(list(zip(views, folders)))
-    write_array_record(out, array_record(views, doubts.notes, scores))
-    return write_array(out)
-
-
-def _evaluate_whisker(
-    session: Session,
-    units: Sequence[Unit],
-    out: Path,
-    settings: Settings,
-    pool: Workers,
-    doubts: Doubts,
-    figure_formats: Sequence[str],
-) -> Summary:
-    """Evaluate the trials of one whisker's session, a unit each, into the folder `out`.
-
-    The folder is locked.
-    """
-    calibration, units = units_in_rig(session, units, pool, doubts)
-    gauges, certificate, units = with_gauges(units, pool, doubts)
-    chosen = [unit for unit in units if settings.takes(unit.trial.name)]
-    whole = finished(evaluate_units(chosen, pool), session.whisker, settings)
-    if whole.doubt:
-        doubts.notes.append(whole.doubt)
-    doubts.notes += exchanged_signals(chosen, whole.results)
-    evaluation = Evaluation(
-        whisker=session.whisker,
-        settings=settings,
-        results=whole.results,
-        friction=whole.friction,
-        alpha_est_sigma_rad=whole.alpha_est_sigma_rad,
-        doubt=whole.doubt,
-        session=session,
-        out=out,
-        gauges=gauges,
-        certificate=certificate,
-        calibration=calibration,
-        doubts=tuple(doubts.notes),
-        recordings={unit.trial.name: unit.files for unit in chosen},
+def add(verbs: Verbs) -> None:
+    """Add the verb."""
+    verb = add_verb(
+        verbs,
+        "evaluate",
+        run,
+        "true distance and slip of every whisk, the estimates beside them, and their errors",
+        "whisker-bench evaluate fixtures/small-session --out demo-out --workers 2",
     )
-    return report(evaluation, pool, figure_formats)
+    add_recorded(verb)
+    add_out(verb, "OUT", "folder for tables, figures and the summary")
+    _add_numbers(verb)
+    _add_seeing(verb)
+    verb.add_argument(
+        "--watch",
+        type=float,
+        nargs="?",
+        const=2.0,
+        metavar="S",
+        help="while the session is recorded: evaluate each trial that is complete, looking every S seconds (2), until "
+        "Ctrl-C",
+    )
+    verb.add_argument(
+        "--gauges-from-all",
+        action="store_true",
+        help="calibrate the gauges by every trial with volts and a truth, not by gauge trials alone; each trial is "
+        "judged by gauges fitted without it",
+    )
+    verb.add_argument(
+        "--estimator",
+        action="append",
+        default=[],
+        dest="estimators",
+        metavar="MODULE:FUNCTION",
+        help="one of your own, importable from here; may be given several times",
+    )
+    verb.add_argument(
+        "--one-camera",
+        metavar="NAME",
+        help="distance, force and stiffness by the shape that this camera alone sees, too, without gauges: "
+        "one_camera.csv (it sees its own trial, and has a line of its own)",
+    )
+    add_trials(verb, ", e.g. 'b3*'")
+    verb.add_argument(
+        "--no-figures",
+        action="store_false",
+        dest="figures",
+        help="tables, report and summary alone",
+    )
+    add_figure_format(verb)
+    verb.add_argument(
+        "--nwb",
+        type=Path,
+        metavar="FILE",
+        help="signals, tables and tracks as Neurodata Without Borders too, for archives (extra `nwb`)",
+    )
+    processes = verb.add_mutually_exclusive_group()
+    add_workers(processes)
+    processes.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="send trials to a Dask cluster that runs, by its scheduler's address; its workers must see SESSION and "
+        "OUT under the same paths (extra `cluster`)",
+    )
 
 
-def _workers(dask: str | None, count: int, out: Path, progress: bool) -> Workers:
-    """Return processes here, or a cluster."""
-    if dask is None:
-        return Workers(count, progress)
-    from bench.base.cluster import Cluster
+def _add_numbers(verb: argparse.ArgumentParser) -> None:
+    """Add the numbers that the estimators assume."""
+    verb.add_argument(
+        "--theta-deg",
+        type=float,
+        default=3.0,
+        metavar="X",
+        help="pushing angle of the estimates (default 3)",
+    )
+    add_alpha_est(verb)
+    verb.add_argument(
+        "--alpha-est-sigma-deg",
+        type=float,
+        metavar="X",
+        help="how far that may be off, one sigma (default: by the spread of the session's surfaces, 5 without any)",
+    )
+    verb.add_argument(
+        "--cutoff-Hz",
+        type=float,
+        metavar="X",
+        help="of the low-pass ahead of one's own estimators (0.5 a deg/s)",
+    )
+    verb.add_argument(
+        "--clock-sigma-s",
+        type=float,
+        metavar="X",
+        help="how well frames' and signals' clocks agree (default: exactly where frame times were recorded, "
+        "else to half a frame)",
+    )
 
-    return Cluster(dask, out, progress)
+
+def _add_seeing(verb: argparse.ArgumentParser) -> None:
+    """Add the options by which pictures are evaluated less thoroughly, or more."""
+    group = verb.add_mutually_exclusive_group()
+    group.add_argument(
+        "--preset",
+        metavar="NAME",
+        help="how hard pictures are looked at: draft, standard (default) or fine; what each costs, tradeoff measures",
+    )
+    group.add_argument(
+        "--accuracy-mm",
+        type=float,
+        metavar="X",
+        help="look at each whisk by draft, standard and fine in turn until d_x's stated sigma is X or less",
+    )
+    group.add_argument(
+        "--settings",
+        type=Path,
+        metavar="FILE",
+        help="the same from a TOML file, as tradeoff writes it",
+    )
 
 
-def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] = ()) -> Summary:
-    """Write tables, figures where they are wanted, report and summary; return the summary.
+def run(options: argparse.Namespace) -> int:
+    """Evaluate the session, once or while it is recorded; return the exit code.
 
-    Results of a synthetic session are scored.
+    Raise BadInput for a time of --watch that is out of range.
     """
-    from bench.report.page.write import write_report
-    from bench.report.record import record_of, write_record
-    from bench.report.score import score
-    from bench.report.summary.compose import summary_of
+    from bench.base.workers import single_thread
 
-    out = evaluation.out
-    write_tables(out, evaluation.results)
-    findings = {analysis: analysis.compute(evaluation) for analysis in ANALYSES}
-    for analysis, found in findings.items():
-        analysis.write(out, found)
-    figures = []
-    if evaluation.settings.figures:
-        from bench.report.figures import draw_trials  # with all of matplotlib
+    single_thread()  # before NumPy is imported
+    from bench.report.nwb import check_nwb, write_nwb
+    from bench.workflows.live_evaluation import watch
+    from bench.workflows.session_evaluation import evaluate
 
-        figures += draw_trials(evaluation, pool)
-        for analysis, found in findings.items():
-            figures += analysis.draw(out, evaluation, found)
-    scores = score(evaluation.session, out, evaluation.gauges)
-    summary = summary_of(evaluation, findings, scores, figures)
-    written = record_of(evaluation, summary, figures)
-    record = write_record(out, written, evaluation.session.path)
-    write_report(out, record, evaluation)
-    if figure_formats:
-        from bench.report.paper import write_paper_figures
+    if options.nwb is not None:
+        check_nwb(options.nwb, options.session)
+    # where --estimator is looked for; last, so that it hides nothing of ours
+    sys.path.append(os.getcwd())
+    settings = _settings(options)
+    if options.watch is None:
+        job = evaluate
+    elif 0 < options.watch <= 3600:
+        job = partial(watch, every_s=options.watch)
+    else:
+        raise BadInput(f"--watch {options.watch:g}: must be above 0 and at most 3600 s")
+    code = job(
+        options.session,
+        options.out,
+        settings,
+        workers=options.workers,
+        dask=options.dask,
+        progress=shows_progress(),
+        figure_formats=options.figure_format,
+        announce=partial(print, flush=True),
+    )
+    if options.nwb is not None and options.watch is None:
+        write_nwb(options.nwb, options.out, options.session)
+    return code
 
-        write_paper_figures(out, evaluation, figure_formats)
-    write_whole(out / "summary.txt", summary.text)
-    return summary
+
+def _settings(options: argparse.Namespace) -> "Settings":
+    """Return the settings of the run. Raise BadInput where one is out of range."""
+    from bench.base.settings import Settings
+
+    return Settings(
+        theta_deg=options.theta_deg,
+        alpha_est_deg=options.alpha_est_deg,
+        cutoff_Hz=options.cutoff_Hz,
+        estimators=tuple(options.estimators),
+        clock_sigma_s=options.clock_sigma_s,
+        alpha_est_sigma_deg=options.alpha_est_sigma_deg,
+        gauges_from_all=options.gauges_from_all,
+        trials=options.trials,
+        figures=options.figures,
+        seeing=_seeing(options),
+        accuracy_mm=options.accuracy_mm,
+        follow_links=options.follow_links,
+        one_camera=options.one_camera,
+    )
+
+
+def _seeing(options: argparse.Namespace) -> "Seeing":
+    """Return the settings of --preset or --settings."""
+    from bench.trials.seeing import STANDARD, by_preset, from_file
+
+    if options.settings:
+        return from_file(options.settings)
+    return by_preset(options.preset or STANDARD)

@@ -1,11 +1,15 @@
-"""What verbs of the command line share: how they are added, and their common options."""
+"""What the verbs share: how each is added, exit codes, and options that several of them have."""
 
 import argparse
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
 
-DONE, DOUBTFUL, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE = 0
+DOUBTFUL = 1
+BAD_INPUT = 2
+INTERRUPTED = 130
 FAULT_OF_OURS = 70  # EX_SOFTWARE: neither a result nor the user's input
 
 Run = Callable[[argparse.Namespace], int]
@@ -13,9 +17,19 @@ Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def add_verb(
-    verbs: Verbs, name: str, run: Run, summary: str, example: str
+    verbs: Verbs,
+    name: str,
+    run: Run,
+    summary: str,
+    example: str,
+    *,
+    needs_sound_environment: bool = True,
 ) -> argparse.ArgumentParser:
-    """A verb with its summary, a worked example and `-v`; `run` is called with the parsed options."""
+    """Add a verb with its summary, a worked example and `-v`; return its parser.
+
+    run: is called with the parsed options and returns the exit code. needs_sound_environment: the
+    versions of all libraries are checked before.
+    """
     verb = verbs.add_parser(
         name,
         help=summary,
@@ -24,25 +38,30 @@ def add_verb(
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     verb.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
-    verb.set_defaults(run=run)
+    verb.set_defaults(run=run, needs_sound_environment=needs_sound_environment)
     return verb
 
 
+def shows_progress() -> bool:
+    """Return whether somebody watches a progress bar: the error stream is a terminal."""
+    return sys.stderr.isatty()
+
+
 def add_session(verb: argparse.ArgumentParser) -> None:
-    """SESSION."""
+    """Add SESSION."""
     verb.add_argument(
         "session", type=Path, metavar="SESSION", help="folder of the recorded session"
     )
 
 
 def add_recorded(verb: argparse.ArgumentParser) -> None:
-    """SESSION as it was recorded, and where its pictures may lie."""
+    """Add SESSION and --follow-links, by which its pictures may lie elsewhere."""
     add_session(verb)
     add_follow_links(verb)
 
 
 def add_follow_links(verb: argparse.ArgumentParser) -> None:
-    """--follow-links."""
+    """Add --follow-links."""
     verb.add_argument(
         "--follow-links",
         action="store_true",
@@ -51,27 +70,48 @@ def add_follow_links(verb: argparse.ArgumentParser) -> None:
     )
 
 
-def add_out(verb: argparse.ArgumentParser, metavar: str, what: str) -> None:
-    """--out, which must be given."""
-    verb.add_argument("--out", type=Path, required=True, metavar=metavar, help=what)
-
-
-def add_workers(verb: argparse.ArgumentParser) -> None:
-    """--workers."""
+def add_run(verb: argparse.ArgumentParser) -> None:
+    """Add OUT, the folder of an evaluated run."""
     verb.add_argument(
-        "--workers", type=count, default=1, metavar="N", help="processes to use (default 1)"
+        "run_folder", type=Path, metavar="OUT", help="folder that `evaluate --out` wrote"
     )
 
 
-def count(text: str) -> int:
-    """A whole number from 1. Raises ArgumentTypeError."""
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
-    return int(text)
+def add_out(verb: argparse.ArgumentParser, metavar: str, what: str) -> None:
+    """Add --out, which must be given."""
+    verb.add_argument("--out", type=Path, required=True, metavar=metavar, help=what)
+
+
+def add_workers(verb: argparse._ActionsContainer) -> None:
+    """Add --workers."""
+    verb.add_argument(
+        "--workers", type=parse_count, default=1, metavar="N", help="processes to use (default 1)"
+    )
+
+
+def add_trials(verb: argparse.ArgumentParser, example: str = "") -> None:
+    """Add --trials, a pattern of names."""
+    verb.add_argument(
+        "--trials",
+        default="*",
+        metavar="PATTERN",
+        help=f"only trials of such names{example} (default: all)",
+    )
+
+
+def add_alpha_est(verb: argparse.ArgumentParser) -> None:
+    """Add --alpha-est-deg."""
+    verb.add_argument(
+        "--alpha-est-deg",
+        type=float,
+        default=10.0,
+        metavar="X",
+        help="friction angle that (10) assumes (default 10)",
+    )
 
 
 def add_figure_format(verb: argparse.ArgumentParser) -> None:
-    """--figure-format, any number of times."""
+    """Add --figure-format, which may be given any number of times."""
     verb.add_argument(
         "--figure-format",
         action="append",
@@ -81,8 +121,16 @@ def add_figure_format(verb: argparse.ArgumentParser) -> None:
     )
 
 
-def add_run(verb: argparse.ArgumentParser) -> None:
-    """OUT of an evaluated run."""
-    verb.add_argument(
-        "run_folder", type=Path, metavar="OUT", help="folder that `evaluate --out` wrote"
-    )
+def parse_count(text: str) -> int:
+    """Return a whole number from 1. Raise ArgumentTypeError for any other text."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
+    return int(text)
+
+
+def parse_squares(text: str) -> tuple[int, int]:
+    """Return a board's counts of squares along x and y. Raise ArgumentTypeError for other text."""
+    counts = text.lower().split("x")
+    if len(counts) != 2 or not all(one.isdecimal() and int(one) > 1 for one in counts):
+        raise argparse.ArgumentTypeError(f"{text!r} is not two counts of squares, such as 8x6")
+    return int(counts[0]), int(counts[1])

@@ -7,9 +7,9 @@ import argparse
 from pathlib import Path
 
 from bench.base.doubts import Doubts
-from bench.commands.calibrate_gauges import calibrate_gauges, chosen_trials
 from bench.gauges.certificate import page
 from bench.session.session_check import checked_session
+from bench.workflows.gauge_calibration import calibrate_gauges, trials_to_use
 
 HERE = Path(__file__).resolve().parent
 
@@ -20,7 +20,7 @@ def main() -> None:
     )
     parser.add_argument("session", type=Path)
     session = checked_session(parser.parse_args().session)
-    certificate = calibrate_gauges(session, chosen_trials(session, every_trial=False), Doubts())
+    certificate = calibrate_gauges(session, trials_to_use(session, every_trial=False), Doubts())
     page(certificate).savefig(HERE / "certificate.png", dpi=90)
     print("\n".join(certificate.lines()))
 

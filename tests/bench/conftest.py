@@ -10,11 +10,11 @@ import pytest
 from bench.base.results import hash_of
 from bench.base.settings import Settings
 from bench.cameras.session_cameras import SessionCalibration
-from bench.commands.evaluate import evaluate
 from bench.records.trial_result import SeenTrial, SeenWhisk
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes
 from bench.trials.seen import whisk_record
+from bench.workflows.session_evaluation import evaluate
 from vision.truth.at_angle import Smooth
 from vision.truth.records import FrameTruth, WhiskTruth
 from vision.truth.value import FIELDS, Value

@@ -79,6 +79,7 @@ def test_figures_are_matplotlibs(exact_run):
     assert set(figures) == {
         "fig8",
         "error_against_slope",
+        "error_against_friction",
         "explained",
         "error_map",
         "against_theta",

@@ -8,7 +8,7 @@ import pytest
 
 from bench.base.settings import Settings
 from bench.commands.cli import main
-from bench.commands.evaluate import evaluate
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.formats import documented, keys
 from tests.scenes.results import table
 

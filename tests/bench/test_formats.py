@@ -11,12 +11,12 @@ import pytest
 
 from bench.base.settings import Settings
 from bench.base.tables import Table
-from bench.commands.evaluate import evaluate
 from bench.gauges.gauges_file import FileKeys
 from bench.report.run_facts import BoardFacts, CameraFacts
 from bench.rig.simulate import simulate
 from bench.session import manifest
 from bench.trials import seeing
+from bench.workflows.session_evaluation import evaluate
 from docs import formats
 from tests.scenes.formats import DOCUMENT, documented, keys
 from tests.scenes.rig_sessions import protocol_file

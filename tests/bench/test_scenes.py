@@ -9,7 +9,7 @@ import pytest
 
 from bench.base.settings import Settings
 from bench.base.tables import sigma_name
-from bench.commands.evaluate import evaluate
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import table
 
 SCENES = Path(__file__).resolve().parents[2] / "fixtures" / "scenes"

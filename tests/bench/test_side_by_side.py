@@ -5,7 +5,7 @@ import pytest
 from bench.base.cluster import Cluster
 from bench.base.settings import Settings
 from bench.commands.cli import main
-from bench.commands.evaluate import evaluate
+from bench.workflows.session_evaluation import evaluate
 from tests.faults.interrupted import contents, differences
 from tests.scenes.deaths import dies
 

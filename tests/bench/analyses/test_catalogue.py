@@ -8,7 +8,7 @@ from bench.analyses.analysis import Analysis, Heading, PageTable
 from bench.analyses.catalogue import ANALYSES
 from bench.base.settings import Settings
 from bench.base.tables import Column, Kind, Table
-from bench.commands.evaluate import evaluate
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.friction_results import WHISKER, result, run_of
 
 COUNTS = Table("counts", "A row.", (Column("whisks", "how many", Kind.WHOLE),))
@@ -78,7 +78,7 @@ def test_one_more_analysis_is_in_all_that_a_run_writes(
     steel_signals, exact_vision, tmp_path, monkeypatch
 ):
     with_count = (*ANALYSES, Count())
-    monkeypatch.setattr("bench.commands.evaluate.ANALYSES", with_count)
+    monkeypatch.setattr("bench.workflows.session_evaluation.ANALYSES", with_count)
     monkeypatch.setattr("bench.report.page.write.ANALYSES", with_count)
     evaluate(steel_signals, tmp_path, Settings(figures=False), workers=0, announce=lambda text: 0)
     (row,) = COUNTS.read(tmp_path)

@@ -9,10 +9,10 @@ from bench.analyses.curved import curved
 from bench.analyses.turning_phi import turn, with_turn
 from bench.base.settings import Settings
 from bench.base.statuses import reason
-from bench.commands.evaluate import evaluate
 from bench.records.trial_result import EstimateRow, FeltAt
 from bench.rig.simulate import simulate
 from bench.session.whisker import Whisker
+from bench.workflows.session_evaluation import evaluate
 from estimator import curvature
 from tests.scenes.rig_sessions import protocol_file
 from vision.truth.value import Value

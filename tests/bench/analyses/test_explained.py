@@ -9,10 +9,10 @@ import pytest
 from bench.analyses.alphas import felt_friction, seen_friction
 from bench.analyses.explained import by_10
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate
 from bench.records.trial_result import FeltWhisk
 from bench.session.session import load_session
 from bench.session.whisker import Whisker
+from bench.workflows.session_evaluation import evaluate
 from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings, Whisk

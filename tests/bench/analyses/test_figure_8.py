@@ -7,9 +7,9 @@ import pytest
 
 from bench.analyses.figure_8 import figure_8
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate
 from bench.report.pooled import pooled
 from bench.rig.simulate import simulate
+from bench.workflows.session_evaluation import evaluate
 from estimator.beam import moment_in_EI_per_metre
 
 KINETIC_DEG, STATIC_DEG = 12.3, 17.0

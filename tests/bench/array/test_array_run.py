@@ -12,11 +12,11 @@ from bench.api import ArrayRun, Run
 from bench.array.compare_arrays import compare_arrays
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.commands.check import check
-from bench.commands.evaluate import evaluate
 from bench.report.compare_runs import compare_runs
 from bench.report.video import write_video
 from bench.rig.simulate import simulate
+from bench.workflows.preflight import check
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.rig_sessions import protocol_file
 
 PROTOCOL = """

@@ -10,10 +10,10 @@ from bench import api
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.tables import sigma_name
-from bench.commands.evaluate import evaluate
 from bench.report.score import truth_of
 from bench.rig.simulate import simulate
 from bench.session.array_view import load_views
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import codes
 from tests.scenes.rig_sessions import protocol_file
 

@@ -10,8 +10,8 @@ import pytest
 from scipy.io import savemat
 
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate
 from bench.trials.seeing import by_preset
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import table
 
 LAMP = Path(__file__).resolve().parents[3] / "fixtures" / "scenes" / "lamp"

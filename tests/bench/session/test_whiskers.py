@@ -5,9 +5,9 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate
 from bench.rig.simulate import simulate
 from bench.session.session import load_session
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import table
 
 ALPHA_DEG, D_X_MM = 10.5, 55.0

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate
 from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import (
     FROM_ALL,
@@ -21,6 +20,7 @@ from bench.trials.agreement import agreement
 from bench.trials.differences import LEAST_CHANCE
 from bench.trials.felt_trial import against_shape
 from bench.trials.readout import Readout
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import codes, table
 
 MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])

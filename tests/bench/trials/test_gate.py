@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate
 from bench.rig.simulate import simulate
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.rig_sessions import protocol_file
 
 PROTOCOL = """

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate
 from bench.gauges.felt import strokes_of
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Phases
 from bench.records.plain import from_plain, to_plain
@@ -16,6 +15,7 @@ from bench.rig.simulate import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
 from bench.trials.stick_slip_phases import felt_phases, seen_phases
+from bench.workflows.session_evaluation import evaluate
 from estimator.beam import Beam
 from vision.truth.records import FrameTruth
 from vision.truth.value import Value

@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate
 from bench.rig.simulate import simulate
+from bench.workflows.session_evaluation import evaluate
 
 COLUMN = """
 [[columns]]

@@ -7,7 +7,6 @@ time of the functions that carry each refinement, with all that they call; of pa
 derivatives' columns. Of large bending it is what centrelines take longer than those of a beam of small angles, timed
 beside each other; of the others what a plainer model would do in their place is not taken off, so that the numbers are
 bounds from above. The time of a whisk is all of seeing and feeling, apart from calibration and tables.
-`bench.analyses.left_out.COST_PERCENT` holds these numbers, rounded up.
 """
 
 import cProfile
@@ -27,7 +26,7 @@ import numpy as np  # noqa: E402
 
 from bench.analyses.left_out import NAMES  # noqa: E402
 from bench.base.settings import Settings  # noqa: E402
-from bench.commands.evaluate import evaluate  # noqa: E402
+from bench.workflows.session_evaluation import evaluate  # noqa: E402
 from vision.fit.blocks import BAR_PRIOR, REST_PRIOR_MM  # noqa: E402
 from vision.geometry.centreline import REST_POWERS, centrelines, rotation_z, simpson, tangent_growth  # noqa: E402
 from vision.geometry.rods import Wire  # noqa: E402

@@ -1,19 +1,26 @@
-"""The verb `plan` of the command line. Parsing only."""
+"""The verb `plan`: what sigmas a bench would give before it is built (bench/plan)."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from bench.base.errors import BadInput
-from bench.commands.options import DONE, DOUBTFUL, Verbs, add_follow_links, add_verb, add_workers
+from bench.commands.options import (
+    DONE,
+    DOUBTFUL,
+    Verbs,
+    add_follow_links,
+    add_verb,
+    add_workers,
+    shows_progress,
+)
 
 
-def add_plan(verbs: Verbs) -> None:
-    """`plan`."""
+def add(verbs: Verbs) -> None:
+    """Add the verb."""
     verb = add_verb(
         verbs,
         "plan",
-        _plan,
+        run,
         "what sigmas a bench would give before it is built, what limits them and which one change would halve them; "
         "of a recorded session, expected beside stated",
         "whisker-bench plan --example > rig.toml && whisker-bench plan rig.toml --out plan-out",
@@ -42,7 +49,14 @@ def add_plan(verbs: Verbs) -> None:
     add_workers(verb)
 
 
-def _plan(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
+    """Write the plan, or print an example of a rig; return the exit code.
+
+    Raise BadInput where RIG.toml, SESSION or --out is missing.
+    """
+    from bench.base.workers import single_thread
+
+    single_thread()  # before NumPy is imported
     from bench.plan.run_plan import EXAMPLE, Options, plan
 
     if options.example:
@@ -50,11 +64,11 @@ def _plan(options: argparse.Namespace) -> int:
         return DONE
     if options.what is None or options.out is None:
         raise BadInput("plan needs RIG.toml or SESSION, and --out OUT; --example prints a RIG.toml")
-    from bench.base.workers import single_thread
-
-    single_thread()
-    wanted = Options(options.theta_deg, options.changes, options.follow_links)
     made = plan(
-        options.what, options.out, wanted, workers=options.workers, progress=sys.stderr.isatty()
+        options.what,
+        options.out,
+        Options(options.theta_deg, options.changes, options.follow_links),
+        workers=options.workers,
+        progress=shows_progress(),
     )
     return DOUBTFUL if made.lacks_truth else DONE

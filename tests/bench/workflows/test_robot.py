@@ -7,9 +7,9 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.commands import robot, robot_trade
-from bench.commands.robot import Answer, Converter
-from bench.commands.robot_trade import front, pooled, trade_lines
+from bench.workflows import robot_answers, robot_points, robot_trade
+from bench.workflows.robot_answers import Answer, Converter
+from bench.workflows.robot_points import front, pool_answers, trade_lines
 
 RATE_HZ = 2000.0
 
@@ -19,26 +19,26 @@ def test_a_filter_makes_a_ramp_late_by_its_delay():
     time_s = np.arange(4000) / RATE_HZ
     ramp = np.stack([time_s, 3.0 * time_s], axis=1)
     converter = Converter(cutoff_Hz=20.0)
-    late = converter.converted(ramp, RATE_HZ, np.ones(2))
+    late = converter.convert(ramp, RATE_HZ, np.ones(2))
     np.testing.assert_allclose(
         late[-1], ramp[-1] - np.array([1.0, 3.0]) * converter.delay_s, rtol=1e-3
     )
-    still = converter.converted(np.full((50, 2), 0.7), RATE_HZ, np.ones(2))
+    still = converter.convert(np.full((50, 2), 0.7), RATE_HZ, np.ones(2))
     np.testing.assert_allclose(still, 0.7)  # it has been settled before
 
 
 def test_bits_round_to_their_step_of_the_range():
     rng = np.random.default_rng(1)
     own = rng.uniform(-1, 1, (500, 2))
-    rounded = Converter(bits=6).converted(own, RATE_HZ, np.array([2.0, 4.0]))
+    rounded = Converter(bits=6).convert(own, RATE_HZ, np.array([2.0, 4.0]))
     assert np.abs(rounded - own).max(axis=0) == pytest.approx([1 / 64, 2 / 64], rel=0.02)
     assert len(np.unique(rounded[:, 0])) <= 65
 
 
 def test_a_cut_off_beyond_half_the_rate_is_none():
-    assert not Converter(cutoff_Hz=1000.0).passes(RATE_HZ) and Converter(cutoff_Hz=400.0).passes(
-        RATE_HZ
-    )
+    assert not Converter(cutoff_Hz=1000.0).can_filter(RATE_HZ) and Converter(
+        cutoff_Hz=400.0
+    ).can_filter(RATE_HZ)
 
 
 @pytest.mark.parametrize(
@@ -47,8 +47,10 @@ def test_a_cut_off_beyond_half_the_rate_is_none():
 def test_the_window_ends_where_the_push_does(push_deg, speed_deg_s):
     """θ and half its window, as `estimator.signal.moment_at` takes it, are the push."""
     push, speed = np.radians([push_deg, speed_deg_s])
-    theta = robot._theta_rad(push, speed)
-    half = min(max(robot.HALF_WINDOW_RAD, speed * robot.HUM_PERIOD_S / 2), 0.9 * theta)
+    theta = robot_answers._theta_rad(push, speed)
+    half = min(
+        max(robot_answers.HALF_WINDOW_RAD, speed * robot_answers.HUM_PERIOD_S / 2), 0.9 * theta
+    )
     assert theta + half == pytest.approx(push)
 
 
@@ -61,7 +63,7 @@ def answer(error: float, time_s: float, estimator: str = "with_friction", **othe
 def test_bias_and_scatter_over_the_whisks():
     """Errors of 1 and 3 %: mean 2, scatter 1, RMS √5; expected 1 and 1 with a noise of 0.75: RMS 1.25."""
     nothing = answer(math.nan, 0.3, noise_percent=math.nan)
-    (point,) = pooled([answer(1.0, 0.3), answer(3.0, 0.3), nothing])
+    (point,) = pool_answers([answer(1.0, 0.3), answer(3.0, 0.3), nothing])
     assert (point.whisks, point.none, point.time_ms) == (2, 1, 300.0)
     measured = point.error_mean_percent, point.error_sd_percent, point.error_rms_percent
     assert measured == pytest.approx((2.0, 1.0, math.sqrt(5.0)))
@@ -70,31 +72,31 @@ def test_bias_and_scatter_over_the_whisks():
 
 def test_the_front_is_what_no_other_beats():
     pushed = {1.0: (0.1, 4.0), 2.0: (0.2, 2.0), 3.0: (0.3, 3.0), 4.0: (0.4, 1.0)}
-    points = pooled(
+    points = pool_answers(
         [answer(error, time_s, push_deg=push) for push, (time_s, error) in pushed.items()]
     )
-    assert front(points) == [True, True, False, True]
-    few = pooled(
+    assert front(points).tolist() == [True, True, False, True]
+    few = pool_answers(
         [
             *(answer(2.0, 0.3) for _ in range(4)),
             answer(0.1, 0.1, push_deg=1.0),
             *(answer(math.nan, 0.1, push_deg=1.0) for _ in range(3)),
         ]
     )
-    assert front(few) == [True, False]  # one of four whisks is another question
+    assert front(few).tolist() == [True, False]  # one of four whisks is another question
     assert len(list(trade_lines(points))) == 4
 
 
 def test_a_recorded_session(steel_signals, exact_vision, monkeypatch, tmp_path):
     """b60_4: pushed further, (10) errs by less; its filter's delay is in the time; a coarse rate finds no touch."""
-    monkeypatch.setattr(robot, "PUSHES_DEG", (1.0, 3.0, 30.0))
+    monkeypatch.setattr(robot_answers, "PUSHES_DEG", (1.0, 3.0, 30.0))
     monkeypatch.setattr(
         robot_trade, "CONVERTERS", (Converter(), Converter(cutoff_Hz=20.0), Converter(every=100))
     )
     robot_trade.robot_trade(
         steel_signals, tmp_path, Settings(trials="b60_4", alpha_est_deg=10.5), workers=0
     )
-    table = robot_trade.ROBOT_TRADE.read(tmp_path)
+    table = robot_points.ROBOT_TRADE.read(tmp_path)
     ten = table[table["estimator"] == "with_friction"]
     near, far = (
         ten[np.isnan(ten["cutoff_Hz"]) & (ten["rate_Hz"] == RATE_HZ) & (ten["push_deg"] == d)]

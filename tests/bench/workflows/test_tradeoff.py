@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.base.settings import Seeing
-from bench.commands import tradeoff
-from bench.commands.tradeoff import Trade, front, ladder
+from bench.base.settings import Seeing, Settings
 from bench.trials.seeing import from_file
+from bench.workflows import seeing_trade
+from bench.workflows.seeing_trade import Trade, front, settings_to_try
 
 RING = Path(__file__).resolve().parents[3] / "fixtures" / "scenes" / "ring"
 
@@ -28,27 +28,30 @@ def test_the_front_is_what_no_other_beats():
         trade(0.5, 0.001, missing=1),
         trade(1.0, 0.03),
     ]
-    assert front(trades) == [True, True, False, True, False]
+    assert front(trades).tolist() == [True, True, False, True, False]
 
 
 def test_a_third_camera_is_left_out_in_turn():
-    names = [seeing.name for seeing in ladder(("a", "b", "c"))]
+    names = [seeing.name for seeing in settings_to_try(("a", "b", "c"))]
     assert [name for name in names if name.startswith("without")] == [
         "without-a",
         "without-b",
         "without-c",
     ]
-    assert not any(seeing.cameras for seeing in ladder(("a", "b")))
+    assert not any(seeing.cameras for seeing in settings_to_try(("a", "b")))
 
 
 @pytest.mark.slow
-def test_a_table_and_files_to_give_back(tmp_path, monkeypatch, capsys):
+def test_a_table_and_files_to_give_back(tmp_path, monkeypatch):
     """That of d_x is below the 0.1 mm of tests/bench/test_scenes.py."""
-    monkeypatch.setattr(tradeoff, "_CHANGES", {})
+    monkeypatch.setattr(seeing_trade, "_CHANGES", {})
     monkeypatch.setattr(
-        tradeoff, "PRESETS", {name: tradeoff.PRESETS[name] for name in ("draft", "standard")}
+        seeing_trade,
+        "PRESETS",
+        {name: seeing_trade.PRESETS[name] for name in ("draft", "standard")},
     )
-    assert tradeoff.tradeoff(RING, tmp_path, trials="w*", repeats=1) == 0
+    rows = seeing_trade.tradeoff(RING, tmp_path, Settings(trials="w*"), repeats=1)
+    assert "of standard" in next(seeing_trade.tradeoff_lines(rows))
     with (tmp_path / "tradeoff.csv").open(newline="") as file:
         rows = {row["setting"]: row for row in csv.DictReader(file)}
     assert set(rows) == {"draft", "standard", "with-figures"}
@@ -61,15 +64,16 @@ def test_a_table_and_files_to_give_back(tmp_path, monkeypatch, capsys):
     assert rows["with-figures"]["d_x_error_rms_mm"] == rows["standard"]["d_x_error_rms_mm"]
     files = sorted((tmp_path / "settings").iterdir())
     assert files
-    assert {from_file(path).vision for path in files} <= {seeing.vision for seeing in ladder(())}
-    assert "of standard" in capsys.readouterr().out
+    assert {from_file(path).vision for path in files} <= {
+        seeing.vision for seeing in settings_to_try(())
+    }
 
 
 def test_no_trial_of_that_name(tmp_path):
     with pytest.raises(BadInput, match=r"--trials c\*: no trial with pictures has such a name"):
-        tradeoff.tradeoff(RING, tmp_path, trials="c*")
+        seeing_trade.tradeoff(RING, tmp_path, Settings(trials="c*"))
 
 
 def test_nothing_is_written_into_the_session():
     with pytest.raises(BadInput, match="lies in the session"):
-        tradeoff.tradeoff(RING, RING / "out")
+        seeing_trade.tradeoff(RING, RING / "out", Settings())

@@ -8,8 +8,8 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.commands.evaluate import evaluate
-from bench.commands.watch import watch
+from bench.workflows.live_evaluation import watch
+from bench.workflows.session_evaluation import evaluate
 
 SETTINGS = Settings(figures=False)
 
@@ -145,6 +145,6 @@ def test_an_interruption_within_an_evaluation_goes_up(steel_signals, tmp_path, m
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bench.commands.watch.evaluate", interrupted)
+    monkeypatch.setattr("bench.workflows.live_evaluation.evaluate", interrupted)
     with pytest.raises(KeyboardInterrupt):
         watched(steel_signals, tmp_path / "out", iter([None, None]))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from bench.base.doubts import Doubts
-from bench.commands.check import look_ahead
 from bench.session.frame_times import FrameTimes
 from bench.session.session_check import checked_session
+from bench.workflows.preflight import check_contents
 from tests.scenes.faults import FAULTS, TRIAL, change_picture
 
 
@@ -20,7 +20,7 @@ def found(folder, *, boards=False) -> Doubts:
     session = checked_session(folder, doubts)
     if not boards:
         session.board_sources.clear()
-    look_ahead(session, doubts)
+    check_contents(session, doubts)
     return doubts
 
 

@@ -12,9 +12,9 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.statuses import reason
 from bench.base.workers import DIED, Workers
-from bench.commands.evaluate import evaluate
 from bench.report.whisk_tables import ESTIMATES, TRACK, WHISKS
 from bench.trials.trial_evaluation import evaluate_unit
+from bench.workflows.session_evaluation import evaluate
 from tests.faults.interrupted import contents, full_disk
 from tests.scenes.results import codes, seen_whisk, table
 

@@ -13,10 +13,10 @@ from bench.base.errors import BadInput
 from bench.base.results import hash_of
 from bench.base.settings import Settings
 from bench.cameras.session_cameras import SessionCalibration
-from bench.commands.calibrate_gauges import calibrate_gauges_command
-from bench.commands.evaluate import evaluate
 from bench.gauges.gauges_file import read_gauges
 from bench.rig.simulate import simulate
+from bench.workflows.gauge_calibration import calibrate_gauges_command
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import codes
 
 

@@ -1,0 +1,82 @@
+"""The verb `calibrate`: of cameras (bench/cameras) and of gauges (bench/workflows)."""
+
+import argparse
+from pathlib import Path
+
+from bench.commands.options import (
+    Verbs,
+    add_out,
+    add_recorded,
+    add_verb,
+    add_workers,
+    shows_progress,
+)
+
+
+def add(verbs: Verbs) -> None:
+    """Add the verb with `cameras` and `gauges` below it."""
+    calibrate = verbs.add_parser(
+        "calibrate", help="cameras from their board views, gauges from the deflection seen"
+    )
+    what = calibrate.add_subparsers(title="what", metavar="WHAT", required=True)
+    _add_cameras(what)
+    _add_gauges(what)
+
+
+def _add_cameras(what: Verbs) -> None:
+    """Add `calibrate cameras`."""
+    verb = add_verb(
+        what,
+        "cameras",
+        _run_cameras,
+        "calibrate the cameras from boards/ and place them in the rig, with their uncertainty",
+        "whisker-bench calibrate cameras fixtures/small-session --out cameras.toml",
+    )
+    add_recorded(verb)
+    add_out(verb, "FILE", "cameras.toml to write; its covariance goes beside it as .npz")
+    verb.add_argument(
+        "--lenses",
+        type=Path,
+        metavar="FILE",
+        help="camera TOML of caliscope or aniposelib: its lenses are taken as exact and only placed in the rig",
+    )
+
+
+def _add_gauges(what: Verbs) -> None:
+    """Add `calibrate gauges`."""
+    verb = add_verb(
+        what,
+        "gauges",
+        _run_gauges,
+        "calibrate the gauges against the deflection seen, with a certificate",
+        "whisker-bench calibrate gauges fixtures/small-session --out gauges.toml",
+    )
+    add_recorded(verb)
+    add_out(verb, "FILE", "gauges.toml to write; the certificate goes beside it as .pdf")
+    verb.add_argument(
+        "--all", action="store_true", help='all trials, not only those marked purpose = "gauge"'
+    )
+    add_workers(verb)
+
+
+def _run_cameras(options: argparse.Namespace) -> int:
+    """Calibrate the cameras; return the exit code."""
+    from bench.cameras.calibrate_session import calibrate_cameras_command
+
+    return calibrate_cameras_command(
+        options.session, options.out, options.lenses, follow_links=options.follow_links
+    )
+
+
+def _run_gauges(options: argparse.Namespace) -> int:
+    """Calibrate the gauges; return the exit code."""
+    from bench.workflows.gauge_calibration import calibrate_gauges_command
+
+    return calibrate_gauges_command(
+        options.session,
+        options.out,
+        every_trial=options.all,
+        workers=options.workers,
+        progress=shows_progress(),
+        follow_links=options.follow_links,
+    )

@@ -1,0 +1,57 @@
+"""The verb `simulate`: a session with known truth (bench/rig/simulate.py)."""
+
+import argparse
+from functools import partial
+
+from bench.commands.options import (
+    DONE,
+    Verbs,
+    add_session,
+    add_verb,
+    add_workers,
+    shows_progress,
+)
+
+
+def add(verbs: Verbs) -> None:
+    """Add the verb."""
+    verb = add_verb(
+        verbs,
+        "simulate",
+        run,
+        "record a session with known truth on a synthetic rig",
+        "whisker-bench simulate my-session --protocol quick --seed 1 --workers 2",
+    )
+    add_session(verb)
+    verb.add_argument(
+        "--protocol", default="quick", metavar="NAME|FILE", help="quick, paper or a TOML file"
+    )
+    verb.add_argument(
+        "--signals-only",
+        action="store_true",
+        help="no pictures; times, signals and truth all the same",
+    )
+    verb.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="the same seed gives the same bytes (default 0)",
+    )
+    add_workers(verb)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Simulate the session; return the exit code."""
+    from bench.rig.simulate import simulate
+
+    simulate(
+        options.session,
+        protocol=options.protocol,
+        signals_only=options.signals_only,
+        seed=options.seed,
+        workers=options.workers,
+        progress=shows_progress(),
+        announce=partial(print, flush=True),
+    )
+    return DONE

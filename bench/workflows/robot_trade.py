@@ -1,0 +1,183 @@
+"""The robot's trade: error of each estimator against the milliseconds since touch, and its converter.
+
+From one recording: pushed further and further, at each speed that was recorded, through filters,
+slower and coarser converters, one changed at a time. Measured: bias and scatter over the whisks.
+Expected: (13), (14) and docs/maps.md at the slope and friction seen, and the noise as stated.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, ScalarFormatter
+
+from bench.base.atomic import lock_output
+from bench.base.doubts import Doubts
+from bench.base.drawing import colour_of, label_of, publish, style
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.base.workers import Workers
+from bench.report.evaluation import finished
+from bench.session.inside import check_outside
+from bench.session.session_check import checked_session
+from bench.session.signals import read_signals
+from bench.trials.lost import evaluate_units
+from bench.trials.of_session import placed_units, require_some, trials_with_whisks, with_gauges
+from bench.workflows.robot_answers import Answer, Converter, Task, answers_of_trial, range_of
+from bench.workflows.robot_points import ROBOT_TRADE, Point, front, pool_answers
+
+FIGURE = "robot_trade"
+CONVERTERS = (
+    Converter(),  # as recorded
+    *(Converter(cutoff_Hz=cutoff) for cutoff in (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0)),
+    *(Converter(every=every) for every in (2, 5, 10, 20, 50)),
+    *(Converter(bits=bits) for bits in (6, 8, 10, 12)),
+)
+# [°] Push that the figure compares converters at, or the nearest to it. Stated.
+_USUAL_PUSH_DEG = 3.0
+
+
+def robot_trade(
+    session_path: Path, out: Path, settings: Settings, *, workers: int = 1, progress: bool = False
+) -> list[Point]:
+    """Write table and figure into `out`, and return the points.
+
+    `out` holds the session's evaluation, too: what of it is there already is not made again. Raise
+    BadInput, also where no whisk has both a truth and moments.
+    """
+    check_outside(out, session_path)
+    answers = _answers_of_session(session_path, out, settings, workers, progress)
+    if not answers:
+        raise BadInput(
+            "no whisk has both a sound truth and moments; evaluate says why", file=session_path
+        )
+    points = pool_answers(answers)
+    on_front = front(points)
+    rows = []
+    for point, is_on_front in zip(points, on_front):
+        rows.append({"on_front": int(is_on_front)} | vars(point))
+    ROBOT_TRADE.write(out, rows)
+    with style():
+        publish(draw(points, on_front), out / FIGURE)
+    return points
+
+
+def _answers_of_session(
+    session_path: Path, out: Path, settings: Settings, workers: int, progress: bool
+) -> list[Answer]:
+    """Evaluate the session into `out`; return all answers about its whisks. Raise BadInput."""
+    doubts = Doubts()
+    session = checked_session(session_path, doubts, follow_links=settings.follow_links)
+    recorded = trials_with_whisks(session)
+    require_some(recorded, settings)
+    with lock_output(out), Workers(workers, progress) as pool:
+        _, units = placed_units(session, recorded, out, settings, pool, doubts)
+        *_, units = with_gauges(units, pool, doubts)
+        chosen = [unit for unit in units if settings.takes(unit.trial.name)]
+        results = finished(evaluate_units(chosen, pool), session.whisker, settings).results
+        ranges_V = [range_of(read_signals(unit.trial)) for unit in chosen]
+        range_V = np.max(ranges_V, axis=0, initial=0.0)
+        tasks = [Task(unit, result, CONVERTERS, range_V) for unit, result in zip(chosen, results)]
+        answers = []
+        for of_trial in pool.run(answers_of_trial, tasks, "answers"):
+            answers += of_trial
+    return answers
+
+
+def draw(points: Sequence[Point], on_front: Sequence[bool]) -> Figure:
+    """Draw error against milliseconds with the front, and against cut-off, rate and bits.
+
+    The last three are at the push nearest to _USUAL_PUSH_DEG.
+    """
+    figure = Figure(figsize=(9.0, 6.4), layout="constrained")
+    time, cutoff, rate, bits = figure.subplots(2, 2).ravel()
+    names = list(dict.fromkeys(point.estimator for point in points))
+    _draw_against_time(time, points, on_front, names)
+    pushes_deg = {point.push_deg for point in points}
+    push_deg = min(pushes_deg, key=lambda deg: abs(deg - _USUAL_PUSH_DEG))
+    usual = [point for point in points if point.push_deg == push_deg]
+    full_rate_Hz = max(point.rate_Hz for point in usual)
+    at_full_rate = [point for point in usual if point.rate_Hz == full_rate_Hz]
+    filtered = [point for point in at_full_rate if np.isfinite(point.cutoff_Hz)]
+    thinned = [point for point in usual if point.is_unfiltered_and_unrounded]
+    rounded = [point for point in at_full_rate if np.isfinite(point.bits)]
+    panels = (
+        (cutoff, "cutoff_Hz", "cut-off, Hz", filtered),
+        (rate, "rate_Hz", "samples a second", thinned),
+        (bits, "bits", "bits of the converter", rounded),
+    )
+    for axes, column, label, of_panel in panels:
+        _draw_against(axes, of_panel, column, names)
+        axes.set(xlabel=label, ylabel="error of d$_x$, RMS, %", title=f"pushed by {push_deg:g}°")
+    handles, labels = time.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(names) + 2)
+    return figure
+
+
+def _draw_against_time(
+    axes: Axes, points: Sequence[Point], on_front: Sequence[bool], names: Sequence[str]
+) -> None:
+    """Draw the error of every point against its milliseconds, and the front."""
+    for number, name in enumerate(names):
+        own = [point for point in points if point.estimator == name and point.whisks]
+        axes.plot(
+            [point.time_ms for point in own],
+            [point.error_rms_percent for point in own],
+            "o",
+            ms=3,
+            alpha=0.5,
+            color=colour_of(name, number),
+            mew=0,
+            label=label_of(name),
+        )
+    joined = []
+    for point, is_on_front in zip(points, on_front):
+        if is_on_front:
+            joined.append((point.time_ms, point.error_rms_percent))
+    time_ms, error_percent = np.array(sorted(joined)).reshape(-1, 2).T
+    axes.plot(time_ms, error_percent, color="0.2", lw=1, label="Pareto front")
+    axes.plot([], [], "--", color="0.4", lw=1, label="expected")
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="from touch to answer, ms",
+        ylabel="error of d$_x$, RMS, %",
+    )
+    _label_logarithmic(axes.xaxis)
+    _label_logarithmic(axes.yaxis)
+
+
+def _draw_against(axes: Axes, points: Sequence[Point], column: str, names: Sequence[str]) -> None:
+    """Draw measured (solid) and expected error (dashed) over a column of ROBOT_TRADE.
+
+    There is a line an estimator and speed.
+    """
+    speeds_deg_s = sorted({point.speed_deg_s for point in points})
+    for number, name in enumerate(names):
+        colour = colour_of(name, number)
+        for speed_deg_s in speeds_deg_s:
+            own = []
+            for point in points:
+                is_own = point.estimator == name and point.speed_deg_s == speed_deg_s
+                if is_own and point.whisks:
+                    errors = (point.error_rms_percent, point.expected_rms_percent)
+                    own.append((getattr(point, column), *errors))
+            if own:
+                x, measured, expected = np.array(sorted(own)).T
+                axes.plot(x, measured, "o-", ms=3, lw=1, color=colour)
+                axes.plot(x, expected, "--", lw=1, color=colour)
+    axes.set_yscale("log")
+    _label_logarithmic(axes.yaxis)
+    if column != "bits":
+        axes.set_xscale("log")
+        _label_logarithmic(axes.xaxis)
+
+
+def _label_logarithmic(axis: Axis) -> None:
+    """Label a logarithmic axis with plain numbers at 1, 2 and 5."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(ScalarFormatter())
+    axis.set_minor_formatter("")

@@ -1,0 +1,179 @@
+"""The main job: a recorded session in; truth, estimates and their errors out."""
+
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+
+from bench.analyses.catalogue import ANALYSES
+from bench.base.atomic import lock_output, write_whole
+from bench.base.doubts import Doubts
+from bench.base.settings import Settings
+from bench.base.workers import Workers
+from bench.report.assembly import write_tables
+from bench.report.evaluation import Evaluation, finished
+from bench.report.summary.compose import Summary
+from bench.session.inside import check_outside
+from bench.session.session import Session
+from bench.session.session_check import checked_views
+from bench.session.trial import Trial
+from bench.trials.estimates import estimators
+from bench.trials.exchanged_signals import exchanged_signals
+from bench.trials.lost import evaluate_units
+from bench.trials.of_session import (
+    first_units,
+    require_some,
+    trials_with_whisks,
+    units_in_rig,
+    with_gauges,
+)
+from bench.trials.one_camera import require_camera
+from bench.trials.side_by_side import array_units
+from bench.trials.unit import Unit
+
+DONE = 0
+DOUBTFUL = 1
+
+
+def evaluate(
+    session_path: Path,
+    out: Path,
+    settings: Settings,
+    *,
+    workers: int = 1,
+    dask: str | None = None,
+    progress: bool = False,
+    figure_formats: Sequence[str] = (),
+    announce: Callable[[str], object] = print,
+    verdict_alone: bool = False,
+    trials: Collection[str] | None = None,
+) -> int:
+    """Evaluate a session into the folder `out`. Return 0, or 1 with warnings.
+
+    dask: address of a Dask cluster's scheduler, in place of `workers`. figure_formats: of figures for a
+    paper, drawn besides the others. announce: is given what is to be seen at a glance, or of that the
+    verdict alone. trials: names of those that the session is taken to have; None: all. Raise BadInput.
+    """
+    estimators(settings.estimators)
+    if dask is not None:  # its workers stand elsewhere
+        session_path = session_path.absolute()
+        out = out.absolute()
+    check_outside(out, session_path)
+    doubts = Doubts()
+    views = checked_views(session_path, doubts, trials, follow_links=settings.follow_links)
+    require_camera(views[0], settings)
+    recorded = [trials_with_whisks(view) for view in views]
+    require_some(recorded[0], settings)
+    with lock_output(out), _workers(dask, workers, out, progress) as pool:
+        if views[0].base is None:
+            units = first_units(views[0], recorded[0], out, settings)
+            summary = _evaluate_whisker(
+                views[0], units, out, settings, pool, doubts, figure_formats
+            )
+        else:
+            summary = _evaluate_array(views, recorded, out, settings, pool, doubts, figure_formats)
+    announce("\n".join(summary.verdict) if verdict_alone else summary.on_screen(out))
+    return DOUBTFUL if summary.doubtful else DONE
+
+
+def _evaluate_array(
+    views: Sequence[Session],
+    recorded: Sequence[Sequence[Trial]],
+    out: Path,
+    settings: Settings,
+    pool: Workers,
+    doubts: Doubts,
+    figure_formats: Sequence[str],
+) -> Summary:
+    """Evaluate each whisker of an array as a run of its own, and then all whiskers together."""
+    from bench.array.array_results import array_record, folder_of, write_array, write_array_record
+    from bench.report.score import score_all
+
+    folders = [folder_of(out, view.base.name) for view in views]
+    units_of_views = array_units(views, recorded, out, folders, settings, pool)
+    for view, folder, units in zip(views, folders, units_of_views):
+        with lock_output(folder):
+            _evaluate_whisker(view, units, folder, settings, pool, Doubts(), figure_formats)
+    scores = score_all(list(zip(views, folders)))
+    write_array_record(out, array_record(views, doubts.notes, scores))
+    return write_array(out)
+
+
+def _evaluate_whisker(
+    session: Session,
+    units: Sequence[Unit],
+    out: Path,
+    settings: Settings,
+    pool: Workers,
+    doubts: Doubts,
+    figure_formats: Sequence[str],
+) -> Summary:
+    """Evaluate the trials of one whisker's session, a unit each, into the folder `out`.
+
+    The folder is locked.
+    """
+    calibration, units = units_in_rig(session, units, pool, doubts)
+    gauges, certificate, units = with_gauges(units, pool, doubts)
+    chosen = [unit for unit in units if settings.takes(unit.trial.name)]
+    whole = finished(evaluate_units(chosen, pool), session.whisker, settings)
+    if whole.doubt:
+        doubts.notes.append(whole.doubt)
+    doubts.notes += exchanged_signals(chosen, whole.results)
+    evaluation = Evaluation(
+        whisker=session.whisker,
+        settings=settings,
+        results=whole.results,
+        friction=whole.friction,
+        alpha_est_sigma_rad=whole.alpha_est_sigma_rad,
+        doubt=whole.doubt,
+        session=session,
+        out=out,
+        gauges=gauges,
+        certificate=certificate,
+        calibration=calibration,
+        doubts=tuple(doubts.notes),
+        recordings={unit.trial.name: unit.files for unit in chosen},
+    )
+    return report(evaluation, pool, figure_formats)
+
+
+def _workers(dask: str | None, count: int, out: Path, progress: bool) -> Workers:
+    """Return processes here, or a cluster."""
+    if dask is None:
+        return Workers(count, progress)
+    from bench.base.cluster import Cluster
+
+    return Cluster(dask, out, progress)
+
+
+def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] = ()) -> Summary:
+    """Write tables, figures where they are wanted, report and summary; return the summary.
+
+    Results of a synthetic session are scored.
+    """
+    from bench.report.page.write import write_report
+    from bench.report.record import record_of, write_record
+    from bench.report.score import score
+    from bench.report.summary.compose import summary_of
+
+    out = evaluation.out
+    write_tables(out, evaluation.results)
+    findings = {analysis: analysis.compute(evaluation) for analysis in ANALYSES}
+    for analysis, found in findings.items():
+        analysis.write(out, found)
+    figures = []
+    if evaluation.settings.figures:
+        from bench.report.figures import draw_trials  # with all of matplotlib
+
+        figures += draw_trials(evaluation, pool)
+        for analysis, found in findings.items():
+            figures += analysis.draw(out, evaluation, found)
+    scores = score(evaluation.session, out, evaluation.gauges)
+    summary = summary_of(evaluation, findings, scores, figures)
+    written = record_of(evaluation, summary, figures)
+    record = write_record(out, written, evaluation.session.path)
+    write_report(out, record, evaluation)
+    if figure_formats:
+        from bench.report.paper import write_paper_figures
+
+        write_paper_figures(out, evaluation, figure_formats)
+    write_whole(out / "summary.txt", summary.text)
+    return summary
