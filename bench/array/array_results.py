@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bench.analyses.runs import alpha_est_sigma
 from bench.array.array_page import write_page
-from bench.array.cloud import Contact, Mount, contacts
+from bench.array.cloud import ContactPoint, Mount, contacts
 from bench.array.exchanged_whiskers import exchanged
 from bench.array.shape_verdict import (
     SURFACE_POINTS,
@@ -17,7 +17,7 @@ from bench.array.shape_verdict import (
     write_surface,
 )
 from bench.array.size import SIZE, FeltSize, fit_sizes, size_lines, write_sizes
-from bench.array.surface import Surface, seen_surface, stated_surface
+from bench.array.surface import ObjectSurface, seen_surface, stated_surface
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.tables import WHISKER
@@ -53,7 +53,7 @@ class ArrayRecord:
     bases: tuple[Base, ...]
     doubts: tuple[str, ...] = ()
     scores: tuple[str, ...] = ()
-    surfaces: dict[str, Surface] = field(default_factory=dict)
+    surfaces: dict[str, ObjectSurface] = field(default_factory=dict)
     verdict: tuple[str, ...] = ()
     doubtful: tuple[str, ...] = ()
 
@@ -153,7 +153,7 @@ def write_array(out: Path) -> Summary:
     return summary
 
 
-def _seen_surfaces(runs: Sequence[WhiskerRun]) -> dict[str, Surface]:
+def _seen_surfaces(runs: Sequence[WhiskerRun]) -> dict[str, ObjectSurface]:
     """Return the bar of each trial, from the first whisk that shows it."""
     surfaces = {}
     for run in runs:
@@ -182,7 +182,7 @@ def _named_by_whisker(result: TrialResult, run: WhiskerRun) -> TrialResult:
 def _summarise(
     record: ArrayRecord,
     runs: Sequence[WhiskerRun],
-    cloud: Sequence[Contact],
+    cloud: Sequence[ContactPoint],
     sizes: Sequence[FeltSize],
 ) -> Summary:
     """Return verdict and sections of the array's summary; sections without lines are left out."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.array.surface import Surface, seen_surface
+from bench.array.surface import ObjectSurface, seen_surface
 from bench.base.doubts import in_one_status
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.assembly import Z_C_MM
@@ -21,7 +21,7 @@ SEEN = "seen"  # in the place of an estimator's name
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Contact:
+class ContactPoint:
     """A contact at first touch: a point of the whisker's centreline in the rig frame.
 
     point_mm (3,), covariance_mm2 (3, 3). normal (3,): of the surface, towards the whisker, as felt;
@@ -74,8 +74,8 @@ class Mount:
 
 
 def contacts(
-    mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, Surface]
-) -> Iterator[Contact]:
+    mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, ObjectSurface]
+) -> Iterator[ContactPoint]:
     """Yield every whisk's contact, as seen where it is and by each estimator that gives a distance.
 
     surfaces: by trial, as stated. Where none is, a felt contact is compared with the bar as this
@@ -99,9 +99,9 @@ def contacts(
                 yield _compare(contact, surface) if surface else contact
 
 
-def _seen_contact(mount: Mount, trial: str, seen: SeenWhisk) -> Contact:
+def _seen_contact(mount: Mount, trial: str, seen: SeenWhisk) -> ContactPoint:
     """Return the contact that the cameras see, in the base frame."""
-    return Contact(
+    return ContactPoint(
         whisker=mount.base.name,
         trial=trial,
         whisk=seen.whisk,
@@ -118,7 +118,7 @@ def _seen_contact(mount: Mount, trial: str, seen: SeenWhisk) -> Contact:
 
 def _felt_contact(
     mount: Mount, trial: str, whisk: int, felt: FeltWhisk, estimate: EstimateRow
-) -> Contact:
+) -> ContactPoint:
     """Return the contact (r_c, θ_c, z_c) that an estimator gives, in the base frame."""
     touch = felt.touch_felt_rad
     r_c = estimate.d_x_est_mm
@@ -134,7 +134,7 @@ def _felt_contact(
     if estimate.alpha_est_rad == mount.alpha_est_rad:
         normal_sigma = math.hypot(felt.phi_felt_rad.sigma, mount.alpha_est_sigma_rad)
     polar = contact_point(r_c.value, touch.value, Z_C_MM.value)
-    return Contact(
+    return ContactPoint(
         whisker=mount.base.name,
         trial=trial,
         whisk=whisk,
@@ -169,7 +169,7 @@ def _normal(touch_rad: float, beta_rad: float) -> np.ndarray:
     )
 
 
-def _to_rig(contact: Contact, base: Base) -> Contact:
+def _to_rig(contact: ContactPoint, base: Base) -> ContactPoint:
     """Convert a contact from the base frame to the rig's, and add the covariance of the base's place."""
     turn = base.T_rig_base[:, :3]
     origin = base.T_rig_base[:, 3]
@@ -185,7 +185,7 @@ def _to_rig(contact: Contact, base: Base) -> Contact:
     )
 
 
-def _compare(contact: Contact, surface: Surface) -> Contact:
+def _compare(contact: ContactPoint, surface: ObjectSurface) -> ContactPoint:
     """Return a contact with its distance from the object, across and along the whisker, and the angle
     between the normals.
 

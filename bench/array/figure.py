@@ -8,8 +8,8 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from bench.array.cloud import SEEN, Contact
-from bench.array.surface import Surface
+from bench.array.cloud import SEEN, ContactPoint
+from bench.array.surface import ObjectSurface
 from bench.base.drawing import blank, is_drawn, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.records.plain import to_plain
@@ -20,7 +20,9 @@ _MARGIN_MM = 15.0  # mm of object shown beyond the contacts
 _POINTS = 400  # of the object's centreline that are drawn
 
 
-def write_figures(out: Path, cloud: Sequence[Contact], surfaces: dict[str, Surface]) -> list[str]:
+def write_figures(
+    out: Path, cloud: Sequence[ContactPoint], surfaces: dict[str, ObjectSurface]
+) -> list[str]:
     """Write surface/<trial>.png for each trial with contacts; return their names.
 
     A figure is drawn again only where its data or the drawing code changed.
@@ -43,7 +45,7 @@ def write_figures(out: Path, cloud: Sequence[Contact], surfaces: dict[str, Surfa
     return names
 
 
-def draw(trial: str, cloud: Sequence[Contact], surface: Surface | None) -> Figure:
+def draw(trial: str, cloud: Sequence[ContactPoint], surface: ObjectSurface | None) -> Figure:
     """Draw the object from the side and from above, with the contacts before it.
 
     Felt contacts have their one-sigma ellipses, seen contacts are crosses.
@@ -72,7 +74,7 @@ def _span(values: np.ndarray) -> tuple[float, float]:
     return float(values.min()) - _MARGIN_MM, float(values.max()) + _MARGIN_MM
 
 
-def _draw_contact(axes, contact: Contact, x: int, y: int, colour) -> None:
+def _draw_contact(axes, contact: ContactPoint, x: int, y: int, colour) -> None:
     """Draw a contact in the view along two of the rig's axes."""
     place = contact.point_mm[[x, y]]
     if contact.estimator == SEEN:
@@ -85,7 +87,7 @@ def _draw_contact(axes, contact: Contact, x: int, y: int, colour) -> None:
     axes.plot(*place, "o", color=colour, markersize=2, alpha=0.5 if contact.status else 1.0)
 
 
-def _draw_object(axes, surface: Surface, points: np.ndarray, x: int, y: int) -> None:
+def _draw_object(axes, surface: ObjectSurface, points: np.ndarray, x: int, y: int) -> None:
     """Draw the object as discs of its radius about its centreline, of a cone as those of balls that
     just fit in."""
     centreline = _centreline(surface, points)
@@ -95,7 +97,7 @@ def _draw_object(axes, surface: Surface, points: np.ndarray, x: int, y: int) -> 
         axes.add_patch(Ellipse(centre, 2 * radius, 2 * radius, facecolor="0.85", edgecolor="none"))
 
 
-def _centreline(surface: Surface, points: np.ndarray) -> np.ndarray:
+def _centreline(surface: ObjectSurface, points: np.ndarray) -> np.ndarray:
     """Return points (n, 3) of the object's centreline about the contacts."""
     if surface.shape == "sphere":
         return surface.point_mm[None]

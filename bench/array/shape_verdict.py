@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.array.cloud import SEEN, Contact
+from bench.array.cloud import SEEN, ContactPoint
 from bench.base.drawing import label_of
 from bench.base.tables import (
     TRIAL,
@@ -59,12 +59,12 @@ SURFACE_POINTS = Table(
 FELT = "with_friction"  # equation (10), whose contacts are the array's verdict
 
 
-def write_surface(out: Path, cloud: Iterable[Contact]) -> None:
+def write_surface(out: Path, cloud: Iterable[ContactPoint]) -> None:
     """Write surface.csv into a folder: a row a contact."""
     SURFACE_POINTS.write(out, map(_row, cloud))
 
 
-def _row(contact: Contact) -> dict:
+def _row(contact: ContactPoint) -> dict:
     """Return the row of a contact."""
     covariance = contact.covariance_mm2
     x_mm, y_mm, z_mm = contact.point_mm.tolist()
@@ -94,7 +94,7 @@ def _row(contact: Contact) -> dict:
     }
 
 
-def _sound_contacts(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
+def _sound_contacts(cloud: Iterable[ContactPoint], estimator: str) -> list[ContactPoint]:
     """Return one estimator's contacts beside a known surface that carry no status."""
     sound = []
     for contact in cloud:
@@ -104,7 +104,7 @@ def _sound_contacts(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
     return sound
 
 
-def surface_verdict(cloud: Sequence[Contact]) -> Iterator[str]:
+def surface_verdict(cloud: Sequence[ContactPoint]) -> Iterator[str]:
     """Yield the array's verdict in a sentence; nothing where no object is known."""
     sound = _sound_contacts(cloud, FELT)
     if not sound:
@@ -130,12 +130,12 @@ def _rms(values: Sequence[float]) -> float:
     return math.sqrt(sum(value**2 for value in finite) / len(finite)) if finite else math.nan
 
 
-def _normals_rms_deg(contacts: Iterable[Contact]) -> float:
+def _normals_rms_deg(contacts: Iterable[ContactPoint]) -> float:
     """Return the RMS angle between felt normals and the object's."""
     return math.degrees(_rms([contact.normal_off_rad for contact in contacts]))
 
 
-def surface_lines(cloud: Sequence[Contact]) -> Iterator[str]:
+def surface_lines(cloud: Sequence[ContactPoint]) -> Iterator[str]:
     """Yield a line an estimator, and one on the seen contacts, below a head line."""
     lines = []
     for name in dict.fromkeys(contact.estimator for contact in cloud):

@@ -15,9 +15,9 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from bench.array.cloud import Contact
+from bench.array.cloud import ContactPoint
 from bench.array.shape_verdict import FELT
-from bench.array.surface import STATED, Surface
+from bench.array.surface import STATED, ObjectSurface
 from bench.base.doubts import in_one_status
 from bench.base.tables import TRIAL, Column, Kind, Table, sigma_name, status, with_sigma
 from estimator.uncertainty import Z_95
@@ -62,7 +62,7 @@ class FeltSize:
     """
 
     trial: str
-    surface: Surface
+    surface: ObjectSurface
     contacts: int
     distances: int
     size: Value = UNKNOWN
@@ -89,7 +89,7 @@ class FeltSize:
         return float(np.degrees(size)) if self.surface.shape == "cone" else size
 
 
-def fit_sizes(cloud: Iterable[Contact], surfaces: dict[str, Surface]) -> list[FeltSize]:
+def fit_sizes(cloud: Iterable[ContactPoint], surfaces: dict[str, ObjectSurface]) -> list[FeltSize]:
     """Fit a size to the contacts of (10) of each trial whose object the manifest names."""
     by_trial = {}
     for contact in cloud:
@@ -102,13 +102,13 @@ def fit_sizes(cloud: Iterable[Contact], surfaces: dict[str, Surface]) -> list[Fe
     return sizes
 
 
-def fit_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> FeltSize:
+def fit_size(trial: str, contacts: Sequence[ContactPoint], surface: ObjectSurface) -> FeltSize:
     """Fit place and size of an object, by Gauss and Newton's method from what is stated of it."""
     from scipy.optimize import least_squares  # it takes longer than an evaluation's tables
 
     distances = sum(not contact.status for contact in contacts)
     unknown = FeltSize(trial, surface, len(contacts), distances)
-    fit = _Fit(contacts, surface)
+    fit = _SizeFit(contacts, surface)
     freedom = len(contacts) + distances - fit.count
     if freedom < 1:
         return replace(unknown, status=f"too few, of {counted(distances, 'sound distance')}")
@@ -135,7 +135,7 @@ def _status(size: Value, chance: float) -> str:
     return "not told: the interval holds 0" if size.value < Z_95 * size.sigma else ""
 
 
-class _Fit:
+class _SizeFit:
     """Whiskers, straight at first touch, against a surface whose place and size are free.
 
     Parameters (count,): the place's shift along each of `free` (k, 3), mm, and the change of the
@@ -143,7 +143,7 @@ class _Fit:
     place along the whisker from where that comes nearest.
     """
 
-    def __init__(self, contacts: Sequence[Contact], surface: Surface):
+    def __init__(self, contacts: Sequence[ContactPoint], surface: ObjectSurface):
         self.contacts = contacts
         self.surface = surface
         self.bases = np.array([contact.base_mm for contact in contacts])
@@ -153,14 +153,14 @@ class _Fit:
         self.free = np.linalg.svd(surface.axis[None])[2][1:] if is_bar else np.eye(3)
         self.count = len(self.free) + 1
 
-    def surface_at(self, parameters: np.ndarray) -> Surface:
+    def surface_at(self, parameters: np.ndarray) -> ObjectSurface:
         """Return the surface with these parameters."""
         point = self.surface.point_mm + parameters[:-1] @ self.free
         key = _SIZES[self.surface.shape]
         size = getattr(self.surface, key) + float(parameters[-1])
         return replace(self.surface, point_mm=point, **{key: size})
 
-    def nearest_arcs(self, surface: Surface) -> np.ndarray:
+    def nearest_arcs(self, surface: ObjectSurface) -> np.ndarray:
         """Return the arcs (n,), mm, at which each whisker comes nearest to a surface."""
         arcs = []
         for contact in self.contacts:
@@ -168,7 +168,7 @@ class _Fit:
             arcs.append(surface.nearest_arc_mm(contact.base_mm, contact.direction, length))
         return np.array(arcs)
 
-    def distances(self, surface: Surface, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def distances(self, surface: ObjectSurface, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return each whisker's distance from a surface at arcs (n,), mm, and the cosine between it
         and the normal there."""
         outside, normals = surface.distance_mm(self.bases + arcs[:, None] * self.directions)

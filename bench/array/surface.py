@@ -16,7 +16,7 @@ _ARCS = 21  # of each pass of that search
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class ObjectSurface:
     """All points at one distance (radius_mm) from a centreline, in the rig frame.
 
     shape: the centreline is straight ("bar"), a circle ("ring") or a point ("sphere"); or a cone
@@ -88,7 +88,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
-def stated_surface(trial: Trial) -> Surface | None:
+def stated_surface(trial: Trial) -> ObjectSurface | None:
     """Return the object as the manifest states it; None where it does not, or does not say how thick
     it is."""
     stated = trial.object
@@ -98,7 +98,7 @@ def stated_surface(trial: Trial) -> Surface | None:
     if trial.bar_diameter_mm is None and not is_cone:
         return None
     axis = np.array(stated.axis, dtype=float)
-    return Surface(
+    return ObjectSurface(
         stated.shape,
         np.array(stated.point_mm, dtype=float),
         axis / np.linalg.norm(axis),
@@ -109,7 +109,9 @@ def stated_surface(trial: Trial) -> Surface | None:
     )
 
 
-def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) -> Surface | None:
+def seen_surface(
+    seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base
+) -> ObjectSurface | None:
     """Return the object as the cameras show it in a whisk, in the rig frame.
 
     It is as uncertain as the place where it is touched. None where no touch is seen. A bar's axis is
@@ -122,7 +124,7 @@ def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) 
     covariance = turn @ seen.truth.point_covariance_mm2 @ turn.T
     rounded = seen.truth.rounded
     if rounded is not None:
-        return Surface(
+        return ObjectSurface(
             rounded.shape,
             turn @ rounded.point_mm + origin,
             turn @ rounded.axis,
@@ -139,4 +141,6 @@ def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) 
     axis = axis_from_angles(0.0, *angles, reach_mm)
     point = turn @ (seen.point_mm.value + axis.point_mm) + origin
     direction = turn @ axis.direction
-    return Surface("bar", point, direction, bar_radius_mm, covariance_mm2=covariance, source=SEEN)
+    return ObjectSurface(
+        "bar", point, direction, bar_radius_mm, covariance_mm2=covariance, source=SEEN
+    )

@@ -14,7 +14,7 @@ from bench.plan.painted import Clamp, Painter
 from bench.plan.sight import Hides, nothing_hides
 from bench.plan.staged import Staged, of_run
 from bench.plan.tries import LIGHT, Try
-from bench.rig.protocol import Protocol, Run
+from bench.rig.protocol import Protocol, ProtocolRun
 from vision.fit.line_noise import LineNoise
 from vision.geometry.camera import Cameras
 from vision.geometry.vision_settings import VisionSettings
@@ -76,7 +76,7 @@ class RigTask:
     """One trial of a rig to be planned."""
 
     protocol: Protocol
-    run: Run
+    run: ProtocolRun
     cameras: Cameras
     tries: Sequence[Try]
     theta_rad: float

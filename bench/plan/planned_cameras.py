@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.rig import boards
-from bench.rig.pinhole import Camera as RigCamera
-from bench.rig.printed_board import Board as RigBoard
+from bench.rig.pinhole import PinholeCamera
+from bench.rig.printed_board import PrintedBoard
 from vision.boards.corners import Corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.views import BoardViews, MeasuredPose
@@ -60,7 +60,7 @@ def expected_cameras(cameras: Sequence[Camera], work: BoardWork, seed: int = 0) 
 def _held(camera: Camera, work: BoardWork, number: int, seed: int) -> list[np.ndarray]:
     """T_rig_board (3, 4) of each view."""
     board = work.board
-    printed = RigBoard(
+    printed = PrintedBoard(
         board.squares,
         board.square_mm,
         board.marker_mm,
@@ -83,13 +83,13 @@ def _corners(
     return Corners(np.flatnonzero(there), found, np.full(len(found), sigma_px))
 
 
-def rig_camera(camera: Camera) -> RigCamera:
+def rig_camera(camera: Camera) -> PinholeCamera:
     """The same camera for the rig's painter."""
     R, t = camera.T_camera_rig[:, :3], camera.T_camera_rig[:, 3]
-    return RigCamera(camera.name, camera.size_px, camera.matrix, camera.distortion, R, t)
+    return PinholeCamera(camera.name, camera.size_px, camera.matrix, camera.distortion, R, t)
 
 
-def seen_camera(camera: RigCamera) -> Camera:
+def seen_camera(camera: PinholeCamera) -> Camera:
     """The rig's camera for vision."""
     T = np.column_stack([camera.rotation, camera.translation_mm])
     return Camera(camera.name, camera.size_px, camera.matrix, camera.distortion, T)

@@ -11,7 +11,7 @@ from bench.plan.plan_rows import Facts, Row, tried_on
 from bench.plan.staged import Staged, on_bar
 from bench.plan.tries import Try
 from bench.records.trial_result import SeenTrial, SeenWhisk
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.session.session import Session
 from bench.session.trial import Trial
@@ -78,7 +78,7 @@ def stage_again(task: SeenTask) -> Staged:
     whisk, trial = task.whisk, task.trial
     rod = _rod(task.session.whisker)
     d_x, touch = float(whisk.d_x_mm.value), float(whisk.touch_rad.value)
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=d_x,
         beta_rad=float(whisk.beta_rad.value),
         psi_rad=float(whisk.psi_rad.value),

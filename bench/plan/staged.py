@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
-from bench.rig.bar import Bar, Touch
+from bench.rig.bar import TouchedBar, UnloadedTouch
 from bench.rig.elastic_rod import Rod
 from bench.rig.linear import rotate_about_z
-from bench.rig.marched import MarchedWhisk
-from bench.rig.protocol import Protocol, Run
+from bench.rig.protocol import Protocol, ProtocolRun
 from bench.rig.recording import Recording
-from bench.rig.stick_slip import Friction
+from bench.rig.stick_slip import FrictionCoefficients
+from bench.rig.whisk_mechanics import WhiskMechanics
 from vision.geometry import rods as seen_rods
 from vision.geometry.centreline import REST_POWERS
 from vision.geometry.contact import BarAxis
@@ -31,7 +31,7 @@ class Staged:
     the rig paints it from, None of a session that was recorded.
     """
 
-    whisk: MarchedWhisk
+    whisk: WhiskMechanics
     rods: seen_rods.Rods
     motor_rad: np.ndarray
     time_s: np.ndarray
@@ -41,7 +41,7 @@ class Staged:
     recording: Recording | None = None
 
     @property
-    def touch(self) -> Touch:
+    def touch(self) -> UnloadedTouch:
         """First touch."""
         return self.whisk.touch
 
@@ -56,7 +56,7 @@ class Staged:
         return BarAxis(self.foot_mm, self.whisk.bar.axis).upward()
 
 
-def of_run(protocol: Protocol, run: Run) -> Staged:
+def of_run(protocol: Protocol, run: ProtocolRun) -> Staged:
     """A whisk of a protocol's trial, everything where it was wanted. Raises ArithmeticError where the whisker slips off
     or buckles."""
     plain = {
@@ -82,18 +82,18 @@ def of_run(protocol: Protocol, run: Run) -> Staged:
 
 def on_bar(
     rod: Rod,
-    bar: Bar,
-    touch: Touch,
+    bar: TouchedBar,
+    touch: UnloadedTouch,
     friction: float,
     motor_rad: Sequence[float],
     time_s: np.ndarray,
 ) -> Staged:
     """A whisk over these motor angles with one coefficient of friction. Raises ArithmeticError as `of_run`."""
     motor = np.asarray(motor_rad, dtype=float)
-    whisk = MarchedWhisk.run(
+    whisk = WhiskMechanics.run(
         rod,
         bar,
-        Friction(friction, friction),
+        FrictionCoefficients(friction, friction),
         touch,
         float(motor.max()),
         step_rad=_STEP_RAD,
@@ -102,7 +102,7 @@ def on_bar(
     return staged(whisk, motor, time_s)
 
 
-def staged(whisk: MarchedWhisk, motor_rad: np.ndarray, time_s: np.ndarray) -> Staged:
+def staged(whisk: WhiskMechanics, motor_rad: np.ndarray, time_s: np.ndarray) -> Staged:
     """A whisk of the rig in vision's terms, at the motor angles of the frames (f,); diameters are exact."""
     states = [
         whisk.forward.state_at(motor) if motor > whisk.touch.motor_rad else None

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.plan.planned_cameras import BoardWork, expected_cameras, seen_camera
 from bench.plan.sight import ALONG_RAD, to_bar_rad
-from bench.rig.pinhole import Camera as RigCamera
+from bench.rig.pinhole import PinholeCamera
 from vision.fit.line_noise import LineNoise
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras
 from vision.geometry.contact import BarAxis
@@ -180,7 +180,7 @@ def looking(camera: Camera, name: str, place_mm: np.ndarray, target_mm: np.ndarr
     """A camera with this one's lens somewhere else, the rig's z upwards in its picture."""
     fx, fy, cx, cy = camera.lens[:4]
     return seen_camera(
-        RigCamera.aim(
+        PinholeCamera.aim(
             name,
             size_px=camera.size_px,
             focal_px=fx,

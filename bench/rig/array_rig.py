@@ -13,14 +13,14 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.rig import build
-from bench.rig.bar import Touch, find_first_touch, unloaded_curve
-from bench.rig.elastic_rod import Rest, Rod
-from bench.rig.protocol import Protocol, Run
+from bench.rig.bar import UnloadedTouch, find_first_touch, unloaded_curve
+from bench.rig.elastic_rod import RestShape, Rod
+from bench.rig.protocol import Protocol, ProtocolRun
 from bench.rig.protocol_tables import ColumnTable
 from bench.rig.recording import (
-    Frames,
+    Exposures,
+    GaugedWhisker,
     Recording,
-    Whisker,
     place_object,
     plan_stroke,
     sample_signals,
@@ -38,7 +38,7 @@ _CHANNELS = ("y_V", "z_V", "f_x_N", "f_y_N", "f_z_N")
 
 
 @dataclass(frozen=True, eq=False)
-class MountedWhisker(Whisker):
+class MountedWhisker(GaugedWhisker):
     """A whisker of an array: its name, its column's table, and its pose (3, 4), T_rig_base, mm."""
 
     name: str
@@ -72,7 +72,7 @@ def _column_rod(protocol, column, number) -> Rod:
         size = given[number] if isinstance(given, list) else given
         sizes[key] = size or getattr(protocol.whisker, key)
     whisker = protocol.whisker
-    rest = Rest(sizes["length_mm"], whisker.sag_mm, whisker.set_y_mm, whisker.set_z_mm)
+    rest = RestShape(sizes["length_mm"], whisker.sag_mm, whisker.set_y_mm, whisker.set_z_mm)
     return replace(build.rod(protocol), rest=rest, **sizes)
 
 
@@ -85,7 +85,7 @@ class ArrayRecording:
     frame_times_s: of each whisk.
     """
 
-    run: Run
+    run: ProtocolRun
     bar: TouchedObject
     recordings: dict[str, Recording | None]
     strokes: dict[str, Stroke]
@@ -96,7 +96,7 @@ class ArrayRecording:
     def make(
         cls,
         protocol: Protocol,
-        run: Run,
+        run: ProtocolRun,
         whiskers: Sequence[MountedWhisker],
         rngs: Sequence[np.random.Generator],
     ) -> "ArrayRecording":
@@ -140,7 +140,9 @@ def _record(protocol, run, whisker, bar, touch, stroke, frames, rng) -> Recordin
         raise ArithmeticError(f"whisker {whisker.name}: {problem}") from None
 
 
-def _find_touch(whisker: MountedWhisker, bar: TouchedObject, near_rad: float) -> Touch | None:
+def _find_touch(
+    whisker: MountedWhisker, bar: TouchedObject, near_rad: float
+) -> UnloadedTouch | None:
     """Find a whisker's first touch; raise BadInput where it lies within the object."""
     try:
         return find_touch_from_afar(whisker.rod, bar, _motor_towards(whisker, near_rad))
@@ -157,7 +159,7 @@ def _motor_towards(whisker: MountedWhisker, angle_rad: float) -> float:
     return math.atan2(y, x)
 
 
-def find_touch_from_afar(rod: Rod, bar: TouchedObject, towards_rad: float) -> Touch | None:
+def find_touch_from_afar(rod: Rod, bar: TouchedObject, towards_rad: float) -> UnloadedTouch | None:
     """Find the first touch of a whisker that comes from lower motor angles, within 60° of a
     direction; None where it meets nothing there.
 
@@ -204,11 +206,11 @@ def _frame_times_s(protocol, run, stroke) -> list[np.ndarray]:
     return [np.arange(start, end, step_s) for start, end in stroke.forward]
 
 
-def _take_frames(stroke, frame_times_s) -> Frames:
+def _take_frames(stroke, frame_times_s) -> Exposures:
     """Return the frames of all whisks; none is on a way back."""
     times = np.concatenate(frame_times_s)
     whisk = np.repeat(np.arange(len(frame_times_s)), [len(some) for some in frame_times_s])
-    return Frames(times, stroke.angle_rad(times), whisk, np.zeros(len(times), bool))
+    return Exposures(times, stroke.angle_rad(times), whisk, np.zeros(len(times), bool))
 
 
 def _add_channels(channels, whisker, signals, several_motors):

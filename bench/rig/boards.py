@@ -6,15 +6,15 @@ import cv2
 import numpy as np
 
 from bench.rig.linear import rotation_about_z
-from bench.rig.pinhole import Camera
-from bench.rig.printed_board import Board
+from bench.rig.pinhole import PinholeCamera
+from bench.rig.printed_board import PrintedBoard
 
 # rad: the golden angle, by which views lean to all sides evenly
 _GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
 
 
 def draw_poses(
-    board: Board, camera: Camera, count: int, rng: np.random.Generator
+    board: PrintedBoard, camera: PinholeCamera, count: int, rng: np.random.Generator
 ) -> list[np.ndarray]:
     """Draw T_rig_board (3, 4) of each view."""
     order = rng.permutation(count)

@@ -13,7 +13,7 @@ import numpy as np
 GIVE_MM = 1e-5  # a held contact gives way by about this before it slides along the whisker
 
 
-class Surface(NamedTuple):
+class ContactLoad(NamedTuple):
     """What a law sees: the normal force, N, the shear force (2,), N, and the motion (2,), mm, of
     the whisker's material, along the object's axis and round it.
 
@@ -38,7 +38,7 @@ class Sliding:
     friction: float
     status = "sliding"
 
-    def equations(self, surface: Surface, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def equations(self, surface: ContactLoad, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals (3,) of shear force and heading, and their derivatives (3, 5)."""
         (heading,) = beyond
         forward = np.array([math.cos(heading), math.sin(heading)])
@@ -62,7 +62,7 @@ class Oiled:
     give_mm: float
     status = "sliding"
 
-    def equations(self, surface: Surface, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def equations(self, surface: ContactLoad, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals (2,) of the shear force, and their derivatives (2, 4)."""
         length = math.hypot(*surface.motion, self.give_mm)
         direction = surface.motion / length
@@ -85,7 +85,7 @@ class Held:
     friction: float
     status = "held"
 
-    def equations(self, surface: Surface, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def equations(self, surface: ContactLoad, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals (2,) of motion along and force round the object, and their
         derivatives (2, 4)."""
         limit = self.friction * surface.press

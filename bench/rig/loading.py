@@ -5,29 +5,31 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from bench.rig.marched import Instants, MarchedWhisk
 from bench.rig.stroke import Stroke
 from bench.rig.vibration import Mode, damped_oscillation
+from bench.rig.whisk_mechanics import ContactPath, WhiskMechanics
 
 _TICK_S = 5e-4  # s: over which the motor's speed, and its changes, are taken
 _PROP_SHARE = 0.999  # of the length: the farthest prop of a mode
 
 
 def quasi_static_Nmm(
-    stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray
+    stroke: Stroke, whisks: Sequence[WhiskMechanics], times_s: np.ndarray
 ) -> np.ndarray:
     """Return (n, 2): m_y, m_z in the hub frame at times (n,), without vibration."""
-    return _over_time(stroke, whisks, times_s, Instants.moments_at, 2)
+    return _over_time(stroke, whisks, times_s, ContactPath.moments_at, 2)
 
 
-def base_force_N(stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray) -> np.ndarray:
+def base_force_N(
+    stroke: Stroke, whisks: Sequence[WhiskMechanics], times_s: np.ndarray
+) -> np.ndarray:
     """Return (n, 3): force of the base on the whisker in the hub frame at times (n,), without
     vibration."""
-    return _over_time(stroke, whisks, times_s, Instants.forces_at, 3)
+    return _over_time(stroke, whisks, times_s, ContactPath.forces_at, 3)
 
 
 def _over_time(
-    stroke, whisks, times_s, at: Callable[[Instants, np.ndarray], np.ndarray], count
+    stroke, whisks, times_s, at: Callable[[ContactPath, np.ndarray], np.ndarray], count
 ) -> np.ndarray:
     """Evaluate (n, count) of the whisks' strokes at times; zeros where there is no whisk."""
     motor = stroke.angle_rad(times_s)
@@ -41,7 +43,7 @@ def _over_time(
 
 
 def ringing_Nmm(
-    stroke: Stroke, whisks: Sequence[MarchedWhisk], times_s: np.ndarray, damping: float
+    stroke: Stroke, whisks: Sequence[WhiskMechanics], times_s: np.ndarray, damping: float
 ) -> np.ndarray:
     """Return (n, 2): the free mode rung by the motor's ramps, the propped one by touch and by every
     jump of stick–slip."""
@@ -65,7 +67,7 @@ def ringing_Nmm(
     return total
 
 
-def _periods(stroke, whisks) -> Iterator[tuple[MarchedWhisk, float, float, float]]:
+def _periods(stroke, whisks) -> Iterator[tuple[WhiskMechanics, float, float, float]]:
     """Yield each whisk with its beginning, its turning back and its end, s; together they are the
     whole recording."""
     starts = [start for start, _ in stroke.forward]

@@ -17,7 +17,7 @@ class Ink:
 
 
 @dataclass(frozen=True)
-class Board:
+class PrintedBoard:
     """A ChArUco board as session.toml names it.
 
     Raises ValueError for a dictionary that OpenCV does not know, or a marker that does not fit its

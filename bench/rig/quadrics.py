@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import Bar
+from bench.rig.bar import TouchedBar
 from bench.rig.rays import (
     Hits,
     Rays,
@@ -16,7 +16,7 @@ from bench.rig.rays import (
     sine_between,
     unit,
 )
-from bench.rig.round_objects import Cone, Ring, Sphere
+from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
 from bench.rig.torus import VisibleRing
 
 # mm along a cone's axis from the height at which it is touched: its base and its upper end
@@ -24,10 +24,12 @@ _CONE_DOWN_MM, _CONE_UP_MM = 30.0, 60.0
 _AROUND = np.linspace(0, 2 * np.pi, 65)  # rad: points about an axis
 
 
-def to_camera_frame(thing: Bar, rotation: np.ndarray, translation_mm: np.ndarray) -> VisibleObject:
+def to_camera_frame(
+    thing: TouchedBar, rotation: np.ndarray, translation_mm: np.ndarray
+) -> VisibleObject:
     """Convert a ring, sphere or cone of the rig frame to that of a camera."""
     turn = rotation.T
-    kinds = {Ring: VisibleRing, Sphere: VisibleSphere, Cone: VisibleCone}
+    kinds = {TouchedRing: VisibleRing, TouchedSphere: VisibleSphere, TouchedCone: VisibleCone}
     pose = np.column_stack([turn, -turn @ translation_mm])
     return kinds[type(thing)](thing.in_frame(pose))
 
@@ -36,7 +38,7 @@ def to_camera_frame(thing: Bar, rotation: np.ndarray, translation_mm: np.ndarray
 class VisibleSphere:
     """A sphere: its outline is a conic."""
 
-    thing: Sphere
+    thing: TouchedSphere
 
     def points_mm(self) -> np.ndarray:
         """Return points (n, 3) all over it."""
@@ -96,7 +98,7 @@ class VisibleCone:
     graze it.
     """
 
-    thing: Cone
+    thing: TouchedCone
 
     def _ends(self) -> list[_Disc]:
         """Return base and upper end."""

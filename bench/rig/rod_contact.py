@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import Touch
+from bench.rig.bar import UnloadedTouch
 from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Elastica
-from bench.rig.laws import Held, Oiled, Sliding, Surface
+from bench.rig.laws import ContactLoad, Held, Oiled, Sliding
 from bench.rig.linear import across, cross, cross_matrix, rotation_about_z, solve
 from bench.rig.loaded_point import LoadedPoint
 from bench.rig.touched_object import TouchedObject
@@ -60,7 +60,7 @@ class ContactState:
         return np.append(self.force_hub_N, self.arc_mm)
 
 
-class Contact:
+class RodContact:
     """The contact problem of one whisker and one object."""
 
     def __init__(self, rod: Rod, bar: TouchedObject):
@@ -68,7 +68,7 @@ class Contact:
         self.bar = bar
         self.elastica = Elastica(rod)
 
-    def touch_state(self, touch: Touch) -> ContactState:
+    def touch_state(self, touch: UnloadedTouch) -> ContactState:
         """Return the state at first touch, without force."""
         tangent = np.array([1.0, 0, 0]) + self.rod.rest.slope(touch.arc_mm)
         return ContactState(
@@ -120,7 +120,7 @@ class _Equations:
     loaded: LoadedPoint
     residual: np.ndarray
     jacobian: np.ndarray
-    surface: Surface
+    surface: ContactLoad
 
     def state(self, motor_rad, unknowns, step, status) -> ContactState:
         """Return the solution after Newton's last step.
@@ -157,7 +157,7 @@ class _Problem:
     (3, 3): of the hub.
     """
 
-    contact: Contact
+    contact: RodContact
     bar: TouchedObject
     bar_moved_mm: np.ndarray
     rotation: np.ndarray
@@ -191,7 +191,7 @@ class _Problem:
         residual[2:], jacobian[2:] = self.law.equations(surface, unknowns[4:])
         return _Equations(loaded, residual, jacobian, surface)
 
-    def _surface(self, unknowns, loaded, frame, frame_by) -> Surface:
+    def _surface(self, unknowns, loaded, frame, frame_by) -> ContactLoad:
         """Return forces and motion in the frame of the contact."""
         force = self.rotation @ unknowns[:3]
         force_by = np.zeros((3, 4))
@@ -206,7 +206,7 @@ class _Problem:
         motion, motion_by = _components(
             frame[1:], frame_by[1:], moved - self.bar_moved_mm, moved_by
         )
-        return Surface(forces[0], forces_by[0], forces[1:], forces_by[1:], motion, motion_by)
+        return ContactLoad(forces[0], forces_by[0], forces[1:], forces_by[1:], motion, motion_by)
 
     def step(self, unknowns, here, step):
         """Return the unknowns after as much of a step as brings them nearer, and the equations

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.rig.bar import Bar
+from bench.rig.bar import TouchedBar
 from bench.rig.layer import Layer
 from bench.rig.light import Light, Material, shade_surface
 from bench.rig.quadrics import to_camera_frame
@@ -22,7 +22,7 @@ _GAUSS = 0.5 / np.sqrt(3)  # Gauss–Legendre's two points across a sample
 class Solid:
     """A ring, sphere or cone in the rig frame, and its material."""
 
-    thing: Bar
+    thing: TouchedBar
     material: Material
 
     def layer(self, window: Window, light: Light) -> Layer | None:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import Touch
+from bench.rig.bar import UnloadedTouch
 from bench.rig.elastic_rod import Rod
 from bench.rig.laws import GIVE_MM, Held, Oiled, Sliding
 from bench.rig.linear import rotate_about_z
-from bench.rig.rod_contact import Contact, ContactState
+from bench.rig.rod_contact import ContactState, RodContact
 from bench.rig.touched_object import TouchedObject
 
 # Share of the coefficient at rest, rad: where the search for the cone's edge ends.
@@ -20,7 +20,7 @@ _HALVINGS = 7  # of a step that comes to no equilibrium
 
 
 @dataclass(frozen=True)
-class Friction:
+class FrictionCoefficients:
     """Coefficients of friction at rest and in motion.
 
     finest_rad: teeth of stick–slip shorter than this are not resolved; the whisker is then taken as
@@ -60,8 +60,10 @@ class March:
     the tip has left the object.
     """
 
-    def __init__(self, rod: Rod, bar: TouchedObject, friction: Friction, touch: Touch):
-        self.contact = Contact(rod, bar)
+    def __init__(
+        self, rod: Rod, bar: TouchedObject, friction: FrictionCoefficients, touch: UnloadedTouch
+    ):
+        self.contact = RodContact(rod, bar)
         self.friction = friction
         self.touch = touch
         self.state = self.contact.touch_state(touch)

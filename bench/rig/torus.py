@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.rig.rays import Hits, Rays, circle_points, perpendicular_axes, sine_between, unit
-from bench.rig.round_objects import Ring
+from bench.rig.round_objects import TouchedRing
 
 _STATIONS = 64  # of a circle, of which those nearest to a ray are found first
 _STATION_RAD = 2 * np.pi / _STATIONS  # from one to the next
@@ -20,7 +20,7 @@ _NEAR_MM, _MOST_STEPS = 1e-4, 100  # of marching along a ray
 class VisibleRing:
     """A ring: all points within its radius of a circle."""
 
-    thing: Ring
+    thing: TouchedRing
 
     def _circle(self, angles: np.ndarray) -> np.ndarray:
         """Return points (..., 3) of the circle."""
@@ -111,7 +111,7 @@ class _Distance:
     c: np.ndarray
 
     @classmethod
-    def from_rays(cls, rays: np.ndarray, ring: Ring) -> "_Distance":
+    def from_rays(cls, rays: np.ndarray, ring: TouchedRing) -> "_Distance":
         """Return the distances between rays (n, 3) and a ring's circle."""
         first, second = (ring.ring_radius_mm * axis for axis in perpendicular_axes(ring.axis))
         directions = unit(rays)

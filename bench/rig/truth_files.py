@@ -94,7 +94,7 @@ def _contact_cells(whisk, motor_rad, back, way_slips_mm) -> list[str]:
 
     way_slips_mm: gives the surface slips (n, 4) of a way of a whisk.
     """
-    way = whisk.way(back)
+    way = whisk.path(back)
     row = way.row_at(motor_rad)
     state = way.state_at(motor_rad)
     if state is None:

@@ -9,7 +9,7 @@ from scipy.special import ndtr
 
 from bench.rig.layer import Layer, Occluder, draw_layers
 from bench.rig.light import Light, Material, shade_surface
-from bench.rig.pinhole import Camera
+from bench.rig.pinhole import PinholeCamera
 from bench.rig.rays import unit
 from bench.rig.window import Window
 
@@ -38,7 +38,7 @@ class Tube:
         axis = (1 - share) * np.asarray(start_mm, float) + share * np.asarray(end_mm, float)
         return cls(axis, np.full(_STATIONS, float(radius_mm)), material)
 
-    def silhouette(self, camera: Camera) -> np.ndarray:
+    def silhouette(self, camera: PinholeCamera) -> np.ndarray:
         """Return the pixels (2, n, 2) of both edges, where rays graze the round surface."""
         facing, across, distance = self._axes_towards(camera)
         cos = (self.radius_mm / distance)[:, None]

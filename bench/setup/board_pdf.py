@@ -110,7 +110,7 @@ def dark_rectangles(board: Board, left_mm: float, top_mm: float) -> Iterator[np.
     They overlap, so that there is no seam between them: runs of cells along rows, runs along
     columns, and the four cells about each point where both have a seam.
     """
-    made = rig.Board(
+    made = rig.PrintedBoard(
         board.squares,
         board.square_mm,
         board.marker_mm,

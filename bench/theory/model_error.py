@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.base.workers import Workers
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
-from bench.rig.stick_slip import Friction, March
+from bench.rig.stick_slip import FrictionCoefficients, March
 from estimator.beam import Beam
 from estimator.builtin import corrected, with_friction
 from estimator.whisk import EstimatorSettings, Whisk
@@ -66,7 +66,7 @@ def feel(push: Push, rod: Rod = ROD, beam: Beam = _BEAM) -> tuple[Whisk, float]:
 
     Raises ArithmeticError where the whisker finds no hold on the bar.
     """
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=push.d_x_mm,
         beta_rad=np.radians(push.beta_deg),
         psi_rad=np.radians(push.psi_deg),
@@ -77,7 +77,7 @@ def feel(push: Push, rod: Rod = ROD, beam: Beam = _BEAM) -> tuple[Whisk, float]:
     theta = np.radians(push.theta_deg)
     friction = np.tan(np.radians(push.alpha_deg))
     touch = find_first_touch(rod, bar, 0.0, push.d_x_mm)
-    march = March(rod, bar, Friction(friction, friction), touch)
+    march = March(rod, bar, FrictionCoefficients(friction, friction), touch)
     _, states = march.along(touch.motor_rad + theta * np.arange(1, _STEPS + 1) / _STEPS)
     if states[-1] is None:
         raise ArithmeticError("the whisker slips off the bar")
