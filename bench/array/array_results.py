@@ -42,9 +42,9 @@ TABLES = {table.name: table for table in (ARRAY_WHISKS, ARRAY_ESTIMATES, SURFACE
 
 @dataclass(frozen=True, eq=False)
 class ArrayRecord:
-    """All that array.json holds of an array, beside its whiskers' runs.
+    """All that array.json holds of an array, without its whiskers' runs.
 
-    doubts: of the session as a whole. scores: of all whiskers against the truth files of a
+    doubts: warnings about the session as a whole. scores: of all whiskers against the truth files of a
     synthetic session. surfaces: objects as the manifests state them, by trial. verdict, doubtful:
     as the summary has them, once it is made.
     """
@@ -179,6 +179,15 @@ def _named_by_whisker(result: TrialResult, run: WhiskerRun) -> TrialResult:
     return replace(result, trial=trial)
 
 
+def _doubtful_lines(record: ArrayRecord, runs: Sequence[WhiskerRun]) -> list[str]:
+    """Return the warnings about the session, about exchanged whiskers, and about each run."""
+    by_whisker = {run.base.name: run.results for run in runs}
+    lines = [*record.doubts, *exchanged(by_whisker)]
+    for run in runs:
+        lines += [f"{run.base.name}: {line}" for line in run.record.doubts]
+    return lines
+
+
 def _summarise(
     record: ArrayRecord,
     runs: Sequence[WhiskerRun],
@@ -186,18 +195,17 @@ def _summarise(
     sizes: Sequence[FeltSize],
 ) -> Summary:
     """Return verdict and sections of the array's summary; sections without lines are left out."""
-    doubtful = [*record.doubts, *exchanged({run.base.name: run.whole.results for run in runs})]
+    doubtful = _doubtful_lines(record, runs)
     results = []
     first_lines = []
     for run in runs:
-        doubtful += [f"{run.base.name}: {line}" for line in run.record.doubts]
-        results += [_named_by_whisker(result, run) for result in run.whole.results]
+        results += [_named_by_whisker(result, run) for result in run.results]
         first_lines.append(f"{run.base.name}: {run.record.verdict[0]}")
     title = f"{record.session}, {counted(len(runs), 'whisker')}"
     has_pictures = any(run.record.has_pictures for run in runs)
     settings = runs[0].record.settings
     general = verdict(title, has_pictures, results, settings, len(doubtful))
-    files = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
+    file_names = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
     surface_title = "Surface: contacts from the object, mm (surface.csv)"
     size_title = "Size of the object by (10), its place free (size.csv)"
     sections = [
@@ -206,7 +214,7 @@ def _summarise(
         Section("size", size_title, tuple(size_lines(sizes))),
         Section("doubtful", DOUBTFUL, tuple(doubtful)),
         Section("score", SCORE, record.scores),
-        Section("files", "Files", (files,)),
+        Section("files", "Files", (file_names,)),
     ]
     kept = tuple(section for section in sections if section.lines)
     return Summary((*surface_verdict(cloud), *general), tuple(doubtful), kept)

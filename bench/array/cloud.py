@@ -120,28 +120,19 @@ def _felt_contact(
     mount: Mount, trial: str, whisk: int, felt: FeltWhisk, estimate: EstimateRow
 ) -> ContactPoint:
     """Return the contact (r_c, θ_c, z_c) that an estimator gives, in the base frame."""
-    touch = felt.touch_felt_rad
-    r_c = estimate.d_x_est_mm
-    covariance = np.diag([r_c.sigma**2, touch.sigma**2, Z_C_MM.sigma**2])
-    if math.isfinite(estimate.touch_covariance_mm_rad):
-        covariance[[0, 1], [1, 0]] = estimate.touch_covariance_mm_rad
-    cos = math.cos(touch.value)
-    sin = math.sin(touch.value)
-    jacobian = np.array(
-        [[cos, -r_c.value * sin, 0.0], [sin, r_c.value * cos, 0.0], [0.0, 0.0, 1.0]]
-    )
+    touch_rad = felt.touch_felt_rad.value
+    polar = contact_point(estimate.d_x_est_mm.value, touch_rad, Z_C_MM.value)
     normal_sigma = NAN
     if estimate.alpha_est_rad == mount.alpha_est_rad:
         normal_sigma = math.hypot(felt.phi_felt_rad.sigma, mount.alpha_est_sigma_rad)
-    polar = contact_point(r_c.value, touch.value, Z_C_MM.value)
     return ContactPoint(
         whisker=mount.base.name,
         trial=trial,
         whisk=whisk,
         estimator=estimate.estimator,
         point_mm=np.array(cartesian(*polar)),
-        covariance_mm2=jacobian @ covariance @ jacobian.T,
-        normal=_normal(touch.value, estimate.beta_est_rad),
+        covariance_mm2=_covariance_mm2(felt.touch_felt_rad, estimate),
+        normal=_normal(touch_rad, estimate.beta_est_rad),
         normal_sigma_rad=normal_sigma,
         status=in_one_status(felt.status, estimate.status),
         base_mm=np.zeros(3),
@@ -149,6 +140,20 @@ def _felt_contact(
         by_alpha_mm=_by_alpha_mm(estimate),
         has_touch=not felt.status,
     )
+
+
+def _covariance_mm2(touch_rad: Value, estimate: EstimateRow) -> np.ndarray:
+    """Return the covariance (3, 3) of a contact in the base frame by that of (r_c, θ_c, z_c)."""
+    r_c = estimate.d_x_est_mm
+    covariance = np.diag([r_c.sigma**2, touch_rad.sigma**2, Z_C_MM.sigma**2])
+    if math.isfinite(estimate.touch_covariance_mm_rad):
+        covariance[[0, 1], [1, 0]] = estimate.touch_covariance_mm_rad
+    cos = math.cos(touch_rad.value)
+    sin = math.sin(touch_rad.value)
+    jacobian = np.array(
+        [[cos, -r_c.value * sin, 0.0], [sin, r_c.value * cos, 0.0], [0.0, 0.0, 1.0]]
+    )
+    return jacobian @ covariance @ jacobian.T
 
 
 def _by_alpha_mm(estimate: EstimateRow) -> float:

@@ -95,7 +95,7 @@ def _row(contact: ContactPoint) -> dict:
 
 
 def _sound_contacts(cloud: Iterable[ContactPoint], estimator: str) -> list[ContactPoint]:
-    """Return one estimator's contacts beside a known surface that carry no status."""
+    """Return one estimator's contacts near a known surface that carry no status."""
     sound = []
     for contact in cloud:
         is_known = math.isfinite(contact.distance_mm.value)

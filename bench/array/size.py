@@ -41,12 +41,6 @@ SIZE = Table(
         status("why there is none, or what is doubtful of it"),
     ),
 )
-_SIZES = {
-    "bar": "radius_mm",
-    "sphere": "radius_mm",
-    "ring": "ring_radius_mm",
-    "cone": "half_angle_rad",
-}
 _STEP = 1e-3  # mm, rad: of differences
 # that contacts on such a surface lie as far off it: one sound object in a thousand
 _LEAST_CHANCE = 1e-3
@@ -55,7 +49,7 @@ _MOST_CONDITION = 1e12  # of the information: beyond it some direction is not de
 
 @dataclass(frozen=True)
 class FeltSize:
-    """The felt size of one trial's object, in the unit of its field of `Surface`.
+    """The felt size of one trial's object, in the unit of its field of `ObjectSurface`.
 
     contacts, distances: numbers of touches and of distances that were used. chance: probability
     that contacts on such a surface lie as far off it.
@@ -70,23 +64,18 @@ class FeltSize:
     status: str = ""
 
     @property
-    def key(self) -> str:
-        """Return the name of the field of `Surface`."""
-        return _SIZES[self.surface.shape]
-
-    @property
     def stated(self) -> float:
         """Return the size by the manifest."""
-        return getattr(self.surface, self.key)
+        return getattr(self.surface, self.surface.form.size)
 
     @property
     def column(self) -> str:
         """Return the name of its column of SIZE; a ring's radius is its circle's."""
-        return "half_angle_deg" if self.surface.shape == "cone" else "radius_mm"
+        return self.surface.form.column
 
     def in_unit_of_column(self, size: float) -> float:
         """Convert a size to the unit of the column."""
-        return float(np.degrees(size)) if self.surface.shape == "cone" else size
+        return self.surface.form.in_unit_of_column(size)
 
 
 def fit_sizes(cloud: Iterable[ContactPoint], surfaces: dict[str, ObjectSurface]) -> list[FeltSize]:
@@ -104,27 +93,18 @@ def fit_sizes(cloud: Iterable[ContactPoint], surfaces: dict[str, ObjectSurface])
 
 def fit_size(trial: str, contacts: Sequence[ContactPoint], surface: ObjectSurface) -> FeltSize:
     """Fit place and size of an object, by Gauss and Newton's method from what is stated of it."""
-    from scipy.optimize import least_squares  # it takes longer than an evaluation's tables
-
     distances = sum(not contact.status for contact in contacts)
     unknown = FeltSize(trial, surface, len(contacts), distances)
     fit = _SizeFit(contacts, surface)
     freedom = len(contacts) + distances - fit.count
     if freedom < 1:
         return replace(unknown, status=f"too few, of {counted(distances, 'sound distance')}")
-    root = np.linalg.cholesky(fit.covariance())
-    found = least_squares(
-        lambda parameters: np.linalg.solve(root, fit.residuals(parameters)),
-        np.zeros(fit.count),
-        method="lm",
-        jac=lambda parameters: np.linalg.solve(root, fit.jacobian(parameters)),
-    )
-    information = found.jac.T @ found.jac
+    change, information, cost = fit.solve()
     if not np.isfinite(information).all() or np.linalg.cond(information) > _MOST_CONDITION:
         return replace(unknown, status="contacts leave the size open")
     sigma = float(np.sqrt(np.linalg.inv(information)[-1, -1]))
-    size = Value(unknown.stated + float(found.x[-1]), sigma)
-    chance = float(chdtrc(freedom, 2 * found.cost))
+    size = Value(unknown.stated + change, sigma)
+    chance = float(chdtrc(freedom, cost))
     return replace(unknown, size=size, chance=chance, status=_status(size, chance))
 
 
@@ -148,17 +128,28 @@ class _SizeFit:
         self.surface = surface
         self.bases = np.array([contact.base_mm for contact in contacts])
         self.directions = np.array([contact.direction for contact in contacts])
-        # A bar is free across its axis, others in all directions.
-        is_bar = surface.shape == "bar"
-        self.free = np.linalg.svd(surface.axis[None])[2][1:] if is_bar else np.eye(3)
+        self.free = surface.form.free_axes(surface)
         self.count = len(self.free) + 1
+
+    def solve(self) -> tuple[float, np.ndarray, float]:
+        """Return the change of the size, the information (count, count), and the cost, χ²."""
+        from scipy.optimize import least_squares  # it takes longer than an evaluation's tables
+
+        root = np.linalg.cholesky(self.covariance())
+        found = least_squares(
+            lambda parameters: np.linalg.solve(root, self.residuals(parameters)),
+            np.zeros(self.count),
+            method="lm",
+            jac=lambda parameters: np.linalg.solve(root, self.jacobian(parameters)),
+        )
+        return float(found.x[-1]), found.jac.T @ found.jac, 2 * found.cost
 
     def surface_at(self, parameters: np.ndarray) -> ObjectSurface:
         """Return the surface with these parameters."""
         point = self.surface.point_mm + parameters[:-1] @ self.free
-        key = _SIZES[self.surface.shape]
-        size = getattr(self.surface, key) + float(parameters[-1])
-        return replace(self.surface, point_mm=point, **{key: size})
+        name = self.surface.form.size
+        size = getattr(self.surface, name) + float(parameters[-1])
+        return replace(self.surface, point_mm=point, **{name: size})
 
     def nearest_arcs(self, surface: ObjectSurface) -> np.ndarray:
         """Return the arcs (n,), mm, at which each whisker comes nearest to a surface."""

@@ -140,7 +140,7 @@ class WhiskMechanics:
         """Return (β, ψ), rad, of the object at first touch."""
         return self.bar.slope(self.touch.motor_rad, self.touch.point_mm)
 
-    def way(self, back: bool) -> ContactPath:
+    def path(self, back: bool) -> ContactPath:
         """Return the forward or the back stroke. Raises ValueError where there is no back
         stroke."""
         if back and self.back is None:

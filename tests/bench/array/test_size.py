@@ -75,7 +75,7 @@ def drawn(
 def test_sizes_come_back_from_where_they_are_not_quite_said_to_be(surface, rng):
     """Without noise, begun 2 mm and a twentieth of the size aside: to the steps' accuracy."""
     contacts = drawn(surface, rng, 0.0)
-    key = fit_size("t", contacts, surface).key
+    key = fit_size("t", contacts, surface).surface.form.size
     said = {
         "point_mm": surface.point_mm + np.array([2.0, -1.0, 1.0]),
         key: 1.05 * getattr(surface, key),
