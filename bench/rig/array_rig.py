@@ -106,36 +106,34 @@ class ArrayRecording:
         cannot begin.
         """
         bar, near_rad, _ = place_object(protocol, run, build.rod(protocol), rngs[0])
-        bars = {}
         touches = {}
         for whisker in whiskers:
-            bars[whisker.name] = bar.in_frame(whisker.pose)
-            touches[whisker.name] = _find_touch(whisker, bars[whisker.name], near_rad)
+            own_bar = bar.in_frame(whisker.pose)
+            touches[whisker.name] = _find_touch(whisker, own_bar, near_rad)
         strokes = _plan_strokes(protocol, run, whiskers, touches, near_rad)
         frame_times_s = _frame_times_s(protocol, run, next(iter(strokes.values())))
         recordings = {}
         channels = {}
         for whisker, rng in zip(whiskers, rngs[1:]):
-            name = whisker.name
             stroke = strokes[whisker.column.name]
-            touch = touches[name]
-            recordings[name] = None
+            touch = touches[whisker.name]
+            recording = None
             if touch is None or touch.motor_rad >= stroke.angles_rad.max():
                 signals = sample_signals(protocol, run, stroke, (), whisker.gauges, rng)
             else:
-                frames = _take_frames(stroke, frame_times_s)
-                recordings[name] = _record(
-                    protocol, run, whisker, bars[name], touch, stroke, frames, rng
-                )
-                signals = recordings[name].signals
+                exposures = _exposures(stroke, frame_times_s)
+                recording = _record(protocol, run, whisker, bar, touch, stroke, exposures, rng)
+                signals = recording.signals
+            recordings[whisker.name] = recording
             _add_channels(channels, whisker, signals, len(strokes) > 1)
         return cls(run, bar, recordings, strokes, channels, frame_times_s)
 
 
-def _record(protocol, run, whisker, bar, touch, stroke, frames, rng) -> Recording:
+def _record(protocol, run, whisker, bar, touch, stroke, exposures, rng) -> Recording:
     """Simulate one whisker; raise ArithmeticError, naming it, where it cannot go on."""
+    own_bar = bar.in_frame(whisker.pose)
     try:
-        return Recording.record(protocol, run, whisker, bar, touch, stroke, frames, rng)
+        return Recording.record(protocol, run, whisker, own_bar, touch, stroke, exposures, rng)
     except ArithmeticError as problem:
         raise ArithmeticError(f"whisker {whisker.name}: {problem}") from None
 
@@ -181,22 +179,28 @@ def _plan_strokes(protocol, run, whiskers, touches, near_rad) -> dict[str, Strok
     farthest."""
     before_rad = math.radians(run.before_deg)
     after_rad = math.radians(run.after_deg)
-    touch_angles = {}  # by column
-    for whisker in whiskers:
-        touch = touches[whisker.name]
-        angles = touch_angles.setdefault(whisker.column.name, [])
-        angles += [] if touch is None else [touch.motor_rad]
     starts = {}
     spans = []
-    for name, angles in touch_angles.items():
-        if not angles:
-            first = next(whisker for whisker in whiskers if whisker.column.name == name)
-            angles = [_motor_towards(first, near_rad)]
+    for name, angles in _touch_angles_rad(whiskers, touches, near_rad).items():
         starts[name] = min(angles) - before_rad
         last = min(max(angles), min(angles) + _FARTHEST_RAD - after_rad)
         spans.append(last + after_rad - starts[name])
     span = max(spans)
     return {name: plan_stroke(protocol, run, low, low + span) for name, low in starts.items()}
+
+
+def _touch_angles_rad(whiskers, touches, near_rad) -> dict[str, list[float]]:
+    """Return the motor angles of first touch by column; of one that touches nothing, that at which
+    its first whisker points to where one at the rig's origin would touch."""
+    columns = {}
+    for whisker in whiskers:
+        columns.setdefault(whisker.column.name, []).append(whisker)
+    angles = {}
+    for name, members in columns.items():
+        known = [touches[whisker.name] for whisker in members if touches[whisker.name]]
+        angles[name] = [touch.motor_rad for touch in known]
+        angles[name] = angles[name] or [_motor_towards(members[0], near_rad)]
+    return angles
 
 
 def _frame_times_s(protocol, run, stroke) -> list[np.ndarray]:
@@ -206,7 +210,7 @@ def _frame_times_s(protocol, run, stroke) -> list[np.ndarray]:
     return [np.arange(start, end, step_s) for start, end in stroke.forward]
 
 
-def _take_frames(stroke, frame_times_s) -> Exposures:
+def _exposures(stroke, frame_times_s) -> Exposures:
     """Return the frames of all whisks; none is on a way back."""
     times = np.concatenate(frame_times_s)
     whisk = np.repeat(np.arange(len(frame_times_s)), [len(some) for some in frame_times_s])

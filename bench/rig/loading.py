@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from bench.rig.vibration import Mode, damped_oscillation
 from bench.rig.whisk_mechanics import ContactPath, WhiskMechanics
 
 _TICK_S = 5e-4  # s: over which the motor's speed, and its changes, are taken
+# [s] A sample as near to the turn of a stroke is at the turn: both times are sums of rounded numbers,
+# some 1e-16 s wrong, and far fewer than samples. Derived.
+_SAME_TIME_S = 1e-9
 _PROP_SHARE = 0.999  # of the length: the farthest prop of a mode
 
 
@@ -31,12 +35,16 @@ def base_force_N(
 def _over_time(
     stroke, whisks, times_s, at: Callable[[ContactPath, np.ndarray], np.ndarray], count
 ) -> np.ndarray:
-    """Evaluate (n, count) of the whisks' strokes at times; zeros where there is no whisk."""
+    """Evaluate (n, count) of the whisks' strokes at times; zeros where there is no whisk.
+
+    A sample at the turn of a stroke belongs to the forward one.
+    """
     motor = stroke.angle_rad(times_s)
     values = np.zeros((len(times_s), count))
     for whisk, start, turn, end in _periods(stroke, whisks):
-        rising = (times_s >= start) & (times_s <= turn)
-        falling = (times_s > turn) & (times_s < end)
+        is_forward = times_s <= turn + _SAME_TIME_S
+        rising = (times_s >= start) & is_forward
+        falling = ~is_forward & (times_s < end)
         values[rising] = at(whisk.forward, motor[rising])
         values[falling] = at(whisk.back or whisk.forward, motor[falling])
     return values
@@ -47,24 +55,33 @@ def ringing_Nmm(
 ) -> np.ndarray:
     """Return (n, 2): the free mode rung by the motor's ramps, the propped one by touch and by every
     jump of stick–slip."""
-    rod = whisks[0].rod
-    free = Mode.solve(rod)
-    propped = Mode.solve(rod, min(whisks[0].touch.arc_mm, _PROP_SHARE * rod.length_mm))
+    free, propped = _modes(whisks[0])
+    oscillation = partial(damped_oscillation, times_s, damping=damping)
     total = np.zeros((len(times_s), 2))
     for number, (whisk, start_s, _, end_s) in enumerate(_periods(stroke, whisks)):
         touch_s = float(stroke.time_s(number, whisk.touch.motor_rad))
         for at_s, change_rad_s in _speed_changes(stroke, start_s, touch_s):
             rate = free.swing * change_rad_s * free.moment_Nmm
-            frequency = free.frequency_rad_s
-            total[:, 1] += damped_oscillation(times_s, at_s, touch_s, frequency, damping, rate=rate)
+            total[:, 1] += oscillation(at_s, touch_s, free.frequency_rad_s, rate=rate)
         frequency = propped.frequency_rad_s
-        per_push = propped.strike * _speed(stroke, touch_s) * propped.moment_Nmm / propped.push_Nmm
-        unit = damped_oscillation(times_s, touch_s, end_s, frequency, damping, rate=1.0)
-        total += np.outer(unit, per_push * _moment_per_rad(whisk))
+        strike_Nmm = _strike_rate(propped, whisk, _speed(stroke, touch_s))
+        total += np.outer(oscillation(touch_s, end_s, frequency, rate=1.0), strike_Nmm)
         for at_s, jump_Nmm in _jumps(stroke, number, whisk):
-            unit = damped_oscillation(times_s, at_s, end_s, frequency, damping, value=1.0)
-            total -= np.outer(unit, jump_Nmm)
+            total -= np.outer(oscillation(at_s, end_s, frequency, value=1.0), jump_Nmm)
     return total
+
+
+def _modes(whisk):
+    """Return the free mode of a whisk's rod, and that propped where it first touches."""
+    rod = whisk.rod
+    prop_mm = min(whisk.touch.arc_mm, _PROP_SHARE * rod.length_mm)
+    return Mode.solve(rod), Mode.solve(rod, prop_mm)
+
+
+def _strike_rate(propped, whisk, speed_rad_s):
+    """Return the rate (2,), N·mm/s, of the moments with which touch sets the propped mode going."""
+    per_push = propped.strike * speed_rad_s * propped.moment_Nmm / propped.push_Nmm
+    return per_push * _moment_per_rad(whisk)
 
 
 def _periods(stroke, whisks) -> Iterator[tuple[WhiskMechanics, float, float, float]]:

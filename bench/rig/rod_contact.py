@@ -120,7 +120,7 @@ class _Equations:
     loaded: LoadedPoint
     residual: np.ndarray
     jacobian: np.ndarray
-    surface: ContactLoad
+    load: ContactLoad
 
     def state(self, motor_rad, unknowns, step, status) -> ContactState:
         """Return the solution after Newton's last step.
@@ -128,12 +128,12 @@ class _Equations:
         The loaded point follows to first order; what is left is of the order of the step squared.
         """
         loaded = self.loaded
-        surface = self.surface
+        load = self.load
         unknowns = unknowns - step
         slides = len(unknowns) > 4
-        heading = float(unknowns[4]) if slides else math.atan2(*surface.motion[::-1])
-        onward_mm = surface.motion @ [math.cos(heading), math.sin(heading)]
-        if surface.press < 0 or (slides and onward_mm < _BACKWARDS_MM):
+        heading = float(unknowns[4]) if slides else math.atan2(*load.motion[::-1])
+        onward_mm = load.motion @ [math.cos(heading), math.sin(heading)]
+        if load.press < 0 or (slides and onward_mm < _BACKWARDS_MM):
             raise ArithmeticError("a contact that pulls, or friction along the motion")
         return ContactState(
             motor_rad,
@@ -141,10 +141,10 @@ class _Equations:
             float(unknowns[3]),
             loaded.point - loaded.point_by @ step[:4],
             loaded.tangent - loaded.tangent_by @ step[:4],
-            abs(surface.shear[0]) / surface.press,
+            abs(load.shear[0]) / load.press,
             status,
             heading,
-            float(surface.motion[1]),
+            float(load.motion[1]),
             loaded.angle,
         )
 
@@ -172,26 +172,37 @@ class _Problem:
         offset_by = local.offset_by @ loaded.point_by
         distance = math.sqrt(local.offset_mm @ local.offset_mm)
         frame, frame_by = _contact_frame(local, offset_by, distance, loaded.point_by)
-        surface = self._surface(unknowns, loaded, frame, frame_by)
-        residual = np.empty(len(unknowns))
-        jacobian = np.zeros((len(unknowns), len(unknowns)))
-        rod = self.contact.rod
+        load = self._load(unknowns, loaded, frame, frame_by)
+        count = len(unknowns)
         arc = unknowns[3]
+        residual = np.empty(count)
+        jacobian = np.zeros((count, count))
+        residual[0], jacobian[0, :4] = self._off_nearest(arc, loaded, local, offset_by)
+        residual[1], jacobian[1, :4] = self._gap_mm(arc, loaded, frame[0], distance, load)
+        residual[2:], jacobian[2:] = self.law.equations(load, unknowns[4:])
+        return _Equations(loaded, residual, jacobian, load)
+
+    def _off_nearest(self, arc, loaded, local, offset_by) -> tuple[float, np.ndarray]:
+        """Return how far the contact is along the whisker from where it belongs, and the
+        derivatives (4,) of that: the point nearest to the object's axis, or the tip."""
         if self.tip:
-            residual[0] = arc - rod.length_mm
-            jacobian[0, 3] = 1.0
-        else:
-            residual[0] = local.offset_mm @ loaded.tangent
-            jacobian[0, :4] = loaded.tangent @ offset_by + local.offset_mm @ loaded.tangent_by
+            return arc - self.contact.rod.length_mm, np.array([0.0, 0.0, 0.0, 1.0])
+        off_by = loaded.tangent @ offset_by + local.offset_mm @ loaded.tangent_by
+        return local.offset_mm @ loaded.tangent, off_by
+
+    def _gap_mm(self, arc, loaded, normal, distance, load) -> tuple[float, np.ndarray]:
+        """Return the gap between the surfaces, as the force presses them, and its derivatives (4,).
+
+        normal (3,): of the contact. distance: between centreline and the object's axis, mm.
+        """
+        rod = self.contact.rod
         stiffness = self.bar.stiffness_N_mm
         reach = self.bar.radius_mm + float(rod.radius_mm(arc))
-        residual[1] = distance + surface.press / stiffness - reach
-        jacobian[1, :4] = frame[0] @ loaded.point_by + surface.press_by / stiffness
-        jacobian[1, 3] -= rod.taper
-        residual[2:], jacobian[2:] = self.law.equations(surface, unknowns[4:])
-        return _Equations(loaded, residual, jacobian, surface)
+        gap_by = normal @ loaded.point_by + load.press_by / stiffness
+        gap_by[3] -= rod.taper
+        return distance + load.press / stiffness - reach, gap_by
 
-    def _surface(self, unknowns, loaded, frame, frame_by) -> ContactLoad:
+    def _load(self, unknowns, loaded, frame, frame_by) -> ContactLoad:
         """Return forces and motion in the frame of the contact."""
         force = self.rotation @ unknowns[:3]
         force_by = np.zeros((3, 4))

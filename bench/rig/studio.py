@@ -109,13 +109,12 @@ class Setting:
         part = studio.window.crop(np.concatenate(px), 4 * blur_px + 3)
         picture = self._still.copy()
         if part is not None:
-            rim = math.ceil(3 * blur_px)  # of the part's pixels, which its own edge blurs wrongly
             drawn = part.blur_to_pixels(self._draw_moments(part, moments), blur_px)
+            rim = math.ceil(3 * blur_px)  # of the part's pixels, which its own edge blurs wrongly
+            inner = drawn[rim : len(drawn) - rim, rim : drawn.shape[1] - rim]
             top = part.top - studio.window.top + rim
             left = part.left - studio.window.left + rim
-            inner = drawn[rim : len(drawn) - rim, rim : drawn.shape[1] - rim]
-            rows, columns = inner.shape
-            picture[top : top + rows, left : left + columns] = inner
+            picture[top : top + len(inner), left : left + inner.shape[1]] = inner
         return studio.crop(picture)
 
     def _draw_moments(self, part, moments):

@@ -154,6 +154,16 @@ def _draw(number, curves):
     for axes, form in zip(grid, forms):
         for ax, panel in zip(axes, "abc"):
             _draw_panel(ax, number, [c for c in curves if (c.panel, c.form) == (panel, form)])
+    _draw_legend(figure, grid)
+    for ax in grid[:, 0]:
+        ax.set_ylabel(r"$\beta_\mathrm{thresh}$  [°]")
+    for ax in grid[-1]:
+        ax.set_xlabel(_X_LABELS[number])
+    return figure
+
+
+def _draw_legend(figure, grid) -> None:
+    """Letter the panels, and draw one legend of all their lines."""
     entries = {}
     for ax, letter in zip(grid.flat, "abcdef"):
         ax.set_title(f"({letter}) {ax.get_title()}")
@@ -162,11 +172,6 @@ def _draw(number, curves):
     figure.legend(
         entries.values(), entries.keys(), loc="outside lower center", ncols=7, frameon=False
     )
-    for ax in grid[:, 0]:
-        ax.set_ylabel(r"$\beta_\mathrm{thresh}$  [°]")
-    for ax in grid[-1]:
-        ax.set_xlabel(_X_LABELS[number])
-    return figure
 
 
 def _draw_panel(ax, number, curves) -> None:
