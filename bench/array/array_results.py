@@ -179,6 +179,25 @@ def _named_by_whisker(result: TrialResult, run: WhiskerRun) -> TrialResult:
     return replace(result, trial=trial)
 
 
+def _sections(record, cloud, sizes, first_lines, doubtful) -> tuple[Section, ...]:
+    """Return the sections that have lines, in their order.
+
+    first_lines: a verdict a whisker. doubtful: see `_doubtful_lines`.
+    """
+    files = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
+    surface_title = "Surface: contacts from the object, mm (surface.csv)"
+    size_title = "Size of the object by (10), its place free (size.csv)"
+    sections = [
+        Section("whiskers", "Whiskers", tuple(first_lines)),
+        Section("surface", surface_title, tuple(surface_lines(cloud))),
+        Section("size", size_title, tuple(size_lines(sizes))),
+        Section("doubtful", DOUBTFUL, tuple(doubtful)),
+        Section("score", SCORE, record.scores),
+        Section("files", "Files", (files,)),
+    ]
+    return tuple(section for section in sections if section.lines)
+
+
 def _doubtful_lines(record: ArrayRecord, runs: Sequence[WhiskerRun]) -> list[str]:
     """Return the warnings about the session, about exchanged whiskers, and about each run."""
     by_whisker = {run.base.name: run.results for run in runs}
@@ -205,16 +224,5 @@ def _summarise(
     has_pictures = any(run.record.has_pictures for run in runs)
     settings = runs[0].record.settings
     general = verdict(title, has_pictures, results, settings, len(doubtful))
-    file_names = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
-    surface_title = "Surface: contacts from the object, mm (surface.csv)"
-    size_title = "Size of the object by (10), its place free (size.csv)"
-    sections = [
-        Section("whiskers", "Whiskers", tuple(first_lines)),
-        Section("surface", surface_title, tuple(surface_lines(cloud))),
-        Section("size", size_title, tuple(size_lines(sizes))),
-        Section("doubtful", DOUBTFUL, tuple(doubtful)),
-        Section("score", SCORE, record.scores),
-        Section("files", "Files", (file_names,)),
-    ]
-    kept = tuple(section for section in sections if section.lines)
+    kept = _sections(record, cloud, sizes, first_lines, doubtful)
     return Summary((*surface_verdict(cloud), *general), tuple(doubtful), kept)

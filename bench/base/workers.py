@@ -79,8 +79,7 @@ class Workers:
 
     def _by_processes(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
         """Yield places and results of tasks that other processes do."""
-        while len(self._processes) < min(self.count, len(tasks)):
-            self._processes.append(_process())
+        self._start(min(self.count, len(tasks)))
         idle = list(range(len(self._processes)))
         waiting = deque(range(len(tasks)))
         deaths: Counter[int] = Counter()
@@ -99,6 +98,11 @@ class Workers:
                     waiting.appendleft(place)
                 else:
                     yield place, result
+
+    def _start(self, count: int) -> None:
+        """Start as many processes as are missing to a number."""
+        while len(self._processes) < count:
+            self._processes.append(_process())
 
     def _submit(self, number: int, job: Callable, task: object) -> Future:
         """Give a task to a process, which is started anew where it has died; return its future."""

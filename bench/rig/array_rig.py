@@ -47,7 +47,7 @@ class MountedWhisker(GaugedWhisker):
 
 
 def mount_whiskers(protocol: Protocol, rng: np.random.Generator) -> list[MountedWhisker]:
-    """Mount the whiskers of a protocol's columns; rng draws their gauges' coefficients."""
+    """Return the whiskers of a protocol's columns; rng draws their gauges' coefficients."""
     whiskers = []
     for column in protocol.columns:
         rotation = build.column_pose(column)[:, :3]
@@ -108,34 +108,37 @@ class ArrayRecording:
         bar, near_rad, _ = place_object(protocol, run, build.rod(protocol), rngs[0])
         touches = {}
         for whisker in whiskers:
-            own_bar = bar.in_frame(whisker.pose)
-            touches[whisker.name] = _find_touch(whisker, own_bar, near_rad)
+            touches[whisker.name] = _find_touch(whisker, bar, near_rad)
         strokes = _plan_strokes(protocol, run, whiskers, touches, near_rad)
         frame_times_s = _frame_times_s(protocol, run, next(iter(strokes.values())))
         recordings = {}
         channels = {}
         for whisker, rng in zip(whiskers, rngs[1:]):
             stroke = strokes[whisker.column.name]
-            touch = touches[whisker.name]
-            recording = None
-            if touch is None or touch.motor_rad >= stroke.angles_rad.max():
-                signals = sample_signals(protocol, run, stroke, (), whisker.gauges, rng)
-            else:
-                exposures = _exposures(stroke, frame_times_s)
-                recording = _record(protocol, run, whisker, bar, touch, stroke, exposures, rng)
-                signals = recording.signals
+            recording, signals = _record(
+                protocol, run, whisker, bar, touches[whisker.name], stroke, frame_times_s, rng
+            )
             recordings[whisker.name] = recording
             _add_channels(channels, whisker, signals, len(strokes) > 1)
         return cls(run, bar, recordings, strokes, channels, frame_times_s)
 
 
-def _record(protocol, run, whisker, bar, touch, stroke, exposures, rng) -> Recording:
-    """Simulate one whisker; raise ArithmeticError, naming it, where it cannot go on."""
+def _record(
+    protocol, run, whisker, bar, touch, stroke, frame_times_s, rng
+) -> tuple[Recording | None, np.ndarray]:
+    """Simulate one whisker; return its recording, None where it touches nothing, and its signals.
+
+    Raises ArithmeticError, naming it, where it cannot go on.
+    """
+    if touch is None or touch.motor_rad >= stroke.angles_rad.max():
+        return None, sample_signals(protocol, run, stroke, (), whisker.gauges, rng)
+    exposures = _exposures(stroke, frame_times_s)
     own_bar = bar.in_frame(whisker.pose)
     try:
-        return Recording.record(protocol, run, whisker, own_bar, touch, stroke, exposures, rng)
+        recording = Recording.record(protocol, run, whisker, own_bar, touch, stroke, exposures, rng)
     except ArithmeticError as problem:
         raise ArithmeticError(f"whisker {whisker.name}: {problem}") from None
+    return recording, recording.signals
 
 
 def _find_touch(
@@ -143,7 +146,8 @@ def _find_touch(
 ) -> UnloadedTouch | None:
     """Find a whisker's first touch; raise BadInput where it lies within the object."""
     try:
-        return find_touch_from_afar(whisker.rod, bar, _motor_towards(whisker, near_rad))
+        own_bar = bar.in_frame(whisker.pose)
+        return find_touch_from_afar(whisker.rod, own_bar, _motor_towards(whisker, near_rad))
     except ValueError as problem:
         raise BadInput(
             f"whisker {whisker.name} {problem}; its base_mm or the trial's d_x_mm is another"
@@ -175,8 +179,8 @@ def find_touch_from_afar(rod: Rod, bar: TouchedObject, towards_rad: float) -> Un
 
 
 def _plan_strokes(protocol, run, whiskers, touches, near_rad) -> dict[str, Stroke]:
-    """Plan each column's stroke, from before its first touch; all go as far as the one that goes
-    farthest."""
+    """Return each column's stroke, from before its first touch; all go as far as the one that
+    goes farthest."""
     before_rad = math.radians(run.before_deg)
     after_rad = math.radians(run.after_deg)
     starts = {}

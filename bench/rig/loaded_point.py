@@ -33,7 +33,7 @@ class LoadedPoint:
         unknowns: np.ndarray,
         guess: np.ndarray | None,
     ) -> "LoadedPoint":
-        """Bend the whisker by a force at an arc, unknowns (4,), and rotate it (3, 3) with the hub.
+        """Solve for the whisker bent by a force at an arc, unknowns (4,), in a hub that is rotated (3, 3).
 
         guess (n,): angles to start from. Raises ArithmeticError where there is no equilibrium.
         """

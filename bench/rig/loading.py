@@ -56,19 +56,25 @@ def ringing_Nmm(
     """Return (n, 2): the free mode rung by the motor's ramps, the propped one by touch and by every
     jump of stick–slip."""
     free, propped = _modes(whisks[0])
-    oscillation = partial(damped_oscillation, times_s, damping=damping)
+    ring_free = _oscillation(free, times_s, damping)
+    ring_propped = _oscillation(propped, times_s, damping)
     total = np.zeros((len(times_s), 2))
     for number, (whisk, start_s, _, end_s) in enumerate(_periods(stroke, whisks)):
-        touch_s = float(stroke.time_s(number, whisk.touch.motor_rad))
+        touch_s = stroke.time_s(number, whisk.touch.motor_rad)
         for at_s, change_rad_s in _speed_changes(stroke, start_s, touch_s):
             rate = free.swing * change_rad_s * free.moment_Nmm
-            total[:, 1] += oscillation(at_s, touch_s, free.frequency_rad_s, rate=rate)
-        frequency = propped.frequency_rad_s
-        strike_Nmm = _strike_rate(propped, whisk, _speed(stroke, touch_s))
-        total += np.outer(oscillation(touch_s, end_s, frequency, rate=1.0), strike_Nmm)
+            total[:, 1] += ring_free(at_s, touch_s, rate=rate)
+        strike_Nmm = _strike_rate(propped, whisk, stroke, touch_s)
+        total += np.outer(ring_propped(touch_s, end_s, rate=1.0), strike_Nmm)
         for at_s, jump_Nmm in _jumps(stroke, number, whisk):
-            total -= np.outer(oscillation(at_s, end_s, frequency, value=1.0), jump_Nmm)
+            total -= np.outer(ring_propped(at_s, end_s, value=1.0), jump_Nmm)
     return total
+
+
+def _oscillation(mode, times_s, damping) -> Callable[..., np.ndarray]:
+    """Return `damped_oscillation` of a mode at times (n,), by its beginning, end and value or rate."""
+    frequency = mode.frequency_rad_s
+    return partial(damped_oscillation, times_s, frequency_rad_s=frequency, damping=damping)
 
 
 def _modes(whisk):
@@ -78,9 +84,9 @@ def _modes(whisk):
     return Mode.solve(rod), Mode.solve(rod, prop_mm)
 
 
-def _strike_rate(propped, whisk, speed_rad_s):
+def _strike_rate(propped, whisk, stroke, touch_s):
     """Return the rate (2,), N·mm/s, of the moments with which touch sets the propped mode going."""
-    per_push = propped.strike * speed_rad_s * propped.moment_Nmm / propped.push_Nmm
+    per_push = propped.strike * _speed(stroke, touch_s) * propped.moment_Nmm / propped.push_Nmm
     return per_push * _moment_per_rad(whisk)
 
 

@@ -160,7 +160,7 @@ def place_object(
 
 
 def plan_stroke(protocol: Protocol, run: ProtocolRun, low_rad: float, high_rad: float) -> Stroke:
-    """Plan a run's motion between two motor angles."""
+    """Return a run's motion between two motor angles."""
     return Stroke.plan(
         low_rad,
         high_rad,
@@ -209,8 +209,11 @@ def _state_velocity(run, rng) -> np.ndarray | None:
 
 
 def _take_frames(protocol, run, touch, stroke) -> Exposures:
-    """Trigger the camera anew in each whisk; on the way back, where that is wanted, at the same
-    angles but the furthest, where the motor may turn."""
+    """Return the exposures of all whisks, the camera triggered anew in each.
+
+    On the way back, where that is wanted, they are at the same angles but the furthest, where the
+    motor may turn.
+    """
     up = touch.motor_rad + np.radians(protocol.pictures.frame_angles_deg(run.speed_deg_s))
     passes = [(up, False)]
     if protocol.pictures.back_stroke:

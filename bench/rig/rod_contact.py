@@ -173,31 +173,29 @@ class _Problem:
         distance = math.sqrt(local.offset_mm @ local.offset_mm)
         frame, frame_by = _contact_frame(local, offset_by, distance, loaded.point_by)
         load = self._load(unknowns, loaded, frame, frame_by)
-        count = len(unknowns)
-        arc = unknowns[3]
-        residual = np.empty(count)
-        jacobian = np.zeros((count, count))
-        residual[0], jacobian[0, :4] = self._off_nearest(arc, loaded, local, offset_by)
-        residual[1], jacobian[1, :4] = self._gap_mm(arc, loaded, frame[0], distance, load)
+        residual = np.empty_like(unknowns)
+        jacobian = np.zeros((len(unknowns), len(unknowns)))
+        residual[0], jacobian[0, :4] = self._off_nearest(unknowns, loaded, local, offset_by)
+        residual[1], jacobian[1, :4] = self._gap_mm(unknowns, loaded, frame[0], distance, load)
         residual[2:], jacobian[2:] = self.law.equations(load, unknowns[4:])
         return _Equations(loaded, residual, jacobian, load)
 
-    def _off_nearest(self, arc, loaded, local, offset_by) -> tuple[float, np.ndarray]:
+    def _off_nearest(self, unknowns, loaded, local, offset_by) -> tuple[float, np.ndarray]:
         """Return how far the contact is along the whisker from where it belongs, and the
         derivatives (4,) of that: the point nearest to the object's axis, or the tip."""
         if self.tip:
-            return arc - self.contact.rod.length_mm, np.array([0.0, 0.0, 0.0, 1.0])
+            return unknowns[3] - self.contact.rod.length_mm, np.array([0.0, 0.0, 0.0, 1.0])
         off_by = loaded.tangent @ offset_by + local.offset_mm @ loaded.tangent_by
         return local.offset_mm @ loaded.tangent, off_by
 
-    def _gap_mm(self, arc, loaded, normal, distance, load) -> tuple[float, np.ndarray]:
+    def _gap_mm(self, unknowns, loaded, normal, distance, load) -> tuple[float, np.ndarray]:
         """Return the gap between the surfaces, as the force presses them, and its derivatives (4,).
 
         normal (3,): of the contact. distance: between centreline and the object's axis, mm.
         """
         rod = self.contact.rod
         stiffness = self.bar.stiffness_N_mm
-        reach = self.bar.radius_mm + float(rod.radius_mm(arc))
+        reach = self.bar.radius_mm + float(rod.radius_mm(unknowns[3]))
         gap_by = normal @ loaded.point_by + load.press_by / stiffness
         gap_by[3] -= rod.taper
         return distance + load.press / stiffness - reach, gap_by

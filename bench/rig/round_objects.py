@@ -25,7 +25,7 @@ class TouchedRing(TouchedObject):
 
     @classmethod
     def from_bar(cls, bar: TouchedBar, touched_mm: np.ndarray, ring_radius_mm: float) -> Self:
-        """Bend a straight bar away from the whisker that touches it at a point (3,)."""
+        """Return a straight bar bent away from the whisker that touches it at a point (3,)."""
         foot, normal = _foot_and_normal(bar, touched_mm)
         return cls(
             foot - ring_radius_mm * normal,

@@ -30,7 +30,7 @@ class ContactPath:
 
     @classmethod
     def from_states(cls, path_rad: np.ndarray, states: Sequence[ContactState | None]) -> Self:
-        """Tabulate the states (None while free) at the motor angles of a path."""
+        """Make the path of states (None while free) at the motor angles of a path."""
         count = len(states)
         points = np.full((count, 3), np.nan)
         arcs = np.full(count, np.nan)
@@ -120,8 +120,8 @@ class WhiskMechanics:
         stops_rad: Sequence[float] = (),
         back: bool = False,
     ) -> Self:
-        """March from touch to `end_rad` (and back) in steps, stopping exactly at `stops_rad` on the
-        way there."""
+        """Compute a whisk from touch to `end_rad` (and back) in steps, stopping exactly at `stops_rad`
+        on the forward stroke."""
         march = March(rod, bar, friction, touch)
         start = march.state
         stations = _stations(touch.motor_rad, end_rad, step_rad, stops_rad)
@@ -156,10 +156,10 @@ class WhiskMechanics:
     def slip_at(self, theta_rad: float | np.ndarray) -> np.ndarray:
         """Interpolate the slip, mm, of the forward stroke at pushing angles, NaN beyond its
         end."""
-        way = self.forward
-        slip = self.slip_mm(way.point_mm, way.motor_rad)
+        path = self.forward
+        slip = self.slip_mm(path.point_mm, path.motor_rad)
         motor = self.touch.motor_rad + np.asarray(theta_rad)
-        return np.interp(motor, way.motor_rad, slip, right=np.nan)
+        return np.interp(motor, path.motor_rad, slip, right=np.nan)
 
     def gave_mm(self, motor_rad: float, back: bool) -> np.ndarray:
         """Return the displacement (3,) of a soft object: away from the contact, by the force along

@@ -1,8 +1,8 @@
 """The whisker for a job: θ, α_est, thickness, length, taper and base tilt of the least worst error of (10).
 
 The error of a design at one slope, friction angle and distance is that of (10) with the moments of
-(13), (14) there, and with its neglected terms to first order; its sigma is that of the estimators'
-own formulas, from the noise of one sample by the weights with which touch and moments are read. Worst
+(13), (14), and with its neglected terms to first order; its sigma is by the estimators' own
+formulas, from the noise of one sample by the weights with which touch and moments are read. Worst
 is the largest |bias| + 1.96 sigma over the region.
 """
 
@@ -116,7 +116,6 @@ def expected_error(
 ) -> ExpectedError:
     """Compute the error of (10) that is to be expected at points (3, n) of the region."""
     beta, alpha, d_x = points
-    theta = design.theta_rad
     slope = beta - np.radians(design.tilt_deg)
     with np.errstate(all="ignore"):
         moments = _moments(design, equipment, slope, alpha, d_x)
@@ -124,13 +123,12 @@ def expected_error(
         noise_share = noise_mm / of_cylinder * design.thickness(d_x)
         by_friction = 1.0 / (1.0 / of_cylinder + design.taper / design.length_mm) / d_x - 1.0
         phi = np.arctan2(*moments)
-        lean = first_order.leaning(theta, np.radians(region.lean_sigma_deg), phi, alpha)
+        lean = first_order.leaning(design.theta_rad, np.radians(region.lean_sigma_deg), phi, alpha)
     bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
     has_distance = np.isfinite(bias) & np.isfinite(noise_share)
     sigma = np.hypot(noise_share, lean)
-    return ExpectedError(
-        100.0 * np.where(has_distance, bias, np.inf), 100.0 * np.where(has_distance, sigma, np.inf)
-    )
+    bias_percent, sigma_percent = 100.0 * np.where(has_distance, [bias, sigma], np.inf)
+    return ExpectedError(bias_percent, sigma_percent)
 
 
 def _moments(design: Design, equipment: Equipment, slope, alpha, d_x) -> tuple[Numbers, Numbers]:
@@ -216,9 +214,9 @@ def faults(design: Design, region: Region, equipment: Equipment) -> dict[str, fl
     compliance = 1.0 / d_x - design.taper / design.length_mm  # of the distance, 1/mm
     moments = design.theta_rad * 3.0 * rigidity * compliance
     bending = moments * (1.0 - _ALONG) / design.thickness(_ALONG * d_x) ** 3
-    strain = 0.5 * design.diameter_mm * bending.max() / rigidity
+    strain = 0.5 * design.diameter_mm * bending / rigidity
     shares = {
-        "strain": strain / equipment.most_strain,
+        "strain": strain.max() / equipment.most_strain,
         "gauges' range": moments.max() / equipment.full_scale_Nmm,
     }
     return {name: share - 1.0 for name, share in shares.items() if share > 1.0}
@@ -275,13 +273,11 @@ def _require_design(design: Design, region: Region, equipment: Equipment) -> Non
     """Raise BadInput where the best design of some ranges does not serve the region."""
     if worst_percent(design, region, equipment) < _NO_DESIGN:
         return
-    excesses = []
-    for name, share in faults(design, region, equipment).items():
-        excesses.append(f"{name} by {100 * share:.0f} %")
+    found = faults(design, region, equipment)
+    excesses = [f"{name} by {100 * share:.0f} %" for name, share in found.items()]
+    why = "(10) has no distance where φ + α_est reaches 90°"
     if excesses:
         why = f"{', '.join(excesses)} too much"
-    else:
-        why = "(10) has no distance where φ + α_est reaches 90°"
     raise BadInput(f"no design within the ranges serves the whole region: {why}")
 
 

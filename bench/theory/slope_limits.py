@@ -163,7 +163,7 @@ def _draw(number, curves):
 
 
 def _draw_legend(figure, grid) -> None:
-    """Letter the panels, and draw one legend of all their lines."""
+    """Draw one legend of all panels' lines, and a letter above each panel."""
     entries = {}
     for ax, letter in zip(grid.flat, "abcdef"):
         ax.set_title(f"({letter}) {ax.get_title()}")
