@@ -116,8 +116,8 @@ def surface_verdict(cloud: Sequence[ContactPoint]) -> Iterator[str]:
     largest = f"{worst.along_mm.value:+.2f} ± {worst.along_mm.sigma:.2f} mm"
     whiskers = counted(len({contact.whisker for contact in sound}), "whisker")
     sources = " and ".join(sorted({contact.source for contact in sound}))
-    normals_deg = math.degrees(_rms(errors.normals_rad))
-    normals = f"; normals are {normals_deg:.1f}° RMS off" if math.isfinite(normals_deg) else ""
+    off_deg = errors.normals_rms_deg
+    normals = f"; normals are {off_deg:.1f}° RMS off" if math.isfinite(off_deg) else ""
     yield (
         f"Surface by {label_of(FELT)}: {counted(len(sound), 'contact')} felt by {whiskers} lie "
         f"{across:.2f} mm RMS off the object ({sources}) and {along:.2f} mm along the whisker, most "
@@ -135,8 +135,8 @@ def surface_lines(cloud: Sequence[ContactPoint]) -> Iterator[str]:
             errors = _Errors.of_contacts(sound)
             across = _statistics(errors.across_mm)
             along = _statistics(errors.along_mm)
-            normals_deg = math.degrees(_rms(errors.normals_rad))
-            normals = f"{normals_deg:8.1f}°" if math.isfinite(normals_deg) else f"{'-':>8}"
+            off_deg = errors.normals_rms_deg
+            normals = f"{off_deg:8.1f}°" if math.isfinite(off_deg) else f"{'-':>8}"
             lines.append(f"{label:<24}{len(sound):>4}     {across}     {along}    {normals}")
     if lines:
         yield f"{'':<24}{'n':>4}   off it: mean     RMS  in 95 %   along: mean     RMS  in 95 %   normals RMS"
@@ -166,6 +166,11 @@ class _Errors:
             rows.append([across.value, across.sigma, along.value, along.sigma, normal])
         table = np.array(rows)
         return cls(table[:, :2], table[:, 2:4], table[:, 4])
+
+    @property
+    def normals_rms_deg(self) -> float:
+        """Return the RMS angle between felt normals and the object's; NaN where none is known."""
+        return math.degrees(_rms(self.normals_rad))
 
 
 def _rms(values: np.ndarray) -> float:

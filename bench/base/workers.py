@@ -79,8 +79,7 @@ class Workers:
 
     def _by_processes(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
         """Yield places and results of tasks that other processes do."""
-        self._start(min(self.count, len(tasks)))
-        idle = list(range(len(self._processes)))
+        idle = self._start(min(self.count, len(tasks)))
         waiting = deque(range(len(tasks)))
         deaths: Counter[int] = Counter()
         busy: dict[Future, tuple[int, int]] = {}  # process and place of each task
@@ -99,10 +98,11 @@ class Workers:
                 else:
                     yield place, result
 
-    def _start(self, count: int) -> None:
-        """Start as many processes as are missing to a number."""
+    def _start(self, count: int) -> list[int]:
+        """Start as many processes as are missing to a number; return the numbers of all."""
         while len(self._processes) < count:
             self._processes.append(_process())
+        return list(range(len(self._processes)))
 
     def _submit(self, number: int, job: Callable, task: object) -> Future:
         """Give a task to a process, which is started anew where it has died; return its future."""

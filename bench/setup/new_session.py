@@ -86,7 +86,7 @@ def new_session(
 
 
 def _ask_until_plausible(question: Question, ask: Ask) -> dict[str, float]:
-    """Return a plausible answer by option, asked for until it is one; nothing for an empty one."""
+    """Return a plausible answer by option, requested until it is one; nothing for an empty one."""
     while text := ask(f"{question.wanted} (Enter: fill in later): ").strip():
         try:
             question.plausible_range.check(float(text), question.key, MANIFEST)

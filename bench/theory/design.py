@@ -122,13 +122,12 @@ def expected_error(
         of_cylinder, noise_mm = _cylinder_distance(design, equipment, *moments)
         noise_share = noise_mm / of_cylinder * design.thickness(d_x)
         by_friction = 1.0 / (1.0 / of_cylinder + design.taper / design.length_mm) / d_x - 1.0
-        phi = np.arctan2(*moments)
-        lean = first_order.leaning(design.theta_rad, np.radians(region.lean_sigma_deg), phi, alpha)
+        lean_sigma = np.radians(region.lean_sigma_deg)
+        lean = first_order.leaning(design.theta_rad, lean_sigma, np.arctan2(*moments), alpha)
     bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
-    has_distance = np.isfinite(bias) & np.isfinite(noise_share)
-    sigma = np.hypot(noise_share, lean)
-    bias_percent, sigma_percent = 100.0 * np.where(has_distance, [bias, sigma], np.inf)
-    return ExpectedError(bias_percent, sigma_percent)
+    errors = np.array([bias, np.hypot(noise_share, lean)])
+    has_distance = np.isfinite(bias + noise_share)
+    return ExpectedError(*np.where(has_distance, 100.0 * errors, np.inf))
 
 
 def _moments(design: Design, equipment: Equipment, slope, alpha, d_x) -> tuple[Numbers, Numbers]:
