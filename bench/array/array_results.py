@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bench.analyses.runs import alpha_est_sigma
 from bench.array.array_page import write_page
-from bench.array.cloud import Contact, Mount, contacts
+from bench.array.cloud import ContactPoint, Mount, contacts
 from bench.array.exchanged_whiskers import exchanged
 from bench.array.shape_verdict import (
     SURFACE_POINTS,
@@ -17,7 +17,7 @@ from bench.array.shape_verdict import (
     write_surface,
 )
 from bench.array.size import SIZE, FeltSize, fit_sizes, size_lines, write_sizes
-from bench.array.surface import Surface, seen_surface, stated_surface
+from bench.array.surface import ObjectSurface, seen_surface, stated_surface
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.tables import WHISKER
@@ -43,9 +43,9 @@ TABLES = {table.name: table for table in (ARRAY_WHISKS, ARRAY_ESTIMATES, SURFACE
 
 @dataclass(frozen=True, eq=False)
 class ArrayRecord:
-    """All that array.json holds of an array, beside its whiskers' runs.
+    """All that array.json holds of an array, without its whiskers' runs.
 
-    doubts: of the session as a whole. scores: of all whiskers against the truth files of a
+    doubts: warnings about the session as a whole. scores: of all whiskers against the truth files of a
     synthetic session. surfaces: objects as the manifests state them, by trial. verdict, doubtful:
     as the summary has them, once it is made.
     """
@@ -54,7 +54,7 @@ class ArrayRecord:
     bases: tuple[Base, ...]
     doubts: tuple[str, ...] = ()
     scores: tuple[str, ...] = ()
-    surfaces: dict[str, Surface] = field(default_factory=dict)
+    surfaces: dict[str, ObjectSurface] = field(default_factory=dict)
     verdict: tuple[str, ...] = ()
     doubtful: tuple[str, ...] = ()
 
@@ -154,7 +154,7 @@ def write_array(out: Path) -> Summary:
     return summary
 
 
-def _seen_surfaces(runs: Sequence[WhiskerRun]) -> dict[str, Surface]:
+def _seen_surfaces(runs: Sequence[WhiskerRun]) -> dict[str, ObjectSurface]:
     """Return the bar of each trial, from the first whisk that shows it."""
     surfaces = {}
     for run in runs:
@@ -180,24 +180,11 @@ def _named_by_whisker(result: TrialResult, run: WhiskerRun) -> TrialResult:
     return replace(result, trial=trial)
 
 
-def _summarise(
-    record: ArrayRecord,
-    runs: Sequence[WhiskerRun],
-    cloud: Sequence[Contact],
-    sizes: Sequence[FeltSize],
-) -> Summary:
-    """Return verdict and sections of the array's summary; sections without lines are left out."""
-    doubtful = [*record.doubts, *exchanged({run.base.name: run.results for run in runs})]
-    results = []
-    first_lines = []
-    for run in runs:
-        doubtful += [f"{run.base.name}: {line}" for line in run.record.doubts]
-        results += [_named_by_whisker(result, run) for result in run.results]
-        first_lines.append(f"{run.base.name}: {run.record.verdict[0]}")
-    title = f"{record.session}, {counted(len(runs), 'whisker')}"
-    has_pictures = any(run.record.has_pictures for run in runs)
-    settings = runs[0].record.settings
-    general = verdict(title, has_pictures, RunAccuracy.of_results(results), settings, len(doubtful))
+def _sections(record, cloud, sizes, first_lines, doubtful) -> tuple[Section, ...]:
+    """Return the sections that have lines, in their order.
+
+    first_lines: a verdict a whisker. doubtful: see `_doubtful_lines`.
+    """
     files = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
     surface_title = "Surface: contacts from the object, mm (surface.csv)"
     size_title = "Size of the object by (10), its place free (size.csv)"
@@ -209,5 +196,34 @@ def _summarise(
         Section("score", SCORE, record.scores),
         Section("files", "Files", (files,)),
     ]
-    kept = tuple(section for section in sections if section.lines)
+    return tuple(section for section in sections if section.lines)
+
+
+def _doubtful_lines(record: ArrayRecord, runs: Sequence[WhiskerRun]) -> list[str]:
+    """Return the warnings about the session, about exchanged whiskers, and about each run."""
+    by_whisker = {run.base.name: run.results for run in runs}
+    lines = [*record.doubts, *exchanged(by_whisker)]
+    for run in runs:
+        lines += [f"{run.base.name}: {line}" for line in run.record.doubts]
+    return lines
+
+
+def _summarise(
+    record: ArrayRecord,
+    runs: Sequence[WhiskerRun],
+    cloud: Sequence[ContactPoint],
+    sizes: Sequence[FeltSize],
+) -> Summary:
+    """Return verdict and sections of the array's summary; sections without lines are left out."""
+    doubtful = _doubtful_lines(record, runs)
+    results = []
+    first_lines = []
+    for run in runs:
+        results += [_named_by_whisker(result, run) for result in run.results]
+        first_lines.append(f"{run.base.name}: {run.record.verdict[0]}")
+    title = f"{record.session}, {counted(len(runs), 'whisker')}"
+    has_pictures = any(run.record.has_pictures for run in runs)
+    settings = runs[0].record.settings
+    general = verdict(title, has_pictures, RunAccuracy.of_results(results), settings, len(doubtful))
+    kept = _sections(record, cloud, sizes, first_lines, doubtful)
     return Summary((*surface_verdict(cloud), *general), tuple(doubtful), kept)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.array.surface import Surface, seen_surface
+from bench.array.surface import ObjectSurface, seen_surface
 from bench.base.doubts import in_one_status
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.assembly import Z_C_MM
@@ -21,7 +21,7 @@ SEEN = "seen"  # in the place of an estimator's name
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Contact:
+class ContactPoint:
     """A contact at first touch: a point of the whisker's centreline in the rig frame.
 
     point_mm (3,), covariance_mm2 (3, 3). normal (3,): of the surface, towards the whisker, as felt;
@@ -74,8 +74,8 @@ class Mount:
 
 
 def contacts(
-    mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, Surface]
-) -> Iterator[Contact]:
+    mount: Mount, results: Iterable[TrialResult], surfaces: dict[str, ObjectSurface]
+) -> Iterator[ContactPoint]:
     """Yield every whisk's contact, as seen where it is and by each estimator that gives a distance.
 
     surfaces: by trial, as stated. Where none is, a felt contact is compared with the bar as this
@@ -99,9 +99,9 @@ def contacts(
                 yield _compare(contact, surface) if surface else contact
 
 
-def _seen_contact(mount: Mount, trial: str, seen: SeenWhisk) -> Contact:
+def _seen_contact(mount: Mount, trial: str, seen: SeenWhisk) -> ContactPoint:
     """Return the contact that the cameras see, in the base frame."""
-    return Contact(
+    return ContactPoint(
         whisker=mount.base.name,
         trial=trial,
         whisk=seen.whisk,
@@ -118,30 +118,21 @@ def _seen_contact(mount: Mount, trial: str, seen: SeenWhisk) -> Contact:
 
 def _felt_contact(
     mount: Mount, trial: str, whisk: int, felt: FeltWhisk, estimate: EstimateRow
-) -> Contact:
+) -> ContactPoint:
     """Return the contact (r_c, θ_c, z_c) that an estimator gives, in the base frame."""
-    touch = felt.touch_felt_rad
-    r_c = estimate.d_x_est_mm
-    covariance = np.diag([r_c.sigma**2, touch.sigma**2, Z_C_MM.sigma**2])
-    if math.isfinite(estimate.touch_covariance_mm_rad):
-        covariance[[0, 1], [1, 0]] = estimate.touch_covariance_mm_rad
-    cos = math.cos(touch.value)
-    sin = math.sin(touch.value)
-    jacobian = np.array(
-        [[cos, -r_c.value * sin, 0.0], [sin, r_c.value * cos, 0.0], [0.0, 0.0, 1.0]]
-    )
+    touch_rad = felt.touch_felt_rad.value
+    polar = contact_point(estimate.d_x_est_mm.value, touch_rad, Z_C_MM.value)
     normal_sigma = NAN
     if estimate.alpha_est_rad == mount.alpha_est_rad:
         normal_sigma = math.hypot(felt.phi_felt_rad.sigma, mount.alpha_est_sigma_rad)
-    polar = contact_point(r_c.value, touch.value, Z_C_MM.value)
-    return Contact(
+    return ContactPoint(
         whisker=mount.base.name,
         trial=trial,
         whisk=whisk,
         estimator=estimate.estimator,
         point_mm=np.array(cartesian(*polar)),
-        covariance_mm2=jacobian @ covariance @ jacobian.T,
-        normal=_normal(touch.value, estimate.beta_est_rad),
+        covariance_mm2=_covariance_mm2(felt.touch_felt_rad, estimate),
+        normal=_normal(touch_rad, estimate.beta_est_rad),
         normal_sigma_rad=normal_sigma,
         status=in_one_status(felt.status, estimate.status),
         base_mm=np.zeros(3),
@@ -149,6 +140,20 @@ def _felt_contact(
         by_alpha_mm=_by_alpha_mm(estimate),
         has_touch=not felt.status,
     )
+
+
+def _covariance_mm2(touch_rad: Value, estimate: EstimateRow) -> np.ndarray:
+    """Return the covariance (3, 3) of a contact in the base frame by that of (r_c, θ_c, z_c)."""
+    r_c = estimate.d_x_est_mm
+    covariance = np.diag([r_c.sigma**2, touch_rad.sigma**2, Z_C_MM.sigma**2])
+    if math.isfinite(estimate.touch_covariance_mm_rad):
+        covariance[[0, 1], [1, 0]] = estimate.touch_covariance_mm_rad
+    cos = math.cos(touch_rad.value)
+    sin = math.sin(touch_rad.value)
+    jacobian = np.array(
+        [[cos, -r_c.value * sin, 0.0], [sin, r_c.value * cos, 0.0], [0.0, 0.0, 1.0]]
+    )
+    return jacobian @ covariance @ jacobian.T
 
 
 def _by_alpha_mm(estimate: EstimateRow) -> float:
@@ -169,7 +174,7 @@ def _normal(touch_rad: float, beta_rad: float) -> np.ndarray:
     )
 
 
-def _to_rig(contact: Contact, base: Base) -> Contact:
+def _to_rig(contact: ContactPoint, base: Base) -> ContactPoint:
     """Convert a contact from the base frame to the rig's, and add the covariance of the base's place."""
     turn = base.T_rig_base[:, :3]
     origin = base.T_rig_base[:, 3]
@@ -185,7 +190,7 @@ def _to_rig(contact: Contact, base: Base) -> Contact:
     )
 
 
-def _compare(contact: Contact, surface: Surface) -> Contact:
+def _compare(contact: ContactPoint, surface: ObjectSurface) -> ContactPoint:
     """Return a contact with its distance from the object, across and along the whisker, and the angle
     between the normals.
 

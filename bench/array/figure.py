@@ -8,19 +8,20 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from bench.array.cloud import SEEN, Contact
-from bench.array.surface import Surface
+from bench.array.cloud import SEEN, ContactPoint
+from bench.array.surface import ObjectSurface
 from bench.base.drawing import blank, is_drawn, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.records.plain import to_plain
 
 _FELT = "with_friction"
 _VIEWS = ((0, 2, "x (mm)", "z (mm)"), (0, 1, "x (mm)", "y (mm)"))
-_MARGIN_MM = 15.0  # mm of object shown beyond the contacts
-_POINTS = 400  # of the object's centreline that are drawn
+_MARGIN_MM = 15.0  # mm of the object that are drawn beyond the contacts
 
 
-def write_figures(out: Path, cloud: Sequence[Contact], surfaces: dict[str, Surface]) -> list[str]:
+def write_figures(
+    out: Path, cloud: Sequence[ContactPoint], surfaces: dict[str, ObjectSurface]
+) -> list[str]:
     """Write surface/<trial>.png for each trial with contacts; return their names.
 
     A figure is drawn again only where its data or the drawing code changed.
@@ -43,7 +44,7 @@ def write_figures(out: Path, cloud: Sequence[Contact], surfaces: dict[str, Surfa
     return names
 
 
-def draw(trial: str, cloud: Sequence[Contact], surface: Surface | None) -> Figure:
+def draw(trial: str, cloud: Sequence[ContactPoint], surface: ObjectSurface | None) -> Figure:
     """Draw the object from the side and from above, with the contacts before it.
 
     Felt contacts have their one-sigma ellipses, seen contacts are crosses.
@@ -51,14 +52,8 @@ def draw(trial: str, cloud: Sequence[Contact], surface: Surface | None) -> Figur
     figure = blank(7.2, 3.6)
     whiskers = dict.fromkeys(contact.whisker for contact in cloud)
     colours = {name: colormaps["tab20"](k % 20) for k, name in enumerate(whiskers)}
-    points = np.array([contact.point_mm for contact in cloud])
-    for axes, (x, y, x_name, y_name) in zip(figure.subplots(1, 2), _VIEWS):
-        if surface is not None:
-            _draw_object(axes, surface, points, x, y)
-        for contact in cloud:
-            _draw_contact(axes, contact, x, y, colours[contact.whisker])
-        axes.set(xlabel=x_name, ylabel=y_name, aspect="equal")
-        axes.set(xlim=_span(points[:, x]), ylim=_span(points[:, y]))
+    for axes, view in zip(figure.subplots(1, 2), _VIEWS):
+        _draw_view(axes, view, cloud, surface, colours)
     for name, colour in colours.items():
         axes.plot([], [], "o", color=colour, label=name)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside right center", title="whisker")
@@ -67,12 +62,27 @@ def draw(trial: str, cloud: Sequence[Contact], surface: Surface | None) -> Figur
     return figure
 
 
+def _draw_view(axes, view, cloud: Sequence[ContactPoint], surface, colours) -> None:
+    """Draw object and contacts in the view along two of the rig's axes.
+
+    view: numbers of these axes, then their names. colours: by whisker.
+    """
+    x, y, x_name, y_name = view
+    points = np.array([contact.point_mm for contact in cloud])
+    if surface is not None:
+        _draw_object(axes, surface, points, x, y)
+    for contact in cloud:
+        _draw_contact(axes, contact, x, y, colours[contact.whisker])
+    axes.set(xlabel=x_name, ylabel=y_name, aspect="equal")
+    axes.set(xlim=_span(points[:, x]), ylim=_span(points[:, y]))
+
+
 def _span(values: np.ndarray) -> tuple[float, float]:
     """Return the limits of an axis, mm."""
     return float(values.min()) - _MARGIN_MM, float(values.max()) + _MARGIN_MM
 
 
-def _draw_contact(axes, contact: Contact, x: int, y: int, colour) -> None:
+def _draw_contact(axes, contact: ContactPoint, x: int, y: int, colour) -> None:
     """Draw a contact in the view along two of the rig's axes."""
     place = contact.point_mm[[x, y]]
     if contact.estimator == SEEN:
@@ -85,29 +95,14 @@ def _draw_contact(axes, contact: Contact, x: int, y: int, colour) -> None:
     axes.plot(*place, "o", color=colour, markersize=2, alpha=0.5 if contact.status else 1.0)
 
 
-def _draw_object(axes, surface: Surface, points: np.ndarray, x: int, y: int) -> None:
+def _draw_object(axes, surface: ObjectSurface, points: np.ndarray, x: int, y: int) -> None:
     """Draw the object as discs of its radius about its centreline, of a cone as those of balls that
     just fit in."""
-    centreline = _centreline(surface, points)
+    heights = (points - surface.point_mm) @ surface.axis
+    low = heights.min() - 2 * _MARGIN_MM
+    high = heights.max() + 2 * _MARGIN_MM
+    centreline = surface.form.centreline_mm(surface, low, high)
     below_tip = (surface.point_mm - centreline) @ surface.axis
     radii = surface.radius_mm + np.sin(surface.half_angle_rad) * below_tip
     for centre, radius in zip(centreline[:, [x, y]], radii):
         axes.add_patch(Ellipse(centre, 2 * radius, 2 * radius, facecolor="0.85", edgecolor="none"))
-
-
-def _centreline(surface: Surface, points: np.ndarray) -> np.ndarray:
-    """Return points (n, 3) of the object's centreline about the contacts."""
-    if surface.shape == "sphere":
-        return surface.point_mm[None]
-    if surface.shape == "ring":
-        across = np.linalg.svd(surface.axis[None])[2][1:]  # two axes of the circle's plane
-        angles = np.linspace(0.0, 2 * np.pi, _POINTS)
-        circle = np.stack([np.cos(angles), np.sin(angles)], axis=1) @ across
-        return surface.point_mm + surface.ring_radius_mm * circle
-    along = (points - surface.point_mm) @ surface.axis
-    low = along.min() - 2 * _MARGIN_MM
-    high = along.max() + 2 * _MARGIN_MM
-    if surface.shape == "cone":
-        low = min(low, -2 * _MARGIN_MM)
-        high = 0.0
-    return surface.point_mm + np.outer(np.linspace(low, high, _POINTS), surface.axis)

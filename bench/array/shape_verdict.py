@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from bench.array.cloud import SEEN, Contact
+from bench.array.cloud import SEEN, ContactPoint
 from bench.base.drawing import label_of
 from bench.base.tables import (
     TRIAL,
@@ -21,7 +22,6 @@ from bench.base.tables import (
 )
 from estimator.uncertainty import Z_95
 from vision.geometry.counted import counted
-from vision.truth.value import Value
 
 _ON_CENTRELINE = "on the whisker's centreline"
 SURFACE_POINTS = Table(
@@ -59,12 +59,12 @@ SURFACE_POINTS = Table(
 FELT = "with_friction"  # equation (10), whose contacts are the array's verdict
 
 
-def write_surface(out: Path, cloud: Iterable[Contact]) -> None:
+def write_surface(out: Path, cloud: Iterable[ContactPoint]) -> None:
     """Write surface.csv into a folder: a row a contact."""
     SURFACE_POINTS.write(out, map(_row, cloud))
 
 
-def _row(contact: Contact) -> dict:
+def _row(contact: ContactPoint) -> dict:
     """Return the row of a contact."""
     covariance = contact.covariance_mm2
     x_mm, y_mm, z_mm = contact.point_mm.tolist()
@@ -94,8 +94,8 @@ def _row(contact: Contact) -> dict:
     }
 
 
-def _sound_contacts(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
-    """Return one estimator's contacts beside a known surface that carry no status."""
+def _sound_contacts(cloud: Iterable[ContactPoint], estimator: str) -> list[ContactPoint]:
+    """Return one estimator's contacts near a known surface that carry no status."""
     sound = []
     for contact in cloud:
         is_known = math.isfinite(contact.distance_mm.value)
@@ -104,19 +104,20 @@ def _sound_contacts(cloud: Iterable[Contact], estimator: str) -> list[Contact]:
     return sound
 
 
-def surface_verdict(cloud: Sequence[Contact]) -> Iterator[str]:
+def surface_verdict(cloud: Sequence[ContactPoint]) -> Iterator[str]:
     """Yield the array's verdict in a sentence; nothing where no object is known."""
     sound = _sound_contacts(cloud, FELT)
     if not sound:
         return
-    across = _rms([contact.distance_mm.value for contact in sound])
-    along = _rms([contact.along_mm.value for contact in sound])
+    errors = _Errors.of_contacts(sound)
+    across = _rms(errors.across_mm[:, 0])
+    along = _rms(errors.along_mm[:, 0])
     worst = max(sound, key=lambda contact: abs(contact.along_mm.value))
     largest = f"{worst.along_mm.value:+.2f} ± {worst.along_mm.sigma:.2f} mm"
     whiskers = counted(len({contact.whisker for contact in sound}), "whisker")
     sources = " and ".join(sorted({contact.source for contact in sound}))
-    normals_deg = _normals_rms_deg(sound)
-    normals = f"; normals are {normals_deg:.1f}° RMS off" if math.isfinite(normals_deg) else ""
+    off_deg = errors.normals_rms_deg
+    normals = f"; normals are {off_deg:.1f}° RMS off" if math.isfinite(off_deg) else ""
     yield (
         f"Surface by {label_of(FELT)}: {counted(len(sound), 'contact')} felt by {whiskers} lie "
         f"{across:.2f} mm RMS off the object ({sources}) and {along:.2f} mm along the whisker, most "
@@ -124,36 +125,62 @@ def surface_verdict(cloud: Sequence[Contact]) -> Iterator[str]:
     )
 
 
-def _rms(values: Sequence[float]) -> float:
-    """Return the RMS of the values that are finite; NaN without any."""
-    finite = [value for value in values if math.isfinite(value)]
-    return math.sqrt(sum(value**2 for value in finite) / len(finite)) if finite else math.nan
-
-
-def _normals_rms_deg(contacts: Iterable[Contact]) -> float:
-    """Return the RMS angle between felt normals and the object's."""
-    return math.degrees(_rms([contact.normal_off_rad for contact in contacts]))
-
-
-def surface_lines(cloud: Sequence[Contact]) -> Iterator[str]:
+def surface_lines(cloud: Sequence[ContactPoint]) -> Iterator[str]:
     """Yield a line an estimator, and one on the seen contacts, below a head line."""
     lines = []
     for name in dict.fromkeys(contact.estimator for contact in cloud):
         sound = _sound_contacts(cloud, name)
         if sound:
             label = "seen" if name == SEEN else label_of(name)
-            across = _statistics([contact.distance_mm for contact in sound])
-            along = _statistics([contact.along_mm for contact in sound])
-            normals_deg = _normals_rms_deg(sound)
-            normals = f"{normals_deg:8.1f}°" if math.isfinite(normals_deg) else f"{'-':>8}"
+            errors = _Errors.of_contacts(sound)
+            across = _statistics(errors.across_mm)
+            along = _statistics(errors.along_mm)
+            off_deg = errors.normals_rms_deg
+            normals = f"{off_deg:8.1f}°" if math.isfinite(off_deg) else f"{'-':>8}"
             lines.append(f"{label:<24}{len(sound):>4}     {across}     {along}    {normals}")
     if lines:
         yield f"{'':<24}{'n':>4}   off it: mean     RMS  in 95 %   along: mean     RMS  in 95 %   normals RMS"
     yield from lines
 
 
-def _statistics(values: Iterable[Value]) -> str:
-    """Return mean, RMS and the share within the 95 % interval about 0 as text."""
-    errors, sigmas = np.array([(one.value, one.sigma) for one in values]).T
-    covered = 100.0 * np.mean(np.abs(errors) <= Z_95 * sigmas)
-    return f"{errors.mean():>+9.2f}{_rms(errors):>8.2f}{covered:>6.0f} %"
+@dataclass(frozen=True, eq=False)
+class _Errors:
+    """How far n contacts are from the object.
+
+    across_mm, along_mm (n, 2): distance from the surface and place along the whisker, each with its
+    sigma. normals_rad (n,): angles between the normals, NaN where they are not known.
+    """
+
+    across_mm: np.ndarray
+    along_mm: np.ndarray
+    normals_rad: np.ndarray
+
+    @classmethod
+    def of_contacts(cls, contacts: Iterable[ContactPoint]) -> "_Errors":
+        """Return the errors of contacts near a known surface."""
+        rows = []
+        for contact in contacts:
+            across = contact.distance_mm
+            along = contact.along_mm
+            normal = contact.normal_off_rad
+            rows.append([across.value, across.sigma, along.value, along.sigma, normal])
+        table = np.array(rows)
+        return cls(table[:, :2], table[:, 2:4], table[:, 4])
+
+    @property
+    def normals_rms_deg(self) -> float:
+        """Return the RMS angle between felt normals and the object's; NaN where none is known."""
+        return math.degrees(_rms(self.normals_rad))
+
+
+def _rms(values: np.ndarray) -> float:
+    """Return the RMS of the values (n,) that are finite; NaN without any."""
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if len(finite) else math.nan
+
+
+def _statistics(errors: np.ndarray) -> str:
+    """Return mean, RMS and the share within the 95 % interval about 0 of errors (n, 2) as text."""
+    values, sigmas = errors.T
+    covered = 100.0 * np.mean(np.abs(values) <= Z_95 * sigmas)
+    return f"{values.mean():>+9.2f}{_rms(values):>8.2f}{covered:>6.0f} %"

@@ -15,9 +15,9 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from bench.array.cloud import Contact
+from bench.array.cloud import ContactPoint
 from bench.array.shape_verdict import FELT
-from bench.array.surface import STATED, Surface
+from bench.array.surface import STATED, ObjectSurface
 from bench.base.doubts import in_one_status
 from bench.base.statuses import reason
 from bench.base.tables import TRIAL, Column, Kind, Table, sigma_name, status, with_sigma
@@ -43,12 +43,6 @@ SIZE = Table(
         status("why there is none, or what is doubtful of it"),
     ),
 )
-_SIZES = {
-    "bar": "radius_mm",
-    "sphere": "radius_mm",
-    "ring": "ring_radius_mm",
-    "cone": "half_angle_rad",
-}
 _STEP = 1e-3  # mm, rad: of differences
 # that contacts on such a surface lie as far off it: one sound object in a thousand
 _LEAST_CHANCE = 1e-3
@@ -57,14 +51,14 @@ _MOST_CONDITION = 1e12  # of the information: beyond it some direction is not de
 
 @dataclass(frozen=True)
 class FeltSize:
-    """The felt size of one trial's object, in the unit of its field of `Surface`.
+    """The felt size of one trial's object, in the unit of its field of `ObjectSurface`.
 
     contacts, distances: numbers of touches and of distances that were used. chance: probability
     that contacts on such a surface lie as far off it.
     """
 
     trial: str
-    surface: Surface
+    surface: ObjectSurface
     contacts: int
     distances: int
     size: Value = UNKNOWN
@@ -72,26 +66,21 @@ class FeltSize:
     status: str = ""
 
     @property
-    def key(self) -> str:
-        """Return the name of the field of `Surface`."""
-        return _SIZES[self.surface.shape]
-
-    @property
     def stated(self) -> float:
         """Return the size by the manifest."""
-        return getattr(self.surface, self.key)
+        return getattr(self.surface, self.surface.form.size)
 
     @property
     def column(self) -> str:
         """Return the name of its column of SIZE; a ring's radius is its circle's."""
-        return "half_angle_deg" if self.surface.shape == "cone" else "radius_mm"
+        return self.surface.form.column
 
     def in_unit_of_column(self, size: float) -> float:
         """Convert a size to the unit of the column."""
-        return float(np.degrees(size)) if self.surface.shape == "cone" else size
+        return self.surface.form.in_unit_of_column(size)
 
 
-def fit_sizes(cloud: Iterable[Contact], surfaces: dict[str, Surface]) -> list[FeltSize]:
+def fit_sizes(cloud: Iterable[ContactPoint], surfaces: dict[str, ObjectSurface]) -> list[FeltSize]:
     """Fit a size to the contacts of (10) of each trial whose object the manifest names."""
     by_trial = {}
     for contact in cloud:
@@ -104,30 +93,21 @@ def fit_sizes(cloud: Iterable[Contact], surfaces: dict[str, Surface]) -> list[Fe
     return sizes
 
 
-def fit_size(trial: str, contacts: Sequence[Contact], surface: Surface) -> FeltSize:
+def fit_size(trial: str, contacts: Sequence[ContactPoint], surface: ObjectSurface) -> FeltSize:
     """Fit place and size of an object, by Gauss and Newton's method from what is stated of it."""
-    from scipy.optimize import least_squares  # it takes longer than an evaluation's tables
-
     distances = sum(not contact.status for contact in contacts)
     unknown = FeltSize(trial, surface, len(contacts), distances)
-    fit = _Fit(contacts, surface)
+    fit = _SizeFit(contacts, surface)
     freedom = len(contacts) + distances - fit.count
     if freedom < 1:
         sound = counted(distances, "sound distance")
         return replace(unknown, status=reason("contacts_few", distances=sound))
-    root = np.linalg.cholesky(fit.covariance())
-    found = least_squares(
-        lambda parameters: np.linalg.solve(root, fit.residuals(parameters)),
-        np.zeros(fit.count),
-        method="lm",
-        jac=lambda parameters: np.linalg.solve(root, fit.jacobian(parameters)),
-    )
-    information = found.jac.T @ found.jac
+    change, information, cost = fit.solve()
     if not np.isfinite(information).all() or np.linalg.cond(information) > _MOST_CONDITION:
         return replace(unknown, status=reason("size_open"))
     sigma = float(np.sqrt(np.linalg.inv(information)[-1, -1]))
-    size = Value(unknown.stated + float(found.x[-1]), sigma)
-    chance = float(chdtrc(freedom, 2 * found.cost))
+    size = Value(unknown.stated + change, sigma)
+    chance = float(chdtrc(freedom, cost))
     return replace(unknown, size=size, chance=chance, status=_status(size, chance))
 
 
@@ -138,7 +118,7 @@ def _status(size: Value, chance: float) -> Reason:
     return reason("size_may_be_zero") if size.value < Z_95 * size.sigma else NO_REASON
 
 
-class _Fit:
+class _SizeFit:
     """Whiskers, straight at first touch, against a surface whose place and size are free.
 
     Parameters (count,): the place's shift along each of `free` (k, 3), mm, and the change of the
@@ -146,24 +126,35 @@ class _Fit:
     place along the whisker from where that comes nearest.
     """
 
-    def __init__(self, contacts: Sequence[Contact], surface: Surface):
+    def __init__(self, contacts: Sequence[ContactPoint], surface: ObjectSurface):
         self.contacts = contacts
         self.surface = surface
         self.bases = np.array([contact.base_mm for contact in contacts])
         self.directions = np.array([contact.direction for contact in contacts])
-        # A bar is free across its axis, others in all directions.
-        is_bar = surface.shape == "bar"
-        self.free = np.linalg.svd(surface.axis[None])[2][1:] if is_bar else np.eye(3)
+        self.free = surface.form.free_axes(surface)
         self.count = len(self.free) + 1
 
-    def surface_at(self, parameters: np.ndarray) -> Surface:
+    def solve(self) -> tuple[float, np.ndarray, float]:
+        """Return the change of the size, the information (count, count), and the cost, χ²."""
+        from scipy.optimize import least_squares  # it takes longer than an evaluation's tables
+
+        root = np.linalg.cholesky(self.covariance())
+        found = least_squares(
+            lambda parameters: np.linalg.solve(root, self.residuals(parameters)),
+            np.zeros(self.count),
+            method="lm",
+            jac=lambda parameters: np.linalg.solve(root, self.jacobian(parameters)),
+        )
+        return float(found.x[-1]), found.jac.T @ found.jac, 2 * found.cost
+
+    def surface_at(self, parameters: np.ndarray) -> ObjectSurface:
         """Return the surface with these parameters."""
         point = self.surface.point_mm + parameters[:-1] @ self.free
-        key = _SIZES[self.surface.shape]
-        size = getattr(self.surface, key) + float(parameters[-1])
-        return replace(self.surface, point_mm=point, **{key: size})
+        name = self.surface.form.size
+        size = getattr(self.surface, name) + float(parameters[-1])
+        return replace(self.surface, point_mm=point, **{name: size})
 
-    def nearest_arcs(self, surface: Surface) -> np.ndarray:
+    def nearest_arcs(self, surface: ObjectSurface) -> np.ndarray:
         """Return the arcs (n,), mm, at which each whisker comes nearest to a surface."""
         arcs = []
         for contact in self.contacts:
@@ -171,7 +162,7 @@ class _Fit:
             arcs.append(surface.nearest_arc_mm(contact.base_mm, contact.direction, length))
         return np.array(arcs)
 
-    def distances(self, surface: Surface, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def distances(self, surface: ObjectSurface, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return each whisker's distance from a surface at arcs (n,), mm, and the cosine between it
         and the normal there."""
         outside, normals = surface.distance_mm(self.bases + arcs[:, None] * self.directions)

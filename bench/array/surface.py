@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bench.array.surface_forms import FORMS, SurfaceForm
 from bench.records.trial_result import SeenWhisk
 from bench.session.session import Base
 from bench.session.trial import Trial
@@ -16,7 +17,7 @@ _ARCS = 21  # of each pass of that search
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class ObjectSurface:
     """All points at one distance (radius_mm) from a centreline, in the rig frame.
 
     shape: the centreline is straight ("bar"), a circle ("ring") or a point ("sphere"); or a cone
@@ -35,37 +36,15 @@ class Surface:
     source: str = STATED
     half_angle_rad: float = 0.0
 
+    @property
+    def form(self) -> SurfaceForm:
+        """Return the form that its shape names."""
+        return FORMS[self.shape]
+
     def distance_mm(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the distances (n,) of points (n, 3) from the surface, negative within, and its
         normals there, (n, 3)."""
-        from_point = points_mm - self.point_mm
-        height = from_point @ self.axis
-        along = np.outer(height, self.axis)
-        from_axis = from_point - along
-        if self.shape == "cone":
-            return self._distance_from_cone(from_point, height, from_axis)
-        if self.shape == "sphere":
-            apart = from_point
-        elif self.shape == "bar":
-            apart = from_axis
-        else:
-            apart = from_point - self.ring_radius_mm * _unit(from_axis)
-        return np.linalg.norm(apart, axis=1) - self.radius_mm, _unit(apart)
-
-    def _distance_from_cone(self, from_tip, height, from_axis):
-        """Return distances and normals of a cone: from its straight lines, or from its tip where none
-        is nearer.
-
-        from_tip (n, 3): points from the tip; height (n,), from_axis (n, 3): along and off the axis.
-        """
-        sin = np.sin(self.half_angle_rad)
-        cos = np.cos(self.half_angle_rad)
-        radial = np.linalg.norm(from_axis, axis=1)
-        is_above = sin * radial < cos * height
-        side_normals = cos * _unit(from_axis) + sin * self.axis
-        normals = np.where(is_above[:, None], _unit(from_tip), side_normals)
-        to_tip = np.linalg.norm(from_tip, axis=1)
-        return np.where(is_above, to_tip, cos * radial + sin * height), normals
+        return self.form.distance_mm(self, points_mm)
 
     def nearest_arc_mm(self, base_mm: np.ndarray, direction: np.ndarray, length_mm: float) -> float:
         """Find the arc, mm, at which a straight whisker comes nearest to the object.
@@ -83,60 +62,60 @@ class Surface:
         return 0.5 * (low + high)
 
 
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Return vectors (n, 3) scaled to length 1."""
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-
-
-def stated_surface(trial: Trial) -> Surface | None:
+def stated_surface(trial: Trial) -> ObjectSurface | None:
     """Return the object as the manifest states it; None where it does not, or does not say how thick
     it is."""
     stated = trial.object
     if stated is None or stated.point_mm is None:
         return None
-    is_cone = stated.shape == "cone"
-    if trial.bar_diameter_mm is None and not is_cone:
+    is_thick = FORMS[stated.shape].is_thick
+    if trial.bar_diameter_mm is None and is_thick:
         return None
     axis = np.array(stated.axis, dtype=float)
-    return Surface(
+    return ObjectSurface(
         stated.shape,
         np.array(stated.point_mm, dtype=float),
         axis / np.linalg.norm(axis),
-        radius_mm=0.0 if is_cone else 0.5 * trial.bar_diameter_mm,
+        radius_mm=0.5 * trial.bar_diameter_mm if is_thick else 0.0,
         ring_radius_mm=0.5 * (stated.ring_diameter_mm or 0.0),
         covariance_mm2=stated.point_sigma_mm**2 * np.eye(3),
         half_angle_rad=float(np.radians(stated.half_angle_deg or 0.0)),
     )
 
 
-def seen_surface(seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base) -> Surface | None:
+def seen_surface(
+    seen: SeenWhisk, bar_radius_mm: float, wire: Wire, base: Base
+) -> ObjectSurface | None:
     """Return the object as the cameras show it in a whisk, in the rig frame.
 
-    It is as uncertain as the place where it is touched. None where no touch is seen. A bar's axis is
-    away from the contact by both radii, at right angles to whisker and axis.
+    It is as uncertain as the place where it is touched. None where no touch is seen.
     """
     if not seen.has_truth or seen.truth.point_covariance_mm2 is None:
         return None
-    turn = base.T_rig_base[:, :3]
-    origin = base.T_rig_base[:, 3]
-    covariance = turn @ seen.truth.point_covariance_mm2 @ turn.T
-    rounded = seen.truth.rounded
-    if rounded is not None:
-        return Surface(
-            rounded.shape,
-            turn @ rounded.point_mm + origin,
-            turn @ rounded.axis,
-            rounded.radius_mm,
-            rounded.ring_radius_mm,
-            covariance,
-            SEEN,
-            rounded.half_angle_rad,
-        )
-    if not np.isfinite(bar_radius_mm):
+    surface = seen.truth.rounded or _seen_bar(seen, bar_radius_mm, wire)
+    if surface is None:
         return None
-    reach_mm = bar_radius_mm + float(wire.radius_mm(seen.d_x_mm.value))
-    angles = seen.touch_rad.value, seen.beta_rad.value, seen.psi_rad.value
-    axis = axis_from_angles(0.0, *angles, reach_mm)
-    point = turn @ (seen.point_mm.value + axis.point_mm) + origin
-    direction = turn @ axis.direction
-    return Surface("bar", point, direction, bar_radius_mm, covariance_mm2=covariance, source=SEEN)
+    rotation = base.T_rig_base[:, :3]
+    return ObjectSurface(
+        surface.shape,
+        rotation @ surface.point_mm + base.T_rig_base[:, 3],
+        rotation @ surface.axis,
+        surface.radius_mm,
+        surface.ring_radius_mm,
+        rotation @ seen.truth.point_covariance_mm2 @ rotation.T,
+        SEEN,
+        surface.half_angle_rad,
+    )
+
+
+def _seen_bar(seen: SeenWhisk, radius_mm: float, wire: Wire) -> ObjectSurface | None:
+    """Return the bar that is seen in a whisk, in the base frame; None where its radius is unknown.
+
+    Its axis is away from the contact by both radii, at right angles to whisker and axis.
+    """
+    if not np.isfinite(radius_mm):
+        return None
+    reach_mm = radius_mm + float(wire.radius_mm(seen.d_x_mm.value))
+    touch_rad = seen.touch_rad.value
+    axis = axis_from_angles(0.0, touch_rad, seen.beta_rad.value, seen.psi_rad.value, reach_mm)
+    return ObjectSurface("bar", seen.point_mm.value + axis.point_mm, axis.direction, radius_mm)

@@ -60,7 +60,7 @@ def _umask() -> int:
 
 @contextmanager
 def lock_output(folder: Path) -> Iterator[None]:
-    """Hold `folder` (made as needed) for one run. Raises BadInput where another run holds it.
+    """Lock `folder` (made as needed) for one run. Raises BadInput where another run holds it.
 
     The lock ends with the process, however that ends. What a killed run left unfinished is removed.
     """

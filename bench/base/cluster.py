@@ -38,13 +38,13 @@ class Cluster(Workers):
     """
 
     def __init__(self, address: str, out: Path, progress: bool = False):
-        """Connect to no scheduler yet."""
+        """Keep the address; the scheduler is not called yet."""
         super().__init__(0, progress)
         self.address = address
         self.out = out
 
     def __enter__(self) -> "Cluster":
-        """Connect to the scheduler. Raise BadInput where there is none."""
+        """Start the connection to the scheduler. Raise BadInput where there is none."""
         try:
             from distributed import Client
         except ImportError:

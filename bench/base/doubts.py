@@ -26,7 +26,7 @@ def in_one_status(*said: str | None) -> Reason:
 
 @dataclass
 class Doubts:
-    """Refusals (bad input) and notes (usable, but look at it), in the order in which they were found."""
+    """Refusals (bad input) and notes (usable, but to be checked), in the order in which they were found."""
 
     stop_at_first: bool = True
     refusals: list[str] = field(default_factory=list)

@@ -211,7 +211,7 @@ def publish(
 
 
 def svg_of(figure: "Figure", name: str) -> str:
-    """Return a figure as an SVG element that may stand in a page beside others.
+    """Return a figure as an SVG element that may stand in a page with others.
 
     name: unique in the page; all ids begin with it. The same figure gives the same text.
     """

@@ -1,7 +1,7 @@
 """Processes that work in parallel, with the same results for any number of them.
 
 Every job runs with one thread, however many processes there are, because libraries sum in another order with other
-numbers of threads: in fresh processes, or here where one is asked for and this one has a single thread itself
+numbers of threads: in fresh processes, or here where one is wanted and this one has a single thread itself
 (`single_thread`), which spares it from loading every library twice. With 0 workers jobs run here.
 """
 
@@ -46,7 +46,7 @@ class Workers:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_) -> None:
-        """End the processes, at once where there was an exception."""
+        """Stop the processes, at once where there was an exception."""
         for process in self._processes:
             process.shutdown(wait=kind is None, cancel_futures=True)
         if kind is not None and self._processes:
@@ -79,9 +79,7 @@ class Workers:
 
     def _by_processes(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
         """Yield places and results of tasks that other processes do."""
-        while len(self._processes) < min(self.count, len(tasks)):
-            self._processes.append(_process())
-        idle = list(range(len(self._processes)))
+        idle = self._start(min(self.count, len(tasks)))
         waiting = deque(range(len(tasks)))
         deaths: Counter[int] = Counter()
         busy: dict[Future, tuple[int, int]] = {}  # process and place of each task
@@ -89,24 +87,38 @@ class Workers:
             while waiting and idle:
                 number = idle.pop()
                 place = waiting.popleft()
-                busy[self._submitted(number, job, tasks[place])] = number, place
+                busy[self._submit(number, job, tasks[place])] = number, place
             for future in wait(busy, return_when=FIRST_COMPLETED).done:
                 number, place = busy.pop(future)
                 idle.append(number)
-                died = isinstance(future.exception(), BrokenProcessPool)
-                deaths[place] += died
-                if died and deaths[place] < MOST_DEATHS:
+                result = _result(future)
+                deaths[place] += result is DIED
+                if result is DIED and deaths[place] < MOST_DEATHS:
                     waiting.appendleft(place)
                 else:
-                    yield place, DIED if died else future.result()
+                    yield place, result
 
-    def _submitted(self, number: int, job: Callable, task: object) -> Future:
-        """Return the task given to a process, which is started anew where it has died."""
+    def _start(self, count: int) -> list[int]:
+        """Start as many processes as are missing to a number; return the numbers of all."""
+        while len(self._processes) < count:
+            self._processes.append(_process())
+        return list(range(len(self._processes)))
+
+    def _submit(self, number: int, job: Callable, task: object) -> Future:
+        """Give a task to a process, which is started anew where it has died; return its future."""
         try:
             return self._processes[number].submit(job, task)
         except BrokenProcessPool:
             self._processes[number] = _process()
             return self._processes[number].submit(job, task)
+
+
+def _result(future: Future) -> object:
+    """Return the result of a finished task, DIED where its process died. Raise what it raised."""
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        return DIED
 
 
 def _process() -> ProcessPoolExecutor:
@@ -147,7 +159,7 @@ def pictures_by_one_thread() -> Iterator[None]:
 
 @contextmanager
 def _single_threaded() -> Iterator[None]:
-    """Let processes started within the context inherit one thread; this one keeps its own."""
+    """Set one thread for processes started within the context; this one keeps its own."""
     before = {name: os.environ.get(name) for name in (*_THREADS, _PICTURES)}
     os.environ.update(dict.fromkeys(before, "1"))
     try:

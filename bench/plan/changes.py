@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bench.plan.planned_cameras import BoardWork, as_seen_camera, expected_cameras
-from bench.rig.pinhole import Camera as RigCamera
+from bench.rig.pinhole import PinholeCamera
 from vision.fit.line_noise import LineNoise
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
@@ -178,7 +178,7 @@ def third_places(cameras: Cameras, target_mm: np.ndarray) -> list[np.ndarray]:
 def aim_camera(camera: Camera, name: str, place_mm: np.ndarray, target_mm: np.ndarray) -> Camera:
     """Return a camera with this one's lens somewhere else, the rig's z upwards in its picture."""
     fx, fy, cx, cy = camera.lens[:4]
-    aimed = RigCamera.aim(
+    aimed = PinholeCamera.aim(
         name,
         size_px=camera.size_px,
         focal_px=fx,

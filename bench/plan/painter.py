@@ -12,7 +12,7 @@ from bench.rig import boards, build
 from bench.rig.album import JPEG_QUALITY
 from bench.rig.moments import exposure_moments
 from bench.rig.painted_scene import block_corners_mm
-from bench.rig.printed_board import Board as PrintedBoard
+from bench.rig.printed_board import PrintedBoard
 from bench.rig.protocol import Protocol
 from bench.rig.studio import Setting, Studio
 from vision.boards.corners import refine_corners

@@ -11,7 +11,7 @@ from bench.plan.changes import LIGHT, Change
 from bench.plan.outlook import Outlook, outlook, sigmas
 from bench.plan.painter import Clamp, Painter
 from bench.plan.staged import stage_run
-from bench.rig.protocol import Protocol, Run
+from bench.rig.protocol import Protocol, ProtocolRun
 from vision.fit.line_noise import LineNoise
 from vision.geometry.camera import Cameras
 from vision.truth.predicted_truth import PredictedTruth, predict_truth
@@ -112,7 +112,7 @@ class RigTask:
     """One trial of a rig to be planned."""
 
     protocol: Protocol
-    run: Run
+    run: ProtocolRun
     cameras: Cameras
     changes: Sequence[Change]
     theta_rad: float
@@ -165,7 +165,7 @@ def plan_run(task: RigTask) -> Row:
     return Row(facts, outlook(predicted, noise, task.theta_rad), tuple(changes), noise)
 
 
-def _facts(run: Run) -> Facts:
+def _facts(run: ProtocolRun) -> Facts:
     """Return what is wanted of a trial."""
     return Facts(
         trial=run.name,

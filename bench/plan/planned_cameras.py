@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.rig import boards
-from bench.rig.pinhole import Camera as RigCamera
-from bench.rig.printed_board import Board as RigBoard
+from bench.rig.pinhole import PinholeCamera
+from bench.rig.printed_board import PrintedBoard
 from bench.rig.protocol_tables import BoardTable
 from vision.boards.corners import Corners
 from vision.calibration.calibrate import calibrate_cameras
@@ -30,7 +30,7 @@ class BoardWork:
     """
 
     board: Board
-    printed: RigBoard
+    printed: PrintedBoard
     on_rig: MeasuredPose
     views: int
     corner_px: Mapping[str, float]
@@ -85,14 +85,14 @@ def _corners(
     return Corners(np.flatnonzero(is_found), px[is_found] + noise_px, np.full(count, sigma_px))
 
 
-def as_rig_camera(camera: Camera) -> RigCamera:
+def as_rig_camera(camera: Camera) -> PinholeCamera:
     """Return a camera for the rig's painter."""
     R = camera.T_camera_rig[:, :3]
     t = camera.T_camera_rig[:, 3]
-    return RigCamera(camera.name, camera.size_px, camera.matrix, camera.distortion, R, t)
+    return PinholeCamera(camera.name, camera.size_px, camera.matrix, camera.distortion, R, t)
 
 
-def as_seen_camera(camera: RigCamera) -> Camera:
+def as_seen_camera(camera: PinholeCamera) -> Camera:
     """Return a camera of the rig for vision."""
     T = np.column_stack([camera.rotation, camera.translation_mm])
     return Camera(camera.name, camera.size_px, camera.matrix, camera.distortion, T)

@@ -10,7 +10,7 @@ from bench.plan.outlook import Outlook, in_unit, outlook
 from bench.plan.plan_rows import Facts, Row, changed_sigmas
 from bench.plan.staged import StagedWhisk, stage_on_bar
 from bench.records.trial_result import SeenTrial, SeenWhisk
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.session.session import Session
 from bench.session.trial import Trial
@@ -78,7 +78,7 @@ def stage_again(task: SeenTask) -> StagedWhisk:
     rod = _rod(task.session.whisker)
     d_x_mm = float(whisk.d_x_mm.value)
     touch_rad = float(whisk.touch_rad.value)
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=d_x_mm,
         beta_rad=float(whisk.beta_rad.value),
         psi_rad=float(whisk.psi_rad.value),
@@ -133,7 +133,7 @@ def _facts(task: SeenTask) -> Facts:
 def _stated_sigmas(whisk: SeenWhisk) -> dict[str, float]:
     """Return the sigmas by column that `evaluate` states.
 
-    Touch is without what the felt touches of all whisks add to it.
+    UnloadedTouch is without what the felt touches of all whisks add to it.
     """
     values = {
         "d_x_mm": whisk.d_x_mm,

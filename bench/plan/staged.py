@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
-from bench.rig.bar import Bar, Touch
+from bench.rig.bar import TouchedBar, UnloadedTouch
 from bench.rig.elastic_rod import Rod
 from bench.rig.linear import rotate_about_z
-from bench.rig.marched import MarchedWhisk
-from bench.rig.protocol import Protocol, Run
+from bench.rig.protocol import Protocol, ProtocolRun
 from bench.rig.recording import Recording
-from bench.rig.stick_slip import Friction
+from bench.rig.stick_slip import FrictionCoefficients
+from bench.rig.whisk_mechanics import WhiskMechanics
 from vision.geometry import rods as seen_rods
 from vision.geometry.contact import BarAxis
 from vision.truth.known_whisk import KnownWhisk
@@ -34,12 +34,12 @@ class StagedWhisk:
     rig paints it from; None of a session that was recorded.
     """
 
-    marched: MarchedWhisk
+    marched: WhiskMechanics
     known: KnownWhisk
     recording: Recording | None = None
 
 
-def stage_run(protocol: Protocol, run: Run) -> StagedWhisk:
+def stage_run(protocol: Protocol, run: ProtocolRun) -> StagedWhisk:
     """Return a whisk of a protocol's trial, with everything exactly where it is wanted.
 
     Raises ArithmeticError where the whisker slips off or buckles.
@@ -64,8 +64,8 @@ def stage_run(protocol: Protocol, run: Run) -> StagedWhisk:
 
 def stage_on_bar(
     rod: Rod,
-    bar: Bar,
-    touch: Touch,
+    bar: TouchedBar,
+    touch: UnloadedTouch,
     friction: float,
     motor_rad: Sequence[float],
     time_s: np.ndarray,
@@ -75,10 +75,10 @@ def stage_on_bar(
     Raises ArithmeticError where the whisker slips off or buckles.
     """
     motor = np.asarray(motor_rad, dtype=float)
-    marched = MarchedWhisk.run(
+    marched = WhiskMechanics.run(
         rod,
         bar,
-        Friction(friction, friction),
+        FrictionCoefficients(friction, friction),
         touch,
         float(motor.max()),
         step_rad=_STEP_RAD,
@@ -87,7 +87,7 @@ def stage_on_bar(
     return as_staged(marched, motor, time_s)
 
 
-def as_staged(marched: MarchedWhisk, motor_rad: np.ndarray, time_s: np.ndarray) -> StagedWhisk:
+def as_staged(marched: WhiskMechanics, motor_rad: np.ndarray, time_s: np.ndarray) -> StagedWhisk:
     """Return a whisk of the rig in frames at these motor angles (f,); its diameters are exact."""
     rod = marched.rod
     touch = marched.touch
@@ -113,7 +113,9 @@ def as_staged(marched: MarchedWhisk, motor_rad: np.ndarray, time_s: np.ndarray) 
     return StagedWhisk(marched, known)
 
 
-def _bends_and_arcs(marched: MarchedWhisk, motor_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _bends_and_arcs(
+    marched: WhiskMechanics, motor_rad: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return bends (f, 2), rad, and contact arcs (f,), mm, at motor angles (f,)."""
     touch = marched.touch
     bends = []

@@ -13,14 +13,14 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.rig import build
-from bench.rig.bar import Touch, find_first_touch, unloaded_curve
-from bench.rig.elastic_rod import Rest, Rod
-from bench.rig.protocol import Protocol, Run
+from bench.rig.bar import UnloadedTouch, find_first_touch, unloaded_curve
+from bench.rig.elastic_rod import RestShape, Rod
+from bench.rig.protocol import Protocol, ProtocolRun
 from bench.rig.protocol_tables import ColumnTable
 from bench.rig.recording import (
-    Frames,
+    Exposures,
+    GaugedWhisker,
     Recording,
-    Whisker,
     place_object,
     plan_stroke,
     sample_signals,
@@ -38,7 +38,7 @@ _CHANNELS = ("y_V", "z_V", "f_x_N", "f_y_N", "f_z_N")
 
 
 @dataclass(frozen=True, eq=False)
-class MountedWhisker(Whisker):
+class MountedWhisker(GaugedWhisker):
     """A whisker of an array: its name, its column's table, and its pose (3, 4), T_rig_base, mm."""
 
     name: str
@@ -47,7 +47,7 @@ class MountedWhisker(Whisker):
 
 
 def mount_whiskers(protocol: Protocol, rng: np.random.Generator) -> list[MountedWhisker]:
-    """Mount the whiskers of a protocol's columns; rng draws their gauges' coefficients."""
+    """Return the whiskers of a protocol's columns; rng draws their gauges' coefficients."""
     whiskers = []
     for column in protocol.columns:
         rotation = build.column_pose(column)[:, :3]
@@ -72,7 +72,7 @@ def _column_rod(protocol, column, number) -> Rod:
         size = given[number] if isinstance(given, list) else given
         sizes[key] = size or getattr(protocol.whisker, key)
     whisker = protocol.whisker
-    rest = Rest(sizes["length_mm"], whisker.sag_mm, whisker.set_y_mm, whisker.set_z_mm)
+    rest = RestShape(sizes["length_mm"], whisker.sag_mm, whisker.set_y_mm, whisker.set_z_mm)
     return replace(build.rod(protocol), rest=rest, **sizes)
 
 
@@ -85,7 +85,7 @@ class ArrayRecording:
     frame_times_s: of each whisk.
     """
 
-    run: Run
+    run: ProtocolRun
     bar: TouchedObject
     recordings: dict[str, Recording | None]
     strokes: dict[str, Stroke]
@@ -96,7 +96,7 @@ class ArrayRecording:
     def make(
         cls,
         protocol: Protocol,
-        run: Run,
+        run: ProtocolRun,
         whiskers: Sequence[MountedWhisker],
         rngs: Sequence[np.random.Generator],
     ) -> "ArrayRecording":
@@ -106,44 +106,48 @@ class ArrayRecording:
         cannot begin.
         """
         bar, near_rad, _ = place_object(protocol, run, build.rod(protocol), rngs[0])
-        bars = {}
         touches = {}
         for whisker in whiskers:
-            bars[whisker.name] = bar.in_frame(whisker.pose)
-            touches[whisker.name] = _find_touch(whisker, bars[whisker.name], near_rad)
+            touches[whisker.name] = _find_touch(whisker, bar, near_rad)
         strokes = _plan_strokes(protocol, run, whiskers, touches, near_rad)
         frame_times_s = _frame_times_s(protocol, run, next(iter(strokes.values())))
         recordings = {}
         channels = {}
         for whisker, rng in zip(whiskers, rngs[1:]):
-            name = whisker.name
             stroke = strokes[whisker.column.name]
-            touch = touches[name]
-            recordings[name] = None
-            if touch is None or touch.motor_rad >= stroke.angles_rad.max():
-                signals = sample_signals(protocol, run, stroke, (), whisker.gauges, rng)
-            else:
-                frames = _take_frames(stroke, frame_times_s)
-                recordings[name] = _record(
-                    protocol, run, whisker, bars[name], touch, stroke, frames, rng
-                )
-                signals = recordings[name].signals
+            recording, signals = _record(
+                protocol, run, whisker, bar, touches[whisker.name], stroke, frame_times_s, rng
+            )
+            recordings[whisker.name] = recording
             _add_channels(channels, whisker, signals, len(strokes) > 1)
         return cls(run, bar, recordings, strokes, channels, frame_times_s)
 
 
-def _record(protocol, run, whisker, bar, touch, stroke, frames, rng) -> Recording:
-    """Simulate one whisker; raise ArithmeticError, naming it, where it cannot go on."""
+def _record(
+    protocol, run, whisker, bar, touch, stroke, frame_times_s, rng
+) -> tuple[Recording | None, np.ndarray]:
+    """Simulate one whisker; return its recording, None where it touches nothing, and its signals.
+
+    Raises ArithmeticError, naming it, where it cannot go on.
+    """
+    if touch is None or touch.motor_rad >= stroke.angles_rad.max():
+        return None, sample_signals(protocol, run, stroke, (), whisker.gauges, rng)
+    exposures = _exposures(stroke, frame_times_s)
+    own_bar = bar.in_frame(whisker.pose)
     try:
-        return Recording.record(protocol, run, whisker, bar, touch, stroke, frames, rng)
+        recording = Recording.record(protocol, run, whisker, own_bar, touch, stroke, exposures, rng)
     except ArithmeticError as problem:
         raise ArithmeticError(f"whisker {whisker.name}: {problem}") from None
+    return recording, recording.signals
 
 
-def _find_touch(whisker: MountedWhisker, bar: TouchedObject, near_rad: float) -> Touch | None:
+def _find_touch(
+    whisker: MountedWhisker, bar: TouchedObject, near_rad: float
+) -> UnloadedTouch | None:
     """Find a whisker's first touch; raise BadInput where it lies within the object."""
     try:
-        return find_touch_from_afar(whisker.rod, bar, _motor_towards(whisker, near_rad))
+        own_bar = bar.in_frame(whisker.pose)
+        return find_touch_from_afar(whisker.rod, own_bar, _motor_towards(whisker, near_rad))
     except ValueError as problem:
         raise BadInput(
             f"whisker {whisker.name} {problem}; its base_mm or the trial's d_x_mm is another"
@@ -157,7 +161,7 @@ def _motor_towards(whisker: MountedWhisker, angle_rad: float) -> float:
     return math.atan2(y, x)
 
 
-def find_touch_from_afar(rod: Rod, bar: TouchedObject, towards_rad: float) -> Touch | None:
+def find_touch_from_afar(rod: Rod, bar: TouchedObject, towards_rad: float) -> UnloadedTouch | None:
     """Find the first touch of a whisker that comes from lower motor angles, within 60° of a
     direction; None where it meets nothing there.
 
@@ -175,26 +179,32 @@ def find_touch_from_afar(rod: Rod, bar: TouchedObject, towards_rad: float) -> To
 
 
 def _plan_strokes(protocol, run, whiskers, touches, near_rad) -> dict[str, Stroke]:
-    """Plan each column's stroke, from before its first touch; all go as far as the one that goes
-    farthest."""
+    """Return each column's stroke, from before its first touch; all go as far as the one that
+    goes farthest."""
     before_rad = math.radians(run.before_deg)
     after_rad = math.radians(run.after_deg)
-    touch_angles = {}  # by column
-    for whisker in whiskers:
-        touch = touches[whisker.name]
-        angles = touch_angles.setdefault(whisker.column.name, [])
-        angles += [] if touch is None else [touch.motor_rad]
     starts = {}
     spans = []
-    for name, angles in touch_angles.items():
-        if not angles:
-            first = next(whisker for whisker in whiskers if whisker.column.name == name)
-            angles = [_motor_towards(first, near_rad)]
+    for name, angles in _touch_angles_rad(whiskers, touches, near_rad).items():
         starts[name] = min(angles) - before_rad
         last = min(max(angles), min(angles) + _FARTHEST_RAD - after_rad)
         spans.append(last + after_rad - starts[name])
     span = max(spans)
     return {name: plan_stroke(protocol, run, low, low + span) for name, low in starts.items()}
+
+
+def _touch_angles_rad(whiskers, touches, near_rad) -> dict[str, list[float]]:
+    """Return the motor angles of first touch by column; of one that touches nothing, that at which
+    its first whisker points to where one at the rig's origin would touch."""
+    columns = {}
+    for whisker in whiskers:
+        columns.setdefault(whisker.column.name, []).append(whisker)
+    angles = {}
+    for name, members in columns.items():
+        known = [touches[whisker.name] for whisker in members if touches[whisker.name]]
+        angles[name] = [touch.motor_rad for touch in known]
+        angles[name] = angles[name] or [_motor_towards(members[0], near_rad)]
+    return angles
 
 
 def _frame_times_s(protocol, run, stroke) -> list[np.ndarray]:
@@ -204,11 +214,11 @@ def _frame_times_s(protocol, run, stroke) -> list[np.ndarray]:
     return [np.arange(start, end, step_s) for start, end in stroke.forward]
 
 
-def _take_frames(stroke, frame_times_s) -> Frames:
+def _exposures(stroke, frame_times_s) -> Exposures:
     """Return the frames of all whisks; none is on a way back."""
     times = np.concatenate(frame_times_s)
     whisk = np.repeat(np.arange(len(frame_times_s)), [len(some) for some in frame_times_s])
-    return Frames(times, stroke.angle_rad(times), whisk, np.zeros(len(times), bool))
+    return Exposures(times, stroke.angle_rad(times), whisk, np.zeros(len(times), bool))
 
 
 def _add_channels(channels, whisker, signals, several_motors):

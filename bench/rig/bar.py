@@ -16,7 +16,7 @@ _TOUCHES_MM = 1e-9
 
 
 @dataclass(frozen=True)
-class Bar(TouchedObject):
+class TouchedBar(TouchedObject):
     """A straight round bar about the axis through `point_mm`; the axis' z is positive."""
 
     shape = "bar"
@@ -71,7 +71,7 @@ class Bar(TouchedObject):
 
 
 @dataclass(frozen=True)
-class Touch:
+class UnloadedTouch:
     """First touch of the unloaded whisker: motor angle, arc length, and contact point P0 (3,) in
     the rig frame."""
 
@@ -96,7 +96,9 @@ def unloaded_curve(
     return rotate_about_z(points, motor_rad), rotate_about_z(tangents, motor_rad)
 
 
-def find_first_touch(rod: Rod, bar: TouchedObject, motor_rad: float, arc_mm: float) -> Touch:
+def find_first_touch(
+    rod: Rod, bar: TouchedObject, motor_rad: float, arc_mm: float
+) -> UnloadedTouch:
     """Find the first touch near a guess: the centreline's nearest point at a distance of both
     radii.
 
@@ -111,7 +113,7 @@ def find_first_touch(rod: Rod, bar: TouchedObject, motor_rad: float, arc_mm: flo
     if arc_mm > rod.length_mm:
         arc_mm = rod.length_mm
         motor_rad = _find_tip_touch(rod, bar, motor_rad)
-    return Touch(motor_rad, arc_mm, unloaded_curve(rod, motor_rad, arc_mm)[0])
+    return UnloadedTouch(motor_rad, arc_mm, unloaded_curve(rod, motor_rad, arc_mm)[0])
 
 
 def _touch_residual(rod, bar, motor_rad, arc_mm):

@@ -5,12 +5,12 @@ import math
 import cv2
 import numpy as np
 
-from bench.rig.elastic_rod import Rest, Rod
+from bench.rig.elastic_rod import RestShape, Rod
 from bench.rig.light import Light, Material
 from bench.rig.linear import rotation_about_z
 from bench.rig.painted_scene import Appearance, Scene, Stand
-from bench.rig.pinhole import Camera
-from bench.rig.printed_board import Board, Ink
+from bench.rig.pinhole import PinholeCamera
+from bench.rig.printed_board import Ink, PrintedBoard
 from bench.rig.protocol import Protocol
 from bench.rig.protocol_tables import ColumnTable
 from bench.rig.sensor import Sensor
@@ -19,7 +19,7 @@ from bench.rig.sensor import Sensor
 def rod(protocol: Protocol) -> Rod:
     """Build the whisker."""
     table = protocol.whisker
-    rest = Rest(table.length_mm, table.sag_mm, table.set_y_mm, table.set_z_mm)
+    rest = RestShape(table.length_mm, table.sag_mm, table.set_y_mm, table.set_z_mm)
     return Rod(
         table.shape,
         table.length_mm,
@@ -31,7 +31,7 @@ def rod(protocol: Protocol) -> Rod:
     )
 
 
-def cameras(protocol: Protocol) -> list[Camera]:
+def cameras(protocol: Protocol) -> list[PinholeCamera]:
     """Build the cameras in the protocol's order. Raises ValueError where one has no place."""
     built = []
     for table in protocol.cameras:
@@ -39,7 +39,7 @@ def cameras(protocol: Protocol) -> list[Camera]:
             raise ValueError(
                 f"camera {table.name} has no position_mm; `whisker-bench plan` finds one"
             )
-        camera = Camera.aim(
+        camera = PinholeCamera.aim(
             table.name,
             size_px=table.size_px,
             focal_px=table.focal,
@@ -54,10 +54,10 @@ def cameras(protocol: Protocol) -> list[Camera]:
     return built
 
 
-def board(protocol: Protocol) -> Board:
+def board(protocol: Protocol) -> PrintedBoard:
     """Build the board."""
     table = protocol.board
-    return Board(
+    return PrintedBoard(
         tuple(table.squares),
         table.square_mm,
         table.marker_mm,

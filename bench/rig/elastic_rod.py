@@ -7,7 +7,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Rest:
+class RestShape:
     """How the unloaded whisker departs from the straight line, in the hub frame, turning with it.
 
     sag_mm: the tip's drop (towards −z) of a cantilever under its own weight. set_y_mm, set_z_mm:
@@ -59,7 +59,7 @@ class Rod:
     diameter_mm: float
     youngs_modulus_GPa: float
     density_kg_m3: float = 6450.0  # Nitinol
-    rest: Rest | None = None
+    rest: RestShape | None = None
     tip_diameter_mm: float | None = None
 
     def __post_init__(self):
@@ -81,7 +81,7 @@ class Rod:
             if not getattr(self, name) > 0:
                 raise ValueError(f"a whisker's {name} is positive, not {getattr(self, name)}")
         if self.rest is None:
-            object.__setattr__(self, "rest", Rest(self.length_mm))
+            object.__setattr__(self, "rest", RestShape(self.length_mm))
 
     @property
     def rigidity_Nmm2(self) -> float:

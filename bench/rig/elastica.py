@@ -66,6 +66,44 @@ class Nodes:
         return cls(0.5 * (1 + on_circle), values, from_base, weights - from_base, weights)
 
 
+@dataclass(frozen=True)
+class _Bending:
+    """The equations ψ = K g of the angles at the nodes.
+
+    force_x_N, force_e_N: along the clamped tangent and across it. scale: s²/EI at the base, 1/N.
+    twice (n, n): K, the double integral.
+    """
+
+    force_x_N: float
+    force_e_N: float
+    arc_mm: float
+    scale: float
+    twice: np.ndarray
+
+    def load(self, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return g (n,) at angles (n,), and its derivatives by them."""
+        cos = np.cos(angle)
+        sin = np.sin(angle)
+        load = self.scale * (self.force_e_N * cos - self.force_x_N * sin)
+        return load, -self.scale * (self.force_e_N * sin + self.force_x_N * cos)
+
+    def solve(self, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the angles (n,) and the last Jacobian (n, n) of Newton's method.
+
+        Raises ArithmeticError where it does not converge from `angle` (n,).
+        """
+        identity = np.eye(len(angle))
+        for _ in range(_MOST_STEPS):
+            load, load_by = self.load(angle)
+            jacobian = identity - self.twice * load_by
+            step = linear.solve(jacobian, self.twice @ load - angle)
+            angle = angle + step
+            if np.abs(step).max() < _LAST_STEP_RAD:
+                return angle, jacobian
+        forces = f"{self.force_x_N:.4g}, {self.force_e_N:.4g} N"
+        raise ArithmeticError(f"no equilibrium found for {forces} at {self.arc_mm:.4g} mm")
+
+
 class Elastica:
     """Solver of EI(u) dψ/du = (x_s − x_u) F_e − (e_s − e_u) F_x, ψ(0) = 0, for the tangent angle ψ
     along 0 ≤ u ≤ s.
@@ -90,27 +128,12 @@ class Elastica:
         """
         scale = arc_mm**2 / self.rod.rigidity_Nmm2
         twice, twice_by_arc = self._double_integral(arc_mm)
-        angle = np.zeros(len(self.nodes.at)) if guess is None else guess
-        identity = np.eye(len(angle))
-        for _ in range(_MOST_STEPS):
-            cos = np.cos(angle)
-            sin = np.sin(angle)
-            load = scale * (force_e_N * cos - force_x_N * sin)
-            jacobian = identity + twice * (scale * (force_e_N * sin + force_x_N * cos))
-            step = linear.solve(jacobian, twice @ load - angle)
-            angle = angle + step
-            if np.abs(step).max() < _LAST_STEP_RAD:
-                break
-        else:
-            raise ArithmeticError(
-                f"no equilibrium found for {force_x_N:.4g}, {force_e_N:.4g} N at {arc_mm:.4g} mm"
-            )
-        cos = np.cos(angle)
-        sin = np.sin(angle)
-        load = scale * (force_e_N * cos - force_x_N * sin)
+        bending = _Bending(force_x_N, force_e_N, arc_mm, scale, twice)
+        angle, jacobian = bending.solve(np.zeros(len(self.nodes.at)) if guess is None else guess)
+        load, _ = bending.load(angle)
         residual_by = np.empty((len(angle), 3))  # of ψ by force x, force e, arc at fixed angles
-        residual_by[:, 0] = -scale * (twice @ sin)
-        residual_by[:, 1] = scale * (twice @ cos)
+        residual_by[:, 0] = -scale * (twice @ np.sin(angle))
+        residual_by[:, 1] = scale * (twice @ np.cos(angle))
         residual_by[:, 2] = (2 / arc_mm * twice + twice_by_arc) @ load
         return self._bent(angle, arc_mm, linear.solve(jacobian, residual_by))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from bench.base.errors import BadInput
 
 if TYPE_CHECKING:
-    from bench.rig.protocol import Protocol, Run
+    from bench.rig.protocol import Protocol, ProtocolRun
 
 # As far as the march finds its way (docs/extremes.md): at a slope of 89.5° it does, at a tilt of 85°
 # it does not.
@@ -61,7 +61,7 @@ def _check_columns(protocol):
                 )
 
 
-def _check_run(protocol, run: "Run"):
+def _check_run(protocol, run: "ProtocolRun"):
     """Raise ValueError for a trial's angles, distance, speed and stroke."""
     if not (abs(run.beta_deg) <= _STEEPEST_DEG and abs(run.psi_deg) <= _MOST_TILT_DEG):
         allowed = f"±{_STEEPEST_DEG:g} and ±{_MOST_TILT_DEG:g} are allowed"
@@ -83,7 +83,7 @@ def _check_run(protocol, run: "Run"):
         raise ValueError("pictures: before_deg and after_deg are at most the motor's")
 
 
-def _check_object(run: "Run"):
+def _check_object(run: "ProtocolRun"):
     """Raise ValueError for sizes that are not the object's, or friction that grows in motion."""
     table = run.table
     for key, shape in (("ring_diameter_mm", "ring"), ("cone_half_angle_deg", "cone")):
@@ -98,7 +98,7 @@ def _check_object(run: "Run"):
         raise ValueError(f"static_friction {static:g} is below friction {table.friction:g}")
 
 
-def _check_moving(protocol, run: "Run"):
+def _check_moving(protocol, run: "ProtocolRun"):
     """Raise ValueError for an object that moves otherwise than with the motor's steady motion, by
     which the march goes."""
     velocity = run.table.object_velocity_mm_s

@@ -1,6 +1,6 @@
 """The laws of friction at one contact: equations in the tangent plane, and their exact derivatives.
 
-A law's `equations(surface, beyond)` returns residuals (n,) and their derivatives (n, 4 + beyond),
+A law's `equations(load, beyond)` returns residuals (n,) and their derivatives (n, 4 + beyond),
 by the four unknowns of the contact and the law's own.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 GIVE_MM = 1e-5  # a held contact gives way by about this before it slides along the whisker
 
 
-class Surface(NamedTuple):
+class ContactLoad(NamedTuple):
     """What a law sees: the normal force, N, the shear force (2,), N, and the motion (2,), mm, of
     the whisker's material, along the object's axis and round it.
 
@@ -38,18 +38,18 @@ class Sliding:
     friction: float
     status = "sliding"
 
-    def equations(self, surface: Surface, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def equations(self, load: ContactLoad, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals (3,) of shear force and heading, and their derivatives (3, 5)."""
         (heading,) = beyond
         forward = np.array([math.cos(heading), math.sin(heading)])
         sideways = np.array([-forward[1], forward[0]])
-        limit = self.friction * surface.press
-        residual = np.append(surface.shear + limit * forward, sideways @ surface.motion)
+        limit = self.friction * load.press
+        residual = np.append(load.shear + limit * forward, sideways @ load.motion)
         residual_by = np.empty((3, 5))
-        residual_by[:2, :4] = surface.shear_by + self.friction * np.outer(forward, surface.press_by)
+        residual_by[:2, :4] = load.shear_by + self.friction * np.outer(forward, load.press_by)
         residual_by[:2, 4] = limit * sideways
-        residual_by[2, :4] = sideways @ surface.motion_by
-        residual_by[2, 4] = -forward @ surface.motion
+        residual_by[2, :4] = sideways @ load.motion_by
+        residual_by[2, 4] = -forward @ load.motion
         return residual, residual_by
 
 
@@ -62,15 +62,15 @@ class Oiled:
     give_mm: float
     status = "sliding"
 
-    def equations(self, surface: Surface, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def equations(self, load: ContactLoad, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals (2,) of the shear force, and their derivatives (2, 4)."""
-        length = math.hypot(*surface.motion, self.give_mm)
-        direction = surface.motion / length
-        along = direction @ surface.motion_by
-        direction_by = (surface.motion_by - np.outer(direction, along)) / length
-        residual = surface.shear + self.friction * surface.press * direction
-        friction_by = np.outer(direction, surface.press_by) + surface.press * direction_by
-        return residual, surface.shear_by + self.friction * friction_by
+        length = math.hypot(*load.motion, self.give_mm)
+        direction = load.motion / length
+        along = direction @ load.motion_by
+        direction_by = (load.motion_by - np.outer(direction, along)) / length
+        residual = load.shear + self.friction * load.press * direction
+        friction_by = np.outer(direction, load.press_by) + load.press * direction_by
+        return residual, load.shear_by + self.friction * friction_by
 
 
 @dataclass(frozen=True)
@@ -85,19 +85,23 @@ class Held:
     friction: float
     status = "held"
 
-    def equations(self, surface: Surface, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def equations(self, load: ContactLoad, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals (2,) of motion along and force round the object, and their
         derivatives (2, 4)."""
-        limit = self.friction * surface.press
-        x = surface.shear[0] / limit if limit else 1.0
-        residual = np.array([surface.motion[0], surface.shear[1]])
-        residual_by = np.stack([surface.motion_by[0], surface.shear_by[1]])
+        limit = self.friction * load.press
+        x = load.shear[0] / limit if limit else 1.0
+        residual = np.array([load.motion[0], load.shear[1]])
+        residual_by = np.stack([load.motion_by[0], load.shear_by[1]])
         if abs(x) < 1:
-            length = math.hypot(surface.motion[1], GIVE_MM)
-            direction = surface.motion[1] / length
-            direction_by = GIVE_MM**2 / length**3 * surface.motion_by[1]
+            direction, direction_by = _soft_sign(load.motion[1], load.motion_by[1])
             left = limit * (1 - x**2)  # what the cone leaves for friction round the object
-            left_by = (1 + x**2) * self.friction * surface.press_by - 2 * x * surface.shear_by[0]
+            left_by = (1 + x**2) * self.friction * load.press_by - 2 * x * load.shear_by[0]
             residual[1] += direction * left
             residual_by[1] += direction * left_by + left * direction_by
         return residual, residual_by
+
+
+def _soft_sign(motion, motion_by):
+    """Return the sign of a motion, softened within GIVE_MM of zero, and its derivatives (4,)."""
+    length = math.hypot(motion, GIVE_MM)
+    return motion / length, GIVE_MM**2 / length**3 * motion_by

@@ -34,13 +34,19 @@ def draw_layers(layers: Sequence[Layer], radiance: np.ndarray) -> None:
     tone = np.concatenate([layer.tone for layer in layers])
     depth = np.concatenate([layer.depth_mm for layer in layers])
     sample = np.ravel_multi_index(tuple(index), radiance.shape)
-    order = np.lexsort((-depth, sample))
-    number = np.arange(len(order))
-    is_farthest = np.diff(sample[order], prepend=-1) != 0
-    rank = number - np.maximum.accumulate(np.where(is_farthest, number, 0))  # in its sample
+    order, rank = _rank_by_depth(sample, depth)
     for nearer in range(int(rank.max()) + 1):
         chosen = order[rank == nearer]
         _blend(radiance, tuple(index[:, chosen]), cover[chosen], tone[chosen])
+
+
+def _rank_by_depth(sample, depth):
+    """Return the order (n,) of samples, farthest first, and the rank (n,) of each of that order
+    within its own sample."""
+    order = np.lexsort((-depth, sample))
+    number = np.arange(len(order))
+    is_farthest = np.diff(sample[order], prepend=-1) != 0
+    return order, number - np.maximum.accumulate(np.where(is_farthest, number, 0))
 
 
 def _blend(radiance, index, cover, tone):

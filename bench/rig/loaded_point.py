@@ -33,7 +33,7 @@ class LoadedPoint:
         unknowns: np.ndarray,
         guess: np.ndarray | None,
     ) -> "LoadedPoint":
-        """Bend the whisker by a force at an arc, unknowns (4,), and rotate it (3, 3) with the hub.
+        """Solve for the whisker bent by a force at an arc, unknowns (4,), in a hub that is rotated (3, 3).
 
         guess (n,): angles to start from. Raises ArithmeticError where there is no equilibrium.
         """
@@ -42,9 +42,7 @@ class LoadedPoint:
         e = np.array([force_y, force_z]) / force_e if force_e else _SIDEWAYS
         bent = elastica.solve(force_x, force_e, arc, guess)
         point, point_by = _lift(bent.end_mm, bent.end_by, e, force_e)
-        planar = np.array([math.cos(bent.slope), math.sin(bent.slope)])
-        planar_by = np.outer([-planar[1], planar[0]], bent.slope_by)
-        tangent, tangent_by = _lift(planar, planar_by, e, force_e)
+        tangent, tangent_by = _lift(*_planar_tangent(bent), e, force_e)
         rest = elastica.rod.rest
         rest_slope = rest.slope(arc)
         point_by[:, 3] += rest_slope
@@ -56,6 +54,12 @@ class LoadedPoint:
             rotation @ tangent_by,
             bent.angle,
         )
+
+
+def _planar_tangent(bent):
+    """Return the tangent (2,) of the loaded point in the plane of bending, and its derivatives."""
+    tangent = np.array([math.cos(bent.slope), math.sin(bent.slope)])
+    return tangent, np.outer([-tangent[1], tangent[0]], bent.slope_by)
 
 
 def _lift(planar, planar_by, e, force_e):

@@ -8,12 +8,12 @@ from bench.rig.array_rig import ArrayRecording, MountedWhisker
 from bench.rig.bar import unloaded_curve
 from bench.rig.elastic_rod import Rod
 from bench.rig.light import Material
-from bench.rig.marched import MarchedWhisk
 from bench.rig.painted_scene import HUB_FRONT_MM
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
 from bench.rig.studio import Moment, Studio
 from bench.rig.tube import Tube
+from bench.rig.whisk_mechanics import WhiskMechanics
 
 _STATIONS = 257  # of a whisker's axis
 _LEAST_RADIUS_MM = 0.01  # of a whisker in pictures
@@ -23,7 +23,7 @@ def exposure_moments(
     protocol: Protocol,
     studio: Studio,
     recording: Recording,
-    whisk: MarchedWhisk,
+    whisk: WhiskMechanics,
     motor_rad: float,
     back: bool,
 ) -> list[Moment]:
@@ -35,7 +35,7 @@ def exposure_moments(
     arc = _drawn_arcs_mm(rod)
     moments = []
     for turn in _exposure_turns_rad(protocol, studio, speed_deg_s, rod.length_mm, near_mm):
-        state = whisk.way(back).state_between(motor_rad + turn)
+        state = whisk.path(back).state_between(motor_rad + turn)
         points = whisk.centreline_mm(motor_rad + turn, state, arc)
         tube = _tube(rod, arc, points, studio.scene.appearance.wire)
         moments.append(Moment.alone(motor_rad + turn, tube))
@@ -95,9 +95,9 @@ def _array_tube(
     if own is None:
         points, _ = unloaded_curve(whisker.rod, motor_rad, arc)
     else:
-        marched = own.whisks[whisk]
-        state = marched.forward.state_between(motor_rad)
-        points = marched.centreline_mm(motor_rad, state, arc)
+        mechanics = own.whisks[whisk]
+        state = mechanics.forward.state_between(motor_rad)
+        points = mechanics.centreline_mm(motor_rad, state, arc)
     points = points @ whisker.pose[:, :3].T + whisker.pose[:, 3]
     return _tube(whisker.rod, arc, points, material)
 

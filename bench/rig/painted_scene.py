@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit
 
-from bench.rig.bar import Bar
+from bench.rig.bar import TouchedBar
 from bench.rig.box import Box
 from bench.rig.layer import Occluder, draw_layers
 from bench.rig.light import Light, Material
 from bench.rig.linear import rotate_about_z
-from bench.rig.pinhole import Camera
+from bench.rig.pinhole import PinholeCamera
 from bench.rig.plate import Plate, Print
-from bench.rig.printed_board import Board, Ink, marker_print
+from bench.rig.printed_board import Ink, PrintedBoard, marker_print
 from bench.rig.rays import unit
 from bench.rig.solid import Solid
 from bench.rig.tube import Tube, draw_tubes
@@ -108,7 +108,7 @@ class Stand:
 class Scene:
     """The rig that a board, a bar and whiskers on their stands make. T_rig_board: (3, 4)."""
 
-    board: Board
+    board: PrintedBoard
     T_rig_board: np.ndarray
     appearance: Appearance
     stands: tuple[Stand, ...]
@@ -129,7 +129,7 @@ class Scene:
         return Plate(self.board.to_print(appearance.ink, appearance.margin_mm), T_rig_board)
 
     def draw_bar(
-        self, window: Window, radiance: np.ndarray, bar: Bar, middle_mm: np.ndarray
+        self, window: Window, radiance: np.ndarray, bar: TouchedBar, middle_mm: np.ndarray
     ) -> None:
         """Draw the posts under the hubs, and a bar with a block at its upper end.
 
@@ -144,7 +144,7 @@ class Scene:
         block.draw(window, radiance, light, self._marker(_BLOCK_MARKER), _BLOCK_FRONT)
 
     def draw_round_object(
-        self, window: Window, radiance: np.ndarray, thing: Bar
+        self, window: Window, radiance: np.ndarray, thing: TouchedBar
     ) -> Occluder | None:
         """Draw the posts under the hubs, and a ring, sphere or cone on a rod from behind.
 
@@ -211,7 +211,7 @@ class Scene:
             hub.draw(window, radiance, self.appearance.light, marker, _HUB_TOP)
 
     def moving_px(
-        self, camera: Camera, hubs: Sequence[Box], whiskers: Sequence[Tube]
+        self, camera: PinholeCamera, hubs: Sequence[Box], whiskers: Sequence[Tube]
     ) -> np.ndarray:
         """Return pixels (n, 2) between which all that moves lies."""
         px = [camera.project(hub.corners_mm()) for hub in hubs]
@@ -219,14 +219,14 @@ class Scene:
         return np.concatenate(px)
 
 
-def _block(bar: Bar, middle_mm: np.ndarray) -> Box:
+def _block(bar: TouchedBar, middle_mm: np.ndarray) -> Box:
     """Return the block that holds a bar at its upper end, its front towards the whiskers."""
     front = unit(bar.axis * bar.axis[1] - _AWAY)
     axes = np.column_stack([np.cross(front, bar.axis), front, bar.axis])
     return Box(-_BLOCK_HALF, _BLOCK_HALF, axes, middle_mm + _BLOCK_UP_MM * bar.axis, 0.1)
 
 
-def block_corners_mm(bar: Bar, middle_mm: np.ndarray) -> np.ndarray:
+def block_corners_mm(bar: TouchedBar, middle_mm: np.ndarray) -> np.ndarray:
     """Return the corners (24, 3) of the block that holds a bar whose middle is near a point (3,)."""
     return _block(bar, middle_mm).corners_mm()
 

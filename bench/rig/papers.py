@@ -7,7 +7,7 @@ import numpy as np
 import tomli_w
 
 from bench.rig.array_rig import ArrayRecording, MountedWhisker, base_keys
-from bench.rig.protocol import Protocol, Run
+from bench.rig.protocol import Protocol, ProtocolRun
 from bench.rig.recording import Recording
 from bench.rig.touched_object import TouchedObject
 
@@ -125,7 +125,7 @@ def array_trial_toml(recording: ArrayRecording, *, says_where: bool = True) -> s
     return tomli_w.dumps(trial)
 
 
-def _bar_keys(run: Run) -> dict:
+def _bar_keys(run: ProtocolRun) -> dict:
     """Return the trial's own diameter of the object, where it has one."""
     diameter_mm = run.table.bar_diameter_mm
     return {"bar_diameter_mm": diameter_mm} if diameter_mm else {}

@@ -15,7 +15,7 @@ _PASSES = 60  # of the correction by which a lens is inverted
 
 
 @dataclass(frozen=True, eq=False)
-class Camera:
+class PinholeCamera:
     """A camera in the rig.
 
     matrix (3, 3), distortion (n,): as OpenCV has them. rotation (3, 3), translation_mm (3,): from
@@ -42,7 +42,7 @@ class Camera:
         roll_rad: float = 0.0,
         centre_px: Sequence[float] | None = None,
         aspect: float = 1.0,
-    ) -> "Camera":
+    ) -> "PinholeCamera":
         """Make a camera at a position that is aimed at a point, the rig's z upwards up to a roll.
 
         Raises ValueError where it is aimed straight up or down (there is no upwards then) or stands

@@ -3,6 +3,7 @@ integrated, none is sampled.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import ndtr
@@ -99,34 +100,41 @@ class Plate:
     def _footprints(self, window, x, y):
         """Return the footprints of a window's rays x, y on the print's two axes."""
         camera = window.camera
-        to_camera = camera.rotation @ self.pose[:, :2]
-        origin = camera.in_camera(self.pose[:, 3])
-        # A ray (x, y, 1) times this is (across, down, 1) over the depth.
-        inverse = np.linalg.inv(np.column_stack([to_camera, origin])).astype(np.float32)
+        inverse = self._rays_to_print(camera)
         inverse_depth = inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2]
         depth = 1 / np.maximum(inverse_depth, _LEAST_INVERSE_DEPTH)
         soft = np.float32(window.soft_px) / np.diag(camera.matrix)[:2].astype(np.float32)  # of rays
-        axes = []
+        footprints = []
         for row in inverse[:2]:
             mm = (row[0] * x + row[1] * y + row[2]) * depth
             by_x = (row[0] - mm * inverse[2, 0]) * depth * soft[0]
             by_y = (row[1] - mm * inverse[2, 1]) * depth * soft[1]
-            axes.append(_Footprint(mm, by_x, by_y, np.sqrt(by_x**2 + by_y**2)))
-        return axes
+            footprints.append(_Footprint(mm, by_x, by_y))
+        return footprints
+
+    def _rays_to_print(self, camera):
+        """Return the matrix (3, 3) that takes a ray (x, y, 1) to (across, down, 1) over the depth."""
+        axes = camera.rotation @ self.pose[:, :2]
+        origin = camera.in_camera(self.pose[:, 3])
+        return np.linalg.inv(np.column_stack([axes, origin])).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
 class _Footprint:
     """The Gaussian spots that samples' blurs are on a plane, along one of its axes.
 
-    mm: their middles. by_x, by_y: mm by one sigma of the blur along the picture's x and y. soft_mm:
-    their sigmas. All have the samples' shape.
+    mm: their middles. by_x, by_y: mm by one sigma of the blur along the picture's x and y. All have
+    the samples' shape.
     """
 
     mm: np.ndarray
     by_x: np.ndarray
     by_y: np.ndarray
-    soft_mm: np.ndarray
+
+    @cached_property
+    def soft_mm(self) -> np.ndarray:
+        """Return the spots' sigmas."""
+        return np.sqrt(self.by_x**2 + self.by_y**2)
 
 
 def _coverage(print_, across, down):
@@ -147,18 +155,26 @@ def _tone(print_, across, down):
         return np.float32(print_.reflectance[0, 0])
     column = _Cells.find(print_.x_mm, across)
     row = _Cells.find(print_.y_mm, down)
-    table = np.pad(print_.reflectance, 2, mode="edge").astype(np.float32)
-    width = table.shape[1]
-    reflectance = table.ravel()
+    padded = np.pad(print_.reflectance, 2, mode="edge").astype(np.float32)
+    width = padded.shape[1]
+    reflectance = padded.ravel()
     first = (row.cell + 1) * width + column.cell + 1  # of the nine cells
     tone = np.zeros_like(across.mm)
-    for j, row_weight in enumerate(row.weights):
-        for i, column_weight in enumerate(column.weights):
-            tone += column_weight * row_weight * reflectance[first + (j * width + i)]
+    for j, i in np.ndindex(3, 3):
+        tone += column.weights[i] * row.weights[j] * reflectance[first + (j * width + i)]
     corner = first + row.is_last_nearer * width + column.is_last_nearer
-    saddle = reflectance[corner] - reflectance[corner + 1]
-    saddle += reflectance[corner + width + 1] - reflectance[corner + width]
+    saddle = _saddle(reflectance, corner, width)
     return tone + saddle * _corner_share(across, down, column.edge_distance, row.edge_distance)
+
+
+def _saddle(reflectance, cell, width):
+    """Return how much the two cells on one diagonal are brighter than those on the other.
+
+    reflectance (n,): of all cells, row by row. cell: number of the upper left one. width: of a row.
+    """
+    saddle = reflectance[cell] - reflectance[cell + 1]
+    saddle += reflectance[cell + width + 1] - reflectance[cell + width]
+    return saddle
 
 
 def _corner_share(across, down, x, y):

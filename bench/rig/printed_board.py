@@ -17,7 +17,7 @@ class Ink:
 
 
 @dataclass(frozen=True)
-class Board:
+class PrintedBoard:
     """A ChArUco board as session.toml names it.
 
     Raises ValueError for a dictionary that OpenCV does not know, or a marker that does not fit its
@@ -64,15 +64,17 @@ class Board:
         cells = modules + 2  # of a square, each way: a marker's modules, and a gap on either side
         size = self.squares[0] * cells, self.squares[1] * cells
         is_white = self._charuco(cells, modules).generateImage(size) > 0
+        x_mm, y_mm = (self._cell_edges_mm(count, modules) for count in self.squares)
+        paper, printed = (ink.black, ink.white) if self.inverted else (ink.white, ink.black)
+        return Print(np.where(is_white, paper, printed), x_mm, y_mm).frame(margin_mm, paper)
+
+    def _cell_edges_mm(self, count, modules):
+        """Return the edges (n,) of the cells of `count` squares in a row, markers of `modules`."""
         gap = (self.square_mm - self.marker_mm) / 2
         marker = gap + self.marker_mm / modules * np.arange(modules + 1)
-        edges = []
-        for count in self.squares:
-            starts = self.square_mm * np.arange(count)
-            cell_starts = np.add.outer(starts, np.append(0, marker))
-            edges.append(np.append(cell_starts, count * self.square_mm))
-        paper, printed = (ink.black, ink.white) if self.inverted else (ink.white, ink.black)
-        return Print(np.where(is_white, paper, printed), *edges).frame(margin_mm, paper)
+        starts = self.square_mm * np.arange(count)
+        cell_starts = np.add.outer(starts, np.append(0, marker))
+        return np.append(cell_starts, count * self.square_mm)
 
 
 def marker_print(dictionary: str, number: int, side_mm: float, ink: Ink) -> Print:

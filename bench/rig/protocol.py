@@ -51,7 +51,7 @@ class Protocol(ProtocolTable, kw_only=True):
     columns: list[ColumnTable] | msgspec.UnsetType = msgspec.UNSET
     trials: Annotated[list[TrialTable], msgspec.Meta(min_length=1)]
 
-    def runs(self) -> list["Run"]:
+    def runs(self) -> list["ProtocolRun"]:
         """Return the trials one by one, their names numbered where several are alike."""
         runs = []
         for table in self.trials:
@@ -65,7 +65,7 @@ class Protocol(ProtocolTable, kw_only=True):
             named.append(msgspec.structs.replace(run, name=run.name + number))
         return named
 
-    def goes_back(self, run: "Run") -> bool:
+    def goes_back(self, run: "ProtocolRun") -> bool:
         """Return whether a trial's recording holds back strokes."""
         return (
             run.table.whisks > 1
@@ -79,7 +79,7 @@ class Protocol(ProtocolTable, kw_only=True):
         return hashlib.sha256(msgspec.json.encode(self)).hexdigest()
 
 
-class Run(msgspec.Struct, frozen=True):
+class ProtocolRun(msgspec.Struct, frozen=True):
     """One trial. The motor goes from `before_deg` before touch to `after_deg` after it."""
 
     name: str
@@ -92,7 +92,7 @@ class Run(msgspec.Struct, frozen=True):
     table: TrialTable
 
 
-def _table_runs(table, motor) -> list[Run]:
+def _table_runs(table, motor) -> list[ProtocolRun]:
     """Return the trials of one table."""
     before_deg = table.before_deg or motor.before_deg
     after_deg = table.after_deg or motor.after_deg
@@ -106,7 +106,7 @@ def _table_runs(table, motor) -> list[Run]:
         else:
             tilt = f"_psi{psi:g}" if psi else ""
             name += f"_b{beta:02g}{tilt}_v{speed:g}"
-        runs.append(Run(name, beta, psi, d_x, speed, before_deg, after_deg, table))
+        runs.append(ProtocolRun(name, beta, psi, d_x, speed, before_deg, after_deg, table))
     return runs
 
 

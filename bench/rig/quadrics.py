@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import Bar
+from bench.rig.bar import TouchedBar
 from bench.rig.rays import (
     Hits,
     Rays,
@@ -16,7 +16,7 @@ from bench.rig.rays import (
     sine_between,
     unit,
 )
-from bench.rig.round_objects import Cone, Ring, Sphere
+from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
 from bench.rig.torus import VisibleRing
 
 # mm along a cone's axis from the height at which it is touched: its base and its upper end
@@ -24,10 +24,12 @@ _CONE_DOWN_MM, _CONE_UP_MM = 30.0, 60.0
 _AROUND = np.linspace(0, 2 * np.pi, 65)  # rad: points about an axis
 
 
-def to_camera_frame(thing: Bar, rotation: np.ndarray, translation_mm: np.ndarray) -> VisibleObject:
+def to_camera_frame(
+    thing: TouchedBar, rotation: np.ndarray, translation_mm: np.ndarray
+) -> VisibleObject:
     """Convert a ring, sphere or cone of the rig frame to that of a camera."""
     turn = rotation.T
-    kinds = {Ring: VisibleRing, Sphere: VisibleSphere, Cone: VisibleCone}
+    kinds = {TouchedRing: VisibleRing, TouchedSphere: VisibleSphere, TouchedCone: VisibleCone}
     pose = np.column_stack([turn, -turn @ translation_mm])
     return kinds[type(thing)](thing.in_frame(pose))
 
@@ -36,7 +38,7 @@ def to_camera_frame(thing: Bar, rotation: np.ndarray, translation_mm: np.ndarray
 class VisibleSphere:
     """A sphere: its outline is a conic."""
 
-    thing: Sphere
+    thing: TouchedSphere
 
     def points_mm(self) -> np.ndarray:
         """Return points (n, 3) all over it."""
@@ -96,7 +98,7 @@ class VisibleCone:
     graze it.
     """
 
-    thing: Cone
+    thing: TouchedCone
 
     def _ends(self) -> list[_Disc]:
         """Return base and upper end."""
@@ -161,23 +163,28 @@ class VisibleCone:
 
     def intersect(self, rays: np.ndarray) -> Hits:
         """Find where rays (n, 3) first meet it."""
-        thing = self.thing
+        axis = self.thing.axis
         base, top = self._ends()
         base_depth = base.depth_mm(rays)
         top_depth = top.depth_mm(rays)
         depth = np.fmin(self._side_depth_mm(rays, base, top), np.fmin(base_depth, top_depth))
-        from_axis = depth[:, None] * rays - thing.point_mm
-        outward = unit(from_axis - np.multiply.outer(from_axis @ thing.axis, thing.axis))
-        sin = math.sin(thing.half_angle_rad)
-        cos = math.cos(thing.half_angle_rad)
         directions = unit(rays)
-        normals = cos * outward + sin * thing.axis
-        obliqueness = sine_between(directions, cos * thing.axis - sin * outward)
+        normals, lines = self._side_directions(depth[:, None] * rays)
+        obliqueness = sine_between(directions, lines)
         for sign, end_depth in ((-1, base_depth), (1, top_depth)):
             is_on_end = end_depth == depth
-            normals[is_on_end] = sign * thing.axis
-            obliqueness[is_on_end] = np.abs(directions[is_on_end] @ thing.axis)
+            normals[is_on_end] = sign * axis
+            obliqueness[is_on_end] = np.abs(directions[is_on_end] @ axis)
         return Hits(depth, normals, obliqueness)
+
+    def _side_directions(self, points_mm):
+        """Return normals and straight lines, (n, 3) each, of the slanting surface at points."""
+        axis = self.thing.axis
+        from_point = points_mm - self.thing.point_mm
+        outward = unit(from_point - np.multiply.outer(from_point @ axis, axis))
+        sin = math.sin(self.thing.half_angle_rad)
+        cos = math.cos(self.thing.half_angle_rad)
+        return cos * outward + sin * axis, cos * axis - sin * outward
 
     def _side_depth_mm(self, rays, base, top):
         """Return the depths (n,) of the slanting surface, NaN where a ray misses it."""
@@ -186,16 +193,14 @@ class VisibleCone:
         cos_square = math.cos(self.thing.half_angle_rad) ** 2
         along = rays @ axis
         a = along**2 - cos_square * (rays * rays).sum(1)
-        b = cos_square * (rays @ tip) - along * (tip @ axis)
-        c = (tip @ axis) ** 2 - cos_square * (tip @ tip)
+        tip_height = tip @ axis
+        b = cos_square * (rays @ tip) - along * tip_height
+        c = tip_height**2 - cos_square * (tip @ tip)
         root = _real_root(b**2 - a * c)
-        depths = []
-        for sign in (-1, 1):
-            depth = (-b + sign * root) / a
-            height = depth * along
-            is_met = (height > base.centre @ axis) & (height < top.centre @ axis) & (depth > 0)
-            depths.append(np.where(is_met, depth, np.nan))
-        return np.fmin(*depths)
+        depths = np.array([-b - root, -b + root]) / a  # (2, n)
+        height = depths * along
+        is_met = (height > base.centre @ axis) & (height < top.centre @ axis) & (depths > 0)
+        return np.fmin.reduce(np.where(is_met, depths, np.nan))
 
 
 def _real_root(square):

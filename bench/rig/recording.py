@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.rig import build
-from bench.rig.bar import Bar, Touch, find_first_touch
+from bench.rig.bar import TouchedBar, UnloadedTouch, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.force_sensor import sample_forces_N
 from bench.rig.linear import rotate_about_z
 from bench.rig.loading import base_force_N, quasi_static_Nmm, ringing_Nmm
-from bench.rig.marched import MarchedWhisk
-from bench.rig.protocol import Protocol, Run
+from bench.rig.protocol import Protocol, ProtocolRun
 from bench.rig.protocol_tables import GaugesTable
 from bench.rig.round_objects import OBJECTS
-from bench.rig.stick_slip import Friction
+from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.strain_gauges import fine_times_s, sample_times_s, sample_volts
 from bench.rig.stroke import Stroke
 from bench.rig.touched_object import TouchedObject
+from bench.rig.whisk_mechanics import WhiskMechanics
 
 # rad: half of it changes nothing that is seen (tests/bench/rig/test_contact_march.py)
 _STEP_RAD = math.radians(0.1)
@@ -27,7 +27,7 @@ _RESTS = 500  # more than a stroke of 25° has teeth of 0.05°
 
 
 @dataclass(frozen=True, eq=False)
-class Whisker:
+class GaugedWhisker:
     """A whisker with the gauges at its base."""
 
     rod: Rod
@@ -35,7 +35,7 @@ class Whisker:
 
 
 @dataclass(frozen=True, eq=False)
-class Frames:
+class Exposures:
     """The middles of the cameras' exposures, over all whisks, each (n,): times, motor angles,
     number of the whisk, and whether on its way back."""
 
@@ -59,23 +59,23 @@ class Recording:
     stated_velocity_mm_s (3,): of the object, as trial.toml has it; None where it stands still.
     """
 
-    run: Run
+    run: ProtocolRun
     rod: Rod
     bar: TouchedObject
-    touch: Touch
+    touch: UnloadedTouch
     stroke: Stroke
-    whisks: tuple[MarchedWhisk, ...]
-    frames: Frames
+    whisks: tuple[WhiskMechanics, ...]
+    frames: Exposures
     signals: np.ndarray
     stated_velocity_mm_s: np.ndarray | None = None
 
     @classmethod
-    def make(cls, protocol: Protocol, run: Run, rng: np.random.Generator) -> "Recording":
+    def make(cls, protocol: Protocol, run: ProtocolRun, rng: np.random.Generator) -> "Recording":
         """Simulate a run, the chance in it drawn from `rng`.
 
         Raises ArithmeticError where the whisker cannot go on.
         """
-        whisker = Whisker(build.rod(protocol), protocol.gauges)
+        whisker = GaugedWhisker(build.rod(protocol), protocol.gauges)
         bar, *near = place_object(protocol, run, whisker.rod, rng)
         touch = find_first_touch(whisker.rod, bar, *near)
         velocity_mm_s = run.table.object_velocity_mm_s
@@ -94,12 +94,12 @@ class Recording:
     def record(
         cls,
         protocol: Protocol,
-        run: Run,
-        whisker: Whisker,
+        run: ProtocolRun,
+        whisker: GaugedWhisker,
         bar: TouchedObject,
-        touch: Touch,
+        touch: UnloadedTouch,
         stroke: Stroke,
-        frames: Frames,
+        frames: Exposures,
         rng: np.random.Generator,
     ) -> "Recording":
         """Simulate what a whisker senses on a stroke that takes it to an object.
@@ -108,9 +108,9 @@ class Recording:
         """
         frictions = _draw_frictions(protocol, run, len(stroke.forward), rng)
         in_first = (frames.whisk == 0) & ~frames.back
-        marched = {}  # whisks of one friction are alike
+        mechanics = {}  # whisks of one friction are alike
         for friction in dict.fromkeys(frictions):
-            marched[friction] = MarchedWhisk.run(
+            mechanics[friction] = WhiskMechanics.run(
                 whisker.rod,
                 bar,
                 friction,
@@ -120,14 +120,14 @@ class Recording:
                 stops_rad=frames.motor_rad[in_first],
                 back=bool(stroke.back),
             )
-        whisks = tuple(marched[friction] for friction in frictions)
+        whisks = tuple(mechanics[friction] for friction in frictions)
         signals = sample_signals(protocol, run, stroke, whisks, whisker.gauges, rng)
         velocity = _state_velocity(run, rng)
         return cls(run, whisker.rod, bar, touch, stroke, whisks, frames, signals, velocity)
 
 
 def place_object(
-    protocol: Protocol, run: Run, rod: Rod, rng: np.random.Generator
+    protocol: Protocol, run: ProtocolRun, rod: Rod, rng: np.random.Generator
 ) -> tuple[TouchedObject, float, float]:
     """Place the object as people set it, near what they wanted.
 
@@ -145,7 +145,7 @@ def place_object(
     )
     beta_deg, psi_deg, d_x_mm, touch_deg = wanted + scatter * rng.standard_normal(4)
     touch_rad = math.radians(touch_deg)
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=d_x_mm,
         beta_rad=math.radians(beta_deg),
         psi_rad=math.radians(psi_deg),
@@ -155,12 +155,12 @@ def place_object(
         stiffness_N_mm=table.stiffness_N_mm or math.inf,
     )
     touched_mm = rotate_about_z([d_x_mm, 0.0, 0.0], touch_rad)
-    placed = OBJECTS[table.object or Bar.shape].from_trial(bar, touched_mm, table)
+    placed = OBJECTS[table.object or TouchedBar.shape].from_trial(bar, touched_mm, table)
     return placed, touch_rad, d_x_mm
 
 
-def plan_stroke(protocol: Protocol, run: Run, low_rad: float, high_rad: float) -> Stroke:
-    """Plan a run's motion between two motor angles."""
+def plan_stroke(protocol: Protocol, run: ProtocolRun, low_rad: float, high_rad: float) -> Stroke:
+    """Return a run's motion between two motor angles."""
     return Stroke.plan(
         low_rad,
         high_rad,
@@ -174,9 +174,9 @@ def plan_stroke(protocol: Protocol, run: Run, low_rad: float, high_rad: float) -
 
 def sample_signals(
     protocol: Protocol,
-    run: Run,
+    run: ProtocolRun,
     stroke: Stroke,
-    whisks: Sequence[MarchedWhisk],
+    whisks: Sequence[WhiskMechanics],
     gauges: GaugesTable,
     rng: np.random.Generator,
 ) -> np.ndarray:
@@ -208,9 +208,12 @@ def _state_velocity(run, rng) -> np.ndarray | None:
     return np.array(table.object_velocity_mm_s) + sigma * rng.standard_normal(3)
 
 
-def _take_frames(protocol, run, touch, stroke) -> Frames:
-    """Trigger the camera anew in each whisk; on the way back, where that is wanted, at the same
-    angles but the furthest, where the motor may turn."""
+def _take_frames(protocol, run, touch, stroke) -> Exposures:
+    """Return the exposures of all whisks, the camera triggered anew in each.
+
+    On the way back, where that is wanted, they are at the same angles but the furthest, where the
+    motor may turn.
+    """
     up = touch.motor_rad + np.radians(protocol.pictures.frame_angles_deg(run.speed_deg_s))
     passes = [(up, False)]
     if protocol.pictures.back_stroke:
@@ -222,10 +225,10 @@ def _take_frames(protocol, run, touch, stroke) -> Frames:
             constant = np.ones(len(angles))
             parts.append([times, angles, whisk * constant, back * constant])
     times, angles, whisks, backs = np.concatenate(parts, axis=1)
-    return Frames(times, angles, whisks.astype(int), backs.astype(bool))
+    return Exposures(times, angles, whisks.astype(int), backs.astype(bool))
 
 
-def _draw_frictions(protocol, run, count: int, rng) -> list[Friction]:
+def _draw_frictions(protocol, run, count: int, rng) -> list[FrictionCoefficients]:
     """Draw the friction in each of the whisks; regular rests draw nothing."""
     table = protocol.friction
     kinetic = run.table.friction
@@ -236,5 +239,5 @@ def _draw_frictions(protocol, run, count: int, rng) -> list[Friction]:
         if table.irregular:
             rests = tuple(np.exp(table.irregular * rng.standard_normal(_RESTS)).tolist())
         finest_rad = math.radians(table.finest_deg)
-        frictions.append(Friction(static * factor, kinetic * factor, finest_rad, rests))
+        frictions.append(FrictionCoefficients(static * factor, kinetic * factor, finest_rad, rests))
     return frictions

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import Touch
+from bench.rig.bar import UnloadedTouch
 from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Elastica
-from bench.rig.laws import Held, Oiled, Sliding, Surface
+from bench.rig.laws import ContactLoad, Held, Oiled, Sliding
 from bench.rig.linear import across, cross, cross_matrix, rotation_about_z, solve
 from bench.rig.loaded_point import LoadedPoint
 from bench.rig.touched_object import TouchedObject
@@ -60,7 +60,7 @@ class ContactState:
         return np.append(self.force_hub_N, self.arc_mm)
 
 
-class Contact:
+class RodContact:
     """The contact problem of one whisker and one object."""
 
     def __init__(self, rod: Rod, bar: TouchedObject):
@@ -68,7 +68,7 @@ class Contact:
         self.bar = bar
         self.elastica = Elastica(rod)
 
-    def touch_state(self, touch: Touch) -> ContactState:
+    def touch_state(self, touch: UnloadedTouch) -> ContactState:
         """Return the state at first touch, without force."""
         tangent = np.array([1.0, 0, 0]) + self.rod.rest.slope(touch.arc_mm)
         return ContactState(
@@ -120,7 +120,7 @@ class _Equations:
     loaded: LoadedPoint
     residual: np.ndarray
     jacobian: np.ndarray
-    surface: Surface
+    load: ContactLoad
 
     def state(self, motor_rad, unknowns, step, status) -> ContactState:
         """Return the solution after Newton's last step.
@@ -128,12 +128,12 @@ class _Equations:
         The loaded point follows to first order; what is left is of the order of the step squared.
         """
         loaded = self.loaded
-        surface = self.surface
+        load = self.load
         unknowns = unknowns - step
         slides = len(unknowns) > 4
-        heading = float(unknowns[4]) if slides else math.atan2(*surface.motion[::-1])
-        onward_mm = surface.motion @ [math.cos(heading), math.sin(heading)]
-        if surface.press < 0 or (slides and onward_mm < _BACKWARDS_MM):
+        heading = float(unknowns[4]) if slides else math.atan2(*load.motion[::-1])
+        onward_mm = load.motion @ [math.cos(heading), math.sin(heading)]
+        if load.press < 0 or (slides and onward_mm < _BACKWARDS_MM):
             raise ArithmeticError("a contact that pulls, or friction along the motion")
         return ContactState(
             motor_rad,
@@ -141,10 +141,10 @@ class _Equations:
             float(unknowns[3]),
             loaded.point - loaded.point_by @ step[:4],
             loaded.tangent - loaded.tangent_by @ step[:4],
-            abs(surface.shear[0]) / surface.press,
+            abs(load.shear[0]) / load.press,
             status,
             heading,
-            float(surface.motion[1]),
+            float(load.motion[1]),
             loaded.angle,
         )
 
@@ -157,7 +157,7 @@ class _Problem:
     (3, 3): of the hub.
     """
 
-    contact: Contact
+    contact: RodContact
     bar: TouchedObject
     bar_moved_mm: np.ndarray
     rotation: np.ndarray
@@ -172,26 +172,35 @@ class _Problem:
         offset_by = local.offset_by @ loaded.point_by
         distance = math.sqrt(local.offset_mm @ local.offset_mm)
         frame, frame_by = _contact_frame(local, offset_by, distance, loaded.point_by)
-        surface = self._surface(unknowns, loaded, frame, frame_by)
-        residual = np.empty(len(unknowns))
+        load = self._load(unknowns, loaded, frame, frame_by)
+        residual = np.empty_like(unknowns)
         jacobian = np.zeros((len(unknowns), len(unknowns)))
-        rod = self.contact.rod
-        arc = unknowns[3]
-        if self.tip:
-            residual[0] = arc - rod.length_mm
-            jacobian[0, 3] = 1.0
-        else:
-            residual[0] = local.offset_mm @ loaded.tangent
-            jacobian[0, :4] = loaded.tangent @ offset_by + local.offset_mm @ loaded.tangent_by
-        stiffness = self.bar.stiffness_N_mm
-        reach = self.bar.radius_mm + float(rod.radius_mm(arc))
-        residual[1] = distance + surface.press / stiffness - reach
-        jacobian[1, :4] = frame[0] @ loaded.point_by + surface.press_by / stiffness
-        jacobian[1, 3] -= rod.taper
-        residual[2:], jacobian[2:] = self.law.equations(surface, unknowns[4:])
-        return _Equations(loaded, residual, jacobian, surface)
+        residual[0], jacobian[0, :4] = self._off_nearest(unknowns, loaded, local, offset_by)
+        residual[1], jacobian[1, :4] = self._gap_mm(unknowns, loaded, frame[0], distance, load)
+        residual[2:], jacobian[2:] = self.law.equations(load, unknowns[4:])
+        return _Equations(loaded, residual, jacobian, load)
 
-    def _surface(self, unknowns, loaded, frame, frame_by) -> Surface:
+    def _off_nearest(self, unknowns, loaded, local, offset_by) -> tuple[float, np.ndarray]:
+        """Return how far the contact is along the whisker from where it belongs, and the
+        derivatives (4,) of that: the point nearest to the object's axis, or the tip."""
+        if self.tip:
+            return unknowns[3] - self.contact.rod.length_mm, np.array([0.0, 0.0, 0.0, 1.0])
+        off_by = loaded.tangent @ offset_by + local.offset_mm @ loaded.tangent_by
+        return local.offset_mm @ loaded.tangent, off_by
+
+    def _gap_mm(self, unknowns, loaded, normal, distance, load) -> tuple[float, np.ndarray]:
+        """Return the gap between the surfaces, as the force presses them, and its derivatives (4,).
+
+        normal (3,): of the contact. distance: between centreline and the object's axis, mm.
+        """
+        rod = self.contact.rod
+        stiffness = self.bar.stiffness_N_mm
+        reach = self.bar.radius_mm + float(rod.radius_mm(unknowns[3]))
+        gap_by = normal @ loaded.point_by + load.press_by / stiffness
+        gap_by[3] -= rod.taper
+        return distance + load.press / stiffness - reach, gap_by
+
+    def _load(self, unknowns, loaded, frame, frame_by) -> ContactLoad:
         """Return forces and motion in the frame of the contact."""
         force = self.rotation @ unknowns[:3]
         force_by = np.zeros((3, 4))
@@ -206,7 +215,7 @@ class _Problem:
         motion, motion_by = _components(
             frame[1:], frame_by[1:], moved - self.bar_moved_mm, moved_by
         )
-        return Surface(forces[0], forces_by[0], forces[1:], forces_by[1:], motion, motion_by)
+        return ContactLoad(forces[0], forces_by[0], forces[1:], forces_by[1:], motion, motion_by)
 
     def step(self, unknowns, here, step):
         """Return the unknowns after as much of a step as brings them nearer, and the equations

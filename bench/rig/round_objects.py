@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from bench.rig.bar import Bar
+from bench.rig.bar import TouchedBar
 from bench.rig.linear import across, cross, cross_matrix
 from bench.rig.protocol_tables import TrialTable
 from bench.rig.touched_object import LocalBar, TouchedObject
@@ -16,7 +16,7 @@ _BEHIND = np.array([0.0, 1.0, 0.0])  # (3,): away from whiskers and cameras
 
 
 @dataclass(frozen=True)
-class Ring(TouchedObject):
+class TouchedRing(TouchedObject):
     """A round bar whose axis is a circle about `point_mm`; `axis` is the normal of its plane."""
 
     shape = "ring"
@@ -24,8 +24,8 @@ class Ring(TouchedObject):
     ring_radius_mm: float = 0.0
 
     @classmethod
-    def from_bar(cls, bar: Bar, touched_mm: np.ndarray, ring_radius_mm: float) -> Self:
-        """Bend a straight bar away from the whisker that touches it at a point (3,)."""
+    def from_bar(cls, bar: TouchedBar, touched_mm: np.ndarray, ring_radius_mm: float) -> Self:
+        """Return a straight bar bent away from the whisker that touches it at a point (3,)."""
         foot, normal = _foot_and_normal(bar, touched_mm)
         return cls(
             foot - ring_radius_mm * normal,
@@ -36,7 +36,7 @@ class Ring(TouchedObject):
         )
 
     @classmethod
-    def from_trial(cls, bar: Bar, touched_mm: np.ndarray, table: TrialTable) -> Self:
+    def from_trial(cls, bar: TouchedBar, touched_mm: np.ndarray, table: TrialTable) -> Self:
         """Make the ring of a trial, which curves away from the whisker."""
         return cls.from_bar(bar, touched_mm, 0.5 * table.ring_diameter_mm)
 
@@ -74,13 +74,13 @@ class Ring(TouchedObject):
 
 
 @dataclass(frozen=True)
-class Sphere(TouchedObject):
+class TouchedSphere(TouchedObject):
     """A sphere about `point_mm`; a contact meets an axis in the surface, as upright as can be."""
 
     shape = "sphere"
 
     @classmethod
-    def from_trial(cls, bar: Bar, touched_mm: np.ndarray, table: TrialTable) -> Self:
+    def from_trial(cls, bar: TouchedBar, touched_mm: np.ndarray, table: TrialTable) -> Self:
         """Make the sphere of the bar's radius about the bar's point."""
         return cls(bar.point_mm, bar.axis, bar.radius_mm, bar.stiffness_N_mm)
 
@@ -106,7 +106,7 @@ class Sphere(TouchedObject):
 
 
 @dataclass(frozen=True)
-class Cone(TouchedObject):
+class TouchedCone(TouchedObject):
     """A round cone: all points at `radius_mm` from the thinner cone whose tip is `point_mm`, up to
     its own tip.
 
@@ -118,7 +118,7 @@ class Cone(TouchedObject):
     half_angle_rad: float = 0.0
 
     @classmethod
-    def from_bar(cls, bar: Bar, touched_mm: np.ndarray, half_angle_rad: float) -> Self:
+    def from_bar(cls, bar: TouchedBar, touched_mm: np.ndarray, half_angle_rad: float) -> Self:
         """Make the cone, tip above, that a whisker touches at the point (3,) and slope at which it
         touches a bar; there it is as curved across as the bar."""
         foot, normal = _foot_and_normal(bar, touched_mm)
@@ -126,7 +126,7 @@ class Cone(TouchedObject):
         return cls(foot, axis, bar.radius_mm, bar.stiffness_N_mm, half_angle_rad=half_angle_rad)
 
     @classmethod
-    def from_trial(cls, bar: Bar, touched_mm: np.ndarray, table: TrialTable) -> Self:
+    def from_trial(cls, bar: TouchedBar, touched_mm: np.ndarray, table: TrialTable) -> Self:
         """Make the cone of a trial."""
         return cls.from_bar(bar, touched_mm, math.radians(table.cone_half_angle_deg))
 
@@ -190,7 +190,9 @@ class Cone(TouchedObject):
         return math.cos(self.half_angle_rad) * outward + math.sin(self.half_angle_rad) * self.axis
 
 
-OBJECTS: dict[str, type[TouchedObject]] = {kind.shape: kind for kind in (Bar, Ring, Sphere, Cone)}
+OBJECTS: dict[str, type[TouchedObject]] = {
+    kind.shape: kind for kind in (TouchedBar, TouchedRing, TouchedSphere, TouchedCone)
+}
 
 
 def _foot_and_normal(bar, touched_mm):

@@ -54,31 +54,37 @@ def simulate(
 def forecast(job: Job, workers: int) -> str:
     """Return a line that says what a session will hold, how big it will be and how long it will
     take."""
-    cameras = job.protocol.cameras
-    table = job.protocol.pictures
     runs = job.protocol.runs()
     whiskers = max(1, len(job.whiskers))
-    whisks = 0
-    frames = 0
-    megabytes = 0.0
-    for run in runs:
-        whisks += run.table.whisks * whiskers
-        frames += run.table.whisks * table.frames_a_whisk(run.speed_deg_s)
-        stroke_s = (run.before_deg + run.after_deg) / run.speed_deg_s + job.protocol.motor.pause_s
-        strokes = run.table.whisks * (2 if job.protocol.goes_back(run) else 1)
-        samples = stroke_s * strokes * job.protocol.gauges.rate_Hz
-        megabytes += samples * _SAMPLE_MEGABYTES * whiskers
-    pictures = 0
-    scaled_pictures = 0.0  # as many of _PIXELS would take as long
-    if job.has_pictures:
-        each_camera = frames + job.protocol.board.views + 1
-        pictures = each_camera * len(cameras)
-        pixels = sum(camera.size_px[0] * camera.size_px[1] for camera in cameras)
-        scaled_pictures = each_camera * pixels / _PIXELS
-    megabytes += scaled_pictures * _MEGABYTES[table.format]
+    whisks = whiskers * sum(run.table.whisks for run in runs)
+    samples = whiskers * sum(_sample_count(job.protocol, run) for run in runs)
+    frames = _frame_count(job)  # of each camera
+    sizes_px = [camera.size_px for camera in job.protocol.cameras]
+    pictures = frames * len(sizes_px)
+    # As many of _PIXELS would take as long.
+    scaled_pictures = frames * sum(width * height for width, height in sizes_px) / _PIXELS
+    megabytes = scaled_pictures * _MEGABYTES[job.protocol.pictures.format]
+    megabytes += samples * _SAMPLE_MEGABYTES
     minutes = (scaled_pictures * _PICTURE_S + whisks * _WHISK_S) / max(workers, 1) / 60
     found = f"{len(runs)} trials, {whisks} whisks, {pictures} pictures"
     return f"{found}: about {megabytes:.0f} MB and {minutes:.1f} minutes"
+
+
+def _sample_count(protocol, run) -> float:
+    """Return the number of samples of a trial's signals."""
+    stroke_s = (run.before_deg + run.after_deg) / run.speed_deg_s + protocol.motor.pause_s
+    strokes = run.table.whisks * (2 if protocol.goes_back(run) else 1)
+    return stroke_s * strokes * protocol.gauges.rate_Hz
+
+
+def _frame_count(job) -> int:
+    """Return the number of pictures that each camera takes."""
+    if not job.has_pictures:
+        return 0
+    count = job.protocol.board.views + 1
+    for run in job.protocol.runs():
+        count += run.table.whisks * job.protocol.pictures.frames_a_whisk(run.speed_deg_s)
+    return count
 
 
 def _require_buildable(job, name):

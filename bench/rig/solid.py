@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.rig.bar import Bar
+from bench.rig.bar import TouchedBar
 from bench.rig.layer import Layer
 from bench.rig.light import Light, Material, shade_surface
 from bench.rig.quadrics import to_camera_frame
@@ -22,7 +22,7 @@ _GAUSS = 0.5 / np.sqrt(3)  # Gauss–Legendre's two points across a sample
 class Solid:
     """A ring, sphere or cone in the rig frame, and its material."""
 
-    thing: Bar
+    thing: TouchedBar
     material: Material
 
     def layer(self, window: Window, light: Light) -> Layer | None:
@@ -32,15 +32,12 @@ class Solid:
         """
         camera = window.camera
         visible = to_camera_frame(self.thing, camera.rotation, camera.translation_mm)
-        points = visible.points_mm()
-        if points[:, 2].min() <= 1.0:
-            raise BadInput(f"camera {camera.name} stands within an object or beside it")
-        points = (points - camera.translation_mm) @ camera.rotation
-        part = window.crop(camera.project(points), 4 * window.soft_px + 2)
+        part = _crop(window, visible)
         if part is None:
             return None
-        x, y = (ray.astype(float) for ray in part.rays())
-        rays = Rays(x, y, np.diag(camera.matrix)[:2], window.soft_px)
+        x, y = part.rays()
+        focal_px = np.diag(camera.matrix)[:2]
+        rays = Rays(x.astype(float), y.astype(float), focal_px, window.soft_px)
         cover = visible.coverage(rays)
         index = np.nonzero(cover > _COVERS)
         if not len(index[0]):
@@ -48,6 +45,19 @@ class Solid:
         shader = _Shader(visible, self.material, light, camera.rotation @ light.towards)
         tone, depth = shader.shade(rays, cover)[:, *index]
         return Layer(part.index_in(window, index), cover[index], tone, depth)
+
+
+def _crop(window: Window, visible: VisibleObject) -> Window | None:
+    """Return the part of a window that holds an object; None where it is not in it.
+
+    Raises BadInput where it is not all before the camera.
+    """
+    camera = window.camera
+    points = visible.points_mm()
+    if points[:, 2].min() <= 1.0:
+        raise BadInput(f"camera {camera.name} stands within an object or beside it")
+    points = (points - camera.translation_mm) @ camera.rotation
+    return window.crop(camera.project(points), 4 * window.soft_px + 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import Touch
+from bench.rig.bar import UnloadedTouch
 from bench.rig.elastic_rod import Rod
 from bench.rig.laws import GIVE_MM, Held, Oiled, Sliding
 from bench.rig.linear import rotate_about_z
-from bench.rig.rod_contact import Contact, ContactState
+from bench.rig.rod_contact import ContactState, RodContact
 from bench.rig.touched_object import TouchedObject
 
 # Share of the coefficient at rest, rad: where the search for the cone's edge ends.
@@ -20,7 +20,7 @@ _HALVINGS = 7  # of a step that comes to no equilibrium
 
 
 @dataclass(frozen=True)
-class Friction:
+class FrictionCoefficients:
     """Coefficients of friction at rest and in motion.
 
     finest_rad: teeth of stick–slip shorter than this are not resolved; the whisker is then taken as
@@ -60,8 +60,10 @@ class March:
     the tip has left the object.
     """
 
-    def __init__(self, rod: Rod, bar: TouchedObject, friction: Friction, touch: Touch):
-        self.contact = Contact(rod, bar)
+    def __init__(
+        self, rod: Rod, bar: TouchedObject, friction: FrictionCoefficients, touch: UnloadedTouch
+    ):
+        self.contact = RodContact(rod, bar)
         self.friction = friction
         self.touch = touch
         self.state = self.contact.touch_state(touch)
@@ -91,7 +93,7 @@ class March:
         return self.friction.at_rest(self._rest)
 
     def _go(self, motor_rad) -> list[ContactState | None]:
-        """Go to a motor angle; return the states met on the way, the last one at that angle."""
+        """Return the states met up to a motor angle, the last one at that angle."""
         if motor_rad <= self.touch.motor_rad + _NO_PUSH_RAD or self.slid_off:
             self.state = self.contact.touch_state(self.touch)
             self.before = None
@@ -105,7 +107,7 @@ class March:
             return [None]
 
     def _step(self, motor_rad, halvings):
-        """Advance to a motor angle in one step, or in halves where that fails."""
+        """Find the states up to a motor angle in one step, or in halves where that fails."""
         try:
             return self._advance(motor_rad)
         except ArithmeticError:
@@ -141,7 +143,8 @@ class March:
         return self._tooth(motor_rad, held, tip)
 
     def _tooth(self, motor_rad, held, tip):
-        """Hold until the static cone is left, jump to the kinetic one, go on from there."""
+        """Find the states of a tooth: held until the static cone is left, after the jump to the kinetic
+        one, and on from there."""
         edge = self._find_edge(held, tip)
         if abs(edge.motor_rad - self._jump_rad) < self.friction.finest_rad:
             self._jump_rad = motor_rad
@@ -192,7 +195,7 @@ class March:
         return self.contact.solve(motor_rad, self.state, self._guess(motor_rad), law, tip)
 
     def _slide_on(self, motor_rad, tip):
-        """Slide in the direction of the step before; at first touch from where the contact would
+        """Find the state that slides in the direction of the step before; at first touch from where the contact would
         be held."""
         if not self.state.force_hub_N.any():
             return self._slide_from(motor_rad, self.state, self._hold(motor_rad, tip), tip)
@@ -200,7 +203,7 @@ class March:
         return self._slide(motor_rad, self.state, guess, self.state.heading_rad, tip)
 
     def _slide_from(self, motor_rad, old, held, tip):
-        """Slide from `old`, starting the search where the contact would be if it were held, its
+        """Find the state that slides from `old`, starting the search where the contact would be if it were held, its
         shear reduced to the kinetic cone."""
         bar = self.contact.bar.at(held.motor_rad)
         local = bar.local_bar(held.point_mm)
@@ -231,7 +234,7 @@ class March:
             return state
 
     def _guess(self, motor_rad):
-        """Extrapolate the last two states; at first, guess the small-angle force of a whisker held
+        """Predict the unknowns (4,) from the last two states; at first, by the small-angle force of a whisker held
         where it is."""
         state = self.state
         before = self.before

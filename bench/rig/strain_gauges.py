@@ -3,6 +3,7 @@
 import numpy as np
 from scipy import signal
 
+from bench.rig.linear import rotation_about_z
 from bench.rig.protocol_tables import GaugesTable
 
 OVERSAMPLED = 4  # times the sampling rate, ahead of the filter against aliases
@@ -27,19 +28,21 @@ def sample_volts(
     [m_y, m_z] = matrix · (volts − offset) in the axes of the follicle, which is turned about the
     whisker by `roll_rad`.
     """
-    cos = np.cos(roll_rad)
-    sin = np.sin(roll_rad)
-    follicle_Nmm = moments_Nmm @ np.array([[cos, -sin], [sin, cos]])
+    follicle_Nmm = moments_Nmm @ rotation_about_z(roll_rad)[:2, :2]
     volts = follicle_Nmm @ np.linalg.inv(gauges.matrix_Nmm_per_V).T
     volts = low_pass(volts, gauges)[::OVERSAMPLED] + gauges.offset_V
-    times = np.arange(len(volts))[:, None] / gauges.rate_Hz
+    return _digitise(gauges, volts + _draw_disturbance(gauges, len(volts), rng))
+
+
+def _draw_disturbance(gauges, count, rng):
+    """Draw hum, drift and noise (count, 2), V, of both channels."""
+    times = np.arange(count)[:, None] / gauges.rate_Hz
     phase = rng.uniform(0, 2 * np.pi, 2)
     swing = rng.uniform(0.7, 1.0, 2)
     drift_sign = rng.uniform(-1, 1, 2)
     hum = gauges.hum_V * swing * np.sin(2 * np.pi * gauges.hum_Hz * times + phase)
     drift = gauges.drift_V_per_s * drift_sign * times
-    noise = gauges.noise_V * rng.standard_normal(volts.shape)
-    return _digitise(gauges, volts + (hum + drift + noise))
+    return hum + drift + gauges.noise_V * rng.standard_normal((count, 2))
 
 
 def low_pass(fine: np.ndarray, gauges: GaugesTable) -> np.ndarray:

@@ -31,7 +31,7 @@ class Stroke:
         pause_s: float = 0.0,
         back: bool = False,
     ) -> "Stroke":
-        """Plan strokes from below `low_rad` to above `high_rad`, at constant speed between the two.
+        """Return strokes from below `low_rad` to above `high_rad`, at constant speed between the two.
 
         Raises ValueError for several without a back stroke.
         """
@@ -74,14 +74,14 @@ class Stroke:
 
 
 def _rest(knots, pause_s):
-    """Append a pause where the motor stands still."""
+    """Add a pause where the motor stands still."""
     time, angle, speed = knots[-1]
     if pause_s and speed == 0:
         knots.append((time + pause_s, angle, 0.0))
 
 
 def _move(knots, span, speed, ramp_s):
-    """Append speeding up, going and slowing down; return beginning and end of the constant
+    """Add speeding up, going and slowing down; return beginning and end of the constant
     speed."""
     time, angle, _ = knots[-1]
     ramp = 0.5 * speed * ramp_s

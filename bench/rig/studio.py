@@ -6,11 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from bench.rig.bar import Bar
+from bench.rig.bar import TouchedBar
 from bench.rig.box import Box
 from bench.rig.layer import Occluder
 from bench.rig.painted_scene import Scene, Stand, draw_floor_and_wall
-from bench.rig.pinhole import Camera
+from bench.rig.pinhole import PinholeCamera
 from bench.rig.sensor import Sensor
 from bench.rig.tube import Tube
 from bench.rig.window import Window
@@ -41,7 +41,7 @@ class Studio:
     so nothing finer is lost, and things cover each other before the lens blurs them.
     """
 
-    def __init__(self, camera: Camera, scene: Scene, sensor: Sensor):
+    def __init__(self, camera: PinholeCamera, scene: Scene, sensor: Sensor):
         self.camera = camera
         self.scene = scene
         self.sensor = sensor
@@ -67,7 +67,7 @@ class Studio:
         """Draw the board standing on the rig."""
         return self.crop(self.window.blur_to_pixels(self.backdrop, self.sensor.blur_px))
 
-    def setting(self, bar: Bar, middle_mm: np.ndarray) -> "Setting":
+    def setting(self, bar: TouchedBar, middle_mm: np.ndarray) -> "Setting":
         """Draw the still scene of a trial: the rig with a bar whose middle is near a point (3,), or
         with a ring, sphere or cone."""
         radiance = self.backdrop.copy()
@@ -109,13 +109,12 @@ class Setting:
         part = studio.window.crop(np.concatenate(px), 4 * blur_px + 3)
         picture = self._still.copy()
         if part is not None:
-            rim = math.ceil(3 * blur_px)  # of the part's pixels, which its own edge blurs wrongly
             drawn = part.blur_to_pixels(self._draw_moments(part, moments), blur_px)
+            rim = math.ceil(3 * blur_px)  # of the part's pixels, which its own edge blurs wrongly
+            inner = drawn[rim : len(drawn) - rim, rim : drawn.shape[1] - rim]
             top = part.top - studio.window.top + rim
             left = part.left - studio.window.left + rim
-            inner = drawn[rim : len(drawn) - rim, rim : drawn.shape[1] - rim]
-            rows, columns = inner.shape
-            picture[top : top + rows, left : left + columns] = inner
+            picture[top : top + len(inner), left : left + inner.shape[1]] = inner
         return studio.crop(picture)
 
     def _draw_moments(self, part, moments):

@@ -9,14 +9,14 @@ import itertools
 import numpy as np
 
 from bench.rig.linear import cross
-from bench.rig.marched import MarchedWhisk
 from bench.rig.rod_contact import ContactState
 from bench.rig.touched_object import TouchedObject
+from bench.rig.whisk_mechanics import WhiskMechanics
 
 COLUMNS = ("along_mm", "round_mm", "slid_along_mm", "slid_round_mm")
 
 
-def slips_mm(whisk: MarchedWhisk, back: bool) -> np.ndarray:
+def slips_mm(whisk: WhiskMechanics, back: bool) -> np.ndarray:
     """Return (n, 4), a row for each instant of a stroke: path of the contact and slide of the
     material since first touch, each along the object's axis there and round it (axis × normal).
 

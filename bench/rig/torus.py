@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.rig.rays import Hits, Rays, circle_points, perpendicular_axes, sine_between, unit
-from bench.rig.round_objects import Ring
+from bench.rig.round_objects import TouchedRing
 
 _STATIONS = 64  # of a circle, of which those nearest to a ray are found first
 _STATION_RAD = 2 * np.pi / _STATIONS  # from one to the next
@@ -20,7 +20,7 @@ _NEAR_MM, _MOST_STEPS = 1e-4, 100  # of marching along a ray
 class VisibleRing:
     """A ring: all points within its radius of a circle."""
 
-    thing: Ring
+    thing: TouchedRing
 
     def _circle(self, angles: np.ndarray) -> np.ndarray:
         """Return points (..., 3) of the circle."""
@@ -77,23 +77,29 @@ class VisibleRing:
     def intersect(self, rays: np.ndarray) -> Hits:
         """Find where rays (n, 3) first meet it, by steps along each as long as the surface is far."""
         thing = self.thing
-        size = thing.ring_radius_mm + thing.radius_mm
         length = np.linalg.norm(rays, axis=1)
         directions = rays / length[:, None]
-        travel = directions @ thing.point_mm - size  # mm along each ray
+        travel, is_met = self._travel_mm(directions)
+        points = travel[:, None] * directions
+        feet = thing.foot_mm(points)
+        along = np.cross(thing.axis, feet - thing.point_mm) / thing.ring_radius_mm
+        depth = np.where(is_met, travel / length, np.nan)
+        return Hits(depth, unit(points - feet), sine_between(directions, along))
+
+    def _travel_mm(self, directions):
+        """Return how far (n,) along unit directions (n, 3) the surface is, and whether it is met."""
+        thing = self.thing
+        size = thing.ring_radius_mm + thing.radius_mm
+        travel = directions @ thing.point_mm - size
         end = travel + 2 * size
-        going = np.arange(len(rays))
+        going = np.arange(len(directions))
         for _ in range(_MOST_STEPS):
             outside = thing.outside_mm(travel[going, None] * directions[going])
             travel[going] += outside
             going = going[(outside > _NEAR_MM) & (travel[going] < end[going])]
             if not len(going):
                 break
-        points = travel[:, None] * directions
-        feet = thing.foot_mm(points)
-        along = np.cross(thing.axis, feet - thing.point_mm) / thing.ring_radius_mm
-        depth = np.where(travel < end, travel / length, np.nan)
-        return Hits(depth, unit(points - feet), sine_between(directions, along))
+        return travel, travel < end
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +117,7 @@ class _Distance:
     c: np.ndarray
 
     @classmethod
-    def from_rays(cls, rays: np.ndarray, ring: Ring) -> "_Distance":
+    def from_rays(cls, rays: np.ndarray, ring: TouchedRing) -> "_Distance":
         """Return the distances between rays (n, 3) and a ring's circle."""
         first, second = (ring.ring_radius_mm * axis for axis in perpendicular_axes(ring.axis))
         directions = unit(rays)

@@ -13,7 +13,7 @@ import numpy as np
 from bench.rig.linear import rotate_about_z
 
 if TYPE_CHECKING:
-    from bench.rig.bar import Bar
+    from bench.rig.bar import TouchedBar
     from bench.rig.protocol_tables import TrialTable
 
 
@@ -54,7 +54,7 @@ class TouchedObject(ABC):
 
     @classmethod
     @abstractmethod
-    def from_trial(cls, bar: "Bar", touched_mm: np.ndarray, table: "TrialTable") -> Self:
+    def from_trial(cls, bar: "TouchedBar", touched_mm: np.ndarray, table: "TrialTable") -> Self:
         """Make the object that a whisker touches where it would touch a bar, with the same slope.
 
         touched_mm (3,): the point of contact. table: holds the sizes that a bar does not have.

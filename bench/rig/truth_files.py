@@ -80,33 +80,33 @@ def truth_csv(recording: Recording) -> str:
         header.append("gave_mm")
     if not recording.bar.is_straight:
         header += COLUMNS
-    way_slips_mm = functools.cache(slips_mm)  # whisks of one friction are one object
+    stroke_slips_mm = functools.cache(slips_mm)  # whisks of one friction are one object
     rows = []
     for frame, (time_s, motor_rad, number, back) in enumerate(recording.frames):
         times = _fixed([time_s, math.degrees(motor_rad)])
-        contact = _contact_cells(recording.whisks[number], motor_rad, back, way_slips_mm)
+        contact = _contact_cells(recording.whisks[number], motor_rad, back, stroke_slips_mm)
         rows.append(",".join([str(frame), *times, *contact]))
     return csv_text(",".join(header), rows)
 
 
-def _contact_cells(whisk, motor_rad, back, way_slips_mm) -> list[str]:
-    """Return the cells of truth.csv about the contact at a motor angle of a way.
+def _contact_cells(whisk, motor_rad, back, stroke_slips_mm) -> list[str]:
+    """Return the cells of truth.csv about the contact at a motor angle of a stroke.
 
-    way_slips_mm: gives the surface slips (n, 4) of a way of a whisk.
+    stroke_slips_mm: gives the surface slips (n, 4) of a stroke of a whisk.
     """
-    way = whisk.way(back)
-    row = way.row_at(motor_rad)
-    state = way.state_at(motor_rad)
+    path = whisk.path(back)
+    row = path.row_at(motor_rad)
+    state = path.state_at(motor_rad)
     if state is None:
         cells = ["0", *_fixed([math.nan] * 5), *_fixed([0.0, 0.0]), "free"]
     else:
         slip = whisk.slip_mm(state.point_mm, motor_rad)
-        values = [*state.point_mm, slip, state.arc_mm, *way.moment_Nmm[row]]
+        values = [*state.point_mm, slip, state.arc_mm, *path.moment_Nmm[row]]
         cells = ["1", *_fixed(values), state.status]
     if math.isfinite(whisk.bar.stiffness_N_mm):
         cells += _fixed([np.linalg.norm(whisk.gave_mm(motor_rad, back))])
     if not whisk.bar.is_straight:
-        slips = [math.nan] * len(COLUMNS) if state is None else way_slips_mm(whisk, back)[row]
+        slips = [math.nan] * len(COLUMNS) if state is None else stroke_slips_mm(whisk, back)[row]
         cells += _fixed(slips)
     return cells
 

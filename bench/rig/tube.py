@@ -9,7 +9,7 @@ from scipy.special import ndtr
 
 from bench.rig.layer import Layer, Occluder, draw_layers
 from bench.rig.light import Light, Material, shade_surface
-from bench.rig.pinhole import Camera
+from bench.rig.pinhole import PinholeCamera
 from bench.rig.rays import unit
 from bench.rig.window import Window
 
@@ -38,7 +38,7 @@ class Tube:
         axis = (1 - share) * np.asarray(start_mm, float) + share * np.asarray(end_mm, float)
         return cls(axis, np.full(_STATIONS, float(radius_mm)), material)
 
-    def silhouette(self, camera: Camera) -> np.ndarray:
+    def silhouette(self, camera: PinholeCamera) -> np.ndarray:
         """Return the pixels (2, n, 2) of both edges, where rays graze the round surface."""
         facing, across, distance = self._axes_towards(camera)
         cos = (self.radius_mm / distance)[:, None]
@@ -83,13 +83,9 @@ class Tube:
         along (n,): px along the strip. position (n,): −1 on one silhouette to 1 on the other; there
         sample (n,) is a sample's width. Two Gauss points are averaged, both on the tube.
         """
-        facing, across, _ = self._axes_towards(camera)
-        half = unit(unit(camera.centre_mm - self.axis_mm) + light.towards)
-        # Along the picture of a tube these four change slowly; across it not at all.
-        lamp_facing = strip.interpolate(along, facing @ light.towards)
-        lamp_across = strip.interpolate(along, across @ light.towards)
-        half_facing = strip.interpolate(along, (facing * half).sum(1))
-        half_across = strip.interpolate(along, (across * half).sum(1))
+        lamp_facing, lamp_across, half_facing, half_across = self._light_cosines(
+            camera, light, strip, along
+        )
         limit = np.maximum(1 - sample / 4, 0)
         total = 0.0
         for step in (-_GAUSS, _GAUSS):
@@ -99,6 +95,20 @@ class Tube:
             mirror = cos * half_facing + sin * half_across
             total = total + shade_surface(light, self.material, lamp, mirror, cos)
         return 0.5 * total
+
+    def _light_cosines(self, camera, light, strip, along):
+        """Return four cosines (n,) at places along the strip: between the axes towards and across
+        the camera and the lamp, then the direction half-way to the lamp.
+
+        Along the picture of a tube they change slowly; across it not at all.
+        """
+        facing, across, _ = self._axes_towards(camera)
+        half = unit(unit(camera.centre_mm - self.axis_mm) + light.towards)
+        lamp_facing = strip.interpolate(along, facing @ light.towards)
+        lamp_across = strip.interpolate(along, across @ light.towards)
+        half_facing = strip.interpolate(along, (facing * half).sum(1))
+        half_across = strip.interpolate(along, (across * half).sum(1))
+        return lamp_facing, lamp_across, half_facing, half_across
 
 
 def draw_tubes(

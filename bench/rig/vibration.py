@@ -44,21 +44,9 @@ class Mode:
         """Find the mode by Rayleigh–Ritz, with polynomials that are clamped at the base, and zero
         at the prop if there is one."""
         length = rod.length_mm * 1e-3
-        nodes, weights = leggauss(64)
-        at = 0.5 * (nodes + 1)  # (64,): parts of the length
-        weights = 0.5 * length * weights
-        width = rod.width(at * rod.length_mm)
-        mass = weights * rod.mass_kg_m * width**2
-        stiffness = weights * 1e-6 * rod.rigidity_Nmm2 * width**4
-
-        shapes = _evaluate(_CLAMPED, at)  # (64, shapes)
-        curvatures = _evaluate(_CURVATURES, at) / length**2
-        allowed = np.eye(len(_CLAMPED))
-        if prop_mm is not None:
-            allowed = null_space(_evaluate(_CLAMPED, np.array([prop_mm / rod.length_mm])))
-        frequency, mode = _first_mode(shapes @ allowed, curvatures @ allowed, mass, stiffness)
-        mode = allowed @ mode  # (shapes,)
-        momentum = mass * (shapes @ mode)
+        at, mass, stiffness = _beam(rod)
+        frequency, mode = _first_mode(rod, prop_mm, at, mass, stiffness)
+        momentum = mass * (_evaluate(_CLAMPED, at) @ mode)
         curvature_at_base = float(_evaluate(_CURVATURES, np.zeros(1))[0] @ mode) / length**2
         moment = -1e-3 * rod.rigidity_Nmm2 * curvature_at_base
         swing = -float(momentum @ at) * length
@@ -68,14 +56,34 @@ class Mode:
         return cls(frequency, moment, swing, 1e-3 * float(momentum @ lag_mm), push)
 
 
-def _first_mode(shapes, curvatures, mass, stiffness):
-    """Return the lowest frequency, rad/s, and its mode (k,) in shapes (n, k) at stations (n,)."""
+def _beam(rod):
+    """Return parts (64,) of the length with the mass, kg, and the stiffness, N·m³, that stand for
+    the rod there in integrals over its length, m."""
+    nodes, weights = leggauss(64)
+    at = 0.5 * (nodes + 1)
+    weights = 0.5 * (rod.length_mm * 1e-3) * weights
+    width = rod.width(at * rod.length_mm)
+    mass = weights * rod.mass_kg_m * width**2
+    stiffness = weights * 1e-6 * rod.rigidity_Nmm2 * width**4
+    return at, mass, stiffness
+
+
+def _first_mode(rod, prop_mm, at, mass, stiffness):
+    """Return the lowest frequency, rad/s, and its mode, coefficients (k,) of _CLAMPED.
+
+    at, mass, stiffness (n,): see `_beam`.
+    """
+    allowed = np.eye(len(_CLAMPED))
+    if prop_mm is not None:
+        allowed = null_space(_evaluate(_CLAMPED, np.array([prop_mm / rod.length_mm])))
+    shapes = _evaluate(_CLAMPED, at) @ allowed
+    curvatures = _evaluate(_CURVATURES, at) / (rod.length_mm * 1e-3) ** 2 @ allowed
     squares, modes = eigh(
         (curvatures.T * stiffness) @ curvatures,
         (shapes.T * mass) @ shapes,
         subset_by_index=[0, 0],
     )
-    return math.sqrt(squares[0]), modes[:, 0]
+    return math.sqrt(squares[0]), allowed @ modes[:, 0]
 
 
 def _evaluate(polynomials, at):

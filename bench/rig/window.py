@@ -6,7 +6,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from bench.rig.pinhole import Camera
+from bench.rig.pinhole import PinholeCamera
 
 _LEAST_BLUR = 0.2  # samples: a blur of less changes nothing
 
@@ -18,7 +18,7 @@ class Window:
     fine: samples to a pixel each way. soft_px: sigma of the blur of every drawn edge.
     """
 
-    camera: Camera
+    camera: PinholeCamera
     left: int
     top: int
     right: int
@@ -27,7 +27,7 @@ class Window:
     soft_px: float
 
     @classmethod
-    def whole(cls, camera: Camera, fine: int, soft_px: float, margin: int = 0) -> "Window":
+    def whole(cls, camera: PinholeCamera, fine: int, soft_px: float, margin: int = 0) -> "Window":
         """Return the window of the whole picture and a margin of pixels round it."""
         width, height = camera.size_px
         return cls(camera, -margin, -margin, width + margin, height + margin, fine, soft_px)

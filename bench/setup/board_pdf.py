@@ -105,12 +105,12 @@ def page(board: Board, paper: Paper) -> Figure:
 
 
 def dark_rectangles(board: Board, left_mm: float, top_mm: float) -> Iterator[np.ndarray]:
-    """Yield what is printed, as rectangles (4, 2), mm.
+    """Return what is printed, as rectangles (4, 2), mm.
 
     They overlap, so that there is no seam between them: runs of cells along rows, runs along
     columns, and the four cells about each point where both have a seam.
     """
-    made = rig.Board(
+    made = rig.PrintedBoard(
         board.squares,
         board.square_mm,
         board.marker_mm,
@@ -120,9 +120,11 @@ def dark_rectangles(board: Board, left_mm: float, top_mm: float) -> Iterator[np.
     )
     margin_mm = board.square_mm / 2 if board.inverted else 0.0
     printed = made.to_print(_INK, margin_mm).shift(left_mm, top_mm)
-    dark = printed.reflectance < 0.5
-    x = printed.x_mm
-    y = printed.y_mm
+    return _rectangles(printed.reflectance < 0.5, printed.x_mm, printed.y_mm)
+
+
+def _rectangles(dark: np.ndarray, x: np.ndarray, y: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield rectangles (4, 2) of the dark ones of cells (rows, columns) between edges x and y."""
     for row, cells in enumerate(dark):
         for a, b in _runs(cells):
             yield _box(x[a], x[b], y[row], y[row + 1])
@@ -147,22 +149,22 @@ def _box(x0: float, x1: float, y0: float, y1: float) -> np.ndarray:
 
 def _ruler(axes: Axes, origin: tuple[float, float], length: float, *, down: bool) -> None:
     """Draw a ruler from the board's corner outwards: a tick each millimetre, a number each ten."""
-    start = np.array(origin)
     along = np.array([0.0, 1.0]) if down else np.array([1.0, 0.0])
     outwards = np.array([-1.0, 0.0]) if down else np.array([0.0, 1.0])
     alignment = {"ha": "right", "va": "center"} if down else {"ha": "center", "va": "top"}
-
-    def line(a: np.ndarray, b: np.ndarray) -> None:
-        axes.plot([a[0], b[0]], [a[1], b[1]], color="black", lw=0.3)
-
     for mm in range(int(length + 1e-6) + 1):
-        at = start + mm * along
+        at = origin + mm * along
         tick_mm = 4.5 if mm % 10 == 0 else 3.0 if mm % 5 == 0 else 2.0
-        line(at, at + tick_mm * outwards)
+        _draw_line(axes, at, at + tick_mm * outwards)
         if mm % 10 == 0:
             x, y = at + 5.2 * outwards
             axes.text(x, y, str(mm), fontsize=6, **alignment)
-    line(start, start + length * along)
+    _draw_line(axes, np.array(origin), origin + length * along)
+
+
+def _draw_line(axes: Axes, start: np.ndarray, end: np.ndarray) -> None:
+    """Draw a thin line between two points (2,)."""
+    axes.plot([start[0], end[0]], [start[1], end[1]], color="black", lw=0.3)
 
 
 def _words(axes: Axes, board: Board, left: float, top: float) -> None:

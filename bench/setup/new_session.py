@@ -77,7 +77,7 @@ def new_session(
     answers = dict(given)
     for question in QUESTIONS if ask else ():
         if question.option not in answers:
-            answers |= _answered(question, ask)
+            answers |= _ask_until_plausible(question, ask)
     for folder in FOLDERS:
         (path / folder).mkdir(parents=True, exist_ok=True)
     text = manifest_text(name or path.resolve().name, answers, squares, dictionary)
@@ -85,8 +85,8 @@ def new_session(
     return list(_next_steps(path, answers))
 
 
-def _answered(question: Question, ask: Ask) -> dict[str, float]:
-    """Ask until the answer is a plausible number, and return it by option; nothing for an empty one."""
+def _ask_until_plausible(question: Question, ask: Ask) -> dict[str, float]:
+    """Return a plausible answer by option, requested until it is one; nothing for an empty one."""
     while text := ask(f"{question.wanted} (Enter: fill in later): ").strip():
         try:
             question.plausible_range.check(float(text), question.key, MANIFEST)

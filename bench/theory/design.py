@@ -1,12 +1,12 @@
 """The whisker for a job: θ, α_est, thickness, length, taper and base tilt of the least worst error of (10).
 
 The error of a design at one slope, friction angle and distance is that of (10) with the moments of
-(13), (14) there, and with its neglected terms to first order; its sigma is that of the estimators'
-own formulas, from the noise of one sample by the weights with which touch and moments are read. Worst
+(13), (14), and with its neglected terms to first order; its sigma is by the estimators' own
+formulas, from the noise of one sample by the weights with which touch and moments are read. Worst
 is the largest |bias| + 1.96 sigma over the region.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -116,27 +116,37 @@ def expected_error(
 ) -> ExpectedError:
     """Compute the error of (10) that is to be expected at points (3, n) of the region."""
     beta, alpha, d_x = points
-    theta = design.theta_rad
     slope = beta - np.radians(design.tilt_deg)
-    thickness = design.thickness(d_x)
+    with np.errstate(all="ignore"):
+        moments = _moments(design, equipment, slope, alpha, d_x)
+        of_cylinder, noise_mm = _cylinder_distance(design, equipment, *moments)
+        noise_share = noise_mm / of_cylinder * design.thickness(d_x)
+        by_friction = 1.0 / (1.0 / of_cylinder + design.taper / design.length_mm) / d_x - 1.0
+        lean_sigma = np.radians(region.lean_sigma_deg)
+        lean = first_order.leaning(design.theta_rad, lean_sigma, np.arctan2(*moments), alpha)
+    bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
+    errors = np.array([bias, np.hypot(noise_share, lean)])
+    has_distance = np.isfinite(bias + noise_share)
+    return ExpectedError(*np.where(has_distance, 100.0 * errors, np.inf))
+
+
+def _moments(design: Design, equipment: Equipment, slope, alpha, d_x) -> tuple[Numbers, Numbers]:
+    """Return (m_y, m_z) (n,), N·mm, at the pushing angle by (13) and (14)."""
+    C = 3.0 * design.rigidity_Nmm2(equipment)
+    return slip.moments(d_x / design.thickness(d_x), design.theta_rad, slope, alpha, C)
+
+
+def _cylinder_distance(
+    design: Design, equipment: Equipment, m_y: Numbers, m_z: Numbers
+) -> tuple[Numbers, Numbers]:
+    """Return the distance (n,) of the base's cylinder by (10), and its sigma by noise, mm."""
+    theta = design.theta_rad
     C = 3.0 * design.rigidity_Nmm2(equipment)
     alpha_est = float(np.radians(design.alpha_est_deg))
     noise = stroke_noise(theta, equipment.noise_Nmm, equipment.rate_Hz, equipment.speed_deg_s)
-    with np.errstate(all="ignore"):
-        m_y, m_z = slip.moments(d_x / thickness, theta, slope, alpha, C)
-        of_cylinder = distance.with_friction(theta, m_y, m_z, alpha_est, C)
-        gradient = uncertainty.gradient_with_friction(theta, m_y, m_z, alpha_est, C)
-        sigma_mm = _noise_sigma(gradient, theta, np.stack([m_y, m_z], axis=-1), noise)
-        noise_share = sigma_mm / of_cylinder * thickness
-        by_friction = 1.0 / (1.0 / of_cylinder + design.taper / design.length_mm) / d_x - 1.0
-        phi = np.arctan2(m_y, m_z)
-        lean = first_order.leaning(theta, np.radians(region.lean_sigma_deg), phi, alpha)
-    bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
-    has_distance = np.isfinite(bias) & np.isfinite(noise_share)
-    sigma = np.hypot(noise_share, lean)
-    return ExpectedError(
-        100.0 * np.where(has_distance, bias, np.inf), 100.0 * np.where(has_distance, sigma, np.inf)
-    )
+    distance_mm = distance.with_friction(theta, m_y, m_z, alpha_est, C)
+    gradient = uncertainty.gradient_with_friction(theta, m_y, m_z, alpha_est, C)
+    return distance_mm, _noise_sigma(gradient, theta, np.stack([m_y, m_z], axis=-1), noise)
 
 
 def _noise_sigma(gradient, theta, moments: np.ndarray, noise: StrokeNoise) -> Numbers:
@@ -203,9 +213,9 @@ def faults(design: Design, region: Region, equipment: Equipment) -> dict[str, fl
     compliance = 1.0 / d_x - design.taper / design.length_mm  # of the distance, 1/mm
     moments = design.theta_rad * 3.0 * rigidity * compliance
     bending = moments * (1.0 - _ALONG) / design.thickness(_ALONG * d_x) ** 3
-    strain = 0.5 * design.diameter_mm * bending.max() / rigidity
+    strain = 0.5 * design.diameter_mm * bending / rigidity
     shares = {
-        "strain": strain / equipment.most_strain,
+        "strain": strain.max() / equipment.most_strain,
         "gauges' range": moments.max() / equipment.full_scale_Nmm,
     }
     return {name: share - 1.0 for name, share in shares.items() if share > 1.0}
@@ -216,12 +226,8 @@ def best_design(
 ) -> tuple[Design, float]:
     """Find the design of least worst error within ranges (low, high) of each of NAMES.
 
-    Returns it and that error in %. By differential evolution (Storn & Price, Journal of Global
-    Optimization 11, 1997), then Nelder and Mead's simplex. Raises BadInput where no design within
-    the ranges is one.
+    Returns it and that error in %. Raises BadInput where no design within the ranges is one.
     """
-    from scipy.optimize import Bounds, differential_evolution, minimize
-
     design = Design(**{name: low for name, (low, _) in ranges.items()})
     free = [name for name in NAMES if ranges[name][0] < ranges[name][1]]
     if free:
@@ -229,21 +235,32 @@ def best_design(
         def worst(values: np.ndarray) -> float:
             return worst_percent(_with_values(design, free, values), region, equipment)
 
-        bounds = Bounds(*np.array([ranges[name] for name in free]).T)
-        found = differential_evolution(
-            worst,
-            bounds,
-            rng=np.random.default_rng(seed),
-            maxiter=_GENERATIONS,
-            popsize=_POPULATION,
-            tol=_TOLERANCE,
-            polish=False,
-        )
-        refined = minimize(worst, found.x, method="Nelder-Mead", bounds=bounds)
-        best = refined if refined.fun < found.fun else found
-        design = _with_values(design, free, best.x)
+        limits = np.array([ranges[name] for name in free])
+        design = _with_values(design, free, _least(worst, limits, seed))
     _require_design(design, region, equipment)
     return design, largest_percent(design, region, equipment)
+
+
+def _least(function: Callable, limits: np.ndarray, seed: int) -> np.ndarray:
+    """Return the arguments (n,) of the least value of a function within limits (n, 2).
+
+    By differential evolution (Storn & Price, Journal of Global Optimization 11, 1997), then Nelder
+    and Mead's simplex.
+    """
+    from scipy.optimize import Bounds, differential_evolution, minimize
+
+    bounds = Bounds(*limits.T)
+    found = differential_evolution(
+        function,
+        bounds,
+        rng=np.random.default_rng(seed),
+        maxiter=_GENERATIONS,
+        popsize=_POPULATION,
+        tol=_TOLERANCE,
+        polish=False,
+    )
+    refined = minimize(function, found.x, method="Nelder-Mead", bounds=bounds)
+    return refined.x if refined.fun < found.fun else found.x
 
 
 def _with_values(design: Design, names: Sequence[str], values: np.ndarray) -> Design:
@@ -255,13 +272,11 @@ def _require_design(design: Design, region: Region, equipment: Equipment) -> Non
     """Raise BadInput where the best design of some ranges does not serve the region."""
     if worst_percent(design, region, equipment) < _NO_DESIGN:
         return
-    excesses = []
-    for name, share in faults(design, region, equipment).items():
-        excesses.append(f"{name} by {100 * share:.0f} %")
+    found = faults(design, region, equipment)
+    excesses = [f"{name} by {100 * share:.0f} %" for name, share in found.items()]
+    why = "(10) has no distance where φ + α_est reaches 90°"
     if excesses:
         why = f"{', '.join(excesses)} too much"
-    else:
-        why = "(10) has no distance where φ + α_est reaches 90°"
     raise BadInput(f"no design within the ranges serves the whole region: {why}")
 
 

@@ -149,7 +149,13 @@ def report_lines(report: DesignReport) -> Iterator[str]:
     for name, cost in sorted(report.costs_percent.items(), key=lambda item: -item[1]):
         choice = _with_unit(Design(), name)
         yield f"  all else as good as can be, but {choice}: {_percent(cost)}"
-    difference = report.exact_percent - report.expected_at(region.corners()).bias_percent
+    yield from _agreement_lines(report)
+
+
+def _agreement_lines(report: DesignReport) -> Iterator[str]:
+    """Yield how far the expected bias is from exact mechanics at the region's corners."""
+    expected = report.expected_at(report.region.corners())
+    difference = report.exact_percent - expected.bias_percent
     is_known = np.isfinite(difference)
     if is_known.any():
         within = f"{np.abs(difference[is_known]).max():.2f} % of d_x"

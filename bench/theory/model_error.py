@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.base.workers import Workers
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
-from bench.rig.stick_slip import Friction, March
+from bench.rig.stick_slip import FrictionCoefficients, March
 from estimator.beam import Beam
 from estimator.builtin import corrected, with_friction
 from estimator.whisk import EstimatorSettings, Whisk
@@ -66,7 +66,7 @@ def feel(push: Push, rod: Rod = ROD, beam: Beam = _BEAM) -> tuple[Whisk, float]:
 
     Raises ArithmeticError where the whisker finds no hold on the bar.
     """
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=push.d_x_mm,
         beta_rad=np.radians(push.beta_deg),
         psi_rad=np.radians(push.psi_deg),
@@ -74,18 +74,28 @@ def feel(push: Push, rod: Rod = ROD, beam: Beam = _BEAM) -> tuple[Whisk, float]:
         radius_mm=push.bar_radius_mm,
         whisker_radius_mm=float(rod.radius_mm(push.d_x_mm)),
     )
-    theta = np.radians(push.theta_deg)
-    friction = np.tan(np.radians(push.alpha_deg))
     touch = find_first_touch(rod, bar, 0.0, push.d_x_mm)
-    march = March(rod, bar, Friction(friction, friction), touch)
-    _, states = march.along(touch.motor_rad + theta * np.arange(1, _STEPS + 1) / _STEPS)
-    if states[-1] is None:
-        raise ArithmeticError("the whisker slips off the bar")
-    m_y, m_z = moments_Nmm(states[-1])
+    theta = np.radians(push.theta_deg)
+    m_y, m_z = _end_moments_Nmm(March(rod, bar, _friction(push), touch), theta)
     covariance = _NOISE_NMM**2 * np.eye(2)
     none = np.zeros(0)
     whisk = Whisk(none, none, none, none, theta, m_y, m_z, covariance, 0.0, beam)
     return whisk, touch.d_x_mm
+
+
+def _friction(push: Push) -> FrictionCoefficients:
+    """Return the friction of a push, the same at rest and in motion."""
+    coefficient = np.tan(np.radians(push.alpha_deg))
+    return FrictionCoefficients(coefficient, coefficient)
+
+
+def _end_moments_Nmm(march: March, theta_rad: float) -> tuple[float, float]:
+    """Return (m_y, m_z) at a pushing angle. Raises ArithmeticError where the whisker slips off."""
+    steps = theta_rad * np.arange(1, _STEPS + 1) / _STEPS
+    _, states = march.along(march.touch.motor_rad + steps)
+    if states[-1] is None:
+        raise ArithmeticError("the whisker slips off the bar")
+    return moments_Nmm(states[-1])
 
 
 def errors_percent(push: Push) -> tuple[float, float]:

@@ -93,13 +93,18 @@ def draw(panels: Sequence[Panel], title: str) -> Figure:
     y_name = _NAMES[panels[0].y]
     grid[0, 0].set_ylabel(f"(10)\n{y_name}")
     grid[1, 0].set_ylabel(f"(10) corrected\n{y_name}")
+    _draw_legend(figure)
+    figure.suptitle(title, fontsize=9)
+    figure.colorbar(colours, ax=grid, label="error of d$_x$  [%]", ticks=_LEVELS)
+    return figure
+
+
+def _draw_legend(figure: Figure) -> None:
+    """Draw what solid and dashed lines are."""
     exact = Line2D([], [], color="black", ls="-", lw=0.8)
     predicted = Line2D([], [], color="0.35", ls="--", lw=0.8)
     names = ["exact mechanics", "to first order in θ"]
     figure.legend([exact, predicted], names, loc="outside lower center", ncols=2)
-    figure.suptitle(title, fontsize=9)
-    figure.colorbar(colours, ax=grid, label="error of d$_x$  [%]", ticks=_LEVELS)
-    return figure
 
 
 def _draw_errors(axes: Axes, panel: Panel, percent: np.ndarray) -> ContourSet:

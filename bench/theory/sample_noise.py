@@ -37,17 +37,30 @@ def stroke_noise(
     """
     speed = np.radians(speed_deg_s)
     half_window = min(max(HALF_WINDOW_RAD, speed * HUM_PERIOD_S / 2), 0.9 * theta_rad)
-    rise_window = max(WINDOW_RAD, speed * WINDOW_S)
     angle = np.linspace(-_FREE_RAD, theta_rad + half_window, _SAMPLES)
     spacing = angle[1] - angle[0]
     sigma = noise_Nmm * np.sqrt(spacing**-1 / (rate_Hz / speed))  # of a sample of this grid
-    level = noise.mean_weights(angle < -GUARD_RAD)
-    is_rise = (angle > GUARD_RAD) & (angle <= rise_window)
-    touch = noise.line_weights(angle, is_rise, 0.0) - level
-    is_at_theta = np.abs(angle - theta_rad) <= half_window
-    moment = noise.line_weights(angle, is_at_theta, theta_rad) - level
+    touch = _touch_weights(angle, max(WINDOW_RAD, speed * WINDOW_S))
+    moment = _moment_weights(angle, theta_rad, half_window)
     return StrokeNoise(
         float(sigma * np.linalg.norm(touch)),
         float(sigma * np.linalg.norm(moment)),
         float(sigma**2 * (touch @ moment)),
     )
+
+
+def _touch_weights(angle, window_rad):
+    """Return the weights (n,) of samples at angles in the rise that is drawn back to touch."""
+    is_rise = (angle > GUARD_RAD) & (angle <= window_rad)
+    return noise.line_weights(angle, is_rise, 0.0) - _level_weights(angle)
+
+
+def _moment_weights(angle, theta_rad, half_window_rad):
+    """Return the weights (n,) of samples at angles in the moment at θ."""
+    is_at_theta = np.abs(angle - theta_rad) <= half_window_rad
+    return noise.line_weights(angle, is_at_theta, theta_rad) - _level_weights(angle)
+
+
+def _level_weights(angle):
+    """Return the weights (n,) of samples at angles in the level of the free stroke."""
+    return noise.mean_weights(angle < -GUARD_RAD)

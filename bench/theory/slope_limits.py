@@ -40,7 +40,7 @@ PRINTED_POINTS = {
 
 
 @dataclass(frozen=True)
-class Curve:
+class ThresholdCurve:
     """One line of a panel.
 
     parameters: columns of the CSV file, by name. x, beta_thresh_deg (n,): NaN where the error is never reached.
@@ -76,7 +76,7 @@ def write_figure(number: int, out: Path) -> list[Path]:
     return [*paths, stem.with_suffix(".csv")]
 
 
-def figure_5() -> Iterator[Curve]:
+def figure_5() -> Iterator[ThresholdCurve]:
     """Yield the curves of figure 5: β_thresh over the true α.
 
     Panels (a) to (c) are of α_est = 0°, 10°, 20°; (10) is solid, (2) dashed; errors 1, 5, 10 %.
@@ -87,7 +87,7 @@ def figure_5() -> Iterator[Curve]:
             for name, equation in EQUATIONS.items():
                 alpha_est = np.radians(alpha_est_deg)
                 beta = slope_threshold(error / 100, alpha, alpha_est, equation=equation)
-                yield Curve(
+                yield ThresholdCurve(
                     panel,
                     {"alpha_est_deg": alpha_est_deg, "error_percent": error, "equation": name},
                     ALPHA_DEG,
@@ -98,7 +98,7 @@ def figure_5() -> Iterator[Curve]:
                 )
 
 
-def figure_6() -> Iterator[Curve]:
+def figure_6() -> Iterator[ThresholdCurve]:
     """Yield the curves of figure 6: β_thresh over r_n, once with Appendix B as printed and once exact.
 
     Panels (a) to (c) are of errors of 1, 5, 10 %; α = α_est = 0° is dashed, 20° solid; θ = 1°, 3°,
@@ -109,7 +109,7 @@ def figure_6() -> Iterator[Curve]:
             for theta_deg in THETA_DEG:
                 for alpha_deg in FRICTION_DEG:
                     beta = _curved_threshold(error, alpha_deg, theta_deg, form == "printed")
-                    yield Curve(
+                    yield ThresholdCurve(
                         panel,
                         {
                             "form": form,
@@ -154,6 +154,16 @@ def _draw(number, curves):
     for axes, form in zip(grid, forms):
         for ax, panel in zip(axes, "abc"):
             _draw_panel(ax, number, [c for c in curves if (c.panel, c.form) == (panel, form)])
+    _draw_legend(figure, grid)
+    for ax in grid[:, 0]:
+        ax.set_ylabel(r"$\beta_\mathrm{thresh}$  [°]")
+    for ax in grid[-1]:
+        ax.set_xlabel(_X_LABELS[number])
+    return figure
+
+
+def _draw_legend(figure, grid) -> None:
+    """Draw one legend of all panels' lines, and a letter above each panel."""
     entries = {}
     for ax, letter in zip(grid.flat, "abcdef"):
         ax.set_title(f"({letter}) {ax.get_title()}")
@@ -162,11 +172,6 @@ def _draw(number, curves):
     figure.legend(
         entries.values(), entries.keys(), loc="outside lower center", ncols=7, frameon=False
     )
-    for ax in grid[:, 0]:
-        ax.set_ylabel(r"$\beta_\mathrm{thresh}$  [°]")
-    for ax in grid[-1]:
-        ax.set_xlabel(_X_LABELS[number])
-    return figure
 
 
 def _draw_panel(ax, number, curves) -> None:

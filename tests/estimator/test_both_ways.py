@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.rig.bar import Bar, find_first_touch
-from bench.rig.marched import MarchedWhisk
-from bench.rig.stick_slip import Friction
+from bench.rig.bar import TouchedBar, find_first_touch
+from bench.rig.stick_slip import FrictionCoefficients
+from bench.rig.whisk_mechanics import WhiskMechanics
 from estimator.both_ways import ALIKE, NO_PUSH, there_and_back
 from estimator.whisk import EstimatorSettings, Whisk
 from tests.studies.accuracy.estimates_montecarlo import rod_and_beam
@@ -26,10 +26,13 @@ def ways(beta_deg):
         "touch_rad": 0.0,
         "radius_mm": 3.0,
     }
-    bar = Bar.at_contact(**place, whisker_radius_mm=0.5)
-    touch, friction = find_first_touch(ROD, bar, 0.0, 60.0), Friction(np.tan(ALPHA), np.tan(ALPHA))
+    bar = TouchedBar.at_contact(**place, whisker_radius_mm=0.5)
+    touch, friction = (
+        find_first_touch(ROD, bar, 0.0, 60.0),
+        FrictionCoefficients(np.tan(ALPHA), np.tan(ALPHA)),
+    )
     end = touch.motor_rad + np.radians(4.6)
-    march = MarchedWhisk.run(ROD, bar, friction, touch, end, step_rad=np.radians(0.2), back=True)
+    march = WhiskMechanics.run(ROD, bar, friction, touch, end, step_rad=np.radians(0.2), back=True)
     at = np.array([touch.motor_rad + THETA])
     moments = (way.moments_at(at)[0] for way in (march.forward, march.back))
     return [

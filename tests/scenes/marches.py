@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
-from bench.rig.stick_slip import Friction, March
+from bench.rig.stick_slip import FrictionCoefficients, March
 
 WIRE = Rod("cylinder", 100.0, 1.0, 60.0)
 C = 3 * WIRE.rigidity_Nmm2
@@ -29,7 +29,7 @@ def whisk(
 ):
     """(march, touch, states) along pushing angles."""
     touch_rad = math.radians(touch_deg)
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=d_x,
         beta_rad=math.radians(beta),
         psi_rad=math.radians(psi),
@@ -38,7 +38,9 @@ def whisk(
         whisker_radius_mm=float(rod.radius_mm(d_x)),
     )
     touch = find_first_touch(rod, bar, touch_rad, d_x)
-    march = March(rod, bar, Friction(mu if static is None else static, mu, rests=rests), touch)
+    march = March(
+        rod, bar, FrictionCoefficients(mu if static is None else static, mu, rests=rests), touch
+    )
     _, states = march.along(touch.motor_rad + np.radians(thetas_deg))
     return march, touch, states
 

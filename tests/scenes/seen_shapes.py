@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import Bar, find_first_touch
-from bench.rig.elastic_rod import Rest, Rod
-from bench.rig.marched import MarchedWhisk
-from bench.rig.stick_slip import Friction
+from bench.rig.bar import TouchedBar, find_first_touch
+from bench.rig.elastic_rod import RestShape, Rod
+from bench.rig.stick_slip import FrictionCoefficients
+from bench.rig.whisk_mechanics import WhiskMechanics
 from estimator.beam import Beam
 from estimator.seen_shape import SeenShape
 
@@ -51,14 +51,14 @@ def shown(
         LENGTH_MM,
         1.0,
         E_GPA,
-        rest=Rest(LENGTH_MM, 0.2, rng.normal(), rng.normal()),
+        rest=RestShape(LENGTH_MM, 0.2, rng.normal(), rng.normal()),
         **({"tip_diameter_mm": 0.4} if shape == "tapered" else {}),
     )
     beta, psi, theta, mu = (
         *np.radians([beta_deg, psi_deg, theta_deg]),
         np.tan(np.radians(alpha_deg)),
     )
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=d_x_mm,
         beta_rad=beta,
         psi_rad=psi,
@@ -71,10 +71,10 @@ def shown(
     wanted = touch.motor_rad + theta
     motor = np.append(np.linspace(touch.motor_rad - 0.05, wanted + 0.01, 23), wanted)
     motor.sort()
-    whisk = MarchedWhisk.run(
+    whisk = WhiskMechanics.run(
         rod,
         bar,
-        Friction(mu, mu),
+        FrictionCoefficients(mu, mu),
         touch,
         motor.max(),
         step_rad=0.004,

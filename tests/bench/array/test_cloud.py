@@ -5,7 +5,7 @@ import pytest
 
 from bench.array.cloud import Mount, contacts
 from bench.array.shape_verdict import surface_lines, surface_verdict
-from bench.array.surface import Surface
+from bench.array.surface import ObjectSurface
 from bench.records.trial_result import (
     EstimateRow,
     FeltWhisk,
@@ -32,7 +32,7 @@ def felt(d_x_mm=60.0, touch_rad=0.3, beta=0.5, status="") -> TrialResult:
     return trial_result(felt=(whisk,))
 
 
-def cloud(result: TrialResult, surface: Surface | None = None, base: Base = BASE):
+def cloud(result: TrialResult, surface: ObjectSurface | None = None, base: Base = BASE):
     mount = Mount(base, WIRE, ALPHA, 0.05)
     return list(contacts(mount, [result], {"t": surface} if surface else {}))
 
@@ -66,7 +66,7 @@ def test_point_and_covariance_are_those_of_draws():
     assert contact.normal_sigma_rad == pytest.approx(np.hypot(0.03, 0.05))
 
 
-def bar(along_mm: float) -> tuple[Surface, Base]:
+def bar(along_mm: float) -> tuple[ObjectSurface, Base]:
     """A bar of slope 0.5 that a whisker at the origin touches at 60 mm and 0.3 rad; its point moved along the axis."""
     across, axis = (
         np.array([0.0, -np.cos(0.5), np.sin(0.5)]),
@@ -75,7 +75,7 @@ def bar(along_mm: float) -> tuple[Surface, Base]:
     cos, sin = np.cos(0.3), np.sin(0.3)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     point = turn @ (np.array([60.0, 0.0, 0.0]) - 3.5 * across + along_mm * axis)
-    return Surface("bar", point, turn @ axis, 3.0), Base("w1", np.eye(3, 4), 0.0, 0.0)
+    return ObjectSurface("bar", point, turn @ axis, 3.0), Base("w1", np.eye(3, 4), 0.0, 0.0)
 
 
 def test_a_contact_on_the_surface_is_on_it():
@@ -100,17 +100,19 @@ def test_an_error_of_distance_shows_along_the_whisker_and_one_of_touch_across_it
 
 def test_distances_from_rings_and_spheres():
     points = np.array([[23.0, 0.0, 0.0], [0.0, 20.0, 4.0], [0.0, 0.0, 15.0]])
-    ring = Surface("ring", np.zeros(3), np.array([0.0, 0.0, 1.0]), 2.0, 20.0)
+    ring = ObjectSurface("ring", np.zeros(3), np.array([0.0, 0.0, 1.0]), 2.0, 20.0)
     outside, normals = ring.distance_mm(points[:2])
     np.testing.assert_allclose(outside, [1.0, 2.0])
     np.testing.assert_allclose(normals, [[1, 0, 0], [0, 0, 1]], atol=1e-12)
-    sphere = Surface("sphere", np.zeros(3), np.array([0.0, 0.0, 1.0]), 10.0)
+    sphere = ObjectSurface("sphere", np.zeros(3), np.array([0.0, 0.0, 1.0]), 10.0)
     np.testing.assert_allclose(sphere.distance_mm(points)[0], [13.0, np.hypot(20, 4) - 10.0, 5.0])
 
 
 def test_distances_from_a_cone():
     """Its tip at the origin, pointing up, opening by 30°: beside it, inside, and above the tip."""
-    cone = Surface("cone", np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, half_angle_rad=np.pi / 6)
+    cone = ObjectSurface(
+        "cone", np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, half_angle_rad=np.pi / 6
+    )
     beside = np.array([0.5, 0.0, -np.sqrt(0.75)]) * 10.0 + 2.0 * np.array([np.sqrt(0.75), 0.0, 0.5])
     outside, normals = cone.distance_mm(np.array([beside, [0.0, 1e-9, -4.0], [3.0, 0.0, 4.0]]))
     np.testing.assert_allclose(outside, [2.0, -2.0, 5.0], atol=1e-8)

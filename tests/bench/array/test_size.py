@@ -6,16 +6,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bench.array.cloud import Contact
+from bench.array.cloud import ContactPoint
 from bench.array.size import fit_size, fit_sizes, size_lines
-from bench.array.surface import SEEN, Surface
+from bench.array.surface import SEEN, ObjectSurface
 from vision.geometry.rods import Wire
 
 WIRE, UP = Wire("cylinder", 100.0, 1.0), np.array([0.0, 0.0, 1.0])
 BASES = [np.array([0.0, y, z]) for y in (0.0, -12.0) for z in (-10.0, 0.0, 10.0)]
-BALL = Surface("sphere", np.array([55.0, 32.0, 2.0]), UP, 30.0)
-CONE = Surface("cone", np.array([55.0, 22.0, 60.0]), UP, 0.0, half_angle_rad=np.radians(20.0))
-RING = Surface("ring", np.array([55.0, 45.0, 2.0]), np.array([1.0, 0.0, 0.0]), 3.0, 40.0)
+BALL = ObjectSurface("sphere", np.array([55.0, 32.0, 2.0]), UP, 30.0)
+CONE = ObjectSurface("cone", np.array([55.0, 22.0, 60.0]), UP, 0.0, half_angle_rad=np.radians(20.0))
+RING = ObjectSurface("ring", np.array([55.0, 45.0, 2.0]), np.array([1.0, 0.0, 0.0]), 3.0, 40.0)
 SURFACES = {surface.shape: surface for surface in (BALL, CONE, RING)}
 TOUCH_SIGMA, D_SIGMA, ALPHA_MM = 5e-4, 0.5, 0.8
 
@@ -38,7 +38,9 @@ def touched(name: str, number: int) -> tuple[float, float]:
     return gap(low)[1], low
 
 
-def drawn(surface: Surface, rng: np.random.Generator, scale: float = 1.0) -> list[Contact]:
+def drawn(
+    surface: ObjectSurface, rng: np.random.Generator, scale: float = 1.0
+) -> list[ContactPoint]:
     """Contacts of all bases, their distances with an error of each and one of all."""
     contacts, common = [], scale * rng.standard_normal()
     for number, base in enumerate(BASES):
@@ -51,7 +53,7 @@ def drawn(surface: Surface, rng: np.random.Generator, scale: float = 1.0) -> lis
         covariance = (D_SIGMA**2 + ALPHA_MM**2) * np.outer(towards, towards)
         covariance += (arc * TOUCH_SIGMA) ** 2 * np.outer(aside, aside) + 1e-8 * np.outer(UP, UP)
         contacts.append(
-            Contact(
+            ContactPoint(
                 whisker=f"w{number}",
                 trial="t",
                 whisk=0,
@@ -73,12 +75,12 @@ def drawn(surface: Surface, rng: np.random.Generator, scale: float = 1.0) -> lis
 def test_sizes_come_back_from_where_they_are_not_quite_said_to_be(surface, rng):
     """Without noise, begun 2 mm and a twentieth of the size aside: to the steps' accuracy."""
     contacts = drawn(surface, rng, 0.0)
-    key = fit_size("t", contacts, surface).key
+    key = fit_size("t", contacts, surface).surface.form.size
     said = {
         "point_mm": surface.point_mm + np.array([2.0, -1.0, 1.0]),
         key: 1.05 * getattr(surface, key),
     }
-    found = fit_size("t", contacts, Surface(**(vars(surface) | said)))
+    found = fit_size("t", contacts, ObjectSurface(**(vars(surface) | said)))
     assert found.size.value == pytest.approx(getattr(surface, key), rel=1e-4)
     assert not found.status and found.chance > 0.999
 
@@ -100,5 +102,5 @@ def test_what_is_not_told_is_not_said(rng):
     assert by_touch.size.sigma > fit_size("t", contacts, BALL).size.sigma
     contacts[0].point_mm[1] += 1.0
     assert fit_size("t", contacts, BALL).status.codes == ("contacts_off_surface",)
-    seen = Surface("bar", np.zeros(3), UP, 3.0, source=SEEN)
+    seen = ObjectSurface("bar", np.zeros(3), UP, 3.0, source=SEEN)
     assert not fit_sizes(contacts, {"t": seen, "other": BALL})

@@ -12,10 +12,10 @@ from bench.gauges.drift import drift_rate, free_slope
 from bench.gauges.felt import gauge_delay, strokes_of
 from bench.gauges.fit import fit_gauges
 from bench.gauges.gauge_readings import pairs_of, reference_from_nominal, reference_from_pictures
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
-from bench.rig.stick_slip import Friction, March
+from bench.rig.stick_slip import FrictionCoefficients, March
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.whisker import Whisker
@@ -80,7 +80,7 @@ def test_a_nominal_bar_gives_the_moments_of_2(session):
 def test_a_nominal_bar_gives_the_moments_of_the_exact_contact(bar_radius_mm):
     """The rig marches the whole contact. Left out here is the second order of its lean in θ: (4°)² / 8 = 0.06 %."""
     rod = Rod("cylinder", WHISKER.length_mm, WHISKER.diameter_mm, WHISKER.implied_modulus_GPa)
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=50.0,
         beta_rad=0.0,
         psi_rad=0.0,
@@ -92,7 +92,7 @@ def test_a_nominal_bar_gives_the_moments_of_the_exact_contact(bar_radius_mm):
         d_x_mm=50.0, d_x_sigma_mm=0.0, beta_deg=0.0, bar_diameter_mm=2 * bar_radius_mm
     )
     reference = reference_from_nominal(trial, FeltTouch(0.0, 1e-4), WHISKER)
-    march = March(rod, bar, Friction(0.2, 0.2), find_first_touch(rod, bar, 0.0, 50.0))
+    march = March(rod, bar, FrictionCoefficients(0.2, 0.2), find_first_touch(rod, bar, 0.0, 50.0))
     exact = [moments_Nmm(state)[1] for state in march.along(reference.theta_rad)[1]]
     assert reference.moments[:, 1] == pytest.approx(exact, rel=6e-4)
 

@@ -8,7 +8,7 @@ import pytest
 from bench.base.errors import BadInput
 from bench.rig import build
 from bench.rig.array_rig import ArrayRecording, find_touch_from_afar, mount_whiskers
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.protocol import Protocol
 from bench.rig.protocol_tables import ColumnTable, TrialTable
 from bench.rig.recording import Recording
@@ -50,9 +50,9 @@ def test_base_and_bar_moved_alike_leave_the_touch_as_it_is(base_deg):
     made = protocol(base_mm=(7.0, -11.0, 3.0), base_deg=base_deg)
     (whisker,), rod = mount_whiskers(made, np.random.default_rng(0)), build.rod(made)
     angles = {"beta_rad": 0.6, "psi_rad": 0.2, "touch_rad": 0.04}
-    bar = Bar.at_contact(d_x_mm=55.0, **angles, radius_mm=3.0, whisker_radius_mm=0.5)
+    bar = TouchedBar.at_contact(d_x_mm=55.0, **angles, radius_mm=3.0, whisker_radius_mm=0.5)
     turn, shift = whisker.pose[:, :3], whisker.pose[:, 3]
-    moved = Bar(turn @ bar.point_mm + shift, turn @ bar.axis, bar.radius_mm)
+    moved = TouchedBar(turn @ bar.point_mm + shift, turn @ bar.axis, bar.radius_mm)
     found = find_touch_from_afar(rod, moved.in_frame(whisker.pose), 0.0)
     expected = find_first_touch(rod, bar, 0.04, 55.0)
     assert found.motor_rad == pytest.approx(expected.motor_rad, abs=1e-9)

@@ -8,11 +8,11 @@ import tomllib
 import numpy as np
 import pytest
 
-from bench.rig.bar import Bar, find_first_touch
-from bench.rig.elastic_rod import Rest, Rod
+from bench.rig.bar import TouchedBar, find_first_touch
+from bench.rig.elastic_rod import RestShape, Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import moments_Nmm
-from bench.rig.stick_slip import Friction
+from bench.rig.stick_slip import FrictionCoefficients
 from tests.scenes.marches import MU_10, polar, slip_mm, small_angle, whisk
 
 
@@ -228,7 +228,7 @@ def test_cone_meets_the_small_angle_cone():
 def test_rest_shape_moves_touch_but_hardly_the_moments():
     """Sag and set are 0.2 mm of 60: they turn the plane of pushing by some 0.3°, and |m| by less than 0.5 %."""
     rod = Rod(
-        "cylinder", 100.0, 1.0, 60.0, rest=Rest(100.0, sag_mm=0.21, set_y_mm=0.5, set_z_mm=0.3)
+        "cylinder", 100.0, 1.0, 60.0, rest=RestShape(100.0, sag_mm=0.21, set_y_mm=0.5, set_z_mm=0.3)
     )
     bare = whisk([1.0, 2.0, 3.0])
     bent = whisk([1.0, 2.0, 3.0], rod=rod)
@@ -237,8 +237,8 @@ def test_rest_shape_moves_touch_but_hardly_the_moments():
 
 
 def test_first_touch_is_where_the_distance_is_both_radii():
-    rod = Rod("cone", 100.0, 1.0, 60.0, rest=Rest(100.0, sag_mm=0.2, set_y_mm=-0.4))
-    bar = Bar.at_contact(
+    rod = Rod("cone", 100.0, 1.0, 60.0, rest=RestShape(100.0, sag_mm=0.2, set_y_mm=-0.4))
+    bar = TouchedBar.at_contact(
         d_x_mm=70.0,
         beta_rad=0.6,
         psi_rad=0.2,
@@ -262,7 +262,7 @@ def test_halving_the_step_changes_nothing_that_is_seen():
 
 def test_friction_at_rest_below_friction_in_motion_is_refused():
     with pytest.raises(ValueError, match="static"):
-        Friction(0.1, 0.2)
+        FrictionCoefficients(0.1, 0.2)
 
 
 @pytest.mark.slow

@@ -10,12 +10,12 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from bench.rig import build
-from bench.rig.bar import Bar, unloaded_curve
+from bench.rig.bar import TouchedBar, unloaded_curve
 from bench.rig.elastic_rod import Rod
 from bench.rig.light import Light, Material
 from bench.rig.painted_scene import HUB_FRONT_MM
-from bench.rig.pinhole import Camera
-from bench.rig.printed_board import Board, Ink
+from bench.rig.pinhole import PinholeCamera
+from bench.rig.printed_board import Ink, PrintedBoard
 from bench.rig.protocol import load
 from bench.rig.sensor import Sensor
 from bench.rig.studio import Moment, Studio
@@ -140,7 +140,7 @@ def test_lens_is_inverted_over_the_picture_and_its_margin():
 @pytest.mark.parametrize("legacy", [False, True])
 @pytest.mark.parametrize("inverted", [False, True])
 def test_the_print_is_opencvs(legacy, inverted):
-    board = Board((7, 6), 15.0, 11.0, "DICT_5X5_100", legacy=legacy, inverted=inverted)
+    board = PrintedBoard((7, 6), 15.0, 11.0, "DICT_5X5_100", legacy=legacy, inverted=inverted)
     print_ = board.to_print(Ink(1.0, 0.0), 5.0)
     per_mm = 7  # marker modules of 11/7 mm are 11 px then
     px = (np.arange(7 * 15 * per_mm) + 0.5) / per_mm
@@ -164,7 +164,7 @@ def moment(motor_rad, material=None):
 @pytest.fixture(scope="module", params=[0, 1])
 def setting(request):
     camera = build.cameras(QUICK)[request.param]
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=60.0, beta_rad=0.5, psi_rad=0.1, touch_rad=0.04, radius_mm=3.0, whisker_radius_mm=0.5
     )
     return studio(camera).setting(bar, bar.foot_mm(np.array([60.0, 2.4, 0.0]))), camera, bar
@@ -234,7 +234,7 @@ def test_vignetting_darkens_corners_by_what_it_says():
 
 def test_a_camera_that_looks_straight_down_is_refused():
     with pytest.raises(ValueError, match="straight"):
-        Camera.aim(
+        PinholeCamera.aim(
             "c",
             size_px=(64, 48),
             focal_px=100.0,

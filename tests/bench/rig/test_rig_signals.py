@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.loading import quasi_static_Nmm, ringing_Nmm
-from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol_tables import GaugesTable
-from bench.rig.stick_slip import Friction
+from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.strain_gauges import fine_times_s, sample_volts
 from bench.rig.stroke import Stroke
 from bench.rig.vibration import Mode, damped_oscillation
+from bench.rig.whisk_mechanics import WhiskMechanics
 
 WIRE = Rod("cylinder", 100.0, 1.0, 60.0)
 MATRIX = np.array([[11.3, 0.32], [-0.25, 10.5]])
@@ -131,7 +131,7 @@ def test_ring_solves_its_equation():
 
 
 def whisked(friction, back=False, beta_deg=60.0, whisks=1, ramp_s=0.0):
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=60.0,
         beta_rad=math.radians(beta_deg),
         psi_rad=0.0,
@@ -149,14 +149,14 @@ def whisked(friction, back=False, beta_deg=60.0, whisks=1, ramp_s=0.0):
         ramp_s=ramp_s,
     )
     end_rad = float(stroke.angles_rad.max())
-    whisk = MarchedWhisk.run(
+    whisk = WhiskMechanics.run(
         WIRE, bar, friction, touch, end_rad, step_rad=math.radians(0.1), back=back
     )
     return stroke, (whisk,) * whisks
 
 
 def test_moments_are_zero_before_touch_and_after_the_way_back():
-    stroke, whisks = whisked(Friction(0.18, 0.18), back=True, whisks=2, ramp_s=0.02)
+    stroke, whisks = whisked(FrictionCoefficients(0.18, 0.18), back=True, whisks=2, ramp_s=0.02)
     times = np.arange(0, stroke.end_s, 1e-3)
     moments, motor = quasi_static_Nmm(stroke, whisks, times), stroke.angle_rad(times)
     free = motor < whisks[0].touch.motor_rad
@@ -168,7 +168,7 @@ def test_moments_are_zero_before_touch_and_after_the_way_back():
 
 
 def test_friction_opens_a_loop_between_the_two_ways():
-    _, (whisk,) = whisked(Friction(0.18, 0.18), back=True)
+    _, (whisk,) = whisked(FrictionCoefficients(0.18, 0.18), back=True)
     at = whisk.touch.motor_rad + math.radians(2)
     up, down = (i.moments_at([at])[0] for i in (whisk.forward, whisk.back))
     phi_up, phi_down = (math.atan2(*m) for m in (up, down))
@@ -176,7 +176,7 @@ def test_friction_opens_a_loop_between_the_two_ways():
 
 
 def test_touch_rings_the_propped_mode_and_dies_out():
-    stroke, whisks = whisked(Friction(0.18, 0.18))
+    stroke, whisks = whisked(FrictionCoefficients(0.18, 0.18))
     times = np.arange(0, stroke.end_s, 1e-4)
     ringing = ringing_Nmm(stroke, whisks, times, damping=0.02)
     touch_s = float(stroke.time_s(0, whisks[0].touch.motor_rad))
@@ -194,7 +194,7 @@ def test_touch_rings_the_propped_mode_and_dies_out():
 
 def test_ringing_makes_a_jump_of_stick_slip_continuous():
     """A mass cannot jump: quasi-static moment and ringing change by less than a fifth of the jump in 0.1 ms."""
-    stroke, whisks = whisked(Friction(0.25, 0.18))
+    stroke, whisks = whisked(FrictionCoefficients(0.25, 0.18))
     times = np.arange(0, stroke.end_s, 1e-4)
     still = quasi_static_Nmm(stroke, whisks, times)
     shaken = still + ringing_Nmm(stroke, whisks, times, damping=0.02)

@@ -6,42 +6,42 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.linear import rotate_about_z
-from bench.rig.marched import MarchedWhisk
 from bench.rig.protocol import load
-from bench.rig.round_objects import Cone, Ring, Sphere
+from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
 from bench.rig.simulate import simulate
-from bench.rig.stick_slip import Friction
+from bench.rig.stick_slip import FrictionCoefficients
+from bench.rig.whisk_mechanics import WhiskMechanics
 from tests.scenes.rig_sessions import protocol_file
 
 ROD = Rod("cylinder", 100.0, 1.0, 60.0)
 TOUCHED = rotate_about_z(np.array([60.0, 0.0, 0.0]), 0.04)
 
 
-def placed(radius_mm: float = 3.0) -> Bar:
+def placed(radius_mm: float = 3.0) -> TouchedBar:
     angles = {"beta_rad": 0.6, "psi_rad": 0.0, "touch_rad": 0.04}
-    return Bar.at_contact(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
+    return TouchedBar.at_contact(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
 
 
-def sphere(radius_mm: float) -> Sphere:
+def sphere(radius_mm: float) -> TouchedSphere:
     bar = placed(radius_mm)
-    return Sphere(bar.point_mm, bar.axis, radius_mm)
+    return TouchedSphere(bar.point_mm, bar.axis, radius_mm)
 
 
-def marched(bar: Bar, friction: Friction) -> MarchedWhisk:
+def marched(bar: TouchedBar, friction: FrictionCoefficients) -> WhiskMechanics:
     touch, step = find_first_touch(ROD, bar, 0.04, 60.0), math.radians(0.2)
-    return MarchedWhisk.run(
+    return WhiskMechanics.run(
         ROD, bar, friction, touch, touch.motor_rad + math.radians(3.0), step_rad=step
     )
 
 
-def cone(radius_mm: float = 20.0, half_angle_rad: float = 0.35) -> Cone:
-    return Cone.from_bar(placed(radius_mm), TOUCHED, half_angle_rad)
+def cone(radius_mm: float = 20.0, half_angle_rad: float = 0.35) -> TouchedCone:
+    return TouchedCone.from_bar(placed(radius_mm), TOUCHED, half_angle_rad)
 
 
-THINGS = [placed(), Ring.from_bar(placed(), TOUCHED, 20.0), sphere(20.0), cone()]
+THINGS = [placed(), TouchedRing.from_bar(placed(), TOUCHED, 20.0), sphere(20.0), cone()]
 
 
 @pytest.mark.parametrize("thing", THINGS, ids=type)
@@ -58,12 +58,14 @@ def test_what_a_contact_sees_has_these_derivatives(thing):
 
 
 @pytest.mark.parametrize(
-    "friction", [Friction(0.2, 0.2, 1e-3), Friction(0.3, 0.2, 1e-3)], ids=["sliding", "teeth"]
+    "friction",
+    [FrictionCoefficients(0.2, 0.2, 1e-3), FrictionCoefficients(0.3, 0.2, 1e-3)],
+    ids=["sliding", "teeth"],
 )
 def test_a_large_ring_is_a_straight_bar(friction):
     """Of a circle of 1e5 mm the axis turns by 2e-5 over 2 mm of slip: moments to some parts in 1e5."""
     straight, bent = (
-        marched(bar, friction) for bar in (placed(), Ring.from_bar(placed(), TOUCHED, 1e5))
+        marched(bar, friction) for bar in (placed(), TouchedRing.from_bar(placed(), TOUCHED, 1e5))
     )
     at = straight.touch.motor_rad + np.radians([0.5, 1.5, 2.5])
     np.testing.assert_allclose(
@@ -73,14 +75,14 @@ def test_a_large_ring_is_a_straight_bar(friction):
 
 
 def test_a_large_sphere_is_a_plane_as_a_large_bar_is():
-    friction = Friction(0.2, 0.2, 1e-3)
+    friction = FrictionCoefficients(0.2, 0.2, 1e-3)
     bar, ball = (marched(thing, friction) for thing in (placed(1e6), sphere(1e6)))
     at = bar.touch.motor_rad + np.radians([0.5, 1.5, 2.5])
     np.testing.assert_allclose(ball.forward.moments_at(at), bar.forward.moments_at(at), rtol=2e-5)
 
 
 def test_force_on_a_sphere_lies_on_the_cone_about_its_normal():
-    whisk = marched(sphere(20.0), Friction(0.2, 0.2, 1e-3))
+    whisk = marched(sphere(20.0), FrictionCoefficients(0.2, 0.2, 1e-3))
     for state in whisk.forward.states[2:]:
         normal = (state.point_mm - whisk.bar.point_mm) / 20.5
         force = rotate_about_z(state.force_hub_N, state.motor_rad)
@@ -106,7 +108,9 @@ def test_a_cone_is_touched_where_the_bar_is_and_ends_at_its_tip():
 
 
 @pytest.mark.parametrize(
-    "friction", [Friction(0.2, 0.2, 1e-3), Friction(0.3, 0.2, 1e-3)], ids=["sliding", "teeth"]
+    "friction",
+    [FrictionCoefficients(0.2, 0.2, 1e-3), FrictionCoefficients(0.3, 0.2, 1e-3)],
+    ids=["sliding", "teeth"],
 )
 def test_a_slim_cone_is_a_bar(friction):
     """Of a half-angle of 1e-5 the radius changes by 2e-5 mm over 2 mm of slip."""

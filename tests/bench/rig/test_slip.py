@@ -7,35 +7,42 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Elastica
 from bench.rig.linear import rotate_about_z
-from bench.rig.marched import MarchedWhisk
-from bench.rig.round_objects import Cone, Ring, Sphere
+from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
 from bench.rig.simulate import simulate
-from bench.rig.stick_slip import Friction
+from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.surface_slip import slips_mm
+from bench.rig.whisk_mechanics import WhiskMechanics
 from tests.scenes.rig_sessions import protocol_file, rows
 
 ROD = Rod("cylinder", 100.0, 1.0, 60.0)
 TOUCHED = rotate_about_z(np.array([60.0, 0.0, 0.0]), 0.04)
-BAR = Bar.at_contact(
+BAR = TouchedBar.at_contact(
     d_x_mm=60.0, beta_rad=0.6, psi_rad=0.0, touch_rad=0.04, radius_mm=20.0, whisker_radius_mm=0.5
 )
-BALL = Sphere(BAR.point_mm, BAR.axis, 20.0)
-THINGS = [BAR, Ring.from_bar(BAR, TOUCHED, 20.0), BALL, Cone.from_bar(BAR, TOUCHED, 0.35)]
+BALL = TouchedSphere(BAR.point_mm, BAR.axis, 20.0)
+THINGS = [
+    BAR,
+    TouchedRing.from_bar(BAR, TOUCHED, 20.0),
+    BALL,
+    TouchedCone.from_bar(BAR, TOUCHED, 0.35),
+]
 
 
-def marched(thing: Bar, mu: float, step_deg: float = 0.1, back: bool = False) -> MarchedWhisk:
+def marched(
+    thing: TouchedBar, mu: float, step_deg: float = 0.1, back: bool = False
+) -> WhiskMechanics:
     touch = find_first_touch(ROD, thing, 0.04, 60.0)
     end, step = touch.motor_rad + math.radians(4.0), math.radians(step_deg)
-    return MarchedWhisk.run(
-        ROD, thing, Friction(mu, mu, 1e-3), touch, end, step_rad=step, back=back
+    return WhiskMechanics.run(
+        ROD, thing, FrictionCoefficients(mu, mu, 1e-3), touch, end, step_rad=step, back=back
     )
 
 
-def shears(whisk: MarchedWhisk) -> np.ndarray:
+def shears(whisk: WhiskMechanics) -> np.ndarray:
     """(n, 2) N: force of the object on the whisker along its axis and round it."""
     found = []
     for state in whisk.forward.states:
@@ -146,7 +153,7 @@ def test_on_a_straight_bar_the_path_along_it_is_the_slip():
     whisk = marched(BAR, 0.2, back=True)
     for back in (False, True):
         sums = slips_mm(whisk, back)
-        slip = whisk.slip_mm(whisk.way(back).point_mm, whisk.way(back).motor_rad)
+        slip = whisk.slip_mm(whisk.path(back).point_mm, whisk.path(back).motor_rad)
         np.testing.assert_allclose(sums[:, 0], slip, atol=1e-9)
 
 

@@ -23,7 +23,7 @@ def test_the_bar_is_painted_where_the_contact_is(beta_deg):
     made = recording(beta_deg=beta_deg, stiffness_N_mm=0.05)
     whisk, most = made.whisks[0], 0.0
     for _, motor, _, back in made.frames:
-        gave, state = whisk.gave_mm(motor, back), whisk.way(back).state_at(motor)
+        gave, state = whisk.gave_mm(motor, back), whisk.path(back).state_at(motor)
         if state is None:
             assert not gave.any()
             continue

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.rig.bar import Bar
+from bench.rig.bar import TouchedBar
 from bench.rig.layer import Occluder
 from bench.rig.light import Light, Material
 from bench.rig.linear import rotate_about_z
-from bench.rig.pinhole import Camera
-from bench.rig.round_objects import Cone, Ring, Sphere
+from bench.rig.pinhole import PinholeCamera
+from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
 from bench.rig.simulate import simulate
 from bench.rig.solid import Solid
 from bench.rig.tube import Tube, draw_tubes
 from bench.rig.window import Window
 from tests.scenes.rig_sessions import TINY, protocol_file
 
-CAMERA = Camera.aim(
+CAMERA = PinholeCamera.aim(
     "small",
     size_px=(320, 240),
     focal_px=1000.0,
@@ -35,26 +35,26 @@ ORIGIN = np.zeros(3)
 TOUCHED = np.array([60.0, 0.0, 0.0])
 
 
-def placed(beta_deg: float, radius_mm: float, psi_deg: float = 8.0) -> Bar:
+def placed(beta_deg: float, radius_mm: float, psi_deg: float = 8.0) -> TouchedBar:
     angles = {
         "beta_rad": math.radians(beta_deg),
         "psi_rad": math.radians(psi_deg),
         "touch_rad": 0.0,
     }
-    return Bar.at_contact(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
+    return TouchedBar.at_contact(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
 
 
-def ring(beta_deg: float, psi_deg: float = 8.0) -> Ring:
-    return Ring.from_bar(placed(beta_deg, 3.0, psi_deg), TOUCHED, 20.0)
+def ring(beta_deg: float, psi_deg: float = 8.0) -> TouchedRing:
+    return TouchedRing.from_bar(placed(beta_deg, 3.0, psi_deg), TOUCHED, 20.0)
 
 
-def sphere(beta_deg: float) -> Sphere:
+def sphere(beta_deg: float) -> TouchedSphere:
     bar = placed(beta_deg, 20.0)
-    return Sphere(bar.point_mm, bar.axis, bar.radius_mm)
+    return TouchedSphere(bar.point_mm, bar.axis, bar.radius_mm)
 
 
-def cone(beta_deg: float, half_angle_deg: float = 20.0, radius_mm: float = 12.0) -> Cone:
-    return Cone.from_bar(placed(beta_deg, radius_mm), TOUCHED, math.radians(half_angle_deg))
+def cone(beta_deg: float, half_angle_deg: float = 20.0, radius_mm: float = 12.0) -> TouchedCone:
+    return TouchedCone.from_bar(placed(beta_deg, radius_mm), TOUCHED, math.radians(half_angle_deg))
 
 
 def height_and_far(thing, points):
@@ -66,9 +66,9 @@ def height_and_far(thing, points):
 def within(thing, points):
     """Negative within the body, at points (..., 3)."""
     height, far = height_and_far(thing, points)
-    if isinstance(thing, Sphere):
+    if isinstance(thing, TouchedSphere):
         return np.hypot(height, far) - thing.radius_mm
-    if isinstance(thing, Ring):
+    if isinstance(thing, TouchedRing):
         return np.hypot(far - thing.ring_radius_mm, height) - thing.radius_mm
     sin, tan = math.sin(thing.half_angle_rad), math.tan(thing.half_angle_rad)
     touched = (
@@ -185,7 +185,7 @@ def test_a_large_ring_looks_like_a_straight_bar():
     bar = placed(20, 3.0)
     window = Window.whole(CAMERA, 3, 0.2, 4)
     bent, straight = (np.full(window.shape, 0.3, np.float32) for _ in range(2))
-    layer = Solid(Ring.from_bar(bar, TOUCHED, 20000.0), METAL).layer(window, LAMP)
+    layer = Solid(TouchedRing.from_bar(bar, TOUCHED, 20000.0), METAL).layer(window, LAMP)
     bent[layer.index] += (layer.cover * (layer.tone - bent[layer.index])).astype(np.float32)
     foot = bar.foot_mm(TOUCHED)
     Tube.straight(foot - 120 * bar.axis, foot + 120 * bar.axis, 3.0, METAL).draw(
@@ -220,7 +220,7 @@ def test_a_wire_is_seen_before_an_object_and_not_behind_it():
 
 
 def test_an_object_beside_a_camera_is_refused():
-    beside = Sphere(CAMERA.centre_mm + 3.0, np.array([0, 0, 1.0]), 5.0)
+    beside = TouchedSphere(CAMERA.centre_mm + 3.0, np.array([0, 0, 1.0]), 5.0)
     with pytest.raises(BadInput, match="camera small stands within"):
         Solid(beside, METAL).layer(Window.whole(CAMERA, 1, 0.3), EVEN)
 

@@ -1,13 +1,17 @@
 """A stroke there and back: friction on both ways, stick and slip, contact at the tip."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from bench.rig.loading import quasi_static_Nmm
 from bench.rig.protocol import load
 from bench.rig.recording import Recording
 from bench.rig.simulate import simulate
+from bench.rig.stroke import Stroke
+from bench.rig.whisk_mechanics import ContactPath
 from tests.scenes.rig_sessions import protocol_file, rows
 
 WAYS = """
@@ -76,7 +80,7 @@ def test_the_whisker_that_is_drawn_touches_where_truth_says(back, tmp_path):
     """On both ways its centreline runs through the contact point, at frames and between them."""
     protocol = load(protocol_file(tmp_path, WAYS))
     recording = Recording.make(protocol, protocol.runs()[0], np.random.default_rng(2))
-    whisk, way = recording.whisks[0], recording.whisks[0].way(back)
+    whisk, way = recording.whisks[0], recording.whisks[0].path(back)
     frames = [
         motor
         for _, motor, _, b in recording.frames
@@ -145,3 +149,18 @@ friction = 0.2
     assert {(row["contact"], row["m_y_Nmm"], row["x_mm"]) for row in table[last + 1 :]} == {
         ("0", "0.000000", "nan")
     }
+
+
+def test_a_sample_at_the_turn_belongs_to_the_forward_stroke():
+    """Two steps of rounding after the turn are at the turn; a millisecond after it is not."""
+
+    def path(moment_Nmm: float) -> ContactPath:
+        moments = np.full((2, 2), moment_Nmm)
+        points = np.zeros((2, 3))
+        return ContactPath(np.array([0.0, 1.0]), points, np.zeros(2), moments, points, ())
+
+    stroke = Stroke.plan(0.0, 1.0, 1.0, back=True)
+    (_, turn_s), whisk = stroke.forward[0], SimpleNamespace(forward=path(1.0), back=path(2.0))
+    times_s = turn_s + np.array([-1e-3, 0.0, 4e-16, 1e-3])
+    moments = quasi_static_Nmm(stroke, [whisk], times_s)
+    np.testing.assert_array_equal(moments[:, 0], [1.0, 1.0, 1.0, 2.0])

@@ -18,9 +18,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD
-from bench.rig.bar import Bar, find_first_touch
-from bench.rig.marched import MarchedWhisk
-from bench.rig.stick_slip import Friction
+from bench.rig.bar import TouchedBar, find_first_touch
+from bench.rig.stick_slip import FrictionCoefficients
+from bench.rig.whisk_mechanics import WhiskMechanics
 from estimator.both_ways import there_and_back
 from estimator.builtin import with_friction
 from estimator.uncertainty import Z_95
@@ -48,7 +48,7 @@ def drawn(shape: str, rng: np.random.Generator):
         rng.uniform(0.4, 0.8),
         10.0 ** rng.uniform(-1.0, 0.5),
     )
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=d_x,
         beta_rad=beta,
         psi_rad=TILT_SIGMA_RAD * rng.normal(),
@@ -59,10 +59,10 @@ def drawn(shape: str, rng: np.random.Generator):
     touch, theta = find_first_touch(rod, bar, 0.0, d_x), share * end
     sigma_m, sigma_touch = MOMENT_SIGMA_NMM * noise, TOUCH_SIGMA_RAD * noise
     try:
-        march = MarchedWhisk.run(
+        march = WhiskMechanics.run(
             rod,
             bar,
-            Friction(*[np.tan(alpha)] * 2),
+            FrictionCoefficients(*[np.tan(alpha)] * 2),
             touch,
             touch.motor_rad + end,
             step_rad=STEP_RAD,

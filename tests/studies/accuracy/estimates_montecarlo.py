@@ -21,10 +21,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD
 from bench.records.trial_result import EstimateRow
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
-from bench.rig.stick_slip import Friction, March
+from bench.rig.stick_slip import FrictionCoefficients, March
 from bench.trials.estimates import answer
 from estimator.beam import Beam
 from estimator.builtin import with_friction
@@ -95,7 +95,7 @@ def push(
 ):
     """First touch, and the exact moments at θ; stiffness: of the bar, N/mm; per_rad_mm (3,): how it moves. Raises
     ArithmeticError without contact."""
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=d_x,
         beta_rad=beta,
         psi_rad=psi,
@@ -107,7 +107,7 @@ def push(
     touch = find_first_touch(rod, bar, 0.0, d_x)
     if per_rad_mm is not None:
         bar = replace(bar, velocity_mm_rad=per_rad_mm, touch_rad=touch.motor_rad)
-    march = March(rod, bar, Friction(np.tan(alpha), np.tan(alpha)), touch)
+    march = March(rod, bar, FrictionCoefficients(np.tan(alpha), np.tan(alpha)), touch)
     *_, state = march.along(touch.motor_rad + theta * np.arange(1, STEPS + 1) / STEPS)[1]
     if state is None:
         raise ArithmeticError("no contact")

@@ -19,14 +19,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.rig import boards, build
 from bench.rig.light import Light, Material
-from bench.rig.pinhole import Camera
+from bench.rig.pinhole import PinholeCamera
 from bench.rig.protocol import load
 from bench.rig.sensor import Sensor
 from bench.rig.studio import Studio
 from bench.rig.tube import Tube
 from bench.rig.window import Window
 
-CAMERA = Camera.aim(
+CAMERA = PinholeCamera.aim(
     "small",
     size_px=(320, 240),
     focal_px=2000.0,

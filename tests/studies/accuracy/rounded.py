@@ -21,12 +21,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.analyses.curved import curved
 from bench.records.trial_result import FeltAt
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
-from bench.rig.marched import MarchedWhisk
-from bench.rig.round_objects import Cone, Ring, Sphere
-from bench.rig.stick_slip import Friction
+from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
+from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.surface_slip import slips_mm
+from bench.rig.whisk_mechanics import WhiskMechanics
 from bench.session.whisker import Whisker
 from estimator import contact_state as contact
 from estimator import first_order
@@ -46,10 +46,10 @@ BETAS_DEG, RADII_MM = np.array([20.0, 40.0, 60.0]), (5.0, 10.0, 20.0, 40.0, 80.0
 OBJECTS = ("bar", "cone of 15 deg", "cone of 45 deg", "sphere", "ring")
 
 
-def placed(name: str, radius_mm: float, beta: float) -> tuple[Bar, float, float]:
+def placed(name: str, radius_mm: float, beta: float) -> tuple[TouchedBar, float, float]:
     """The object where the whisker first touches it at d_x; its radii in the whisking plane and along the slip."""
     ring = name == "ring"
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=D_X_MM,
         beta_rad=beta,
         psi_rad=0.0,
@@ -59,12 +59,12 @@ def placed(name: str, radius_mm: float, beta: float) -> tuple[Bar, float, float]
     )
     touched = np.array([D_X_MM, 0.0, 0.0])
     if ring:
-        return Ring.from_bar(bar, touched, radius_mm), TUBE_MM, radius_mm + TUBE_MM
+        return TouchedRing.from_bar(bar, touched, radius_mm), TUBE_MM, radius_mm + TUBE_MM
     if name == "sphere":
-        return Sphere(bar.point_mm, bar.axis, radius_mm), radius_mm, radius_mm
+        return TouchedSphere(bar.point_mm, bar.axis, radius_mm), radius_mm, radius_mm
     if name.startswith("cone"):
         return (
-            Cone.from_bar(bar, touched, math.radians(float(name.split()[2]))),
+            TouchedCone.from_bar(bar, touched, math.radians(float(name.split()[2]))),
             radius_mm,
             math.inf,
         )
@@ -80,7 +80,7 @@ def first_order_share(beta: float, rolled_mm: float, slipped_mm: float) -> float
     return share - 0.5 * THETA * D_X_MM / (slipped_mm + 0.5) * turned
 
 
-def felt_at(whisk: MarchedWhisk, theta: float) -> FeltAt:
+def felt_at(whisk: WhiskMechanics, theta: float) -> FeltAt:
     """What the gauges would say there."""
     m_y, m_z = whisk.forward.moments_at(np.array([whisk.touch.motor_rad + theta]))[0]
     moments = Value(float(m_y), NOISE_NMM), Value(float(m_z), NOISE_NMM)
@@ -92,8 +92,11 @@ def row(name: str, radius_mm: float, beta: float) -> list[float]:
     whisker comes to no equilibrium."""
     thing, rolled, slipped = placed(name, radius_mm, beta)
     touch = find_first_touch(ROD, thing, 0.0, D_X_MM)
-    friction, stops = Friction(math.tan(ALPHA), math.tan(ALPHA), 1e-3), touch.motor_rad + THETAS
-    whisk = MarchedWhisk.run(
+    friction, stops = (
+        FrictionCoefficients(math.tan(ALPHA), math.tan(ALPHA), 1e-3),
+        touch.motor_rad + THETAS,
+    )
+    whisk = WhiskMechanics.run(
         ROD, thing, friction, touch, float(stops[-1]) + 1e-3, step_rad=0.004, stops_rad=stops
     )
     at = felt_at(whisk, THETA)

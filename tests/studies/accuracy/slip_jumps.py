@@ -15,9 +15,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.rig.bar import Bar, find_first_touch
-from bench.rig.marched import MarchedWhisk
-from bench.rig.stick_slip import Friction
+from bench.rig.bar import TouchedBar, find_first_touch
+from bench.rig.stick_slip import FrictionCoefficients
+from bench.rig.whisk_mechanics import WhiskMechanics
 from tests.studies.accuracy.estimates_montecarlo import rod_and_beam
 from vision.truth.at_angle import Smooth, TruthAtAngle, at_angle
 from vision.truth.value import FIELDS
@@ -36,7 +36,7 @@ SIGMAS, TOUCH_SIGMA_RAD = {"slip": 0.004, "phi": 0.001}, np.radians(0.02)
 def whisk(beta_deg: float, kinetic: float, static: float) -> dict[str, np.ndarray]:
     """Pushing angle, slip and φ along the way."""
     rod, _ = rod_and_beam("cylinder")
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=D_X_MM,
         beta_rad=np.radians(beta_deg),
         psi_rad=0.0,
@@ -45,19 +45,19 @@ def whisk(beta_deg: float, kinetic: float, static: float) -> dict[str, np.ndarra
         whisker_radius_mm=0.5,
     )
     touch = find_first_touch(rod, bar, 0.0, D_X_MM)
-    marched = MarchedWhisk.run(
+    mechanics = WhiskMechanics.run(
         rod,
         bar,
-        Friction(static, kinetic),
+        FrictionCoefficients(static, kinetic),
         touch,
         touch.motor_rad + np.radians(5.0),
         step_rad=np.radians(0.05),
     )
-    way = marched.forward
+    way = mechanics.forward
     m_y, m_z = way.moment_Nmm[1:].T
     return {
         "theta": (way.motor_rad - touch.motor_rad)[1:],
-        "slip": marched.slip_mm(way.point_mm, way.motor_rad)[1:],
+        "slip": mechanics.slip_mm(way.point_mm, way.motor_rad)[1:],
         "phi": np.arctan2(m_y, m_z),
     }
 

@@ -21,9 +21,9 @@ from bench.analyses.gave import normal_force_N
 from bench.analyses.soft import Place, softness
 from bench.base.drawing import blank, colour_of, label_of, save, style
 from bench.records.trial_result import FeltWhisk, TrialFacts
-from bench.rig.bar import Bar, find_first_touch
-from bench.rig.marched import MarchedWhisk
-from bench.rig.stick_slip import Friction
+from bench.rig.bar import TouchedBar, find_first_touch
+from bench.rig.stick_slip import FrictionCoefficients
+from bench.rig.whisk_mechanics import WhiskMechanics
 from bench.session.whisker import Whisker
 from estimator.builtin import ESTIMATORS
 from estimator.whisk import EstimatorSettings, Whisk
@@ -46,7 +46,7 @@ TWO, SEEN = "1/k, two distances", "1/k, seen"
 def pushed(beta_rad: float, d_x_mm: float, stiffness_N_mm: float) -> tuple[np.ndarray, float]:
     """Moments (m_y, m_z) at θ, and how far the bar came, mm."""
     rod, _ = rod_and_beam("cylinder")
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=d_x_mm,
         beta_rad=beta_rad,
         psi_rad=0.0,
@@ -57,7 +57,9 @@ def pushed(beta_rad: float, d_x_mm: float, stiffness_N_mm: float) -> tuple[np.nd
     )
     touch, mu = find_first_touch(rod, bar, 0.0, d_x_mm), np.tan(ALPHA_RAD)
     end = touch.motor_rad + THETA_RAD
-    whisk = MarchedWhisk.run(rod, bar, Friction(mu, mu), touch, end, step_rad=THETA_RAD / 6)
+    whisk = WhiskMechanics.run(
+        rod, bar, FrictionCoefficients(mu, mu), touch, end, step_rad=THETA_RAD / 6
+    )
     return whisk.forward.moment_Nmm[-1], float(np.linalg.norm(whisk.gave_mm(end, False)))
 
 

@@ -21,10 +21,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.analyses.turning_phi import turn, with_turn
 from bench.records.trial_result import EstimateRow, FeltAt
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
-from bench.rig.stick_slip import Friction, March
+from bench.rig.stick_slip import FrictionCoefficients, March
 from bench.trials.estimates import answer
 from estimator.beam import Beam
 from estimator.builtin import with_friction
@@ -83,7 +83,7 @@ def exact(push: Push) -> Exact:
         * rod.diameter_mm
         * (1.0 - (push.d_x_mm / rod.length_mm if push.shape == "cone" else 0.0))
     )
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=push.d_x_mm,
         beta_rad=beta,
         psi_rad=psi,
@@ -93,7 +93,7 @@ def exact(push: Push) -> Exact:
     )
     touch = find_first_touch(rod, bar, 0.0, push.d_x_mm)
     angles = np.unique(np.concatenate([theta * np.arange(1, _STEPS + 1) / _STEPS, STROKE_RAD]))
-    states = March(rod, bar, Friction(np.tan(alpha), np.tan(alpha)), touch).along(
+    states = March(rod, bar, FrictionCoefficients(np.tan(alpha), np.tan(alpha)), touch).along(
         touch.motor_rad + angles
     )[1]
     felt = {

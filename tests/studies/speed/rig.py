@@ -19,14 +19,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 import cv2
 
 from bench.rig import build
-from bench.rig.bar import Bar, find_first_touch
+from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
-from bench.rig.marched import MarchedWhisk
 from bench.rig.parts import Job, Part, render_frames
 from bench.rig.protocol import load
 from bench.rig.recording import Recording
 from bench.rig.simulate import make_part
-from bench.rig.stick_slip import Friction
+from bench.rig.stick_slip import FrictionCoefficients
+from bench.rig.whisk_mechanics import WhiskMechanics
 
 
 def cpu_s(work, repeats: int = 5) -> float:
@@ -42,7 +42,7 @@ def cpu_s(work, repeats: int = 5) -> float:
 def whisk_s(beta_deg: float, static: float, kinetic: float, back: bool) -> float:
     """Mechanics of 60 steps of 0.1°."""
     rod = Rod("cylinder", 100.0, 1.0, 60.0)
-    bar = Bar.at_contact(
+    bar = TouchedBar.at_contact(
         d_x_mm=60.0,
         beta_rad=math.radians(beta_deg),
         psi_rad=0.0,
@@ -51,8 +51,10 @@ def whisk_s(beta_deg: float, static: float, kinetic: float, back: bool) -> float
         whisker_radius_mm=0.5,
     )
     touch, step = find_first_touch(rod, bar, 0.04, 60.0), math.radians(0.1)
-    end, friction = touch.motor_rad + 60 * step, Friction(static, kinetic)
-    return cpu_s(lambda: MarchedWhisk.run(rod, bar, friction, touch, end, step_rad=step, back=back))
+    end, friction = touch.motor_rad + 60 * step, FrictionCoefficients(static, kinetic)
+    return cpu_s(
+        lambda: WhiskMechanics.run(rod, bar, friction, touch, end, step_rad=step, back=back)
+    )
 
 
 def frame_s(protocol_name: str, trial: int, camera: int) -> tuple[float, int]:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bench.rig.bar import Bar
+from bench.rig.bar import TouchedBar
 from bench.rig.linear import rotate_about_z
-from bench.rig.round_objects import Cone, Ring, Sphere
+from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
 from tests.scenes.model_scenes import CAMERAS
 from vision.geometry.centreline import Curves
 from vision.geometry.cone import Cone as SeenCone
@@ -23,14 +23,14 @@ SPOT = rotate_about_z(np.array([60.0, 0.0, 0.0]), 0.04)
 
 def placed(radius_mm):
     angles = {"beta_rad": 0.6, "psi_rad": 0.05, "touch_rad": 0.04}
-    return Bar.at_contact(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
+    return TouchedBar.at_contact(d_x_mm=60.0, **angles, radius_mm=radius_mm, whisker_radius_mm=0.5)
 
 
 RING, SPHERE = (
-    Ring.from_bar(placed(3.0), SPOT, 25.0),
-    Sphere(placed(15.0).point_mm, placed(15.0).axis, 15.0),
+    TouchedRing.from_bar(placed(3.0), SPOT, 25.0),
+    TouchedSphere(placed(15.0).point_mm, placed(15.0).axis, 15.0),
 )
-CONE = Cone.from_bar(placed(6.0), SPOT, 0.3)
+CONE = TouchedCone.from_bar(placed(6.0), SPOT, 0.3)
 THINGS = [
     (RING, RoundedAxis(RING.point_mm, RING.axis, SeenRing(6.0, 0.0, 50.0), SPOT), 3.0),
     (SPHERE, RoundedAxis(SPHERE.point_mm, SPHERE.axis, SeenSphere(30.0), SPOT), 15.0),

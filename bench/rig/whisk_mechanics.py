@@ -7,17 +7,17 @@ from typing import Self
 
 import numpy as np
 
-from bench.rig.bar import Touch, unloaded_curve
+from bench.rig.bar import UnloadedTouch, unloaded_curve
 from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Elastica
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import ContactState, moments_Nmm
-from bench.rig.stick_slip import Friction, March
+from bench.rig.stick_slip import FrictionCoefficients, March
 from bench.rig.touched_object import TouchedObject
 
 
 @dataclass(frozen=True, eq=False)
-class Instants:
+class ContactPath:
     """States in the order of the motor's path; a jump is two rows at one angle. Contacts of free
     ones are NaN."""
 
@@ -30,7 +30,7 @@ class Instants:
 
     @classmethod
     def from_states(cls, path_rad: np.ndarray, states: Sequence[ContactState | None]) -> Self:
-        """Tabulate the states (None while free) at the motor angles of a path."""
+        """Make the path of states (None while free) at the motor angles of a path."""
         count = len(states)
         points = np.full((count, 3), np.nan)
         arcs = np.full(count, np.nan)
@@ -96,41 +96,43 @@ class Instants:
 
 
 @dataclass(frozen=True, eq=False)
-class MarchedWhisk:
+class WhiskMechanics:
     """The mechanics of one whisk. `forward` begins at touch, `back` (None without a back stroke)
     ends there."""
 
     rod: Rod
     bar: TouchedObject
-    touch: Touch
-    friction: Friction
-    forward: Instants
-    back: Instants | None
+    touch: UnloadedTouch
+    friction: FrictionCoefficients
+    forward: ContactPath
+    back: ContactPath | None
 
     @classmethod
     def run(
         cls,
         rod: Rod,
         bar: TouchedObject,
-        friction: Friction,
-        touch: Touch,
+        friction: FrictionCoefficients,
+        touch: UnloadedTouch,
         end_rad: float,
         *,
         step_rad: float,
         stops_rad: Sequence[float] = (),
         back: bool = False,
     ) -> Self:
-        """March from touch to `end_rad` (and back) in steps, stopping exactly at `stops_rad` on the
-        way there."""
+        """Compute a whisk from touch to `end_rad` (and back) in steps, stopping exactly at `stops_rad`
+        on the forward stroke."""
         march = March(rod, bar, friction, touch)
         start = march.state
         stations = _stations(touch.motor_rad, end_rad, step_rad, stops_rad)
         path, states = march.along(stations)
-        forward = Instants.from_states(np.append(touch.motor_rad, path), [start, *states])
+        forward = ContactPath.from_states(np.append(touch.motor_rad, path), [start, *states])
         backward = None
         if back:
             way_back, returned = march.along(np.append(stations[-2::-1], touch.motor_rad))
-            backward = Instants.from_states(np.append(path[-1], way_back), [states[-1], *returned])
+            backward = ContactPath.from_states(
+                np.append(path[-1], way_back), [states[-1], *returned]
+            )
         return cls(rod, bar, touch, friction, forward, backward)
 
     @property
@@ -138,7 +140,7 @@ class MarchedWhisk:
         """Return (β, ψ), rad, of the object at first touch."""
         return self.bar.slope(self.touch.motor_rad, self.touch.point_mm)
 
-    def way(self, back: bool) -> Instants:
+    def path(self, back: bool) -> ContactPath:
         """Return the forward or the back stroke. Raises ValueError where there is no back
         stroke."""
         if back and self.back is None:
@@ -154,15 +156,15 @@ class MarchedWhisk:
     def slip_at(self, theta_rad: float | np.ndarray) -> np.ndarray:
         """Interpolate the slip, mm, of the forward stroke at pushing angles, NaN beyond its
         end."""
-        way = self.forward
-        slip = self.slip_mm(way.point_mm, way.motor_rad)
+        path = self.forward
+        slip = self.slip_mm(path.point_mm, path.motor_rad)
         motor = self.touch.motor_rad + np.asarray(theta_rad)
-        return np.interp(motor, way.motor_rad, slip, right=np.nan)
+        return np.interp(motor, path.motor_rad, slip, right=np.nan)
 
     def gave_mm(self, motor_rad: float, back: bool) -> np.ndarray:
         """Return the displacement (3,) of a soft object: away from the contact, by the force along
         its normal over its stiffness."""
-        state = self.way(back).state_between(motor_rad)
+        state = self.path(back).state_between(motor_rad)
         stiffness = self.bar.stiffness_N_mm
         if state is None or not state.force_hub_N.any() or math.isinf(stiffness):
             return np.zeros(3)
