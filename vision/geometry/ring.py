@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from vision.geometry.checks import require, require_length, require_sigma
+from vision.geometry.rotation import unit
 from vision.geometry.rounded import (
     AboutAxis,
     Balls,
@@ -13,7 +14,6 @@ from vision.geometry.rounded import (
     Local,
     Rounded,
     RoundedAxis,
-    unit,
     upwards,
 )
 from vision.geometry.touched import StatedSizes

@@ -184,10 +184,8 @@ class RoundedAxis(Axis):
 
     def turned(self, rotations: np.ndarray) -> "RoundedAxis":
         """Return the places of a batch (n, 3), each turned about the origin by rotations (n, 3, 3)."""
-        point_mm, direction, spot_mm = (
-            np.einsum("nij,nj->ni", rotations, vectors)
-            for vectors in (self.point_mm, self.direction, self.spot_mm)
-        )
+        vectors = np.stack([self.point_mm, self.direction, self.spot_mm], axis=-1)  # (n, 3, 3)
+        point_mm, direction, spot_mm = np.moveaxis(rotations @ vectors, -1, 0)
         return RoundedAxis(point_mm, direction, self.form, spot_mm)
 
     def upward(self) -> "RoundedAxis":
@@ -276,23 +274,18 @@ class RoundedAxis(Axis):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return both sides (stations, 2) px of the silhouette."""
         points, _ = self.silhouette(camera.centre_mm, radius_mm, reach_mm, stations)
-        one, other = points
-        return camera.project(one), camera.project(other)
+        one, other = camera.project(points)
+        return one, other
 
     def covering_discs(self, camera: Camera, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:
         """Return middles (m, 2) and radii (m,) px of discs that cover the object in a picture."""
         points, _ = self.silhouette(camera.centre_mm, radius_mm, OUTLINE_MM, OUTLINE_POINTS)
-        return self.form.covering_discs(camera.project(points.reshape(-1, 3)).reshape(2, -1, 2))
+        return self.form.covering_discs(camera.project(points))
 
     def shifted_along(self, across: np.ndarray, vector: np.ndarray) -> "RoundedAxis":
         """Return the object moved as by `shifted`, and by vector[..., 4] mm along its axis."""
         shifted = self.shifted(across, vector)
         return replace(shifted, point_mm=shifted.point_mm + vector[..., 4:] * self.direction)
-
-
-def unit(vectors: np.ndarray) -> np.ndarray:
-    """Return vectors (..., 3) at unit length."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY)
 
 
 def upwards(directions: np.ndarray) -> np.ndarray:

@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from vision.geometry.checks import require_length, require_sigma
-from vision.geometry.rounded import Balls, Local, Rounded, RoundedAxis, unit
+from vision.geometry.rotation import unit
+from vision.geometry.rounded import Balls, Local, Rounded, RoundedAxis
 from vision.geometry.touched import StatedSizes
 
 # [—] A layout: the direction along which slopes count.

@@ -13,6 +13,7 @@ score.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, ClassVar
 
 import numpy as np
@@ -109,10 +110,7 @@ def climb(
     A neighbour differs by one step in two numbers at most. Where no neighbour is better, the step
     is halved, from first_step (k,) on.
     """
-    k = len(first_step)
-    signs = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * k, indexing="ij"), axis=-1).reshape(-1, k)
-    is_near = np.sum(signs != 0.0, axis=1) <= 2
-    steps = first_step * signs[is_near]  # (neighbours, k), the hypothesis itself among them
+    steps = first_step * _signs_of_neighbours(len(first_step))  # (neighbours, k)
     best = starts.copy()
     highest = np.full(len(starts), -np.inf)
     step_share = np.ones(len(starts))
@@ -121,7 +119,7 @@ def climb(
         if not len(going):
             break
         around = best[going, None] + step_share[going, None, None] * steps  # (going, neighbours, k)
-        scores = score(around.reshape(-1, k)).reshape(len(going), -1)
+        scores = score(around.reshape(-1, len(first_step))).reshape(len(going), -1)
         rows = np.arange(len(going))
         chosen = np.argmax(scores, axis=1)
         reached = scores[rows, chosen]
@@ -130,6 +128,12 @@ def climb(
         best[going] = around[rows, chosen]
         highest[going] = reached
     return best, highest
+
+
+def _signs_of_neighbours(k: int) -> np.ndarray:
+    """Return the steps (n, k) to neighbours, -1, 0 or 1 each, with two numbers moved at most."""
+    signs = np.array(list(product((-1.0, 0.0, 1.0), repeat=k)))
+    return signs[np.count_nonzero(signs, axis=1) <= 2]
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ places a smaller grid about the last posterior.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -161,6 +162,34 @@ class _LineGrid:
     segment_deviance: np.ndarray
     temperature: np.ndarray
 
+    @cached_property
+    def _density(self) -> np.ndarray:
+        """Return the density (n, r, b) of the posterior over that at its highest."""
+        return np.exp(-0.5 * (self.deviance - self.deviance.min()))
+
+    @property
+    def volume(self) -> float:
+        """Return the sum of the posterior's density over that at its highest."""
+        return self._density.sum()
+
+    @property
+    def blur_step(self) -> float:
+        """Return the largest step between log blurs, 0 of one."""
+        return float(np.max(np.diff(self.log_blurs), initial=0.0))
+
+    def average_line(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the posterior's mean line (2,) and its covariance (2, 2)."""
+        probability = self._density.sum(axis=(1, 2)) / self.volume
+        mean = probability @ self.lines
+        residual = self.lines - mean
+        return mean, (probability * residual.T) @ residual
+
+    def average_log_blur(self) -> tuple[float, float]:
+        """Return the posterior's mean of the blur's logarithm, and its sigma."""
+        probability = self._density.sum(axis=(0, 1)) / self.volume
+        mean = float(probability @ self.log_blurs)
+        return mean, float(np.sqrt(probability @ (self.log_blurs - mean) ** 2))
+
 
 def fit_coarse(pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float) -> Posterior:
     """Return the posterior about a line (2,) that may be reach_px off, on a coarse grid of
@@ -240,17 +269,10 @@ def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> 
     profiles = compute_profiles(move_to_line(pieces, line), SEGMENTS, reach_px, gamma)
     evidences = _evidences(profiles, window, reach_px)
     grid = _evaluate_lines(evidences, profiles, window)
-    density = np.exp(-0.5 * (grid.deviance - grid.deviance.min()))
-    total = density.sum()
-    line_probability = density.sum(axis=(1, 2)) / total
-    blur_probability = density.sum(axis=(0, 1)) / total
-    mean = line_probability @ grid.lines
-    residual = grid.lines - mean
-    covariance = (line_probability * residual.T) @ residual
-    log_blur = float(blur_probability @ grid.log_blurs)
-    log_blur_sigma = float(np.sqrt(blur_probability @ (grid.log_blurs - log_blur) ** 2))
-    step = float(np.max(np.diff(grid.log_blurs), initial=0.0))
-    cell = float(np.prod(2.0 * window.most_px / (window.lines - 1))) * max(step, 1e-300)
+    mean, covariance = grid.average_line()
+    log_blur, log_blur_sigma = grid.average_log_blur()
+    line_cell = float(np.prod(2.0 * window.most_px / (window.lines - 1)))
+    cell = line_cell * max(grid.blur_step, 1e-300)
     # A flat posterior over a window of half widths a, b has the determinant (a b)² / 9.
     area = 3.0 * np.sqrt(np.linalg.det(covariance))
     best = _best_of(evidences)
@@ -260,13 +282,13 @@ def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> 
         covariance=covariance,
         segment_deviance=grid.segment_deviance,
         temperature=grid.temperature,
-        volume_deviance=-2.0 * np.log(total * cell),
+        volume_deviance=-2.0 * np.log(grid.volume * cell),
         evidence_for_bar=float(np.sum(odds)),
         detection_score=LitRod(profiles).detection_score(best),
         unresolved_share=float(area / np.prod(window.most_px)),
         blur_px=np.exp(log_blur),
         log_blur_sigma=log_blur_sigma,
-        log_blur_step=step,
+        log_blur_step=grid.blur_step,
     )
 
 
@@ -333,20 +355,30 @@ def _evaluate_lines(
     lines = window.grid()
     temperature = estimate_temperature(_best_of(evidences), profiles)
     shift_px = evidences[0].shift_px  # of the narrowest blur, which has the most positions
-    deviance = _at_shifts(evidences, shift_px) / temperature[:, None, None, None]  # (k, g, r, b)
-    log_blurs, deviance = _at_fine_blurs(np.log(window.blurs_px), deviance)
-    shape = (len(lines), deviance.shape[2], len(log_blurs))
+    deviance = _at_shifts(evidences, shift_px) / temperature[:, None, None, None]
+    log_blurs, deviance = _at_fine_blurs(np.log(window.blurs_px), deviance)  # (k, g, r, b)
+    priors = deviance.shape[2]
     deviance = deviance.reshape(len(profiles), len(shift_px), -1)  # (k, g, r b)
     least = deviance.min(axis=1)
-    middle_px = lines[:, 0] + profiles.place_mm[:, None] / ARM_MM * lines[:, 1]  # (k, n)
-    middle_px = np.clip(middle_px, shift_px[0], shift_px[-1])
-    excess = _interpolate(shift_px, deviance - least[:, None], middle_px)
-    excess = _bound_deviance(np.maximum(excess, 0.0))  # (k, n, r b)
+    excess = _excess_of_lines(profiles, lines, shift_px, deviance - least[:, None])
     total = excess.sum(axis=0)
     total = least.sum(axis=0) + total / _misfit_of_line(total, profiles)
     line, other = np.unravel_index(np.argmin(total), total.shape)
     segment_deviance = temperature * (least[:, other] + excess[:, line, other])
-    return _LineGrid(lines, log_blurs, total.reshape(shape), segment_deviance, temperature)
+    total = total.reshape(len(lines), priors, len(log_blurs))
+    return _LineGrid(lines, log_blurs, total, segment_deviance, temperature)
+
+
+def _excess_of_lines(
+    profiles: Profiles, lines: np.ndarray, shift_px: np.ndarray, excess: np.ndarray
+) -> np.ndarray:
+    """Return the bounded deviance (k, n, m) of each segment at lines (n, 2) over its least.
+
+    excess (k, g, m): the deviance over its least, at shifts (g,).
+    """
+    middle_px = lines[:, 0] + profiles.place_mm[:, None] / ARM_MM * lines[:, 1]  # (k, n)
+    middle_px = np.clip(middle_px, shift_px[0], shift_px[-1])
+    return _bound_deviance(np.maximum(_interpolate(shift_px, excess, middle_px), 0.0))
 
 
 def _at_shifts(evidences: Sequence[Evidence], shift_px: np.ndarray) -> np.ndarray:

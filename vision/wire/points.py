@@ -1,5 +1,6 @@
 """Points of a rod's line in a picture, and which camera and frame they were seen by."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,14 @@ class LinePoints:
 
     def __len__(self) -> int:
         return len(self.place)
+
+    @classmethod
+    def joined(cls, groups: Sequence["LinePoints"]) -> "LinePoints":
+        """Return the points of all groups, one behind the other."""
+        columns = []
+        for name in cls.__dataclass_fields__:
+            columns.append(np.concatenate([getattr(points, name) for points in groups]))
+        return cls(*columns)
 
     def select(self, keep: np.ndarray) -> "LinePoints":
         """Return the points where keep (n,) holds."""
