@@ -81,10 +81,9 @@ class Cone(Rounded):
         """Return the balls near where the cone is touched; their radii shrink towards its tip."""
         point = np.asarray(at.point_mm)[..., None, :]
         axis = np.asarray(at.direction)[..., None, :]
-        spot = np.broadcast_to(at.spot_mm, at.point_mm.shape)
-        foot = at.near(spot[..., None, :]).foot_mm
         sin = np.sin(self.half_angle_rad)
-        spot_down = np.sum((point - foot) * axis, axis=-1, keepdims=True)  # from the tip
+        from_tip = point - at.spot_foot_mm
+        spot_down = np.sum(from_tip * axis, axis=-1, keepdims=True)
         nearest = np.maximum(spot_down - reach_mm, _LEAST_RADIUS_MM / sin)
         farthest = np.maximum(spot_down, nearest) + reach_mm
         share = np.linspace(0.0, 1.0, stations)[:, None]

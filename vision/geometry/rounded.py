@@ -60,6 +60,22 @@ class Balls:
     radius_mm: np.ndarray
     growth: float
 
+    def silhouette(self, centre_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Compute where sights graze the surface of the balls, see `RoundedAxis.silhouette`."""
+        sight = self.middle_mm - centre_mm
+        along = np.sum(sight * self.ahead, axis=-1, keepdims=True)
+        towards = sight - along * self.ahead
+        distance = np.linalg.norm(towards, axis=-1, keepdims=True)
+        towards = towards / distance
+        root = np.sqrt(1.0 - self.growth**2)
+        cosine = (self.growth * along - self.radius_mm) / (root * distance)
+        cosine = np.where(np.abs(cosine) < 1.0, cosine, np.nan)
+        between = root * cosine * towards - self.growth * self.ahead
+        sideways = root * np.sqrt(1.0 - cosine**2) * np.cross(self.ahead, towards)
+        normals = np.stack([between + sideways, between - sideways], axis=-3)
+        both_mm = self.middle_mm[..., None, :, :] + self.radius_mm[..., None, :, :] * normals
+        return both_mm, normals
+
 
 @dataclass(frozen=True)
 class FreeNumber:
@@ -117,22 +133,7 @@ class Rounded(Touched):
         stations: int,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compute where sights graze the surface, see `RoundedAxis.silhouette`."""
-        balls = self.balls(at, radius_mm, reach_mm, stations)
-        middle = balls.middle_mm
-        growth = balls.growth
-        sight = middle - centre_mm
-        along = np.sum(sight * balls.ahead, axis=-1, keepdims=True)
-        towards = sight - along * balls.ahead
-        distance = np.linalg.norm(towards, axis=-1, keepdims=True)
-        towards = towards / distance
-        root = np.sqrt(1.0 - growth**2)
-        cosine = (growth * along - balls.radius_mm) / (root * distance)
-        cosine = np.where(np.abs(cosine) < 1.0, cosine, np.nan)
-        sideways = np.sqrt(1.0 - cosine**2) * np.cross(balls.ahead, towards)
-        one = root * (cosine * towards + sideways) - growth * balls.ahead
-        other = root * (cosine * towards - sideways) - growth * balls.ahead
-        normals = np.stack([one, other], axis=-3)
-        return middle[..., None, :, :] + balls.radius_mm[..., None, :, :] * normals, normals
+        return self.balls(at, radius_mm, reach_mm, stations).silhouette(centre_mm)
 
     def covering_discs(self, edges_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return middles (m, 2) and radii (m,) px of discs between both sides (2, m, 2)."""
@@ -204,6 +205,12 @@ class RoundedAxis(Axis):
     def near(self, points_mm: np.ndarray) -> Local:
         """Return the object as a bar near points (..., k, 3)."""
         return self.form.near(self, points_mm)
+
+    @property
+    def spot_foot_mm(self) -> np.ndarray:
+        """Return the point (..., 1, 3) of the middle nearest to where it is touched."""
+        spot_mm = np.broadcast_to(self.spot_mm, np.shape(self.point_mm))
+        return self.near(spot_mm[..., None, :]).foot_mm
 
     def outside_mm(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute how far points (..., k, 3) are from the middle, less `Local.wider_mm`.

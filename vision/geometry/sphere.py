@@ -73,16 +73,16 @@ class Sphere(Rounded):
         stations: int,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compute where sights graze the sphere: a circle in two halves, whatever the reach."""
-        sight = np.asarray(at.point_mm) - centre_mm
-        distance = np.linalg.norm(sight, axis=-1, keepdims=True)[..., None]
-        ahead = unit(sight)[..., None, :]
+        middle = np.asarray(at.point_mm)[..., None, :]
+        sight = middle - centre_mm
+        ahead = unit(sight)
         right = unit(np.cross(ahead, _UP + _SKEWED))
-        turn = (np.arange(2 * stations) + 0.5) * np.pi / stations
-        ring = np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * np.cross(ahead, right)
-        cosine = radius_mm / distance
+        turn = ((np.arange(2 * stations) + 0.5) * np.pi / stations)[:, None]
+        ring = np.cos(turn) * right + np.sin(turn) * np.cross(ahead, right)
+        cosine = radius_mm / np.linalg.norm(sight, axis=-1, keepdims=True)
         normals = -cosine * ahead + np.sqrt(1.0 - cosine**2) * ring
         normals = normals.reshape(*normals.shape[:-2], 2, stations, 3)
-        return np.asarray(at.point_mm)[..., None, None, :] + radius_mm * normals, normals
+        return middle[..., None, :] + radius_mm * normals, normals
 
     def covering_discs(self, edges_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return one disc (1, 2), (1,) px for all of the silhouette (2, m, 2)."""
