@@ -68,10 +68,7 @@ def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | 
     None where fewer than two frames are free and well seen.
     """
     rows = _free_rows(problem, state)
-    counts = np.zeros(len(problem.motor_rad))
-    for own in rows:
-        counts[own.frame] += len(own.residual)
-    frames = np.flatnonzero(counts >= _FEWEST_POINTS)
+    frames = _well_seen_frames(rows)
     if len(frames) < 2:
         return None
     shape, covariance = _shape_at_rest(rows)
@@ -86,6 +83,13 @@ def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | 
     point, point_spread, direction, direction_spread = map(np.array, zip(*lines))
     shared = _shared(covariance, float(motor_rad.mean()), length_mm)
     return BaseLines(motor_rad, point, point_spread, direction, direction_spread, shared)
+
+
+def _well_seen_frames(rows: list[_Rows]) -> np.ndarray:
+    """Return the frames that have enough points."""
+    frame = np.array([own.frame for own in rows], dtype=int)
+    counts = np.bincount(frame, [len(own.residual) for own in rows])
+    return np.flatnonzero(counts >= _FEWEST_POINTS)
 
 
 def _free_rows(problem: Problem, state: State) -> list[_Rows]:

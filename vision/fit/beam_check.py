@@ -14,7 +14,7 @@ what the step moves has mean 0 and a covariance that follows from those of line 
 and its square over that covariance is a chi² (the test of Hausman, Econometrica 46, 1251, 1978).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
@@ -112,7 +112,7 @@ def check_beam(
         """Return a quantity with gradient (size,) that also changes `directly` (k,) with the
         departure.
         """
-        row = gradient @ departure.parameters_by + directly
+        row = gradient @ departure.parameters_by[: problem.size] + directly
         difference_sigma = float(np.sqrt(row @ departure.covariance @ row))
         sigma = float(np.sqrt(gradient @ covariance @ gradient))
         beam = float(value)
@@ -139,8 +139,8 @@ def _chance(departure: np.ndarray, spread: np.ndarray) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Observations:
-    """The n observations of a fit about its solution, over sigma and robustly weighted.
+class _LeastSquares:
+    """The least-squares problem of n observations about a fit's solution, weighted.
 
     residual (n,). jacobian (n, p): by the fit's parameters, and by others that have priors alone;
     prior (m, p): rows of these priors. by_camera (n, c): by the cameras' parameters, with their
@@ -182,15 +182,14 @@ def _estimate_departure(
     on_contacts, slip_by = by_contacts(problem, state, curves, moves, frame, _STEP_MM_PER_RAD)
     by_departure = np.concatenate([by_lines(problem, curves, moves), on_contacts])
     jacobian = np.hstack([linear.jacobian * root[:, None], _weighted(root, _wander_rows(problem))])
-    observations = _Observations(
+    weighted = _LeastSquares(
         residual=linear.residual * root,
         jacobian=jacobian,
         prior=np.eye(jacobian.shape[1])[problem.size :] / WANDER_PX,
         by_camera=_weighted(root, camera_rows(problem, state)),
         covariance=problem.cameras.covariance,
     )
-    departure = _fit_added(observations, _weighted(root, by_departure))
-    return replace(departure, parameters_by=departure.parameters_by[: problem.size]), slip_by
+    return _fit_added(weighted, _weighted(root, by_departure)), slip_by
 
 
 def _weighted(root_weight: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -200,13 +199,13 @@ def _weighted(root_weight: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return weighted
 
 
-def _fit_added(observations: _Observations, rows: np.ndarray) -> _Departure:
+def _fit_added(problem: _LeastSquares, rows: np.ndarray) -> _Departure:
     """Fit parameters (k,) with Jacobian `rows` (n, k) that are added to a fit that has converged.
 
     Their covariance is that by noise and by cameras where the parameters are none.
     """
-    own = observations.jacobian
-    basis, triangle = np.linalg.qr(np.vstack([own, observations.prior]))
+    own = problem.jacobian
+    basis, triangle = np.linalg.qr(np.vstack([own, problem.prior]))
     basis = basis[: len(own)]
     explained = basis.T @ rows
     free = rows - basis @ explained
@@ -214,10 +213,10 @@ def _fit_added(observations: _Observations, rows: np.ndarray) -> _Departure:
     prior_information = np.eye(rows.shape[1]) / _DEPARTURE_MM_PER_RAD**2
     within = np.linalg.inv(information + prior_information)
     gain = within @ free.T
-    by_cameras = gain @ observations.by_camera
-    spread = by_cameras @ observations.covariance @ by_cameras.T
+    by_cameras = gain @ problem.by_camera
+    spread = by_cameras @ problem.covariance @ by_cameras.T
     return _Departure(
-        values=-gain @ observations.residual,
+        values=-gain @ problem.residual,
         covariance=within @ information @ within + spread,
         parameters_by=-np.linalg.solve(triangle, explained),
     )

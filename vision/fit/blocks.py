@@ -168,6 +168,12 @@ class Blocks:
         return np.concatenate([np.broadcast_to(b.step, len(b)) for b in self.in_order])
 
     @property
+    def geometry(self) -> np.ndarray:
+        """Return the indices of what bends and places whisker and object, of no error of lines."""
+        whisker = columns_of(self.bar_axis, self.rest_shape, self.friction, self.bends)
+        return np.append(whisker, self.placement)
+
+    @property
     def placement(self) -> np.ndarray:
         """Return the indices of what places the object besides its axis: motion, shift along it,
         outline bias.

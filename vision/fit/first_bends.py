@@ -138,11 +138,11 @@ def _resting_points(
     shapes = np.stack([1.0 - along, along, along * (1.0 - along)], axis=1)
     grids = [np.arange(-n, n + 1) * _STEP_PX for n in np.ceil(most_px / _STEP_PX)]
     best, is_sure = likely_curve([found], shapes, grids)
+    if not is_sure:
+        return []
     points = found.points(shapes @ best)
-    seen = []
-    for k, frame in enumerate(curves):
-        seen.append(Observed(k, camera, points.select(is_sure & (found.pieces.source == frame))))
-    return seen
+    source = found.pieces.source
+    return [Observed(k, camera, points.select(source == own)) for k, own in enumerate(curves)]
 
 
 def follow_bends(

@@ -195,21 +195,18 @@ class _LinesOff:
     ) -> "_LinesOff":
         """Return how far one camera's lines are off."""
         problem = observations.problem
-        wire = problem.blocks.wire_offsets[camera]
-        bar = problem.blocks.bar_offsets[camera]
-        off = np.append(columns_of(wire)[:2], columns_of(bar))
-        prior_row = problem.prior_rows.start + off
-        sigma_px = 1.0 / observations.jacobian[prior_row, off]
+        blocks = problem.blocks
+        wire = columns_of(blocks.wire_offsets[camera])
+        off = np.append(wire[:2], columns_of(blocks.bar_offsets[camera]))
+        sigma_px = blocks.prior_sigma[off]
         own = inverse_normal[np.ix_(off, off)] / np.outer(sigma_px, sigma_px)
-        determined, directions = np.linalg.eigh(np.eye(len(off)) - own)
-        keep = determined > _DETERMINED
-        directions = directions[:, keep]
+        determined, directions = _determined_directions(own)
         gain = inverse_normal[off] @ observations.jacobian.T  # (4, n)
         rows = -gain / sigma_px[:, None]
-        rows[np.arange(len(off)), prior_row] += 1.0
+        rows[np.arange(len(off)), problem.prior_rows.start + off] += 1.0
         in_sigmas = (state.vector[off] - gain @ observations.residual) / sigma_px
         covariance = observations.spread(directions.T @ rows)
-        px_per_value = sigma_px[:, None] * directions / determined[keep]
+        px_per_value = sigma_px[:, None] * directions / determined
         return cls(directions, directions.T @ in_sigmas, covariance, px_per_value)
 
     @property
@@ -225,6 +222,18 @@ class _LinesOff:
         is_determined = np.sum(self.directions**2, axis=1) > 0.5
         worst = int(np.argmax(np.where(is_determined, in_sigmas, 0.0)))
         return float(off_px[worst]), float(sigma_px[worst])
+
+
+def _determined_directions(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return by how much (k,) of their prior's variance combinations are determined, and these (4,
+    k).
+
+    covariance (4, 4): of the parameters, in sigmas of their priors. Combinations that are
+    determined by less than _DETERMINED are left out.
+    """
+    determined, directions = np.linalg.eigh(np.eye(len(covariance)) - covariance)
+    is_kept = determined > _DETERMINED
+    return determined[is_kept], directions[:, is_kept]
 
 
 def _chance(moved: np.ndarray, spread: np.ndarray) -> float:

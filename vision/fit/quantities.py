@@ -94,19 +94,25 @@ def _deflection(
     P is the contact point (…, f, 3). V, the virtual point, is that of the resting whisker which is
     as far along the contact frame's x axis as the contact at touch.
     """
-    shape = point_mm.shape[:-1]
-    motor = np.broadcast_to(problem.motor_rad, shape)
+    motor = np.broadcast_to(problem.motor_rad, point_mm.shape[:-1])
     unbent = resting_curves(problem, vector[..., None, :], motor)
     x, y, _ = np.moveaxis(rotation_z(touch.motor_rad)[..., None, :, :], -1, 0)  # (…, 1, 3)
-    arc = np.broadcast_to(touch.arc_mm[..., None], shape)
+    offset = _virtual_point(unbent, touch, x) - point_mm
+    return np.sum(offset * y, axis=-1), -offset[..., 2]
+
+
+def _virtual_point(unbent: Curves, touch: FirstTouch, x: np.ndarray) -> np.ndarray:
+    """Find the points (…, f, 3) of unbent curves that are as far along x as the contact at touch.
+
+    x (…, 1, 3): unit, of the contact frame.
+    """
+    arc = np.broadcast_to(touch.arc_mm[..., None], unbent.points_mm.shape[:-2])
     for _ in range(_ROUNDS):
-        virtual, tangent = unbent.at(arc[..., None])  # (…, f, 1, 3)
-        to_touch = touch.point_mm[..., None, :] - virtual[..., 0, :]
+        point, tangent = unbent.at(arc[..., None])  # (…, f, 1, 3)
+        to_touch = touch.point_mm[..., None, :] - point[..., 0, :]
         along = np.sum(tangent[..., 0, :] * x, axis=-1)
         arc = arc + np.sum(to_touch * x, axis=-1) / along
-    virtual, _ = unbent.at(arc[..., None])
-    offset = virtual[..., 0, :] - point_mm
-    return np.sum(offset * y, axis=-1), -offset[..., 2]
+    return unbent.at(arc[..., None])[0][..., 0, :]
 
 
 def _force_direction(

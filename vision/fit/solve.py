@@ -16,7 +16,7 @@ from itertools import groupby
 import numpy as np
 
 from vision.fit.bend_onset import Onset
-from vision.fit.blocks import Blocks, columns_of
+from vision.fit.blocks import Blocks
 from vision.fit.differences import Perturbed, perturb
 from vision.fit.object_rows import CameraPoints, Part, object_rows
 from vision.fit.problem import (
@@ -187,8 +187,7 @@ def solve(
     step is negligible.
     """
     blocks = problem.blocks
-    geometry = columns_of(blocks.bar_axis, blocks.rest_shape, blocks.friction, blocks.bends)
-    geometry = np.concatenate([geometry, blocks.placement])
+    geometry = blocks.geometry
     near = _ALIKE * blocks.steps[geometry]
     near_jacobian = None
     for scale in scales:

@@ -19,6 +19,8 @@ _SURE_BEND_RAD = np.radians(0.25)
 _STEP = 1e-5
 # [mm] Secant steps below this would divide rounding by rounding. Derived.
 _TOUCH_GAP_MM = 1e-10
+# [steps] Secants from half a millimetre to `_TOUCH_GAP_MM`, where they end before. Derived.
+_SECANT_STEPS = 8
 # [rad] Half a millimetre at the contact, when touch is searched for. Stated.
 _SCAN_RAD = np.radians(0.5)
 # [1] Starts of the hinge that are tried between frames: finer than frames determine. Derived.
@@ -40,7 +42,7 @@ class FirstTouch:
     arc_mm: np.ndarray
 
 
-def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstTouch:
+def first_touch(problem: Problem, vector: np.ndarray) -> FirstTouch:
     """Find the motor angle at which axis and resting centreline are reach apart; batches allowed.
 
     A secant search, from about where the first of a batch touches.
@@ -50,7 +52,7 @@ def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstT
     angle = np.full(vector.shape[:-1], last)
     gap_before, _, _ = _gap(problem, vector, before)
     gap, arc, point = _gap(problem, vector, angle)
-    for _ in range(rounds):
+    for _ in range(_SECANT_STEPS):
         is_open = np.abs(gap) > _TOUCH_GAP_MM
         slope = np.divide(gap - gap_before, angle - before, out=np.ones_like(gap), where=is_open)
         before = np.where(is_open, angle, before)

@@ -192,10 +192,8 @@ def centrelines(
     lateral = lateral + _slope_by_bend(
         np.asarray(bend_rad), np.asarray(pull)[..., None], arc, np.asarray(contact_mm), wire
     )
-    forward2 = 1.0 - lateral[..., 0] ** 2 - lateral[..., 1] ** 2
-    tangents = np.empty((*lateral.shape[:-1], 3))
-    tangents[..., 0] = np.sqrt(np.maximum(forward2, _LEAST_FORWARD2))
-    tangents[..., 1:] = lateral
+    forward2 = np.maximum(1.0 - np.sum(lateral**2, axis=-1, keepdims=True), _LEAST_FORWARD2)
+    tangents = np.concatenate([np.sqrt(forward2), lateral], axis=-1)
     points = simpson() @ tangents * arc[1]
     points[..., 1:] += rest_mm[..., None, :, 0]
     rotation = np.swapaxes(rotation_z(motor_rad), -1, -2)

@@ -66,11 +66,11 @@ class Cone(Rounded):
         """Return the cone as a bar near points (..., k, 3): along its surface to the tip."""
         sin = np.sin(self.half_angle_rad)
         cos = np.cos(self.half_angle_rad)
-        axis = np.asarray(at.direction)[..., None, :]
+        axis = at.direction[..., None, :]
         place = AboutAxis.of(at, points_mm)
         down = place.radius_mm * sin / cos - place.height_mm  # from the tip to the foot
         along_surface = upwards(cos * axis - sin * place.outward)
-        foot = np.asarray(at.point_mm)[..., None, :] - down * axis
+        foot = at.point_mm[..., None, :] - down * axis
         return Local(foot, along_surface, (down * sin)[..., 0])
 
     def follows(self, at: RoundedAxis, local: Local, away: np.ndarray) -> float:
@@ -79,8 +79,8 @@ class Cone(Rounded):
 
     def balls(self, at: RoundedAxis, radius_mm: float, reach_mm: float, stations: int) -> Balls:
         """Return the balls near where the cone is touched; their radii shrink towards its tip."""
-        point = np.asarray(at.point_mm)[..., None, :]
-        axis = np.asarray(at.direction)[..., None, :]
+        point = at.point_mm[..., None, :]
+        axis = at.direction[..., None, :]
         sin = np.sin(self.half_angle_rad)
         from_tip = point - at.spot_foot_mm
         spot_down = np.sum(from_tip * axis, axis=-1, keepdims=True)

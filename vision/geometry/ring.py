@@ -77,9 +77,9 @@ class Ring(Rounded):
 
     def near(self, at: RoundedAxis, points_mm: np.ndarray) -> Local:
         """Return the ring as a bar near points (..., k, 3): its tangent at the nearest place."""
-        axis = np.asarray(at.direction)[..., None, :]
+        axis = at.direction[..., None, :]
         outward = AboutAxis.of(at, points_mm).outward
-        foot = np.asarray(at.point_mm)[..., None, :] + self.ring_radius_mm * outward
+        foot = at.point_mm[..., None, :] + self.ring_radius_mm * outward
         return Local(foot, upwards(np.cross(axis, outward)), np.zeros(outward.shape[:-1]))
 
     def follows(self, at: RoundedAxis, local: Local, away: np.ndarray) -> np.ndarray:
@@ -87,7 +87,7 @@ class Ring(Rounded):
 
         It is less than on a straight line, if the point is outside of the circle.
         """
-        outward = (local.foot_mm - np.asarray(at.point_mm)[..., None, :]) / self.ring_radius_mm
+        outward = (local.foot_mm - at.point_mm[..., None, :]) / self.ring_radius_mm
         distance = self.ring_radius_mm + np.sum(away * outward, axis=-1)  # from the ring's axis
         return self.ring_radius_mm / np.maximum(distance, _LEAST_RADIUS_SHARE * self.ring_radius_mm)
 
@@ -102,8 +102,8 @@ class Ring(Rounded):
         steps_mm = np.arange(-1.0, 1.0, radius_mm / diameter_mm) * (diameter_mm + radius_mm)
         batch = (*at.point_mm.shape[:-1], -1, 3)
         ahead = unit(points_mm - centre_mm).reshape(batch)
-        start = points_mm.reshape(batch) - np.asarray(at.point_mm)[..., None, :]
-        axis = np.asarray(at.direction)[..., None]
+        start = points_mm.reshape(batch) - at.point_mm[..., None, :]
+        axis = at.direction[..., None]
         height = start @ axis + steps_mm * (ahead @ axis)  # (..., k, steps) above the ring's plane
         distance2 = _dot(start, start) + 2.0 * steps_mm * _dot(start, ahead) + steps_mm**2
         across = np.sqrt(np.maximum(distance2 - height**2, 0.0)) - self.ring_radius_mm
@@ -112,8 +112,8 @@ class Ring(Rounded):
 
     def balls(self, at: RoundedAxis, radius_mm: float, reach_mm: float, stations: int) -> Balls:
         """Return balls of one size along the circle, all round it if reach_mm is infinite."""
-        point = np.asarray(at.point_mm)[..., None, :]
-        axis = np.asarray(at.direction)[..., None, :]
+        point = at.point_mm[..., None, :]
+        axis = at.direction[..., None, :]
         most = np.pi
         if np.isfinite(reach_mm):
             most = min(reach_mm / self.ring_radius_mm, _MOST_TURN_RAD)

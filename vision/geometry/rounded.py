@@ -315,8 +315,8 @@ class AboutAxis:
     @classmethod
     def of(cls, at: RoundedAxis, points_mm: np.ndarray) -> "AboutAxis":
         """Return the places of points (..., k, 3)."""
-        axis = np.asarray(at.direction)[..., None, :]
-        apart = points_mm - np.asarray(at.point_mm)[..., None, :]
+        axis = at.direction[..., None, :]
+        apart = points_mm - at.point_mm[..., None, :]
         height = np.sum(apart * axis, axis=-1, keepdims=True)
         flat = apart - height * axis
         radius = np.linalg.norm(flat, axis=-1, keepdims=True)

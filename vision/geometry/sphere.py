@@ -48,7 +48,7 @@ class Sphere(Rounded):
 
     def near(self, at: RoundedAxis, points_mm: np.ndarray) -> Local:
         """Return the sphere as a bar near points (..., k, 3): along the steepest way there."""
-        centre = np.asarray(at.point_mm)[..., None, :]
+        centre = at.point_mm[..., None, :]
         apart = points_mm - centre
         normal = unit(apart)
         upright = unit(_UP - normal[..., 2:] * normal)
@@ -60,8 +60,8 @@ class Sphere(Rounded):
 
     def balls(self, at: RoundedAxis, radius_mm: float, reach_mm: float, stations: int) -> Balls:
         """Return the one ball."""
-        centre = np.asarray(at.point_mm)[..., None, :]
-        ahead = np.asarray(at.direction)[..., None, :]
+        centre = at.point_mm[..., None, :]
+        ahead = at.direction[..., None, :]
         return Balls(centre, ahead, np.full((*centre.shape[:-1], 1), radius_mm), 0.0)
 
     def silhouette(
@@ -73,7 +73,7 @@ class Sphere(Rounded):
         stations: int,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compute where sights graze the sphere: a circle in two halves, whatever the reach."""
-        middle = np.asarray(at.point_mm)[..., None, :]
+        middle = at.point_mm[..., None, :]
         sight = middle - centre_mm
         ahead = unit(sight)
         right = unit(np.cross(ahead, _UP + _SKEWED))

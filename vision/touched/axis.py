@@ -22,6 +22,8 @@ _PRIOR = np.array([5.0, 5.0, 0.5, 0.5])
 # [mm, rad] Steps of differences; a smaller step of the axis is the last: a hundredth of a pixel.
 # Derived.
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5])
+# [steps] Gauss–Newton; it ends earlier. Stated.
+_GAUSS_NEWTON = 5
 # [sigmas] Scale of the Cauchy distribution that weighs residuals. Stated.
 _CAUCHY_SIGMAS = 5.0
 
@@ -31,12 +33,11 @@ def settle_axis(
     cameras: Cameras,
     lines: Mapping[str, LinePoints],
     radius_mm: float,
-    rounds: int = 5,
 ) -> BarAxis:
     """Fit the axis whose outline passes through line points in each camera, from an axis nearby.
 
-    lines: by camera, their `place` mm along the axis given. rounds: most Gauss–Newton steps. Where
-    the cameras see the bar from nearly the same side, what they cannot determine stays as it was.
+    lines: by camera, their `place` mm along the axis given. Where the cameras see the bar from
+    nearly the same side, what they cannot determine stays as it was.
     """
     across = axis_frame(axis.direction)
     used = {name: points for name, points in lines.items() if len(points)}
@@ -49,7 +50,7 @@ def settle_axis(
         residuals = [_residuals(axes, cameras[name], used[name], radius_mm) for name in used]
         return np.concatenate(residuals, axis=1)
 
-    vector = gauss_newton(residuals_of, _PRIOR, _STEPS, rounds, _CAUCHY_SIGMAS)
+    vector = gauss_newton(residuals_of, _PRIOR, _STEPS, _GAUSS_NEWTON, _CAUCHY_SIGMAS)
     return axis.shifted(across, vector).upward()
 
 

@@ -298,6 +298,20 @@ class _Design:
     cover: np.ndarray
     leak: np.ndarray
 
+    @classmethod
+    def at(
+        cls, offset_px: np.ndarray, modes: np.ndarray, radius_px: float, blur_px: float
+    ) -> "_Design":
+        """Return the design at offset_px (n,), with modes (splines, r) of the light on the rod."""
+        rod_light = _blur_splines(offset_px, radius_px, blur_px) @ modes
+        beyond_px = np.stack([-offset_px, offset_px], axis=1) - radius_px  # left and right edge
+        cover = ndtr(beyond_px / blur_px)
+        density = np.exp(-0.5 * (beyond_px / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
+        sides = np.stack([cover, cover * beyond_px / OUTSIDE_PX], axis=2)
+        sides = sides.reshape(len(offset_px), _SIDES)
+        leak = blur_px * np.array([-1.0, 1.0]) * density
+        return cls(np.concatenate([rod_light, sides], axis=1), cover, leak)
+
     @cached_property
     def products(self) -> list[np.ndarray]:
         """Return products of two columns, (n, elements) each, by the moment that each belongs to.
@@ -343,20 +357,17 @@ def compute_evidence(
     profiles = rod.profiles
     radius_px = width_factor * profiles.radius_px
     tried = _Positions.within(profiles, reach_px, every, positions)
-    pictures = []
-    for fraction_px in tried.fractions_px:
-        pictures.append(_blur_splines(tried.offset_px(fraction_px), radius_px, blur_px))
+    picture = _blur_splines(tried.offset_px(0.0), radius_px, blur_px)
     root_weight = _largest_root_weight(profiles, tried)
     modes, precisions = rod.observable_modes(
-        root_weight[:, None] * pictures[0], with_smooth_priors=with_smooth_priors
+        root_weight[:, None] * picture, with_smooth_priors=with_smooth_priors
     )
     matrices = []
-    for fraction_px, picture in zip(tried.fractions_px, pictures):
-        offset_px = tried.offset_px(fraction_px)
-        design = _make_design(offset_px, picture @ modes, radius_px, blur_px)
+    for fraction_px in tried.fractions_px:
+        design = _Design.at(tried.offset_px(fraction_px), modes, radius_px, blur_px)
         matrices.append(_normal_matrices(profiles, tried, design))
-    size = matrices[0].shape[-1]
-    normal = np.stack(matrices, axis=2).reshape(len(profiles), -1, size, size)
+    normal = np.stack(matrices, axis=2)  # (k, s, p, m, m)
+    normal = normal.reshape(len(profiles), -1, *normal.shape[-2:])
     models = [rod.marginalise(normal, precision) for precision in precisions]
     bar_deviance, misfit = np.moveaxis(models, 0, -1)  # (k, g, r) each
     best = np.argmin(bar_deviance.reshape(len(profiles), -1), axis=1)
@@ -430,18 +441,6 @@ def _element_layout(columns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     first += 3
     element[-1] = first + np.arange(columns + 3)
     return row, column, element
-
-
-def _make_design(offset_px, rod_light, radius_px: float, blur_px: float) -> _Design:
-    """Return the design at offset_px (n,), of the blurred pictures rod_light (n, r) of the modes of
-    light on the rod."""
-    beyond_px = np.stack([-offset_px, offset_px], axis=1) - radius_px  # (n, 2) left and right edge
-    cover = ndtr(beyond_px / blur_px)
-    density = np.exp(-0.5 * (beyond_px / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
-    sides = np.stack([cover, cover * beyond_px / OUTSIDE_PX], axis=2)
-    sides = sides.reshape(len(offset_px), _SIDES)
-    leak = blur_px * np.array([-1.0, 1.0]) * density
-    return _Design(np.concatenate([rod_light, sides], axis=1), cover, leak)
 
 
 def _blur_splines(offset_px, radius_px: float, blur_px: float) -> np.ndarray:

@@ -119,15 +119,20 @@ def climb(
         if not len(going):
             break
         around = best[going, None] + step_share[going, None, None] * steps  # (going, neighbours, k)
-        scores = score(around.reshape(-1, len(first_step))).reshape(len(going), -1)
-        rows = np.arange(len(going))
-        chosen = np.argmax(scores, axis=1)
-        reached = scores[rows, chosen]
+        best[going], reached = _best_of_each(around, score)
         has_gained = reached > highest[going] + _LEAST_GAIN
-        step_share[going] = np.where(has_gained, step_share[going], 0.5 * step_share[going])
-        best[going] = around[rows, chosen]
+        step_share[going[~has_gained]] *= 0.5
         highest[going] = reached
     return best, highest
+
+
+def _best_of_each(hypotheses: np.ndarray, score: Score) -> tuple[np.ndarray, np.ndarray]:
+    """Return the best (n, k) of each row of hypotheses (n, m, k), and their scores (n,)."""
+    count, _, k = hypotheses.shape
+    scores = score(hypotheses.reshape(-1, k)).reshape(count, -1)
+    chosen = np.argmax(scores, axis=1)
+    rows = np.arange(count)
+    return hypotheses[rows, chosen], scores[rows, chosen]
 
 
 def _signs_of_neighbours(k: int) -> np.ndarray:

@@ -103,6 +103,18 @@ class LineWindow:
         """Return how many lines are tried by shift, and how many by tilt."""
         return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / self.spacing_px)))
 
+    @property
+    def cell_px2(self) -> float:
+        """Return the area that each line of the grid stands for, px by shift times px by tilt."""
+        return float(np.prod(2.0 * self.most_px / (self.lines - 1)))
+
+    def unresolved_share(self, covariance: np.ndarray) -> float:
+        """Return the share of the window that lines of a covariance (2, 2) fill, 1 where flat.
+
+        A flat posterior over a window of half widths a, b has the determinant (a b)² / 9.
+        """
+        return float(3.0 * np.sqrt(np.linalg.det(covariance)) / np.prod(self.most_px))
+
     def grid(self) -> np.ndarray:
         """Return the lines (lines², 2): shift and tilt, px."""
         axes = [np.linspace(-most, most, self.lines) for most in self.most_px]
@@ -271,10 +283,7 @@ def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> 
     grid = _evaluate_lines(evidences, profiles, window)
     mean, covariance = grid.average_line()
     log_blur, log_blur_sigma = grid.average_log_blur()
-    line_cell = float(np.prod(2.0 * window.most_px / (window.lines - 1)))
-    cell = line_cell * max(grid.blur_step, 1e-300)
-    # A flat posterior over a window of half widths a, b has the determinant (a b)² / 9.
-    area = 3.0 * np.sqrt(np.linalg.det(covariance))
+    cell = window.cell_px2 * max(grid.blur_step, 1e-300)
     best = _best_of(evidences)
     odds = (best.no_bar_deviance - best.least_deviance) / grid.temperature
     return Posterior(
@@ -285,7 +294,7 @@ def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> 
         volume_deviance=-2.0 * np.log(grid.volume * cell),
         evidence_for_bar=float(np.sum(odds)),
         detection_score=LitRod(profiles).detection_score(best),
-        unresolved_share=float(area / np.prod(window.most_px)),
+        unresolved_share=window.unresolved_share(covariance),
         blur_px=np.exp(log_blur),
         log_blur_sigma=log_blur_sigma,
         log_blur_step=grid.blur_step,
@@ -356,16 +365,16 @@ def _evaluate_lines(
     temperature = estimate_temperature(_best_of(evidences), profiles)
     shift_px = evidences[0].shift_px  # of the narrowest blur, which has the most positions
     deviance = _at_shifts(evidences, shift_px) / temperature[:, None, None, None]
-    log_blurs, deviance = _at_fine_blurs(np.log(window.blurs_px), deviance)  # (k, g, r, b)
-    priors = deviance.shape[2]
-    deviance = deviance.reshape(len(profiles), len(shift_px), -1)  # (k, g, r b)
+    log_blurs, deviance = _at_fine_blurs(np.log(window.blurs_px), deviance)
+    segments, shifts, priors, blurs = deviance.shape
+    deviance = deviance.reshape(segments, shifts, -1)
     least = deviance.min(axis=1)
     excess = _excess_of_lines(profiles, lines, shift_px, deviance - least[:, None])
     total = excess.sum(axis=0)
     total = least.sum(axis=0) + total / _misfit_of_line(total, profiles)
     line, other = np.unravel_index(np.argmin(total), total.shape)
     segment_deviance = temperature * (least[:, other] + excess[:, line, other])
-    total = total.reshape(len(lines), priors, len(log_blurs))
+    total = total.reshape(-1, priors, blurs)
     return _LineGrid(lines, log_blurs, total, segment_deviance, temperature)
 
 

@@ -264,13 +264,18 @@ def _average_patches(
     texture, variance_inflation = _estimate_texture(membership[:, 1:-1], patches)
     squares = np.where(is_observed, membership @ patches.weight**2, 1.0)
     number = np.where(is_observed, total**2 / squares, 1.0)  # effective number of patches
+
+    def mean(sums: np.ndarray) -> np.ndarray:
+        """Return the segments' means (k, b) of sums (s, b) over patches."""
+        return membership @ sums / divisor
+
     return Profiles(
         offset_px=offset_px,
-        light=(membership @ patches.light) / divisor,
+        light=mean(patches.light),
         sigma=np.where(is_observed, np.sqrt(1.0 / divisor + texture / number), np.inf),
-        background=_about_median((membership @ patches.background) / divisor, is_observed),
-        background_slope=(membership @ patches.background_slope) / divisor,
-        light_per_grey=(membership @ patches.light_per_grey) / divisor,
+        background=_about_median(mean(patches.background), is_observed),
+        background_slope=mean(patches.background_slope),
+        light_per_grey=mean(patches.light_per_grey),
         place_mm=np.array([some.mean() for some in place_mm]),
         radius_px=radius_px,
         variance_inflation=variance_inflation,

@@ -141,10 +141,15 @@ def measure_silhouette_edges(
             )
         outlines[name] = _fit_outline(sides, pieces, one_pass)
     deviance = np.sum([outline.curve_deviances for outline in outlines.values()], axis=0)
+    probabilities = _probable_alone(deviance)
+    return {name: outline.average(probabilities) for name, outline in outlines.items()}
+
+
+def _probable_alone(deviance: np.ndarray) -> np.ndarray:
+    """Return the probabilities (g,) of transfer curves, 0 of those that are hardly possible."""
     weights = np.exp(-0.5 * (deviance - deviance.min()))
     weights = np.where(weights < _LEAST_PROBABILITY, 0.0, weights)
-    probabilities = weights / weights.sum()
-    return {name: outline.average(probabilities) for name, outline in outlines.items()}
+    return weights / weights.sum()
 
 
 @dataclass(frozen=True)
@@ -173,10 +178,7 @@ class _OutlinePosterior:
         if not self.sides:
             none = LinePoints(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
             return SilhouetteEdges(none, 0, _BLURS_PX[1])
-        weights = []  # by transfer curve the weight (b,) of each blur
-        for probability, curve in zip(probabilities, self.posteriors):
-            deviance = sum(side.deviance for side in curve)
-            weights.append(probability * softmax(-0.5 * deviance))
+        weights = self._blur_weights(probabilities)
         segments = 0
         edges = []
         for number in range(len(self.sides)):
@@ -188,6 +190,14 @@ class _OutlinePosterior:
         blur_px = float(np.exp(log_blurs @ np.sum(weights, axis=0)))
         density = 2.0 * self.measured.reach_px / (np.sqrt(2.0 * np.pi) * edges.sigma_px)
         return SilhouetteEdges(edges, segments, blur_px, float(np.sum(np.log(density))))
+
+    def _blur_weights(self, probabilities: np.ndarray) -> list[np.ndarray]:
+        """Return by transfer curve the probability (b,) of curve and blur."""
+        weights = []
+        for probability, curve in zip(probabilities, self.posteriors):
+            deviance = sum(side.deviance for side in curve)
+            weights.append(probability * softmax(-0.5 * deviance))
+        return weights
 
     def _average_side(self, number: int, probabilities, weights) -> tuple[LinePoints, np.ndarray]:
         """Return the line points of one side's segments, and which of them (k,) show an edge."""

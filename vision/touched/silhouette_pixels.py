@@ -56,6 +56,11 @@ class OutlineSide:
         steps = np.linalg.norm(np.diff(self.px, axis=0), axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)])
 
+    @property
+    def model_half_px(self) -> float:
+        """Return half the object's width in the model of its pixels."""
+        return min(float(np.median(self.half_px[self.is_clear])), _LARGEST_HALF_PX)
+
     def station_at(self, along_px: np.ndarray) -> np.ndarray:
         """Return the stations (n,) at places (n,) along the side."""
         arc_px = self.arc_px
@@ -241,11 +246,9 @@ def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) 
     grey = view.mean[row, column]
     background = view.background[row, column]
     scale = FULL_SCALE / view.full_scale
-    slope = np.sum(
-        _gradient(view.background, row, column) * side.normal[side.station_at(found.along_px)],
-        axis=1,
-    )
-    half_px = min(float(np.median(side.half_px[side.is_clear])), _LARGEST_HALF_PX)
+    across = side.normal[side.station_at(found.along_px)]
+    slope = np.sum(_gradient(view.background, row, column) * across, axis=1)
+    half_px = side.model_half_px
     middle = (rows.pieces + 0.5) * length_px
     station = side.station_at(middle)
     offset_px = rows.table(found.offset_px + half_px, 0.0)
