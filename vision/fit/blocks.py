@@ -63,8 +63,8 @@ class Block:
     """Neighbouring parameters of the fit that mean one thing.
 
     start: index of the first of them in the parameter vector. sigma (k,): standard deviations of
-    their prior. step: by which they are moved for finite differences, one
-    for all or (k,); 0 where derivatives are known without.
+    their prior. step: by which they are moved for finite differences, one for all or (k,); 0 where
+    derivatives are known without.
     """
 
     start: int

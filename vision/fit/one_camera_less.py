@@ -48,9 +48,9 @@ class OneLess:
 
     step (size,): by how much parameters differ. moved (4,): d_x, touch, beta and the last slip, in
     mm and rad, with moved_sigma (4,) where all cameras agree and sigma (4,), the stated one.
-    beside, beside_sigma: px by which that of the camera's lines which is off most lies from where
-    the others have it. chance: that of cameras that agree one moves so much, or has lines so far
-    off. spread (size, size): covariance of the step, where it contradicts.
+    line_offset_px, line_offset_sigma_px: by which that of the camera's lines which is off most lies
+    from where the others have it. chance: that of cameras that agree one moves so much, or has
+    lines so far off. spread (size, size): covariance of the step, where it contradicts.
     """
 
     camera: str
@@ -58,8 +58,8 @@ class OneLess:
     moved: np.ndarray
     moved_sigma: np.ndarray
     sigma: np.ndarray
-    beside: float
-    beside_sigma: float
+    line_offset_px: float
+    line_offset_sigma_px: float
     chance: float
     spread: np.ndarray | None = None
 
@@ -78,10 +78,8 @@ class OneLess:
         scale, unit = _UNITS[name]
         moved = scale * self.moved[worst]
         by = f"{moved:+.3f} ± {scale * self.moved_sigma[worst]:.3f} {unit}"
-        lines = (
-            f"its lines up to {abs(self.beside):.2f} ± {self.beside_sigma:.2f} px beside where the "
-            "others have them"
-        )
+        offset_px = f"{abs(self.line_offset_px):.2f} ± {self.line_offset_sigma_px:.2f} px"
+        lines = f"its lines up to {offset_px} beside where the others have them"
         return f"without {self.camera} {name} is {by} elsewhere, {lines} (chance {self.chance:.1g})"
 
 
@@ -153,7 +151,7 @@ def _leave_out(
     moved = gradients @ step
     spread = observations.spread(gradients @ change)
     lines = _LinesOff.of(observations, state, fitted.inverse_normal, camera)
-    beside, beside_sigma = lines.worst_px()
+    line_offset_px, line_offset_sigma_px = lines.worst_px()
     names = observations.problem.cameras.names
     least = min(_chance(moved, spread), lines.chance)
     one = OneLess(
@@ -162,8 +160,8 @@ def _leave_out(
         moved=moved,
         moved_sigma=np.sqrt(np.diag(spread)),
         sigma=np.sqrt(np.diag(gradients @ fitted.covariance @ gradients.T)),
-        beside=beside,
-        beside_sigma=beside_sigma,
+        line_offset_px=line_offset_px,
+        line_offset_sigma_px=line_offset_sigma_px,
         chance=min(1.0, 2 * len(names) * least),
     )
     return replace(one, spread=observations.spread(change)) if one.contradicts else one
