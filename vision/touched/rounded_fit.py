@@ -116,8 +116,12 @@ def fit_silhouette(
         return place
 
     def residuals_of(vectors: np.ndarray) -> np.ndarray:
-        """Compute the residuals (m, n) of all cameras' edge points for vectors (m, 5)."""
-        places = place.shifted_along(across, vectors)
+        """Compute the residuals (m, n) of all cameras' edge points for vectors (m, 5).
+
+        All but the first vector are small steps from the place that the first one gives.
+        """
+        here = place.shifted_along(across, vectors[0])
+        places = here.shifted_along(across, vectors - vectors[0])
         residuals = [_residuals(places, cameras[name], used[name], radius_mm) for name in used]
         return np.concatenate(residuals, axis=1)
 
