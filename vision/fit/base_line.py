@@ -23,6 +23,7 @@ from vision.fit.problem import (
 from vision.fit.solve import linear_at
 from vision.geometry.base_lines import BaseLines
 from vision.geometry.centreline import REST_POWERS, rotation_z
+from vision.geometry.rotation import unit
 from vision.wire.points import Observed
 
 # [columns] A layout, no threshold: offsets and slopes, y then z, among the rest shape's
@@ -67,10 +68,7 @@ def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | 
     None where fewer than two frames are free and well seen.
     """
     rows = _free_rows(problem, state)
-    frames = []
-    for frame in sorted({r.frame for r in rows}):
-        if sum(len(r.residual) for r in rows if r.frame == frame) >= _FEWEST_POINTS:
-            frames.append(frame)
+    frames = _well_seen_frames(rows)
     if len(frames) < 2:
         return None
     shape, covariance = _shape_at_rest(rows)
@@ -85,6 +83,13 @@ def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | 
     point, point_spread, direction, direction_spread = map(np.array, zip(*lines))
     shared = _shared(covariance, float(motor_rad.mean()), length_mm)
     return BaseLines(motor_rad, point, point_spread, direction, direction_spread, shared)
+
+
+def _well_seen_frames(rows: list[_Rows]) -> np.ndarray:
+    """Return the frames that have enough points."""
+    frame = np.array([own.frame for own in rows], dtype=int)
+    counts = np.bincount(frame, [len(own.residual) for own in rows])
+    return np.flatnonzero(counts >= _FEWEST_POINTS)
 
 
 def _free_rows(problem: Problem, state: State) -> list[_Rows]:
@@ -152,14 +157,13 @@ def _in_space(
     """
     place = -np.trace(covariance[:2, 2:]) / np.trace(covariance[2:, 2:])  # in lengths
     R = rotation_z(motor_rad)
-    to_place = np.hstack([np.eye(2), place * np.eye(2)])
-    point = np.append(place * length_mm, to_place @ line)
-    direction = np.append(1.0, line[2:] / length_mm)
-    spread = np.zeros((2, 3, 3))
-    spread[0, 1:, 1:] = to_place @ covariance @ to_place.T
-    spread[1, 1:, 1:] = covariance[2:, 2:] / length_mm**2
-    point_spread, direction_spread = R @ spread @ R.T
-    return R @ point, point_spread, R @ direction / np.linalg.norm(direction), direction_spread
+    along = R[:, 0]
+    across = R[:, 1:]  # (3, 2): y and z of the hub
+    by_line = across @ np.hstack([np.eye(2), place * np.eye(2)])  # (3, 4)
+    point = place * length_mm * along + by_line @ line
+    direction = unit(along + across @ line[2:] / length_mm)
+    direction_spread = across @ covariance[2:, 2:] @ across.T / length_mm**2
+    return point, by_line @ covariance @ by_line.T, direction, direction_spread
 
 
 def _shared(covariance: np.ndarray, motor_rad: float, length_mm: float) -> np.ndarray:
@@ -170,17 +174,14 @@ def _shared(covariance: np.ndarray, motor_rad: float, length_mm: float) -> np.nd
     one in z about −y. An offset in y that changes as the whisker turns shifts the base along it;
     one in z passes for an axis that leans about the whisker.
     """
-    hub = np.zeros((6, 4))
-    hub[4, 0] = 1.0
-    hub[5, 1] = 1.0
-    hub[2, 2] = 1.0 / length_mm
-    hub[1, 3] = -1.0 / length_mm
-    R = rotation_z(motor_rad)
-    to_rig = np.kron(np.eye(2), R) @ hub
-    along = np.append(np.zeros(3), R[:, 0])
-    lean = np.append(along[3:], np.zeros(3)) / (0.5 * length_mm)
-    shared = to_rig @ covariance[np.ix_(_LINE, _LINE)] @ to_rig.T
-    drift = np.zeros((6, 6))
-    for k, motion in zip(_LINE[:2], (along, lean)):
-        drift += _DRIFT_PER_RAD**2 * covariance[k, k] * np.outer(motion, motion)
-    return shared + drift
+    x, y, z = rotation_z(motor_rad).T  # of the hub, in the rig frame
+    none = np.zeros(3)
+    turns = np.column_stack([none, none, z, -y]) / length_mm
+    shifts = np.column_stack([y, z, none, none])
+    by_line = np.vstack([turns, shifts])  # (6, 4)
+    shift_along = np.append(none, x)
+    lean = np.append(x / (0.5 * length_mm), none)
+    by_drift = _DRIFT_PER_RAD * np.column_stack([shift_along, lean])  # (6, 2)
+    of_line = covariance[np.ix_(_LINE, _LINE)]
+    offset_variances = np.diag(np.diag(of_line)[:2])
+    return by_line @ of_line @ by_line.T + by_drift @ offset_variances @ by_drift.T

@@ -39,7 +39,6 @@ KNOTS = 5
 _DEPARTURE_MM_PER_RAD = 50.0
 # [mm/rad] Of differences: far above rounding, far below what bends. Derived.
 _STEP_MM_PER_RAD = 1e-4
-_NAMES = ("d_x", "touch", "slip")
 
 
 @dataclass(frozen=True)
@@ -79,19 +78,15 @@ class BeamCheck:
         """Return what is wrong, or '' where the curves differ by no more than chance, or the truth
         by less than what matters.
         """
-        compared = {"d_x": self.d_x, "touch": self.touch, "slip": self.slip}
-        worst = max(_NAMES, key=lambda name: abs(compared[name].shift))
-        moved = compared[worst]
+        slip = f"slip at {np.degrees(self.theta_rad):.1f} deg"
+        compared = [
+            (self.d_x, "d_x", 1.0, "mm"),
+            (self.touch, "touch", np.degrees(1.0), "deg"),
+            (self.slip, slip, 1.0, "mm"),
+        ]
+        moved, what, scale, unit = max(compared, key=lambda row: abs(row[0].shift))
         if not (self.chance <= FALSE_ALARM and abs(moved.shift) >= _MATTERS):
             return ""
-        what = worst
-        scale = 1.0
-        unit = "mm"
-        if worst == "touch":
-            scale = np.degrees(1.0)
-            unit = "deg"
-        if worst == "slip":
-            what = f"slip at {np.degrees(self.theta_rad):.1f} deg"
         change = scale * (moved.spline - moved.beam)
         by = f"{change:+.4f} ± {scale * moved.difference_sigma:.4f} {unit}"
         return (
@@ -111,24 +106,25 @@ def check_beam(
     quantities and their derivatives.
     """
     last = np.flatnonzero(problem.touching)[-1]
-    departure, spread, follows, slip_by = _departure(problem, state, last)
+    departure, slip_by = _estimate_departure(problem, state, last)
 
     def compare(value: float, gradient: np.ndarray, directly: np.ndarray | float) -> Compared:
         """Return a quantity with gradient (size,) that also changes `directly` (k,) with the
         departure.
         """
-        row = gradient @ follows + directly
-        difference_sigma = float(np.sqrt(row @ spread @ row))
+        row = gradient @ departure.parameters_by[: problem.size] + directly
+        difference_sigma = float(np.sqrt(row @ departure.covariance @ row))
         sigma = float(np.sqrt(gradient @ covariance @ gradient))
         beam = float(value)
-        return Compared(beam, beam + float(row @ departure), difference_sigma, sigma)
+        return Compared(beam, beam + float(row @ departure.values), difference_sigma, sigma)
 
+    touch = measured.whisk["touch"]
     return BeamCheck(
         d_x=compare(measured.whisk["d_x"], by.whisk["d_x"], 0.0),
-        touch=compare(measured.whisk["touch"], by.whisk["touch"], 0.0),
+        touch=compare(touch, by.whisk["touch"], 0.0),
         slip=compare(measured.frame["slip"][last], by.frame["slip"][last], slip_by),
-        theta_rad=float(problem.motor_rad[last] - measured.whisk["touch"]),
-        chance=_chance(departure, spread),
+        theta_rad=float(problem.motor_rad[last] - touch),
+        chance=_chance(departure.values, departure.covariance),
     )
 
 
@@ -142,64 +138,88 @@ def _chance(departure: np.ndarray, spread: np.ndarray) -> float:
     return float(chdtrc(len(departure), square))
 
 
-def _departure(
-    problem: Problem, state: State, frame: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Estimate the departure (k,), mm/rad, by one linear step from the fit.
+@dataclass(frozen=True, eq=False)
+class _LeastSquares:
+    """The least-squares problem of n observations about a fit's solution, weighted.
 
-    Returns it, its covariance (k, k) where the beam is right, what the parameters follow it by
-    (size, k), and the slip in a frame (k,), the parameters standing still.
+    residual (n,). jacobian (n, p): by the fit's parameters, and by others that have priors alone;
+    prior (m, p): rows of these priors. by_camera (n, c): by the cameras' parameters, with their
+    covariance (c, c).
+    """
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    prior: np.ndarray
+    by_camera: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _Departure:
+    """The departure from the beam.
+
+    values (k,): mm/rad. covariance (k, k): where the beam is right. parameters_by (p, k):
+    derivatives of the fit's parameters, which follow it.
+    """
+
+    values: np.ndarray
+    covariance: np.ndarray
+    parameters_by: np.ndarray
+
+
+def _estimate_departure(
+    problem: Problem, state: State, frame: int
+) -> tuple[_Departure, np.ndarray]:
+    """Estimate the departure (k,) by one linear step from the fit.
+
+    Returns with it the change (k,) of the slip in a frame by the departure, the parameters standing
+    still.
     """
     linear = linear_at(problem, state)
-    root = np.sqrt(robust_weights(linear, LAST_SCALE))[:, None]
+    root = np.sqrt(robust_weights(linear, LAST_SCALE))
     curves, _ = curves_of(problem, state.vector, state.arcs_mm)
     moves = _moves(problem, state, curves)
     on_contacts, slip_by = by_contacts(problem, state, curves, moves, frame, _STEP_MM_PER_RAD)
-    of_lines = by_lines(problem, curves, moves)
-    count = len(root)
-    wander = _padded_rows(count, _wander_rows(problem)) * root
-    own = np.hstack([linear.jacobian * root, wander])
-    prior = np.eye(own.shape[1])[problem.size :] / WANDER_PX
-    rows = _padded_rows(count, np.concatenate([of_lines, on_contacts])) * root
-    cameras = _padded_rows(count, camera_rows(problem, state)) * root
-    residual = linear.residual * root[:, 0]
-    covariance = problem.cameras.covariance
-    departure, spread, follows = _beside(own, prior, rows, residual, cameras, covariance)
-    return departure, spread, follows[: problem.size], slip_by
+    by_departure = np.concatenate([by_lines(problem, curves, moves), on_contacts])
+    jacobian = np.hstack([linear.jacobian * root[:, None], _weighted(root, _wander_rows(problem))])
+    weighted = _LeastSquares(
+        residual=linear.residual * root,
+        jacobian=jacobian,
+        prior=np.eye(jacobian.shape[1])[problem.size :] / WANDER_PX,
+        by_camera=_weighted(root, camera_rows(problem, state)),
+        covariance=problem.cameras.covariance,
+    )
+    return _fit_added(weighted, _weighted(root, by_departure)), slip_by
 
 
-def _padded_rows(count: int, rows: np.ndarray) -> np.ndarray:
-    """Return the rows, and zeros below them up to `count` rows."""
-    padded = np.zeros((count, rows.shape[1]))
-    padded[: len(rows)] = rows
-    return padded
+def _weighted(root_weight: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return rows of the first observations times their root weights (n,), and zeros below them."""
+    weighted = np.zeros((len(root_weight), rows.shape[1]))
+    weighted[: len(rows)] = rows * root_weight[: len(rows), None]
+    return weighted
 
 
-def _beside(
-    own: np.ndarray,
-    prior: np.ndarray,
-    rows: np.ndarray,
-    residual: np.ndarray,
-    cameras: np.ndarray,
-    covariance: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fit parameters (k,) with Jacobian `rows` (n, k) that are added to a least-squares problem.
+def _fit_added(problem: _LeastSquares, rows: np.ndarray) -> _Departure:
+    """Fit parameters (k,) with Jacobian `rows` (n, k) that are added to a fit that has converged.
 
-    It is solved, with residuals 0, by Jacobian `own` (n, p) and the rows of `prior` (m, p). cameras
-    (n, c): derivatives by the cameras' parameters, with their covariance (c, c). Returns the
-    values, their covariance where they are none, by noise and by cameras, and what the p follow
-    them by (p, k).
+    Their covariance is that by noise and by cameras where the parameters are none.
     """
-    basis, triangle = np.linalg.qr(np.vstack([own, prior]))
+    own = problem.jacobian
+    basis, triangle = np.linalg.qr(np.vstack([own, problem.prior]))
     basis = basis[: len(own)]
     explained = basis.T @ rows
     free = rows - basis @ explained
     information = rows.T @ free
     prior_information = np.eye(rows.shape[1]) / _DEPARTURE_MM_PER_RAD**2
     within = np.linalg.inv(information + prior_information)
-    by_cameras = within @ free.T @ cameras
-    spread = within @ information @ within + by_cameras @ covariance @ by_cameras.T
-    return -within @ (free.T @ residual), spread, -np.linalg.solve(triangle, explained)
+    gain = within @ free.T
+    by_cameras = gain @ problem.by_camera
+    spread = by_cameras @ problem.covariance @ by_cameras.T
+    return _Departure(
+        values=-gain @ problem.residual,
+        covariance=within @ information @ within + spread,
+        parameters_by=-np.linalg.solve(triangle, explained),
+    )
 
 
 def _moves(problem: Problem, state: State, curves: Curves) -> Curves:

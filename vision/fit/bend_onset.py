@@ -90,15 +90,20 @@ def _misfit(
     near = past < _WINDOW_RAD
     if np.sum(near & (past > 0)) < _FEWEST_BENT:
         return np.inf
-    model_variance = _LINE_RAD**2 + (_MODEL_SHARE * bend_rad[near]) ** 2
-    whole = covariance[np.ix_(near, near)] + np.diag(model_variance)
-    root = np.linalg.cholesky(whole)
-    after = np.clip(past[near], 0.0, None)
-    columns = np.linalg.solve(root, np.stack([after, after**2], axis=1))
-    wanted = np.linalg.solve(root, bend_rad[near])
-    slope = abs(columns[:, 0] @ wanted) / (columns[:, 0] @ columns[:, 0])
+    chi2 = _misfit_of_parabola(past[near], bend_rad[near], covariance[np.ix_(near, near)])
+    return chi2 + float(np.sum(~near))
+
+
+def _misfit_of_parabola(past: np.ndarray, bend_rad: np.ndarray, covariance: np.ndarray) -> float:
+    """Return chi² of bends (f,) about the best parabola from nothing, at angles past (f,) it."""
+    model_variance = _LINE_RAD**2 + (_MODEL_SHARE * bend_rad) ** 2
+    root = np.linalg.cholesky(covariance + np.diag(model_variance))
+    after = np.maximum(past, 0.0)
+    whitened = np.linalg.solve(root, np.stack([after, after**2, bend_rad], axis=1))
+    linear, _, bend = whitened.T
+    slope = abs(linear @ bend) / (linear @ linear)
     curvature_sigma = max(slope * _CURVED_PER_RAD, 1e-9)
-    columns = np.vstack([columns, [0.0, 1.0 / curvature_sigma]])
-    wanted = np.append(wanted, 0.0)
+    columns = np.vstack([whitened[:, :2], [0.0, 1.0 / curvature_sigma]])
+    wanted = np.append(bend, 0.0)
     solution = np.linalg.lstsq(columns, wanted, rcond=None)[0]
-    return float(np.sum((wanted - columns @ solution) ** 2) + np.sum(~near))
+    return float(np.sum((wanted - columns @ solution) ** 2))

@@ -62,12 +62,11 @@ _STEP_FRICTION = 1e-3
 class Block:
     """Neighbouring parameters of the fit that mean one thing.
 
-    name: what they are. start: index of the first of them in the parameter vector. sigma (k,):
-    standard deviations of their prior. step: by which they are moved for finite differences, one
-    for all or (k,); 0 where derivatives are known without.
+    start: index of the first of them in the parameter vector. sigma (k,): standard deviations of
+    their prior. step: by which they are moved for finite differences, one for all or (k,); 0 where
+    derivatives are known without.
     """
 
-    name: str
     start: int
     sigma: np.ndarray
     step: float | np.ndarray = 0.0
@@ -122,14 +121,14 @@ class Blocks:
         """
         layout = _Layout()
         axis_step = np.repeat([_STEP_MM, _STEP_TILT_RAD], 2)
-        bar_axis = layout.add("bar axis", BAR_PRIOR, axis_step)
-        rest_shape = layout.add("rest shape", np.tile(REST_PRIOR_MM, 2), _STEP_MM)
-        reach = layout.add("reach", [max(reach_sigma_mm, _LEAST_REACH_MM)], _STEP_MM)
+        bar_axis = layout.add(BAR_PRIOR, axis_step)
+        rest_shape = layout.add(np.tile(REST_PRIOR_MM, 2), _STEP_MM)
+        reach = layout.add([max(reach_sigma_mm, _LEAST_REACH_MM)], _STEP_MM)
         wire_offsets = []
         bar_offsets = []
         for sigma_px in offset_sigma_px:
-            wire_offsets.append(layout.add("wire offset", sigma_px[:WIRE_OFFSETS]))
-            bar_offsets.append(layout.add("bar offset", sigma_px[WIRE_OFFSETS:]))
+            wire_offsets.append(layout.add(sigma_px[:WIRE_OFFSETS]))
+            bar_offsets.append(layout.add(sigma_px[WIRE_OFFSETS:]))
         outline_sigma = touched.outline_sigma_px * len(offset_sigma_px)
         return cls(
             bar_axis=bar_axis,
@@ -137,11 +136,11 @@ class Blocks:
             reach=reach,
             wire_offsets=tuple(wire_offsets),
             bar_offsets=tuple(bar_offsets),
-            motion=layout.add("motion", motion_sigma, _STEP_MM),
-            shift_along=layout.add("shift along", touched.along_sigma_mm, _STEP_MM),
-            outline_bias=layout.add("outline bias", outline_sigma, _STEP_MM),
-            friction=layout.add("friction", [PULL_PRIOR], _STEP_FRICTION),
-            bends=layout.add("bends", [BEND_PRIOR_RAD] * (2 * bent_frames), _STEP_BEND_RAD),
+            motion=layout.add(motion_sigma, _STEP_MM),
+            shift_along=layout.add(touched.along_sigma_mm, _STEP_MM),
+            outline_bias=layout.add(outline_sigma, _STEP_MM),
+            friction=layout.add([PULL_PRIOR], _STEP_FRICTION),
+            bends=layout.add([BEND_PRIOR_RAD] * (2 * bent_frames), _STEP_BEND_RAD),
         )
 
     @property
@@ -169,6 +168,12 @@ class Blocks:
         return np.concatenate([np.broadcast_to(b.step, len(b)) for b in self.in_order])
 
     @property
+    def geometry(self) -> np.ndarray:
+        """Return the indices of what bends and places whisker and object, of no error of lines."""
+        whisker = columns_of(self.bar_axis, self.rest_shape, self.friction, self.bends)
+        return np.append(whisker, self.placement)
+
+    @property
     def placement(self) -> np.ndarray:
         """Return the indices of what places the object besides its axis: motion, shift along it,
         outline bias.
@@ -183,9 +188,9 @@ class _Layout:
         """Start with no parameter."""
         self.size = 0
 
-    def add(self, name: str, sigma: Sequence[float], step: float | np.ndarray = 0.0) -> Block:
+    def add(self, sigma: Sequence[float], step: float | np.ndarray = 0.0) -> Block:
         """Return a block behind all others."""
-        block = Block(name, self.size, np.asarray(sigma, dtype=float), step)
+        block = Block(self.size, np.asarray(sigma, dtype=float), step)
         self.size += len(block)
         return block
 

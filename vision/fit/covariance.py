@@ -97,29 +97,34 @@ def variance_by_cause(
     its row's sensitivity times the row's covariance with all others. The placement errs apart from
     corners and lenses, so that there are no cross-terms.
     """
-    blocks = problem.blocks
     by_row = weighted_jacobian(problem, state) @ (fitted.inverse_normal @ gradient)
     parts = by_row * times_residual_covariance(problem, by_row[None])[0]
-    is_wire = [np.full(len(seen.points), seen.frame >= 0) for seen in problem.seen]
-    on_wire = np.concatenate(is_wire)
-    by_point = parts[: len(on_wire)]
-    first_prior = problem.prior_rows.start
-    reach = first_prior + blocks.reach.start
-    behind_light = first_prior + blocks.motion.start
-    variances = {
-        "wire": np.sum(by_point[on_wire]),
-        "bar": np.sum(by_point[~on_wire]),
-        "touch": np.sum(parts[problem.contact_rows]),
-        "diameters": parts[reach],
-        "light": np.sum(parts[reach + 1 : behind_light]),
-        "priors": np.sum(parts[first_prior:reach]) + np.sum(parts[behind_light:]),
-    }
+    variances = _sum_by_cause(problem, parts)
     whole = float(gradient @ fitted.lens @ gradient)
     placement = _placement_variance(problem, state, fitted.inverse_normal, gradient)
     known = 0.0 if np.isnan(placement) else placement
     variances["cameras"] = max(whole - known, 0.0)  # rounding may leave less than nothing
     variances["placement"] = placement
     return {name: float(variance) for name, variance in variances.items()}
+
+
+def _sum_by_cause(problem: Problem, parts: np.ndarray) -> dict[str, float]:
+    """Return the sums of all residuals' parts (n,) by the cause that each belongs to."""
+    blocks = problem.blocks
+    on_wire = [seen.frame >= 0 for seen in problem.seen]
+    is_wire = np.repeat(on_wire, [len(seen.points) for seen in problem.seen])
+    by_point = parts[: len(is_wire)]
+    priors = parts[problem.prior_rows.start :]
+    reach = blocks.reach.start
+    behind_light = blocks.motion.start
+    return {
+        "wire": np.sum(by_point[is_wire]),
+        "bar": np.sum(by_point[~is_wire]),
+        "touch": np.sum(parts[problem.contact_rows]),
+        "diameters": priors[reach],
+        "light": np.sum(priors[reach + 1 : behind_light]),
+        "priors": np.sum(priors[:reach]) + np.sum(priors[behind_light:]),
+    }
 
 
 def _placement_variance(

@@ -23,33 +23,65 @@ class Perturbation:
     column: np.ndarray
     is_shared: bool
 
+    def apply(self, vector: np.ndarray) -> np.ndarray:
+        """Return a copy of the vector (size,) that is moved so."""
+        moved = vector.copy()
+        moved[self.column[self.column >= 0]] += self.step  # once, of a column in several frames
+        return moved
 
-def perturbed(
-    problem: Problem, vector: np.ndarray, *, reach: bool = False
-) -> tuple[np.ndarray, Sequence[Perturbation]]:
-    """Return the vector itself with moved copies (c + 1, size), and how each of the c copies was
-    moved.
 
-    reach: move the reach's error, too.
+@dataclass(frozen=True, eq=False)
+class Perturbed:
+    """A parameter vector with c moved copies.
+
+    vectors (c + 1, size): the vector itself, then the copies. moves (c,): how each was moved.
     """
+
+    vectors: np.ndarray
+    moves: Sequence[Perturbation] = ()
+
+    @property
+    def vector(self) -> np.ndarray:
+        """Return the vector (size,) itself."""
+        return self.vectors[0]
+
+    def jacobian(self, change: np.ndarray, frame: np.ndarray) -> np.ndarray:
+        """Return derivatives (n, size) of values that each belong to a frame (n,).
+
+        change (c, n): of the values, from the vector to each copy.
+        """
+        jacobian = np.zeros((len(frame), len(self.vector)))
+        for move, moved in zip(self.moves, change):
+            column = move.column[frame]
+            row = np.flatnonzero(column >= 0)
+            jacobian[row, column[row]] = moved[row] / move.step
+        return jacobian
+
+    def shared_gradient(self, change: np.ndarray) -> np.ndarray:
+        """Return the derivatives (size,) by the shared parameters of a value of the whole whisk.
+
+        change (c,): of the value, from the vector to each copy.
+        """
+        gradient = np.zeros(len(self.vector))
+        for move, moved in zip(self.moves, change):
+            if move.is_shared:
+                gradient[move.column[0]] = moved / move.step
+        return gradient
+
+
+def perturb(problem: Problem, vector: np.ndarray, *, reach: bool = False) -> Perturbed:
+    """Return the vector with moved copies; reach: move the reach's error, too."""
     blocks = problem.blocks
-    steps = blocks.steps
     frames = len(problem.motor_rad)
     geometry = [blocks.bar_axis, blocks.rest_shape, *([blocks.reach] if reach else [])]
     objects = [blocks.motion, blocks.shift_along, blocks.outline_bias]
-    rows = [vector]
+    steps = blocks.steps
     moves = []
-    for k in columns_of(*geometry, *objects, blocks.friction).tolist():
-        row = vector.copy()
-        row[k] += steps[k]
-        rows.append(row)
+    for k in columns_of(*geometry, *objects, blocks.friction):
         moves.append(Perturbation(steps[k], np.full(frames, k), is_shared=True))
     order = np.cumsum(problem.bent) - 1  # (f,) number of each bent frame
-    step = blocks.bends.step
-    for part in range(2):
-        row = vector.copy()
-        row[blocks.bends.start + part :: 2] += step
-        column = np.where(problem.bent, blocks.bends.start + 2 * order + part, -1)
-        rows.append(row)
-        moves.append(Perturbation(step, column, is_shared=False))
-    return np.stack(rows), moves
+    for first in (blocks.bends.start, blocks.bends.start + 1):
+        column = np.where(problem.bent, first + 2 * order, -1)
+        moves.append(Perturbation(blocks.bends.step, column, is_shared=False))
+    copies = [move.apply(vector) for move in moves]
+    return Perturbed(np.stack([vector, *copies]), moves)

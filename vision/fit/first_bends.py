@@ -111,9 +111,7 @@ def find_rest(
         curves[frame] = one_curve(straight, np.zeros(2), rods.wire.length_mm, angle, rods.wire)
     seen = []
     for camera, sight in enumerate(sights):
-        points, source = _resting_points(sight, curves)
-        for k, frame in enumerate(motor_rad):
-            seen.append(Observed(k, camera, points.select(source == frame)))
+        seen += _resting_points(sight, camera, curves)
     if not any(len(one.points) for one in seen):
         raise Refused(
             "no whisker is seen where the motor angle says it should be", code="no_whisker_seen"
@@ -126,23 +124,25 @@ def find_rest(
 
 
 def _resting_points(
-    sight: SwingPictures, curves: Mapping[int, Curves]
-) -> tuple[LinePoints, np.ndarray]:
+    sight: SwingPictures, camera: int, curves: Mapping[int, Curves]
+) -> list[Observed]:
     """Return points, to a pixel or two, of a wire that lies alike from the straight one in all
-    frames, and the frame of each; none where none is surely seen.
+    frames; none where none is surely seen.
     """
     straight = next(iter(curves.values()))
     _, px_per_mm = outline(sight.view.camera, straight.points_mm, straight.tangents, 1.0)
     # Of offset, slope and curvature.
     most_px = _REST_SIGMAS * REST_PRIOR_MM[:3] * np.max(px_per_mm)
-    seen = sight.votes(curves, int(np.ceil(most_px[1])))
-    along = seen.pieces.place / sight.rods.wire.length_mm
+    found = sight.votes(curves, int(np.ceil(most_px[1])))
+    along = found.pieces.place / sight.rods.wire.length_mm
     shapes = np.stack([1.0 - along, along, along * (1.0 - along)], axis=1)
     grids = [np.arange(-n, n + 1) * _STEP_PX for n in np.ceil(most_px / _STEP_PX)]
-    best, sure = likely_curve([seen], shapes, grids)
-    points = seen.points(shapes @ best)
-    keep = np.full(len(shapes), sure)
-    return points.select(keep), seen.pieces.source[keep]
+    best, is_sure = likely_curve([found], shapes, grids)
+    if not is_sure:
+        return []
+    points = found.points(shapes @ best)
+    source = found.pieces.source
+    return [Observed(k, camera, points.select(source == own)) for k, own in enumerate(curves)]
 
 
 def follow_bends(
@@ -154,23 +154,19 @@ def follow_bends(
     """Return the bend (2,) in rad of every frame in order, each searched for near the extrapolation
     of the last two.
     """
-    bend_rad: dict[int, np.ndarray] = {}
+    bends_rad = [np.zeros(2), np.zeros(2)]  # before the first frame
     prior = _prior_information(axis, len(sights))
     wire = sights[0].rods.wire
     views = [sight.view for sight in sights]
-    last = np.zeros(2)
-    before = np.zeros(2)
     for frame, motor in motor_rad.items():
-        guess = 2 * last - before
+        guess = 2 * bends_rad[-1] - bends_rad[-2]
         arc = contact_arc(rest_mm, guess, motor, axis, wire)
         curve = one_curve(rest_mm, guess, arc, motor, wire)
         seen = [sight.votes({frame: curve}) for sight in sights]
         model = _BendModel(views, rest_mm, arc, motor, wire)
         bend, points = _bend_by_votes(model, seen, guess)
-        before = last
-        last = _fit_bend(model, bend, points, prior)
-        bend_rad[frame] = last
-    return bend_rad
+        bends_rad.append(_fit_bend(model, bend, points, prior))
+    return dict(zip(motor_rad, bends_rad[2:]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,8 +192,8 @@ class _BendModel:
         distances = []
         for view, points in zip(self.views, seen):
             points_mm, _ = curves.at(points.place)
-            expected = view.camera.project(points_mm.reshape(-1, 3)).reshape(*shape, -1, 2)
-            distances.append(np.sum(points.normal * (expected - points.px), axis=-1))
+            offset_px = view.camera.project(points_mm) - points.px
+            distances.append(np.sum(points.normal * offset_px, axis=-1))
         return np.concatenate(distances, axis=-1)
 
     def linearise(
@@ -220,13 +216,17 @@ def _bend_by_votes(
     _, slopes = model.linearise(guess, _points_of(seen, none))
     scaled = slopes / np.sqrt(max(len(none), 1))
     _, px_per_rad, turned = np.linalg.svd(scaled, full_matrices=False)
-    count = np.minimum(_REACH_PX / _BEND_PX, 2.0 * _PULL_RAD * px_per_rad / _BEND_PX)
-    grids = []
-    for n, scale in zip(np.floor(count), px_per_rad):
-        grids.append(np.arange(-n, n + 1) * _BEND_PX / max(scale, 1e-9))
-    best, sure = likely_curve(seen, slopes @ turned.T, grids)
-    change = best @ turned if sure else np.zeros(2)
+    grids = [_bend_grid(scale) for scale in px_per_rad]
+    best, is_sure = likely_curve(seen, slopes @ turned.T, grids)
+    change = best @ turned if is_sure else np.zeros(2)
     return guess + change, _points_of(seen, slopes @ change)
+
+
+def _bend_grid(px_per_rad: float) -> np.ndarray:
+    """Return the changes (n,) of a bend that are tried, rad, where it moves the wire by so much."""
+    most_px = min(_REACH_PX, 2.0 * _PULL_RAD * px_per_rad)
+    count = np.floor(most_px / _BEND_PX)
+    return np.arange(-count, count + 1) * _BEND_PX / max(px_per_rad, 1e-9)
 
 
 def _points_of(seen: Sequence[Votes], shift_px: np.ndarray) -> list[LinePoints]:

@@ -26,6 +26,47 @@ from vision.wire.points import LinePoints, Observed
 Part = tuple[np.ndarray, np.ndarray]
 
 
+@dataclass(frozen=True, eq=False)
+class CameraPoints:
+    """All line points (n,) of one rod in one camera.
+
+    frame, side, bar_in (n,): of each point, as of its `Observed`.
+    """
+
+    camera: int
+    points: LinePoints
+    frame: np.ndarray
+    side: np.ndarray
+    bar_in: np.ndarray
+
+    @classmethod
+    def joined(cls, camera: int, group: Sequence[Observed]) -> "CameraPoints":
+        """Return the line points of all observations of a group in one camera."""
+        points = LinePoints.join([seen.points for seen in group])
+        values = np.array([[seen.frame, seen.side, seen.bar_in] for seen in group])
+        counts = [len(seen.points) for seen in group]
+        frame, side, bar_in = np.repeat(values, counts, axis=0).T
+        return cls(camera, points, frame, side, bar_in)
+
+    def over_sigma(
+        self,
+        px: np.ndarray,
+        jacobian: np.ndarray,
+        offsets: Block,
+        modes: np.ndarray,
+        vector: np.ndarray,
+    ) -> Part:
+        """Return residuals of points predicted at px (n, 2), and their Jacobian, over sigma.
+
+        modes (n, k): shapes in which the whole line may be off, by the parameters of the block
+        `offsets`.
+        """
+        points = self.points
+        jacobian[:, offsets.slice] = modes
+        residual = np.sum(points.normal * (px - points.px), axis=1) + modes @ vector[offsets.slice]
+        return residual / points.sigma_px, jacobian / points.sigma_px[:, None]
+
+
 @dataclass(frozen=True)
 class ObjectRows(ABC):
     """The residuals of line points of the touched object in one problem."""
@@ -33,9 +74,7 @@ class ObjectRows(ABC):
     problem: Problem
 
     @abstractmethod
-    def part(
-        self, number: int, group: Sequence[Observed], with_jacobian: bool, vector: np.ndarray
-    ) -> Part:
+    def part(self, seen: CameraPoints, with_jacobian: bool, vector: np.ndarray) -> Part:
         """Return residuals and Jacobian rows of all line points of one camera."""
 
     @abstractmethod
@@ -45,6 +84,10 @@ class ObjectRows(ABC):
     @abstractmethod
     def sigmas_px(self, seen: Observed) -> list[list[float]]:
         """Return side and two sigmas of lines that are handed on as such, see `LineNoise`."""
+
+    def camera(self, number: int) -> Camera:
+        """Return a camera by its number."""
+        return self.problem.cameras.cameras[number]
 
     def moved_alone(
         self, blocks: Sequence[Block], vector: np.ndarray
@@ -57,78 +100,57 @@ class ObjectRows(ABC):
         moved[np.arange(1, len(moved)), columns] += self.problem.blocks.steps[columns]
         return columns, moved
 
+    def jacobian_of(self, columns: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Return derivatives (n, size) by some columns (k,), from changes (k, n) by their steps."""
+        jacobian = np.zeros((change.shape[1], self.problem.size))
+        jacobian[:, columns] = change.T / self.problem.blocks.steps[columns]
+        return jacobian
+
 
 class BarRows(ObjectRows):
     """The residuals of points on the middle or the edges of a straight bar."""
 
-    def part(
-        self, number: int, group: Sequence[Observed], with_jacobian: bool, vector: np.ndarray
-    ) -> Part:
+    def part(self, seen: CameraPoints, with_jacobian: bool, vector: np.ndarray) -> Part:
         """Return residuals and Jacobian rows of one camera's points of the bar."""
-        points = joined_points(group)
-        side = of_each_point(group, [seen.side for seen in group])
-        frame = of_each_point(group, [seen.bar_in for seen in group])
         blocks = self.problem.blocks
-        wider = [blocks.reach] if np.any(side) else []
+        wider = [blocks.reach] if np.any(seen.side) else []
         moved_blocks = [blocks.bar_axis, *wider, blocks.motion] if with_jacobian else []
         columns, moved = self.moved_alone(moved_blocks, vector)
-        camera = self.problem.cameras.cameras[number]
-        px = self._expected_px(camera, moved, points, side, frame)
-        jacobian = np.zeros((len(points), self.problem.size))
-        change_px = np.einsum("knj,nj->nk", px[1:] - px[0], points.normal)
-        jacobian[:, columns] = change_px / blocks.steps[columns]
-        modes = np.stack([np.ones(len(points)), points.place / BAR_TILT_ARM_MM], axis=1)
-        return over_sigma(points, px[0], jacobian, blocks.bar_offsets[number], modes, vector)
+        px = self._expected_px(moved, seen)
+        jacobian = self.jacobian_of(columns, np.sum((px[1:] - px[0]) * seen.points.normal, axis=-1))
+        modes = np.stack([np.ones(len(seen.side)), seen.points.place / BAR_TILT_ARM_MM], axis=1)
+        return seen.over_sigma(px[0], jacobian, blocks.bar_offsets[seen.camera], modes, vector)
 
-    def _expected_px(
-        self,
-        camera: Camera,
-        vector: np.ndarray,
-        points: LinePoints,
-        side: np.ndarray,
-        frame: np.ndarray,
-    ) -> np.ndarray:
+    def _expected_px(self, vector: np.ndarray, seen: CameraPoints) -> np.ndarray:
         """Return where the outline's middle or edge (…, n, 2) is expected; of an edge the reach's
         error widens the bar.
-
-        side, frame (n,): of each point, `Observed.side` and, of a bar that moves, the frame in
-        which it is seen.
         """
         problem = self.problem
         axis = bar_axis(problem, vector)
         direction = axis.direction[..., None, :]
-        middle_mm = axis.point_mm[..., None, :] + points.place[:, None] * direction
+        middle_mm = axis.point_mm[..., None, :] + seen.points.place[:, None] * direction
         if problem.motion is not None:
-            middle_mm = middle_mm + shifts_mm(problem, vector)[..., frame, :]
-        shape = middle_mm.shape  # (…, n, 3)
-        directions = np.broadcast_to(direction, shape)
-        wider_mm = vector[..., problem.blocks.reach.slice] * (side != 0)
-        radius_mm = np.broadcast_to(problem.rods.bar.radius_mm + wider_mm, shape[:-1])
-        one, other = edges(
-            camera, middle_mm.reshape(-1, 3), directions.reshape(-1, 3), radius_mm.ravel()
-        )
-        one = one.reshape(*shape[:-1], 2)
-        other = other.reshape(*shape[:-1], 2)
-        half_px = 0.5 * np.abs(np.sum((one - other) * points.normal, axis=-1, keepdims=True))
-        return 0.5 * (one + other) + side[:, None] * half_px * points.normal
+            middle_mm = middle_mm + shifts_mm(problem, vector)[..., seen.bar_in, :]
+        wider_mm = vector[..., problem.blocks.reach.slice] * (seen.side != 0)  # (…, n)
+        radius_mm = problem.rods.bar.radius_mm + wider_mm
+        one, other = edges(self.camera(seen.camera), middle_mm, direction, radius_mm)
+        normal = seen.points.normal
+        half_px = 0.5 * np.abs(np.sum((one - other) * normal, axis=-1, keepdims=True))
+        return 0.5 * (one + other) + seen.side[:, None] * half_px * normal
 
     def shown_mm(self, seen: Observed, vector: np.ndarray) -> list[np.ndarray]:
         """Return points (n, 3) of the bar's edge that line points show, or of both its edges."""
         problem = self.problem
         axis = bar_axis(problem, vector)
-        camera = problem.cameras.cameras[seen.camera]
+        camera = self.camera(seen.camera)
         middle_mm = axis.point_mm + seen.points.place[:, None] * axis.direction
         middle_mm = middle_mm + shifts_mm(problem, vector)[seen.bar_in]
-        directions = np.broadcast_to(axis.direction, middle_mm.shape)
-        both_mm = grazed(camera, middle_mm, directions, problem.rods.bar.radius_mm)
+        both_mm = grazed(camera, middle_mm, axis.direction, problem.rods.bar.radius_mm)
         if not seen.side:
             return list(both_mm)
-        middle_px = camera.project(middle_mm)
-        offsets_px = []
-        for edge_mm in both_mm:
-            offset_px = camera.project(edge_mm) - middle_px
-            offsets_px.append(float(np.sum(offset_px * seen.points.normal)))
-        return [both_mm[int(np.argmax(seen.side * np.array(offsets_px)))]]
+        from_middle_px = camera.project(np.stack(both_mm)) - camera.project(middle_mm)
+        offset_px = np.sum(from_middle_px * seen.points.normal, axis=(1, 2))
+        return [both_mm[int(np.argmax(seen.side * offset_px))]]
 
     def sigmas_px(self, seen: Observed) -> list[list[float]]:
         """Return side and two sigmas of a line of the bar."""
@@ -138,38 +160,43 @@ class BarRows(ObjectRows):
 class SilhouetteRows(ObjectRows):
     """The residuals of points on the silhouette of an object that is no straight bar."""
 
-    def part(
-        self, number: int, group: Sequence[Observed], with_jacobian: bool, vector: np.ndarray
-    ) -> Part:
+    def part(self, seen: CameraPoints, with_jacobian: bool, vector: np.ndarray) -> Part:
         """Return residuals and Jacobian rows of one camera's silhouette: how far its sights pass
         outside of the object.
         """
-        problem = self.problem
-        points = joined_points(group)
-        blocks = problem.blocks
+        points = seen.points
+        blocks = self.problem.blocks
         moved_blocks = [blocks.bar_axis, blocks.shift_along] if with_jacobian else []
         columns, moved = self.moved_alone(moved_blocks, vector)
-        camera = problem.cameras.cameras[number]
-        reach = blocks.reach.start
-        grazing = sights_beside(camera, bar_axis(problem, moved), points.px, points.place)
-        px_per_mm = grazing.px_per_mm(camera, points.normal)
-        outside_mm = grazing.outside_mm - problem.rods.bar.radius_mm - vector[reach]
-        off_px = px_per_mm * outside_mm  # (copies, n)
-        outward = blocks.outline_bias.start + number
-        jacobian = np.zeros((len(points), problem.size))
-        jacobian[:, columns] = -(off_px[1:] - off_px[0]).T / blocks.steps[columns]
-        jacobian[:, reach] = px_per_mm
-        jacobian[:, outward] = 1.0
-        off_px[0] -= vector[outward]
-        px = points.px - off_px[0][:, None] * points.normal
+        outside_px, px_per_mm = self._outside_px(moved, seen)
+        jacobian = self.jacobian_of(columns, outside_px[0] - outside_px[1:])
+        bias = blocks.outline_bias.start + seen.camera
+        jacobian[:, blocks.reach.start] = px_per_mm
+        jacobian[:, bias] = 1.0
+        expected_px = points.px - (outside_px[0] - vector[bias])[:, None] * points.normal
         modes = points.normal * (BAR_OFFSET_PX / BAR_MODES_PX)  # along rows and columns alike
-        return over_sigma(points, px, jacobian, blocks.bar_offsets[number], modes, vector)
+        offsets = blocks.bar_offsets[seen.camera]
+        return seen.over_sigma(expected_px, jacobian, offsets, modes, vector)
+
+    def _outside_px(self, vector: np.ndarray, seen: CameraPoints) -> tuple[np.ndarray, np.ndarray]:
+        """Return how far (…, n) px points lie outside the silhouette, by parameters (…, size).
+
+        Returns with it px per mm (n,) by which the silhouette moves with the surface.
+        """
+        camera = self.camera(seen.camera)
+        points = seen.points
+        axis = bar_axis(self.problem, vector)
+        grazing = sights_beside(camera, axis, points.px, points.place)
+        px_per_mm = grazing.px_per_mm(camera, points.normal)
+        wider_mm = vector[..., self.problem.blocks.reach.slice]
+        outside_mm = grazing.outside_mm - self.problem.rods.bar.radius_mm - wider_mm
+        return px_per_mm * outside_mm, px_per_mm
 
     def shown_mm(self, seen: Observed, vector: np.ndarray) -> list[np.ndarray]:
         """Return points (n, 3) where sights graze the object."""
-        camera = self.problem.cameras.cameras[seen.camera]
         axis = bar_axis(self.problem, vector)
-        return [sights_beside(camera, axis, seen.points.px, seen.points.place).points_mm]
+        points = seen.points
+        return [sights_beside(self.camera(seen.camera), axis, points.px, points.place).points_mm]
 
     def sigmas_px(self, seen: Observed) -> list[list[float]]:
         """Return none: a silhouette is no line."""
@@ -197,34 +224,3 @@ def _rows_of_bar(touched: Bar) -> type[ObjectRows]:
 def _rows_of_rounded(touched: Rounded) -> type[ObjectRows]:
     """Return the residuals of any other object."""
     return SilhouetteRows
-
-
-def joined_points(group: Sequence[Observed]) -> LinePoints:
-    """Return the line points of all observations of a group."""
-    fields = {}
-    for name in LinePoints.__dataclass_fields__:
-        fields[name] = np.concatenate([getattr(seen.points, name) for seen in group])
-    return LinePoints(**fields)
-
-
-def of_each_point(group: Sequence[Observed], values: Sequence[int]) -> np.ndarray:
-    """Return one value of each observation (n,) for each of its points."""
-    return np.repeat(values, [len(seen.points) for seen in group])
-
-
-def over_sigma(
-    points: LinePoints,
-    px: np.ndarray,
-    jacobian: np.ndarray,
-    offsets: Block,
-    modes: np.ndarray,
-    vector: np.ndarray,
-) -> Part:
-    """Return residuals of points predicted at px (n, 2), and their Jacobian, over sigma.
-
-    modes (n, k): shapes in which the whole line may be off, by the parameters of the block
-    `offsets`.
-    """
-    jacobian[:, offsets.slice] = modes
-    residual = np.sum(points.normal * (px - points.px), axis=1) + modes @ vector[offsets.slice]
-    return residual / points.sigma_px, jacobian / points.sigma_px[:, None]

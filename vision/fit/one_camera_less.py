@@ -48,9 +48,9 @@ class OneLess:
 
     step (size,): by how much parameters differ. moved (4,): d_x, touch, beta and the last slip, in
     mm and rad, with moved_sigma (4,) where all cameras agree and sigma (4,), the stated one.
-    beside, beside_sigma: px by which that of the camera's lines which is off most lies from where
-    the others have it. chance: that of cameras that agree one moves so much, or has lines so far
-    off. spread (size, size): covariance of the step, where it contradicts.
+    line_offset_px, line_offset_sigma_px: by which that of the camera's lines which is off most lies
+    from where the others have it. chance: that of cameras that agree one moves so much, or has
+    lines so far off. spread (size, size): covariance of the step, where it contradicts.
     """
 
     camera: str
@@ -58,8 +58,8 @@ class OneLess:
     moved: np.ndarray
     moved_sigma: np.ndarray
     sigma: np.ndarray
-    beside: float
-    beside_sigma: float
+    line_offset_px: float
+    line_offset_sigma_px: float
     chance: float
     spread: np.ndarray | None = None
 
@@ -78,10 +78,8 @@ class OneLess:
         scale, unit = _UNITS[name]
         moved = scale * self.moved[worst]
         by = f"{moved:+.3f} ± {scale * self.moved_sigma[worst]:.3f} {unit}"
-        lines = (
-            f"its lines up to {abs(self.beside):.2f} ± {self.beside_sigma:.2f} px beside where the "
-            "others have them"
-        )
+        offset_px = f"{abs(self.line_offset_px):.2f} ± {self.line_offset_sigma_px:.2f} px"
+        lines = f"its lines up to {offset_px} beside where the others have them"
         return f"without {self.camera} {name} is {by} elsewhere, {lines} (chance {self.chance:.1g})"
 
 
@@ -134,72 +132,106 @@ def leave_out_each(
     gradients = np.array(
         [by.whisk["d_x"], by.whisk["touch"], by.whisk["beta"], by.frame["slip"][last]]
     )
-    sigma = np.sqrt(np.einsum("qi,ij,qj->q", gradients, fitted.covariance, gradients))
-    gain = fitted.inverse_normal @ observations.jacobian.T  # (size, n) with all cameras
-    found = []
-    for number, name in enumerate(problem.cameras.names):
-        kept = observations.without(number)
-        inverse_normal = np.linalg.inv(kept.T @ kept)
-        change = inverse_normal @ kept.T - gain
-        step = -inverse_normal @ (kept.T @ observations.residual)
-        moved = gradients @ step
-        spread = observations.spread(gradients @ change)
-        beside, beside_sigma, line_chance = _lines_beside(
-            observations, state, fitted.inverse_normal, number
-        )
-        least = min(_chance(moved, spread), line_chance)
-        one = OneLess(
-            camera=name,
-            step=step,
-            moved=moved,
-            moved_sigma=np.sqrt(np.diag(spread)),
-            sigma=sigma,
-            beside=beside,
-            beside_sigma=beside_sigma,
-            chance=min(1.0, 2 * len(problem.cameras) * least),
-        )
-        if one.contradicts:
-            one = replace(one, spread=observations.spread(change))
-        found.append(one)
-    return found
+    cameras = range(len(problem.cameras))
+    return [_leave_out(observations, state, fitted, gradients, camera) for camera in cameras]
 
 
-def _lines_beside(
-    observations: _Observations, state: State, inverse_normal: np.ndarray, camera: int
-) -> tuple[float, float, float]:
-    """Return by how many px that of a camera's lines which is off most lies from where the others
-    have it, its sigma, and the chance of all: offset and tilt of its lines of wire and bar.
+def _leave_out(
+    observations: _Observations,
+    state: State,
+    fitted: Uncertainty,
+    gradients: np.ndarray,
+    camera: int,
+) -> OneLess:
+    """Return the fit without one camera; gradients (4, size): of what `OneLess.moved` holds."""
+    kept = observations.without(camera)
+    inverse_normal = np.linalg.inv(kept.T @ kept)
+    change = inverse_normal @ kept.T - fitted.inverse_normal @ observations.jacobian.T  # (size, n)
+    step = -inverse_normal @ (kept.T @ observations.residual)
+    moved = gradients @ step
+    spread = observations.spread(gradients @ change)
+    lines = _LinesOff.of(observations, state, fitted.inverse_normal, camera)
+    line_offset_px, line_offset_sigma_px = lines.worst_px()
+    names = observations.problem.cameras.names
+    least = min(_chance(moved, spread), lines.chance)
+    one = OneLess(
+        camera=names[camera],
+        step=step,
+        moved=moved,
+        moved_sigma=np.sqrt(np.diag(spread)),
+        sigma=np.sqrt(np.diag(gradients @ fitted.covariance @ gradients.T)),
+        line_offset_px=line_offset_px,
+        line_offset_sigma_px=line_offset_sigma_px,
+        chance=min(1.0, 2 * len(names) * least),
+    )
+    return replace(one, spread=observations.spread(change)) if one.contradicts else one
+
+
+@dataclass(frozen=True, eq=False)
+class _LinesOff:
+    """How far a camera's lines are off from where the others have them: of wire and bar offset and
+    tilt, four in all.
 
     A camera that was moved has its lines elsewhere, and the fit takes them to be off as a whole,
     against the prior that they are not: what it makes of that prior, over its covariance, is the
     test (the w-test of Baarda, A testing procedure for use in geodetic networks, 1968). So it is
     where the others alone do not determine the bar.
+
+    directions (4, k): combinations that the others determine, in sigmas of the prior. value (k,),
+    covariance (k, k): what the fit makes of their priors. px_per_value (4, k): how far the lines
+    are off by that, without the prior.
     """
-    problem = observations.problem
-    wire = problem.blocks.wire_offsets[camera]
-    bar = problem.blocks.bar_offsets[camera]
-    off = np.append(columns_of(wire)[:2], columns_of(bar))  # offset and tilt of wire and bar
-    prior_row = problem.prior_rows.start + off
-    sigma_px = 1.0 / observations.jacobian[prior_row, off]
-    own = inverse_normal[np.ix_(off, off)] / np.outer(sigma_px, sigma_px)
-    determined, directions = np.linalg.eigh(np.eye(len(off)) - own)
-    keep = determined > _DETERMINED
-    determined = determined[keep]
-    directions = directions[:, keep]
-    if not len(determined):
-        return 0.0, 0.0, 1.0
-    rows = -(inverse_normal[off] @ observations.jacobian.T) / sigma_px[:, None]
-    rows[np.arange(len(off)), prior_row] += 1.0
-    step_px = inverse_normal[off] @ (observations.jacobian.T @ observations.residual)
-    value = directions.T @ ((state.vector[off] - step_px) / sigma_px)
-    spread = observations.spread(directions.T @ rows)
-    without_prior = sigma_px[:, None] * directions / determined
-    beside = without_prior @ value
-    sigma = np.sqrt(np.diag(without_prior @ spread @ without_prior.T))
-    in_sigmas = np.abs(beside) / np.maximum(sigma, 1e-300)
-    is_determined = np.sum(directions**2, axis=1) > 0.5
-    worst = int(np.argmax(np.where(is_determined, in_sigmas, 0.0)))
-    return float(beside[worst]), float(sigma[worst]), _chance(value, spread)
+
+    directions: np.ndarray
+    value: np.ndarray
+    covariance: np.ndarray
+    px_per_value: np.ndarray
+
+    @classmethod
+    def of(
+        cls, observations: _Observations, state: State, inverse_normal: np.ndarray, camera: int
+    ) -> "_LinesOff":
+        """Return how far one camera's lines are off."""
+        problem = observations.problem
+        blocks = problem.blocks
+        wire = columns_of(blocks.wire_offsets[camera])
+        off = np.append(wire[:2], columns_of(blocks.bar_offsets[camera]))
+        sigma_px = blocks.prior_sigma[off]
+        own = inverse_normal[np.ix_(off, off)] / np.outer(sigma_px, sigma_px)
+        determined, directions = _determined_directions(own)
+        gain = inverse_normal[off] @ observations.jacobian.T  # (4, n)
+        rows = -gain / sigma_px[:, None]
+        rows[np.arange(len(off)), problem.prior_rows.start + off] += 1.0
+        in_sigmas = (state.vector[off] - gain @ observations.residual) / sigma_px
+        covariance = observations.spread(directions.T @ rows)
+        px_per_value = sigma_px[:, None] * directions / determined
+        return cls(directions, directions.T @ in_sigmas, covariance, px_per_value)
+
+    @property
+    def chance(self) -> float:
+        """Return the chance that cameras which agree have lines so far off."""
+        return _chance(self.value, self.covariance) if len(self.value) else 1.0
+
+    def worst_px(self) -> tuple[float, float]:
+        """Return by how much the line lies off that does most, in its sigmas, and its sigma, px."""
+        off_px = self.px_per_value @ self.value
+        sigma_px = np.sqrt(np.diag(self.px_per_value @ self.covariance @ self.px_per_value.T))
+        in_sigmas = np.abs(off_px) / np.maximum(sigma_px, 1e-300)
+        is_determined = np.sum(self.directions**2, axis=1) > 0.5
+        worst = int(np.argmax(np.where(is_determined, in_sigmas, 0.0)))
+        return float(off_px[worst]), float(sigma_px[worst])
+
+
+def _determined_directions(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return by how much (k,) of their prior's variance combinations are determined, and these (4,
+    k).
+
+    covariance (4, 4): of the parameters, in sigmas of their priors. Combinations that are
+    determined by less than _DETERMINED are left out.
+    """
+    determined, directions = np.linalg.eigh(np.eye(len(covariance)) - covariance)
+    is_kept = determined > _DETERMINED
+    return determined[is_kept], directions[:, is_kept]
 
 
 def _chance(moved: np.ndarray, spread: np.ndarray) -> float:

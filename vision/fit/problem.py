@@ -223,6 +223,14 @@ def curves_of(
     return centrelines(rest, angles, arcs, motor, problem.wire, friction), arcs
 
 
+def resting_curves(problem: Problem, vector: np.ndarray, motor_rad: np.ndarray) -> Curves:
+    """Return the unbent centrelines (…) at motor angles (…), by parameters (…, size)."""
+    shape = np.shape(motor_rad)
+    middle_mm = np.full(shape, 0.5 * problem.wire.length_mm)
+    rest = np.broadcast_to(rest_shape(problem, vector), (*shape, 2, REST_POWERS))
+    return centrelines(rest, np.zeros((*shape, 2)), middle_mm, motor_rad, problem.wire)
+
+
 def start(problem: Problem, contact_arc_mm: float) -> State:
     """Return the state of a straight whisker without a bend, the bar where the problem counts it
     from.

@@ -9,20 +9,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.differences import perturbed
+from vision.fit.differences import perturb
 from vision.fit.problem import (
     Problem,
     State,
     bar_axes,
     bar_axis,
     curves_of,
-    rest_shape,
+    resting_curves,
     shift_at_mm,
     shifts_mm,
 )
 from vision.fit.touch import FirstTouch, first_touch
-from vision.geometry.centreline import REST_POWERS, Curves, centrelines
+from vision.geometry.centreline import Curves, rotation_z
 from vision.geometry.contact import BarAxis, clearance, contact_frame_angles
+from vision.geometry.rotation import unit
 
 # [rounds] Of Newton's method for the virtual point: the resting whisker is nearly straight.
 # Derived.
@@ -51,17 +52,16 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     _, arc, point = clearance(curves, each)
     touched = bar_axis(problem, vector).bar_at(touch.point_mm)
     beta, psi = contact_frame_angles(touched.direction, touch.motor_rad)
+    contact_moved = point - touch.point_mm[..., None, :] - _bar_moved_mm(problem, vector, touch)
+    d_y, d_z = _deflection(problem, vector, touch, point)
+    force = _force_direction(curves, touch, arc, d_y, d_z)
     whisk = {
         "touch": touch.motor_rad,
         "d_x": np.linalg.norm(touch.point_mm, axis=-1),
         "beta": beta,
         "psi": psi,
+        **_by_axis(touch.point_mm),
     }
-    bar_at_touch = shift_at_mm(problem, vector, touch.motor_rad)[..., None, :]
-    bar_moved = shifts_mm(problem, vector) - bar_at_touch
-    contact_moved = point - touch.point_mm[..., None, :] - bar_moved
-    d_y, d_z = _deflection(problem, vector, touch, point)
-    force = _force_direction(curves, touch, arc, d_y, d_z)
     frame = {
         "slip": np.sum(contact_moved * touched.direction[..., None, :], axis=-1),
         "longitudinal_slip": arc - touch.arc_mm[..., None],
@@ -70,11 +70,20 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
         "arc": arc,
         "phi": np.arctan2(d_z, d_y),
         "alpha": _angle_to_normal(force, each.bar_at(point), point, beta),
+        **_by_axis(point),
     }
-    for k, name in enumerate("xyz"):
-        whisk[name] = touch.point_mm[..., k]
-        frame[name] = point[..., k]
     return Measured(whisk, frame)
+
+
+def _by_axis(points_mm: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the coordinates (…) of points (…, 3) by name."""
+    return dict(zip("xyz", np.moveaxis(points_mm, -1, 0)))
+
+
+def _bar_moved_mm(problem: Problem, vector: np.ndarray, touch: FirstTouch) -> np.ndarray:
+    """Return how far (…, f, 3) the bar has moved since touch, (…, 1, 3) where it stands."""
+    at_touch = shift_at_mm(problem, vector, touch.motor_rad)[..., None, :]
+    return shifts_mm(problem, vector) - at_touch
 
 
 def _deflection(
@@ -85,25 +94,25 @@ def _deflection(
     P is the contact point (…, f, 3). V, the virtual point, is that of the resting whisker which is
     as far along the contact frame's x axis as the contact at touch.
     """
-    shape = point_mm.shape[:-1]
-    rest = rest_shape(problem, vector)[..., None, :, :]
-    rest = np.broadcast_to(rest, (*shape, 2, REST_POWERS))
-    motor = np.broadcast_to(problem.motor_rad, shape)
-    middle = np.full(shape, problem.wire.length_mm / 2)
-    unbent = centrelines(rest, np.zeros((*shape, 2)), middle, motor, problem.wire)
-    cosine = np.cos(touch.motor_rad)[..., None]
-    sine = np.sin(touch.motor_rad)[..., None]
-    at_touch = touch.point_mm[..., None, :]
-    wanted = cosine * at_touch[..., 0] + sine * at_touch[..., 1]
-    arc = np.broadcast_to(touch.arc_mm[..., None], shape)
+    motor = np.broadcast_to(problem.motor_rad, point_mm.shape[:-1])
+    unbent = resting_curves(problem, vector[..., None, :], motor)
+    x, y, _ = np.moveaxis(rotation_z(touch.motor_rad)[..., None, :, :], -1, 0)  # (…, 1, 3)
+    offset = _virtual_point(unbent, touch, x) - point_mm
+    return np.sum(offset * y, axis=-1), -offset[..., 2]
+
+
+def _virtual_point(unbent: Curves, touch: FirstTouch, x: np.ndarray) -> np.ndarray:
+    """Find the points (…, f, 3) of unbent curves that are as far along x as the contact at touch.
+
+    x (…, 1, 3): unit, of the contact frame.
+    """
+    arc = np.broadcast_to(touch.arc_mm[..., None], unbent.points_mm.shape[:-2])
     for _ in range(_ROUNDS):
-        virtual, tangent = unbent.at(arc[..., None])  # (…, f, 1, 3)
-        here = cosine * virtual[..., 0, 0] + sine * virtual[..., 0, 1]
-        slope = cosine * tangent[..., 0, 0] + sine * tangent[..., 0, 1]
-        arc = arc + (wanted - here) / slope
-    virtual, _ = unbent.at(arc[..., None])
-    offset = virtual[..., 0, :] - point_mm
-    return -sine * offset[..., 0] + cosine * offset[..., 1], -offset[..., 2]
+        point, tangent = unbent.at(arc[..., None])  # (…, f, 1, 3)
+        to_touch = touch.point_mm[..., None, :] - point[..., 0, :]
+        along = np.sum(tangent[..., 0, :] * x, axis=-1)
+        arc = arc + np.sum(to_touch * x, axis=-1) / along
+    return unbent.at(arc[..., None])[0][..., 0, :]
 
 
 def _force_direction(
@@ -115,11 +124,9 @@ def _force_direction(
     It is that in which the whisker was bent: from the virtual point to the contact.
     """
     _, tangent = curves.at(arc_mm[..., None])
-    tangent = tangent[..., 0, :]
-    along = tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
-    cosine = np.cos(touch.motor_rad)[..., None]
-    sine = np.sin(touch.motor_rad)[..., None]
-    deflection = np.stack([sine * d_y, -cosine * d_y, d_z], axis=-1)
+    along = unit(tangent[..., 0, :])
+    to_rig = rotation_z(touch.motor_rad)[..., None, :, :]  # from the contact frame
+    deflection = d_z[..., None] * to_rig[..., 2] - d_y[..., None] * to_rig[..., 1]
     return deflection - np.sum(deflection * along, axis=-1, keepdims=True) * along
 
 
@@ -130,8 +137,7 @@ def _angle_to_normal(
     psi = 0."""
     from_axis = point_mm - axis.point_mm
     along_mm = np.sum(from_axis * axis.direction, axis=-1, keepdims=True)
-    normal = from_axis - along_mm * axis.direction
-    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    normal = unit(from_axis - along_mm * axis.direction)
     sign = np.where(beta_rad >= 0, 1.0, -1.0)[..., None]
     uphill = -np.sum(force * axis.direction, axis=-1) * sign
     return np.arctan2(uphill, np.sum(force * normal, axis=-1))
@@ -149,22 +155,16 @@ def jacobians(problem: Problem, state: State) -> tuple[Measured, Jacobians]:
     """Return all quantities and their derivatives by finite differences, all frames' bends at
     once.
     """
-    vectors, moves = perturbed(problem, state.vector, reach=True)
-    values = measure(problem, vectors, state.arcs_mm)
-    here = values.one(0)
-    whisk = {name: np.zeros(problem.size) for name in here.whisk}
-    frame = {name: np.zeros((len(problem.motor_rad), problem.size)) for name in here.frame}
-    for number, move in enumerate(moves, start=1):
-        moved = values.one(number)
-        if move.is_shared:
-            for name, column in whisk.items():
-                change = moved.whisk[name] - here.whisk[name]
-                column[move.column[0]] = change / move.step
-        frames = np.flatnonzero(move.column >= 0)
-        for name, rows in frame.items():
-            change = _difference(name, moved.frame[name][frames], here.frame[name][frames])
-            rows[frames, move.column[frames]] = change / move.step
-    return here, Jacobians(whisk, frame)
+    perturbed = perturb(problem, state.vector, reach=True)
+    values = measure(problem, perturbed.vectors, state.arcs_mm)
+    frames = np.arange(len(problem.motor_rad))
+    whisk = {}
+    for name, value in values.whisk.items():  # (copies,)
+        whisk[name] = perturbed.shared_gradient(value[1:] - value[0])
+    frame = {}
+    for name, value in values.frame.items():  # (copies, f)
+        frame[name] = perturbed.jacobian(_difference(name, value[1:], value[0]), frames)
+    return values.one(0), Jacobians(whisk, frame)
 
 
 def _difference(name: str, after: np.ndarray, before: np.ndarray) -> np.ndarray:

@@ -171,14 +171,8 @@ def _contacts_of_small_angles(
     moves = _in_rig(problem, curves, _small_angles(problem, state, curves, arcs_mm))
     points = curves.points_mm + moves.points_mm[0]
     tangents = curves.tangents + moves.tangents[0]
-    shape = (len(arcs_mm), 3)
     axis = bar_axes(problem, state.vector)
-    each = replace(
-        axis,
-        point_mm=np.broadcast_to(axis.point_mm, shape),
-        direction=np.broadcast_to(axis.direction, shape),
-    )
-    return closest_arc(Curves(curves.arc_mm, points, tangents), each, arcs_mm)
+    return closest_arc(Curves(curves.arc_mm, points, tangents), axis, arcs_mm)
 
 
 def _taper(fit: Fit) -> LeftOut:

@@ -5,8 +5,6 @@ moves: `Curves` whose points and tangents (k, f, m, 3) are the changes, by each 
 those of the f frames.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from vision.fit.problem import CONTACT_SIGMA_MM, Problem, State, bar_axes
@@ -46,14 +44,8 @@ def by_contacts(
     """
     points = _with_moves(curves.points_mm, step * moves.points_mm)
     tangents = _with_moves(curves.tangents, step * moves.tangents)
-    shape = (*points.shape[:2], 3)
     axis = bar_axes(problem, state.vector)
-    each = replace(
-        axis,
-        point_mm=np.broadcast_to(axis.point_mm, shape),
-        direction=np.broadcast_to(axis.direction, shape),
-    )
-    distance, _, contact = clearance(Curves(curves.arc_mm, points, tangents), each)
+    distance, _, contact = clearance(Curves(curves.arc_mm, points, tangents), axis)
     by_change = (distance[1:] - distance[0]) / step / CONTACT_SIGMA_MM
     along = axis.bar_at(contact[0, frame]).direction[0]
     slip = (contact[1:, frame] - contact[0, frame]) @ along / step

@@ -16,9 +16,9 @@ from itertools import groupby
 import numpy as np
 
 from vision.fit.bend_onset import Onset
-from vision.fit.blocks import columns_of
-from vision.fit.differences import Perturbation, perturbed
-from vision.fit.object_rows import Part, joined_points, object_rows, of_each_point, over_sigma
+from vision.fit.blocks import Blocks
+from vision.fit.differences import Perturbed, perturb
+from vision.fit.object_rows import CameraPoints, Part, object_rows
 from vision.fit.problem import (
     CONTACT_SIGMA_MM,
     Problem,
@@ -26,10 +26,10 @@ from vision.fit.problem import (
     bar_axes,
     bar_axis,
     curves_of,
-    rest_shape,
+    resting_curves,
     wire_modes,
 )
-from vision.geometry.centreline import Curves, centrelines
+from vision.geometry.centreline import Curves
 from vision.geometry.contact import clearance
 from vision.geometry.newton import cauchy_weights
 from vision.wire.points import Observed
@@ -68,28 +68,33 @@ def linearise(
 
     jacobian: that of a state nearby, taken as it is, which saves nine tenths of the work.
     """
-    vector = state.vector
+    perturbed = Perturbed(state.vector[None])
     if jacobian is None:
-        moved, moves = perturbed(problem, vector)
-    else:
-        moved, moves = vector[None], []
-    curves, arcs = curves_of(problem, moved, state.arcs_mm)
-    touched = object_rows(problem)
-    parts = []
-    for (camera, on_wire), group in groupby(problem.seen, key=_camera_and_rod):
-        if on_wire:
-            parts.append(_wire_part(problem, camera, list(group), curves, moves, vector))
-        else:
-            parts.append(touched.part(camera, list(group), bool(moves), vector))
-    parts.append(_contact_part(problem, moved, curves, arcs, moves, vector))
-    parts.append(_prior_part(problem, vector))
+        perturbed = perturb(problem, state.vector)
+    curves, arcs = curves_of(problem, perturbed.vectors, state.arcs_mm)
+    parts = _point_parts(problem, curves, perturbed)
+    parts.append(_contact_part(problem, curves, arcs, perturbed))
+    parts.append(_prior_part(problem, state.vector))
     if problem.onset is not None:
-        parts.append(_onset_part(problem, problem.onset, moved, moves, vector))
+        parts.append(_onset_part(problem, problem.onset, perturbed))
     residual = np.concatenate([part[0] for part in parts])
     if jacobian is None:
         jacobian = np.concatenate([part[1] for part in parts])
     is_point = np.arange(len(residual)) < problem.contact_rows.start
     return Linear(residual, jacobian, is_point), replace(state, arcs_mm=arcs[0])
+
+
+def _point_parts(problem: Problem, curves: Curves, perturbed: Perturbed) -> list[Part]:
+    """Return residuals and Jacobian rows of all line points, by camera and rod."""
+    touched = object_rows(problem)
+    parts = []
+    for (camera, on_wire), group in groupby(problem.seen, key=_camera_and_rod):
+        seen = CameraPoints.joined(camera, list(group))
+        if on_wire:
+            parts.append(_wire_part(problem, seen, curves, perturbed))
+        else:
+            parts.append(touched.part(seen, bool(perturbed.moves), perturbed.vector))
+    return parts
 
 
 def _camera_and_rod(seen: Observed) -> tuple[int, bool]:
@@ -107,89 +112,52 @@ def linear_at(problem: Problem, state: State) -> Linear:
     return linearise(problem, state)[0]
 
 
-def _wire_part(
-    problem: Problem,
-    number: int,
-    group: Sequence[Observed],
-    curves: Curves,
-    moves: Sequence[Perturbation],
-    vector: np.ndarray,
-) -> Part:
+def _wire_part(problem: Problem, seen: CameraPoints, curves: Curves, perturbed: Perturbed) -> Part:
     """Return residuals and Jacobian rows of one camera's points of the wire, all frames."""
-    points = joined_points(group)
-    frame = of_each_point(group, [seen.frame for seen in group])
-    positions = curves.at_one_each(frame, points.place)  # (copies, n, 3) mm
-    camera = problem.cameras.cameras[number]
+    points = seen.points
+    positions = curves.at_one_each(seen.frame, points.place)  # (copies, n, 3) mm
+    camera = problem.cameras.cameras[seen.camera]
     px, by_point, _ = camera.project_with_jacobians(positions[0])
     along_normal = np.einsum("ni,nij->nj", points.normal, by_point)
     change_px = np.einsum("cnj,nj->cn", positions[1:] - positions[0], along_normal)
-    jacobian = np.zeros((len(points), problem.size))
-    row = np.arange(len(points))
-    for move, by_step in zip(moves, change_px):
-        column = move.column[frame]
-        moves_point = column >= 0
-        jacobian[row[moves_point], column[moves_point]] = by_step[moves_point] / move.step
+    jacobian = perturbed.jacobian(change_px, seen.frame)
     swing_rad = problem.motor_rad
-    modes = wire_modes(problem.wire.length_mm, points.place, swing_rad[frame], swing_rad)
+    modes = wire_modes(problem.wire.length_mm, points.place, swing_rad[seen.frame], swing_rad)
     modes = np.hstack([modes, points.shared_px])
-    return over_sigma(points, px, jacobian, problem.blocks.wire_offsets[number], modes, vector)
+    offsets = problem.blocks.wire_offsets[seen.camera]
+    return seen.over_sigma(px, jacobian, offsets, modes, perturbed.vector)
 
 
 def _contact_part(
-    problem: Problem,
-    moved: np.ndarray,
-    curves: Curves,
-    arcs_mm: np.ndarray,
-    moves: Sequence[Perturbation],
-    vector: np.ndarray,
+    problem: Problem, curves: Curves, arcs_mm: np.ndarray, perturbed: Perturbed
 ) -> Part:
     """Return residuals and Jacobian rows of touching frames: distance from axis to centreline is
     reach + its error.
     """
-    distance, arc, _ = clearance(curves, bar_axes(problem, moved), arcs_mm)
-    gap = distance - problem.rods.reach_mm(arc)  # (copies, f) mm
-    frames = np.flatnonzero(problem.touching)
+    distance, arc, _ = clearance(curves, bar_axes(problem, perturbed.vectors), arcs_mm)
+    gap = (distance - problem.rods.reach_mm(arc))[:, problem.touching]  # (copies, touching) mm
     reach = problem.blocks.reach.start
-    jacobian = np.zeros((len(frames), problem.size))
-    for move, moved_gap in zip(moves, gap[1:]):
-        column = move.column[frames]
-        row = np.flatnonzero(column >= 0)
-        change = (moved_gap - gap[0])[frames[row]]
-        jacobian[row, column[row]] = change / move.step
+    jacobian = perturbed.jacobian(gap[1:] - gap[0], np.flatnonzero(problem.touching))
     jacobian[:, reach] = -1.0
-    residual = gap[0, frames] - vector[reach]
+    residual = gap[0] - perturbed.vector[reach]
     return residual / CONTACT_SIGMA_MM, jacobian / CONTACT_SIGMA_MM
 
 
-def _onset_part(
-    problem: Problem,
-    onset: Onset,
-    moved: np.ndarray,
-    moves: Sequence[Perturbation],
-    vector: np.ndarray,
-) -> Part:
+def _onset_part(problem: Problem, onset: Onset, perturbed: Perturbed) -> Part:
     """Return residual and Jacobian row of the onset: the unbent whisker is then the reach away from
     the axis.
     """
-    count = len(moved)
-    curves = centrelines(
-        rest_shape(problem, moved),
-        np.zeros((count, 2)),
-        np.full(count, problem.wire.length_mm / 2),
-        np.full(count, onset.motor_rad) + _later_rad(problem, moved),
-        problem.wire,
-    )
-    distance, arc, _ = clearance(curves, bar_axis(problem, moved))
+    vectors = perturbed.vectors
+    motor_rad = np.full(len(vectors), onset.motor_rad) + _later_rad(problem, vectors)
+    curves = resting_curves(problem, vectors, motor_rad)
+    distance, arc, _ = clearance(curves, bar_axis(problem, vectors))
     gap = distance - problem.rods.reach_mm(arc)  # (copies,) mm
     sigma_mm = onset.sigma_rad * arc[0]
     reach = problem.blocks.reach.start
-    jacobian = np.zeros((1, problem.size))
-    for move, moved_gap in zip(moves, gap[1:]):
-        if move.is_shared:
-            jacobian[0, move.column[0]] = (moved_gap - gap[0]) / move.step
-    jacobian[0, reach] = -1.0
-    residual = gap[:1] - vector[reach]
-    return residual / sigma_mm, jacobian / sigma_mm
+    gradient = perturbed.shared_gradient(gap[1:] - gap[0])
+    gradient[reach] = -1.0
+    residual = gap[:1] - perturbed.vector[reach]
+    return residual / sigma_mm, gradient[None] / sigma_mm
 
 
 def _later_rad(problem: Problem, vector: np.ndarray) -> np.ndarray | float:
@@ -219,17 +187,12 @@ def solve(
     step is negligible.
     """
     blocks = problem.blocks
-    geometry = columns_of(blocks.bar_axis, blocks.rest_shape, blocks.friction, blocks.bends)
-    geometry = np.concatenate([geometry, blocks.placement])
+    geometry = blocks.geometry
     near = _ALIKE * blocks.steps[geometry]
     near_jacobian = None
     for scale in scales:
         linear, state = linearise(problem, state, near_jacobian)
-        root = np.sqrt(robust_weights(linear, scale))
-        jacobian = linear.jacobian * root[:, None]
-        step = np.linalg.lstsq(jacobian, -linear.residual * root, rcond=None)[0]
-        most_bend_rad = np.max(np.abs(step[blocks.bends.slice]), initial=0.0)
-        step = step * min(1.0, _LONGEST_RAD / max(most_bend_rad, 1e-9))
+        step, jacobian = _step_of(blocks, linear, scale)
         state = replace(state, vector=state.vector + step)
         if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _STILL_SIGMA:
             break
@@ -238,6 +201,17 @@ def solve(
     else:
         jacobian = weighted_jacobian(problem, state, scales[-1], near_jacobian)
     return state, np.linalg.inv(jacobian.T @ jacobian)
+
+
+def _step_of(blocks: Blocks, linear: Linear, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return Gauss–Newton's step (size,), within _LONGEST_RAD of bend, and the Jacobian that it was
+    found with, robustly weighted.
+    """
+    root = np.sqrt(robust_weights(linear, scale))
+    jacobian = linear.jacobian * root[:, None]
+    step = np.linalg.lstsq(jacobian, -linear.residual * root, rcond=None)[0]
+    most_bend_rad = np.max(np.abs(step[blocks.bends.slice]), initial=0.0)
+    return step * min(1.0, _LONGEST_RAD / max(most_bend_rad, 1e-9)), jacobian
 
 
 def weighted_jacobian(

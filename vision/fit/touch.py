@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.fit.problem import Problem, bar_axis, rest_shape, shift_at_mm
-from vision.geometry.centreline import centrelines
+from vision.fit.problem import Problem, bar_axis, resting_curves, shift_at_mm
 from vision.geometry.contact import clearance
 
 # [frames] Before touch: one gives the rest shape, two show that it swings with the motor. Derived.
@@ -20,6 +19,8 @@ _SURE_BEND_RAD = np.radians(0.25)
 _STEP = 1e-5
 # [mm] Secant steps below this would divide rounding by rounding. Derived.
 _TOUCH_GAP_MM = 1e-10
+# [steps] Secants from half a millimetre to `_TOUCH_GAP_MM`, where they end before. Derived.
+_SECANT_STEPS = 8
 # [rad] Half a millimetre at the contact, when touch is searched for. Stated.
 _SCAN_RAD = np.radians(0.5)
 # [1] Starts of the hinge that are tried between frames: finer than frames determine. Derived.
@@ -41,25 +42,24 @@ class FirstTouch:
     arc_mm: np.ndarray
 
 
-def first_touch(problem: Problem, vector: np.ndarray, rounds: int = 8) -> FirstTouch:
+def first_touch(problem: Problem, vector: np.ndarray) -> FirstTouch:
     """Find the motor angle at which axis and resting centreline are reach apart; batches allowed.
 
     A secant search, from about where the first of a batch touches.
     """
     first, last = _about_touch(problem, vector.reshape(-1, vector.shape[-1])[0])
-    low = np.full(vector.shape[:-1], first)
-    high = np.full(vector.shape[:-1], last)
-    gap_low, _, _ = _gap(problem, vector, low)
-    gap_high, arc, point = _gap(problem, vector, high)
-    for _ in range(rounds):
-        is_open = np.abs(gap_high) > _TOUCH_GAP_MM
-        slope = (gap_high - gap_low) / np.where(is_open, high - low, 1.0)
-        new = np.where(is_open, high - gap_high / np.where(is_open, slope, 1.0), high)
-        low = np.where(is_open, high, low)
-        gap_low = np.where(is_open, gap_high, gap_low)
-        high = new
-        gap_high, arc, point = _gap(problem, vector, new)
-    return FirstTouch(high, point, arc)
+    before = np.full(vector.shape[:-1], first)
+    angle = np.full(vector.shape[:-1], last)
+    gap_before, _, _ = _gap(problem, vector, before)
+    gap, arc, point = _gap(problem, vector, angle)
+    for _ in range(_SECANT_STEPS):
+        is_open = np.abs(gap) > _TOUCH_GAP_MM
+        slope = np.divide(gap - gap_before, angle - before, out=np.ones_like(gap), where=is_open)
+        before = np.where(is_open, angle, before)
+        gap_before = np.where(is_open, gap, gap_before)
+        angle = np.where(is_open, angle - gap / slope, angle)
+        gap, arc, point = _gap(problem, vector, angle)
+    return FirstTouch(angle, point, arc)
 
 
 def _about_touch(problem: Problem, vector: np.ndarray) -> tuple[float, float]:
@@ -104,10 +104,7 @@ def _gap(
     axis = bar_axis(problem, vector)
     shift_mm = shift_at_mm(problem, vector, motor_rad)
     there = replace(axis, point_mm=axis.point_mm + shift_mm)
-    straight = np.zeros((*motor_rad.shape, 2))
-    middle = np.full(motor_rad.shape, problem.wire.length_mm / 2)
-    curves = centrelines(rest_shape(problem, vector), straight, middle, motor_rad, problem.wire)
-    distance, arc, point = clearance(curves, there)
+    distance, arc, point = clearance(resting_curves(problem, vector, motor_rad), there)
     wider_mm = vector[..., problem.blocks.reach.start]
     return distance - problem.rods.reach_mm(arc) - wider_mm, arc, point
 

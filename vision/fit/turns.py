@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit.problem import Problem, State, point_rows
-from vision.fit.solve import LAST_SCALE, linear_at, linearise, robust_weights
+from vision.fit.solve import LAST_SCALE, Linear, linear_at, linearise, robust_weights
 
 # [rad] Of differences: the tip moves by 0.01 mm. Derived.
 _STEP_RAD = 1e-4
@@ -37,19 +37,24 @@ class Turns:
 def frame_turns(problem: Problem, state: State, index: Sequence[int]) -> Turns:
     """Return the turns of the frames (f,) of a fit that has converged."""
     linear = linear_at(problem, state)
+    count = len(problem.motor_rad)
+    weight = robust_weights(linear, LAST_SCALE)
+    jacobian = np.hstack([linear.jacobian, _by_turns(problem, state, linear)])
+    weighted = jacobian.T * weight
+    prior = np.append(np.zeros(problem.size), np.full(count, _PRIOR_RAD**-2.0))
+    covariance = np.linalg.inv(weighted @ jacobian + np.diag(prior))
+    step = -covariance @ (weighted @ linear.residual)
+    turn_rad = step[-count:]
+    return Turns(np.asarray(index), problem.motor_rad, turn_rad, covariance[-count:, -count:])
+
+
+def _by_turns(problem: Problem, state: State, linear: Linear) -> np.ndarray:
+    """Return derivatives (n, f) of all residuals by the turn of each frame."""
     turned_problem = replace(problem, motor_rad=problem.motor_rad + _STEP_RAD)
     turned, _ = linearise(turned_problem, state, linear.jacobian)
     by_turn = (turned.residual - linear.residual) / _STEP_RAD
-    of_row = _frame_of_row(problem, len(linear.residual))
-    count = len(problem.motor_rad)
-    columns = np.where(of_row[:, None] == np.arange(count), by_turn[:, None], 0.0)
-    root = np.sqrt(robust_weights(linear, LAST_SCALE))
-    rows = np.hstack([linear.jacobian, columns]) * root[:, None]
-    prior = np.append(np.zeros(problem.size), np.full(count, _PRIOR_RAD**-2.0))
-    covariance = np.linalg.inv(rows.T @ rows + np.diag(prior))
-    step = -covariance @ (rows.T @ (linear.residual * root))
-    own = slice(problem.size, None)
-    return Turns(np.asarray(index, dtype=int), problem.motor_rad, step[own], covariance[own, own])
+    is_of_frame = _frame_of_row(problem, len(by_turn))[:, None] == np.arange(len(problem.motor_rad))
+    return is_of_frame * by_turn[:, None]
 
 
 def _frame_of_row(problem: Problem, count: int) -> np.ndarray:

@@ -82,9 +82,10 @@ class Camera:
         return -self.T_camera_rig[:, :3].T @ self.T_camera_rig[:, 3]
 
     def project(self, points_mm: np.ndarray) -> np.ndarray:
-        """Project points (n, 3) of the rig frame to pixels (n, 2); NaN behind the camera."""
-        x_camera = apply(self.T_camera_rig, np.asarray(points_mm, dtype=float))
-        return lens_model.project(x_camera, self.lens)
+        """Project points (..., 3) of the rig frame to pixels (..., 2); NaN behind the camera."""
+        points = np.asarray(points_mm, dtype=float)
+        x_camera = apply(self.T_camera_rig, points.reshape(-1, 3))
+        return lens_model.project(x_camera, self.lens).reshape(*points.shape[:-1], 2)
 
     def project_with_jacobians(
         self, points_mm: np.ndarray

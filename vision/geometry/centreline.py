@@ -73,6 +73,21 @@ def bend_growth(
         by_bend = turn_rad / 30.0 * (w2**2 - 1.0)
         by_pull = pull / 6.0 * (w2 - 1.0)
         return growth + w2 * turn_rad * (by_bend - by_pull)
+    return growth + _growth_of_taper(growth, turn_rad, pull, arc_mm, contact_mm, wire)
+
+
+def _growth_of_taper(
+    growth: np.ndarray,
+    turn_rad: np.ndarray,
+    pull: np.ndarray | float,
+    arc_mm: np.ndarray,
+    contact_mm: np.ndarray,
+    wire: Wire,
+) -> np.ndarray:
+    """Return what large bends and pull add to the growth (…, m) of a tapering rod by small bends.
+
+    Arguments are as of `bend_growth`.
+    """
     integral = simpson().T * arc_mm[1]  # (m, m) mm: from the base to each node
     remaining_rad = turn_rad * (1.0 - growth)
     shortening_mm = (0.5 * remaining_rad - pull) * remaining_rad @ integral
@@ -80,7 +95,7 @@ def bend_growth(
     softness = np.where(arc_mm < contact_mm, radius**-4.0, 0.0)
     lost_turn = softness * (shortening_mm[..., -1:] - shortening_mm) @ integral
     whole_turn = _turn(contact_mm, contact_mm, wire.taper_per_mm)
-    return growth + (growth * lost_turn[..., -1:] - lost_turn) / whole_turn
+    return (growth * lost_turn[..., -1:] - lost_turn) / whole_turn
 
 
 @dataclass(frozen=True)
@@ -172,23 +187,27 @@ def centrelines(
     pull (…): force along the whisker at the contact over that across it, towards the tip.
     """
     rest_mm = np.asarray(rest_mm)
-    bend_rad = np.asarray(bend_rad)
     arc = np.linspace(0.0, wire.length_mm, _NODES)
-    turn = np.linalg.norm(bend_rad, axis=-1)[..., None]
-    growth = bend_growth(
-        turn, np.asarray(pull)[..., None], arc, np.asarray(contact_mm)[..., None], wire
+    lateral = _rest_slope(rest_mm, arc / wire.length_mm) / wire.length_mm
+    lateral = lateral + _slope_by_bend(
+        np.asarray(bend_rad), np.asarray(pull)[..., None], arc, np.asarray(contact_mm), wire
     )
-    sine = np.where(turn > 1e-12, np.sin(turn * growth) / np.maximum(turn, 1e-12), growth)
-    rest_slope = _rest_slope(rest_mm, arc / wire.length_mm) / wire.length_mm
-    lateral = rest_slope + sine[..., None] * bend_rad[..., None, :]  # (…, m, 2): y, z of tangents
-    forward2 = 1.0 - lateral[..., 0] ** 2 - lateral[..., 1] ** 2
-    tangents = np.empty((*lateral.shape[:-1], 3))
-    tangents[..., 0] = np.sqrt(np.maximum(forward2, _LEAST_FORWARD2))
-    tangents[..., 1:] = lateral
+    forward2 = np.maximum(1.0 - np.sum(lateral**2, axis=-1, keepdims=True), _LEAST_FORWARD2)
+    tangents = np.concatenate([np.sqrt(forward2), lateral], axis=-1)
     points = simpson() @ tangents * arc[1]
     points[..., 1:] += rest_mm[..., None, :, 0]
     rotation = np.swapaxes(rotation_z(motor_rad), -1, -2)
     return Curves(arc, points @ rotation, tangents @ rotation)
+
+
+def _slope_by_bend(
+    bend_rad: np.ndarray, pull: np.ndarray, arc_mm: np.ndarray, contact_mm: np.ndarray, wire: Wire
+) -> np.ndarray:
+    """Return y and z (…, m, 2) of the tangents by bends (…, 2): sines of the tangent angle."""
+    turn = np.linalg.norm(bend_rad, axis=-1)[..., None]
+    growth = bend_growth(turn, pull, arc_mm, contact_mm[..., None], wire)
+    sine = np.where(turn > 1e-12, np.sin(turn * growth) / np.maximum(turn, 1e-12), growth)
+    return sine[..., None] * bend_rad[..., None, :]
 
 
 @lru_cache

@@ -66,11 +66,11 @@ class Cone(Rounded):
         """Return the cone as a bar near points (..., k, 3): along its surface to the tip."""
         sin = np.sin(self.half_angle_rad)
         cos = np.cos(self.half_angle_rad)
-        axis = np.asarray(at.direction)[..., None, :]
+        axis = at.direction[..., None, :]
         place = AboutAxis.of(at, points_mm)
         down = place.radius_mm * sin / cos - place.height_mm  # from the tip to the foot
         along_surface = upwards(cos * axis - sin * place.outward)
-        foot = np.asarray(at.point_mm)[..., None, :] - down * axis
+        foot = at.point_mm[..., None, :] - down * axis
         return Local(foot, along_surface, (down * sin)[..., 0])
 
     def follows(self, at: RoundedAxis, local: Local, away: np.ndarray) -> float:
@@ -79,12 +79,11 @@ class Cone(Rounded):
 
     def balls(self, at: RoundedAxis, radius_mm: float, reach_mm: float, stations: int) -> Balls:
         """Return the balls near where the cone is touched; their radii shrink towards its tip."""
-        point = np.asarray(at.point_mm)[..., None, :]
-        axis = np.asarray(at.direction)[..., None, :]
-        spot = np.broadcast_to(at.spot_mm, at.point_mm.shape)
-        foot = at.near(spot[..., None, :]).foot_mm
+        point = at.point_mm[..., None, :]
+        axis = at.direction[..., None, :]
         sin = np.sin(self.half_angle_rad)
-        spot_down = np.sum((point - foot) * axis, axis=-1, keepdims=True)  # from the tip
+        from_tip = point - at.spot_foot_mm
+        spot_down = np.sum(from_tip * axis, axis=-1, keepdims=True)
         nearest = np.maximum(spot_down - reach_mm, _LEAST_RADIUS_MM / sin)
         farthest = np.maximum(spot_down, nearest) + reach_mm
         share = np.linspace(0.0, 1.0, stations)[:, None]

@@ -80,22 +80,23 @@ class BarAxis(Axis):
 
     def covering_discs(self, camera: Camera, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the middle (m, 2) of the bar's outline and its half-width (m,) px."""
-        return self._outline(camera, radius_mm, OUTLINE_MM, OUTLINE_POINTS)
+        return self.outline(camera, radius_mm, OUTLINE_MM, OUTLINE_POINTS)
 
     def edges_px(
         self, camera: Camera, radius_mm: float, reach_mm: float, stations: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return both edges (stations, 2) px of the bar, reach_mm to either side of its point."""
-        middle, half_px = self._outline(camera, radius_mm, reach_mm, stations)
+        middle, half_px = self.outline(camera, radius_mm, reach_mm, stations)
         offset = half_px[:, None] * normals(middle)
         return middle - offset, middle + offset
 
-    def _outline(self, camera, radius_mm, reach_mm, stations) -> tuple[np.ndarray, np.ndarray]:
-        """Return middle (m, 2) and half-width (m,) px of the outline near the axis's point."""
+    def outline(
+        self, camera: Camera, radius_mm: float, reach_mm: float, stations: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return middle (stations, 2) and half-width (stations,) px of the outline near its point."""
         place = np.linspace(-reach_mm, reach_mm, stations)
         points = self.point_mm + place[:, None] * self.direction
-        directions = np.broadcast_to(self.direction, points.shape)
-        return outline(camera, points, directions, radius_mm)
+        return outline(camera, points, self.direction, radius_mm)
 
     def _from_axis(self, points: np.ndarray) -> np.ndarray:
         """Return the vectors (..., k, 3) straight from the axis to points (..., k, 3)."""

@@ -22,11 +22,8 @@ def distort(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
     _, _, p1, p2, _ = distortion
     a, b = ab.T
     r2 = a * a + b * b
-    radial = _radial(r2, distortion)
-    ab2 = 2.0 * a * b
-    distorted_a = a * radial + p1 * ab2 + p2 * (r2 + 2 * a * a)
-    distorted_b = b * radial + p1 * (r2 + 2 * b * b) + p2 * ab2
-    return np.column_stack([distorted_a, distorted_b])
+    scale = _radial(r2, distortion) + 2.0 * (p1 * b + p2 * a)
+    return scale[:, None] * ab + r2[:, None] * [p2, p1]
 
 
 def distort_jacobian(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
@@ -36,14 +33,10 @@ def distort_jacobian(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
     k1, k2, p1, p2, k3 = distortion
     a, b = ab.T
     r2 = a * a + b * b
-    radial = _radial(r2, distortion)
-    slope = 2.0 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))  # d radial / d r² · 2
-    jacobian = np.empty((len(ab), 2, 2))
-    jacobian[:, 0, 0] = radial + a * a * slope + 2 * p1 * b + 6 * p2 * a
-    jacobian[:, 1, 1] = radial + b * b * slope + 6 * p1 * b + 2 * p2 * a
-    jacobian[:, 0, 1] = a * b * slope + 2 * p1 * a + 2 * p2 * b
-    jacobian[:, 1, 0] = jacobian[:, 0, 1]
-    return jacobian
+    scale = _radial(r2, distortion) + 2.0 * (p1 * b + p2 * a)
+    slope = k1 + r2 * (2 * k2 + 3 * r2 * k3)  # d radial / d r²
+    half = (slope[:, None] * ab + [2 * p2, 2 * p1])[:, :, None] * ab[:, None]  # (n, 2, 2)
+    return scale[:, None, None] * np.eye(2) + half + np.swapaxes(half, 1, 2)
 
 
 def project(x_camera: np.ndarray, lens: np.ndarray) -> np.ndarray:
@@ -123,18 +116,12 @@ def _by_lens(ab: np.ndarray, distorted: np.ndarray, lens: np.ndarray) -> np.ndar
     a, b = ab.T
     r2 = a * a + b * b
     jacobian = np.zeros((len(ab), 2, 9))
-    jacobian[:, 0, 0] = distorted[:, 0]
-    jacobian[:, 1, 1] = distorted[:, 1]
-    jacobian[:, 0, 2] = 1.0
-    jacobian[:, 1, 3] = 1.0
-    radial_powers = {4: r2, 5: r2 * r2, 8: r2 * r2 * r2}
-    for column, power in radial_powers.items():
-        jacobian[:, :, column] = ab * power[:, None]
-    jacobian[:, 0, 6] = 2 * a * b
-    jacobian[:, 1, 7] = 2 * a * b
-    jacobian[:, 0, 7] = r2 + 2 * a * a
-    jacobian[:, 1, 6] = r2 + 2 * b * b
-    jacobian[:, :, 4:] *= lens[:2, None]
+    jacobian[:, [0, 1], [0, 1]] = distorted
+    jacobian[:, [0, 1], [2, 3]] = 1.0
+    factors = np.stack([r2, r2 * r2, 2.0 * b, 2.0 * a, r2 * r2 * r2], axis=1)  # k1 k2 p1 p2 k3
+    by_distortion = ab[:, :, None] * factors[:, None]
+    by_distortion[:, [1, 0], [2, 3]] += r2[:, None]
+    jacobian[:, :, 4:] = lens[:2, None] * by_distortion
     return jacobian
 
 

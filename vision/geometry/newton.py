@@ -83,20 +83,24 @@ def cauchy_weights(residual: np.ndarray, scale: float) -> np.ndarray:
 
 
 def gauss_newton(
-    rows_of: Callable, prior: np.ndarray, steps: np.ndarray, rounds: int
+    residuals_of: Callable, prior: np.ndarray, steps: np.ndarray, rounds: int, scale: float
 ) -> np.ndarray:
-    """Fit parameters (k,) by Gauss–Newton's method from 0.
+    """Fit parameters (k,) by Gauss–Newton's method from 0, with Cauchy weights.
 
-    rows_of(parameters) returns pairs of residuals (n,) and their derivatives (n, k), weighted.
-    prior (k,): standard deviations about 0. Ends with a step below `steps` (k,), or after so many
+    residuals_of: function of parameters (k + 1, k) that returns residuals (k + 1, n), in sigmas.
+    prior (k,): standard deviations about 0. steps (k,): of the differences that give derivatives.
+    scale: of the Cauchy distribution, in sigmas. Ends with a step below `steps`, or after so many
     rounds.
     """
     parameters = np.zeros(len(prior))
+    differences = np.vstack([np.zeros(len(prior)), np.diag(steps)])
     for _ in range(rounds):
-        rows = [*rows_of(parameters), (-parameters / prior, np.diag(1.0 / prior))]
-        residual = np.concatenate([one for one, _ in rows])
-        jacobian = np.concatenate([columns for _, columns in rows])
-        step = np.linalg.lstsq(jacobian, residual, rcond=None)[0]
+        residual, *moved = residuals_of(parameters + differences)
+        root_weight = np.sqrt(cauchy_weights(residual, scale))[:, None]
+        jacobian = (np.array(moved) - residual).T / steps  # (n, k)
+        rows = np.vstack([root_weight * jacobian, np.diag(1.0 / prior)])
+        weighted = np.append(root_weight[:, 0] * residual, parameters / prior)
+        step = -np.linalg.lstsq(rows, weighted, rcond=None)[0]
         parameters = parameters + step
         if np.all(np.abs(step) < steps):
             break

@@ -10,7 +10,7 @@ class Refused(ValueError):
     """
 
     def __init__(self, sentence: str, code: str = "refused"):
-        """Keep the code beside the message."""
+        """Keep the code with the message."""
         super().__init__(sentence)
         self.code = code
 

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from vision.geometry.checks import require, require_length, require_sigma
+from vision.geometry.rotation import unit
 from vision.geometry.rounded import (
     AboutAxis,
     Balls,
@@ -13,7 +14,6 @@ from vision.geometry.rounded import (
     Local,
     Rounded,
     RoundedAxis,
-    unit,
     upwards,
 )
 from vision.geometry.touched import StatedSizes
@@ -77,9 +77,9 @@ class Ring(Rounded):
 
     def near(self, at: RoundedAxis, points_mm: np.ndarray) -> Local:
         """Return the ring as a bar near points (..., k, 3): its tangent at the nearest place."""
-        axis = np.asarray(at.direction)[..., None, :]
+        axis = at.direction[..., None, :]
         outward = AboutAxis.of(at, points_mm).outward
-        foot = np.asarray(at.point_mm)[..., None, :] + self.ring_radius_mm * outward
+        foot = at.point_mm[..., None, :] + self.ring_radius_mm * outward
         return Local(foot, upwards(np.cross(axis, outward)), np.zeros(outward.shape[:-1]))
 
     def follows(self, at: RoundedAxis, local: Local, away: np.ndarray) -> np.ndarray:
@@ -87,7 +87,7 @@ class Ring(Rounded):
 
         It is less than on a straight line, if the point is outside of the circle.
         """
-        outward = (local.foot_mm - np.asarray(at.point_mm)[..., None, :]) / self.ring_radius_mm
+        outward = (local.foot_mm - at.point_mm[..., None, :]) / self.ring_radius_mm
         distance = self.ring_radius_mm + np.sum(away * outward, axis=-1)  # from the ring's axis
         return self.ring_radius_mm / np.maximum(distance, _LEAST_RADIUS_SHARE * self.ring_radius_mm)
 
@@ -99,34 +99,26 @@ class Ring(Rounded):
         The distances of points along each sight are compared with the tube's radius.
         """
         diameter_mm = self.ring_diameter_mm
-        sight = points_mm - centre_mm
-        sight = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
-        steps = np.arange(-1.0, 1.0, radius_mm / diameter_mm) * (diameter_mm + radius_mm)
-        axis = np.asarray(at.direction)
-        batch = at.point_mm.shape[:-1]
-        start = points_mm.reshape(*batch, -1, 3) - np.asarray(at.point_mm)[..., None, :]
-        ahead = sight.reshape(*batch, -1, 3)
-        height = np.einsum("...kj,...j->...k", start, axis)[..., None]
-        climb = np.einsum("...kj,...j->...k", ahead, axis)[..., None]
-        start2 = np.sum(start**2, axis=-1)[..., None]
-        along = np.sum(start * ahead, axis=-1)[..., None]
-        distance2 = start2 + 2.0 * steps * along + steps**2  # (..., k, steps) from the centre
-        height = height + steps * climb
+        steps_mm = np.arange(-1.0, 1.0, radius_mm / diameter_mm) * (diameter_mm + radius_mm)
+        batch = (*at.point_mm.shape[:-1], -1, 3)
+        ahead = unit(points_mm - centre_mm).reshape(batch)
+        start = points_mm.reshape(batch) - at.point_mm[..., None, :]
+        axis = at.direction[..., None]
+        height = start @ axis + steps_mm * (ahead @ axis)  # (..., k, steps) above the ring's plane
+        distance2 = _dot(start, start) + 2.0 * steps_mm * _dot(start, ahead) + steps_mm**2
         across = np.sqrt(np.maximum(distance2 - height**2, 0.0)) - self.ring_radius_mm
         is_within = across**2 + height**2 < radius_mm**2
         return np.any(is_within, axis=-1).reshape(points_mm.shape[:-1])
 
     def balls(self, at: RoundedAxis, radius_mm: float, reach_mm: float, stations: int) -> Balls:
         """Return balls of one size along the circle, all round it if reach_mm is infinite."""
-        point = np.asarray(at.point_mm)[..., None, :]
-        axis = np.asarray(at.direction)[..., None, :]
-        spot = np.broadcast_to(at.spot_mm, at.point_mm.shape)
-        foot = at.near(spot[..., None, :]).foot_mm
+        point = at.point_mm[..., None, :]
+        axis = at.direction[..., None, :]
         most = np.pi
         if np.isfinite(reach_mm):
             most = min(reach_mm / self.ring_radius_mm, _MOST_TURN_RAD)
         turn = np.linspace(-most, most, stations)[:, None]
-        begin = unit(foot - point)
+        begin = unit(at.spot_foot_mm - point)
         outward = np.cos(turn) * begin + np.sin(turn) * np.cross(axis, begin)
         middle = point + self.ring_radius_mm * outward
         radii = np.full((*middle.shape[:-1], 1), radius_mm)
@@ -145,3 +137,8 @@ class Ring(Rounded):
         towards = np.cos(turn) * inwards + np.sin(turn) * np.cross(tangent, inwards)
         point = spot_mm + self.radius_mm * inwards + self.ring_radius_mm * towards
         return RoundedAxis(point, np.cross(tangent, towards), self, spot_mm)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the products (..., 1) of vectors (..., 3)."""
+    return np.sum(a * b, axis=-1, keepdims=True)

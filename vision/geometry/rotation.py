@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 # [1] Sine of the angle below which a rotation matrix gives its axis by its symmetric part. Derived.
 _SMALL_SINE = 1e-6
+# [1] Least length that a vector is divided by. Stated.
+_TINY = 1e-12
 # [rad] Below it (θ − sin θ)/θ³ loses its digits; its limit is 1/6. Derived.
 _SMALL_ANGLE_RAD = 1e-4
 
@@ -31,6 +33,11 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     last_axis = [2, 0, 1]
     forward = a.take(next_axis, -1) * b.take(last_axis, -1)
     return forward - a.take(last_axis, -1) * b.take(next_axis, -1)
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (..., k) at unit length; one of no length stays so."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY)
 
 
 def exp_rotation(w: np.ndarray) -> np.ndarray:

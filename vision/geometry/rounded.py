@@ -60,6 +60,22 @@ class Balls:
     radius_mm: np.ndarray
     growth: float
 
+    def silhouette(self, centre_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Compute where sights graze the surface of the balls, see `RoundedAxis.silhouette`."""
+        sight = self.middle_mm - centre_mm
+        along = np.sum(sight * self.ahead, axis=-1, keepdims=True)
+        towards = sight - along * self.ahead
+        distance = np.linalg.norm(towards, axis=-1, keepdims=True)
+        towards = towards / distance
+        root = np.sqrt(1.0 - self.growth**2)
+        cosine = (self.growth * along - self.radius_mm) / (root * distance)
+        cosine = np.where(np.abs(cosine) < 1.0, cosine, np.nan)
+        between = root * cosine * towards - self.growth * self.ahead
+        sideways = root * np.sqrt(1.0 - cosine**2) * np.cross(self.ahead, towards)
+        normals = np.stack([between + sideways, between - sideways], axis=-3)
+        both_mm = self.middle_mm[..., None, :, :] + self.radius_mm[..., None, :, :] * normals
+        return both_mm, normals
+
 
 @dataclass(frozen=True)
 class FreeNumber:
@@ -117,22 +133,7 @@ class Rounded(Touched):
         stations: int,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compute where sights graze the surface, see `RoundedAxis.silhouette`."""
-        balls = self.balls(at, radius_mm, reach_mm, stations)
-        middle = balls.middle_mm
-        growth = balls.growth
-        sight = middle - centre_mm
-        along = np.sum(sight * balls.ahead, axis=-1, keepdims=True)
-        towards = sight - along * balls.ahead
-        distance = np.linalg.norm(towards, axis=-1, keepdims=True)
-        towards = towards / distance
-        root = np.sqrt(1.0 - growth**2)
-        cosine = (growth * along - balls.radius_mm) / (root * distance)
-        cosine = np.where(np.abs(cosine) < 1.0, cosine, np.nan)
-        sideways = np.sqrt(1.0 - cosine**2) * np.cross(balls.ahead, towards)
-        one = root * (cosine * towards + sideways) - growth * balls.ahead
-        other = root * (cosine * towards - sideways) - growth * balls.ahead
-        normals = np.stack([one, other], axis=-3)
-        return middle[..., None, :, :] + balls.radius_mm[..., None, :, :] * normals, normals
+        return self.balls(at, radius_mm, reach_mm, stations).silhouette(centre_mm)
 
     def covering_discs(self, edges_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return middles (m, 2) and radii (m,) px of discs between both sides (2, m, 2)."""
@@ -184,10 +185,8 @@ class RoundedAxis(Axis):
 
     def turned(self, rotations: np.ndarray) -> "RoundedAxis":
         """Return the places of a batch (n, 3), each turned about the origin by rotations (n, 3, 3)."""
-        point_mm, direction, spot_mm = (
-            np.einsum("nij,nj->ni", rotations, vectors)
-            for vectors in (self.point_mm, self.direction, self.spot_mm)
-        )
+        vectors = np.stack([self.point_mm, self.direction, self.spot_mm], axis=-1)  # (n, 3, 3)
+        point_mm, direction, spot_mm = np.moveaxis(rotations @ vectors, -1, 0)
         return RoundedAxis(point_mm, direction, self.form, spot_mm)
 
     def upward(self) -> "RoundedAxis":
@@ -206,6 +205,12 @@ class RoundedAxis(Axis):
     def near(self, points_mm: np.ndarray) -> Local:
         """Return the object as a bar near points (..., k, 3)."""
         return self.form.near(self, points_mm)
+
+    @property
+    def spot_foot_mm(self) -> np.ndarray:
+        """Return the point (..., 1, 3) of the middle nearest to where it is touched."""
+        spot_mm = np.broadcast_to(self.spot_mm, np.shape(self.point_mm))
+        return self.near(spot_mm[..., None, :]).foot_mm
 
     def outside_mm(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute how far points (..., k, 3) are from the middle, less `Local.wider_mm`.
@@ -276,23 +281,18 @@ class RoundedAxis(Axis):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return both sides (stations, 2) px of the silhouette."""
         points, _ = self.silhouette(camera.centre_mm, radius_mm, reach_mm, stations)
-        one, other = points
-        return camera.project(one), camera.project(other)
+        one, other = camera.project(points)
+        return one, other
 
     def covering_discs(self, camera: Camera, radius_mm: float) -> tuple[np.ndarray, np.ndarray]:
         """Return middles (m, 2) and radii (m,) px of discs that cover the object in a picture."""
         points, _ = self.silhouette(camera.centre_mm, radius_mm, OUTLINE_MM, OUTLINE_POINTS)
-        return self.form.covering_discs(camera.project(points.reshape(-1, 3)).reshape(2, -1, 2))
+        return self.form.covering_discs(camera.project(points))
 
     def shifted_along(self, across: np.ndarray, vector: np.ndarray) -> "RoundedAxis":
         """Return the object moved as by `shifted`, and by vector[..., 4] mm along its axis."""
         shifted = self.shifted(across, vector)
         return replace(shifted, point_mm=shifted.point_mm + vector[..., 4:] * self.direction)
-
-
-def unit(vectors: np.ndarray) -> np.ndarray:
-    """Return vectors (..., 3) at unit length."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY)
 
 
 def upwards(directions: np.ndarray) -> np.ndarray:
@@ -315,8 +315,8 @@ class AboutAxis:
     @classmethod
     def of(cls, at: RoundedAxis, points_mm: np.ndarray) -> "AboutAxis":
         """Return the places of points (..., k, 3)."""
-        axis = np.asarray(at.direction)[..., None, :]
-        apart = points_mm - np.asarray(at.point_mm)[..., None, :]
+        axis = at.direction[..., None, :]
+        apart = points_mm - at.point_mm[..., None, :]
         height = np.sum(apart * axis, axis=-1, keepdims=True)
         flat = apart - height * axis
         radius = np.linalg.norm(flat, axis=-1, keepdims=True)

@@ -17,42 +17,42 @@ _TINY = 1e-12
 def outline(
     camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middle (n, 2) and half-width (n,) px of a rod's outline at points of its axis.
+    """Return the middle (n, 2) and half-width (n,) px of a rod's outline at points (n, 3) of its
+    axis.
 
-    points_mm (n, 3). directions (n, 3): unit vectors along the rod. radius_mm: one, or (n,).
+    directions (n, 3): unit vectors along the rod. radius_mm: one, or (n,).
     """
     one, other = edges(camera, points_mm, directions, radius_mm)
     middle = 0.5 * (one + other)
-    width = np.abs(np.sum((one - other) * normals(middle), axis=1))
+    width = np.abs(np.sum((one - other) * normals(middle), axis=-1))
     return middle, 0.5 * width
 
 
 def edges(
     camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the two edges, each (n, 2) px, of a rod's outline at points (n, 3) of its axis.
+    """Return the two edges, each (..., n, 2) px, of a rod's outline at points of its axis.
 
-    directions (n, 3): unit vectors along the rod. radius_mm: one, or (n,).
+    Arguments are as of `grazed`.
     """
-    grazing_mm = grazed(camera, points_mm, directions, radius_mm)
-    one, other = np.split(camera.project(np.concatenate(grazing_mm)), 2)
+    one, other = camera.project(np.stack(grazed(camera, points_mm, directions, radius_mm)))
     return one, other
 
 
 def grazed(
     camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points (n, 3) and (n, 3) of a rod's surface where lines of sight graze it.
+    """Return the points (..., n, 3) of a rod's surface where sights graze it, on either side.
 
-    points_mm (n, 3): of its axis. directions (n, 3): unit vectors along the rod. radius_mm: one, or
-    (n,).
+    points_mm (..., n, 3): of its axis. directions (..., n, 3): unit vectors along the rod.
+    radius_mm: one, or (..., n).
     """
     points = np.atleast_2d(points_mm)
     directions = np.atleast_2d(directions)
-    radius = np.broadcast_to(radius_mm, len(points))[:, None]
+    radius = np.asarray(radius_mm)[..., None]
     sight = points - camera.centre_mm
-    sight = sight - np.sum(sight * directions, axis=1, keepdims=True) * directions
-    distance = np.linalg.norm(sight, axis=1, keepdims=True)
+    sight = sight - np.sum(sight * directions, axis=-1, keepdims=True) * directions
+    distance = np.linalg.norm(sight, axis=-1, keepdims=True)
     sideways = cross(directions, sight / distance)
     near = points - radius**2 / distance**2 * sight
     cosine = np.sqrt(np.maximum(1.0 - radius**2 / distance**2, 0.0))

@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from vision.geometry.checks import require_length, require_sigma
-from vision.geometry.rounded import Balls, Local, Rounded, RoundedAxis, unit
+from vision.geometry.rotation import unit
+from vision.geometry.rounded import Balls, Local, Rounded, RoundedAxis
 from vision.geometry.touched import StatedSizes
 
 # [—] A layout: the direction along which slopes count.
@@ -47,7 +48,7 @@ class Sphere(Rounded):
 
     def near(self, at: RoundedAxis, points_mm: np.ndarray) -> Local:
         """Return the sphere as a bar near points (..., k, 3): along the steepest way there."""
-        centre = np.asarray(at.point_mm)[..., None, :]
+        centre = at.point_mm[..., None, :]
         apart = points_mm - centre
         normal = unit(apart)
         upright = unit(_UP - normal[..., 2:] * normal)
@@ -59,8 +60,8 @@ class Sphere(Rounded):
 
     def balls(self, at: RoundedAxis, radius_mm: float, reach_mm: float, stations: int) -> Balls:
         """Return the one ball."""
-        centre = np.asarray(at.point_mm)[..., None, :]
-        ahead = np.asarray(at.direction)[..., None, :]
+        centre = at.point_mm[..., None, :]
+        ahead = at.direction[..., None, :]
         return Balls(centre, ahead, np.full((*centre.shape[:-1], 1), radius_mm), 0.0)
 
     def silhouette(
@@ -72,16 +73,16 @@ class Sphere(Rounded):
         stations: int,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compute where sights graze the sphere: a circle in two halves, whatever the reach."""
-        sight = np.asarray(at.point_mm) - centre_mm
-        distance = np.linalg.norm(sight, axis=-1, keepdims=True)[..., None]
-        ahead = unit(sight)[..., None, :]
+        middle = at.point_mm[..., None, :]
+        sight = middle - centre_mm
+        ahead = unit(sight)
         right = unit(np.cross(ahead, _UP + _SKEWED))
-        turn = (np.arange(2 * stations) + 0.5) * np.pi / stations
-        ring = np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * np.cross(ahead, right)
-        cosine = radius_mm / distance
+        turn = ((np.arange(2 * stations) + 0.5) * np.pi / stations)[:, None]
+        ring = np.cos(turn) * right + np.sin(turn) * np.cross(ahead, right)
+        cosine = radius_mm / np.linalg.norm(sight, axis=-1, keepdims=True)
         normals = -cosine * ahead + np.sqrt(1.0 - cosine**2) * ring
         normals = normals.reshape(*normals.shape[:-2], 2, stations, 3)
-        return np.asarray(at.point_mm)[..., None, None, :] + radius_mm * normals, normals
+        return middle[..., None, :] + radius_mm * normals, normals
 
     def covering_discs(self, edges_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return one disc (1, 2), (1,) px for all of the silhouette (2, m, 2)."""

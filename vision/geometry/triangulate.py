@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.geometry.camera import Cameras
+from vision.geometry.camera import Camera, Cameras
 
 # [steps] Gauss–Newton from the meeting of rays converges quadratically; rays meet to a percent.
 # Derived.
@@ -74,18 +74,26 @@ def _gauss_newton_step(cameras: Cameras, px, sigma_px, points: np.ndarray):
     gradient = np.zeros((n, 3, 1))
     couplings = []
     for camera in cameras:
-        predicted, by_point, by_camera = camera.project_with_jacobians(points)
-        residual = px[camera.name] - predicted
-        visible = np.isfinite(residual).all(axis=1)
-        weight = np.where(visible, 1.0 / sigma_px[camera.name], 0.0)[:, None, None]
-        weighted = np.nan_to_num(residual[:, :, None] * weight)  # (n, 2, 1)
-        J = np.nan_to_num(by_point * weight)  # (n, 2, 3)
-        Jt = np.swapaxes(J, 1, 2)
-        normal += Jt @ J
-        gradient += Jt @ weighted
-        couplings.append(-Jt @ np.nan_to_num(by_camera * weight))
+        residual, by_point, by_camera = _weighted_rows(
+            camera, px[camera.name], sigma_px[camera.name], points
+        )
+        transposed = np.swapaxes(by_point, 1, 2)
+        normal += transposed @ by_point
+        gradient += transposed @ residual[:, :, None]
+        couplings.append(-transposed @ by_camera)
     step = (_inverse(normal) @ gradient)[:, :, 0]
     return step, normal, np.concatenate(couplings, axis=2)
+
+
+def _weighted_rows(camera: Camera, px, sigma_px, points: np.ndarray) -> list[np.ndarray]:
+    """Return one camera's residuals (n, 2), and derivatives of its pixels by points (n, 2, 3) and
+    by its parameters (n, 2, 15), over sigma; 0 of points that it does not see.
+    """
+    predicted, by_point, by_camera = camera.project_with_jacobians(points)
+    residual = px - predicted
+    weight = np.where(np.isfinite(residual).all(axis=1), 1.0 / sigma_px, 0.0)[:, None]
+    rows = (residual * weight, by_point * weight[:, None], by_camera * weight[:, None])
+    return [np.nan_to_num(values) for values in rows]
 
 
 def _inverse(matrices: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import BarAxis, axis_frame
-from vision.geometry.newton import cauchy_weights, gauss_newton
+from vision.geometry.newton import gauss_newton
 from vision.geometry.silhouette import edges
 from vision.wire.points import LinePoints
 
@@ -22,6 +22,8 @@ _PRIOR = np.array([5.0, 5.0, 0.5, 0.5])
 # [mm, rad] Steps of differences; a smaller step of the axis is the last: a hundredth of a pixel.
 # Derived.
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5])
+# [steps] Gauss–Newton; it ends earlier. Stated.
+_GAUSS_NEWTON = 5
 # [sigmas] Scale of the Cauchy distribution that weighs residuals. Stated.
 _CAUCHY_SIGMAS = 5.0
 
@@ -31,47 +33,33 @@ def settle_axis(
     cameras: Cameras,
     lines: Mapping[str, LinePoints],
     radius_mm: float,
-    rounds: int = 5,
 ) -> BarAxis:
     """Fit the axis whose outline passes through line points in each camera, from an axis nearby.
 
-    lines: by camera, their `place` mm along the axis given. rounds: most Gauss–Newton steps. Where
-    the cameras see the bar from nearly the same side, what they cannot determine stays as it was.
+    lines: by camera, their `place` mm along the axis given. Where the cameras see the bar from
+    nearly the same side, what they cannot determine stays as it was.
     """
     across = axis_frame(axis.direction)
+    used = {name: points for name, points in lines.items() if len(points)}
+    if not used:
+        return axis.upward()
 
-    def rows_of(vector: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Compute residuals and Jacobian of each camera at a step from the begin."""
-        return [
-            _axis_rows(axis, across, vector, cameras[name], points, radius_mm)
-            for name, points in lines.items()
-            if len(points)
-        ]
+    def residuals_of(vectors: np.ndarray) -> np.ndarray:
+        """Compute the residuals (m, n) of all cameras' line points for vectors (m, 4)."""
+        axes = axis.shifted(across, vectors)
+        residuals = [_residuals(axes, cameras[name], used[name], radius_mm) for name in used]
+        return np.concatenate(residuals, axis=1)
 
-    return axis.shifted(across, gauss_newton(rows_of, _PRIOR, _STEPS, rounds)).upward()
+    vector = gauss_newton(residuals_of, _PRIOR, _STEPS, _GAUSS_NEWTON, _CAUCHY_SIGMAS)
+    return axis.shifted(across, vector).upward()
 
 
-def _axis_rows(
-    axis: BarAxis,
-    across: np.ndarray,
-    vector: np.ndarray,
-    camera: Camera,
-    points: LinePoints,
-    radius_mm: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Compute weighted residuals (n,) of line points, and their Jacobian (n, 4).
+def _residuals(axes: BarAxis, camera: Camera, points: LinePoints, radius_mm: float) -> np.ndarray:
+    """Compute how far line points lie from the middle of an outline, in sigmas.
 
-    Residuals are in sigmas, with Cauchy weights. vector (4,): shifts and tilts of the axis, see
-    `Axis.shifted`.
+    Returns (m, n) of a batch of axes (m, 3).
     """
-    steps = np.concatenate([np.zeros((1, 4)), np.diag(_STEPS)])
-    shifted = axis.shifted(across, vector + steps)  # a batch of five axes
-    on_axis = shifted.point_mm[:, None] + points.place[:, None] * shifted.direction[:, None]
-    directions = np.broadcast_to(shifted.direction[:, None], on_axis.shape)  # (5, n, 3)
-    one, other = edges(camera, on_axis.reshape(-1, 3), directions.reshape(-1, 3), radius_mm)
-    middle, *stepped = 0.5 * (one + other).reshape(*on_axis.shape[:2], 2)
-    residual = np.sum(points.normal * (points.px - middle), axis=1) / points.sigma_px
-    weight = np.sqrt(cauchy_weights(residual, _CAUCHY_SIGMAS))
-    by_axis = np.sum(points.normal * (np.array(stepped) - middle), axis=-1)  # (4, n)
-    jacobian = (by_axis / _STEPS[:, None]).T / points.sigma_px[:, None]
-    return residual * weight, jacobian * weight[:, None]
+    directions = axes.direction[:, None]
+    on_axis = axes.point_mm[:, None] + points.place[:, None] * directions  # (m, n, 3) mm
+    one, other = edges(camera, on_axis, directions, radius_mm)
+    return np.sum(points.normal * (points.px - 0.5 * (one + other)), axis=-1) / points.sigma_px

@@ -87,9 +87,9 @@ class ChangeMap:
         height, width = self.field.shape
         last = np.array([width, height]) - 1.0
         is_inside = np.all((px >= 0.0) & (px < last), axis=-1)
-        column = np.where(is_inside, px[..., 0] + 0.5, 0.0).astype(np.intp)
-        row = np.where(is_inside, px[..., 1] + 0.5, 0.0).astype(np.intp)
-        return self.field.ravel().take(row * width + column), is_inside
+        nearest = np.where(is_inside[..., None], px + 0.5, 0.0).astype(np.intp)
+        index = nearest[..., 1] * width + nearest[..., 0]
+        return self.field.ravel().take(index), is_inside
 
 
 def find_covering(
@@ -148,17 +148,23 @@ def _lowest_coverage(
 
 def _coverage(change: ChangeMap, rings: RoundedAxis, radius_mm: float, stations: int) -> np.ndarray:
     """Compute how much more (n,) a picture differs within rings (n, 3) than beyond them."""
-    silhouette, normals = _outer_side(change.camera, rings, radius_mm, stations)
-    offsets_mm = radius_mm * _OUTWARDS[:, None] * normals[..., None, :]
-    places = silhouette[..., None, :] + offsets_mm  # (n, stations, 4, 3)
-    px = change.camera.project(places.reshape(-1, 3)).reshape(*places.shape[:-1], 2) / HALF
-    field, is_inside = change.at(px)  # (n, stations, 4)
+    px = _px_across_outline(change.camera, rings, radius_mm, stations)
+    field, is_inside = change.at(px / HALF)  # (n, stations, 4)
     within = np.mean(field[..., :_WITHIN], axis=-1)
     beyond = np.mean(field[..., _WITHIN:], axis=-1)
     is_read = np.all(is_inside, axis=-1)  # (n, stations)
     difference = np.where(is_read, within - _BEYOND * beyond, 0.0)
     count = np.maximum(np.sum(is_read, axis=-1), _LEAST_SHARE * stations)
     return np.sum(difference, axis=-1) / count
+
+
+def _px_across_outline(
+    camera: Camera, rings: RoundedAxis, radius_mm: float, stations: int
+) -> np.ndarray:
+    """Project points across the outer silhouettes of rings (n, 3): (n, stations, 4, 2) px."""
+    silhouette, normals = _outer_side(camera, rings, radius_mm, stations)
+    offsets_mm = radius_mm * _OUTWARDS[:, None] * normals[..., None, :]
+    return camera.project(silhouette[..., None, :] + offsets_mm)
 
 
 def _outer_side(

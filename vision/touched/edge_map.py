@@ -93,11 +93,7 @@ def edge_strength_tensor(grey: np.ndarray, background: np.ndarray, blur_px: floa
     goes from 0 to 1: it compares what the gradient has beyond its surroundings with the median
     gradient, which is that of noise.
     """
-    gradient = _gradient(grey, blur_px)  # (2, h, w)
-    behind = _gradient(background, blur_px)
-    power = np.maximum(np.sum(behind**2, axis=0), _TINY)
-    light = np.sum(gradient * behind, axis=0) / power  # of this picture over the background's
-    residual = gradient - np.clip(light, 0.0, _MOST_LIGHT) * behind
+    residual = _gradient_beyond(grey, background, blur_px)
     size = np.hypot(residual[0], residual[1])
     bell, _ = _gaussian_and_derivative(_SURROUND_BLURS * blur_px)
     excess = np.maximum(size - _filter(size, bell, bell), 0.0)
@@ -105,6 +101,15 @@ def edge_strength_tensor(grey: np.ndarray, background: np.ndarray, blur_px: floa
     strength = excess**2 / (excess**2 + noise**2 + _TINY)
     x, y = residual / np.maximum(size, _TINY)
     return strength[..., None] * np.stack([x * x, x * y, y * y], axis=-1)
+
+
+def _gradient_beyond(grey: np.ndarray, background: np.ndarray, blur_px: float) -> np.ndarray:
+    """Compute the gradient (2, h, w) of a picture that its background in any light lacks."""
+    gradient = _gradient(grey, blur_px)
+    behind = _gradient(background, blur_px)
+    power = np.maximum(np.sum(behind**2, axis=0), _TINY)
+    light = np.sum(gradient * behind, axis=0) / power  # of this picture over the background's
+    return gradient - np.clip(light, 0.0, _MOST_LIGHT) * behind
 
 
 def _gradient(picture: np.ndarray, blur_px: float) -> np.ndarray:

@@ -86,17 +86,22 @@ def measure_edges(
     if len(pieces) < FEWEST_PIECES:
         return None
     start = _search_coarse(pieces, knots) if coarse else np.zeros(4)
-    q = np.append(start, 0.0)
-    pieces = of_bar_alone(pieces, partial(_align, q=q), knots)
+    start = np.append(start, 0.0)
+    pieces = of_bar_alone(pieces, partial(_align, q=start), knots)
+    q, covariance, chi2 = _fit_edges(pieces, knots, start)
+    if chi2 > NO_BAR:
+        return None
+    return _points_of_edges(pieces, q[:4], covariance[:4, :4])
+
+
+def _fit_edges(pieces: Pieces, knots: Knots, q) -> tuple[np.ndarray, np.ndarray, float]:
+    """Fit q (5,) to the rims' pixels, with its covariance (5, 5) and chi² per pixel."""
     for _ in range(_PASSES):
         rims = rims_of(pieces, _align(pieces, q))
         misfit = partial(_fit_rims, rims, knots)
         q, chi2, curvature = descend(misfit, q, _STEPS, _LONGEST, _CONVERGED_PX, _STEP_SHARES)
-    if chi2 > NO_BAR:
-        return None
     pixels = float(np.sum(rims.weight > 0))
-    covariance = covariance_of(curvature, chi2, pixels)
-    return _points_of_edges(pieces, q[:4], covariance[:4, :4])
+    return q, covariance_of(curvature, chi2, pixels), chi2
 
 
 def _fit_rims(rims: Pieces, knots: Knots, q) -> float:

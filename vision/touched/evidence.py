@@ -248,6 +248,41 @@ class Evidence:
 
 
 @dataclass(frozen=True)
+class _Positions:
+    """The positions of the bar's middle that are tried.
+
+    shifts (s,): in whole steps of the profiles' grid. fractions_px (p,): added to each of them.
+    steps (n,): offsets from a middle, in steps, that have pixels for some shift.
+    """
+
+    shifts: np.ndarray
+    fractions_px: np.ndarray
+    steps: np.ndarray
+
+    @classmethod
+    def within(cls, profiles: Profiles, reach_px: float, every: int, per_step: int) -> "_Positions":
+        """Return positions within reach_px: every so many steps, and `per_step` in each step."""
+        most = int(np.ceil(reach_px / (every * STEP_PX)))
+        shifts = every * np.arange(-most, most + 1)
+        steps = _visible_steps(profiles, every * most)
+        return cls(shifts, STEP_PX / per_step * np.arange(per_step), steps)
+
+    @property
+    def most(self) -> int:
+        """Return the largest shift, in steps."""
+        return int(np.max(np.abs(self.shifts)))
+
+    @property
+    def shift_px(self) -> np.ndarray:
+        """Return all positions (s · p,)."""
+        return (STEP_PX * self.shifts[:, None] + self.fractions_px).ravel()
+
+    def offset_px(self, fraction_px: float) -> np.ndarray:
+        """Return the offsets (n,) from a middle that lies a fraction of a step from the grid."""
+        return STEP_PX * self.steps - fraction_px
+
+
+@dataclass(frozen=True)
 class _Design:
     """Columns of the model at offsets (n,) from the bar's middle, apart from the picture without
     rods.
@@ -262,6 +297,45 @@ class _Design:
     light: np.ndarray
     cover: np.ndarray
     leak: np.ndarray
+
+    @classmethod
+    def at(
+        cls, offset_px: np.ndarray, modes: np.ndarray, radius_px: float, blur_px: float
+    ) -> "_Design":
+        """Return the design at offset_px (n,), with modes (splines, r) of the light on the rod."""
+        rod_light = _blur_splines(offset_px, radius_px, blur_px) @ modes
+        beyond_px = np.stack([-offset_px, offset_px], axis=1) - radius_px  # left and right edge
+        cover = ndtr(beyond_px / blur_px)
+        density = np.exp(-0.5 * (beyond_px / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
+        sides = np.stack([cover, cover * beyond_px / OUTSIDE_PX], axis=2)
+        sides = sides.reshape(len(offset_px), _SIDES)
+        leak = blur_px * np.array([-1.0, 1.0]) * density
+        return cls(np.concatenate([rod_light, sides], axis=1), cover, leak)
+
+    @cached_property
+    def products(self) -> list[np.ndarray]:
+        """Return products of two columns, (n, elements) each, by the moment that each belongs to.
+
+        They are in the order of `Profiles.moments`. Of two columns of the light only the lower
+        triangle is there, and of the two edges left left, left right and right right.
+        """
+        light = self.light
+        cover = self.cover
+        leak = self.leak
+        row, column, _ = _element_layout(light.shape[1])
+        one = [0, 0, 1]
+        other = [0, 1, 1]
+        return [
+            light[:, row] * light[:, column],
+            (light[:, None] * cover[:, :, None]).reshape(len(light), -1),
+            (light[:, None] * leak[:, :, None]).reshape(len(light), -1),
+            cover[:, one] * cover[:, other],
+            cover[:, one] * leak[:, other] + leak[:, one] * cover[:, other],
+            leak[:, one] * leak[:, other],
+            light,
+            cover,
+            leak,
+        ]
 
 
 def compute_evidence(
@@ -282,36 +356,23 @@ def compute_evidence(
     """
     profiles = rod.profiles
     radius_px = width_factor * profiles.radius_px
-    most = int(np.ceil(reach_px / (every * STEP_PX)))
-    shifts = every * np.arange(-most, most + 1)  # (steps,) whole steps of the grid
-    steps = _visible_steps(profiles, every * most)
-    fractions_px = STEP_PX / positions * np.arange(positions)
-    pictures = []
-    for fraction_px in fractions_px:
-        pictures.append(_blur_splines(STEP_PX * steps - fraction_px, radius_px, blur_px))
-    root_weight = _largest_root_weight(profiles, steps, every * most)
+    tried = _Positions.within(profiles, reach_px, every, positions)
+    picture = _blur_splines(tried.offset_px(0.0), radius_px, blur_px)
+    root_weight = _largest_root_weight(profiles, tried)
     modes, precisions = rod.observable_modes(
-        root_weight[:, None] * pictures[0], with_smooth_priors=with_smooth_priors
+        root_weight[:, None] * picture, with_smooth_priors=with_smooth_priors
     )
     matrices = []
-    for fraction_px, picture in zip(fractions_px, pictures):
-        offset_px = STEP_PX * steps - fraction_px
-        design = _make_design(offset_px, picture @ modes, radius_px, blur_px)
-        matrices.append(_normal_matrices(profiles, shifts, design, steps))
-    size = matrices[0].shape[-1]
-    normal = np.stack(matrices, axis=2).reshape(len(profiles), -1, size, size)
-    shift_px = (STEP_PX * shifts[:, None] + fractions_px).ravel()
-    deviances = []
-    misfits = []
-    for precision in precisions:
-        deviance, misfit = rod.marginalise(normal, precision)
-        deviances.append(deviance)
-        misfits.append(misfit)
-    bar_deviance = np.stack(deviances, axis=-1)
-    misfit = np.stack(misfits, axis=-1).reshape(len(profiles), -1)
+    for fraction_px in tried.fractions_px:
+        design = _Design.at(tried.offset_px(fraction_px), modes, radius_px, blur_px)
+        matrices.append(_normal_matrices(profiles, tried, design))
+    normal = np.stack(matrices, axis=2)  # (k, s, p, m, m)
+    normal = normal.reshape(len(profiles), -1, *normal.shape[-2:])
+    models = [rod.marginalise(normal, precision) for precision in precisions]
+    bar_deviance, misfit = np.moveaxis(models, 0, -1)  # (k, g, r) each
     best = np.argmin(bar_deviance.reshape(len(profiles), -1), axis=1)
-    misfit = misfit[np.arange(len(profiles)), best]
-    return Evidence(blur_px, shift_px, bar_deviance, misfit, rod.without_rod[0])
+    misfit = misfit.reshape(len(profiles), -1)[np.arange(len(profiles)), best]
+    return Evidence(blur_px, tried.shift_px, bar_deviance, misfit, rod.without_rod[0])
 
 
 def _visible_steps(profiles: Profiles, most: int) -> np.ndarray:
@@ -322,47 +383,23 @@ def _visible_steps(profiles: Profiles, most: int) -> np.ndarray:
     return visible - (len(profiles.offset_px) // 2 + most)
 
 
-def _largest_root_weight(profiles: Profiles, steps: np.ndarray, most: int) -> np.ndarray:
-    """Return 1 / sigma (n,) at offsets `steps`, the largest over segments and shifts of up to
-    `most` steps."""
-    weight = np.pad(np.max(profiles.weight, axis=0), most)
-    largest = maximum_filter1d(weight, 2 * most + 1)
-    return np.sqrt(largest[steps + len(largest) // 2])
+def _largest_root_weight(profiles: Profiles, tried: _Positions) -> np.ndarray:
+    """Return 1 / sigma (n,) at offsets from the middle, the largest over segments and shifts."""
+    weight = np.pad(np.max(profiles.weight, axis=0), tried.most)
+    largest = maximum_filter1d(weight, 2 * tried.most + 1)
+    return np.sqrt(largest[tried.steps + len(largest) // 2])
 
 
-def _normal_matrices(profiles: Profiles, shifts, design: _Design, steps) -> np.ndarray:
-    """Compute the matrices [A y]ᵀ W [A y] (k, g, m, m) for middles at `shifts` (g,), in whole steps
-    of the grid.
+def _normal_matrices(profiles: Profiles, tried: _Positions, design: _Design) -> np.ndarray:
+    """Compute the matrices [A y]ᵀ W [A y] (k, s, m, m) for middles at each of the shifts.
 
-    design: at offsets `steps` (n,) from the middle. Columns of A are the r + 4 of the light, then
-    the background beyond either edge, cover · g + leak · s of the background g and its slope s. So
-    each element is a sum over products of two columns of the design times one of the `moments` of
-    the profiles, shifted: nine matrix products give all of them. Only the lower triangle is right.
+    Columns of A are the r + 4 of the light, then the background beyond either edge, cover · g +
+    leak · s of the background g and its slope s. So each element is a sum over products of two
+    columns of the design times one of the `moments` of the profiles, shifted: nine matrix products
+    give all of them. Only the lower triangle is right.
     """
-    light = design.light
-    cover = design.cover
-    leak = design.leak
-    columns = light.shape[1]
-    row, column, element = _element_layout(columns)
-    one = [0, 0, 1]  # pairs of the two edges: left left, left right, right right
-    other = [0, 1, 1]
-    tables = [
-        light[:, row] * light[:, column],
-        (light[:, None] * cover[:, :, None]).reshape(len(light), -1),
-        (light[:, None] * leak[:, :, None]).reshape(len(light), -1),
-        cover[:, one] * cover[:, other],
-        cover[:, one] * leak[:, other] + leak[:, one] * cover[:, other],
-        leak[:, one] * leak[:, other],
-        light,
-        cover,
-        leak,
-    ]
-    most = int(np.max(np.abs(shifts)))
-    middle = len(profiles.offset_px) // 2
-    padded = np.pad(profiles.moments, ((0, 0), (0, 0), (2 * most, 2 * most)))
-    bins = 2 * most + middle + shifts[:, None] + steps  # (g, n)
-    windows = padded.take(bins, axis=2).reshape(len(tables), -1, len(light))
-    products = [window @ table for window, table in zip(windows, tables)]
+    windows = _shifted_moments(profiles, tried)
+    products = [window @ table for window, table in zip(windows, design.products)]
     power = np.sum(profiles.weight * profiles.light**2, axis=1)
     sums = [
         products[0],
@@ -370,10 +407,20 @@ def _normal_matrices(profiles: Profiles, shifts, design: _Design, steps) -> np.n
         products[3] + products[4] + products[5],
         products[6],
         products[7] + products[8],
-        np.repeat(power, len(shifts))[:, None],
+        np.repeat(power, len(tried.shifts))[:, None],
     ]
+    _, _, element = _element_layout(design.light.shape[1])
     elements = np.concatenate(sums, axis=1).take(element.ravel(), axis=1)
-    return elements.reshape(len(profiles), len(shifts), *element.shape)
+    return elements.reshape(len(profiles), len(tried.shifts), *element.shape)
+
+
+def _shifted_moments(profiles: Profiles, tried: _Positions) -> np.ndarray:
+    """Return the moments (9, k · s, n) of the profiles at offsets from a middle at each shift."""
+    margin = 2 * tried.most
+    padded = np.pad(profiles.moments, ((0, 0), (0, 0), (margin, margin)))
+    middle = margin + len(profiles.offset_px) // 2
+    bins = middle + tried.shifts[:, None] + tried.steps  # (s, n)
+    return padded.take(bins, axis=2).reshape(len(padded), -1, len(tried.steps))
 
 
 @lru_cache(maxsize=_SPLINES)
@@ -394,18 +441,6 @@ def _element_layout(columns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     first += 3
     element[-1] = first + np.arange(columns + 3)
     return row, column, element
-
-
-def _make_design(offset_px, rod_light, radius_px: float, blur_px: float) -> _Design:
-    """Return the design at offset_px (n,), of the blurred pictures rod_light (n, r) of the modes of
-    light on the rod."""
-    beyond_px = np.stack([-offset_px, offset_px], axis=1) - radius_px  # (n, 2) left and right edge
-    cover = ndtr(beyond_px / blur_px)
-    density = np.exp(-0.5 * (beyond_px / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
-    sides = np.stack([cover, cover * beyond_px / OUTSIDE_PX], axis=2)
-    sides = sides.reshape(len(offset_px), _SIDES)
-    leak = blur_px * np.array([-1.0, 1.0]) * density
-    return _Design(np.concatenate([rod_light, sides], axis=1), cover, leak)
 
 
 def _blur_splines(offset_px, radius_px: float, blur_px: float) -> np.ndarray:

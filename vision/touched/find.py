@@ -138,23 +138,29 @@ class EdgeScore(ObjectScore):
 
         It is their geometric mean, 0 to 1.
         """
+        is_used = self.weights != 0.0
+        strength = self._along_lines(axes, edges, _OFFSETS[is_used].astype(np.float32))
+        strength = strength * self.weights[is_used, None]
+        for_edge = np.max(strength, axis=1)
+        against = np.min(strength, axis=1, initial=0.0)
+        sides = np.maximum(for_edge + against, 0.0)
+        return np.sqrt(np.prod(sides, axis=0))
+
+    def _along_lines(self, axes: BarAxis, edges: EdgeMap, offsets: np.ndarray) -> np.ndarray:
+        """Compute the mean strengths (2, m, n) of edges along lines at offsets to either side.
+
+        offsets (m,): from the middles of bars (n, 3), in half widths.
+        """
         middle, half_width = _bar_in_picture(axes, edges.camera, self.radius_mm, self.along_mm)
         # Both edges run nearly as the middle does: one normal (x, y) = (-dy, dx) serves all lines.
         dx, dy = np.gradient(middle, axis=-1)  # (n, t) each
         across = np.stack([dy * dy, -2.0 * dx * dy, dx * dx], axis=-1)  # weights of xx, xy, yy
         across = across / (dx * dx + dy * dy)[..., None]
-        is_used = self.weights != 0.0
-        offsets = _OFFSETS[is_used].astype(np.float32)
-        weights = self.weights[is_used]
         both_sides = np.concatenate([offsets, -offsets])[:, None, None, None]
         x, y = np.moveaxis(middle + both_sides * half_width, 1, 0)  # (lines, n, t) px each
         along_lines = edges.tensor_at(x, y)  # (lines, n, t, 3)
         strength = np.einsum("antk,ntk->an", along_lines, across) / len(self.along_mm)
-        strength = strength.reshape(2, len(offsets), -1) * weights[:, None]  # (side, offset, n)
-        for_edge = np.max(strength, axis=1)
-        against = np.min(strength, axis=1, initial=0.0)
-        sides = np.maximum(for_edge + against, 0.0)
-        return np.sqrt(np.prod(sides, axis=0))
+        return strength.reshape(2, len(offsets), -1)
 
 
 def _bar_in_picture(
@@ -168,14 +174,10 @@ def _bar_in_picture(
     points = axes.point_mm[:, None] + along_mm[:, None] * axes.direction[:, None]  # (n, t, 3)
     sideways = np.cross(axes.direction, axes.point_mm - camera.centre_mm)
     sideways = radius_mm * sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
-    both_mm = np.stack([points, points + sideways[:, None]])  # (2, n, t, 3)
-    middle, edge = camera.project(both_mm.reshape(-1, 3)).reshape(*both_mm.shape[:3], 2)
-    half_width = edge - middle
-    to_xy = (2, 0, 1)
-    return (
-        middle.transpose(to_xy).astype(np.float32) / HALF,
-        half_width.transpose(to_xy).astype(np.float32) / HALF,
-    )
+    middle, edge = camera.project(np.stack([points, points + sideways[:, None]]))  # (n, t, 2)
+    both = np.moveaxis([middle, edge - middle], -1, 1)  # (2, x and y, n, t)
+    middle, half_width = both.astype(np.float32) / HALF
+    return middle, half_width
 
 
 def axis_from_angles(
@@ -190,19 +192,14 @@ def axis_from_angles(
     x_mm: along the whisker. touch_rad: motor angle. beta_rad, psi_rad: slope and tilt of the bar.
     All arguments (n,). reach_mm: distance between the axes of bar and whisker where they touch.
     """
-    turn = rotation_z(np.asarray(touch_rad, dtype=float))  # (n, 3, 3)
-    zero = np.zeros_like(turn[..., 0, 0])
-    direction = np.stack(
-        np.broadcast_arrays(
-            np.sin(psi_rad) + zero,
-            np.cos(psi_rad) * np.sin(beta_rad) + zero,
-            np.cos(psi_rad) * np.cos(beta_rad) + zero,
-        ),
-        axis=-1,
-    )
-    normal = np.stack([zero, np.cos(beta_rad) + zero, -np.sin(beta_rad) + zero], axis=-1)
-    on_whisker = np.stack([x_mm + zero, zero, zero], axis=-1)
-    point = on_whisker + np.asarray(reach_mm)[..., None] * normal
+    x, touch, beta, psi, reach = np.broadcast_arrays(x_mm, touch_rad, beta_rad, psi_rad, reach_mm)
+    zero = np.zeros(x.shape)
+    upright = np.stack([zero, np.sin(beta), np.cos(beta)], axis=-1)
+    normal = np.stack([zero, np.cos(beta), -np.sin(beta)], axis=-1)
+    along_x = np.array([1.0, 0.0, 0.0])
+    direction = np.sin(psi)[..., None] * along_x + np.cos(psi)[..., None] * upright
+    point = x[..., None] * along_x + reach[..., None] * normal
+    turn = rotation_z(touch)  # (n, 3, 3)
     return BarAxis(
         np.einsum("...ij,...j->...i", turn, point), np.einsum("...ij,...j->...i", turn, direction)
     )

@@ -13,6 +13,7 @@ score.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, ClassVar
 
 import numpy as np
@@ -109,10 +110,7 @@ def climb(
     A neighbour differs by one step in two numbers at most. Where no neighbour is better, the step
     is halved, from first_step (k,) on.
     """
-    k = len(first_step)
-    signs = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * k, indexing="ij"), axis=-1).reshape(-1, k)
-    is_near = np.sum(signs != 0.0, axis=1) <= 2
-    steps = first_step * signs[is_near]  # (neighbours, k), the hypothesis itself among them
+    steps = first_step * _signs_of_neighbours(len(first_step))  # (neighbours, k)
     best = starts.copy()
     highest = np.full(len(starts), -np.inf)
     step_share = np.ones(len(starts))
@@ -121,15 +119,26 @@ def climb(
         if not len(going):
             break
         around = best[going, None] + step_share[going, None, None] * steps  # (going, neighbours, k)
-        scores = score(around.reshape(-1, k)).reshape(len(going), -1)
-        rows = np.arange(len(going))
-        chosen = np.argmax(scores, axis=1)
-        reached = scores[rows, chosen]
+        best[going], reached = _best_of_each(around, score)
         has_gained = reached > highest[going] + _LEAST_GAIN
-        step_share[going] = np.where(has_gained, step_share[going], 0.5 * step_share[going])
-        best[going] = around[rows, chosen]
+        step_share[going[~has_gained]] *= 0.5
         highest[going] = reached
     return best, highest
+
+
+def _best_of_each(hypotheses: np.ndarray, score: Score) -> tuple[np.ndarray, np.ndarray]:
+    """Return the best (n, k) of each row of hypotheses (n, m, k), and their scores (n,)."""
+    count, _, k = hypotheses.shape
+    scores = score(hypotheses.reshape(-1, k)).reshape(count, -1)
+    chosen = np.argmax(scores, axis=1)
+    rows = np.arange(count)
+    return hypotheses[rows, chosen], scores[rows, chosen]
+
+
+def _signs_of_neighbours(k: int) -> np.ndarray:
+    """Return the steps (n, k) to neighbours, -1, 0 or 1 each, with two numbers moved at most."""
+    signs = np.array(list(product((-1.0, 0.0, 1.0), repeat=k)))
+    return signs[np.count_nonzero(signs, axis=1) <= 2]
 
 
 @dataclass(frozen=True)

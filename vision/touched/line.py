@@ -10,10 +10,11 @@ shadow's border may be the edge, the posterior is wide or has several peaks, and
 wide.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import softmax
 
 from vision.geometry.contact import BarAxis
 from vision.geometry.vision_settings import VisionSettings
@@ -64,6 +65,9 @@ _LARGEST_UNRESOLVED = 1.0 / 6.0
 OVERSTATED_PX = np.array([0.025, 0.0125])
 # [1] Least temperature beyond 1: no light is so plain. Stated.
 _LEAST_BEYOND = 0.01
+
+# Posteriors of the bar's line by camera, then by gamma of the transfer curve.
+CameraPosteriors = Mapping[str, Mapping[float, Posterior]]
 
 
 @dataclass(frozen=True)
@@ -160,31 +164,44 @@ def measure_bars(
     pieces = clear_pieces(views, axis, radius_mm, wires_px, settings)
     if not pieces:
         return {}
-    if before:
-        gammas = list(next(iter(before.values())).posteriors)
-        posteriors = {}
-        for name, some in pieces.items():
-            if name in before:
-                posteriors[name] = before[name].posteriors_about(some)
-            else:
-                posteriors[name] = _refine(some, _fit_coarse(some, gammas), 1)
-    else:
-        posteriors = {name: _fit_coarse(some, _GAMMAS) for name, some in pieces.items()}
-        is_kept = _gamma_probabilities(posteriors.values()) > _LEAST_AT_FIRST
-        gammas = [gamma for gamma, keep in zip(_GAMMAS, is_kept) if keep]
+    starts = _starts_nearby(pieces, before) if before else _coarse_starts(pieces)
     refined = {}
-    for name, some in pieces.items():
-        by_gamma = {gamma: posteriors[name][gamma] for gamma in gammas}
-        refined[name] = _refine(some, by_gamma, 2 if before else 1)
-    probabilities = _gamma_probabilities(refined.values())
-    is_kept = probabilities > _LEAST_PROBABILITY
-    kept = [gamma for gamma, keep in zip(gammas, is_kept) if keep]
-    probabilities = probabilities[is_kept] / probabilities[is_kept].sum()
+    for name, by_gamma in starts.items():
+        refined[name] = _refine(pieces[name], by_gamma, 2 if before else 1)
+    probabilities = _probable_gammas(refined, _LEAST_PROBABILITY)
     lines = {}
-    for name, some in pieces.items():
-        by_gamma = {gamma: refined[name][gamma] for gamma in kept}
-        lines[name] = _average_posteriors(some, by_gamma, probabilities)
+    for name, by_gamma in _under(refined, probabilities).items():
+        weights = np.array(list(probabilities.values()))
+        lines[name] = _average_posteriors(pieces[name], by_gamma, weights)
     return lines
+
+
+def _starts_nearby(
+    pieces: Mapping[str, Pieces], before: Mapping[str, BarLineEstimate]
+) -> CameraPosteriors:
+    """Return the posteriors of lines measured about an axis nearby; of other cameras new ones."""
+    gammas = list(next(iter(before.values())).posteriors)
+    starts = {}
+    for name, some in pieces.items():
+        if name in before:
+            starts[name] = before[name].posteriors_about(some)
+        else:
+            starts[name] = _refine(some, _fit_coarse(some, gammas), 1)
+    return starts
+
+
+def _coarse_starts(pieces: Mapping[str, Pieces]) -> CameraPosteriors:
+    """Return the coarse posteriors under all transfer curves that are probable by these."""
+    starts = {name: _fit_coarse(some, _GAMMAS) for name, some in pieces.items()}
+    return _under(starts, _probable_gammas(starts, _LEAST_AT_FIRST))
+
+
+def _under(posteriors: CameraPosteriors, gammas: Iterable[float]) -> CameraPosteriors:
+    """Return the posteriors under some of the transfer curves alone."""
+    selected = {}
+    for name, by_gamma in posteriors.items():
+        selected[name] = {gamma: by_gamma[gamma] for gamma in gammas}
+    return selected
 
 
 def _fit_coarse(pieces: Pieces, gammas: Iterable[float]) -> dict[float, Posterior]:
@@ -225,22 +242,26 @@ def clear_pieces(
     return clear
 
 
-def _gamma_probabilities(cameras: Iterable[Mapping[float, Posterior]]) -> np.ndarray:
-    """Return the probability of each transfer curve, from the posteriors of all cameras.
+def _probable_gammas(cameras: CameraPosteriors, least: float) -> dict[float, float]:
+    """Return the probability of each transfer curve that has at least so much, by its gamma.
 
     All segments of a bar are lit nearly alike, so that the evidence of their light counts once for
-    a camera: its mean. The evidence of segments that no curve explains is tempered.
+    a camera: its mean. The evidence of segments that no curve explains is tempered. The
+    probabilities that are returned add up to 1.
     """
     total = 0.0
-    for posteriors in cameras:
+    for posteriors in cameras.values():
         temperature = np.max([one.temperature for one in posteriors.values()], axis=0)
         deviance = np.array([one.segment_deviance for one in posteriors.values()]) / temperature
         excess = deviance - deviance.min(axis=0)
         bounded = -2.0 * np.logaddexp(-0.5 * excess, -0.5 * _LARGEST_DEVIANCE)
         volume = [one.volume_deviance for one in posteriors.values()]
         total = total + bounded.mean(axis=1) + volume
-    density = np.exp(-0.5 * (total - total.min()))
-    return density / density.sum()
+    probabilities = softmax(-0.5 * total)
+    kept = np.where(probabilities > least, probabilities, 0.0)
+    kept = kept / kept.sum()
+    gammas = next(iter(cameras.values()))
+    return {gamma: float(share) for gamma, share in zip(gammas, kept) if share > 0.0}
 
 
 def _average_posteriors(
@@ -248,27 +269,35 @@ def _average_posteriors(
 ) -> BarLineEstimate:
     """Average the posteriors under all transfer curves, weighted by the curves' probabilities
     (g,)."""
-    lines = np.array([one.line for one in posteriors.values()])  # (g, 2)
-    covariances = np.array([one.covariance for one in posteriors.values()])
-    line = probabilities @ lines
-    scatter = np.einsum("gi,gj->gij", lines - line, lines - line)
-    covariance = np.einsum("g,gij->ij", probabilities, covariances + scatter)
-    figures = []
-    for one in posteriors.values():
-        figures.append([one.evidence_for_bar, one.detection_score, one.unresolved_share])
-    evidence_for_bar, detection_score, unresolved_share = probabilities @ np.array(figures)
-    temperatures = np.array([np.median(one.temperature) for one in posteriors.values()])
-    beyond = max(probabilities @ temperatures - 1.0, _LEAST_BEYOND)
-    points = _points_of_line(pieces, line, covariance, np.sqrt(beyond) * OVERSTATED_PX)
+    line, covariance = _average_lines(list(posteriors.values()), probabilities)
+
+    def average(figure: Callable[[Posterior], float]) -> float:
+        """Return the mean of a figure of the posteriors."""
+        figures = [figure(one) for one in posteriors.values()]
+        return float(probabilities @ np.array(figures))
+
+    temperature = average(lambda one: float(np.median(one.temperature)))
+    shared_px = np.sqrt(max(temperature - 1.0, _LEAST_BEYOND)) * OVERSTATED_PX
     return BarLineEstimate(
-        points,
-        float(evidence_for_bar),
-        float(detection_score),
-        float(unresolved_share),
-        posteriors,
-        line,
-        pieces,
+        points=_points_of_line(pieces, line, covariance, shared_px),
+        evidence_for_bar=average(lambda one: one.evidence_for_bar),
+        detection_score=average(lambda one: one.detection_score),
+        unresolved_share=average(lambda one: one.unresolved_share),
+        posteriors=posteriors,
+        line=line,
+        pieces=pieces,
     )
+
+
+def _average_lines(
+    posteriors: Sequence[Posterior], probabilities: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean line (2,) of posteriors, and its covariance (2, 2) with their scatter."""
+    lines = np.array([one.line for one in posteriors])  # (g, 2)
+    covariances = np.array([one.covariance for one in posteriors])
+    line = probabilities @ lines
+    scatter = (lines - line)[:, :, None] * (lines - line)[:, None, :]
+    return line, np.tensordot(probabilities, covariances + scatter, axes=1)
 
 
 def _read_pieces(

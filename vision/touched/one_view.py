@@ -17,6 +17,7 @@ from vision.geometry.centreline import resting_lines, rotation_z
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods, Wire
+from vision.geometry.rotation import unit
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.edge_map import EdgeMap
@@ -64,9 +65,8 @@ def _axes_across_sight(hypotheses: np.ndarray, camera: Camera, motor_rad: float)
     on_whisker = x_mm * rotation_z(motor_rad)[:, 0]
     sight = on_whisker - camera.centre_mm
     point = camera.centre_mm + (1.0 + farther) * sight
-    ahead = sight / np.linalg.norm(sight, axis=1, keepdims=True)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    ahead = unit(sight)
+    right = unit(np.cross(ahead, [0.0, 0.0, 1.0]))
     return BarAxis(point, np.cos(turn) * right + np.sin(turn) * np.cross(right, ahead))
 
 
@@ -115,8 +115,7 @@ def seen_from_one_side(cameras: Cameras, axis: BarAxis) -> bool:
 def widest_angle_rad(cameras: Cameras, axis: BarAxis) -> float:
     """Return the widest angle, rad, between the planes that two cameras span with the bar."""
     sights = np.array([axis.point_mm - camera.centre_mm for camera in cameras])
-    normals = np.cross(axis.direction, sights)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = unit(np.cross(axis.direction, sights))
     least_cosine = np.min(np.abs(normals @ normals.T))
     return float(np.arccos(min(least_cosine, 1.0)))
 
@@ -127,14 +126,12 @@ def axis_from_edges(edges: Mapping[int, LinePoints], camera: Camera, radius_mm: 
     edges: two points each, by side (-1 and 1). Its point is where the mean ray through the edge
     points meets it.
     """
-    rays = {side: camera.rays(points.px) for side, points in edges.items()}  # (2, 3) each
-    planes = np.array([np.cross(rays[-1][0], rays[-1][1]), np.cross(rays[1][0], rays[1][1])])
-    one, other = planes / np.linalg.norm(planes, axis=1, keepdims=True)
-    direction = np.cross(one, other)
-    direction /= np.linalg.norm(direction)
+    rays = np.array([camera.rays(edges[side].px) for side in (-1, 1)])  # (sides, 2, 3)
+    one, other = unit(np.cross(rays[:, 0], rays[:, 1]))  # normals of the grazing planes
+    direction = unit(np.cross(one, other))
     half_angle_rad = 0.5 * np.arccos(np.clip(one @ other, -1.0, 1.0))
     distance_mm = radius_mm / np.sin(half_angle_rad)
-    middle = np.sum(list(rays.values()), axis=(0, 1))
-    away = middle - (middle @ direction) * direction
-    point_mm = camera.centre_mm + distance_mm / np.linalg.norm(away) * middle
+    middle = np.sum(rays, axis=(0, 1))
+    across = middle - (middle @ direction) * direction
+    point_mm = camera.centre_mm + distance_mm / np.linalg.norm(across) * middle
     return BarAxis(point_mm, direction).upward()

@@ -13,7 +13,6 @@ import numpy as np
 
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
-from vision.geometry.silhouette import outline
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
@@ -26,6 +25,8 @@ ARM_MM = 20.0
 # [radii] Pixels nearer to the axis are no rim, where edges are measured. Origin not known. Study:
 # thresholds.py touched.pieces _INNER_SHARE ….
 _INNER_SHARE = 0.72
+# [points] Along the bar's predicted outline. A layout.
+_STATIONS = 200
 # [1] Least share of a piece's pixels in the picture. Set by eye. Study: bar_scenes.py.
 _LEAST_IN_PICTURE = 0.5
 # [pieces] Four: two for a line, two left over. Derived.
@@ -63,23 +64,27 @@ def bar_pieces(
     noise: of the difference of mean and background. Raises Refused where no part of the bar lies
     before the camera.
     """
-    place = np.linspace(-settings.bar_reach_mm, settings.bar_reach_mm, 200)
-    points = axis.point_mm + place[:, None] * axis.direction
-    directions = np.broadcast_to(axis.direction, points.shape)
-    middle, radius = outline(view.camera, points, directions, radius_mm)
-    if not np.any(np.isfinite(radius)):
-        raise Refused(
-            f"camera {view.camera.name} would have the bar behind it: check T_camera_rig",
-            code="bar_behind_camera",
-        )
-    half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
-    band = read_band(view.mean, view.background, middle, place, radius, half)
+    band = _read_bar_band(view, axis, radius_mm, settings)
     length_px = settings.bar_piece_px
     pieces = cut_pieces([_from_whole(band, length_px)], length_px, noise)
     is_used = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
     if view.itself is None:  # else the wires are known, and not in the mean
         is_used &= clear_of_wire(pieces, wires_px, length_px / 2 + 5.0)
     return pieces.select(is_used)
+
+
+def _read_bar_band(view: View, axis: BarAxis, radius_mm: float, settings: VisionSettings) -> Band:
+    """Read the band along the bar; raise Refused where no part of it lies before the camera."""
+    reach_mm = settings.bar_reach_mm
+    middle, radius = axis.outline(view.camera, radius_mm, reach_mm, _STATIONS)
+    if not np.any(np.isfinite(radius)):
+        raise Refused(
+            f"camera {view.camera.name} would have the bar behind it: check T_camera_rig",
+            code="bar_behind_camera",
+        )
+    half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
+    place = np.linspace(-reach_mm, reach_mm, _STATIONS)
+    return read_band(view.mean, view.background, middle, place, radius, half)
 
 
 def _from_whole(band: Band, length_px: int) -> Band:

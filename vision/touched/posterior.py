@@ -17,6 +17,7 @@ places a smaller grid about the last posterior.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -102,6 +103,18 @@ class LineWindow:
         """Return how many lines are tried by shift, and how many by tilt."""
         return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / self.spacing_px)))
 
+    @property
+    def cell_px2(self) -> float:
+        """Return the area that each line of the grid stands for, px by shift times px by tilt."""
+        return float(np.prod(2.0 * self.most_px / (self.lines - 1)))
+
+    def unresolved_share(self, covariance: np.ndarray) -> float:
+        """Return the share of the window that lines of a covariance (2, 2) fill, 1 where flat.
+
+        A flat posterior over a window of half widths a, b has the determinant (a b)² / 9.
+        """
+        return float(3.0 * np.sqrt(np.linalg.det(covariance)) / np.prod(self.most_px))
+
     def grid(self) -> np.ndarray:
         """Return the lines (lines², 2): shift and tilt, px."""
         axes = [np.linspace(-most, most, self.lines) for most in self.most_px]
@@ -160,6 +173,34 @@ class _LineGrid:
     deviance: np.ndarray
     segment_deviance: np.ndarray
     temperature: np.ndarray
+
+    @cached_property
+    def _density(self) -> np.ndarray:
+        """Return the density (n, r, b) of the posterior over that at its highest."""
+        return np.exp(-0.5 * (self.deviance - self.deviance.min()))
+
+    @property
+    def volume(self) -> float:
+        """Return the sum of the posterior's density over that at its highest."""
+        return self._density.sum()
+
+    @property
+    def blur_step(self) -> float:
+        """Return the largest step between log blurs, 0 of one."""
+        return float(np.max(np.diff(self.log_blurs), initial=0.0))
+
+    def average_line(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the posterior's mean line (2,) and its covariance (2, 2)."""
+        probability = self._density.sum(axis=(1, 2)) / self.volume
+        mean = probability @ self.lines
+        residual = self.lines - mean
+        return mean, (probability * residual.T) @ residual
+
+    def average_log_blur(self) -> tuple[float, float]:
+        """Return the posterior's mean of the blur's logarithm, and its sigma."""
+        probability = self._density.sum(axis=(0, 1)) / self.volume
+        mean = float(probability @ self.log_blurs)
+        return mean, float(np.sqrt(probability @ (self.log_blurs - mean) ** 2))
 
 
 def fit_coarse(pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float) -> Posterior:
@@ -240,19 +281,9 @@ def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> 
     profiles = compute_profiles(move_to_line(pieces, line), SEGMENTS, reach_px, gamma)
     evidences = _evidences(profiles, window, reach_px)
     grid = _evaluate_lines(evidences, profiles, window)
-    density = np.exp(-0.5 * (grid.deviance - grid.deviance.min()))
-    total = density.sum()
-    line_probability = density.sum(axis=(1, 2)) / total
-    blur_probability = density.sum(axis=(0, 1)) / total
-    mean = line_probability @ grid.lines
-    residual = grid.lines - mean
-    covariance = (line_probability * residual.T) @ residual
-    log_blur = float(blur_probability @ grid.log_blurs)
-    log_blur_sigma = float(np.sqrt(blur_probability @ (grid.log_blurs - log_blur) ** 2))
-    step = float(np.max(np.diff(grid.log_blurs), initial=0.0))
-    cell = float(np.prod(2.0 * window.most_px / (window.lines - 1))) * max(step, 1e-300)
-    # A flat posterior over a window of half widths a, b has the determinant (a b)² / 9.
-    area = 3.0 * np.sqrt(np.linalg.det(covariance))
+    mean, covariance = grid.average_line()
+    log_blur, log_blur_sigma = grid.average_log_blur()
+    cell = window.cell_px2 * max(grid.blur_step, 1e-300)
     best = _best_of(evidences)
     odds = (best.no_bar_deviance - best.least_deviance) / grid.temperature
     return Posterior(
@@ -260,13 +291,13 @@ def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> 
         covariance=covariance,
         segment_deviance=grid.segment_deviance,
         temperature=grid.temperature,
-        volume_deviance=-2.0 * np.log(total * cell),
+        volume_deviance=-2.0 * np.log(grid.volume * cell),
         evidence_for_bar=float(np.sum(odds)),
         detection_score=LitRod(profiles).detection_score(best),
-        unresolved_share=float(area / np.prod(window.most_px)),
+        unresolved_share=window.unresolved_share(covariance),
         blur_px=np.exp(log_blur),
         log_blur_sigma=log_blur_sigma,
-        log_blur_step=step,
+        log_blur_step=grid.blur_step,
     )
 
 
@@ -333,20 +364,30 @@ def _evaluate_lines(
     lines = window.grid()
     temperature = estimate_temperature(_best_of(evidences), profiles)
     shift_px = evidences[0].shift_px  # of the narrowest blur, which has the most positions
-    deviance = _at_shifts(evidences, shift_px) / temperature[:, None, None, None]  # (k, g, r, b)
+    deviance = _at_shifts(evidences, shift_px) / temperature[:, None, None, None]
     log_blurs, deviance = _at_fine_blurs(np.log(window.blurs_px), deviance)
-    shape = (len(lines), deviance.shape[2], len(log_blurs))
-    deviance = deviance.reshape(len(profiles), len(shift_px), -1)  # (k, g, r b)
+    segments, shifts, priors, blurs = deviance.shape
+    deviance = deviance.reshape(segments, shifts, -1)
     least = deviance.min(axis=1)
-    middle_px = lines[:, 0] + profiles.place_mm[:, None] / ARM_MM * lines[:, 1]  # (k, n)
-    middle_px = np.clip(middle_px, shift_px[0], shift_px[-1])
-    excess = _interpolate(shift_px, deviance - least[:, None], middle_px)
-    excess = _bound_deviance(np.maximum(excess, 0.0))  # (k, n, r b)
+    excess = _excess_of_lines(profiles, lines, shift_px, deviance - least[:, None])
     total = excess.sum(axis=0)
     total = least.sum(axis=0) + total / _misfit_of_line(total, profiles)
     line, other = np.unravel_index(np.argmin(total), total.shape)
     segment_deviance = temperature * (least[:, other] + excess[:, line, other])
-    return _LineGrid(lines, log_blurs, total.reshape(shape), segment_deviance, temperature)
+    total = total.reshape(-1, priors, blurs)
+    return _LineGrid(lines, log_blurs, total, segment_deviance, temperature)
+
+
+def _excess_of_lines(
+    profiles: Profiles, lines: np.ndarray, shift_px: np.ndarray, excess: np.ndarray
+) -> np.ndarray:
+    """Return the bounded deviance (k, n, m) of each segment at lines (n, 2) over its least.
+
+    excess (k, g, m): the deviance over its least, at shifts (g,).
+    """
+    middle_px = lines[:, 0] + profiles.place_mm[:, None] / ARM_MM * lines[:, 1]  # (k, n)
+    middle_px = np.clip(middle_px, shift_px[0], shift_px[-1])
+    return _bound_deviance(np.maximum(_interpolate(shift_px, excess, middle_px), 0.0))
 
 
 def _at_shifts(evidences: Sequence[Evidence], shift_px: np.ndarray) -> np.ndarray:

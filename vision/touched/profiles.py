@@ -18,6 +18,7 @@ correlated; `variance_inflation` states by how much. Because all bins lie on one
 equations of all positions of the bar are a few products of matrices (`evidence.py`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -107,24 +108,13 @@ class Profiles:
         """Return the products (9, k, b) of w, the background g, its slope s and the light y for the
         normal equations.
 
-        In this order, which `evidence._normal_matrices` relies on: w, w g, w s, w g², w g s, w s²,
+        In this order, which `evidence._Design.products` has, too: w, w g, w s, w g², w g s, w s²,
         w y, w g y, w s y.
         """
-        weighted_background = self.weight * self.background
-        weighted_slope = self.weight * self.background_slope
-        return np.stack(
-            [
-                self.weight,
-                weighted_background,
-                weighted_slope,
-                weighted_background * self.background,
-                weighted_background * self.background_slope,
-                weighted_slope * self.background_slope,
-                self.weight * self.light,
-                weighted_background * self.light,
-                weighted_slope * self.light,
-            ]
-        )
+        one = np.ones_like(self.light)
+        first = np.stack([one, self.background, self.background_slope])
+        products = [*first, *(first[[1, 1, 2]] * first[[1, 2, 2]]), *(first * self.light)]
+        return self.weight * np.stack(products)
 
     @cached_property
     def log_jacobian(self) -> np.ndarray:
@@ -152,6 +142,70 @@ class _PatchSums:
     light_per_grey: np.ndarray
     variance_share: np.ndarray
 
+    @classmethod
+    def along_bar(
+        cls, pieces: Pieces, is_used: np.ndarray, position: np.ndarray, bins: int, gamma: float
+    ) -> "_PatchSums":
+        """Return the sums of pieces, in their order along the bar.
+
+        is_used, position (s, p): of the pixels, which of them count and their places, in bins.
+        """
+        light, light_per_grey = _linearise_grey(pieces.grey, gamma)
+        background, background_per_grey = _linearise_grey(pieces.background, gamma)
+        background_slope = background_per_grey * pieces.slope
+        weight = np.where(is_used, (pieces.weight / light_per_grey) ** 2, 0.0)
+        one = np.ones_like(light)
+        order = np.argsort(pieces.place)
+        sums = []
+        for values in (one, light, background, background_slope, light_per_grey, None):
+            sums.append(_sum_in_bins(weight, values, position, bins)[order])
+        return cls(*sums)
+
+    def mean(self, sums: np.ndarray) -> np.ndarray:
+        """Return sums (s, b) over the weight, 0 where there is none."""
+        return sums / np.where(self.weight > 0, self.weight, 1.0)
+
+
+@dataclass(frozen=True)
+class _NeighbourDifferences:
+    """The light of each patch, but the outermost two, minus the mean of its two neighbours'.
+
+    So light that changes steadily along the bar is no difference. All (s - 2, b).
+    residual: without the share of the background's own difference that explains it best. noise: its
+    variance by the pixels' noise. weight: one over the variance that patches of their weights have,
+    0 where a bin has hardly any of a pixel: rounding decides whether it has one.
+    """
+
+    residual: np.ndarray
+    noise: np.ndarray
+    weight: np.ndarray
+
+    @classmethod
+    def of(cls, patches: _PatchSums) -> "_NeighbourDifferences":
+        """Return the differences of patches along the bar."""
+        light = _second_difference(patches.mean(patches.light))
+        background = _second_difference(patches.mean(patches.background))
+        noise = _sum_variances(patches.mean(patches.mean(patches.variance_share)))
+        variance = _sum_variances(1.0 / np.maximum(patches.weight, _TINY))
+        weight = np.where(variance < 0.1 / _TINY, 1.0 / variance, 0.0)
+        power = np.maximum(np.sum(weight * background**2, axis=0), _TINY)
+        share = np.sum(weight * light * background, axis=0) / power
+        return cls(light - np.clip(share, 0.0, 1.0) * background, noise, weight)
+
+    @cached_property
+    def relative(self) -> np.ndarray:
+        """Return the weights, 1 where all patches weigh the same."""
+        power = np.maximum(np.sum(self.weight**2, axis=0), _TINY)
+        return self.weight * np.sum(self.weight, axis=0) / power
+
+    def patch_variance(self, variance: np.ndarray) -> np.ndarray:
+        """Return the variance (b,) of one patch by those of all differences, averaged across.
+
+        The difference to the mean of two neighbours has 1.5 times the variance of one patch.
+        """
+        number = np.maximum(np.sum(self.relative, axis=0), _TINY)
+        return np.sum(self.relative * variance, axis=0) / (1.5 * number)
+
 
 def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: float) -> Profiles:
     """Compute the profiles of a bar whose middle is at most reach_px from where it is expected.
@@ -166,23 +220,11 @@ def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: floa
     position = offset_px / STEP_PX + half
     is_used = (position >= 0) & (position < 2 * half)
     is_used &= np.abs(offset_px) > radius_px - reach_px - _INSIDE_PX
-    light, light_per_grey = _linearise_grey(pieces.grey, gamma)
-    weight = np.where(is_used, (pieces.weight / light_per_grey) ** 2, 0.0)
-    background, background_per_grey = _linearise_grey(pieces.background, gamma)
-    background_slope = background_per_grey * pieces.slope
-    order = np.argsort(pieces.place)
-    values = [np.ones_like(light), light, background, background_slope, light_per_grey]
-    sums = []
-    for value in values:
-        sums.append(_sum_in_bins(weight, value, position, 2 * half + 1)[order])
-    variance_share = _sum_in_bins(weight, None, position, 2 * half + 1)[order]
-    patches = _PatchSums(*sums, variance_share)
+    patches = _PatchSums.along_bar(pieces, is_used, position, 2 * half + 1, gamma)
     number = max(1, min(segments, len(pieces) // 2))
-    members = np.array_split(np.arange(len(pieces)), number)
-    place_mm = pieces.place[order]
-    segment_place_mm = np.array([place_mm[some].mean() for some in members])
+    place_mm = np.array_split(np.sort(pieces.place), number)  # of the patches of each segment
     grid_px = STEP_PX * np.arange(-half, half + 1)
-    return _average_patches(patches, members, grid_px, segment_place_mm, radius_px)
+    return _average_patches(patches, place_mm, grid_px, radius_px)
 
 
 def _sum_in_bins(weight, value, position, size: int) -> np.ndarray:
@@ -208,38 +250,44 @@ def _linearise_grey(grey, gamma: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _average_patches(
-    patches: _PatchSums, members, offset_px, place_mm, radius_px: float
+    patches: _PatchSums, place_mm: Sequence[np.ndarray], offset_px: np.ndarray, radius_px: float
 ) -> Profiles:
-    """Average patches into the profiles of segments. members: by segment the indices of its
-    patches."""
-    membership = np.zeros((len(members), len(patches.weight)))  # (k, s) 1 for a segment's patches
-    for row, some in zip(membership, members):
-        row[some] = 1.0
+    """Average patches into the profiles of k segments.
+
+    place_mm: of the patches, by segment, in their order along the bar. offset_px (b,): of the bins.
+    """
+    segment = np.repeat(np.arange(len(place_mm)), [len(some) for some in place_mm])
+    membership = (segment == np.arange(len(place_mm))[:, None]).astype(float)  # (k, s)
     total = membership @ patches.weight
     is_observed = total > 0
     divisor = np.where(is_observed, total, 1.0)
-    light = (membership @ patches.light) / divisor
-    background = (membership @ patches.background) / divisor
-    background_slope = (membership @ patches.background_slope) / divisor
-    light_per_grey = (membership @ patches.light_per_grey) / divisor
     texture, variance_inflation = _estimate_texture(membership[:, 1:-1], patches)
     squares = np.where(is_observed, membership @ patches.weight**2, 1.0)
     number = np.where(is_observed, total**2 / squares, 1.0)  # effective number of patches
-    sigma = np.where(is_observed, np.sqrt(1.0 / divisor + texture / number), np.inf)
+
+    def mean(sums: np.ndarray) -> np.ndarray:
+        """Return the segments' means (k, b) of sums (s, b) over patches."""
+        return membership @ sums / divisor
+
+    return Profiles(
+        offset_px=offset_px,
+        light=mean(patches.light),
+        sigma=np.where(is_observed, np.sqrt(1.0 / divisor + texture / number), np.inf),
+        background=_about_median(mean(patches.background), is_observed),
+        background_slope=mean(patches.background_slope),
+        light_per_grey=mean(patches.light_per_grey),
+        place_mm=np.array([some.mean() for some in place_mm]),
+        radius_px=radius_px,
+        variance_inflation=variance_inflation,
+    )
+
+
+def _about_median(background: np.ndarray, is_observed: np.ndarray) -> np.ndarray:
+    """Return each row of a background (k, b) minus its median over the bins that are observed."""
     medians = []
     for row, some in zip(background, is_observed):
         medians.append(np.median(row[some]) if np.any(some) else 0.0)
-    return Profiles(
-        offset_px,
-        light,
-        sigma,
-        background - np.array(medians)[:, None],
-        background_slope,
-        light_per_grey,
-        place_mm,
-        radius_px,
-        variance_inflation,
-    )
+    return background - np.array(medians)[:, None]
 
 
 def _estimate_texture(membership, patches: _PatchSums) -> tuple[np.ndarray, float]:
@@ -249,38 +297,20 @@ def _estimate_texture(membership, patches: _PatchSums) -> tuple[np.ndarray, floa
     membership (k, s - 2): 1 for the patches of each segment, the first and last patch of the bar
     left out.
 
-    Each patch is compared with the mean of its two neighbours, so that light which changes steadily
-    along the bar is no texture; the share of the background's own difference that explains it best
-    is subtracted. The variance is the product of one factor for each segment and one function
-    across the bar.
-
-    Bins that hold hardly any of a pixel get hardly any weight, for rounding decides whether they
-    hold one. The spread is at least the noise: where a single patch has pixels, the fitted share of
-    the background leaves only rounding, compared with which any other segment would be rough.
+    The variance is the product of one factor for each segment and one function across the bar. The
+    spread is at least the noise: where a single patch has pixels, the fitted share of the
+    background leaves only rounding, compared with which any other segment would be rough.
     """
-    divisor = np.where(patches.weight > 0, patches.weight, 1.0)
-    light = _second_difference(patches.light / divisor)
-    background = _second_difference(patches.background / divisor)
-    noise = _sum_variances(patches.variance_share / divisor**2)
-    variance = _sum_variances(1.0 / np.maximum(patches.weight, _TINY))
-    weight = np.where(variance < 0.1 / _TINY, 1.0 / variance, 0.0)
-    background_power = np.sum(weight * background**2, axis=0)
-    share = np.sum(weight * light * background, axis=0) / np.maximum(background_power, _TINY)
-    residual = light - np.clip(share, 0.0, 1.0) * background
-    # (s - 2, b) 1 where all patches weigh the same
-    relative = weight * np.sum(weight, axis=0) / np.maximum(np.sum(weight**2, axis=0), _TINY)
-    number = np.maximum(np.sum(relative, axis=0), _TINY)
-    # The difference to the mean of two neighbours has 1.5 times the variance of one patch.
-    spread = np.sum(relative * residual**2, axis=0) / (1.5 * number)
-    noise = np.sum(relative * noise, axis=0) / (1.5 * number)
-    by_median = _weighted_median(residual**2, weight) / (1.5 * _MEDIAN_SQUARED)
-    spread = np.minimum(spread, _LARGEST_OVER_MEDIAN * by_median)
+    differences = _NeighbourDifferences.of(patches)
+    squares = differences.residual**2
+    by_median = _weighted_median(squares, differences.weight) / (1.5 * _MEDIAN_SQUARED)
+    spread = np.minimum(differences.patch_variance(squares), _LARGEST_OVER_MEDIAN * by_median)
     spread = uniform_filter1d(spread, _TEXTURE_WINDOW)
-    noise = uniform_filter1d(noise, _TEXTURE_WINDOW)
+    noise = uniform_filter1d(differences.patch_variance(differences.noise), _TEXTURE_WINDOW)
     spread = np.maximum(spread, np.maximum(noise, _TINY))
-    standardised = residual * np.sqrt(relative / (1.5 * spread))
+    standardised = differences.residual * np.sqrt(differences.relative / (1.5 * spread))
     power = np.sum(membership @ standardised**2, axis=1)
-    bins = np.sum(membership @ relative, axis=1)
+    bins = np.sum(membership @ differences.relative, axis=1)
     roughness = (power + _PRIOR_BINS) / (bins + _PRIOR_BINS)  # (k,) of each segment
     texture = np.maximum(roughness[:, None] * spread - noise, 0.0)
     return texture, _estimate_variance_inflation(standardised)

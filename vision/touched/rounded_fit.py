@@ -14,14 +14,10 @@ import numpy as np
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import axis_frame
 from vision.geometry.grazing import sights_beside
-from vision.geometry.newton import cauchy_weights, gauss_newton
+from vision.geometry.newton import gauss_newton
 from vision.geometry.rounded import RoundedAxis
 from vision.touched.search_scene import SearchScene
-from vision.touched.silhouette_edges import (
-    SEGMENTS_OF_SIDE,
-    SilhouetteEdges,
-    measure_silhouette_edges,
-)
+from vision.touched.silhouette_edges import SEGMENTS_OF_SIDE, measure_silhouette_edges
 from vision.wire.points import LinePoints
 
 # [px] Within which edges are measured, iteration by iteration: rings came from 17 mm off. Study:
@@ -73,34 +69,30 @@ def fit_to_edges(
             reach_px,
             coarse=coarse,
         )
-        silhouettes = {
-            name: silhouette for name, silhouette in silhouettes.items() if silhouette.segments
-        }
-        if not any(len(silhouette.points) for silhouette in silhouettes.values()):
+        edges = {name: one.points for name, one in silhouettes.items() if one.segments}
+        if not any(len(points) for points in edges.values()):
             return RoundedFit(place, 0.0)
         before = place
-        edges = {name: silhouette.points for name, silhouette in silhouettes.items()}
         place = fit_silhouette(place, scene.cameras, edges, scene.radius_mm, prior)
         moved_mm = np.linalg.norm(place.point_mm - before.point_mm)
         if reach_px == REACHES_PX[-1] and moved_mm < _CONVERGED_MM:
             break
-    scores = [
-        _detection_score(place, scene.cameras[name], silhouette, scene.radius_mm)
-        for name, silhouette in silhouettes.items()
-    ]
-    return RoundedFit(place, sum(scores) / len(scene.views))
+    total = 0.0
+    for name, points in edges.items():
+        total += _detection_score(place, scene.cameras[name], points, scene.radius_mm)
+    return RoundedFit(place, total / len(scene.views))
 
 
 def _detection_score(
-    place: RoundedAxis, camera: Camera, silhouette: SilhouetteEdges, radius_mm: float
+    place: RoundedAxis, camera: Camera, points: LinePoints, radius_mm: float
 ) -> float:
-    """Compute how much more probable edges are on the silhouette than elsewhere, -1 to 1.
+    """Compute how much more probable edge points are on the silhouette than elsewhere, -1 to 1.
 
     It is the mean log likelihood ratio over all segments that a whole silhouette has, over the most
     that one counts.
     """
-    residual = _residuals(place, camera, silhouette.points, radius_mm)
-    density = np.sqrt(2.0 * np.pi) * silhouette.points.sigma_px
+    residual = _residuals(place, camera, points, radius_mm)
+    density = np.sqrt(2.0 * np.pi) * points.sigma_px
     log_ratio = np.log(2.0 * REACHES_PX[-1] / density) - 0.5 * residual**2
     total = np.sum(np.clip(log_ratio, -_MOST_NATS, _MOST_NATS))
     return float(total) / (2 * SEGMENTS_OF_SIDE * _MOST_NATS)
@@ -119,17 +111,22 @@ def fit_silhouette(
     rad; what the edges do not determine stays as it was.
     """
     across = axis_frame(place.direction)
+    used = {name: points for name, points in edges.items() if len(points)}
+    if not used:
+        return place
 
-    def rows_of(vector: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Compute residuals and Jacobian of each camera at a step from the begin."""
-        here = place.shifted_along(across, vector)
-        return [
-            _weighted_rows(here, across, cameras[name], points, radius_mm)
-            for name, points in edges.items()
-            if len(points)
-        ]
+    def residuals_of(vectors: np.ndarray) -> np.ndarray:
+        """Compute the residuals (m, n) of all cameras' edge points for vectors (m, 5).
 
-    return place.shifted_along(across, gauss_newton(rows_of, prior, _STEPS, _GAUSS_NEWTON))
+        All but the first vector are small steps from the place that the first one gives.
+        """
+        here = place.shifted_along(across, vectors[0])
+        places = here.shifted_along(across, vectors - vectors[0])
+        residuals = [_residuals(places, cameras[name], used[name], radius_mm) for name in used]
+        return np.concatenate(residuals, axis=1)
+
+    vector = gauss_newton(residuals_of, prior, _STEPS, _GAUSS_NEWTON, _CAUCHY_SIGMAS)
+    return place.shifted_along(across, vector)
 
 
 def _residuals(
@@ -142,18 +139,3 @@ def _residuals(
     near = sights_beside(camera, places, points.px, points.place)
     outside_px = (near.outside_mm - radius_mm) * near.px_per_mm(camera, points.normal)
     return outside_px / points.sigma_px
-
-
-def _weighted_rows(
-    place: RoundedAxis, across: np.ndarray, camera: Camera, points: LinePoints, radius_mm: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Compute weighted residuals (n,) of edge points, and minus their Jacobian (n, 5).
-
-    Residuals are in sigmas, with Cauchy weights.
-    """
-    steps = np.concatenate([np.zeros((1, 5)), np.diag(_STEPS)])
-    places = place.shifted_along(across, steps)
-    residual, *stepped = _residuals(places, camera, points, radius_mm)
-    weight = np.sqrt(cauchy_weights(residual, _CAUCHY_SIGMAS))
-    columns = -(np.array(stepped) - residual).T / _STEPS
-    return residual * weight, columns * weight[:, None]

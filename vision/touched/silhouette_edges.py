@@ -13,16 +13,17 @@ probabilities. Which outlines are possible is left to the fit of the object.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
 from vision.geometry.rounded import RoundedAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.edges import EDGE_PX, FORMAL_TO_TRUE
-from vision.touched.evidence import LitRod, compute_evidence
+from vision.touched.evidence import Evidence, LitRod, compute_evidence
 from vision.touched.posterior import estimate_temperature
 from vision.touched.profiles import compute_profiles
 from vision.touched.silhouette_pixels import OutlineSide, predict_sides, read_pieces
@@ -72,6 +73,31 @@ class SilhouetteEdges:
 
 
 @dataclass(frozen=True)
+class _EdgePass:
+    """How the edges near an outline are measured in one pass.
+
+    reach_px: how far from the outline. blurs_px (b,): of the lens. gammas: of the transfer curves.
+    every: steps of the grid between positions. is_fine: with two positions a step, and with all
+    priors of the light.
+    """
+
+    reach_px: float
+    blurs_px: Sequence[float] = _BLURS_PX
+    gammas: Sequence[float] = _GAMMAS
+    every: int = 1
+    is_fine: bool = False
+
+
+def _choose_pass(reach_px: float, before: SilhouetteEdges | None, coarse: bool) -> _EdgePass:
+    """Return a coarse pass, a fine one where there is an earlier one, or the first one."""
+    if coarse:
+        return _EdgePass(reach_px, _COARSE_BLURS_PX, _GAMMAS[:1], _COARSE_EVERY)
+    if before is None:
+        return _EdgePass(reach_px)
+    return _EdgePass(_FINE_REACH_PX, before.blur_px * _FINE_BLUR_FACTORS, is_fine=True)
+
+
+@dataclass(frozen=True)
 class _EdgePosterior:
     """The edge of k segments of one side under one transfer curve and b blurs.
 
@@ -103,37 +129,40 @@ def measure_silhouette_edges(
     by camera lines (m, 2) where the wire lies in some frame.
     """
     before = before or {}
-    outlines = []
+    outlines = {}
     for view in views:
         name = view.camera.name
+        one_pass = _choose_pass(reach_px, before.get(name), coarse)
         sides = predict_sides(view, axis, radius_mm, settings)
-        wires = wires_px.get(name, [])
-        outlines.append(
-            _fit_outline(view, sides, wires, settings, reach_px, before.get(name), coarse)
-        )
-    deviance = np.sum([outline.curve_deviances for outline in outlines], axis=0)
+        pieces = []
+        for side in sides:
+            pieces.append(
+                read_pieces(view, side, wires_px.get(name, []), settings, one_pass.reach_px)
+            )
+        outlines[name] = _fit_outline(sides, pieces, one_pass)
+    deviance = np.sum([outline.curve_deviances for outline in outlines.values()], axis=0)
+    probabilities = _probable_alone(deviance)
+    return {name: outline.average(probabilities) for name, outline in outlines.items()}
+
+
+def _probable_alone(deviance: np.ndarray) -> np.ndarray:
+    """Return the probabilities (g,) of transfer curves, 0 of those that are hardly possible."""
     weights = np.exp(-0.5 * (deviance - deviance.min()))
-    weights = np.where(weights < _LEAST_PROBABILITY * weights.max(), 0.0, weights)
-    probabilities = weights / weights.sum()
-    edges = {}
-    for view, outline in zip(views, outlines):
-        edges[view.camera.name] = outline.average(probabilities)
-    return edges
+    weights = np.where(weights < _LEAST_PROBABILITY, 0.0, weights)
+    return weights / weights.sum()
 
 
 @dataclass(frozen=True)
 class _OutlinePosterior:
     """Both sides of an outline in one camera, their pieces, and their edges' posteriors.
 
-    posteriors: by transfer curve, then by side. blurs_px (b,): of these. reach_px: how far edges
-    were tried.
+    posteriors: by transfer curve, then by side. measured: how they were.
     """
 
     sides: Sequence[OutlineSide]
     pieces: Sequence[Pieces]
     posteriors: Sequence[Sequence[_EdgePosterior]]
-    blurs_px: Sequence[float]
-    reach_px: float
+    measured: _EdgePass
 
     @property
     def curve_deviances(self) -> list[float]:
@@ -149,22 +178,26 @@ class _OutlinePosterior:
         if not self.sides:
             none = LinePoints(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
             return SilhouetteEdges(none, 0, _BLURS_PX[1])
-        weights = []  # by transfer curve the weight (b,) of each blur
-        for probability, curve in zip(probabilities, self.posteriors):
-            weights.append(probability * _normalise(sum(side.deviance for side in curve)))
+        weights = self._blur_weights(probabilities)
         segments = 0
-        points = []
+        edges = []
         for number in range(len(self.sides)):
-            of_side, is_edge = self._average_side(number, probabilities, weights)
-            points.append(of_side.select(is_edge))
+            points, is_edge = self._average_side(number, probabilities, weights)
+            edges.append(points.select(is_edge))
             segments += len(is_edge)
-        joined = {}
-        for field in fields(LinePoints):
-            joined[field.name] = np.concatenate([getattr(one, field.name) for one in points])
-        joined = LinePoints(**joined)
-        blur_px = float(np.exp(np.log(self.blurs_px) @ np.sum(weights, axis=0)))
-        density = 2.0 * self.reach_px / (np.sqrt(2.0 * np.pi) * joined.sigma_px)
-        return SilhouetteEdges(joined, segments, blur_px, float(np.sum(np.log(density))))
+        edges = LinePoints.join(edges)
+        log_blurs = np.log(self.measured.blurs_px)
+        blur_px = float(np.exp(log_blurs @ np.sum(weights, axis=0)))
+        density = 2.0 * self.measured.reach_px / (np.sqrt(2.0 * np.pi) * edges.sigma_px)
+        return SilhouetteEdges(edges, segments, blur_px, float(np.sum(np.log(density))))
+
+    def _blur_weights(self, probabilities: np.ndarray) -> list[np.ndarray]:
+        """Return by transfer curve the probability (b,) of curve and blur."""
+        weights = []
+        for probability, curve in zip(probabilities, self.posteriors):
+            deviance = sum(side.deviance for side in curve)
+            weights.append(probability * softmax(-0.5 * deviance))
+        return weights
 
     def _average_side(self, number: int, probabilities, weights) -> tuple[LinePoints, np.ndarray]:
         """Return the line points of one side's segments, and which of them (k,) show an edge."""
@@ -179,96 +212,61 @@ class _OutlinePosterior:
             evidence = evidence + probability * posterior.evidence
         formal_px = np.sqrt(np.maximum(square - mean**2, 0.0))
         sigma_px = np.hypot(FORMAL_TO_TRUE * formal_px, EDGE_PX)
-        at = _middle_stations(self.pieces[number], len(mean))
-        normal = side.normal[at]
-        px = side.px[at] + mean[:, None] * normal
-        points = LinePoints(px, normal, sigma_px, side.distance_mm[at])
-        is_edge = (evidence > _LEAST_EVIDENCE) & (formal_px < _LARGEST_SIGMA_SHARE * self.reach_px)
-        return points, is_edge
+        station = _middle_stations(self.pieces[number], len(mean))
+        is_sharp = formal_px < _LARGEST_SIGMA_SHARE * self.measured.reach_px
+        return side.points(station, mean, sigma_px), is_sharp & (evidence > _LEAST_EVIDENCE)
 
 
 def _fit_outline(
-    view: View,
-    sides: Sequence[OutlineSide],
-    wires_px: Sequence[np.ndarray],
-    settings: VisionSettings,
-    reach_px: float,
-    before: SilhouetteEdges | None,
-    coarse: bool,
+    sides: Sequence[OutlineSide], pieces: Sequence[Pieces], one_pass: _EdgePass
 ) -> _OutlinePosterior:
-    """Return the posteriors of the edges near predicted sides in one camera, as of
-    `measure_silhouette_edges`."""
-    is_fine = before is not None
-    reach_px = _FINE_REACH_PX if is_fine else reach_px
-    used = []
-    pieces = []
-    for side in sides:
-        of_side = read_pieces(view, side, wires_px, settings, reach_px)
-        if len(of_side) >= _FEWEST_PIECES:
-            used.append(side)
-            pieces.append(of_side)
-    blurs_px = before.blur_px * _FINE_BLUR_FACTORS if is_fine else _BLURS_PX
-    gammas = _GAMMAS
-    every = 1
-    if coarse:
-        blurs_px = _COARSE_BLURS_PX
-        gammas = _GAMMAS[:1]
-        every = _COARSE_EVERY
+    """Return the posteriors of the edges near those sides of an outline that have enough pieces."""
+    is_used = [len(of_side) >= _FEWEST_PIECES for of_side in pieces]
+    sides = list(compress(sides, is_used))
+    pieces = list(compress(pieces, is_used))
     posteriors = []
-    for gamma in gammas:
-        curve = [_fit_side(some, reach_px, blurs_px, gamma, every, is_fine) for some in pieces]
-        posteriors.append(curve)
-    return _OutlinePosterior(used, pieces, posteriors, blurs_px, reach_px)
+    for gamma in one_pass.gammas:
+        posteriors.append([_fit_side(of_side, one_pass, gamma) for of_side in pieces])
+    return _OutlinePosterior(sides, pieces, posteriors, one_pass)
 
 
-def _fit_side(
-    pieces: Pieces,
-    reach_px: float,
-    blurs_px: Sequence[float],
-    gamma: float,
-    every: int,
-    is_fine: bool,
-) -> _EdgePosterior:
+def _fit_side(pieces: Pieces, one_pass: _EdgePass, gamma: float) -> _EdgePosterior:
     """Return the posterior of the edge in each segment of a side, under one transfer curve."""
-    profiles = compute_profiles(pieces, SEGMENTS_OF_SIDE, reach_px, gamma)
+    profiles = compute_profiles(pieces, SEGMENTS_OF_SIDE, one_pass.reach_px, gamma)
     rod = LitRod(profiles)
     evidences = []
-    for blur_px in blurs_px:
+    for blur_px in one_pass.blurs_px:
         evidence = compute_evidence(
             rod,
-            reach_px,
+            one_pass.reach_px,
             float(blur_px),
-            positions=2 if is_fine else 1,
-            with_smooth_priors=is_fine,
-            every=every,
+            positions=2 if one_pass.is_fine else 1,
+            with_smooth_priors=one_pass.is_fine,
+            every=one_pass.every,
         )
         evidences.append(evidence)
     best = min(evidences, key=lambda evidence: evidence.least_deviance.sum())
     temperature = estimate_temperature(best, profiles)
-    deviances = []
-    means = []
-    variances = []
-    for evidence in evidences:
-        log_density = -0.5 * evidence.bar_deviance / temperature[:, None, None]  # (k, g, r)
-        total = logsumexp(log_density, axis=(1, 2))
-        probability = np.sum(np.exp(log_density - total[:, None, None]), axis=2)
-        mean = probability @ evidence.shift_px
-        deviances.append(-2.0 * total.sum())
-        means.append(mean)
-        variances.append(probability @ evidence.shift_px**2 - mean**2)
+    moments = [_moments_of_edge(evidence, temperature) for evidence in evidences]
+    deviances, means, variances = map(np.array, zip(*moments))
     return _EdgePosterior(
-        np.array(deviances),
-        np.array(means),
-        np.array(variances),
+        deviances,
+        means,
+        variances,
         (best.no_bar_deviance - best.least_deviance) / temperature,
         float(np.mean(best.least_deviance / temperature)),
     )
 
 
-def _normalise(deviance: np.ndarray) -> np.ndarray:
-    """Return the probabilities (b,) that belong to deviances."""
-    density = np.exp(-0.5 * (deviance - deviance.min()))
-    return density / density.sum()
+def _moments_of_edge(
+    evidence: Evidence, temperature: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return the deviance of one blur, and mean and variance (k,) of the edge's shift under it."""
+    log_density = -0.5 * evidence.bar_deviance / temperature[:, None, None]  # (k, g, r)
+    total = logsumexp(log_density, axis=(1, 2))
+    probability = np.sum(np.exp(log_density - total[:, None, None]), axis=2)
+    mean = probability @ evidence.shift_px
+    return -2.0 * total.sum(), mean, probability @ evidence.shift_px**2 - mean**2
 
 
 def _middle_stations(pieces: Pieces, segments: int) -> np.ndarray:

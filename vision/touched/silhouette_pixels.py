@@ -10,11 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from vision.geometry.camera import Camera
 from vision.geometry.rounded import RoundedAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
 from vision.touched.profiles import FULL_SCALE, OUTSIDE_PX
 from vision.wire.bands import Pieces
+from vision.wire.points import LinePoints
 
 # [px] Depth inside an edge that is read: that of a thick bar, and one pixel more. Stated.
 _INSIDE_PX = 9.0
@@ -54,10 +56,23 @@ class OutlineSide:
         steps = np.linalg.norm(np.diff(self.px, axis=0), axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)])
 
+    @property
+    def model_half_px(self) -> float:
+        """Return half the object's width in the model of its pixels."""
+        return min(float(np.median(self.half_px[self.is_clear])), _LARGEST_HALF_PX)
+
     def station_at(self, along_px: np.ndarray) -> np.ndarray:
         """Return the stations (n,) at places (n,) along the side."""
         arc_px = self.arc_px
         return np.clip(np.searchsorted(arc_px, along_px), 0, len(arc_px) - 1)
+
+    def points(
+        self, station: np.ndarray, outside_px: np.ndarray, sigma_px: np.ndarray
+    ) -> LinePoints:
+        """Return line points (k,) so far outside of stations (k,)."""
+        normal = self.normal[station]
+        px = self.px[station] + outside_px[:, None] * normal
+        return LinePoints(px, normal, sigma_px, self.distance_mm[station])
 
 
 def predict_sides(
@@ -67,22 +82,29 @@ def predict_sides(
     before the camera."""
     camera = view.camera
     points, normals = axis.silhouette(camera.centre_mm, radius_mm, settings.bar_reach_mm, _STATIONS)
-    px = camera.project(points.reshape(-1, 3)).reshape(2, -1, 2)
+    px = camera.project(points)
     if not np.all(np.isfinite(px)):
         return []
     half_px = 0.5 * np.linalg.norm(px[0] - px[1], axis=1)
+    is_wide = half_px > _LEAST_HALF_PX
     sides = []
-    for side_points, outwards, side_px in zip(points, normals, px):
-        jacobians = camera.project_with_jacobians(side_points)[1]
-        normal = np.einsum("nij,nj->ni", jacobians, outwards)
-        px_per_mm = np.linalg.norm(normal, axis=1)
-        outside = side_points + (_CLEAR_PX / px_per_mm)[:, None] * outwards
-        is_hidden = axis.hides_itself(camera.centre_mm, outside, radius_mm)
-        is_clear = (half_px > _LEAST_HALF_PX) & ~is_hidden
-        distance_mm = np.linalg.norm(side_points - camera.centre_mm, axis=1)
-        normal = normal / px_per_mm[:, None]
-        sides.append(OutlineSide(side_px, normal, distance_mm, is_clear, half_px))
+    for points_mm, outwards, side_px in zip(points, normals, px):
+        normal, px_per_mm = _normals_in_picture(camera, points_mm, outwards)
+        outside_mm = points_mm + _CLEAR_PX / px_per_mm * outwards
+        is_hidden = axis.hides_itself(camera.centre_mm, outside_mm, radius_mm)
+        distance_mm = np.linalg.norm(points_mm - camera.centre_mm, axis=1)
+        sides.append(OutlineSide(side_px, normal, distance_mm, is_wide & ~is_hidden, half_px))
     return sides
+
+
+def _normals_in_picture(
+    camera: Camera, points_mm: np.ndarray, normals: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Project normals (n, 3) of a surface at points (n, 3): unit (n, 2), and px per mm (n, 1)."""
+    _, by_point, _ = camera.project_with_jacobians(points_mm)
+    normal_px = np.einsum("nij,nj->ni", by_point, normals)
+    px_per_mm = np.linalg.norm(normal_px, axis=1, keepdims=True)
+    return normal_px / px_per_mm, px_per_mm
 
 
 @dataclass(frozen=True)
@@ -135,11 +157,17 @@ def read_pieces(
     keep &= found.offset_px > -np.minimum(inside_px, side.half_px[found.station])
     keep &= (found.along_px >= 0.0) & (found.along_px <= side.arc_px[-1])
     if len(wires_px) and view.itself is None:
-        wire = np.concatenate([_dense(line) for line in wires_px])
-        margin_px = settings.bar_piece_px / 2 + _BESIDE_WIRE_PX
-        distance, _ = cKDTree(wire).query(pixels, distance_upper_bound=margin_px)
-        keep &= ~np.isfinite(distance)
+        keep &= _is_clear_of(wires_px, pixels, settings.bar_piece_px / 2 + _BESIDE_WIRE_PX)
     return _as_rows(view, side, found.select(keep), settings.bar_piece_px)
+
+
+def _is_clear_of(
+    wires_px: Sequence[np.ndarray], pixels: np.ndarray, margin_px: float
+) -> np.ndarray:
+    """Return which pixels (n, 2) lie farther than a margin from all wires' lines."""
+    lines = np.concatenate([_dense(line) for line in wires_px])
+    distance, _ = cKDTree(lines).query(pixels, distance_upper_bound=margin_px)
+    return ~np.isfinite(distance)
 
 
 def _dense(line: np.ndarray) -> np.ndarray:
@@ -217,19 +245,19 @@ def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) 
     column, row = found.pixels.astype(int).T
     grey = view.mean[row, column]
     background = view.background[row, column]
-    gradient = _gradient(view.background, row, column)
-    slope = np.sum(gradient * side.normal[side.station_at(found.along_px)], axis=1)
     scale = FULL_SCALE / view.full_scale
-    half_px = min(float(np.median(side.half_px[side.is_clear])), _LARGEST_HALF_PX)
+    across = side.normal[side.station_at(found.along_px)]
+    slope = np.sum(_gradient(view.background, row, column) * across, axis=1)
+    half_px = side.model_half_px
     middle = (rows.pieces + 0.5) * length_px
     station = side.station_at(middle)
-    slopes = rows.table(slope * scale, 0.0)
+    offset_px = rows.table(found.offset_px + half_px, 0.0)
     return Pieces(
-        offset_px=rows.table(found.offset_px + half_px, 0.0),
+        offset_px=offset_px,
         grey=rows.table(grey * scale, 1.0),
         background=rows.table(background * scale, 1.0),
-        slope=slopes,
-        curvature=np.zeros_like(slopes),
+        slope=rows.table(slope * scale, 0.0),
+        curvature=np.zeros_like(offset_px),
         weight=rows.table(_weights(view, grey, background) / scale, 0.0),
         place=middle,
         radius_px=np.full(len(rows.pieces), half_px),

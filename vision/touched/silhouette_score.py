@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from vision.geometry.rods import Rods
+from vision.geometry.rotation import unit
 from vision.geometry.rounded import RoundedAxis
 from vision.pictures.change import HALF
 from vision.touched.edge_map import EdgeMap
@@ -90,21 +91,17 @@ class SilhouetteScore(ObjectScore):
         centre_mm = edges.camera.centre_mm
         reach_mm = objects.form.search_reach_mm
         silhouette, normals = objects.silhouette(centre_mm, self.radius_mm, reach_mm, _STATIONS)
-        strength = _strength_along(edges, silhouette.reshape(-1, 3), normals.reshape(-1, 3))
-        strength = strength.reshape(silhouette.shape[:-1])  # (n, 2, stations)
+        strength = _strength_along(edges, silhouette, normals)  # (n, 2, stations)
         strength[~np.isfinite(silhouette[..., 0])] = np.nan
         sides = np.mean(strength, axis=-1)
         return np.sqrt(np.prod(sides, axis=-1))
 
 
 def _strength_along(edges: EdgeMap, points_mm: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return the strength (m,) of edges through points (m, 3) of a surface with normals (m, 3)."""
-    outwards = points_mm + _OUTWARDS_MM * normals
-    both_mm = np.concatenate([points_mm, outwards])
-    px, outwards_px = np.split(edges.camera.project(both_mm) / HALF, 2)
-    normal_px = outwards_px - px
-    normal_px /= np.linalg.norm(normal_px, axis=1, keepdims=True)
-    x, y = np.nan_to_num(normal_px).T
-    column, row = np.nan_to_num(px).T
-    xx, xy, yy = edges.tensor_at(column, row).T
+    """Return the strength (...) of edges through points (..., 3) of a surface with normals."""
+    both_mm = np.stack([points_mm, points_mm + _OUTWARDS_MM * normals])
+    px, outwards_px = edges.camera.project(both_mm) / HALF
+    x, y = np.moveaxis(np.nan_to_num(unit(outwards_px - px)), -1, 0)
+    column, row = np.moveaxis(np.nan_to_num(px), -1, 0)
+    xx, xy, yy = np.moveaxis(edges.tensor_at(column, row), -1, 0)
     return x * x * xx + 2.0 * x * y * xy + y * y * yy

@@ -41,23 +41,18 @@ def bar_diameter_mm(
     trial by camera, spread over it; background: the same without rods. motor_rad: lowest and
     highest motor angle. Raises Refused where nothing like the bar is found.
     """
-    names = []
-    for name in cameras.names:
-        has_pictures = len(pictures.get(name, ())) >= _FEWEST_PICTURES
-        if has_pictures and background.get(name) is not None:
-            names.append(name)
-    if len(names) < 2:
-        return np.nan
-    used = cameras.subset(names)
     views = []
-    for camera in used:
-        frames = pictures[camera.name]
-        empty = np.asarray(background[camera.name], dtype=float)
-        views.append(View(camera, dict(enumerate(frames)), empty, measure_noise(*frames[:2])))
-    motor = np.array(motor_rad)
-    scene = SearchScene(views, used, Rods(wire, bar), motor, VisionSettings())
-    seen = find_object(scene)
-    widths = measure_relative_widths(seen)
+    for camera in cameras:
+        frames = pictures.get(camera.name, ())
+        empty = background.get(camera.name)
+        if len(frames) >= _FEWEST_PICTURES and empty is not None:
+            noise = measure_noise(*frames[:2])
+            views.append(View(camera, dict(enumerate(frames)), np.asarray(empty, float), noise))
+    if len(views) < 2:
+        return np.nan
+    used = cameras.subset([view.camera.name for view in views])
+    scene = SearchScene(views, used, Rods(wire, bar), np.array(motor_rad), VisionSettings())
+    widths = measure_relative_widths(find_object(scene))
     return bar.diameter_mm * combine_widths(widths)[0] if widths else np.nan
 
 

@@ -6,7 +6,7 @@ import pytest
 from bench.rig.protocol_tables import WhiskerTable
 from tests.studies.accuracy.broken_beams import broken, check_of, joint, loose_clamp, softer_outside
 from tests.studies.accuracy.scenes import as_problem, draw_scene, line_points
-from vision.fit.beam_check import BeamCheck, Compared, _beside, _chance
+from vision.fit.beam_check import BeamCheck, Compared, _chance, _fit_added, _LeastSquares
 from vision.geometry.rods import Wire
 
 
@@ -64,12 +64,16 @@ def test_little_is_no_alarm_however_sure():
 
 def test_lines_that_tell_nothing_are_no_departure():
     """No point lies on a bent wire: nothing is told, and nothing breaks."""
-    own, nothing = np.eye(3), np.zeros((3, 2))
-    found, spread, _ = _beside(
-        own, np.zeros((1, 3)), nothing, np.ones(3), np.zeros((3, 1)), np.zeros((1, 1))
+    found = _fit_added(_least_squares(np.ones(3), np.eye(3)), np.zeros((3, 2)))
+    assert _chance(found.values, found.covariance) == 1.0
+    assert np.isnan(_chance(found.values, np.nan * found.covariance))
+
+
+def _least_squares(residual, jacobian):
+    """Return a problem without priors of their own, by cameras that are exact."""
+    return _LeastSquares(
+        residual, jacobian, np.zeros((1, 3)), np.zeros((len(residual), 1)), np.zeros((1, 1))
     )
-    assert _chance(found, spread) == 1.0
-    assert np.isnan(_chance(found, np.nan * spread))
 
 
 def test_one_step_is_the_joint_fit(rng):
@@ -80,12 +84,11 @@ def test_one_step_is_the_joint_fit(rng):
         rng.standard_normal(40),
     )
     residual = residual - own @ np.linalg.lstsq(own, residual)[0]
-    prior = np.zeros((1, 3))
-    found, spread, follows = _beside(
-        own, prior, rows, residual, np.zeros((40, 1)), np.zeros((1, 1))
-    )
+    found = _fit_added(_least_squares(residual, own), rows)
     whole = np.hstack([own, rows])
     at_once = np.linalg.lstsq(whole, -residual)[0]
     # the check's own wide prior (50) pulls by 1 in 40 * 50² = 1e-5 of what is found
-    np.testing.assert_allclose(np.concatenate([follows @ found, found]), at_once, atol=1e-5)
-    np.testing.assert_allclose(spread, np.linalg.inv(whole.T @ whole)[3:, 3:], rtol=1e-4)
+    both = np.concatenate([found.parameters_by @ found.values, found.values])
+    np.testing.assert_allclose(both, at_once, atol=1e-5)
+    covariance = np.linalg.inv(whole.T @ whole)[3:, 3:]
+    np.testing.assert_allclose(found.covariance, covariance, rtol=1e-4)

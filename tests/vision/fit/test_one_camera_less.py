@@ -89,7 +89,7 @@ def test_a_camera_off_is_told_where_the_others_hardly_know_the_bar(rng):
     third = found[2]
     assert np.all(np.abs(third.moved) < 2.0 * third.moved_sigma)
     assert third.contradicts
-    assert abs(third.beside) == pytest.approx(2.0, abs=4.0 * third.beside_sigma)
+    assert abs(third.line_offset_px) == pytest.approx(2.0, abs=4.0 * third.line_offset_sigma_px)
     whole, gradient = fitted.covariance + covariance_of(found, problem.size), by.whisk["d_x"]
     assert abs(measured.whisk["d_x"] - 60.0) < 3.0 * np.sqrt(gradient @ whole @ gradient)
 
