@@ -1,1 +1,33 @@
-"""What the cameras see: calibrated views, the bar and the wire in space, the contact. Knows no torque."""
+"""What the cameras see: calibrated views, the bar and the wire in space, the contact. Knows no torque.
+
+This is the door through which `bench` sees: it imports the names below, those of the doors
+`vision.geometry`, `vision.pictures`, `vision.boards` and `vision.calibration`, and nothing behind
+them (tests/house/test_doors.py). Each name is imported from its module at first use, so that a
+command that sees no picture starts without what sees.
+"""
+
+from vision.geometry.lazy_names import lazy_names
+
+NAMES = {
+    "fit.beam_check": ("BeamCheck",),
+    "fit.blocks": ("REST_PRIOR_MM",),
+    "fit.covariance": ("CAUSES",),
+    "fit.line_noise": ("LineNoise",),
+    "fit.refinements": ("ALONG", "LENS_TERMS", "LeftOut"),
+    "fit.touch": ("FEWEST_FREE",),
+    "fit.turns": ("Turns",),
+    "touched.find": ("axis_from_angles",),
+    "touched.width": ("SIGMA_SHARE", "bar_diameter_mm", "combine_widths"),
+    "truth.at_angle": ("Smooth", "TruthAtAngle"),
+    "truth.known_whisk": ("KnownWhisk",),
+    "truth.noise_in_pictures": ("CameraPictures", "line_noise_in_pictures"),
+    "truth.observe": ("observe_trial", "wire_lines"),
+    "truth.predicted_truth": ("PredictedTruth", "predict_truth"),
+    "truth.records": ("FrameTruth", "TrialTruth", "WhiskTruth"),
+    "truth.sight_lines": ("sights_of",),
+    "truth.trial_pictures": ("TrialPictures",),
+    "truth.value": ("NAN", "UNKNOWN", "Value"),
+    "wire.one_sided": ("SeenWidth",),
+    "wire.trace": ("lines_of",),
+}
+__getattr__ = lazy_names(__name__, NAMES)

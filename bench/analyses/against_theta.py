@@ -14,8 +14,8 @@ from bench.analyses.pooling import column, grouped, known_rows, mean, rms, sound
 from bench.base.drawing import blank, colour_of, label_of
 from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table
 from bench.records.trial_result import EstimateRow, TrialResult
-from vision.geometry.counted import counted
-from vision.truth.value import Value
+from vision import Value
+from vision.geometry import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,7 +17,7 @@ from bench.records.trial_result import (
     whisks,
 )
 from bench.trials.stick_slip_phases import seen_phases, slips
-from vision.truth.value import Value
+from vision import Value
 
 _ROUNDS = 12  # each leaves less than half of the change up to a heading of 45°
 # Terms of θ² are enough up to here: pushed by 8, 16 and 25 degrees against a bar at 40, α seen is off by 0.03, 0.3 and

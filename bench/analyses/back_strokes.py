@@ -23,8 +23,7 @@ from bench.base.doubts import in_one_status
 from bench.base.drawing import label_of
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
-from vision.truth.records import WhiskTruth
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, Value, WhiskTruth
 
 BOTH_WAYS = Table(
     "both_ways",

@@ -29,7 +29,7 @@ from estimator import curvature, first_order
 from estimator.beam import Beam
 from estimator.domain import RIGHT_ANGLE
 from estimator.uncertainty import Z_95, gradient_with_friction, slip_angle_sigma
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, Value
 
 CURVATURE = Table(
     "curvature",

@@ -18,7 +18,7 @@ from bench.records.trial_result import TrialResult
 from bench.trials.estimate_errors import judge
 from estimator.beam import Beam
 from estimator.threshold import distance_error
-from vision.geometry.counted import counted
+from vision.geometry import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -20,7 +20,7 @@ from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialR
 from bench.session.whisker import Whisker
 from bench.trials.estimate_errors import sound_whisks
 from estimator.distance import with_friction
-from vision.truth.value import Value
+from vision import Value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

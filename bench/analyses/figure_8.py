@@ -12,7 +12,7 @@ from bench.base.drawing import SLOPES_DEG, add_legend, blank, colour_of
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma
 from estimator.beam import moment_in_EI_per_metre
 from estimator.friction import curves
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, Value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

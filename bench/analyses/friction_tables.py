@@ -24,7 +24,7 @@ from bench.records.phases import KINETIC, STATIC, Phases
 from bench.records.trial_result import TrialResult
 from bench.session.whisker import Whisker
 from bench.trials.estimate_errors import judge
-from vision.truth.value import Value
+from vision import Value
 
 FRICTION_ANGLE = Heading("friction", "Friction angle α (± one sigma)")
 RECORDS = ("seen", "felt")

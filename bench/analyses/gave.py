@@ -13,8 +13,8 @@ from bench.analyses.pooling import column, grouped, mean, panel_title, rms
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.trials.estimate_errors import is_sound
-from vision.geometry.counted import counted
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, Value
+from vision.geometry import counted
 
 GIVES_WAY = Table(
     "gives_way",

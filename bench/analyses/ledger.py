@@ -23,7 +23,7 @@ from bench.base.tables import TRIAL, WHISK, Column, Kind, Table, alike, status
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_touch
-from vision.truth.value import NAN, UNKNOWN
+from vision import NAN, UNKNOWN
 
 MATTERS = 0.1  # of a sigma: the user's own bound
 NEEDED = "needed"

@@ -16,8 +16,7 @@ from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialR
 from bench.session.whisker import Whisker
 from bench.trials.clocks import SharedTouch
 from estimator import first_order
-from vision.fit.refinements import ALONG, LENS_TERMS, LeftOut
-from vision.truth.value import NAN
+from vision import ALONG, LENS_TERMS, NAN, LeftOut
 
 NAMES = (
     "large bending",

@@ -18,7 +18,7 @@ from bench.records.trial_result import EstimateRow, SeenWhisk, whisks
 from bench.session.trial import Trial
 from bench.trials.estimate_errors import is_sound
 from bench.trials.object_motion import in_contact_frame
-from vision.geometry.counted import counted
+from vision.geometry import counted
 
 if TYPE_CHECKING:  # matplotlib is loaded where something is drawn
     from matplotlib.figure import Figure

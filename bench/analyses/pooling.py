@@ -9,8 +9,8 @@ import numpy as np
 from bench.base.tables import sigma_name
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.trials.estimate_errors import is_sound
-from vision.geometry.counted import counted
-from vision.truth.value import Value
+from vision import Value
+from vision.geometry import counted
 
 Item = TypeVar("Item")
 Key = TypeVar("Key", bound=Hashable)

@@ -32,7 +32,7 @@ from estimator.builtin import corrected, with_friction
 from estimator.friction import FrictionFit
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
-from vision.truth.value import Value
+from vision import Value
 
 GIVEN = "with_friction"
 FITTED = "with_friction_fitted"

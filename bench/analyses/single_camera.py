@@ -15,8 +15,8 @@ from bench.base.doubts import in_one_status
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, status, with_sigma
 from bench.records.trial_result import ByOneCamera, SeenWhisk, TrialResult, whisks
 from estimator.uncertainty import Z_95
-from vision.geometry.counted import counted
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, Value
+from vision.geometry import counted
 
 ONE_CAMERA = Table(
     "one_camera",

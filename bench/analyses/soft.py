@@ -32,7 +32,7 @@ from bench.session.whisker import Whisker
 from estimator import compliance, first_order
 from estimator.beam import Beam
 from estimator.uncertainty import Z_95, model_share
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, Value
 
 COMPLIANCE = Table(
     "compliance",

@@ -12,7 +12,7 @@ from bench.trials.estimate_errors import slope_deg
 from estimator.beam import Beam
 from estimator.friction import FrictionFit, Pushes, fit_alpha
 from estimator.uncertainty import Z_95
-from vision.geometry.counted import counted
+from vision.geometry import counted
 
 # From so many recordings that slip on, the fit's own sigma is that of its residuals, the whisks of a recording counting
 # together: what is wrong with its slope is wrong in all of them. With fewer it is that of moments and slopes as stated.

@@ -17,8 +17,8 @@ from bench.base.numbers import MISSING, number, number_range
 from bench.base.tables import SURFACE, WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
 from bench.records.trial_result import EstimateRow, TrialResult
 from bench.trials.estimate_errors import slope_deg
-from vision.geometry.counted import counted
-from vision.truth.value import Value
+from vision import Value
+from vision.geometry import counted
 
 SENSORS = Table(
     "sensors",

@@ -22,7 +22,7 @@ from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult
 from bench.session.session import Session
 from bench.trials.estimates import whisk_of
 from estimator.two_tilts import SharedContact, shared_contact
-from vision.geometry.counted import counted
+from vision.geometry import counted
 
 TILTS = Table(
     "tilts",

@@ -18,8 +18,8 @@ from bench.base.settings import TILT_SIGMA_RAD
 from bench.records.trial_result import EstimateRow, FeltAt
 from estimator.domain import RIGHT_ANGLE
 from estimator.uncertainty import Z_95
-from vision.geometry.reasons import Reason, joined
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, Value
+from vision.geometry import Reason, joined
 
 _FEWEST = 4  # angles, for three numbers and what is left
 _CHANCE = 1e-3  # of a turn as large where an object leans by no more than sigma holds, of a scatter as large by noise

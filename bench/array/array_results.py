@@ -33,7 +33,7 @@ from bench.report.summary.compose import DOUBTFUL, SCORE, Summary
 from bench.report.summary.verdict import verdict
 from bench.report.whisk_tables import ESTIMATES, WHISKS
 from bench.session.session import Base, Session
-from vision.geometry.counted import counted
+from vision.geometry import counted
 
 ARRAY_WHISKS = replace(WHISKS, columns=(WHISKER, *WHISKS.columns))
 ARRAY_ESTIMATES = replace(ESTIMATES, columns=(WHISKER, *ESTIMATES.columns))

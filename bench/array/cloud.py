@@ -13,9 +13,8 @@ from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialR
 from bench.report.assembly import Z_C_MM
 from bench.session.session import Base
 from estimator.distance import cartesian, contact_point
-from vision.geometry.rods import Wire
-from vision.geometry.rotation import skew
-from vision.truth.value import NAN, UNKNOWN, Value
+from vision import NAN, UNKNOWN, Value
+from vision.geometry import Wire, skew
 
 SEEN = "seen"  # in the place of an estimator's name
 

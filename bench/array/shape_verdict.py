@@ -21,7 +21,7 @@ from bench.base.tables import (
     with_sigma,
 )
 from estimator.uncertainty import Z_95
-from vision.geometry.counted import counted
+from vision.geometry import counted
 
 _ON_CENTRELINE = "on the whisker's centreline"
 SURFACE_POINTS = Table(

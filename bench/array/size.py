@@ -22,9 +22,8 @@ from bench.base.doubts import in_one_status
 from bench.base.statuses import reason
 from bench.base.tables import TRIAL, Column, Kind, Table, sigma_name, status, with_sigma
 from estimator.uncertainty import Z_95
-from vision.geometry.counted import counted
-from vision.geometry.reasons import NO_REASON, Reason
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, Value
+from vision.geometry import NO_REASON, Reason, counted
 
 SIZE = Table(
     "size",

@@ -8,8 +8,8 @@ from bench.array.surface_forms import FORMS, SurfaceForm
 from bench.records.trial_result import SeenWhisk
 from bench.session.session import Base
 from bench.session.trial import Trial
-from vision.geometry.rods import Wire
-from vision.touched.find import axis_from_angles
+from vision import axis_from_angles
+from vision.geometry import Wire
 
 STATED, SEEN = "manifest", "pictures"
 _ARC_MM = 1e-6  # mm: to which the nearest arc is found

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bench.base.errors import BadInput
-from vision.geometry.reasons import Reason, joined
-from vision.geometry.refusals import Refused
+from vision.geometry import Reason, Refused, joined
 
 
 @contextmanager

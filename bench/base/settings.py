@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from bench.base.errors import BadInput
-from vision.geometry.vision_settings import VisionSettings
+from vision.geometry import VisionSettings
 
 # The paper's 5 Hz at 10 deg/s and 45 Hz at 90 deg/s: half a hertz for each deg/s.
 CUTOFF_HZ_PER_DEG_S = 0.5

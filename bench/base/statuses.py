@@ -8,7 +8,7 @@ stands here: how severe it is, and what to do about it. Nothing else asks what a
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from vision.geometry.reasons import UNNAMED, Reason, as_reason
+from vision.geometry import UNNAMED, Reason, as_reason
 
 # Severities. A note leaves distance and moments what they are; a warning makes them doubtful; a
 # refusal says why there are none.

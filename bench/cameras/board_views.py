@@ -12,13 +12,18 @@ from bench.base.threads import in_threads
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.session import Session
 from bench.session.table import forward_in_time, read_table, require_columns
-from vision.boards.corners import Corners, find_corners, refine_corners
-from vision.boards.diagnosis import why_not_found
-from vision.boards.marker_size import check_marker_size
-from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
-from vision.calibration.views import BoardViews
-from vision.geometry.board import Board
-from vision.pictures.frames import Frames
+from vision.boards import (
+    MIN_VIEWS,
+    Corners,
+    check_marker_size,
+    find_corners,
+    fixes_pose,
+    refine_corners,
+    why_not_found,
+)
+from vision.calibration import BoardViews
+from vision.geometry import Board
+from vision.pictures import Frames
 
 # [frames] A longer series is sampled in runs of neighbours, which determine how the board moved.
 _MOST_FRAMES = 120

@@ -12,14 +12,21 @@ from bench.cameras.board_views import SessionViews, read_board_views, rig_view
 from bench.cameras.cameras_toml import write_cameras
 from bench.cameras.known_scale import check_scale
 from bench.session.session import Session, load_session
-from vision.boards.corners import Corners
-from vision.calibration.calibrate import Calibration, CameraReport, calibrate_cameras
-from vision.calibration.cameras_import import import_cameras, place_on_rig
-from vision.calibration.held_out import Agreement, HeldOut, held_out
-from vision.calibration.place import by_board, move_rig_frame
-from vision.calibration.views import MeasuredPose
-from vision.geometry.camera import Camera, Cameras
-from vision.geometry.lens import LENS_TERMS
+from vision.boards import Corners
+from vision.calibration import (
+    Agreement,
+    Calibration,
+    CameraReport,
+    HeldOut,
+    MeasuredPose,
+    by_board,
+    calibrate_cameras,
+    check_held_out,
+    import_cameras,
+    move_rig_frame,
+    place_on_rig,
+)
+from vision.geometry import LENS_TERMS, Camera, Cameras
 
 # Every fourth view (index % 4 == 3) measures a calibration from the other three quarters.
 HOLD_EVERY = 4
@@ -154,13 +161,13 @@ def measure_held_out(session: Session, views: SessionViews) -> HeldOut | None:
     try:
         made = calibrate_from(session, kept)
         if made.together or len(views.boards) < 2:
-            return held_out(made, views.boards, is_held, session.board, times_s=views.times_s)
+            return check_held_out(made, views.boards, is_held, session.board, times_s=views.times_s)
         made = calibrate_from(session, _with_even_rows(kept, session))
     except BadInput:
         return None
-    alone = held_out(made, views.boards, is_held, session.board).alone_px
+    alone = check_held_out(made, views.boards, is_held, session.board).alone_px
     odd = {name: [_rows(view, session, 1)] for name, view in views.rig.items()}
-    on_rig = held_out(made, odd, [True], session.board, together=True)
+    on_rig = check_held_out(made, odd, [True], session.board, together=True)
     return replace(on_rig, alone_px=alone)
 
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from bench.base.atomic import write_whole
-from vision.calibration.cameras_file import cameras_as_files
-from vision.geometry.camera import Cameras
+from vision.calibration import cameras_as_files
+from vision.geometry import Cameras
 
 
 def write_cameras(path: Path, cameras: Cameras) -> None:

@@ -12,10 +12,8 @@ from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
-from vision.calibration.hub_turning import FirstRig, first_rig
-from vision.calibration.moving_line import MovingLines, moving_lines
-from vision.calibration.place import Placement
-from vision.geometry.camera import Cameras
+from vision.calibration import FirstRig, MovingLines, Placement, first_rig, moving_lines
+from vision.geometry import Cameras
 
 Item = TypeVar("Item")
 

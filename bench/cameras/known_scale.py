@@ -11,11 +11,9 @@ from bench.session.frame_times import frame_times
 from bench.session.session import Session
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
-from vision.calibration.known_lengths import check_known_lengths
-from vision.geometry.camera import Cameras
-from vision.geometry.refusals import Refused
-from vision.geometry.rods import Bar
-from vision.touched.width import SIGMA_SHARE, bar_diameter_mm
+from vision import SIGMA_SHARE, bar_diameter_mm
+from vision.calibration import check_known_lengths
+from vision.geometry import Bar, Cameras, Refused
 
 # [trials] A median is taken over them. Set by eye.
 _MOST_TRIALS = 3

@@ -28,15 +28,19 @@ from bench.cameras.first_look import by_first_look, first_look
 from bench.cameras.known_scale import check_scale
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.session import Session
-from vision.boards.corners import refine_corners
-from vision.boards.static_board import camera_moved
-from vision.calibration.cameras_file import read_cameras
-from vision.calibration.place import Placement, by_board, move_rig_frame
-from vision.geometry.camera import Cameras
-from vision.geometry.counted import counted
-from vision.geometry.reasons import NO_REASON, Reason
-from vision.geometry.refusals import Refused
-from vision.geometry.rotation import compose, invert_transform, log_rotation, skew
+from vision.boards import camera_moved, refine_corners
+from vision.calibration import Placement, by_board, move_rig_frame, read_cameras
+from vision.geometry import (
+    NO_REASON,
+    Cameras,
+    Reason,
+    Refused,
+    compose,
+    counted,
+    invert_transform,
+    log_rotation,
+    skew,
+)
 
 # [sigmas] A camera whose board stands farther elsewhere than this, and than the next, was moved. Set by eye.
 _MOVED_SIGMAS = 5.0

@@ -38,7 +38,7 @@ def add(verbs: Verbs) -> None:
 def run(options: argparse.Namespace) -> int:
     """Write the PDF, print the board's lines for session.toml; return the exit code."""
     from bench.setup.board_pdf import MARKER_SHARE, toml_block, write_board
-    from vision.geometry.board import Board
+    from vision.geometry import Board
 
     board = Board(
         options.squares,

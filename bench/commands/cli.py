@@ -14,7 +14,7 @@ from importlib import import_module
 
 from bench.base.errors import BadInput
 from bench.commands.options import BAD_INPUT, DONE, FAULT_OF_OURS, INTERRUPTED
-from vision.geometry.refusals import Refused
+from vision.geometry import Refused
 
 # Names of the verbs and of their modules, in the order of --help.
 VERBS = (

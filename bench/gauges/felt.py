@@ -15,8 +15,7 @@ from bench.session.signals import Signals, back_stroke, forward_strokes, stroke_
 from bench.session.trial import Trial
 from estimator.onset import usable
 from estimator.signal import FeltTouch, MomentAt, felt_touch, moment_at, zero_phase_lowpass
-from vision.truth.records import FrameTruth
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, FrameTruth, Value
 
 # [rad] Before felt touch, beyond what that is uncertain by. Set by eye.
 _GUARD_RAD = np.radians(0.2)

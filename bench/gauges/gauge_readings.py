@@ -17,7 +17,7 @@ from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from estimator.beam import rigidity_at
 from estimator.signal import FeltTouch, MomentAt
-from vision.truth.value import Value
+from vision import Value
 
 # A rod that bends is drawn towards its clamp over the bar, and friction pulls it back. How rough the bar is, is not
 # known at this stage: from nothing to 0.4, all values alike. At 3° this is 0.2 % of the moment, ± 0.1 %.

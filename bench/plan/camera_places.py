@@ -14,8 +14,8 @@ from bench.plan.staged import StagedWhisk
 from bench.rig import build
 from bench.rig.protocol import Protocol
 from bench.rig.protocol_tables import CameraTable
-from vision.geometry.camera import Cameras
-from vision.truth.predicted_truth import predict_truth
+from vision import predict_truth
+from vision.geometry import Cameras
 
 # [deg] Directions of cameras from the contact: azimuth; 0 is beyond the tip, -90 the side that the whisker comes
 # from. Stated.

@@ -7,10 +7,8 @@ import numpy as np
 
 from bench.plan.planned_cameras import BoardWork, as_seen_camera, expected_cameras
 from bench.rig.pinhole import PinholeCamera
-from vision.fit.line_noise import LineNoise
-from vision.geometry.camera import Camera, Cameras
-from vision.geometry.refusals import Refused
-from vision.truth.known_whisk import KnownWhisk
+from vision import KnownWhisk, LineNoise
+from vision.geometry import Camera, Cameras, Refused
 
 # [deg] By which a camera is taken round the contact. Stated.
 _TURN_DEG = 30.0

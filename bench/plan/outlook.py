@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vision.fit.line_noise import LineNoise
-from vision.geometry.reasons import joined
-from vision.truth.predicted_truth import PredictedTruth
+from vision import LineNoise, PredictedTruth
+from vision.geometry import joined
 
 # The columns of a row, by vision's name of the quantity: at touch, then at a pushing angle.
 COLUMNS = {

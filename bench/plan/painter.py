@@ -15,13 +15,9 @@ from bench.rig.painted_scene import block_corners_mm
 from bench.rig.printed_board import PrintedBoard
 from bench.rig.protocol import Protocol
 from bench.rig.studio import Setting, Studio
-from vision.boards.corners import refine_corners
-from vision.fit.line_noise import LineNoise
-from vision.geometry.board import Board
-from vision.geometry.camera import Camera, Cameras
-from vision.geometry.refusals import Refused
-from vision.geometry.rotation import apply
-from vision.truth.noise_in_pictures import CameraPictures, line_noise_in_pictures
+from vision import CameraPictures, LineNoise, line_noise_in_pictures
+from vision.boards import refine_corners
+from vision.geometry import Board, Camera, Cameras, Refused, apply
 
 # [corners] Of a board held up to a camera; fewer, and it would not be found. Stated.
 _FEWEST_CORNERS = 6

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from bench.base.drawing import publish, style
 from bench.plan.staged import StagedWhisk
-from vision.geometry.camera import Camera, Cameras
-from vision.geometry.rotation import apply
+from vision.geometry import Camera, Cameras, apply
 
 _SIDES = {"from above": (0, 1), "from the side": (0, 2)}
 # [mm] Of a bar that is drawn to either side of the contact. A layout.

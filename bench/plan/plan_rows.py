@@ -12,9 +12,8 @@ from bench.plan.outlook import Outlook, outlook, sigmas
 from bench.plan.painter import Clamp, Painter
 from bench.plan.staged import stage_run
 from bench.rig.protocol import Protocol, ProtocolRun
-from vision.fit.line_noise import LineNoise
-from vision.geometry.camera import Cameras
-from vision.truth.predicted_truth import PredictedTruth, predict_truth
+from vision import LineNoise, PredictedTruth, predict_truth
+from vision.geometry import Cameras
 
 # [1] Of a sigma, that is left where a change halves it. Derived.
 _HALF = 0.5

@@ -9,12 +9,9 @@ from bench.rig import boards
 from bench.rig.pinhole import PinholeCamera
 from bench.rig.printed_board import PrintedBoard
 from bench.rig.protocol_tables import BoardTable
-from vision.boards.corners import Corners
-from vision.calibration.calibrate import calibrate_cameras
-from vision.calibration.views import BoardViews, MeasuredPose
-from vision.geometry.board import Board
-from vision.geometry.camera import Camera, Cameras
-from vision.geometry.rotation import apply
+from vision.boards import Corners
+from vision.calibration import BoardViews, MeasuredPose, calibrate_cameras
+from vision.geometry import Board, Camera, Cameras, apply
 
 # [px] A corner nearer to the picture's edge is not found. Stated.
 _RIM_PX = 8.0

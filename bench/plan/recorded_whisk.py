@@ -15,10 +15,8 @@ from bench.rig.elastic_rod import Rod
 from bench.session.session import Session
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
-from vision.geometry import rods
-from vision.geometry.camera import Cameras
-from vision.geometry.vision_settings import VisionSettings
-from vision.truth.predicted_truth import predict_truth
+from vision import predict_truth
+from vision.geometry import Bar, Cameras, Rods, VisionSettings
 
 # [rad] Least and most friction with which a whisk is staged again; where less was seen, sigmas
 # change little. Stated.
@@ -89,8 +87,8 @@ def stage_again(task: SeenTask) -> StagedWhisk:
     touch = find_first_touch(rod, bar, touch_rad, d_x_mm)
     frames = whisk.frames
     staged = stage_on_bar(rod, bar, touch, _friction(whisk), frames.motor_rad, frames.time_s)
-    stated_bar = rods.Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm)
-    stated = rods.Rods(task.session.whisker.wire, stated_bar)
+    stated_bar = Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm)
+    stated = Rods(task.session.whisker.wire, stated_bar)
     return replace(staged, known=replace(staged.known, rods=stated))
 
 

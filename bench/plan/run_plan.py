@@ -30,10 +30,8 @@ from bench.session.session import MANIFEST
 from bench.session.session_check import checked_session
 from bench.trials.of_session import placed_units, trials_with_whisks
 from bench.trials.trial_evaluation import see_unit
-from vision.calibration.views import MeasuredPose
-from vision.geometry.board import Board
-from vision.geometry.camera import Cameras
-from vision.geometry.refusals import Refused
+from vision.calibration import MeasuredPose
+from vision.geometry import Board, Cameras, Refused
 
 # [bars] In a drawing, at most. A layout.
 _MOST_DRAWN = 12

@@ -14,9 +14,8 @@ from bench.rig.protocol import Protocol, ProtocolRun
 from bench.rig.recording import Recording
 from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.whisk_mechanics import WhiskMechanics
-from vision.geometry import rods as seen_rods
-from vision.geometry.contact import BarAxis
-from vision.truth.known_whisk import KnownWhisk
+from vision import KnownWhisk
+from vision.geometry import Bar, BarAxis, Rods, Wire
 
 # [rad] Step of the mechanics between frames. Stated.
 _STEP_RAD = math.radians(0.1)
@@ -92,15 +91,13 @@ def as_staged(marched: WhiskMechanics, motor_rad: np.ndarray, time_s: np.ndarray
     rod = marched.rod
     touch = marched.touch
     bend_rad, arc_mm = _bends_and_arcs(marched, motor_rad)
-    wire = seen_rods.Wire(
-        rod.shape, rod.length_mm, rod.diameter_mm, tip_diameter_mm=rod.tip_diameter_mm
-    )
-    bar = seen_rods.Bar(2.0 * marched.bar.radius_mm)
+    wire = Wire(rod.shape, rod.length_mm, rod.diameter_mm, tip_diameter_mm=rod.tip_diameter_mm)
+    bar = Bar(2.0 * marched.bar.radius_mm)
     share = np.linspace(0.0, 1.0, _REST_POINTS)
     rest_offset_mm = rod.rest.offset_mm(share * rod.length_mm)[:, 1:]
     foot_mm = marched.bar.foot_mm(touch.point_mm)  # of the bar's axis, opposite the contact
     known = KnownWhisk(
-        rods=seen_rods.Rods(wire, bar),
+        rods=Rods(wire, bar),
         axis=BarAxis(foot_mm, marched.bar.axis).upward(),
         motor_rad=np.asarray(motor_rad),
         time_s=np.asarray(time_s),

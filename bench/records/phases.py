@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.truth.value import NAN
+from vision import NAN
 
 STATIC = "static"
 KINETIC = "kinetic"

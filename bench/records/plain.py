@@ -15,8 +15,8 @@ import numpy as np
 
 from bench.base.results import plain
 from bench.base.tables import sigma_name
-from vision.geometry.reasons import Reason, as_reason
-from vision.truth.value import NAN, Value
+from vision import NAN, Value
+from vision.geometry import Reason, as_reason
 
 Record = TypeVar("Record")
 

@@ -9,11 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
-from vision.geometry.reasons import NO_REASON, Reason
-from vision.truth.at_angle import TruthAtAngle
-from vision.truth.records import FrameTruth, WhiskTruth
-from vision.truth.value import NAN, UNKNOWN, Value
-from vision.wire.one_sided import SeenWidth
+from vision import NAN, UNKNOWN, FrameTruth, SeenWidth, TruthAtAngle, Value, WhiskTruth
+from vision.geometry import NO_REASON, Reason
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,8 @@ from bench.base.doubts import in_one_status
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.whisk_tables import BEAM, BUDGET, ESTIMATES, PLACE, TRACK, WHISKS
 from estimator.distance import cartesian, contact_point
-from vision.fit.covariance import CAUSES
-from vision.geometry.reasons import Reason
-from vision.truth.value import NAN, UNKNOWN, Value
+from vision import CAUSES, NAN, UNKNOWN, Value
+from vision.geometry import Reason
 
 # Field of the value by column; in the table each value is followed by its sigma.
 _SEEN = {

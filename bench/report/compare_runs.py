@@ -14,7 +14,7 @@ from bench.report.evaluation import finished
 from bench.report.page.words import MISSING, number, with_sigma
 from bench.report.pooled import read_run
 from bench.report.record import read_record
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, Value
 
 COMPARISON = Table(
     "comparison",

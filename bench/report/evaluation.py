@@ -16,7 +16,7 @@ from bench.records.trial_result import TrialResult
 from bench.report.estimator_accuracy import RunAccuracy
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
-from vision.geometry.reasons import Reason
+from vision.geometry import Reason
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

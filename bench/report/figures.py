@@ -19,7 +19,7 @@ from bench.report.planes import draw_planes
 from bench.report.run_facts import GaugePoints
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
-from vision.fit.covariance import CAUSES
+from vision import CAUSES
 
 _MARKERS = "osD^vP"
 # [whisks] A layout: bars that can still be told apart; of more, those of the largest sigma.

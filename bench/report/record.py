@@ -16,7 +16,7 @@ from bench.report.evaluation import Evaluation
 from bench.report.run_facts import BoardFacts, CameraFacts, GaugeFacts, GaugePoints, RunRecord
 from bench.report.summary.compose import Summary
 from bench.session.session import Session
-from vision.geometry.reasons import as_reason
+from vision.geometry import as_reason
 
 RECORD = "run.json"
 SESSION = ".session"

@@ -21,9 +21,7 @@ from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
 from bench.session.session import load_session
 from bench.session.trial import Trial
-from vision.geometry.camera import Camera
-from vision.geometry.centreline import one_curve
-from vision.geometry.rods import Wire
+from vision.geometry import Camera, Wire, one_curve
 
 FOURCC = {".webm": "VP90", ".avi": "MJPG"}
 _WIDTH_PX = 720  # of each camera's picture

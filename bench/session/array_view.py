@@ -30,7 +30,7 @@ from bench.session.signals import FORCES, MOMENTS, MOTOR, TIME, VOLTS
 from bench.session.strict_toml import values
 from bench.session.table import column_names
 from bench.session.trial import Trial
-from vision.geometry.rotation import compose
+from vision.geometry import compose
 
 _PARALLEL = 1e-6  # rounding of cosines: axes of bases on one motor
 _OWN = (*VOLTS, *MOMENTS, *FORCES)  # columns that no two whiskers share

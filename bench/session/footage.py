@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
-from vision.geometry.refusals import Refused
-from vision.pictures.files import (
+from vision.geometry import Refused
+from vision.pictures import (
     FILM_SUFFIXES,
     PICTURE_SUFFIXES,
+    Frames,
     natural_order,
     pictures_in,
     read_picture,
 )
-from vision.pictures.frames import Frames
 
 
 def camera_sources(folder: Path, shown: str) -> dict[str, Path]:

@@ -12,10 +12,8 @@ from bench.session.footage import declared_rate_Hz, decoded_count, frame_count, 
 from bench.session.signals import Signals
 from bench.session.table import NumberTable, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
-from vision.geometry.counted import counted
-from vision.geometry.reasons import Reason
-from vision.geometry.refusals import Refused
-from vision.pictures.frames import Frames
+from vision.geometry import Reason, Refused, counted
+from vision.pictures import Frames
 
 FRAME = "frame"
 TIME = "time_s"

@@ -10,7 +10,7 @@ from pathlib import Path, PurePath
 
 from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
-from vision.pictures.files import FILM_SUFFIXES, PICTURE_SUFFIXES
+from vision.pictures import FILM_SUFFIXES, PICTURE_SUFFIXES
 
 _MOST_NAMED = 3  # names in one line
 _FOOTAGE = PICTURE_SUFFIXES | FILM_SUFFIXES

@@ -17,10 +17,8 @@ from bench.session.plausible import YOUNGS_MODULUS
 from bench.session.strict_toml import as_keys, read_toml, values
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker
-from vision.geometry.board import Board
-from vision.geometry.reasons import Reason
-from vision.geometry.rotation import invert_transform, nearest_rotation
-from vision.pictures.files import natural_order
+from vision.geometry import Board, Reason, invert_transform, nearest_rotation
+from vision.pictures import natural_order
 
 FORMAT = 1  # of session.toml; another one is refused
 MANIFEST = "session.toml"

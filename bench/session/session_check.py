@@ -16,18 +16,16 @@ from bench.session.frame_times import frame_times
 from bench.session.session import Session, load_session
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
-from vision.calibration.cameras_file import read_cameras
-from vision.geometry.counted import counted
-from vision.geometry.reasons import Reason
-from vision.geometry.refusals import Refused
-from vision.pictures.files import (
+from vision.calibration import read_cameras
+from vision.geometry import Reason, Refused, counted
+from vision.pictures import (
     STACK_SUFFIXES,
     VIDEO_SUFFIXES,
+    Frames,
     page_count,
     picture_size,
     pictures_in,
 )
-from vision.pictures.frames import Frames
 
 Size: TypeAlias = tuple[int, int]  # width, height, px
 _MOST_NAMED = 5  # frames in one line

@@ -17,7 +17,7 @@ from bench.session.plausible import (
 )
 from bench.session.table import NumberTable, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
-from vision.geometry.reasons import Reason
+from vision.geometry import Reason
 
 TIME = "time_s"
 MOTOR = "motor_deg"

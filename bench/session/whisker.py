@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from estimator.beam import Beam, flexural_rigidity
-from vision.geometry.rods import Wire
+from vision.geometry import Wire
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from bench.base.drawing import paper_style, publish
 from bench.base.errors import BadInput
 from bench.rig import printed_board as rig
 from bench.session.plausible import WIDTH
-from vision.geometry.board import Board
+from vision.geometry import Board
 
 MM_PER_INCH = 25.4
 # Margins around the board: rulers on the left and below, with the words below them.

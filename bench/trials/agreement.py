@@ -16,7 +16,7 @@ from scipy.special import chdtrc
 from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import GaugeMatrix
 from bench.trials.differences import LEAST_CHANCE, Cause, Difference, constant_message
-from vision.geometry.reasons import NO_REASON, Reason
+from vision.geometry import NO_REASON, Reason
 
 _EXPLAINED = 0.01  # of the chance that a cause must leave
 _UNEXPLAINED = (

@@ -18,9 +18,8 @@ from scipy.special import chdtrc
 
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import SeenWhisk, TrialResult
-from vision.geometry.counted import counted
-from vision.geometry.reasons import NO_REASON, Reason
-from vision.truth.value import Value
+from vision import Value
+from vision.geometry import NO_REASON, Reason, counted
 
 # Chance by which sound sigmas would show as much: one session in a thousand.
 FALSE_ALARM = 1e-3

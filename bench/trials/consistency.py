@@ -17,11 +17,8 @@ from bench.trials.differences import (
     constant_message,
     without_mean,
 )
-from vision.fit.turns import Turns
-from vision.geometry.board import Board
-from vision.geometry.reasons import NO_REASON, Reason
-from vision.touched.width import combine_widths
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, Turns, Value, combine_widths
+from vision.geometry import NO_REASON, Board, Reason
 
 # Of a nominal slope that states no sigma: a bar set by eye and a protractor, written in steps of 5°.
 _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)

@@ -20,8 +20,8 @@ from estimator.distance import felt_slip_angle
 from estimator.signal import FeltTouch
 from estimator.uncertainty import Z_95, slip_angle_sigma
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
-from vision.geometry.reasons import NO_REASON, Reason, as_reason, joined
-from vision.truth.value import Value
+from vision import Value
+from vision.geometry import NO_REASON, Reason, as_reason, joined
 
 UNKNOWN_RADII_MM = (math.nan, 0.0)  # of bar and whisker
 

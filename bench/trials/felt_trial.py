@@ -43,8 +43,8 @@ from estimator.builtin import ESTIMATORS
 from estimator.sensors import SENSORS
 from estimator.signal import NOT_REACHED, FeltTouch
 from estimator.whisk import Whisk
-from vision.geometry.reasons import NO_REASON, Reason, joined
-from vision.truth.value import NAN, UNKNOWN, Value
+from vision import NAN, UNKNOWN, Value
+from vision.geometry import NO_REASON, Reason, joined
 
 NO_GAUGES = reason("no_gauges")
 SATURATED = reason("gauges_at_rail")

@@ -8,7 +8,7 @@ from bench.gauges.felt import FeltStroke
 from bench.session.trial import Trial
 from estimator.moving import known_motion
 from estimator.whisk import ObjectMotion, Whisk
-from vision.geometry.centreline import rotation_z
+from vision.geometry import rotation_z
 
 # Purpose of such a trial's results: equations of standing objects are not judged by it.
 MOVING = "moving"

@@ -35,7 +35,7 @@ from bench.trials.lost import see_units
 from bench.trials.placing import place_rig
 from bench.trials.trial_evaluation import kept_seen
 from bench.trials.unit import Unit
-from vision.geometry.reasons import Reason
+from vision.geometry import Reason
 
 _MORE = "or let the other trials serve: --gauges-from-all"
 _MOST_NAMED = 8  # trials in one line

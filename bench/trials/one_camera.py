@@ -12,9 +12,7 @@ from bench.records.trial_result import ByOneCamera
 from bench.session.session import Session
 from bench.session.whisker import Whisker
 from estimator.seen_shape import SeenShape, contact_of_shape
-from vision.truth.records import WhiskTruth
-from vision.truth.sight_lines import sights_of
-from vision.truth.value import Value
+from vision import Value, WhiskTruth, sights_of
 
 NOT_SHOWN = reason("wire_not_shown")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from bench.base.results import read_result, write_result
 from bench.records.plain import from_plain, to_plain
-from vision.pictures.others import Others, RodLines
+from vision.pictures import Others, RodLines
 
 
 def write_lines(path: Path, key: str, lines: Mapping[str, RodLines]) -> None:

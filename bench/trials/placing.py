@@ -15,17 +15,15 @@ from bench.session.session import Session
 from bench.trials.differences import Cause, Difference
 from bench.trials.lost import see_units
 from bench.trials.unit import Unit
-from vision.calibration.place import (
+from vision.calibration import (
     Placement,
     by_board,
+    by_strokes,
     check_swing_suffices,
     combine,
     move_rig_frame,
 )
-from vision.calibration.swing import by_strokes
-from vision.geometry.reasons import Reason
-from vision.geometry.refusals import Refused
-from vision.geometry.rotation import compose, invert_transform
+from vision.geometry import Reason, Refused, compose, invert_transform
 
 # A step beyond this is taken once more from where it led: lines far from where they were expected are read less well.
 _SMALL_STEP = np.repeat([2e-3, 0.2], 3)

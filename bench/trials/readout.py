@@ -12,7 +12,7 @@ from bench.session.trial import Trial
 from estimator.beam import Beam
 from estimator.signal import FeltTouch
 from estimator.whisk import Whisk
-from vision.geometry.reasons import Reason, as_reason
+from vision.geometry import Reason, as_reason
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from bench.base.errors import BadInput
 from bench.base.settings import Seeing, Settings
 from bench.session.plausible import PlausibleRange
 from bench.session.strict_toml import Keys, as_keys, plausible_ranges, read_toml, values
-from vision.geometry.vision_settings import VisionSettings
+from vision.geometry import VisionSettings
 
 # Each preset has what the one before leaves out. What it costs and how wrong it is, `tradeoff` measures.
 PRESETS = {

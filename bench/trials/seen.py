@@ -35,12 +35,9 @@ from bench.trials.consistency import (
 from bench.trials.one_camera import by_one_camera
 from bench.trials.seeing import presets_for
 from bench.trials.trial_frames import TrialFrames
-from vision.geometry.reasons import Reason
-from vision.geometry.refusals import Refused
-from vision.pictures.others import Others
-from vision.truth.at_angle import Smooth
-from vision.truth.observe import observe_trial
-from vision.truth.records import TrialTruth, WhiskTruth
+from vision import Smooth, TrialTruth, WhiskTruth, observe_trial
+from vision.geometry import Reason, Refused
+from vision.pictures import Others
 
 NO_PICTURES = reason("no_pictures")
 _MOST_DEFLECTIONS = 12  # frames of a whisk, kept with their joint covariance

@@ -23,11 +23,9 @@ from bench.trials.of_session import first_units
 from bench.trials.other_wires import has_lines, lines_in, write_lines
 from bench.trials.trial_frames import TrialFrames
 from bench.trials.unit import Unit
-from vision.geometry.centreline import REST_POWERS, one_curve
-from vision.geometry.refusals import Refused
-from vision.pictures.others import RodLines
-from vision.truth.observe import wire_lines
-from vision.wire.trace import lines_of
+from vision import lines_of, wire_lines
+from vision.geometry import REST_POWERS, Refused, one_curve
+from vision.pictures import RodLines
 
 _PASSES = 3  # wires that others cross are up to 38 px off after the first, 18 after the second, 2 after the third
 

@@ -22,7 +22,7 @@ from bench.trials.readout import Readout
 from estimator.beam import Beam
 from estimator.signal import FeltTouch
 from estimator.uncertainty import slip_angle_sigma
-from vision.truth.records import FrameTruth
+from vision import FrameTruth
 
 # mm: less slip shows neither rest nor jump. Set by eye
 _LEAST_SLIP_MM = 0.1

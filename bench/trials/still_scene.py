@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.session.session import Session
-from vision.geometry.reasons import Reason
-from vision.pictures.scene_match import Likeness, exposures, is_blank, likeness, texture
+from vision.geometry import Reason
+from vision.pictures import Likeness, exposures, is_blank, likeness, texture
 
 if TYPE_CHECKING:
     from bench.cameras.session_cameras import SessionCalibration

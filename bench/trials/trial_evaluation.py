@@ -14,7 +14,7 @@ from bench.trials.other_wires import lines_in
 from bench.trials.seen import see_trial
 from bench.trials.unit import Unit
 from bench.trials.whose_wire import with_whose
-from vision.truth.value import NAN
+from vision import NAN
 
 
 def see_unit(unit: Unit) -> SeenTrial:

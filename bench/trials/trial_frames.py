@@ -14,11 +14,9 @@ from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes, ways_back
 from bench.session.trial import Trial
 from bench.trials.still_scene import StillScene, still_scene
-from vision.geometry.forms import touched_object
-from vision.geometry.rods import Bar, Rods
-from vision.geometry.touched import StatedSizes, Touched
-from vision.pictures.others import Others, RodLines
-from vision.truth.trial_pictures import TrialPictures
+from vision import TrialPictures
+from vision.geometry import Bar, Rods, StatedSizes, Touched, touched_object
+from vision.pictures import Others, RodLines
 
 _FEWEST_BACK = 6  # frames of a back stroke: two free ones, two that touch, and two about the touch
 

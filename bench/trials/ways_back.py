@@ -9,7 +9,7 @@ from bench.trials.estimates import whisk_of
 from estimator.beam import Beam
 from estimator.both_ways import there_and_back
 from estimator.whisk import EstimatorSettings
-from vision.truth.value import Value
+from vision import Value
 
 BOTH_WAYS = "both_ways"
 NO_WAY_BACK = reason("no_way_back")

@@ -10,8 +10,8 @@ import numpy as np
 from bench.base.doubts import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import Drawing, SeenTrial, SeenWhisk
-from vision.fit.blocks import REST_PRIOR_MM
-from vision.pictures.others import Others, RodLines
+from vision import REST_PRIOR_MM
+from vision.pictures import Others, RodLines
 
 _MOSTLY = 0.5  # of a wire's length: of two wires in one place most is, of two that cross little
 # mm: as far as a wire is traced for, two sigma of what is believed of a clamp (`vision.fit.blocks`).

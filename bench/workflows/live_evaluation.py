@@ -19,7 +19,7 @@ from bench.session.inside import check_outside
 from bench.session.session_check import checked_views
 from bench.trials.estimates import estimators
 from bench.workflows.session_evaluation import DONE, evaluate
-from vision.geometry.refusals import Refused
+from vision.geometry import Refused
 
 _HINT = (
     "cameras.toml is not brought along, so that each new trial calibrates the cameras anew and all are seen again: "

@@ -25,12 +25,16 @@ from bench.session.session_check import checked_views, find_damage
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.trials.still_scene import evenly_exposed, other_scene
-from vision.boards.corners import MIN_CORNERS, edge_blur_px, find_corners
-from vision.boards.diagnosis import why_not_found
-from vision.boards.sufficiency import MIN_VIEWS, fixes_pose
-from vision.fit.touch import FEWEST_FREE
-from vision.geometry.board import Board
-from vision.geometry.counted import counted
+from vision import FEWEST_FREE
+from vision.boards import (
+    MIN_CORNERS,
+    MIN_VIEWS,
+    edge_blur_px,
+    find_corners,
+    fixes_pose,
+    why_not_found,
+)
+from vision.geometry import Board, counted
 
 # [1] Pictures of a board series that are searched: a board that is in none of them is in few. Stated.
 _BOARD_PICTURES = 2

@@ -1,4 +1,17 @@
 """ChArUco boards in pictures: corners with sigma, faults of a board, whether its views suffice.
 
 May import geometry, pictures.
+
+`bench` imports the names below from here (see `vision`).
 """
+
+from vision.geometry.lazy_names import lazy_names
+
+NAMES = {
+    "corners": ("Corners", "MIN_CORNERS", "edge_blur_px", "find_corners", "refine_corners"),
+    "diagnosis": ("why_not_found",),
+    "marker_size": ("check_marker_size",),
+    "static_board": ("camera_moved",),
+    "sufficiency": ("MIN_VIEWS", "fixes_pose"),
+}
+__getattr__ = lazy_names(__name__, NAMES)

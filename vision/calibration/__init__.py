@@ -2,4 +2,22 @@
 rig is.
 
 May import geometry, pictures, boards.
+
+`bench` imports the names below from here (see `vision`).
 """
+
+from vision.geometry.lazy_names import lazy_names
+
+NAMES = {
+    "calibrate": ("Calibration", "CameraReport", "calibrate_cameras"),
+    "cameras_file": ("cameras_as_files", "read_cameras"),
+    "cameras_import": ("import_cameras", "place_on_rig"),
+    "held_out": ("Agreement", "HeldOut", "check_held_out"),
+    "hub_turning": ("FirstRig", "first_rig"),
+    "known_lengths": ("check_known_lengths",),
+    "moving_line": ("MovingLines", "moving_lines"),
+    "place": ("Placement", "by_board", "check_swing_suffices", "combine", "move_rig_frame"),
+    "swing": ("by_strokes",),
+    "views": ("BoardViews", "MeasuredPose"),
+}
+__getattr__ = lazy_names(__name__, NAMES)

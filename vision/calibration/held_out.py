@@ -69,7 +69,7 @@ class HeldOut:
         return self.offsets or self.at_once
 
 
-def held_out(
+def check_held_out(
     calibration: Calibration,
     views: Mapping[str, Sequence[Corners]],
     is_held: Sequence[bool],

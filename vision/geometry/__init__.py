@@ -1,4 +1,32 @@
 """Space and lenses: cameras, board, rods, centrelines, silhouettes, contact; settings and refusals of vision.
 
 Imports nothing else of vision.
+
+`bench` imports the names below from here (see `vision`).
 """
+
+from vision.geometry.lazy_names import lazy_names
+
+NAMES = {
+    "board": ("Board",),
+    "camera": ("Camera", "Cameras"),
+    "centreline": ("REST_POWERS", "one_curve", "rotation_z"),
+    "contact": ("BarAxis",),
+    "forms": ("touched_object",),
+    "lens": ("LENS_TERMS",),
+    "number_words": ("counted",),
+    "reasons": ("NO_REASON", "Reason", "UNNAMED", "as_reason", "joined"),
+    "refusals": ("Refused",),
+    "rods": ("Bar", "Rods", "Wire"),
+    "rotation": (
+        "apply",
+        "compose",
+        "invert_transform",
+        "log_rotation",
+        "nearest_rotation",
+        "skew",
+    ),
+    "touched": ("StatedSizes", "Touched"),
+    "vision_settings": ("VisionSettings",),
+}
+__getattr__ = lazy_names(__name__, NAMES)

@@ -20,7 +20,7 @@ from vision.fit.refinements import Fit, LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before
-from vision.geometry.counted import counted
+from vision.geometry.number_words import counted
 from vision.geometry.reasons import Reason, joined
 from vision.geometry.refusals import Misled, Refused, TooFewFrames
 from vision.geometry.rods import Rods, Wire

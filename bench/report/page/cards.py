@@ -14,9 +14,8 @@ from bench.report.page.thumbnails import picture_source
 from bench.report.page.words import MISSING, Row, number, value_text, with_sigma
 from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
-from vision.fit.beam_check import BeamCheck
-from vision.geometry.counted import counted
-from vision.truth.value import UNKNOWN, Value
+from vision import UNKNOWN, BeamCheck, Value
+from vision.geometry import counted
 
 SOUND = "sound"
 _DEGREES = math.degrees(1.0)

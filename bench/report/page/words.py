@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from bench.base.numbers import MISSING, number, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
-from vision.truth.value import Value
+from vision import Value
 
 __all__ = ["MISSING", "Row", "by_whisk", "number", "rows_of", "value_text", "with_sigma"]
 

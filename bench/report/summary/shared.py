@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from bench.records.trial_result import TrialResult, whisks
-from vision.geometry.reasons import Reason
+from vision.geometry import Reason
 
 # Causes of `budget` that are the same wire, bar, lamp, lenses and board in every whisk.
 SHARED = ("diameters", "light", "cameras", "placement")

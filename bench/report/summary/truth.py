@@ -9,8 +9,7 @@ from bench.gauges.felt import lateness
 from bench.records.trial_result import TrialResult, whisks
 from bench.report.assembly import BEAM_UNITS, beam_rows, budget_rows
 from bench.trials.clocks import shared_touch
-from vision.fit.covariance import CAUSES
-from vision.truth.value import Value
+from vision import CAUSES, Value
 
 _LEAST_SHOWN_PERCENT = 0.5  # rounds to 0 %
 

@@ -13,7 +13,7 @@ from bench.gauges.matrix import FROM_ALL, GaugeCalibration
 from bench.records.trial_result import TrialResult, whisks
 from bench.report.estimator_accuracy import Accuracy, RunAccuracy, TruthUncertainty
 from bench.trials.estimate_errors import Judged
-from vision.geometry.counted import counted
+from vision.geometry import counted
 
 _ASSUMPTIONS = {
     "no_slip": "that the contact does not slip sideways",

@@ -7,8 +7,7 @@ from bench.base.doubts import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.session import Session
-from vision.geometry.counted import counted
-from vision.geometry.reasons import Reason, as_reason
+from vision.geometry import Reason, as_reason, counted
 
 # Codes of statuses that are as they should be: of a session without pictures, of a gauge trial.
 SILENT = {"no_pictures", "own_gauges"}

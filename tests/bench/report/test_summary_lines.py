@@ -26,7 +26,7 @@ from estimator.signal import FeltTouch
 from tests.scenes.results import seen_whisk, trial_result
 from vision.fit.beam_check import BeamCheck, Compared
 from vision.fit.covariance import CAUSES
-from vision.geometry.counted import counted
+from vision.geometry.number_words import counted
 from vision.truth.value import Value
 from vision.wire.one_sided import SeenWidth
 

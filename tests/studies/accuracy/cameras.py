@@ -25,7 +25,7 @@ from bench.cameras.calibrate_session import calibrate_from
 from bench.session.session import load_session
 from vision.boards.corners import Corners, detect, find_corners
 from vision.calibration.calibrate import calibrate_cameras
-from vision.calibration.held_out import held_out
+from vision.calibration.held_out import check_held_out
 from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera
@@ -59,7 +59,7 @@ def real_video(folder: Path, names: list[str], find, **how) -> str:
     sizes = {name: frames.size_px for name, frames in series.items()}
     made = calibrate_cameras(BoardViews(kept, sizes), WEBCAM_BOARD, None, **how)
     done = time.perf_counter()
-    got = held_out(made, views, is_held, WEBCAM_BOARD)
+    got = check_held_out(made, views, is_held, WEBCAM_BOARD)
     alone = np.sqrt(np.mean(np.square(list(got.alone_px.values()))))
     seconds = f"{found - begin:.1f} s corners, {done - found:.1f} s adjustment"
     if not got.corners:

@@ -5,7 +5,7 @@ import pytest
 
 from vision.boards.corners import Corners, find_corners
 from vision.calibration.calibrate import calibrate_cameras
-from vision.calibration.held_out import held_out
+from vision.calibration.held_out import check_held_out
 from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
 from vision.pictures.frames import Frames
@@ -31,7 +31,7 @@ def measured(folder, names):
         n: [Corners.none() if out else v for v, out in zip(vs, is_held)] for n, vs in views.items()
     }
     made = calibrate_cameras(BoardViews(kept, sizes), BOARD, None)
-    return held_out(made, views, is_held, BOARD)
+    return check_held_out(made, views, is_held, BOARD)
 
 
 @pytest.mark.parametrize("name, best_of_others_px", [("cam_0", 0.338), ("cam_2", 0.189)])
