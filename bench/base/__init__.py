@@ -1,4 +1,4 @@
-"""What every part of the bench needs: errors, doubts, atomic files, results and hashes, workers, settings, drawing.
+"""What every part of the bench needs: errors, warnings, atomic files, results and hashes, workers, settings, drawing.
 
 Imports nothing else of bench.
 """

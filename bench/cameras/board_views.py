@@ -182,12 +182,12 @@ def _times(session: Session, boards: Mapping[str, list[Corners]]) -> dict[str, n
     times = {}
     for name, views in boards.items():
         file = files[name]
-        shown = f"boards/{file.name}"
-        table = read_table(file, shown)
-        require_columns(table, ("time_s",), shown)
-        table, _ = forward_in_time(table, "time_s", shown)
+        label = f"boards/{file.name}"
+        table = read_table(file, label)
+        require_columns(table, ("time_s",), label)
+        table, _ = forward_in_time(table, "time_s", label)
         if len(table) != len(views):
             found = f"has {len(table)} rows, boards/{name} has {len(views)} frames"
-            raise BadInput(found, file=shown)
+            raise BadInput(found, file=label)
         times[name] = table["time_s"]
     return times

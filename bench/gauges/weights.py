@@ -72,7 +72,7 @@ def _factor(
         raise BadInput(
             f"{hung} should give {moment_Nmm:.3g} N·mm; the gauges say {felt_Nmm:.3g}. Does it "
             "hang along rig −z, and is follicle_roll_deg right?",
-            file=trial.shown("trial.toml"),
+            file=trial.label("trial.toml"),
         )
     by_force = trial.force_sigma_N / trial.force_N
     by_place = trial.at_sigma_mm / trial.at_mm

@@ -1,4 +1,4 @@
-"""What people look at: tables, figures, overlays, summary, score of synthetic sessions, pooled runs.
+"""What people read: tables, figures, overlays, summary, score of synthetic sessions, pooled runs.
 
 May import all folders of bench but theory.
 """

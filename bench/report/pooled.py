@@ -111,7 +111,7 @@ def _result(out: Path, trial: str | None) -> TrialResult:
 def _check_given_once(runs: Sequence[tuple[Path, list[TrialResult]]]) -> None:
     """Raise BadInput where two runs hold the same recording.
 
-    A recording that is counted twice would look like two that agree.
+    A recording that is counted twice would pass for two that agree.
     """
     run_of: dict[str, Path] = {}  # by hash
     for out, results in runs:

@@ -8,7 +8,7 @@ instead of nearest). The others say what friction does in the plane that touches
 - sliding: the force lies on the edge of the friction cone, against the motion of the whisker's
   material there, whatever its direction (along the object or along the whisker);
 - held: the material does not move along the object. Along the whisker it slides all the same, since
-  a rod that does not stretch cannot bend between two fixed points; what the cone leaves of the
+  an inextensible rod cannot bend between two fixed points; what the cone leaves of the
   friction acts there.
 """
 

@@ -173,7 +173,7 @@ def _tagged(column: str, whisker: str) -> str:
 def _tagged_columns(trial: Trial, whisker: str) -> dict[str, str]:
     """Return time and motor angle, and a whisker's own columns in signals.csv, by what they are."""
     path = trial.signals_path
-    in_file = column_names(path, trial.shown(path.name))
+    in_file = column_names(path, trial.label(path.name))
     columns = {TIME: TIME, MOTOR: MOTOR}
     for column in (MOTOR, *_OWN):
         if _tagged(column, whisker) in in_file:

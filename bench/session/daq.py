@@ -51,7 +51,7 @@ class DaqFile:
     channels: dict[str, Channel]
 
 
-def daq_file(keys: manifest.SignalKeys | None, shown: str) -> DaqFile | None:
+def daq_file(keys: manifest.SignalKeys | None, label: str) -> DaqFile | None:
     """Return the file of [signals] of session.toml; None without that table.
 
     Raises BadInput for a file that is not in the trial's folder, or of no known kind.
@@ -61,10 +61,10 @@ def daq_file(keys: manifest.SignalKeys | None, shown: str) -> DaqFile | None:
     name = Path(keys.file)
     if name.name != keys.file or keys.file in ("", ".", ".."):
         fix = "must be the name of a file in each trial's folder"
-        raise BadInput(f"[signals] file {keys.file!r} {fix}", file=shown)
+        raise BadInput(f"[signals] file {keys.file!r} {fix}", file=label)
     if name.suffix.lower() not in _READERS:
         known = f"is of no kind that is read; these are: {', '.join(_READERS)}"
-        raise BadInput(f"[signals] file {keys.file!r} {known}", file=shown)
+        raise BadInput(f"[signals] file {keys.file!r} {known}", file=label)
     channels = {}
     for column, channel in values(keys, leave_out=("file", "rate_Hz")).items():
         if channel is not None:
@@ -72,17 +72,17 @@ def daq_file(keys: manifest.SignalKeys | None, shown: str) -> DaqFile | None:
     return DaqFile(keys.file, keys.rate_Hz, channels)
 
 
-def read_daq(path: Path, daq: DaqFile, shown: str) -> NumberTable:
+def read_daq(path: Path, daq: DaqFile, label: str) -> NumberTable:
     """Read the columns of [signals], and time_s; frame_V is left to `frame_edges`.
 
     Raises BadInput where a channel is not there, is no series of finite numbers, or lengths differ.
     """
     channels = {name: one for name, one in daq.channels.items() if name != _FRAME}
-    columns = dict(zip(channels, _read(path, list(channels.values()), shown)))
+    columns = dict(zip(channels, _read(path, list(channels.values()), label)))
     lengths = {len(column) for column in columns.values()}
     if len(lengths) != 1:
         found = ", ".join(f"{name} {len(column)}" for name, column in columns.items()) or "none"
-        raise BadInput(f"channels must have one length; found {found}", file=shown)
+        raise BadInput(f"channels must have one length; found {found}", file=label)
     count = lengths.pop()
     if _TIME not in columns:
         if daq.rate_Hz is None:
@@ -92,65 +92,65 @@ def read_daq(path: Path, daq: DaqFile, shown: str) -> NumberTable:
     return NumberTable(columns, np.arange(1, count + 1))
 
 
-def frame_edges(path: Path, daq: DaqFile, time_s: np.ndarray, shown: str) -> np.ndarray:
+def frame_edges(path: Path, daq: DaqFile, time_s: np.ndarray, label: str) -> np.ndarray:
     """Return the times (n,) at which the camera's channel rises through the middle of its range.
 
     Times are interpolated between samples. Raises BadInput where the channel has other samples than
     the rest.
     """
     channel = daq.channels[_FRAME]
-    (level,) = _read(path, [channel], shown)
+    (level,) = _read(path, [channel], label)
     if len(level) != len(time_s):
         found = f"channel {channel.channel} has {len(level)} samples, the others {len(time_s)}"
-        raise BadInput(found, file=shown)
+        raise BadInput(found, file=label)
     middle = 0.5 * (level.min() + level.max())
     k = np.flatnonzero((level[:-1] < middle) & (level[1:] >= middle))
     share = (middle - level[k]) / (level[k + 1] - level[k])
     return time_s[k] + share * (time_s[k + 1] - time_s[k])
 
 
-def _read(path: Path, channels: list[Channel], shown: str) -> list[np.ndarray]:
+def _read(path: Path, channels: list[Channel], label: str) -> list[np.ndarray]:
     """Read the values (n,) of channels."""
-    check_size(path, _MOST_BYTES, "record in several trials", shown)
+    check_size(path, _MOST_BYTES, "record in several trials", label)
     reader = _READERS[path.suffix.lower()]
-    raw = reader(path, [channel.channel for channel in channels], shown)
-    return [_scaled(series, channel, shown) for series, channel in zip(raw, channels)]
+    raw = reader(path, [channel.channel for channel in channels], label)
+    return [_scaled(series, channel, label) for series, channel in zip(raw, channels)]
 
 
-def _scaled(series: Any, channel: Channel, shown: str) -> np.ndarray:
+def _scaled(series: Any, channel: Channel, label: str) -> np.ndarray:
     """Return the values (n,) of a raw series. Raise BadInput where it is none of finite numbers."""
     name = f"channel {channel.channel}"
     try:
         raw = np.squeeze(np.asarray(series, dtype=float))
     except (TypeError, ValueError):
-        raise BadInput(f"{name} holds no numbers", file=shown) from None
+        raise BadInput(f"{name} holds no numbers", file=label) from None
     if raw.ndim != 1 or len(raw) < 2:
-        raise BadInput(f"{name} is no series: its shape is {raw.shape}", file=shown)
+        raise BadInput(f"{name} is no series: its shape is {raw.shape}", file=label)
     bad = np.flatnonzero(~np.isfinite(raw))
     if len(bad):
-        raise BadInput(f"{name} is not a finite number", file=shown, row=int(bad[0]) + 1)
+        raise BadInput(f"{name} is not a finite number", file=label, row=int(bad[0]) + 1)
     return channel.scale * raw + channel.offset
 
 
-def _no_channel(name: str, names: Iterable[str], shown: str) -> BadInput:
+def _no_channel(name: str, names: Iterable[str], label: str) -> BadInput:
     """Return the error of a channel that is not among the names of a file."""
     names = list(names)
     more = ", …" if len(names) > _MOST_LISTED else ""
     listed = ", ".join(names[:_MOST_LISTED]) or "none"
-    return BadInput(f"has no channel {name}; it has {listed}{more}", file=shown)
+    return BadInput(f"has no channel {name}; it has {listed}{more}", file=label)
 
 
-def _csv(path: Path, names: list[str], shown: str) -> list:
+def _csv(path: Path, names: list[str], label: str) -> list:
     """Read raw series of a CSV file."""
-    columns = column_names(path, shown)
+    columns = column_names(path, label)
     for name in names:
         if name not in columns:
-            raise _no_channel(name, columns, shown)
-    table = read_table(path, shown, only=names)
+            raise _no_channel(name, columns, label)
+    table = read_table(path, label, only=names)
     return [table[name] for name in names]
 
 
-def _mat(path: Path, names: list[str], shown: str) -> list:
+def _mat(path: Path, names: list[str], label: str) -> list:
     """Read raw series of a MATLAB file."""
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
@@ -158,61 +158,61 @@ def _mat(path: Path, names: list[str], shown: str) -> list:
     try:
         content = loadmat(path, simplify_cells=True)
     except NotImplementedError:  # version 7.3 is HDF5
-        return _hdf5(path, names, shown)
+        return _hdf5(path, names, label)
     except (MatReadError, *_NOT_MATLAB) as problem:
-        raise BadInput(f"cannot be read as a MATLAB file ({problem})", file=shown) from None
-    return [_variable(content, name, shown) for name in names]
+        raise BadInput(f"cannot be read as a MATLAB file ({problem})", file=label) from None
+    return [_variable(content, name, label) for name in names]
 
 
-def _variable(content: dict, name: str, shown: str) -> Any:
+def _variable(content: dict, name: str, label: str) -> Any:
     """Return the variable `a/b` of a MATLAB file. Raise BadInput where there is none."""
     found = content
     for part in name.split("/"):
         fields = found if isinstance(found, dict) else {}
         if part not in fields:
             named = [field for field in fields if not field.startswith("__")]
-            raise _no_channel(name, named, shown)
+            raise _no_channel(name, named, label)
         found = fields[part]
     return found
 
 
-def _hdf5(path: Path, names: list[str], shown: str) -> list:
+def _hdf5(path: Path, names: list[str], label: str) -> list:
     """Read raw series of an HDF5 file."""
-    h5py = _extra("h5py", "hdf5", shown)
+    h5py = _extra("h5py", "hdf5", label)
     try:
         with h5py.File(path, "r") as file:
             for name in names:
                 if not isinstance(file.get(name), h5py.Dataset):
-                    raise _no_channel(name, file, shown)
+                    raise _no_channel(name, file, label)
             return [file[name][()] for name in names]
     except OSError as problem:
-        raise BadInput(f"cannot be read as HDF5 ({problem})", file=shown) from None
+        raise BadInput(f"cannot be read as HDF5 ({problem})", file=label) from None
 
 
-def _tdms(path: Path, names: list[str], shown: str) -> list:
+def _tdms(path: Path, names: list[str], label: str) -> list:
     """Read raw series of a TDMS file."""
-    nptdms = _extra("nptdms", "tdms", shown)
+    nptdms = _extra("nptdms", "tdms", label)
     try:
         file = nptdms.TdmsFile.read(path)
     except _NOT_TDMS as problem:
-        raise BadInput(f"cannot be read as TDMS ({problem})", file=shown) from None
+        raise BadInput(f"cannot be read as TDMS ({problem})", file=label) from None
     channels = {}
     for group in file.groups():
         for channel in group.channels():
             channels[f"{group.name}/{channel.name}"] = channel
     for name in names:
         if name not in channels:
-            raise _no_channel(name, channels, shown)
+            raise _no_channel(name, channels, label)
     return [channels[name][:] for name in names]
 
 
-def _extra(module: str, extra: str, shown: str) -> Any:
+def _extra(module: str, extra: str, label: str) -> Any:
     """Import a library that not everybody needs. Raise BadInput where it is not installed."""
     try:
         return importlib.import_module(module)
     except ImportError:
         fix = f"needs {module}: pip install 'whisker-bench[{extra}]'"
-        raise BadInput(fix, file=shown) from None
+        raise BadInput(fix, file=label) from None
 
 
 _READERS: dict[str, Callable[[Path, list[str], str], list]] = {

@@ -17,7 +17,7 @@ from vision.pictures import (
 )
 
 
-def camera_sources(folder: Path, shown: str) -> dict[str, Path]:
+def camera_sources(folder: Path, label: str) -> dict[str, Path]:
     """Return the folder of pictures or the video of each camera in `folder`, by the camera's name.
 
     Folders without pictures are no cameras. Raises BadInput where one camera has a folder and a
@@ -30,12 +30,12 @@ def camera_sources(folder: Path, shown: str) -> dict[str, Path]:
         name = entry.name if entry.is_dir() else entry.stem
         if name in sources:
             found = f"camera {name} has {sources[name].name} and {entry.name}"
-            raise BadInput(f"{found}; keep one", file=shown)
+            raise BadInput(f"{found}; keep one", file=label)
         sources[name] = entry
     return sources
 
 
-def single_pictures(folder: Path, shown: str) -> dict[str, Path]:
+def single_pictures(folder: Path, label: str) -> dict[str, Path]:
     """Return the one picture of each camera in `folder` (boards/rig), by the camera's name.
 
     Raises BadInput where a camera has two.
@@ -45,7 +45,7 @@ def single_pictures(folder: Path, shown: str) -> dict[str, Path]:
         if entry.suffix.lower() not in PICTURE_SUFFIXES:
             continue
         if entry.stem in pictures:
-            raise BadInput(f"camera {entry.stem} has two pictures here; keep one", file=shown)
+            raise BadInput(f"camera {entry.stem} has two pictures here; keep one", file=label)
         pictures[entry.stem] = entry
     return pictures
 

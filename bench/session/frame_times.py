@@ -89,7 +89,7 @@ def frame_times(trial: Trial) -> FrameTimes:
         missing = [camera for camera in cameras if camera not in with_own]
         if missing:
             found = f"is missing, and camera {with_own[0]} has its own"
-            raise BadInput(found, file=trial.shown(_own_file(missing[0])))
+            raise BadInput(found, file=trial.label(_own_file(missing[0])))
         return _in_own_files(trial)
     if not cameras:
         return FrameTimes(np.array([]), "none", {})
@@ -137,15 +137,15 @@ def _all_pictures(trial: Trial, count: int) -> dict[str, np.ndarray]:
 
 def _in_common_file(trial: Trial) -> FrameTimes:
     """Return the times of frames.csv: all cameras were triggered together."""
-    shown = trial.shown("frames.csv")
-    table, repeats = _read(trial.folder / "frames.csv", shown)
+    label = trial.label("frames.csv")
+    table, repeats = _read(trial.folder / "frames.csv", label)
     warnings: list[str] = []
     for camera in trial.camera_sources:
-        warnings += _count_warnings(trial, camera, len(table), shown)
-    _check_rate(table[TIME], trial, shown)
-    warnings += _header_warnings(table[TIME], trial, trial.camera_sources, shown)
+        warnings += _count_warnings(trial, camera, len(table), label)
+    _check_rate(table[TIME], trial, label)
+    warnings += _header_warnings(table[TIME], trial, trial.camera_sources, label)
     if repeats:
-        line = f"{shown}: {counted(repeats, 'repeated row')} dropped"
+        line = f"{label}: {counted(repeats, 'repeated row')} dropped"
         warnings.append(Reason("rows_repeated", line))
     picture = _all_pictures(trial, len(table))
     return FrameTimes(table[TIME], "frames.csv", picture, warnings=tuple(warnings))
@@ -156,10 +156,10 @@ def _in_own_files(trial: Trial) -> FrameTimes:
     times_s = {}
     warnings: list[str] = []
     for camera in trial.camera_sources:
-        shown = trial.shown(_own_file(camera))
-        table, _ = _read(trial.folder / _own_file(camera), shown)
-        warnings += _count_warnings(trial, camera, len(table), shown)
-        warnings += _header_warnings(table[TIME], trial, [camera], shown)
+        label = trial.label(_own_file(camera))
+        table, _ = _read(trial.folder / _own_file(camera), label)
+        warnings += _count_warnings(trial, camera, len(table), label)
+        warnings += _header_warnings(table[TIME], trial, [camera], label)
         times_s[camera] = table[TIME]
     time_s, picture, spread_s = merge_times(times_s)
     return FrameTimes(time_s, "frames_<camera>.csv", picture, spread_s, tuple(warnings))
@@ -191,14 +191,14 @@ def merge_times(
 def _by_edges(trial: Trial, daq: DaqFile) -> FrameTimes:
     """Return the rising edges of a channel of the DAQ, one a frame of every camera."""
     path = trial.signals_path
-    shown = trial.shown(path.name)
-    edges_s = frame_edges(path, daq, read_daq(path, daq, shown)[TIME], shown)
+    label = trial.label(path.name)
+    edges_s = frame_edges(path, daq, read_daq(path, daq, label)[TIME], label)
     count = _one_count(_frame_counts(trial), trial)
     if len(edges_s) != count:
         rises = f"channel {daq.channels['frame_V'].channel} rises {len(edges_s)} times"
         found = f"{rises}, the cameras have {count} frames"
-        raise BadInput(f"{found}; there must be an edge a frame", file=shown)
-    warnings = tuple(_header_warnings(edges_s, trial, trial.camera_sources, shown))
+        raise BadInput(f"{found}; there must be an edge a frame", file=label)
+    warnings = tuple(_header_warnings(edges_s, trial, trial.camera_sources, label))
     picture = _all_pictures(trial, count)
     return FrameTimes(edges_s, "edges of a DAQ channel", picture, warnings=warnings)
 
@@ -260,34 +260,34 @@ def _container_times(source: Path, trial: Trial) -> np.ndarray:
             line = f"there are no frame times, and {problem}; {fix}"
             raise BadInput(line, file=_shown(trial)) from None
     if found is None:
-        raise BadInput(f"there are no frame times; {fix}", file=trial.shown("frames.csv"))
+        raise BadInput(f"there are no frame times; {fix}", file=trial.label("frames.csv"))
     return found
 
 
-def _read(path: Path, shown: str) -> tuple[NumberTable, int]:
+def _read(path: Path, label: str) -> tuple[NumberTable, int]:
     """Read a table of frame times; return it and how many repeated rows it had.
 
     Raises BadInput where times or frame numbers do not increase.
     """
-    table = read_table(path, shown)
-    require_columns(table, (FRAME, TIME), shown)
-    table, repeats = forward_in_time(table, TIME, shown)
+    table = read_table(path, label)
+    require_columns(table, (FRAME, TIME), label)
+    table, repeats = forward_in_time(table, TIME, label)
     wrong = np.flatnonzero(np.diff(table[FRAME]) <= 0)
     if len(wrong):
         row = int(table.row[wrong[0] + 1])
         found = "frame numbers must increase, a row a picture"
-        raise BadInput(found, file=shown, row=row, column=FRAME)
+        raise BadInput(found, file=label, row=row, column=FRAME)
     return table, repeats
 
 
-def _count_warnings(trial: Trial, camera: str, rows: int, shown: str) -> tuple[str, ...]:
+def _count_warnings(trial: Trial, camera: str, rows: int, label: str) -> tuple[str, ...]:
     """Return warnings on a camera's number of frames.
 
     Raises BadInput where it is not the number of rows. A video that is cut short is the trial's
     trouble, not the session's: its header still declares the rows, or it does not open at all.
     """
     source = trial.camera_sources[camera]
-    place = trial.shown(source.name)
+    place = trial.label(source.name)
     declared = frame_count(source)
     if declared == rows:
         return ()
@@ -299,7 +299,7 @@ def _count_warnings(trial: Trial, camera: str, rows: int, shown: str) -> tuple[s
         line = f"{place}: the header declares {counted(declared, 'frame')}, there are {found}"
         return (Reason("frame_count_unlike_header", line),)
     unlike = f"has {counted(rows, 'row')}, camera {camera} has {counted(found, 'frame')}"
-    raise BadInput(f"{unlike}; there must be a row a frame", file=shown)
+    raise BadInput(f"{unlike}; there must be a row a frame", file=label)
 
 
 def _frame_counts(trial: Trial) -> dict[str, int]:
@@ -317,7 +317,7 @@ def _one_count(counts: Mapping[str, int], trial: Trial) -> int:
     return next(iter(counts.values()))
 
 
-def _check_rate(time_s: np.ndarray, trial: Trial, shown: str) -> None:
+def _check_rate(time_s: np.ndarray, trial: Trial, label: str) -> None:
     """Raise BadInput where a stated frame rate is not that of the times between dropped frames."""
     if trial.frame_rate_Hz is None or len(time_s) < 3:
         return
@@ -327,7 +327,7 @@ def _check_rate(time_s: np.ndarray, trial: Trial, shown: str) -> None:
     if abs(found_s - stated_s) > _RATE_TOLERANCE * stated_s + _CLOCK_STEP_S / len(usual):
         stated = f"trial.toml says frame_rate_Hz = {trial.frame_rate_Hz:g}"
         found = f"frames come at {1 / found_s:.6g} Hz, {stated}"
-        raise BadInput(f"{found}; mend the wrong one (or take frame_rate_Hz out)", file=shown)
+        raise BadInput(f"{found}; mend the wrong one (or take frame_rate_Hz out)", file=label)
 
 
 def _usual_steps(time_s: np.ndarray) -> np.ndarray:
@@ -337,7 +337,7 @@ def _usual_steps(time_s: np.ndarray) -> np.ndarray:
 
 
 def _header_warnings(
-    time_s: np.ndarray, trial: Trial, cameras: Iterable[str], shown: str
+    time_s: np.ndarray, trial: Trial, cameras: Iterable[str], label: str
 ) -> Iterator[str]:
     """Yield a line on each video whose header states another rate than the times.
 
@@ -351,7 +351,7 @@ def _header_warnings(
         if stated_Hz and abs(stated_Hz / found_Hz - 1.0) > _HEADER_TOLERANCE:
             yield Reason(
                 "rate_unlike_header",
-                f"{shown}: frames come at {found_Hz:.4g} Hz, the header of {source.name} says "
+                f"{label}: frames come at {found_Hz:.4g} Hz, the header of {source.name} says "
                 f"{stated_Hz:.4g} Hz; the times are taken: where they are right, say so by "
                 "frame_rate_Hz in trial.toml, or in [trial] of session.toml",
             )

@@ -39,10 +39,10 @@ class _Inspection:
     session: Path
     follow_links: bool
 
-    def refused(self, folder: Path, shown: PurePath) -> Iterator[str]:
-        """Yield a line on each entry that is not opened. shown: the folder's path in the session."""
+    def refused(self, folder: Path, label: PurePath) -> Iterator[str]:
+        """Yield a line on each entry that is not opened. label: the folder's path in the session."""
         for path in sorted(folder.iterdir()):
-            name = shown / path.name
+            name = label / path.name
             if path.name.startswith("."):
                 continue
             if path.is_symlink():

@@ -105,13 +105,13 @@ def check_recording(trial: Trial, doubts: Doubts) -> None:
 
 def _note_signals(trial: Trial, signals: Signals, doubts: Doubts) -> None:
     """Note warnings about a trial's signals, and what was mended in them."""
-    shown = trial.shown(trial.signals_path.name)
+    label = trial.label(trial.signals_path.name)
     for warning in signals.warnings:
         doubts.note(warning)
     for cause, count in signals.dropped.items():
-        doubts.note(reason("signals_mended", shown=shown, count=count, cause=cause))
+        doubts.note(reason("signals_mended", label=label, count=count, cause=cause))
     if trial.purpose != "weight" and not signals.warnings and not forward_strokes(signals):
-        doubts.note(reason("no_forward_stroke", shown=shown))
+        doubts.note(reason("no_forward_stroke", label=label))
 
 
 def _check_clock(trial: Trial, signals_s: np.ndarray, frames_s: np.ndarray, doubts: Doubts) -> None:
@@ -159,18 +159,18 @@ def _check_camera_sizes(session: Session, camera: str, calibrated_size: Size | N
     first_file = "cameras.toml"
     first_size = calibrated_size
     for file in _files_of_camera(session, camera):
-        shown = file.relative_to(session.path).as_posix()
-        _check_stack(file, camera, shown)
+        label = file.relative_to(session.path).as_posix()
+        _check_stack(file, camera, label)
         size = _size(file)
         if size is None:
             continue
         if first_size is None:
-            first_file = shown
+            first_file = label
             first_size = size
         if size != first_size:
             found = f"is {_px(size)}, but {first_file} is {_px(first_size)}"
             rule = "a camera has one size, and pictures are never rescaled"
-            raise BadInput(f"{found}; {rule}", file=shown)
+            raise BadInput(f"{found}; {rule}", file=label)
 
 
 def _files_of_camera(session: Session, camera: str) -> Iterator[Path]:
@@ -183,14 +183,14 @@ def _files_of_camera(session: Session, camera: str) -> Iterator[Path]:
         yield session.rig_pictures[camera]
 
 
-def _check_stack(file: Path, camera: str, shown: str) -> None:
+def _check_stack(file: Path, camera: str, label: str) -> None:
     """Raise BadInput for a stack of pictures within the camera's folder."""
     if file.suffix.lower() not in STACK_SUFFIXES or file.parent.name != camera:
         return
     count = page_count(file)
     if count > 1:
         rule = "a stack stands beside the camera's folder, in place of it"
-        raise BadInput(f"holds {count} pictures; {rule}, as {camera}{file.suffix}", file=shown)
+        raise BadInput(f"holds {count} pictures; {rule}, as {camera}{file.suffix}", file=label)
 
 
 def _size(file: Path) -> Size | None:
@@ -222,8 +222,8 @@ def find_damage(
     for source in each(sources):
         found = _damage(source)
         if found:
-            shown = source.relative_to(session.path).as_posix()
-            doubts.note(Reason("frames_damaged", f"{shown}: {found}"))
+            label = source.relative_to(session.path).as_posix()
+            doubts.note(Reason("frames_damaged", f"{label}: {found}"))
 
 
 def _damage(source: Path) -> str:

@@ -112,13 +112,13 @@ def read_signals(trial: Trial) -> Signals:
     millivolts).
     """
     path = trial.signals_path
-    shown = trial.shown(path.name)
-    table = read_table(path, shown) if trial.daq is None else read_daq(path, trial.daq, shown)
-    kind, channels = _kind_and_channels(table, shown)
-    forces = _force_columns(table, shown)
-    table, duplicates = forward_in_time(table, TIME, shown)
+    label = trial.label(path.name)
+    table = read_table(path, label) if trial.daq is None else read_daq(path, trial.daq, label)
+    kind, channels = _kind_and_channels(table, label)
+    forces = _force_columns(table, label)
+    table, duplicates = forward_in_time(table, TIME, label)
     motor_deg, wraps = _unwrapped(table[MOTOR])
-    _check_units(table, VOLTAGE if kind == "V" else MOMENT, channels, shown)
+    _check_units(table, VOLTAGE if kind == "V" else MOMENT, channels, label)
     mended = {"duplicate rows": duplicates, "encoder wraps": wraps}
     return Signals(
         time_s=table[TIME],
@@ -127,34 +127,34 @@ def read_signals(trial: Trial) -> Signals:
         z=table[channels[1]],
         kind=kind,
         dropped={cause: count for cause, count in mended.items() if count},
-        warnings=_motor_warnings(table[TIME], motor_deg, trial, shown),
-        forces_N=_forces_N(table, forces, shown) if forces else None,
+        warnings=_motor_warnings(table[TIME], motor_deg, trial, label),
+        forces_N=_forces_N(table, forces, label) if forces else None,
     )
 
 
-def _kind_and_channels(table: NumberTable, shown: str) -> tuple[str, tuple[str, str]]:
+def _kind_and_channels(table: NumberTable, label: str) -> tuple[str, tuple[str, str]]:
     """Return "V" or "Nmm", and the names of its two columns. Raise BadInput where not both are there."""
     has_volts = any(name in table.columns for name in VOLTS)
     has_moments = any(name in table.columns for name in MOMENTS)
     if has_volts and has_moments:
-        raise BadInput("has volts and moments; keep y_V,z_V or m_y_Nmm,m_z_Nmm", file=shown, row=1)
+        raise BadInput("has volts and moments; keep y_V,z_V or m_y_Nmm,m_z_Nmm", file=label, row=1)
     kind, channels = ("Nmm", MOMENTS) if has_moments else ("V", VOLTS)
-    require_columns(table, (TIME, MOTOR, *channels), shown)
+    require_columns(table, (TIME, MOTOR, *channels), label)
     return kind, channels
 
 
-def _forces_N(table: NumberTable, names: Sequence[str], shown: str) -> np.ndarray:
+def _forces_N(table: NumberTable, names: Sequence[str], label: str) -> np.ndarray:
     """Return the forces (n, 3). Raise BadInput where one seems to be in another unit."""
     for name in names:
-        FORCE.check(_extreme(table[name]), f"the largest {name}", shown)
+        FORCE.check(_extreme(table[name]), f"the largest {name}", label)
     return np.column_stack([table[name] for name in names])
 
 
-def _force_columns(table: NumberTable, shown: str) -> tuple[str, ...]:
+def _force_columns(table: NumberTable, label: str) -> tuple[str, ...]:
     """Return the load cell's columns, all three or none. Raise BadInput where some are missing."""
     if not any(name in table.columns for name in FORCES):
         return ()
-    require_columns(table, FORCES, shown)
+    require_columns(table, FORCES, label)
     return FORCES
 
 
@@ -165,14 +165,14 @@ def _unwrapped(motor_deg: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def _check_units(
-    table: NumberTable, channel_range: PlausibleRange, channels: tuple[str, str], shown: str
+    table: NumberTable, channel_range: PlausibleRange, channels: tuple[str, str], label: str
 ) -> None:
     """Raise BadInput where times or channels seem to be in another unit."""
     if len(table) < 2:
-        raise BadInput("has one row; a recording has many", file=shown)
-    SAMPLING_STEP.check(float(np.median(np.diff(table[TIME]))), f"the usual step of {TIME}", shown)
+        raise BadInput("has one row; a recording has many", file=label)
+    SAMPLING_STEP.check(float(np.median(np.diff(table[TIME]))), f"the usual step of {TIME}", label)
     for name in channels:
-        channel_range.check(_extreme(table[name]), f"the largest {name}", shown)
+        channel_range.check(_extreme(table[name]), f"the largest {name}", label)
 
 
 def _extreme(values: np.ndarray) -> float:
@@ -181,7 +181,7 @@ def _extreme(values: np.ndarray) -> float:
 
 
 def _motor_warnings(
-    time_s: np.ndarray, motor_deg: np.ndarray, trial: Trial, shown: str
+    time_s: np.ndarray, motor_deg: np.ndarray, trial: Trial, label: str
 ) -> tuple[str, ...]:
     """Return warnings about angle and speed of the motor, none where a weight hangs.
 
@@ -191,10 +191,10 @@ def _motor_warnings(
         return ()
     range_deg = float(np.ptp(strokes.without_spikes(motor_deg)[0]))
     if range_deg < _STILL_DEG:
-        return (f"{shown}: the motor stands still ({range_deg:.3g}°): no whisk",)
+        return (f"{label}: the motor stands still ({range_deg:.3g}°): no whisk",)
     if range_deg > _TURN_DEG:
         found = f"motor_deg spans {range_deg:.6g}, more than a turn. Is it in encoder counts?"
-        raise BadInput(found, file=shown)
+        raise BadInput(found, file=label)
     speed_deg_s = _measured_speed(time_s, motor_deg)
     is_small = range_deg < _SMALL_RANGE_DEG and not _agree(speed_deg_s, trial.speed_deg_s)
     if is_small or _agree(DEGREES_PER_RADIAN * speed_deg_s, trial.speed_deg_s):
@@ -202,12 +202,12 @@ def _motor_warnings(
         raise BadInput(
             f"motor_deg spans {range_deg:.3g}. Is it in radians? Then write degrees: it would span "
             f"{in_degrees:.3g}",
-            file=shown,
+            file=label,
         )
-    return _speed_warnings(speed_deg_s, trial, shown)
+    return _speed_warnings(speed_deg_s, trial, label)
 
 
-def _speed_warnings(speed_deg_s: float, trial: Trial, shown: str) -> tuple[str, ...]:
+def _speed_warnings(speed_deg_s: float, trial: Trial, label: str) -> tuple[str, ...]:
     """Return a warning where the stated speed is not the motor's. Raise BadInput for rad/s."""
     stated = trial.speed_deg_s
     if stated is None or not speed_deg_s > 0 or _agree(speed_deg_s, stated):
@@ -215,9 +215,9 @@ def _speed_warnings(speed_deg_s: float, trial: Trial, shown: str) -> tuple[str, 
     if _agree(speed_deg_s / DEGREES_PER_RADIAN, stated):
         found = f"speed_deg_s is {stated:g}, but the motor goes at {speed_deg_s:.3g}°/s"
         cure = f"Is it in rad/s? Then write {speed_deg_s:.3g}."
-        raise BadInput(f"{found}. {cure}", file=trial.shown("trial.toml"))
+        raise BadInput(f"{found}. {cure}", file=trial.label("trial.toml"))
     found = f"the motor goes at {speed_deg_s:.3g}°/s, speed_deg_s says {stated:g}"
-    return (Reason("speed_unlike_stated", f"{shown}: {found}"),)
+    return (Reason("speed_unlike_stated", f"{label}: {found}"),)
 
 
 def _measured_speed(time_s: np.ndarray, motor_deg: np.ndarray) -> float:

@@ -31,32 +31,32 @@ class Keys(msgspec.Struct, frozen=True):
     """A table of a file: its keys with their types and defaults."""
 
 
-def read_toml(path: Path, shown: str) -> dict[str, Any]:
-    """Return the tables of a TOML file. Raise BadInput, naming it as `shown`, where it is not one."""
-    check_size(path, _MOST_BYTES, "a few lines are expected", shown)
-    text = read_text(path, "save it as UTF-8", shown)
+def read_toml(path: Path, label: str) -> dict[str, Any]:
+    """Return the tables of a TOML file. Raise BadInput, naming it as `label`, where it is not one."""
+    check_size(path, _MOST_BYTES, "a few lines are expected", label)
+    text = read_text(path, "save it as UTF-8", label)
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as problem:
-        raise _bad_toml(str(problem), text, shown) from None
+        raise _bad_toml(str(problem), text, label) from None
     except RecursionError:
-        raise BadInput("is not TOML: brackets within brackets without end", file=shown) from None
+        raise BadInput("is not TOML: brackets within brackets without end", file=label) from None
 
 
-def _bad_toml(problem: str, text: str, shown: str) -> BadInput:
+def _bad_toml(problem: str, text: str, label: str) -> BadInput:
     """Return the error of a text that is not TOML, with its line."""
     place = re.search(r"line (\d+)", problem)
     if not place:
-        return BadInput(f"is not TOML: {problem}", file=shown)
+        return BadInput(f"is not TOML: {problem}", file=label)
     row = int(place.group(1))
     line = text.splitlines()[row - 1].strip()
     if re.search(r"=\s*-?\d+,\d", line):
-        return BadInput(f"found {line!r}; a decimal comma? Write a point.", file=shown, row=row)
-    return BadInput(f"is not TOML: {problem}; found {line!r}", file=shown, row=row)
+        return BadInput(f"found {line!r}; a decimal comma? Write a point.", file=label, row=row)
+    return BadInput(f"is not TOML: {problem}; found {line!r}", file=label, row=row)
 
 
 def as_keys(
-    tables: dict[str, Any], kind: type[Keys], shown: str, doubts: Doubts, needed: Sequence[str] = ()
+    tables: dict[str, Any], kind: type[Keys], label: str, doubts: Doubts, needed: Sequence[str] = ()
 ) -> Keys:
     """Check a file's tables against `kind`: names, types, plausible values. Return them as `kind`.
 
@@ -66,12 +66,12 @@ def as_keys(
     absent = [f"[{name}] is missing" for name in needed if name not in tables]
     for line in (*_unknown_keys(tables, kind), *absent, *_missing_keys(tables, kind)):
         with doubts.guard():
-            raise BadInput(line, file=shown)
+            raise BadInput(line, file=label)
     try:
         keys = msgspec.convert(tables, kind, strict=True)
     except msgspec.ValidationError as problem:
-        raise BadInput(_in_plain_words(str(problem), kind), file=shown) from None
-    doubts.each(_value_checks(tables, kind, shown))
+        raise BadInput(_in_plain_words(str(problem), kind), file=label) from None
+    doubts.each(_value_checks(tables, kind, label))
     return keys
 
 
@@ -141,7 +141,7 @@ def _missing_keys(tables: dict[str, Any], top: type[Keys]) -> Iterator[str]:
 
 
 def _value_checks(
-    tables: dict[str, Any], top: type[Keys], shown: str
+    tables: dict[str, Any], top: type[Keys], label: str
 ) -> Iterator[Callable[[], None]]:
     """Yield a check of each value, tables within included."""
     for table, kind, path in _tables(tables, top):
@@ -152,20 +152,20 @@ def _value_checks(
                 plausible_range = plausible.SIGMA
             else:
                 plausible_range = plausible_ranges(kind).get(key, plausible.NUMBER)
-            yield partial(_check_value, value, key, plausible_range, path[-1:], shown)
+            yield partial(_check_value, value, key, plausible_range, path[-1:], label)
 
 
 def _check_value(
-    value: Any, key: str, plausible_range: plausible.PlausibleRange, path: TablePath, shown: str
+    value: Any, key: str, plausible_range: plausible.PlausibleRange, path: TablePath, label: str
 ) -> None:
     """Raise BadInput where a value, or a number of its lists, is not plausible."""
     name = _key_path([*path, key])
     for number in _numbers(value):
-        plausible_range.check(number, name, shown)
+        plausible_range.check(number, name, label)
     if key in _SET_BY_PROTRACTOR and plausible.looks_like_radians(value):
         degrees = value * plausible.DEGREES_PER_RADIAN
         found = f"{name} is {value:g}. Is it in radians? Then write {degrees:.4g}."
-        raise BadInput(found, file=shown)
+        raise BadInput(found, file=label)
 
 
 def _numbers(value: Any) -> Iterator[float]:

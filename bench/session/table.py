@@ -43,34 +43,34 @@ class NumberTable:
         return NumberTable(columns, self.row[kept])
 
 
-def read_table(path: Path, shown: str, only: Collection[str] | None = None) -> NumberTable:
+def read_table(path: Path, label: str, only: Collection[str] | None = None) -> NumberTable:
     """Read the columns of a comma-separated file of finite numbers.
 
     only: names of the columns wanted, of which those that are there are read; None: all. A
-    byte-order mark and CRLF are taken. Raises BadInput, naming the file as `shown`: semicolons,
+    byte-order mark and CRLF are taken. Raises BadInput, naming the file as `label`: semicolons,
     tabs, decimal commas, text, an empty cell or row, NaN, infinity, a row too short or too long, no
     rows at all.
     """
-    lines = _lines(path, shown)
-    names = _column_names(lines[0], shown)
+    lines = _lines(path, label)
+    names = _column_names(lines[0], label)
     if len(lines) < 2:
-        raise BadInput(f"has a header and no rows ({','.join(names)})", file=shown)
+        raise BadInput(f"has a header and no rows ({','.join(names)})", file=label)
     chosen = [k for k, name in enumerate(names) if only is None or name in only]
     values = _read_at_once(lines[1:], len(names), chosen)
     if values is None:
-        values = _read_row_by_row(lines[1:], names, shown)[:, chosen]
+        values = _read_row_by_row(lines[1:], names, label)[:, chosen]
     columns = {names[k]: column for k, column in zip(chosen, values.T)}
     return NumberTable(columns, np.arange(2, len(values) + 2))
 
 
-def column_names(path: Path, shown: str) -> list[str]:
+def column_names(path: Path, label: str) -> list[str]:
     """Read the names of a CSV file's columns. Raises BadInput as `read_table` does."""
     with path.open("rb") as file:
         first = file.readline(_MOST_BYTES)
-    return _column_names(decode(first, _EXPORT, shown).rstrip("\r\n"), shown)
+    return _column_names(decode(first, _EXPORT, label).rstrip("\r\n"), label)
 
 
-def forward_in_time(table: NumberTable, time: str, shown: str) -> tuple[NumberTable, int]:
+def forward_in_time(table: NumberTable, time: str, label: str) -> tuple[NumberTable, int]:
     """Drop the rows that repeat the one before them; return the table and how many those were.
 
     Raises BadInput where time goes back, or stands still while another value changes.
@@ -85,42 +85,42 @@ def forward_in_time(table: NumberTable, time: str, shown: str) -> tuple[NumberTa
         if after < before:
             found = f"goes back from {before:.10g} to {after:.10g}"
         fix = "; times must increase (rows that are wholly the same are dropped)"
-        raise BadInput(found + fix, file=shown, row=int(table.row[wrong[0] + 1]), column=time)
+        raise BadInput(found + fix, file=label, row=int(table.row[wrong[0] + 1]), column=time)
     return table, int(repeats.sum())
 
 
-def require_columns(table: NumberTable, names: Sequence[str], shown: str) -> None:
+def require_columns(table: NumberTable, names: Sequence[str], label: str) -> None:
     """Raise BadInput for the first column that is not there, with what it may have been called."""
     for name in names:
         if name in table.columns:
             continue
         near = difflib.get_close_matches(name, table.columns, n=1, cutoff=0.6)
         hint = f"{near[0]!r} (names carry units)" if near else ",".join(table.columns)
-        raise BadInput(f"column {name} is missing; found {hint}", file=shown, row=1)
+        raise BadInput(f"column {name} is missing; found {hint}", file=label, row=1)
 
 
-def _lines(path: Path, shown: str) -> list[str]:
+def _lines(path: Path, label: str) -> list[str]:
     """Return a file's lines without empty ones at its end. Raise BadInput where it has none."""
-    check_size(path, _MOST_BYTES, "record in several trials", shown)
-    lines = read_text(path, _EXPORT, shown).splitlines()
+    check_size(path, _MOST_BYTES, "record in several trials", label)
+    lines = read_text(path, _EXPORT, label).splitlines()
     while lines and not lines[-1].strip():
         lines.pop()
     if not lines:
-        raise BadInput("is empty", file=shown)
+        raise BadInput("is empty", file=label)
     return lines
 
 
-def _column_names(header: str, shown: str) -> list[str]:
+def _column_names(header: str, label: str) -> list[str]:
     """Return the names in a file's first line. Raise BadInput where it does not name columns."""
     for mark, name in _SEPARATORS.items():
         if mark in header:
             fix = "export with commas (and decimal points)"
-            raise BadInput(f"columns are separated by {name}; {fix}", file=shown)
+            raise BadInput(f"columns are separated by {name}; {fix}", file=label)
     names = [name.strip() for name in next(csv.reader([header]))]
     if all(_is_number(name) for name in names):
-        raise BadInput(f"the first row must name the columns; found {header!r}", file=shown, row=1)
+        raise BadInput(f"the first row must name the columns; found {header!r}", file=label, row=1)
     if len(set(names)) < len(names):
-        raise BadInput(f"a column is named twice: {header}", file=shown, row=1)
+        raise BadInput(f"a column is named twice: {header}", file=label, row=1)
     return names
 
 
@@ -141,28 +141,28 @@ def _read_at_once(lines: list[str], width: int, chosen: list[int]) -> np.ndarray
     return values if is_whole else None
 
 
-def _read_row_by_row(lines: list[str], names: list[str], shown: str) -> np.ndarray:
+def _read_row_by_row(lines: list[str], names: list[str], label: str) -> np.ndarray:
     """Read all columns (rows, columns). Raise BadInput naming the first cell that is bad."""
     rows = enumerate(csv.reader(lines), start=2)
-    return np.array([_row(cells, names, shown, row) for row, cells in rows])
+    return np.array([_row(cells, names, label, row) for row, cells in rows])
 
 
-def _row(cells: list[str], names: list[str], shown: str, row: int) -> list[float]:
+def _row(cells: list[str], names: list[str], label: str, row: int) -> list[float]:
     """Return the numbers of a row. Raise BadInput where it is not a number a column."""
     if not "".join(cells).strip():
-        raise BadInput("is empty", file=shown, row=row)
+        raise BadInput("is empty", file=label, row=row)
     if ";" in "".join(cells):
         found = "values are separated by semicolons; export with commas"
-        raise BadInput(found, file=shown, row=row)
+        raise BadInput(found, file=label, row=row)
     if len(cells) != len(names):
         found = f"has {counted(len(cells), 'value')}, the header names {len(names)}."
         if len(names) < len(cells) <= 2 * len(names):
             found += " Decimal commas? Export with decimal points."
-        raise BadInput(found, file=shown, row=row)
-    return [_cell(cell.strip(), name, shown, row) for cell, name in zip(cells, names)]
+        raise BadInput(found, file=label, row=row)
+    return [_cell(cell.strip(), name, label, row) for cell, name in zip(cells, names)]
 
 
-def _cell(cell: str, name: str, shown: str, row: int) -> float:
+def _cell(cell: str, name: str, label: str, row: int) -> float:
     """Return the number of a cell. Raise BadInput where it is none."""
     if _is_number(cell):
         return float(cell)
@@ -172,7 +172,7 @@ def _cell(cell: str, name: str, shown: str, row: int) -> float:
         found = f"{cell!r} has a decimal comma; export with decimal points"
     else:
         found = f"{cell!r} is not a finite number"
-    raise BadInput(found, file=shown, row=row, column=name)
+    raise BadInput(found, file=label, row=row, column=name)
 
 
 def _is_number(cell: str) -> bool:

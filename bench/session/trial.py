@@ -88,7 +88,7 @@ class Trial:
         """Return how messages name the trial: its path in the session, and the whisker of an array."""
         return f"trials/{self.name}{self._of_whisker}"
 
-    def shown(self, file: str) -> str:
+    def label(self, file: str) -> str:
         """Return how messages name one of its files: its path, and the whisker of an array."""
         return f"trials/{self.name}/{file}{self._of_whisker}"
 
@@ -114,19 +114,19 @@ def load_trial(
     daq: of [signals].
     """
     place = f"trials/{folder.name}"
-    shown = f"{place}/{MANIFEST}"
-    keys = _trial_keys(folder, session.trial, shown, doubts)
+    label = f"{place}/{MANIFEST}"
+    keys = _trial_keys(folder, session.trial, label, doubts)
     if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
-        raise BadInput('purpose = "weight" needs force_N and at_mm', file=shown)
+        raise BadInput('purpose = "weight" needs force_N and at_mm', file=label)
     if keys.object_gives_way and keys.object_velocity_mm_s is not None:
         found = "an object that moves does not give way, too; leave out object_velocity_mm_s"
-        raise BadInput(f"object_gives_way: {found}", file=shown)
+        raise BadInput(f"object_gives_way: {found}", file=label)
     signals_path = folder / (daq.file if daq else SIGNALS)
     if not signals_path.is_file():
         found = "is not there; a trial needs its signals"
         raise BadInput(found, file=f"{place}/{signals_path.name}")
     settings = values(keys) | _bar_diameter(keys, session.bar)
-    settings["object"] = _stated_object(keys.object, settings["bar_diameter_mm"], shown)
+    settings["object"] = _stated_object(keys.object, settings["bar_diameter_mm"], label)
     return Trial(
         name=folder.name,
         folder=folder,
@@ -138,7 +138,7 @@ def load_trial(
 
 
 def _trial_keys(
-    folder: Path, defaults: manifest.TrialKeys, shown: str, doubts: Doubts
+    folder: Path, defaults: manifest.TrialKeys, label: str, doubts: Doubts
 ) -> manifest.TrialKeys:
     """Return trial.toml, with absent keys from the session's [trial].
 
@@ -147,15 +147,15 @@ def _trial_keys(
     file = folder / MANIFEST
     if not file.is_file():
         return defaults
-    given = read_toml(file, shown)
-    own = values(as_keys(given, manifest.TrialKeys, shown, doubts))
+    given = read_toml(file, label)
+    own = values(as_keys(given, manifest.TrialKeys, label, doubts))
     stated = set(given) | {manifest.sigma_key(key) for key in given}
     kept = {name: value for name, value in own.items() if name in stated}
     return manifest.TrialKeys(**values(defaults) | kept)
 
 
 def _stated_object(
-    keys: manifest.ObjectKeys | None, thickness_mm: float | None, shown: str
+    keys: manifest.ObjectKeys | None, thickness_mm: float | None, label: str
 ) -> StatedObject | None:
     """Return the object of trial.toml; None where there is none. Raise BadInput for an impossible one.
 
@@ -163,7 +163,7 @@ def _stated_object(
     """
     if keys is None:
         return None
-    _check_object(keys, thickness_mm, shown)
+    _check_object(keys, thickness_mm, label)
     is_placed = keys.point_mm is not None
     return StatedObject(
         shape=keys.shape,
@@ -175,24 +175,24 @@ def _stated_object(
     )
 
 
-def _check_object(keys: manifest.ObjectKeys, thickness_mm: float | None, shown: str) -> None:
+def _check_object(keys: manifest.ObjectKeys, thickness_mm: float | None, label: str) -> None:
     """Raise BadInput for an impossible object. thickness_mm: bar_diameter_mm."""
     for key, shape in _SHAPE_OF_SIZE.items():
         if (keys.shape == shape) != (getattr(keys, key) is not None):
             found = f'{key} belongs to shape = "{shape}", and to no other shape'
-            raise BadInput(f"[object] {found}", file=shown)
+            raise BadInput(f"[object] {found}", file=label)
     if keys.axis is not None and not any(keys.axis):
-        raise BadInput("[object] axis is a direction, not zero", file=shown)
+        raise BadInput("[object] axis is a direction, not zero", file=label)
     if keys.point_mm is None and (keys.axis is not None or keys.point_sigma_mm):
         found = "says how it stands, and not where; point_mm is missing"
-        raise BadInput(f"[object] {found}", file=shown)
+        raise BadInput(f"[object] {found}", file=label)
     ring_mm = keys.ring_diameter_mm
     if ring_mm is not None and thickness_mm is not None and ring_mm <= thickness_mm:
         found = (
             f"ring_diameter_mm is {ring_mm:g}, of a bar of {thickness_mm:g} mm (bar_diameter_mm)"
         )
         meant = "it is the diameter along the bar's middle, and larger"
-        raise BadInput(f"[object] {found}; {meant}", file=shown)
+        raise BadInput(f"[object] {found}; {meant}", file=label)
 
 
 def _bar_diameter(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float]:

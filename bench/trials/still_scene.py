@@ -79,9 +79,9 @@ def other_scene(name: str, pictures: Pictures, background: Mapping[str, np.ndarr
     rig = background.get(name)
     if rig is None or rig.shape != picture.shape:
         return ""
-    shown = texture(picture)
+    label = texture(picture)
     rig_texture = texture(rig)
-    as_is = likeness(shown, rig_texture)
+    as_is = likeness(label, rig_texture)
     if as_is.is_same_scene and as_is.shift_length_px < _LEAST_MOVED_PX:
         return ""
     fault = _moved_sentence(as_is) if as_is.is_same_scene else ""
@@ -91,7 +91,7 @@ def other_scene(name: str, pictures: Pictures, background: Mapping[str, np.ndarr
     for other, scene in background.items():
         if other == name or scene is None or scene.shape != picture.shape:
             continue
-        if _is_clearer(likeness(shown, texture(scene)), as_is):
+        if _is_clearer(likeness(label, texture(scene)), as_is):
             fault = f"its frames are those of camera {other}"
     return fault
 
@@ -153,9 +153,9 @@ def _brightness(gains: Mapping[int, float], count: int, *, digits: int) -> str:
 
 def _first_frames(indices: Collection[int]) -> str:
     """Return the first frames by number, with an ellipsis where there are more."""
-    shown = ", ".join(map(str, list(indices)[:_MOST_NAMED]))
+    label = ", ".join(map(str, list(indices)[:_MOST_NAMED]))
     frames = "frame" if len(indices) == 1 else "frames"
-    return f"{frames} {shown}" + (", …" if len(indices) > _MOST_NAMED else "")
+    return f"{frames} {label}" + (", …" if len(indices) > _MOST_NAMED else "")
 
 
 def _divided(grey: np.ndarray, gain: float) -> np.ndarray:

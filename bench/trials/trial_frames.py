@@ -76,7 +76,7 @@ class TrialFrames:
 
 
 def _chosen_frames(scene: StillScene, settings: Settings) -> dict[str, Mapping[int, np.ndarray]]:
-    """Return the frames of the cameras that stood still and that the settings name."""
+    """Return the frames of the cameras that did not move and that the settings name."""
     chosen = {}
     for name, frames in scene.frames.items():
         if name not in scene.left_out and settings.seeing.asks(name):

@@ -2,8 +2,8 @@
 the lens.
 
 Each shading function of the angle round the rod has a blurred profile across the picture. Profiles
-are integrated once for each ratio of half-width and blur, tabulated (`_tables`), and looked up for
-all pixels by linear interpolation.
+are integrated once for each ratio of half-width and blur, tabulated (`_tables`), and
+interpolated linearly for all pixels.
 """
 
 from functools import lru_cache

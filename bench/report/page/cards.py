@@ -214,7 +214,7 @@ def cells(row: Row, estimators: list[str]) -> list[Cell]:
 
 
 def is_flagged(row: Row) -> bool:
-    """Return whether the user should look at a whisk."""
+    """Return whether a whisk has a warning that the user should read."""
     return not is_silent(status_of(row.seen, row.felt))
 
 

@@ -1,4 +1,4 @@
-"""Overlays as small pictures inside the page; beyond a number of whisks they stay beside it."""
+"""Overlays as small pictures inside the page; beyond a number of whisks they stay in their own files."""
 
 import io
 from base64 import b64encode
