@@ -8,7 +8,7 @@ import numpy as np
 from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.pooling import angle_cells, column, degrees
 from bench.analyses.surfaces import FittedSurface, SlopePoint
-from bench.base.drawing import SLOPES_DEG, add_legend, blank, colour_of
+from bench.base.drawing import SLOPES_DEG, add_legend, blank, colour_of, whisk_url
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma
 from estimator.beam import moment_in_EI_per_metre
 from estimator.friction import curves
@@ -151,6 +151,22 @@ def _fitted_curves(surface: FittedSurface, beta_deg: np.ndarray) -> tuple[np.nda
     return moment_in_EI_per_metre(m, beam.rigidity_Nmm2), np.degrees(phi)
 
 
+def _draw_whisks(top: "Axes", bottom: "Axes", surface: FittedSurface, edge_colour: str) -> None:
+    """Draw each whisk as a small point that links to it, |m| at the panel's common d_x."""
+    felt = surface.felt
+    beam = surface.beam
+    distances_mm = beam.as_cylinder_mm(column(felt, "d_x_mm"))
+    scale = distances_mm / beam.as_cylinder_mm(surface.common_d_x_mm)
+    m = moment_in_EI_per_metre(scale * column(felt, "m_Nmm"), beam.rigidity_Nmm2)
+    beta_deg = np.abs(column(felt, "beta_deg"))
+    urls = [whisk_url(one.trial, one.whisk) for one in felt]
+    for axes, values in ((top, m), (bottom, np.abs(column(felt, "phi_deg")))):
+        dots = axes.scatter(
+            beta_deg, values, s=9, facecolors="white", edgecolors=edge_colour, lw=0.7, zorder=4
+        )
+        dots.set_urls(urls)
+
+
 def _draw_panel(top: "Axes", bottom: "Axes", surface: FittedSurface, letter: str) -> None:
     """Draw |m| above, φ below; negative slopes stand at their mirror image's place."""
     points = surface.points()
@@ -163,6 +179,7 @@ def _draw_panel(top: "Axes", bottom: "Axes", surface: FittedSurface, letter: str
     top.errorbar(beta_deg, m, m_sd, **_BARS, label=_meaning(points))
     phi_deg = np.abs(column(points, "phi_deg"))
     bottom.errorbar(beta_deg, phi_deg, column(points, "phi_sd_deg"), **_BARS)
+    _draw_whisks(top, bottom, surface, "black" if len(points) == len(surface.felt) else "0.65")
     fitted = ""
     if surface.fit is not None:
         fitted = _draw_fit(top, bottom, surface)
