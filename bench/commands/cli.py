@@ -1,6 +1,6 @@
 """whisker-bench: the list of verbs, and what every verb's run may end with.
 
-Each verb is a module of this folder, with a function `add(verbs)`. Heavy modules are imported
+Each verb is a module of this folder, with functions `add(verbs)`, its parser, and `run`. Heavy modules are imported
 inside the verbs' runs, so that --help takes 0.1 s.
 """
 
@@ -37,7 +37,8 @@ VERBS = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one verb. Return 0 done, 1 done with warnings, 2 bad input or usage, 130 interrupted."""
+    """Run one verb. Return 0 done, 1 done with warnings, 2 bad input or usage, 70 a fault of ours, 130
+    interrupted."""
     options = make_parser().parse_args(arguments)
     level = logging.INFO if options.verbose else logging.WARNING
     logging.basicConfig(level=level, format="%(message)s")

@@ -1,4 +1,4 @@
 """What people read: tables, figures, overlays, summary, score of synthetic sessions, pooled runs.
 
-May import all folders of bench but theory.
+May import analyses and what it may import.
 """

@@ -268,7 +268,7 @@ class SessionKeys(Keys, kw_only=True):
 
     # version of this format: 1
     format: int
-    # label in the summary; the folder's name where it is absent
+    # shown in the summary; the folder's name where it is absent
     name: str = ""
     # the order of surfaces in tables and figures, such as ["steel", "sandpaper"]; others follow by
     # the names of their trials

@@ -1,5 +1,5 @@
 """Whole jobs on a session, which the verbs run: check, evaluate, calibrate the gauges, compare
 settings.
 
-May import all of bench but `commands`; `commands` and `bench/api.py` are made of it.
+May import all of bench but `commands` and `bench/api.py`, which are made of it.
 """

@@ -56,9 +56,8 @@ def uncertainty(problem: Problem, state: State, inverse_normal: np.ndarray) -> U
 def times_residual_covariance(problem: Problem, rows: np.ndarray) -> np.ndarray:
     """Return rows (k, n) over all observations times the covariance (n, n) of their residuals.
 
-    It is the unit matrix, but for points of the wire: each shares a part of its error with the next
-    one, of that part as much with the one after, and so on, and has a sigma wider by what all that
-    makes of a mean.
+    It is the unit matrix, but for points of the wire: points i and j of a line have the correlation
+    ρ^|i − j|, and their sigmas are widened so that the variance of a mean stays what it is.
     """
     product = rows.copy()
     if not problem.neighbour_correlation:

@@ -4,8 +4,8 @@ each frame.
 Shared by all frames: the bar's axis and the whisker's rest shape. Each touching frame adds the two
 components of its bend and one observation, that axis and centreline are bar radius + whisker radius
 apart. What the pictures may be wrong in as a whole (a shift of the seen line from the rod's axis,
-by light and lens) enters as an offset and a tilt per camera with a prior, and so ends up in the
-stated uncertainty.
+by light and lens) enters as twelve displacements a camera with priors (`Blocks.wire_offsets`,
+`Blocks.bar_offsets`), and so ends up in the stated uncertainty.
 """
 
 from collections.abc import Sequence

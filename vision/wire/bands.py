@@ -3,8 +3,8 @@
 A wire or bar is a cylinder that hides its background. What is seen across it is the background
 outside the two edges and the rod's own shading between them, both blurred by the lens. The
 background is known (a picture without the rod), the width is known (diameter and distance), and the
-shading is smooth along the rod and over the frames. So the shading is estimated once for all frames
-of a camera (`shading.py`), and only then the position of each short segment (`joint.py`).
+shading is smooth along the rod and over the frames. So one shading for all frames of a camera
+(`shading.py`) is solved together with the positions of all short segments (`joint.py`).
 
 Where the background is bright behind one segment and dark behind the next, both edges are seen
 somewhere, and a dark rim or a highlight no longer pulls the position to one side.

@@ -45,7 +45,7 @@ _FIRST_ROUNDS = 2
 NO_CHANCE = 200.0
 # [1] Of the evidence: strengths are fitted to the pixels that they explain, and what the model
 # lacks is alike in all segments. In 65 views of 30 path-traced scenes the log probability of the
-# true shift is 1.32 in the mean, with 1 1.26, with a Gaussian 1.15. Study: wire_scenes.py.
+# true shift is 1.32 in the mean; with the value 1 it is 1.26, with a Gaussian 1.15. Study: wire_scenes.py.
 EVIDENCE_COUNTS = 0.5
 
 

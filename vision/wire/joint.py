@@ -32,8 +32,8 @@ _SPREAD_SEGMENTS = 120
 
 @dataclass(frozen=True)
 class Solved(Shared):
-    """Hold of each segment by itself, too, all (s,): own_sigma_px by its own noise, chi2 per pixel,
-    contrast.
+    """Besides what `Shared` has, for each segment (s,): own_sigma_px by its own noise, chi2 per
+    pixel, contrast.
 
     widened_px2 (s, 2): by how much its blur² is above that of all, and sigma.
     """
@@ -47,7 +47,7 @@ class Solved(Shared):
 def solve_jointly(task: ShadedSegments, *, last: bool = True) -> Solved:
     """Return the most probable positions, shading and blur of segments.
 
-    The segments lie where they are expected, or, before an earlier pass, all to one side. last: this
+    The segments lie where they are expected, or, in the first pass, all to one side. last: this
     is the last pass, so that other common shifts that are as probable enter the sigma.
     """
     tempered = task.tempered()

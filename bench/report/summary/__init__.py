@@ -1,1 +1,1 @@
-"""summary.txt, a module a section; `page` puts them together."""
+"""summary.txt, a module a section; `compose` puts them together."""
