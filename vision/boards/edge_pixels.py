@@ -52,18 +52,37 @@ def cut_windows(
     grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float
 ) -> Windows:
     """Return the pixels that show the two edges of each corner; arguments as of `fit_saddles`."""
-    longest_px = np.linalg.norm(frames, axis=1).max()
-    grid = _disc(int(np.ceil(min(REACH_PX, _ARM_SQUARES * longest_px))))
+    grid = _disc(_reach_px(frames))
     anchor = np.round(px_guess).astype(int)
     place = anchor[:, :, None] + grid  # (n, 2, cells) px
-    last = np.array(grey.shape[::-1])[:, None] - 1
-    is_inside = np.all((place >= 0) & (place <= last), axis=1)
-    is_used = is_inside & _shows_edges(place - px_guess[:, :, None], frames, border)
+    is_edge = _shows_edges(place - px_guess[:, :, None], frames, border)
+    is_used = _is_inside(place, grey) & is_edge
     order = _used_first(is_used)
     weight = np.take_along_axis(is_used, order, axis=1).astype(float)
     offset = np.swapaxes(grid[:, order], 0, 1)
-    column, row = np.clip(anchor[:, :, None] + offset, 0, last).swapaxes(0, 1)
-    return Windows(anchor, offset, grey[row, column].astype(float), weight)
+    return Windows(anchor, offset, _grey_at(grey, anchor[:, :, None] + offset), weight)
+
+
+def _reach_px(frames: np.ndarray) -> int:
+    """Return how far from their corners edges are used, whole px, for frames (n, 2, 2)."""
+    longest_px = np.linalg.norm(frames, axis=1).max()
+    return int(np.ceil(min(REACH_PX, _ARM_SQUARES * longest_px)))
+
+
+def _last_px(picture: np.ndarray) -> np.ndarray:
+    """Return the last column and row (2, 1) of a picture."""
+    return np.array(picture.shape[::-1])[:, None] - 1
+
+
+def _is_inside(place: np.ndarray, picture: np.ndarray) -> np.ndarray:
+    """Return which places (n, 2, cells), x and y in px, lie in a picture, (n, cells) bool."""
+    return np.all((place >= 0) & (place <= _last_px(picture)), axis=1)
+
+
+def _grey_at(grey: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return the grey levels (n, k) at places (n, 2, k), x and y in px; outside, those of the rim."""
+    column, row = np.clip(place, 0, _last_px(grey)).swapaxes(0, 1)
+    return grey[row, column].astype(float)
 
 
 def _disc(reach: int) -> np.ndarray:

@@ -120,19 +120,28 @@ def _start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray
 def _model(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Predict the grey (n, k) by the parameters p (n, 10), with its Jacobian (n, 10, k)."""
     offset = windows.offset - p[:, PLACE, None]  # (n, 2, k) px from the corner
-    edges, by_edge = _blurred_edges(offset, p[:, TURN, None], p[:, BLUR, None])
-    contrast = p[:, CONTRAST, None, None, None]
-    by_edge = contrast * by_edge * edges[:, ::-1, None]  # each edge is multiplied by the other
-
+    crossing, by_edge = _crossing(offset, p)
     J = np.empty((len(p), 10, offset.shape[2]))
     J[:, PLACE] = by_edge[:, :, :2].sum(axis=1) - p[:, SLOPE, None]
     J[:, TURN] = by_edge[:, :, 2]
     J[:, BLUR] = by_edge[:, :, 3]
-    J[:, CONTRAST] = edges.prod(axis=1)
+    J[:, CONTRAST] = crossing
     J[:, LEVEL] = 1.0
     J[:, SLOPE] = offset
     grey = p[:, None, LINEAR] @ J[:, LINEAR]
     return grey[:, 0], J
+
+
+def _crossing(offset: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the product (n, k) of both edges, −1 to 1, and the derivatives (n, 2, 4, k) of grey.
+
+    offset (n, 2, k): px from the corner. The derivatives are by each edge's share of the corner's x
+    and y, its turn and its log s, with the contrast of the parameters p (n, 10).
+    """
+    edges, by_edge = _blurred_edges(offset, p[:, TURN, None], p[:, BLUR, None])
+    contrast = p[:, CONTRAST, None, None, None]
+    # each edge is multiplied by the other
+    return edges.prod(axis=1), contrast * by_edge * edges[:, ::-1, None]
 
 
 def _blurred_edges(
@@ -191,14 +200,19 @@ def _levenberg_marquardt(windows: Windows, start: np.ndarray) -> tuple[np.ndarra
         if not len(active):
             break
         step = fit.step(active, damping)
-        trial_p = fit.p[active] + step
-        trial_p[:, BLUR] = np.clip(trial_p[:, BLUR], *np.log(_BLUR_SEARCH_PX))
-        trial = _evaluate(windows.select(active), trial_p)
+        trial = _evaluate(windows.select(active), _within_search(fit.p[active] + step))
         is_better = trial.cost <= fit.cost[active]
         fit.accept(active, trial, is_better)
         damping[active] *= np.where(is_better, 0.2, 10.0)
         converged[active] = np.linalg.norm(step[:, PLACE], axis=1) < _CONVERGED_PX
     return fit.p, converged
+
+
+def _within_search(p: np.ndarray) -> np.ndarray:
+    """Return the parameters (n, 10) with blurs within the limits of the search."""
+    limited = p.copy()
+    limited[:, BLUR] = np.clip(p[:, BLUR], *np.log(_BLUR_SEARCH_PX))
+    return limited
 
 
 class _Fit(NamedTuple):

@@ -173,6 +173,16 @@ def check_lens(camera: Camera, covered: float | None = None) -> None:
     covered: how far from the principal point corners were seen, px over focal length; None for most
     of the picture.
     """
+    _check_pixels(camera)
+    if np.abs(camera.distortion[2:4]).max() > _MOST_DECENTRING:
+        raise _over_fitted(
+            camera, f"p1 or p2 is above {_MOST_DECENTRING}, a hundred times what lenses have"
+        )
+    _check_rim(camera, _reach_of_most(camera) if covered is None else covered)
+
+
+def _check_pixels(camera: Camera) -> None:
+    """Raise Refused for pixels far from square."""
     fx, fy = camera.lens[:2]
     aspect = abs(fx / fy - 1)
     if aspect > _MOST_ASPECT:
@@ -181,14 +191,19 @@ def check_lens(camera: Camera, covered: float | None = None) -> None:
             f"fx = {fx:.0f} and fy = {fy:.0f} differ by {100 * aspect:.0f} %, "
             "real ones by less than 1 %",
         )
-    if np.abs(camera.distortion[2:4]).max() > _MOST_DECENTRING:
-        raise _over_fitted(
-            camera, f"p1 or p2 is above {_MOST_DECENTRING}, a hundred times what lenses have"
-        )
-    radius = covered
-    if radius is None:
-        rim = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-        radius = _LEAST_REACH * _reach(camera, rim * camera.size_px)
+
+
+def _reach_of_most(camera: Camera) -> float:
+    """Return how far most of the picture lies from the principal point, px over focal length."""
+    rim = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+    return _LEAST_REACH * _reach(camera, rim * camera.size_px)
+
+
+def _check_rim(camera: Camera, radius: float) -> None:
+    """Raise Refused for a picture magnified or folded onto itself within a radius.
+
+    radius: px over focal length, where the lens is used.
+    """
     if not radius < _MOST_REACH:
         raise Refused(
             f"camera {camera.name}: the picture's farthest corner is {radius:.3g} focal lengths "

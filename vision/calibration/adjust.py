@@ -50,6 +50,23 @@ class Solution:
     converged: bool
 
 
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """What was seen, of a board with corners_mm (m, 3), and what is known besides.
+
+    width: of Cauchy's loss in sigmas, inf for least squares.
+    """
+
+    seen: Sightings
+    corners_mm: np.ndarray
+    priors: Priors
+    width: float
+
+    def normal(self, state: BundleState) -> Normal:
+        """Return the cost and the normal equations at a state."""
+        return normal_equations(state, self.seen, self.corners_mm, self.priors, self.width)
+
+
 def adjust_bundle(
     state: BundleState,
     seen: Sightings,
@@ -64,14 +81,27 @@ def adjust_bundle(
     corners_mm (m, 3): of the board. width: of Cauchy's loss in sigmas, inf for least squares.
     tolerance: relative fall of the cost at which the iteration ends.
     """
-    normal = normal_equations(state, seen, corners_mm, priors, width)
+    problem = _Problem(seen, corners_mm, priors, width)
+    state, normal, converged = _descend(problem, state, tolerance)
+    covariance = _covariance(normal, priors.free)
+    return Solution(state, normal.residual_px, covariance, normal.cost, converged)
+
+
+def _descend(
+    problem: _Problem, state: BundleState, tolerance: float
+) -> tuple[BundleState, Normal, bool]:
+    """Return the state of least cost, its equations, and whether the cost came to rest.
+
+    tolerance: relative fall of the cost at which the iteration ends.
+    """
+    normal = problem.normal(state)
     damping = _DAMPED
     converged = False
     fall = np.inf
     for _ in range(_MOST_STEPS if np.isfinite(normal.cost) else 0):
-        steps = _solve_step(normal, priors.free, damping)
+        steps = _solve_step(normal, problem.priors.free, damping)
         trial_state = state.move(*steps)
-        trial = normal_equations(trial_state, seen, corners_mm, priors, width)
+        trial = problem.normal(trial_state)
         if trial.cost <= normal.cost * (1 + 1e-13):
             fall = (normal.cost - trial.cost) / (1e-12 + normal.cost)
             converged = fall <= tolerance
@@ -83,9 +113,7 @@ def adjust_bundle(
             converged = damping > _MOST_DAMPED
         if converged:
             break
-    covariance = _covariance(normal, priors.free)
-    converged = converged or fall < _NEARLY_AT_REST
-    return Solution(state, normal.residual_px, covariance, normal.cost, converged)
+    return state, normal, converged or fall < _NEARLY_AT_REST
 
 
 def _solve_step(

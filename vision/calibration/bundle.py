@@ -152,18 +152,14 @@ def predict(
     """
     points_mm, by_board = _printed_board(state.board, corners_mm)
     motion = _board_motion(state, seen)
-    R_board = state.T_world_board[seen.view, :, :3]
-    R_camera = state.T_camera_world[seen.camera, :, :3]
-    in_view = np.einsum("nij,nj->ni", R_board, points_mm[seen.corner])
-    turned = np.einsum("nij,nj->ni", motion.turn, in_view)
-    world = turned + state.T_world_board[seen.view, :, 3] + motion.shift_mm
-    in_camera = np.einsum("nij,nj->ni", R_camera, world)
-    px, by_x, by_lens = _project(state, seen.camera, in_camera)
+    placed = _place_corners(state, seen, motion, points_mm)
+    px, by_x, by_lens = _project(state, seen.camera, placed.in_camera)
 
-    by_world = by_x @ R_camera
-    by_turn = -by_world @ skew(turned)  # Exp(w) y = y + w × y to first order
-    by_camera = [by_lens, -by_x @ skew(in_camera), by_x, motion.by_time(by_turn, by_world)]
-    by_print = by_world @ motion.turn @ R_board @ by_board[seen.corner]
+    by_world = by_x @ placed.R_camera
+    by_turn = -by_world @ skew(placed.turned)  # Exp(w) y = y + w × y to first order
+    by_time = motion.by_time(by_turn, by_world)
+    by_camera = [by_lens, -by_x @ skew(placed.in_camera), by_x, by_time]
+    by_print = by_world @ motion.turn @ placed.R_board @ by_board[seen.corner]
     by_views = motion.by_poses(by_turn, by_world)
     return px, np.concatenate([*by_camera, by_print, *by_views], axis=2)
 
@@ -240,20 +236,44 @@ class _Motion(NamedTuple):
         return columns
 
 
+class _Placed(NamedTuple):
+    """Where corners were at the instants of their pictures, a row each.
+
+    R_board, R_camera (n, 3, 3): of the view and the camera. turned (n, 3): from the board's origin,
+    along the world's axes, mm. in_camera (n, 3): from the world's origin, along the camera's axes,
+    mm.
+    """
+
+    R_board: np.ndarray
+    R_camera: np.ndarray
+    turned: np.ndarray
+    in_camera: np.ndarray
+
+
+def _place_corners(
+    state: BundleState, seen: Sightings, motion: _Motion, points_mm: np.ndarray
+) -> _Placed:
+    """Return where the sightings' corners were, points_mm (m, 3) being the board as printed."""
+    R_board = state.T_world_board[seen.view, :, :3]
+    R_camera = state.T_camera_world[seen.camera, :, :3]
+    in_view = np.einsum("nij,nj->ni", R_board, points_mm[seen.corner])
+    turned = np.einsum("nij,nj->ni", motion.turn, in_view)
+    world = turned + state.T_world_board[seen.view, :, 3] + motion.shift_mm
+    return _Placed(R_board, R_camera, turned, np.einsum("nij,nj->ni", R_camera, world))
+
+
 def _board_motion(state: BundleState, seen: Sightings) -> _Motion:
     """Return how the board moved from the time of each sighting's view to that of its picture."""
     if state.trajectory is None:
         return _Motion.none(len(seen))
     view = seen.view
-    elapsed_s = seen.time_s + state.instants[view, seen.camera] + state.clock[seen.camera]
-    shares, rates = state.trajectory.shares(view, elapsed_s)  # (n, 2)
+    shares, rates = state.trajectory.shares(view, _elapsed_s(state, seen))  # (n, 2)
     paths = state.trajectory.paths(state.T_world_board)  # (V, 2, 6)
     path = np.einsum("nk,nki->ni", shares, paths[view])
     rate = np.einsum("nk,nki->ni", rates, paths[view])
     turn = exp_rotation(path[:, :3])
     J = left_jacobian(path[:, :3])
-    inverse = np.linalg.inv(left_jacobian(paths[:, :, :3]))  # (V, 2, 3, 3)
-    by_path = inverse[view] * shares[:, :, None, None]
+    by_path = _inverse_jacobians(paths)[view] * shares[:, :, None, None]
     return _Motion(
         turn=turn,
         shift_mm=path[:, 3:],
@@ -262,6 +282,17 @@ def _board_motion(state: BundleState, seen: Sightings) -> _Motion:
         turn_by_poses=_turn_by_poses(turn, J, by_path),
         shift_by_poses=np.column_stack([1.0 - shares.sum(axis=1), shares]),
     )
+
+
+def _elapsed_s(state: BundleState, seen: Sightings) -> np.ndarray:
+    """Return the times (n,) of the sightings' pictures after their views' own times, s."""
+    late_s = state.instants[seen.view, seen.camera]
+    return seen.time_s + late_s + state.clock[seen.camera]
+
+
+def _inverse_jacobians(paths: np.ndarray) -> np.ndarray:
+    """Return J⁻¹ (V, 2, 3, 3) of the turns of paths (V, 2, 6), J being left Jacobians."""
+    return np.linalg.inv(left_jacobian(paths[:, :, :3]))
 
 
 def _turn_by_poses(turn: np.ndarray, J: np.ndarray, by_path: np.ndarray) -> np.ndarray:

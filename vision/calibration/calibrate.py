@@ -10,7 +10,7 @@ zero only as far as the views demand it, and one they do not constrain keeps the
 instead of running away (a free k3 on 14 views came out at 6).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -110,14 +110,9 @@ def calibrate_cameras(
     standing = _standing(views, board) if on_rig else None
     joint = JointInput(alone, standing, board, on_rig, views.times_s, triggered).adjust()
     adjustment, notes = _with_warp(joint.layout, joint.adjustment, board)
-    if not triggered:
-        check_errors(alone, adjustment.error_px)
+    _check_adjustment(alone, adjustment, triggered)
     if joint.timing is not None:
         notes.append(timing_note(alone, joint.timing))
-    if not adjustment.solution.converged:
-        raise Refused(
-            "the adjustment of the cameras did not come to rest: record more views, well spread and tilted"
-        )
     cameras = _place(as_cameras(alone, views.sizes_px, adjustment), on_rig)
     reports = _checked_reports(cameras, alone, adjustment, board)
     check_work(cameras, alone, standing, work_points_mm)
@@ -129,6 +124,19 @@ def calibrate_cameras(
         board=adjustment.solution.state.board,
         together=joint.layout.trajectory is not None,
     )
+
+
+def _check_adjustment(names: Iterable[str], adjustment: Adjustment, triggered: bool) -> None:
+    """Raise Refused for views that no lens and no poses explain, or that let nothing come to rest.
+
+    triggered: as of `calibrate_cameras`; errors are not checked then.
+    """
+    if not triggered:
+        check_errors(names, adjustment.error_px)
+    if not adjustment.solution.converged:
+        raise Refused(
+            "the adjustment of the cameras did not come to rest: record more views, well spread and tilted"
+        )
 
 
 def _checked_reports(

@@ -122,13 +122,20 @@ def lay_out(
     if standing is not None:
         views.insert(0, [_Shot(c, -1, standing[name]) for c, name in enumerate(cameras)])
         T_world_board.insert(0, T_rig_board)
-    lenses = np.array([alone.lens for alone in cameras.values()])
-    state = BundleState(lenses, np.asarray(T_camera_world), np.array(T_world_board))
+    state = _first_state(cameras, T_camera_world, T_world_board)
     index = np.array([group[0].index for group in views])
     trajectory = elapsed_s = None
     if together:
         trajectory, elapsed_s = _in_time(views, _rank_by_views(cameras))
     return Layout(gather(_numbered(views), elapsed_s), state, trajectory, index)
+
+
+def _first_state(
+    cameras: Mapping[str, Alone], T_camera_world: np.ndarray, T_world_board: Sequence[np.ndarray]
+) -> BundleState:
+    """Return the state with each camera's own lens at T_camera_world (C, 3, 4), boards at V poses."""
+    lenses = np.array([alone.lens for alone in cameras.values()])
+    return BundleState(lenses, np.asarray(T_camera_world), np.array(T_world_board))
 
 
 def _numbered(views: Sequence[Sequence[_Shot]]) -> list[tuple[int, int, Corners]]:

@@ -89,14 +89,12 @@ def normal_equations(
     if not np.all(np.isfinite(squared)):
         return Normal(np.inf, residual_px)
     loss, weight = _cauchy(squared, width)
-    root = np.sqrt(weight) / seen.sigma_px
-    rows = np.dstack([J, residual_px]) * root[:, None, None]
+    rows = _weighted(J, residual_px, np.sqrt(weight) / seen.sigma_px)
     shots = _shots(state, seen)
     blocks = _shot_blocks(rows, seen.shot_starts())
     instants, cost = _eliminate_instants(blocks, shots, state, priors)
-    equations = _assemble(blocks, shots, state)
-    cost += np.sum(loss) + _add_priors(equations, state, priors)
-    _hold(equations, np.repeat(~priors.view_free, N_VIEW))
+    equations, prior_cost = _with_priors(_assemble(blocks, shots, state), state, priors)
+    cost += np.sum(loss) + prior_cost
     return Normal(float(cost), residual_px, shots, instants, equations)
 
 
@@ -109,6 +107,11 @@ def _cauchy(squared: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
         return squared, np.ones_like(squared)
     ratio = squared / width**2
     return width**2 * np.log1p(ratio), 1.0 / (1.0 + ratio)
+
+
+def _weighted(J: np.ndarray, residual: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """Return J (n, 2, p) with the residuals (n, 2) as last column, times the weights' roots (n,)."""
+    return np.dstack([J, residual]) * root[:, None, None]
 
 
 def _shots(state: BundleState, seen: Sightings) -> Shots:
@@ -155,10 +158,16 @@ def _eliminate_instants(
     prior = priors.late_sigma_s[shots.camera] ** -2.0  # precision, 1/s²
     precision = blocks[:, CLOCK, CLOCK] + prior
     gradient = is_free * (blocks[:, CLOCK, -1] - prior * late_s)
-    coupling = is_free[:, None] * blocks[:, :, CLOCK]
-    row = np.column_stack([coupling, gradient])
-    blocks -= coupling[:, :, None] * row[:, None] / precision[:, None, None]
-    return Instants(precision, gradient, coupling), float(np.sum(prior * late_s**2))
+    instants = Instants(precision, gradient, is_free[:, None] * blocks[:, :, CLOCK])
+    _take_off(blocks, instants)
+    return instants, float(np.sum(prior * late_s**2))
+
+
+def _take_off(blocks: np.ndarray, instants: Instants) -> None:
+    """Subtract from the pictures' blocks (s, p, p + 1) what their instants explain, in place."""
+    coupling = instants.coupling
+    row = np.column_stack([coupling, instants.gradient])
+    blocks -= coupling[:, :, None] * row[:, None] / instants.precision[:, None, None]
 
 
 def _assemble(blocks: np.ndarray, shots: Shots, state: BundleState) -> Equations:
@@ -193,6 +202,15 @@ def _lower_band(blocks: np.ndarray, poses: np.ndarray, size: int) -> np.ndarray:
     is_lower = below >= 0
     index = (below[is_lower], column[is_lower])
     return _sum_at((below.max() + 1, size), index, blocks[is_lower])
+
+
+def _with_priors(
+    equations: Equations, state: BundleState, priors: Priors
+) -> tuple[Equations, float]:
+    """Return the equations, changed in place, with the priors added and views held, and their cost."""
+    cost = _add_priors(equations, state, priors)
+    _hold(equations, np.repeat(~priors.view_free, N_VIEW))
+    return equations, cost
 
 
 def _add_priors(equations: Equations, state: BundleState, priors: Priors) -> float:

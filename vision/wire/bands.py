@@ -254,10 +254,6 @@ def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray) -> Pieces
         """Return values (n, k) by segment (s, p), 0 where a pixel is not known."""
         return np.where(is_known, values, 0.0).reshape(count, -1)
 
-    def middle(values: np.ndarray) -> np.ndarray:
-        """Return the mean (s, …) over each segment of values (n, …)."""
-        return values.reshape(count, length_px, *values.shape[1:]).mean(axis=1)
-
     return Pieces(
         offset_px=band.offset_px.reshape(count, -1),
         grey=known(band.grey),
@@ -265,13 +261,18 @@ def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray) -> Pieces
         slope=known(slope),
         curvature=known(curvature),
         weight=known(1.0 / noise.sigma(np.where(is_known, band.grey, 0.0))),
-        place=middle(band.place),
-        radius_px=middle(band.radius_px),
-        foot_px=middle(band.foot_px),
-        normal=middle(band.normal),
+        place=_means(band.place, length_px),
+        radius_px=_means(band.radius_px, length_px),
+        foot_px=_means(band.foot_px, length_px),
+        normal=_means(band.normal, length_px),
         source=source,
         still=known(band.still) if band.still.size else None,
     )
+
+
+def _means(values: np.ndarray, length: int) -> np.ndarray:
+    """Return the mean (s, …) of each `length` values (s · length, …) that follow one another."""
+    return values.reshape(-1, length, *values.shape[1:]).mean(axis=1)
 
 
 def _derivatives(band: Band) -> tuple[np.ndarray, np.ndarray]:

@@ -133,11 +133,20 @@ def _evidences(
     for number in range(_ROUNDS + 1):
         stiff = own[:, None] * strength[some, None] ** -2.0  # (some, knots, terms)
         evidences[some], squares = _integrate(normal.select(some), stiff.reshape(len(some), -1))
-        mean_squares = own @ squares.reshape(stiff.shape) / len(own)
-        strength[some, 1:] = _bound(np.sqrt(mean_squares[:, 1:]), contrast[some])
+        fitted = _fitted_strength(squares.reshape(stiff.shape), own)
+        strength[some, 1:] = _bound(fitted, contrast[some])
         if number >= _FIRST_ROUNDS:
             some = some[evidences[some] < evidences.min() + no_chance]
     return evidences
+
+
+def _fitted_strength(squares: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Return the most probable strengths (g, terms − 1) of all terms but the first, grey levels.
+
+    squares (g, knots, terms): expected, of the coefficients. own (knots,): as of `_evidences`.
+    """
+    mean_squares = own @ squares / len(own)
+    return np.sqrt(mean_squares[:, 1:])
 
 
 def _bound(strength: np.ndarray, contrast: np.ndarray) -> np.ndarray:
