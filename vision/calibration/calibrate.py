@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vision.boards.board_coverage import check_work, coverage
 from vision.boards.corners import Corners
-from vision.boards.coverage import check_work, coverage
 from vision.boards.static_board import camera_moved, mean_view
 from vision.boards.sufficiency import (
     check_errors,
