@@ -95,6 +95,16 @@ def there_and_back(
     gradient = _gradient(felt, beam)
     sigmas = np.sqrt(np.einsum("ik,ij,jk->k", gradient, covariance, gradient))
     model_share = _model_share(there, settings, d_x, beta, abs(alpha))
+    return _with_sigmas(values, sigmas, model_share, beam.length_mm)
+
+
+def _with_sigmas(
+    values: np.ndarray, sigmas: np.ndarray, model_share: float, length_mm: float
+) -> ThereAndBack:
+    """Return (d_x, β, α), mm and rad, with one sigma of each by noise and that of d_x by the
+    model.
+    """
+    d_x, beta, alpha = values.tolist()
     sigma = hypot(sigmas[0], d_x * model_share)
     return ThereAndBack(
         d_x_mm=d_x,
@@ -104,7 +114,7 @@ def there_and_back(
         alpha_rad=abs(alpha),
         alpha_sigma_rad=float(sigmas[2]),
         low_mm=max(d_x - Z_95 * sigma, 0.0),
-        high_mm=min(d_x + Z_95 * sigma, beam.length_mm),
+        high_mm=min(d_x + Z_95 * sigma, length_mm),
     )
 
 

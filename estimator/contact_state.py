@@ -69,9 +69,7 @@ def contact_of(whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> Contact:
         return NO_CONTACT
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
     inputs = np.array([*felt, estimate.alpha_est_rad])
-    covariance = np.zeros((4, 4))
-    covariance[:3, :3] = felt_covariance(whisk)
-    covariance[3, 3] = alpha_sigma**2
+    covariance = _covariance_of_inputs(whisk, alpha_sigma)
     gradient = np.zeros(4)
     if estimate.gradient is not None:
         gradient = np.array(estimate.gradient, dtype=float)
@@ -83,6 +81,19 @@ def contact_of(whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> Contact:
     d_y, d_z, slip_mm = _quantities(d_x, inputs, beam).tolist()
     touch_covariance = -float(gradient @ covariance[:, 0])
     contact = Contact(d_y, sigmas[0], d_z, sigmas[1], slip_mm, sigmas[2], touch_covariance)
+    return _with_own_deflection(contact, estimate)
+
+
+def _covariance_of_inputs(whisk: Whisk, alpha_sigma: float) -> np.ndarray:
+    """Assemble the covariance (4, 4) of θ, m_y, m_z and α_est, which is independent of the rest."""
+    covariance = np.zeros((4, 4))
+    covariance[:3, :3] = felt_covariance(whisk)
+    covariance[3, 3] = alpha_sigma**2
+    return covariance
+
+
+def _with_own_deflection(contact: Contact, estimate: Estimate) -> Contact:
+    """Return the contact with the deflection that the estimate gives itself, if it does."""
     if estimate.deflection_mm is None:
         return contact
     d_y, d_z = estimate.deflection_mm
