@@ -92,8 +92,7 @@ def there_and_back(
     covariance += _covariance_of_dragging(felt, abs(alpha), float(beam.left(d_x)))
     if not _differs(felt, covariance):
         return ThereAndBack(nan, status=ALIKE)
-    gradient = _gradient(felt, beam)
-    sigmas = np.sqrt(np.einsum("ik,ij,jk->k", gradient, covariance, gradient))
+    sigmas = _sigmas(felt, covariance, beam)
     model_share = _model_share(there, settings, d_x, beta, abs(alpha))
     return _with_sigmas(values, sigmas, model_share, beam.length_mm)
 
@@ -147,6 +146,12 @@ def _gradient(felt: np.ndarray, beam: Beam) -> np.ndarray:
         change = _solution(felt + step, beam) - _solution(felt - step, beam)
         rows.append(change / (2 * step.max()))
     return np.array(rows)
+
+
+def _sigmas(felt: np.ndarray, covariance: np.ndarray, beam: Beam) -> np.ndarray:
+    """Return one sigma (3,) of `_solution` where the felt values have a covariance (6, 6)."""
+    gradient = _gradient(felt, beam)
+    return np.sqrt(np.einsum("ik,ij,jk->k", gradient, covariance, gradient))
 
 
 def _covariance(there: Whisk, back: Whisk, shared) -> np.ndarray:

@@ -283,7 +283,7 @@ def alpha_from_tilts(tilt: ArrayLike, phi: ArrayLike, *, phi_sigma: ArrayLike = 
     tilt = tilt[known]
     phi = phi[known]
     band = _dead_band(tilt, phi, phi_sigma)
-    if min(band.below_count, band.above_count) == 0 or not band.alpha > 0:
+    if not band.has_both_sides:
         return FrictionFit(np.nan, np.nan, np.nan, np.nan, np.nan, ONE_SIDED)
     squares = (phi - band.slip_angle(tilt)) ** 2
     sigma, freedom = _sigma_of_band(band, squares, phi_sigma)
@@ -320,6 +320,11 @@ class _DeadBand:
     def above_count(self) -> int:
         """Count the points above the range."""
         return np.count_nonzero(self.above)
+
+    @property
+    def has_both_sides(self) -> bool:
+        """Check that there are points on both sides, and a range between them."""
+        return min(self.below_count, self.above_count) > 0 and self.alpha > 0
 
     def slip_angle(self, tilt: np.ndarray) -> np.ndarray:
         """Return the slip angles (n,) that follow from the tilts: how far they are outside."""

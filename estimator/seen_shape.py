@@ -180,10 +180,17 @@ def contact_of_shape(
     spread = gradient @ covariance @ gradient.T
     model_share = fit.model_share(vector, values[1], reach_mm, tilt_sigma_rad)
     contact = _with_sigmas(values, spread, beam.length_mm, model_share, force_share)
-    by_plane = gradient[2] @ covariance[:, _TAN] / covariance[_TAN, _TAN] ** 0.5  # N, one sigma
-    if contact.status or abs(by_plane) / max(values[2], 1e-9) < _MOST_BY_PLANE:
+    if contact.status or _is_plane_known(values[2], gradient[2], covariance):
         return contact
     return _without_force(contact)
+
+
+def _is_plane_known(force: float, gradient: np.ndarray, covariance: np.ndarray) -> bool:
+    """Check that tan φ changes the force by a small share; gradient: of the force, N, by the
+    parameters.
+    """
+    by_plane = gradient @ covariance[:, _TAN] / covariance[_TAN, _TAN] ** 0.5  # N, one sigma
+    return abs(by_plane) / max(force, 1e-9) < _MOST_BY_PLANE
 
 
 def _without_force(contact: ShapeContact) -> ShapeContact:
