@@ -81,7 +81,7 @@ def there_and_back(
     both have in common. Thickness and lean of the object enter the sigma as in (10).
     """
     felt = np.array([*_felt(there), *_felt(back)])
-    if not np.isfinite(felt).all() or not min(felt[2], felt[5]) > 0:
+    if not _pushes_both_ways(felt):
         return ThereAndBack(nan, status=NO_PUSH)
     beam = there.beam
     values = _solution(felt, beam)
@@ -120,6 +120,11 @@ def _with_sigmas(
 def _felt(whisk: Whisk) -> tuple[float, float, float]:
     """Return θ, m_y and m_z at the pushing angle."""
     return whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm
+
+
+def _pushes_both_ways(felt: np.ndarray) -> bool:
+    """Check that all felt values (6,) are known, and that m_z is positive on both ways."""
+    return np.isfinite(felt).all() and min(felt[2], felt[5]) > 0
 
 
 def _solution(felt: np.ndarray, beam: Beam) -> np.ndarray:
