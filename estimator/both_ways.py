@@ -81,7 +81,7 @@ def there_and_back(
     both have in common. Thickness and lean of the object enter the sigma as in (10).
     """
     felt = np.array([*_felt(there), *_felt(back)])
-    if not np.isfinite(felt).all() or not min(felt[2], felt[5]) > 0:
+    if not _pushes_both_ways(felt):
         return ThereAndBack(nan, status=NO_PUSH)
     beam = there.beam
     values = _solution(felt, beam)
@@ -92,9 +92,18 @@ def there_and_back(
     covariance += _covariance_of_dragging(felt, abs(alpha), float(beam.left(d_x)))
     if not _differs(felt, covariance):
         return ThereAndBack(nan, status=ALIKE)
-    gradient = _gradient(felt, beam)
-    sigmas = np.sqrt(np.einsum("ik,ij,jk->k", gradient, covariance, gradient))
+    sigmas = _sigmas(felt, covariance, beam)
     model_share = _model_share(there, settings, d_x, beta, abs(alpha))
+    return _with_sigmas(values, sigmas, model_share, beam.length_mm)
+
+
+def _with_sigmas(
+    values: np.ndarray, sigmas: np.ndarray, model_share: float, length_mm: float
+) -> ThereAndBack:
+    """Return (d_x, β, α), mm and rad, with one sigma of each by noise and that of d_x by the
+    model.
+    """
+    d_x, beta, alpha = values.tolist()
     sigma = hypot(sigmas[0], d_x * model_share)
     return ThereAndBack(
         d_x_mm=d_x,
@@ -104,13 +113,18 @@ def there_and_back(
         alpha_rad=abs(alpha),
         alpha_sigma_rad=float(sigmas[2]),
         low_mm=max(d_x - Z_95 * sigma, 0.0),
-        high_mm=min(d_x + Z_95 * sigma, beam.length_mm),
+        high_mm=min(d_x + Z_95 * sigma, length_mm),
     )
 
 
 def _felt(whisk: Whisk) -> tuple[float, float, float]:
     """Return θ, m_y and m_z at the pushing angle."""
     return whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm
+
+
+def _pushes_both_ways(felt: np.ndarray) -> bool:
+    """Check that all felt values (6,) are known, and that m_z is positive on both ways."""
+    return np.isfinite(felt).all() and min(felt[2], felt[5]) > 0
 
 
 def _solution(felt: np.ndarray, beam: Beam) -> np.ndarray:
@@ -137,6 +151,12 @@ def _gradient(felt: np.ndarray, beam: Beam) -> np.ndarray:
         change = _solution(felt + step, beam) - _solution(felt - step, beam)
         rows.append(change / (2 * step.max()))
     return np.array(rows)
+
+
+def _sigmas(felt: np.ndarray, covariance: np.ndarray, beam: Beam) -> np.ndarray:
+    """Return one sigma (3,) of `_solution` where the felt values have a covariance (6, 6)."""
+    gradient = _gradient(felt, beam)
+    return np.sqrt(np.einsum("ik,ij,jk->k", gradient, covariance, gradient))
 
 
 def _covariance(there: Whisk, back: Whisk, shared) -> np.ndarray:

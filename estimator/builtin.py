@@ -168,40 +168,60 @@ def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
     their squares.
     """
     beam = whisk.beam
-    errors = {
+    tapered = beam.distance_mm(d_x)
+    # Share of the base's diameter at the contact, and of a relative error on the base's cylinder.
+    left = tapered / d_x
+    model = model_share(whisk, settings, tapered, left)
+    low, high = _interval(whisk, settings, m_y, model / left if model else 0.0)
+    if isnan(d_x):
+        return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
+    of_inputs = uncertainty.sigma(gradient, **_errors(whisk, settings))
+    sigma = hypot(of_inputs * left**2, model * tapered)
+    if beam.taper and settings.alpha_est_sigma_rad > 0 and low > 0:
+        sigma = max(sigma, hypot(tapered - low, high - tapered) / (sqrt(2) * uncertainty.Z_95))
+    estimate = Estimate(tapered, sigma, "", low, high, gradient=gradient * left**2)
+    return _up_to_tip(estimate, beam.length_mm, clamp)
+
+
+def _errors(whisk, settings):
+    """Return the errors of the inputs, as keywords of `uncertainty.sigma`."""
+    return {
         "theta_sigma": whisk.theta_sigma_rad,
         "covariance": whisk.covariance_at,
         "alpha_est_sigma": settings.alpha_est_sigma_rad,
         "theta_moment_covariance": whisk.theta_moment_covariance_at,
     }
-    tapered = beam.distance_mm(d_x)
-    # Share of the base's diameter at the contact, and of a relative error on the base's cylinder.
-    left = tapered / d_x
-    model = model_share(whisk, settings, tapered, left)
+
+
+def _interval(whisk, settings, m_y, model_sigma):
+    """Return the ends of the 95 % interval on this whisker, mm; model_sigma: relative sigma of the
+    cylinder's equation.
+    """
     low, high = uncertainty.interval_with_friction(
         whisk.theta_at_rad,
         m_y,
         whisk.m_z_at_Nmm,
         settings.alpha_est_rad,
-        beam.C_Nmm2,
-        model_sigma=model / left if model else 0.0,
-        **errors,
+        whisk.beam.C_Nmm2,
+        model_sigma=model_sigma,
+        **_errors(whisk, settings),
     )
-    low = _on_whisker(low, beam)
-    high = _on_whisker(high, beam)
-    if isnan(d_x):
-        return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
-    sigma = hypot(uncertainty.sigma(gradient, **errors) * left**2, model * tapered)
-    gradient = gradient * left**2
-    if beam.taper and settings.alpha_est_sigma_rad > 0 and low > 0:
-        sigma = max(sigma, hypot(tapered - low, high - tapered) / (sqrt(2) * uncertainty.Z_95))
-    clamped, at_tip = distance.clamp_to_length(tapered, beam.length_mm)
+    return _on_whisker(low, whisk.beam), _on_whisker(high, whisk.beam)
+
+
+def _up_to_tip(estimate, length_mm, clamp):
+    """Return the estimate with its status: clamped at the tip, or flagged there and without an
+    interval.
+    """
+    d_x = estimate.d_x_mm
+    clamped, at_tip = distance.clamp_to_length(d_x, length_mm)
     if at_tip and not clamp:
-        return Estimate(tapered, sigma, BEYOND, gradient=gradient)
+        return replace(estimate, status=BEYOND, low_mm=nan, high_mm=nan)
     if at_tip:
-        return Estimate(clamped, sigma, TIP.format(tapered, low), low, high)
-    status = NEARER.format(high) if low == 0 else ""
-    return Estimate(clamped, sigma, status, low, high, gradient=gradient)
+        status = TIP.format(d_x, estimate.low_mm)
+        return replace(estimate, d_x_mm=clamped, status=status, gradient=None)
+    status = NEARER.format(estimate.high_mm) if estimate.low_mm == 0 else ""
+    return replace(estimate, d_x_mm=clamped, status=status)
 
 
 def _on_whisker(end, beam):

@@ -56,10 +56,7 @@ def two_distances(
     require_positive("shift", shift, "mm")
     near = C * compliance_near
     far = C * compliance_far
-    square = 3 * shift + near - far
-    linear = shift * (2 * far - 3 * shift)
-    constant = shift * shift * (far - shift)
-    cylinder = _positive_root(square, linear, constant)
+    cylinder = _cylinder_root(near, far, shift)
     d_x = np.where(taper_per_mm > 0, _tapered_root(near, far, shift, taper_per_mm), cylinder)
     give = near - C * _rigid(d_x, C, taper_per_mm)
     possible = (near > 0) & (d_x > 0) & np.isfinite(d_x)
@@ -70,6 +67,14 @@ def two_distances(
 def _rigid(d_x, C, taper_per_mm):
     """Return k_θ against a rigid object: (1) of the base's cylinder."""
     return d_x / (C * (1 - taper_per_mm * d_x))
+
+
+def _cylinder_root(near, far, shift):
+    """Find the larger root of (K_1 − d) d² = (K_2 − d − s)(d + s)², mm."""
+    square = 3 * shift + near - far
+    linear = shift * (2 * far - 3 * shift)
+    constant = shift * shift * (far - shift)
+    return _positive_root(square, linear, constant)
 
 
 @np.vectorize

@@ -69,20 +69,50 @@ def contact_of(whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> Contact:
         return NO_CONTACT
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
     inputs = np.array([*felt, estimate.alpha_est_rad])
-    covariance = np.zeros((4, 4))
-    covariance[:3, :3] = felt_covariance(whisk)
-    covariance[3, 3] = alpha_sigma**2
-    gradient = np.zeros(4)
-    if estimate.gradient is not None:
-        gradient = np.array(estimate.gradient, dtype=float)
-    of_model = max(estimate.sigma_mm**2 - gradient @ covariance @ gradient, 0.0)
-    by_d_x, by_input = _derivatives(d_x, inputs, beam)
-    rows = by_input + np.outer(by_d_x, gradient)  # (3, 4): with d_x as a function of the inputs
-    variances = np.einsum("ij,jk,ik->i", rows, covariance, rows) + by_d_x**2 * of_model
+    error = _DistanceError.of(whisk, estimate, alpha_sigma)
+    variances = error.variances(*_derivatives(d_x, inputs, beam))
     sigmas = np.sqrt(np.maximum(variances, 0.0)).tolist()
     d_y, d_z, slip_mm = _quantities(d_x, inputs, beam).tolist()
-    touch_covariance = -float(gradient @ covariance[:, 0])
+    touch_covariance = -float(error.gradient @ error.covariance[:, 0])
     contact = Contact(d_y, sigmas[0], d_z, sigmas[1], slip_mm, sigmas[2], touch_covariance)
+    return _with_own_deflection(contact, estimate)
+
+
+@dataclass(frozen=True, eq=False)
+class _DistanceError:
+    """Errors of the inputs θ, m_y, m_z and α_est, and of the distance with them and without.
+
+    covariance (4, 4): of the inputs. gradient (4,): derivative of the distance by them, zero where
+    the estimate has none. of_model: variance of the distance that is left, mm².
+    """
+
+    covariance: np.ndarray
+    gradient: np.ndarray
+    of_model: float
+
+    @classmethod
+    def of(cls, whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> "_DistanceError":
+        """Assemble the errors of an estimate; that of α_est is independent of the others."""
+        covariance = np.zeros((4, 4))
+        covariance[:3, :3] = felt_covariance(whisk)
+        covariance[3, 3] = alpha_sigma**2
+        gradient = np.zeros(4)
+        if estimate.gradient is not None:
+            gradient = np.array(estimate.gradient, dtype=float)
+        of_model = max(estimate.sigma_mm**2 - gradient @ covariance @ gradient, 0.0)
+        return cls(covariance, gradient, of_model)
+
+    def variances(self, by_d_x: np.ndarray, by_input: np.ndarray) -> np.ndarray:
+        """Compute variances (3,) of quantities from their derivatives by distance (3,) and inputs
+        (3, 4).
+        """
+        rows = by_input + np.outer(by_d_x, self.gradient)  # d_x as a function of the inputs
+        by_inputs = np.einsum("ij,jk,ik->i", rows, self.covariance, rows)
+        return by_inputs + by_d_x**2 * self.of_model
+
+
+def _with_own_deflection(contact: Contact, estimate: Estimate) -> Contact:
+    """Return the contact with the deflection that the estimate gives itself, if it does."""
     if estimate.deflection_mm is None:
         return contact
     d_y, d_z = estimate.deflection_mm

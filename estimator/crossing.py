@@ -104,14 +104,12 @@ def threshold_touch(
     stroke = _Stroke(motor_rad, moments, time_s, cutoff_Hz, felt)
     magnitude = np.hypot.reduce(stroke.filtered, axis=1)
     if threshold is None:
-        noise = stroke.noise(len(magnitude) // 2)
-        threshold = _THRESHOLD_IN_SIGMAS * np.sqrt(np.trace(noise))
+        threshold = _threshold_above_noise(stroke)
     index, found, steepness = _last_crossing(magnitude, stroke.motor, threshold)
     if index is None:
         return FeltTouch.none(NOT_CROSSED)
-    along = felt.rise.slope / np.hypot.reduce(felt.rise.slope)
     covariance = stroke.noise(index) + felt.level.covariance_between(found, found)
-    sigma = np.sqrt(along @ covariance @ along) / steepness
+    sigma = _sigma_along(felt.rise.slope, covariance) / steepness
     ideal_magnitude = np.hypot.reduce(stroke.ideal, axis=1)
     ideal = _last_crossing(ideal_magnitude, stroke.motor, threshold)[1]
     return _touch(found, sigma, ideal, felt)
@@ -192,6 +190,20 @@ class _Stroke:
         impulse = np.zeros(len(self.motor))
         impulse[np.clip(index, 0, len(impulse) - 1)] = 1.0
         return self._filter(impulse)
+
+
+def _threshold_above_noise(stroke: _Stroke) -> float:
+    """Return the threshold, N·mm, that the filtered noise in mid-stroke does not cross."""
+    noise = stroke.noise(len(stroke.motor) // 2)
+    return _THRESHOLD_IN_SIGMAS * np.sqrt(np.trace(noise))
+
+
+def _sigma_along(direction: np.ndarray, covariance: np.ndarray) -> float:
+    """Return the standard deviation along a direction (k,) of any length, of moments with a
+    covariance (k, k).
+    """
+    along = direction / np.hypot.reduce(direction)
+    return np.sqrt(along @ covariance @ along)
 
 
 def _touch(found, sigma, ideal, felt):

@@ -282,38 +282,74 @@ def alpha_from_tilts(tilt: ArrayLike, phi: ArrayLike, *, phi_sigma: ArrayLike = 
     known = np.isfinite(tilt) & np.isfinite(phi)
     tilt = tilt[known]
     phi = phi[known]
-    middle, alpha, below, above = _dead_band(tilt, phi, phi_sigma)
-    below_count = np.count_nonzero(below)
-    above_count = np.count_nonzero(above)
-    if min(below_count, above_count) == 0 or not alpha > 0:
+    band = _dead_band(tilt, phi, phi_sigma)
+    if not band.has_both_sides:
         return FrictionFit(np.nan, np.nan, np.nan, np.nan, np.nan, ONE_SIDED)
-    outside = np.maximum(np.abs(tilt - middle) - alpha, 0.0) * np.sign(tilt - middle)
-    squares = (phi - outside) ** 2
-    if phi_sigma > 0:
-        freedom = np.inf
-        scatter = phi_sigma
-    else:
-        freedom = float(below_count + above_count - 2)  # two were fitted: the middle and α
-        scatter = np.sqrt(np.sum(squares[below | above]) / freedom) if freedom else np.nan
-    sigma = scatter / 2 * np.sqrt(1 / below_count + 1 / above_count)
+    squares = (phi - band.slip_angle(tilt)) ** 2
+    sigma, freedom = _sigma_of_band(band, squares, phi_sigma)
     half_width = stdtrit(freedom, 0.975) * sigma
     return FrictionFit(
-        alpha_rad=float(alpha),
+        alpha_rad=float(band.alpha),
         sigma_rad=float(sigma),
-        low_rad=max(0.0, float(alpha - half_width)),
-        high_rad=float(alpha + half_width),
+        low_rad=max(0.0, float(band.alpha - half_width)),
+        high_rad=float(band.alpha + half_width),
         rms=float(np.sqrt(squares.mean())),
         status="",
         freedom=freedom,
     )
 
 
-def _dead_band(tilt, phi, phi_sigma):
+@dataclass(frozen=True, eq=False)
+class _DeadBand:
+    """Range of tilts without slip: middle ∓ α, rad, NaN where a side has no point.
+
+    below, above (n,): masks of the points on either side of it.
+    """
+
+    middle: float
+    alpha: float
+    below: np.ndarray
+    above: np.ndarray
+
+    @property
+    def below_count(self) -> int:
+        """Count the points below the range."""
+        return np.count_nonzero(self.below)
+
+    @property
+    def above_count(self) -> int:
+        """Count the points above the range."""
+        return np.count_nonzero(self.above)
+
+    @property
+    def has_both_sides(self) -> bool:
+        """Check that there are points on both sides, and a range between them."""
+        return min(self.below_count, self.above_count) > 0 and self.alpha > 0
+
+    def slip_angle(self, tilt: np.ndarray) -> np.ndarray:
+        """Return the slip angles (n,) that follow from the tilts: how far they are outside."""
+        from_middle = tilt - self.middle
+        return np.maximum(np.abs(from_middle) - self.alpha, 0.0) * np.sign(from_middle)
+
+
+def _sigma_of_band(band: _DeadBand, squares: np.ndarray, phi_sigma) -> tuple[float, float]:
+    """Return (sigma of α in rad, degrees of freedom) from the squared residuals (n,), or from
+    phi_sigma where it is above 0.
+    """
+    if phi_sigma > 0:
+        freedom = np.inf
+        scatter = phi_sigma
+    else:
+        # Two were fitted: the middle and α.
+        freedom = float(band.below_count + band.above_count - 2)
+        outside = squares[band.below | band.above]
+        scatter = np.sqrt(np.sum(outside) / freedom) if freedom else np.nan
+    return scatter / 2 * np.sqrt(1 / band.below_count + 1 / band.above_count), freedom
+
+
+def _dead_band(tilt, phi, phi_sigma) -> _DeadBand:
     """Fit the lines φ = tilt − middle ∓ α to the slip angles on both sides of the range without
     slip.
-
-    Returns (middle, α, masks (n,) of the points below and above the range); middle and α are NaN
-    where a side has no point.
     """
     threshold = max(3 * phi_sigma, 0.1 * np.abs(phi).max(initial=0.0))
     below = phi < -threshold
@@ -329,7 +365,7 @@ def _dead_band(tilt, phi, phi_sigma):
         alpha = (upper - lower) / 2
         below = tilt < middle - alpha
         above = tilt > middle + alpha
-    return middle, alpha, below, above
+    return _DeadBand(middle, alpha, below, above)
 
 
 @elementwise

@@ -87,36 +87,61 @@ def sliding(
     >>> round(float(still), 3), round(float(away.d_x_mm), 3)
     (62.939, 50.468)
     """
+    whisker = _SlidingWhisker(theta, atan2(m_y, m_z), hypot(m_y, m_z), alpha, u, beam)
     up = -1.0 if m_y < 0 else 1.0
-    first, first_slip = _slide_one_way(up, theta, m_y, m_z, alpha, u, beam)
+    first, first_slip = whisker.contact_to(up)
     if first_slip * up > 0:
         return first
-    second, second_slip = _slide_one_way(-up, theta, m_y, m_z, alpha, u, beam)
+    second, second_slip = whisker.contact_to(-up)
     return second if second_slip * -up > 0 else first
 
 
-def _slide_one_way(way, theta, m_y, m_z, alpha, u, beam) -> tuple[MovingContact, float]:
-    """Compute the contact if the whisker slides to one side (1: up the z of the object), and its
-    slip in mm.
+@dataclass(frozen=True, eq=False)
+class _SlidingWhisker:
+    """Whisker that slides over a moving object.
+
+    theta, phi, alpha: pushing angle, felt slip angle and friction angle, rad; moment: |m|, N·mm; u
+    (3,): the object's motion, mm/rad.
     """
-    phi = atan2(m_y, m_z)
-    moment = hypot(m_y, m_z)
-    share = 1.0  # of friction that acts along the surface in the sensing plane
-    for _ in range(_ITERATIONS):
-        cone = way * atan(share * tan(alpha))
-        beta = phi + cone
-        towards = -u[1] * cos(beta) + u[2] * sin(beta)
-        along = u[1] * sin(beta) + u[2] * cos(beta)
-        standing = beam.C_Nmm2 * theta * cos(beta) / (moment * cos(cone))
-        x, other = _distances(standing, towards / cos(beta), beam)
-        if not x > 0:
-            return _NOWHERE, nan
-        deflection = moment * x * beam.as_cylinder_mm(x) / beam.C_Nmm2
-        slip = theta * (x * sin(beta) - along) - deflection * sin(cone)
-        share = abs(slip) / max(hypot(slip, u[0] * theta), 1e-12)
-    along_whisker = copysign(sqrt(1 - share**2), u[0])
-    x *= 1 - along_whisker * first_order.dragging(theta, alpha) / beam.left(x)
-    return MovingContact(x - u[0] * theta, beta, other), slip
+
+    theta: float
+    phi: float
+    moment: float
+    alpha: float
+    u: np.ndarray
+    beam: Beam
+
+    def contact_to(self, way: float) -> tuple[MovingContact, float]:
+        """Compute the contact if it slides to one side (1: up the z of the object), and its slip in
+        mm.
+        """
+        share = 1.0  # of friction that acts along the surface in the sensing plane
+        for _ in range(_ITERATIONS):
+            cone = way * atan(share * tan(self.alpha))
+            beta = self.phi + cone
+            x, other = self._distances_at(beta, cone)
+            if not x > 0:
+                return _NOWHERE, nan
+            slip = self._slip(x, beta, cone)
+            share = abs(slip) / max(hypot(slip, self.u[0] * self.theta), 1e-12)
+        along_whisker = copysign(sqrt(1 - share**2), self.u[0])
+        dragging = first_order.dragging(self.theta, self.alpha)
+        x *= 1 - along_whisker * dragging / self.beam.left(x)
+        return MovingContact(x - self.u[0] * self.theta, beta, other), slip
+
+    def _distances_at(self, beta: float, cone: float) -> tuple[float, float]:
+        """Solve for both distances, mm, on a slope β where the force is turned from the normal by
+        `cone`, rad.
+        """
+        towards = -self.u[1] * cos(beta) + self.u[2] * sin(beta)
+        standing = self.beam.C_Nmm2 * self.theta * cos(beta) / (self.moment * cos(cone))
+        return _distances(standing, towards / cos(beta), self.beam)
+
+    def _slip(self, x: float, beta: float, cone: float) -> float:
+        """Compute how far a contact at x has slipped up the slope β, mm."""
+        along = self.u[1] * sin(beta) + self.u[2] * cos(beta)
+        deflection = self.moment * x * self.beam.as_cylinder_mm(x) / self.beam.C_Nmm2
+        return self.theta * (x * sin(beta) - along) - deflection * sin(cone)
 
 
 def _distances(standing_mm: float, gains_mm: float, beam: Beam) -> tuple[float, float]:
@@ -149,9 +174,7 @@ def known_motion(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     sigma of the rest.
     """
     beam = whisk.beam
-    if whisk.object_motion is None:
-        return Estimate(nan, nan, MOTION_UNKNOWN)
-    reason = distance.why_not(whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+    reason = _why_not(whisk)
     if reason:
         return Estimate(nan, nan, reason)
     inputs = _inputs(whisk, settings)
@@ -162,21 +185,42 @@ def known_motion(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     if not 0 < d_x <= beam.length_mm:
         return Estimate(nan, nan, RUNS_AWAY)
     gradient = _gradient(solve, inputs, beam)
-    variance = gradient @ _covariance(whisk) @ gradient
-    rest = float(np.sqrt(variance + (_model_share(whisk, settings, d_x) * d_x) ** 2))
+    rest = _sigma_without_alpha(whisk, settings, d_x, gradient)
     half_alpha = Z_95 * settings.alpha_est_sigma_rad
     low, high = _interval(solve, inputs, beam, d_x, half_alpha, Z_95 * rest)
-    is_ambiguous = contact.other_mm > _LEAST_OTHER * d_x
     return Estimate(
         d_x,
         hypot(rest, gradient[3] * settings.alpha_est_sigma_rad),
-        AMBIGUOUS.format(contact.other_mm) if is_ambiguous else "",
+        _status(contact),
         low,
         high,
         alpha_est_rad=nan if sticks else settings.alpha_est_rad,
         beta_rad=contact.beta_rad,
         gradient=gradient[:4],
     )
+
+
+def _why_not(whisk: Whisk) -> str:
+    """Return the reason for having no distance before it is looked for; empty without one."""
+    if whisk.object_motion is None:
+        return MOTION_UNKNOWN
+    return distance.why_not(whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+
+
+def _status(contact: MovingContact) -> str:
+    """Return that another distance explains as much; empty where none does."""
+    is_ambiguous = contact.other_mm > _LEAST_OTHER * contact.d_x_mm
+    return AMBIGUOUS.format(contact.other_mm) if is_ambiguous else ""
+
+
+def _sigma_without_alpha(
+    whisk: Whisk, settings: EstimatorSettings, d_x: float, gradient: np.ndarray
+) -> float:
+    """Return the sigma of d_x, mm, by all but α_est; gradient (7,): its derivative by the
+    inputs.
+    """
+    variance = gradient @ _covariance(whisk) @ gradient
+    return float(np.sqrt(variance + (_model_share(whisk, settings, d_x) * d_x) ** 2))
 
 
 def _inputs(whisk: Whisk, settings: EstimatorSettings) -> np.ndarray:

@@ -74,15 +74,28 @@ def rate_at(
     Raises ValueError where angles and moments do not have the same samples.
     """
     motor, samples = columns(motor_rad, moments)
-    begin = touch.motor_rad + GUARD_RAD
-    end = touch.motor_rad + theta_rad
-    used = usable(motor, samples) & (motor > begin) & (motor <= end)
+    used = usable(motor, samples) & _is_pushed(motor, touch, theta_rad)
     if touch.status or np.count_nonzero(used) < MIN_SAMPLES:
         unknown = np.full((samples.shape[1], samples.shape[1]), np.nan)
         return unknown[0], unknown
-    at = motor[used].mean() + 1.0
-    weights = noise.line_weights(motor, used, at) - noise.mean_weights(used)
+    weights = _slope_weights(motor, used)
     own = noise.Memory.of(motor, samples, used).of_sum(weights)
     scatter = noise.wider(touch.rise.memory.of_sum(weights), own)
     slope = noise.weighted_sum(weights, samples, used)
     return slope, scatter + np.diag(touch.level.drift**2)
+
+
+def _is_pushed(motor: np.ndarray, touch: FeltTouch, theta_rad: float) -> np.ndarray:
+    """Mark the samples (n,) from a little past the touch to theta_rad past it."""
+    begin = touch.motor_rad + GUARD_RAD
+    end = touch.motor_rad + theta_rad
+    return (motor > begin) & (motor <= end)
+
+
+def _slope_weights(motor: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Return the weights (n,), 1/rad, of the samples in the slope of a line through those used.
+
+    The line is read 1 rad past the mean angle, and the mean is subtracted.
+    """
+    at = motor[used].mean() + 1.0
+    return noise.line_weights(motor, used, at) - noise.mean_weights(used)

@@ -117,10 +117,25 @@ class SeenShape:
             shared_rad=self.shared_rad[keep],
         )
 
+    def reaches(self, motor_rad: float) -> bool:
+        """Check that a frame at a motor angle, or as good as at it, has points."""
+        last = self.motor_rad[self.frame].max()
+        return motor_rad <= last + 1e-3
+
     @property
     def frames(self) -> int:
         """Count the frames that have points."""
         return len(np.unique(self.frame))
+
+    @property
+    def has_frames(self) -> bool:
+        """Check that there are frames enough to fit a shape."""
+        return self.frames >= _FEWEST_FRAMES
+
+    @property
+    def suffices(self) -> bool:
+        """Check that there are frames and points enough to fit a shape."""
+        return self.has_frames and len(self.frame) >= _FEWEST_POINTS
 
 
 @dataclass(frozen=True)
@@ -165,25 +180,32 @@ def contact_of_shape(
     `EstimatorSettings`: they enter the sigma of d_x. rigidity_share: one sigma of EI as a share of
     it, which enters the force alone.
     """
-    if seen.frames < _FEWEST_FRAMES or len(seen.frame) < _FEWEST_POINTS:
+    if not seen.suffices:
         return ShapeContact(status=FEW)
     touch, begin = _initial_parameters(_ShapeFit(seen, theta_rad, beam))
-    near = seen.until(touch + theta_rad + _BEYOND_RAD)
-    last = seen.motor_rad[seen.frame].max()
-    if near.frames < _FEWEST_FRAMES or touch + theta_rad > last + 1e-3:
+    pushed_rad = touch + theta_rad
+    near = seen.until(pushed_rad + _BEYOND_RAD)
+    if not (near.has_frames and seen.reaches(pushed_rad)):
         return ShapeContact(status=NOT_PUSHED)
     fit = _ShapeFit(near, theta_rad, beam)
     vector, covariance = fit.solve(begin)
-    force_share = hypot(rigidity_share, _DRAG * theta_rad)
     values = fit.observables(vector)
     gradient = _derivatives(fit.observables, vector)  # (4, parameters)
     spread = gradient @ covariance @ gradient.T
     model_share = fit.model_share(vector, values[1], reach_mm, tilt_sigma_rad)
+    force_share = fit.force_share(rigidity_share)
     contact = _with_sigmas(values, spread, beam.length_mm, model_share, force_share)
-    by_plane = gradient[2] @ covariance[:, _TAN] / covariance[_TAN, _TAN] ** 0.5  # N, one sigma
-    if contact.status or abs(by_plane) / max(values[2], 1e-9) < _MOST_BY_PLANE:
+    if contact.status or _is_plane_known(values[2], gradient[2], covariance):
         return contact
     return _without_force(contact)
+
+
+def _is_plane_known(force: float, gradient: np.ndarray, covariance: np.ndarray) -> bool:
+    """Check that tan φ changes the force by a small share; gradient: of the force, N, by the
+    parameters.
+    """
+    by_plane = gradient @ covariance[:, _TAN] / covariance[_TAN, _TAN] ** 0.5  # N, one sigma
+    return abs(by_plane) / max(force, 1e-9) < _MOST_BY_PLANE
 
 
 def _without_force(contact: ShapeContact) -> ShapeContact:
@@ -368,6 +390,10 @@ class _ShapeFit:
         phi = atan(abs(vector[_TAN]))
         rolling = load_cell.rolling(self.theta_rad, reach_mm, 0.0, d_x, self.beam.left(d_x))
         return hypot(rolling, load_cell.leaning(self.theta_rad, tilt_sigma_rad, phi, 0.0))
+
+    def force_share(self, rigidity_share) -> float:
+        """Return the relative sigma of the force by EI's own and by friction along the whisker."""
+        return hypot(rigidity_share, _DRAG * self.theta_rad)
 
     def solve(self, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Fit the parameters, and return them with their covariance.

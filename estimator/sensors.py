@@ -67,7 +67,6 @@ def force_and_moment(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     others = whisk.others
     if others is None or not np.isfinite(others.force_N).all():
         return Estimate(nan, nan, NO_CELL)
-    length = whisk.beam.length_mm
     m_y = whisk.m_y_at_Nmm
     m_z = whisk.m_z_at_Nmm
     f_x, f_y, f_z = others.force_N.tolist()
@@ -77,11 +76,18 @@ def force_and_moment(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     by_felt = load_cell.relative_gradient(m_y, m_z, f_y, f_z)
     noise_share = _noise_share(whisk, by_felt)
     share = hypot(noise_share, others.scale_sigma, _model_share(whisk, settings, d_x))
+    gradient = np.array([0.0, d_x * by_felt[0], d_x * by_felt[1], 0.0])
+    return _on_whisker(d_x, share, gradient, whisk.beam.length_mm)
+
+
+def _on_whisker(d_x: float, share: float, gradient: np.ndarray, length: float) -> Estimate:
+    """Assemble the estimate of a distance and its relative sigma; beyond the length it is the
+    tip's, and has no gradient.
+    """
     low, high = _interval(d_x, Z_95 * share, length)
     clamped, at_tip = distance.clamp_to_length(d_x, length)
     if at_tip:
         return Estimate(clamped, d_x * share, TIP.format(d_x, low), low, high)
-    gradient = np.array([0.0, d_x * by_felt[0], d_x * by_felt[1], 0.0])
     return Estimate(clamped, d_x * share, "", low, high, gradient=gradient)
 
 

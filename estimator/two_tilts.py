@@ -15,6 +15,7 @@ whisk differ from another's. Angles in rad, lengths in mm.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import atan, cos, hypot, isnan, nan, sin, sqrt
 
 import numpy as np
@@ -77,24 +78,95 @@ def shared_contact(
     """
     if len(whisks) < 2:
         raise ValueError("two whisks at two tilts are the fewest that tell friction from distance")
-    felt = np.array([(w.theta_at_rad, w.m_y_at_Nmm, w.m_z_at_Nmm) for w in whisks])
-    m_y = np.abs(felt[:, 1])
-    m_z = felt[:, 2]
-    if not (m_z > 0).all() or not np.isfinite(felt).all():
+    if not _all_push(_felt(whisks)):
         return _without_contact(NO_PUSH)
-    per_mm = _per_distance(whisks)
     apart = apart_sigma_mm * _by_place(places or range(len(whisks)))
-    solution = _start(np.column_stack([per_mm, m_y]), m_z)
+    equations = _Equations(whisks, settings, apart, shared_Nmm)
+    solution = equations.start()
     for _ in range(_ITERATIONS):
-        models = [_model(whisk, solution, settings) for whisk in whisks]
-        held = np.array([model.held for model in models])
-        error = np.array([model.error for model in models])
-        rows = np.column_stack([per_mm * (1 + error), np.where(held, 0.0, m_y)])
-        spread = _spread(whisks, models, solution, apart, shared_Nmm)
-        solution, covariance = _weighted(rows, m_z, spread)
+        solution, covariance = equations.refine(solution)
         if not np.isfinite(covariance).all() or not solution[0] > 0:
             return _without_contact(ALIKE)
     return _contact(whisks[0], solution, covariance)
+
+
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """Equations m_z = a d (1 + e) + |m_y| μ of n whisks, a = |m|² / Cθ, in (d, μ).
+
+    apart_mm (n, p): one sigma of the distance by place. shared_Nmm: as in `shared_contact`.
+    """
+
+    whisks: Sequence[Whisk]
+    settings: EstimatorSettings
+    apart_mm: np.ndarray
+    shared_Nmm: Sequence[np.ndarray]
+
+    @cached_property
+    def per_mm(self) -> np.ndarray:
+        """Return a (n,), N·mm per mm."""
+        return _per_distance(self.whisks)
+
+    @cached_property
+    def m_y(self) -> np.ndarray:
+        """Return |m_y| (n,), N·mm."""
+        return np.abs(_felt(self.whisks)[:, 1])
+
+    @cached_property
+    def m_z(self) -> np.ndarray:
+        """Return m_z (n,), N·mm."""
+        return _felt(self.whisks)[:, 2]
+
+    def start(self) -> np.ndarray:
+        """Solve for (d, μ) without errors and weights."""
+        return _start(np.column_stack([self.per_mm, self.m_y]), self.m_z)
+
+    def refine(self, solution: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Solve for (d, μ) and its covariance with errors and weights at the solution so far."""
+        models = [_model(whisk, solution, self.settings) for whisk in self.whisks]
+        held = np.array([model.held for model in models])
+        error = np.array([model.error for model in models])
+        rows = np.column_stack([self.per_mm * (1 + error), np.where(held, 0.0, self.m_y)])
+        return _weighted(rows, self.m_z, self.spread(models, solution))
+
+    def spread(self, models: "Sequence[_TiltModel]", solution: np.ndarray) -> np.ndarray:
+        """Compute the covariance (n, n) of the equations' errors, (N·mm)².
+
+        It holds each whisk's own errors, and those that all whisks or those of one place have in
+        common.
+        """
+        own, common = self._by_felt(models, solution)
+        left = solution[0] * self.per_mm * [model.own for model in models]
+        by_place = self.per_mm[:, None] * self.apart_mm
+        by_model = solution[0] * self.per_mm[:, None] * [model.shared for model in models]
+        causes = np.concatenate([common, by_place, by_model], axis=1)
+        return np.diag(own + left**2) + causes @ causes.T
+
+    def _by_felt(self, models, solution) -> tuple[np.ndarray, np.ndarray]:
+        """Return the variances (n,) by each whisk's own angle and moments, (N·mm)², and the changes
+        (n, k) by the causes that all have in common, N·mm.
+        """
+        count = len(self.whisks)
+        measured = np.zeros(count)
+        common = []  # (k,) of each whisk
+        for row, (whisk, model) in enumerate(zip(self.whisks, models)):
+            gradient = _gradient(whisk, model.held, solution)
+            measured[row] = gradient @ whisk.felt_covariance @ gradient
+            by_causes = self.shared_Nmm[row] @ gradient[1:] if len(self.shared_Nmm) else np.zeros(0)
+            common.append(by_causes)
+        common = np.array(common)
+        # The moments' covariance holds their shared causes, too.
+        return np.maximum(measured - (common**2).sum(axis=1), 0.0), common
+
+
+def _felt(whisks: Sequence[Whisk]) -> np.ndarray:
+    """Return θ, rad, and m_y, m_z, N·mm, of each whisk (n, 3)."""
+    return np.array([(w.theta_at_rad, w.m_y_at_Nmm, w.m_z_at_Nmm) for w in whisks])
+
+
+def _all_push(felt: np.ndarray) -> bool:
+    """Check that all felt values (n, 3) are known, and that each m_z is positive."""
+    return (felt[:, 2] > 0).all() and np.isfinite(felt).all()
 
 
 def _per_distance(whisks: Sequence[Whisk]) -> np.ndarray:
@@ -139,30 +211,6 @@ def _by_place(places: Sequence[object]) -> np.ndarray:
     return made_at
 
 
-def _spread(whisks, models, solution, apart_mm, shared_Nmm) -> np.ndarray:
-    """Compute the covariance (n, n) of the equations' errors, (N·mm)².
-
-    It holds each whisk's own errors, and those that all whisks or those of one place have in
-    common. apart_mm (n, p): one sigma of the distance by place.
-    """
-    count = len(whisks)
-    per_mm = _per_distance(whisks)
-    measured = np.zeros(count)  # variance by angle and moments
-    common = []  # (k,) of each whisk
-    for row, (whisk, model) in enumerate(zip(whisks, models)):
-        gradient = _gradient(whisk, model.held, solution)
-        measured[row] = gradient @ whisk.felt_covariance @ gradient
-        common.append(shared_Nmm[row] @ gradient[1:] if len(shared_Nmm) else np.zeros(0))
-    common = np.array(common)
-    # The moments' covariance holds their shared causes, too.
-    own = np.maximum(measured - (common**2).sum(axis=1), 0.0)
-    left = solution[0] * per_mm * [model.own for model in models]
-    by_place = per_mm[:, None] * apart_mm
-    by_model = solution[0] * per_mm[:, None] * [model.shared for model in models]
-    causes = np.concatenate([common, by_place, by_model], axis=1)
-    return np.diag(own + left**2) + causes @ causes.T
-
-
 def _gradient(whisk: Whisk, held: bool, solution: np.ndarray) -> np.ndarray:
     """Compute the derivative (3,) of m_z − a d − |m_y| μ by θ, m_y, m_z, where a = |m|² / Cθ."""
     d, mu = solution
@@ -201,22 +249,48 @@ def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _
     d_x = whisk.beam.distance_mm(solution[0])
     left = d_x / solution[0]
     held = is_held(whisk)
-    phi = 0.0 if held else abs(felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm))
-    bent = theta if held else theta * max(cos(phi + alpha), 0.0) / cos(alpha)
-    dragging = first_order.dragging(theta, alpha)
-    large = bent**2 / (6 * left)
-    if held:
-        along = first_order.HELD_SHARE
-        own = first_order.HELD_SPREAD * dragging
-    else:
-        drawn = _DRAWN * bent
-        along = drawn / hypot(drawn, sin(phi) / cos(alpha))
-        own = _DRAGGING_LEFT * along * dragging
-    rolling, rolling_sigma = _rolling(theta, phi, alpha, d_x, left, settings)
-    leaning = first_order.leaning(theta, settings.tilt_sigma_rad, phi, alpha)
-    error = along * dragging + large + rolling
+    bending = _bending_held(theta, alpha) if held else _bending_slipping(whisk, alpha)
+    large = bending.bent**2 / (6 * left)
+    rolling, rolling_sigma = _rolling(theta, bending.phi, alpha, d_x, left, settings)
+    leaning = first_order.leaning(theta, settings.tilt_sigma_rad, bending.phi, alpha)
+    error = bending.dragging + large + rolling
     shared = np.array([leaning, rolling_sigma, _LARGE_LEFT * large])
-    return _TiltModel(held, error / left, shared / left, own / left)
+    return _TiltModel(held, error / left, shared / left, bending.dragging_sigma / left)
+
+
+@dataclass(frozen=True)
+class _Bending:
+    """How a whisker bends and is drawn along itself.
+
+    phi: felt slip angle, rad. bent: how much of the pushing angle bends it, rad. dragging: error by
+    friction along it, as a share, with its sigma.
+    """
+
+    phi: float
+    bent: float
+    dragging: float
+    dragging_sigma: float
+
+
+def _bending_held(theta: float, alpha: float) -> _Bending:
+    """Return the bending of a whisker that does not slip sideways."""
+    dragging = first_order.dragging(theta, alpha)
+    of_held = (first_order.HELD_SHARE * dragging, first_order.HELD_SPREAD * dragging)
+    return _Bending(0.0, theta, *of_held)
+
+
+def _bending_slipping(whisk: Whisk, alpha: float) -> _Bending:
+    """Return the bending of a whisker that slips sideways.
+
+    Friction acts along it by the share that the way along has in the whole way of the contact.
+    """
+    theta = whisk.theta_at_rad
+    phi = abs(felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm))
+    bent = theta * max(cos(phi + alpha), 0.0) / cos(alpha)
+    drawn = _DRAWN * bent
+    along = drawn / hypot(drawn, sin(phi) / cos(alpha))
+    dragging = first_order.dragging(theta, alpha)
+    return _Bending(phi, bent, along * dragging, _DRAGGING_LEFT * along * dragging)
 
 
 def _rolling(theta, phi, alpha, d_x, left, settings) -> tuple[float, float]:

@@ -219,16 +219,25 @@ def interval_with_friction(
     middle, gradient = _through_zero(theta, m_y, m_z, alpha_est, C)
     rest = Z_95 * np.hypot(sigma(gradient, **sigmas), model_sigma * middle)
     half = Z_95 * np.asarray(alpha_est_sigma)
+    least, most = _at_alpha_ends(theta, m_y, m_z, alpha_est, C, half)
+    high = middle + _upper_side(most - middle, rest, alpha_est, half)
+    low = middle - np.hypot(middle - least, rest)
+    pushes = (np.asarray(theta) > 0) & (np.asarray(m_z) > 0) & np.isfinite(middle)
+    return _not_negative(low, pushes), _not_negative(high, pushes)
+
+
+def _at_alpha_ends(theta, m_y, m_z, alpha_est, C, half):
+    """Compute (10), mm, at the steep and at the flat end of α_est's interval, α_est ± half, rad."""
     steep = np.clip(alpha_est + half, 0.0, _STEEPEST_RAD)
     flat = np.clip(alpha_est - half, 0.0, _STEEPEST_RAD)
     least, _ = _through_zero(theta, m_y, m_z, steep, C)
     most, _ = _through_zero(theta, m_y, m_z, flat, C)
-    high = middle + _upper_side(most - middle, rest, alpha_est, half)
-    low = middle - np.hypot(middle - least, rest)
-    push = (np.asarray(theta) > 0) & (np.asarray(m_z) > 0) & np.isfinite(middle)
-    low = np.where(push, np.maximum(low, 0.0), np.nan)
-    high = np.where(push, np.maximum(high, 0.0), np.nan)
-    return low[()], high[()]
+    return least, most
+
+
+def _not_negative(end, pushes):
+    """Return an end of the interval, mm, at least 0; NaN where the whisker does not push."""
+    return np.where(pushes, np.maximum(end, 0.0), np.nan)[()]
 
 
 def model_share(
