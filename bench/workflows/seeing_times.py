@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from bench.base.settings import Settings
 from bench.records.trial_result import SeenTrial, TrialResult
-from bench.report.figures import draw_trial
+from bench.report.trial_figures import draw_trial
 from bench.session.signals import read_signals
 from bench.trials.seen import see_trial
 from bench.trials.unit import Unit

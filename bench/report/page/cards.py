@@ -11,7 +11,7 @@ from bench.gauges.felt import lateness
 from bench.records.trial_result import EstimateRow
 from bench.report.assembly import status_of
 from bench.report.page.thumbnails import picture_source
-from bench.report.page.words import MISSING, Row, number, value_text, with_sigma
+from bench.report.page.words import MISSING, WhiskRow, number, value_text, with_sigma
 from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
 from vision import UNKNOWN, BeamCheck, Value
@@ -50,7 +50,7 @@ class Card:
     doubts: tuple[tuple[str, str], ...]
 
 
-def card(row: Row, out: Path, whisks: int) -> Card:
+def card(row: WhiskRow, out: Path, whisks: int) -> Card:
     """Return the card of one whisk. whisks: how many the whole session has."""
     warnings = []
     for code, sentence in status_of(row.seen, row.felt).parts:
@@ -67,7 +67,7 @@ def card(row: Row, out: Path, whisks: int) -> Card:
     )
 
 
-def _subtitle(row: Row) -> str:
+def _subtitle(row: WhiskRow) -> str:
     """Return surface, speed, purpose and what the truth rests on, as far as they are known."""
     trial = row.result.trial
     parts = [trial.surface] if trial.surface else []
@@ -81,7 +81,7 @@ def _subtitle(row: Row) -> str:
     return ", ".join(parts)
 
 
-def _pictures(row: Row, out: Path, whisks: int) -> tuple[tuple[str, str], ...]:
+def _pictures(row: WhiskRow, out: Path, whisks: int) -> tuple[tuple[str, str], ...]:
     """Return (alt text, source) of the pictures of a whisk that are in the results' folder."""
     which = f"{row.trial}_{row.seen.whisk}.png"
     found = []
@@ -95,7 +95,7 @@ def _pictures(row: Row, out: Path, whisks: int) -> tuple[tuple[str, str], ...]:
     return tuple((f"{row.name}: {alt}", source) for alt, source in found if source)
 
 
-def numbers(row: Row) -> list[tuple[str, str]]:
+def numbers(row: WhiskRow) -> list[tuple[str, str]]:
     """Return each quantity with one sigma; what is not known is left out."""
     seen = row.seen
     felt = row.felt
@@ -147,7 +147,7 @@ def _beam_changes(beam: BeamCheck) -> list[tuple[str, Value, str]]:
     return changes
 
 
-def _estimate(row: Row, estimate: EstimateRow) -> tuple[str, ...]:
+def _estimate(row: WhiskRow, estimate: EstimateRow) -> tuple[str, ...]:
     """Return estimator, distance, 95 % interval, error in mm, in per cent, status."""
     truth = row.seen.d_x_mm
     low = estimate.d_x_est_low_mm
@@ -193,7 +193,7 @@ def _head(text: str, *, wide: bool = False) -> Cell:
     return Cell(text, math.nan, wide)
 
 
-def cells(row: Row, estimators: list[str]) -> list[Cell]:
+def cells(row: WhiskRow, estimators: list[str]) -> list[Cell]:
     """Return the row of a whisk, in the columns' order, the trial's name apart."""
     seen = row.seen
     trial = row.result.trial
@@ -213,12 +213,12 @@ def cells(row: Row, estimators: list[str]) -> list[Cell]:
     return [*fixed, *errors, Cell(status_of(seen, row.felt) or SOUND)]
 
 
-def is_flagged(row: Row) -> bool:
+def is_flagged(row: WhiskRow) -> bool:
     """Return whether the user should look at a whisk."""
     return not is_silent(status_of(row.seen, row.felt))
 
 
-def _error(row: Row, estimator: str) -> Cell:
+def _error(row: WhiskRow, estimator: str) -> Cell:
     """Return the error of one estimator, per cent of the true distance."""
     truth = row.seen.d_x_mm
     for estimate in row.felt.estimates:
