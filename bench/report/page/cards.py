@@ -14,11 +14,13 @@ from bench.report.page.thumbnails import picture_source
 from bench.report.page.words import MISSING, WhiskRow, number, value_text, with_sigma
 from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
-from vision import UNKNOWN, BeamCheck, Value
+from vision import UNKNOWN, BeamCheck, TruthAtAngle, Value
 from vision.geometry import counted
 
 SOUND = "sound"
 _DEGREES = math.degrees(1.0)
+
+_Quantity = tuple[str, Value, str]  # name, value (an angle in rad), unit that it is shown in
 
 
 @dataclass(frozen=True)
@@ -97,44 +99,52 @@ def _pictures(row: WhiskRow, out: Path, whisks: int) -> tuple[tuple[str, str], .
 
 def numbers(row: WhiskRow) -> list[tuple[str, str]]:
     """Return each quantity with one sigma; what is not known is left out."""
-    seen = row.seen
-    felt = row.felt
-    quantities = [
-        ("d_x", seen.d_x_mm, "mm"),
-        ("touch seen", seen.touch_rad, "°"),
-        ("touch felt", felt.touch_felt_rad, "°"),
-        ("slope β", seen.beta_rad, "°"),
-        ("tilt ψ", seen.psi_rad, "°"),
-    ]
-    if seen.at is not None:
-        quantities += [
-            ("slip σ at θ", seen.at.slip_mm, "mm"),
-            ("slip along the whisker", seen.at.longitudinal_slip_mm, "mm"),
-            ("deflection d_y", seen.at.d_y_mm, "mm"),
-            ("deflection d_z", seen.at.d_z_mm, "mm"),
-            ("force angle φ seen", seen.at.phi_rad, "°"),
-            ("friction angle α seen", seen.at.alpha_rad, "°"),
-        ]
-    quantities += [
-        ("moment m_y felt", felt.m_y_Nmm, "N·mm"),
-        ("moment m_z felt", felt.m_z_Nmm, "N·mm"),
-        ("force angle φ felt", felt.phi_felt_rad, "°"),
-    ]
-    if seen.truth.beam is not None:
-        quantities += _beam_changes(seen.truth.beam)
+    beam = row.seen.truth.beam
+    quantities = _quantities(row)
+    if beam is not None:
+        quantities += _beam_changes(beam)
     found = []
     for name, value, unit in quantities:
         text = value_text(value, degrees=unit == "°")
         if text != MISSING:
             found.append((name, f"{text} {unit}"))
-    if seen.truth.beam is not None:
-        chance = number(100.0 * seen.truth.beam.chance, 1)
+    if beam is not None:
+        chance = number(100.0 * beam.chance, 1)
         if chance != MISSING:
             found.append(("chance that a beam departs so far", f"{chance} %"))
     return found
 
 
-def _beam_changes(beam: BeamCheck) -> list[tuple[str, Value, str]]:
+def _quantities(row: WhiskRow) -> list[_Quantity]:
+    """Return what was seen and felt of a whisk, known or not."""
+    seen = row.seen
+    felt = row.felt
+    return [
+        ("d_x", seen.d_x_mm, "mm"),
+        ("touch seen", seen.touch_rad, "°"),
+        ("touch felt", felt.touch_felt_rad, "°"),
+        ("slope β", seen.beta_rad, "°"),
+        ("tilt ψ", seen.psi_rad, "°"),
+        *(_quantities_at(seen.at) if seen.at is not None else ()),
+        ("moment m_y felt", felt.m_y_Nmm, "N·mm"),
+        ("moment m_z felt", felt.m_z_Nmm, "N·mm"),
+        ("force angle φ felt", felt.phi_felt_rad, "°"),
+    ]
+
+
+def _quantities_at(at: TruthAtAngle) -> list[_Quantity]:
+    """Return what was seen at the pushing angle."""
+    return [
+        ("slip σ at θ", at.slip_mm, "mm"),
+        ("slip along the whisker", at.longitudinal_slip_mm, "mm"),
+        ("deflection d_y", at.d_y_mm, "mm"),
+        ("deflection d_z", at.d_z_mm, "mm"),
+        ("force angle φ seen", at.phi_rad, "°"),
+        ("friction angle α seen", at.alpha_rad, "°"),
+    ]
+
+
+def _beam_changes(beam: BeamCheck) -> list[_Quantity]:
     """Return by how much a curve left free moves what the beam with a point load gives."""
     changes = []
     for name, compared, unit in (
