@@ -82,13 +82,18 @@ def _draw_bench(axes: Axes, bench: Bench, side: tuple[int, int], title: str) -> 
         axes.plot(*_bar_ends_mm(whisk)[:, side].T, color="#999999", lw=1.5)
     axes.plot(*_wire_mm(bench.staged[0])[:, side].T, color="black", lw=2)
     axes.plot(0, 0, "ks", ms=7)
+    _draw_cameras(axes, bench, side)
+    axes.set_aspect("equal", adjustable="datalim")
+    horizontal, vertical = ("xyz"[number] for number in side)
+    axes.set(xlabel=f"{horizontal} / mm", ylabel=f"{vertical} / mm", title=title)
+
+
+def _draw_cameras(axes: Axes, bench: Bench, side: tuple[int, int]) -> None:
+    """Draw each camera, and its picture as far ahead as the contact."""
     for number, camera in enumerate(bench.cameras):
         corners_mm = _corners_at(camera, bench.contact_mm)
         colour = _COLOURS[number % len(_COLOURS)]
         _draw_camera(axes, camera, corners_mm[:, side], camera.centre_mm[list(side)], colour)
-    axes.set_aspect("equal", adjustable="datalim")
-    horizontal, vertical = ("xyz"[number] for number in side)
-    axes.set(xlabel=f"{horizontal} / mm", ylabel=f"{vertical} / mm", title=title)
 
 
 def _bar_ends_mm(whisk: StagedWhisk) -> np.ndarray:

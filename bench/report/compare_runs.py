@@ -102,11 +102,7 @@ def compare_runs(outs: Sequence[Path], table: Path | None = None) -> tuple[list[
     The code is 1 where anything changed that matters. table: a CSV file to write, a row a whisk and
     quantity. Raises BadInput where a folder is no run, or no whisk stands in two of them.
     """
-    if len(outs) < 2:
-        raise BadInput("is one run alone; give two or more", file=outs[0])
-    if len({Path(out).resolve() for out in outs}) < len(outs):
-        raise BadInput("is given twice; give each run once", file=outs[-1])
-    first, *others = [_EvaluatedRun.read(Path(out)) for out in outs]
+    first, *others = _read_runs(outs)
     changes: list[QuantityChange] = []
     lines: list[str] = []
     for other in others:
@@ -121,6 +117,15 @@ def compare_runs(outs: Sequence[Path], table: Path | None = None) -> tuple[list[
     lines += _accuracy_lines([first, *others])
     has_changed = any(change.matters for change in changes)
     return lines, CHANGED if has_changed else DONE
+
+
+def _read_runs(outs: Sequence[Path]) -> list["_EvaluatedRun"]:
+    """Read two or more runs. Raises BadInput where there is one alone, one twice, or one is none."""
+    if len(outs) < 2:
+        raise BadInput("is one run alone; give two or more", file=outs[0])
+    if len({Path(out).resolve() for out in outs}) < len(outs):
+        raise BadInput("is given twice; give each run once", file=outs[-1])
+    return [_EvaluatedRun.read(Path(out)) for out in outs]
 
 
 @dataclass(frozen=True)
@@ -222,6 +227,11 @@ def _run_lines(
         alone = sorted(run.whisks.keys() - rest.whisks.keys())
         if alone:
             yield f"  only in {run.out}: {_names(alone)}"
+    yield from _largest_changes(changes)
+
+
+def _largest_changes(changes: Sequence[QuantityChange]) -> Iterator[str]:
+    """Yield the quantities that changed most, and by how much the others did at most."""
     significant = [change for change in changes if change.matters]
     significant.sort(key=lambda change: -abs(change.sigmas))
     for change in significant[:_MOST_LISTED]:
