@@ -93,22 +93,17 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
             file=path,
         )
     whisks = list(staged.values())
-    target_mm = _mean_contact_mm(whisks)
     try:
-        rig = _place_rig(protocol, whisks, target_mm)
+        rig = _place_rig(protocol, whisks)
     except BadInput as bad:
         raise BadInput(bad.reason, file=path) from None
     except (Refused, ValueError, cv2.error) as problem:
         raise _on_one_line(problem, path) from None
-    changes = list_changes(rig.cameras, rig.work, target_mm, light=True) if options.changes else ()
-    theta_rad = float(np.radians(options.theta_deg))
-    runs = rig.protocol.runs()
-    tasks = [RigTask(rig.protocol, run, rig.cameras, changes, theta_rad) for run in runs]
-    rows = pool.run(plan_run, tasks, "trials")
+    rows = pool.run(plan_run, _rig_tasks(rig, options), "trials")
     with lock_output(out):
         _draw_rig(out, rig.painter, rig.cameras, staged)
     return Plan(
-        title=f"{rig.protocol.name}: {len(runs)} trials planned",
+        title=f"{rig.protocol.name}: {len(rows)} trials planned",
         cameras=tuple(_describe_cameras(rig.cameras, whisks)),
         rows=tuple(rows),
         theta_deg=options.theta_deg,
@@ -120,26 +115,37 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
 class _PlacedRig:
     """A rig whose cameras all have a place.
 
-    work: what the cameras would be calibrated from. cameras: with the covariance that this leaves.
+    target_mm (3,): what they look at. work: what they would be calibrated from. cameras: with the
+    covariance that this leaves.
     """
 
     protocol: Protocol
+    target_mm: np.ndarray
     painter: Painter
     work: BoardWork
     cameras: Cameras
 
 
-def _place_rig(
-    protocol: Protocol, whisks: Sequence[StagedWhisk], target_mm: np.ndarray
-) -> _PlacedRig:
-    """Return the rig with a place for each camera. target_mm (3,): what they look at.
+def _place_rig(protocol: Protocol, whisks: Sequence[StagedWhisk]) -> _PlacedRig:
+    """Return the rig with a place for each camera, which looks at the whisks' mean contact.
 
     Raises BadInput, Refused, ValueError or cv2.error where that cannot be.
     """
+    target_mm = _mean_contact_mm(whisks)
     placed = place_cameras(protocol, whisks, target_mm)
     painter = painter_of(placed)
     work = _board_work(painter)
-    return _PlacedRig(placed, painter, work, expected_cameras(painter.cameras, work))
+    return _PlacedRig(placed, target_mm, painter, work, expected_cameras(painter.cameras, work))
+
+
+def _rig_tasks(rig: _PlacedRig, options: Options) -> list[RigTask]:
+    """Return a task for each trial of a rig."""
+    changes: Sequence[Change] = ()
+    if options.changes:
+        changes = list_changes(rig.cameras, rig.work, rig.target_mm, light=True)
+    theta_rad = float(np.radians(options.theta_deg))
+    runs = rig.protocol.runs()
+    return [RigTask(rig.protocol, run, rig.cameras, changes, theta_rad) for run in runs]
 
 
 def _load_rig(path: Path) -> Protocol:

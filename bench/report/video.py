@@ -188,15 +188,20 @@ def _draw_lines(
 
     for edge in _bar_edges(camera, result.seen, whisk):
         polyline(picture, project(edge), _BAR)
-    points_mm = whisk.frames.point_mm.value[: k + 1]
-    touching = np.asarray(whisk.frames.touching[: k + 1], dtype=bool)
-    contact_mm = points_mm[k] if touching[k] else None
+    path_mm = _contact_path(whisk, k)
+    contact_mm = path_mm[-1] if whisk.frames.touching[k] else None
     polyline(picture, project(_wire(result, whisk, k, contact_mm)), _WIRE)
-    if np.count_nonzero(touching) > 1:
-        polyline(picture, project(points_mm[touching]), _PATH)
+    if len(path_mm) > 1:
+        polyline(picture, project(path_mm), _PATH)
     if contact_mm is not None:
         ((x, y),) = project(contact_mm[None])
         cv2.circle(picture, (round(x), round(y)), 5, _CONTACT, 1, cv2.LINE_AA)
+
+
+def _contact_path(whisk: SeenWhisk, k: int) -> np.ndarray:
+    """Return the contact (n, 3), mm, in those frames up to k in which the whisker touches."""
+    touching = np.asarray(whisk.frames.touching[: k + 1], dtype=bool)
+    return whisk.frames.point_mm.value[: k + 1][touching]
 
 
 def _bar_edges(camera: Camera, seen: SeenTrial, whisk: SeenWhisk) -> list[np.ndarray]:
