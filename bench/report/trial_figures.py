@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,21 @@ _MOST_NAMED = 8
 _WhiskOfTrial = tuple[str, SeenWhisk]  # name of the trial, whisk
 
 
+@dataclass(frozen=True)
+class TrialToDraw:
+    """One trial's drawing as a task.
+
+    friction: half the opening of the friction cone, rad, and where it comes from. out: the results'
+    folder.
+    """
+
+    trial: Trial
+    result: TrialResult
+    whisker: Whisker
+    friction: tuple[float, str]
+    out: Path
+
+
 def draw_trials(evaluation: Evaluation, pool: Workers) -> list[str]:
     """Draw the figures of each trial; return the names of the files.
 
@@ -43,7 +59,7 @@ def draw_trials(evaluation: Evaluation, pool: Workers) -> list[str]:
     for result in evaluation.results:
         trial = evaluation.session.trial(result.trial.name)
         friction = _friction_of(result, fitted, evaluation.settings)
-        tasks.append((trial, result, evaluation.whisker, friction, evaluation.out))
+        tasks.append(TrialToDraw(trial, result, evaluation.whisker, friction, evaluation.out))
     names = []
     for of_trial in pool.run(draw_trial, tasks, "figures"):
         names += of_trial
@@ -60,13 +76,13 @@ def _friction_of(
     return settings.alpha_est_rad, "assumed"
 
 
-def draw_trial(task: tuple[Trial, TrialResult, Whisker, tuple[float, str], Path]) -> list[str]:
+def draw_trial(task: TrialToDraw) -> list[str]:
     """Draw planes and overlays of one trial; return their names, relative to the results' folder."""
-    trial, result, whisker, friction, out = task
-    stamp = hash_of(result.hash, friction, hash_of_code(DRAWING))
+    result = task.result
+    stamp = hash_of(result.hash, task.friction, hash_of_code(DRAWING))
     with style():
-        planes = draw_planes(result, whisker, friction, out, stamp)
-        return [*planes, *draw_overlays(trial, result, out, stamp)]
+        planes = draw_planes(result, task.whisker, task.friction, task.out, stamp)
+        return [*planes, *draw_overlays(task.trial, result, task.out, stamp)]
 
 
 def variance_of_truth(results: Sequence[TrialResult]) -> Figure | None:
