@@ -1,4 +1,4 @@
-"""The verb `design`: the best whisker for a region (bench/theory/design.py)."""
+"""The verb `design`: the best whisker for a region (bench/theory/best_design.py)."""
 
 import argparse
 
@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
         value = getattr(options, name)
         if not 0 < value < float("inf"):
             raise BadInput(f"{_option(name)} {value:g}: must be positive and finite")
-    from bench.theory.design import Equipment, Region
+    from bench.theory.best_design import Equipment, Region
     from bench.theory.design_map import find_design, report_lines, write_design
 
     region = Region(**region_ends, bar_radius_mm=0.5 * options.bar_diameter_mm)

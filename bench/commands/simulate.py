@@ -1,4 +1,4 @@
-"""The verb `simulate`: a session with known truth (bench/rig/simulate.py)."""
+"""The verb `simulate`: a session with known truth (bench/rig/simulation.py)."""
 
 import argparse
 from functools import partial
@@ -43,7 +43,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Simulate the session; return the exit code."""
-    from bench.rig.simulate import simulate
+    from bench.rig.simulation import simulate
 
     simulate(
         options.session,

@@ -79,22 +79,35 @@ def _draw_bench(axes: Axes, bench: Bench, side: tuple[int, int], title: str) -> 
     if bench.board_mm is not None:
         axes.fill(*bench.board_mm[:, side].T, color="#dddddd", label="board")
     for whisk in bench.staged:
-        bar = whisk.known.axis
-        half_mm = _BAR_MM * bar.direction
-        ends_mm = np.array([bar.point_mm - half_mm, bar.point_mm + half_mm])
-        axes.plot(*ends_mm[:, side].T, color="#999999", lw=1.5)
-    first = bench.staged[0].known
-    direction = np.array([np.cos(first.touch_rad), np.sin(first.touch_rad), 0.0])
-    wire_mm = np.array([np.zeros(3), first.rods.wire.length_mm * direction])
-    axes.plot(*wire_mm[:, side].T, color="black", lw=2)
+        axes.plot(*_bar_ends_mm(whisk)[:, side].T, color="#999999", lw=1.5)
+    axes.plot(*_wire_mm(bench.staged[0])[:, side].T, color="black", lw=2)
     axes.plot(0, 0, "ks", ms=7)
+    _draw_cameras(axes, bench, side)
+    axes.set_aspect("equal", adjustable="datalim")
+    horizontal, vertical = ("xyz"[number] for number in side)
+    axes.set(xlabel=f"{horizontal} / mm", ylabel=f"{vertical} / mm", title=title)
+
+
+def _draw_cameras(axes: Axes, bench: Bench, side: tuple[int, int]) -> None:
+    """Draw each camera, and its picture as far ahead as the contact."""
     for number, camera in enumerate(bench.cameras):
         corners_mm = _corners_at(camera, bench.contact_mm)
         colour = _COLOURS[number % len(_COLOURS)]
         _draw_camera(axes, camera, corners_mm[:, side], camera.centre_mm[list(side)], colour)
-    axes.set_aspect("equal", adjustable="datalim")
-    horizontal, vertical = ("xyz"[number] for number in side)
-    axes.set(xlabel=f"{horizontal} / mm", ylabel=f"{vertical} / mm", title=title)
+
+
+def _bar_ends_mm(whisk: StagedWhisk) -> np.ndarray:
+    """Return the ends (2, 3) of the part of a bar that is drawn, in the rig frame."""
+    bar = whisk.known.axis
+    half_mm = _BAR_MM * bar.direction
+    return np.array([bar.point_mm - half_mm, bar.point_mm + half_mm])
+
+
+def _wire_mm(whisk: StagedWhisk) -> np.ndarray:
+    """Return base and tip (2, 3) of the straight wire at first touch, in the rig frame."""
+    known = whisk.known
+    direction = np.array([np.cos(known.touch_rad), np.sin(known.touch_rad), 0.0])
+    return np.array([np.zeros(3), known.rods.wire.length_mm * direction])
 
 
 def _corners_at(camera: Camera, point_mm: np.ndarray) -> np.ndarray:
@@ -120,18 +133,11 @@ def _draw_camera(
 
 def _draw_picture(axes: Axes, camera: Camera, painted: PaintedTrial) -> None:
     """Draw a painted frame with wire, bar and contact."""
-    width, height = camera.size_px
     picture = painted.pictures[camera.name]
     white = np.iinfo(picture.dtype).max if picture.dtype == np.uint8 else None
     axes.imshow(picture, cmap="gray", vmin=0, vmax=white)
-    known = painted.staged.known
-    last = int(np.argmax(known.motor_rad))
-    wire_px = camera.project(known.curves([last])[last].points_mm)
-    axes.plot(*wire_px.T, color="#e08214", lw=0.8)
-    radius_mm = known.rods.bar.radius_mm
-    for edge_px in known.axis.edges_px(camera, radius_mm, _EDGES_MM, _EDGE_POINTS):
-        axes.plot(*edge_px.T, color="#67a9cf", lw=0.8)
-    axes.plot(*camera.project(known.contact_mm[None])[0], "+", color="#b2182b", ms=9)
+    _draw_known(axes, camera, painted.staged)
+    width, height = camera.size_px
     axes.set(
         xlim=(-0.5, width - 0.5),
         ylim=(height - 0.5, -0.5),
@@ -139,3 +145,15 @@ def _draw_picture(axes: Axes, camera: Camera, painted: PaintedTrial) -> None:
         yticks=[],
         title=f"{camera.name}: {painted.name}",
     )
+
+
+def _draw_known(axes: Axes, camera: Camera, whisk: StagedWhisk) -> None:
+    """Draw the wire pushed furthest, the bar's edges and the contact as a camera sees them."""
+    known = whisk.known
+    last = int(np.argmax(known.motor_rad))
+    wire_px = camera.project(known.curves([last])[last].points_mm)
+    axes.plot(*wire_px.T, color="#e08214", lw=0.8)
+    radius_mm = known.rods.bar.radius_mm
+    for edge_px in known.axis.edges_px(camera, radius_mm, _EDGES_MM, _EDGE_POINTS):
+        axes.plot(*edge_px.T, color="#67a9cf", lw=0.8)
+    axes.plot(*camera.project(known.contact_mm[None])[0], "+", color="#b2182b", ms=9)

@@ -30,6 +30,7 @@ from bench.session.session import MANIFEST
 from bench.session.session_check import checked_session
 from bench.trials.of_session import placed_units, trials_with_whisks
 from bench.trials.trial_evaluation import see_unit
+from bench.trials.unit import Unit
 from vision.calibration import MeasuredPose
 from vision.geometry import Board, Cameras, Refused
 
@@ -92,30 +93,59 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
             file=path,
         )
     whisks = list(staged.values())
-    target_mm = _mean_contact_mm(whisks)
     try:
-        protocol = place_cameras(protocol, whisks, target_mm)
-        painter = painter_of(protocol)
-        work = _board_work(painter)
-        cameras = expected_cameras(painter.cameras, work)
+        rig = _place_rig(protocol, whisks)
     except BadInput as bad:
         raise BadInput(bad.reason, file=path) from None
     except (Refused, ValueError, cv2.error) as problem:
         raise _on_one_line(problem, path) from None
-    changes = list_changes(cameras, work, target_mm, light=True) if options.changes else ()
-    theta_rad = float(np.radians(options.theta_deg))
-    runs = protocol.runs()
-    tasks = [RigTask(protocol, run, cameras, changes, theta_rad) for run in runs]
-    rows = pool.run(plan_run, tasks, "trials")
+    rows = pool.run(plan_run, _rig_tasks(rig, options), "trials")
     with lock_output(out):
-        _draw_rig(out, painter, cameras, staged)
+        _draw_rig(out, rig.painter, rig.cameras, staged)
     return Plan(
-        title=f"{protocol.name}: {len(runs)} trials planned",
-        cameras=tuple(_describe_cameras(cameras, whisks)),
+        title=f"{rig.protocol.name}: {len(rows)} trials planned",
+        cameras=tuple(_describe_cameras(rig.cameras, whisks)),
         rows=tuple(rows),
         theta_deg=options.theta_deg,
-        assumptions=tuple(_assumptions(work)),
+        assumptions=tuple(_assumptions(rig.work)),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _PlacedRig:
+    """A rig whose cameras all have a place.
+
+    target_mm (3,): what they look at. work: what they would be calibrated from. cameras: with the
+    covariance that this leaves.
+    """
+
+    protocol: Protocol
+    target_mm: np.ndarray
+    painter: Painter
+    work: BoardWork
+    cameras: Cameras
+
+
+def _place_rig(protocol: Protocol, whisks: Sequence[StagedWhisk]) -> _PlacedRig:
+    """Return the rig with a place for each camera, which looks at the whisks' mean contact.
+
+    Raises BadInput, Refused, ValueError or cv2.error where that cannot be.
+    """
+    target_mm = _mean_contact_mm(whisks)
+    placed = place_cameras(protocol, whisks, target_mm)
+    painter = painter_of(placed)
+    work = _board_work(painter)
+    return _PlacedRig(placed, target_mm, painter, work, expected_cameras(painter.cameras, work))
+
+
+def _rig_tasks(rig: _PlacedRig, options: Options) -> list[RigTask]:
+    """Return a task for each trial of a rig."""
+    changes: Sequence[Change] = ()
+    if options.changes:
+        changes = list_changes(rig.cameras, rig.work, rig.target_mm, light=True)
+    theta_rad = float(np.radians(options.theta_deg))
+    runs = rig.protocol.runs()
+    return [RigTask(rig.protocol, run, rig.cameras, changes, theta_rad) for run in runs]
 
 
 def _load_rig(path: Path) -> Protocol:
@@ -242,28 +272,34 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
     settings = Settings(theta_deg=options.theta_deg)
     with lock_output(out):
         calibration, units = placed_units(session, trials, out, settings, pool, doubts)
-        seen = pool.run(see_unit, units, "trials")
-        cameras = calibration.cameras
-        changes = _changes_of_session(cameras, seen) if options.changes else ()
-        tasks = []
-        for unit, trial in zip(units, seen):
-            for whisk in trial.whisks:
-                task = SeenTask(
-                    session, unit.trial, trial, whisk, cameras, changes, settings.theta_rad
-                )
-                tasks.append(task)
+        tasks = _see_whisks(units, calibration.cameras, options, pool)
         rows = pool.run(plan_seen, tasks, "whisks")
         staged = [stage_again(task) for task, row in zip(tasks, rows) if row.outlook.has_truth]
         if staged:
             outline_mm = _session_outline(session.board, calibration.T_rig_board)
-            write_drawing(out, Bench(cameras, _drawn(staged), outline_mm))
+            write_drawing(out, Bench(calibration.cameras, _drawn(staged), outline_mm))
     return Plan(
         title=f"{session.name}: {len(rows)} whisks as recorded",
-        cameras=tuple(_describe_cameras(cameras, staged)) if staged else (),
+        cameras=tuple(_describe_cameras(calibration.cameras, staged)) if staged else (),
         rows=tuple(rows),
         theta_deg=options.theta_deg,
         assumptions=(_AS_RECORDED,) if staged else (),
     )
+
+
+def _see_whisks(
+    units: Sequence[Unit], cameras: Cameras, options: Options, pool: Workers
+) -> list[SeenTask]:
+    """See the trials of the units, and return a task for each of their whisks."""
+    seen = pool.run(see_unit, units, "trials")
+    changes = _changes_of_session(cameras, seen) if options.changes else ()
+    tasks = []
+    for unit, trial in zip(units, seen):
+        theta_rad = unit.settings.theta_rad
+        for whisk in trial.whisks:
+            task = SeenTask(unit.session, unit.trial, trial, whisk, cameras, changes, theta_rad)
+            tasks.append(task)
+    return tasks
 
 
 def _changes_of_session(cameras: Cameras, seen: Sequence[SeenTrial]) -> list[Change]:

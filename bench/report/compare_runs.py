@@ -54,7 +54,7 @@ Pair = tuple[SeenWhisk, FeltWhisk]
 
 
 @dataclass(frozen=True)
-class Change:
+class QuantityChange:
     """One quantity of one whisk in two runs.
 
     values: in the first run, and in `out`; NaN where it is not known. sigma: of the difference. Where
@@ -102,12 +102,8 @@ def compare_runs(outs: Sequence[Path], table: Path | None = None) -> tuple[list[
     The code is 1 where anything changed that matters. table: a CSV file to write, a row a whisk and
     quantity. Raises BadInput where a folder is no run, or no whisk stands in two of them.
     """
-    if len(outs) < 2:
-        raise BadInput("is one run alone; give two or more", file=outs[0])
-    if len({Path(out).resolve() for out in outs}) < len(outs):
-        raise BadInput("is given twice; give each run once", file=outs[-1])
-    first, *others = [_EvaluatedRun.read(Path(out)) for out in outs]
-    changes: list[Change] = []
+    first, *others = _read_runs(outs)
+    changes: list[QuantityChange] = []
     lines: list[str] = []
     for other in others:
         of_run = list(_changes(first, other))
@@ -121,6 +117,15 @@ def compare_runs(outs: Sequence[Path], table: Path | None = None) -> tuple[list[
     lines += _accuracy_lines([first, *others])
     has_changed = any(change.matters for change in changes)
     return lines, CHANGED if has_changed else DONE
+
+
+def _read_runs(outs: Sequence[Path]) -> list["_EvaluatedRun"]:
+    """Read two or more runs. Raises BadInput where there is one alone, one twice, or one is none."""
+    if len(outs) < 2:
+        raise BadInput("is one run alone; give two or more", file=outs[0])
+    if len({Path(out).resolve() for out in outs}) < len(outs):
+        raise BadInput("is given twice; give each run once", file=outs[-1])
+    return [_EvaluatedRun.read(Path(out)) for out in outs]
 
 
 @dataclass(frozen=True)
@@ -148,7 +153,7 @@ class _EvaluatedRun:
         return ours is not None and ours == other.recordings.get(trial)
 
 
-def _changes(first: _EvaluatedRun, other: _EvaluatedRun) -> Iterator[Change]:
+def _changes(first: _EvaluatedRun, other: _EvaluatedRun) -> Iterator[QuantityChange]:
     """Yield every quantity of a whisk that stands in both runs, where either knows it."""
     for key, pair in first.whisks.items():
         if key not in other.whisks:
@@ -161,7 +166,9 @@ def _changes(first: _EvaluatedRun, other: _EvaluatedRun) -> Iterator[Change]:
             if new is None or not (math.isfinite(old.value) or math.isfinite(new.value)):
                 continue
             values = (old.value, new.value)
-            yield Change(trial, whisk, name, other.out, values, _sigma(old, new, same), same)
+            yield QuantityChange(
+                trial, whisk, name, other.out, values, _sigma(old, new, same), same
+            )
 
 
 def _sigma(old: Value, new: Value, same_recording: bool) -> float:
@@ -193,7 +200,7 @@ def _scaled(value: Value, scale: float) -> Value:
     return Value(scale * float(value.value), scale * float(value.sigma))
 
 
-def _row(change: Change, reference: Path) -> dict:
+def _row(change: QuantityChange, reference: Path) -> dict:
     """Return the row of COMPARISON. reference: folder of the first run."""
     return {
         "trial": change.trial,
@@ -210,7 +217,7 @@ def _row(change: Change, reference: Path) -> dict:
 
 
 def _run_lines(
-    first: _EvaluatedRun, other: _EvaluatedRun, changes: Sequence[Change]
+    first: _EvaluatedRun, other: _EvaluatedRun, changes: Sequence[QuantityChange]
 ) -> Iterator[str]:
     """Yield counts of one run against the first, and the quantities that changed most."""
     compared = {change.key for change in changes}
@@ -220,6 +227,11 @@ def _run_lines(
         alone = sorted(run.whisks.keys() - rest.whisks.keys())
         if alone:
             yield f"  only in {run.out}: {_names(alone)}"
+    yield from _largest_changes(changes)
+
+
+def _largest_changes(changes: Sequence[QuantityChange]) -> Iterator[str]:
+    """Yield the quantities that changed most, and by how much the others did at most."""
     significant = [change for change in changes if change.matters]
     significant.sort(key=lambda change: -abs(change.sigmas))
     for change in significant[:_MOST_LISTED]:
@@ -244,7 +256,7 @@ def _accuracy_lines(runs: Sequence[_EvaluatedRun]) -> Iterator[str]:
         yield f"  {label:<24}" + "".join(f"{cell:>18}" for cell in cells)
 
 
-def _change_line(change: Change) -> str:
+def _change_line(change: QuantityChange) -> str:
     """Return what changed by how much, in words."""
     name, _, unit = change.quantity.rpartition("_")
     estimator, _, quantity = name.rpartition(": ")

@@ -84,9 +84,13 @@ def _plot(panel: np.ndarray, name: str, theta_deg: np.ndarray, values: np.ndarra
     polyline(panel, points[: k + 1], _INK)
     now = round(points[k, 0])
     cv2.line(panel, (now, y_axis.high_px), (now, y_axis.low_px), _NOW, 1)
-    value = f" = {values[k]:.3f}" if np.isfinite(values[k]) else ""
-    title = f"{name}{value}  at theta = {theta_deg[k]:.2f} deg"
-    put_text(panel, title, (x_axis.low_px, 18), _INK)
+    put_text(panel, _title(name, theta_deg[k], values[k]), (x_axis.low_px, 18), _INK)
+
+
+def _title(name: str, theta_deg: float, value: float) -> str:
+    """Return the title of a panel: the value in the frame, if it is known, and the pushing angle."""
+    known = f" = {value:.3f}" if np.isfinite(value) else ""
+    return f"{name}{known}  at theta = {theta_deg:.2f} deg"
 
 
 def _draw_grid(panel: np.ndarray, x_axis: Limits, y_axis: Limits) -> None:

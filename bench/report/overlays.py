@@ -116,16 +116,22 @@ def _panel(picture: np.ndarray | None, lines: Mapping[str, np.ndarray]) -> np.nd
     panel = _draw_view(grey, corner, scale, _PANEL_PX, lines)
     contact = np.asarray(lines["contact"], dtype=float)
     if np.isfinite(contact).all():
-        low = contact - _AROUND_PX
-        size = (_INSET_PX, _INSET_PX)
-        inset = _draw_view(grey, low, _INSET_PX / (2.0 * _AROUND_PX), size, lines)
-        cv2.rectangle(inset, (0, 0), (_INSET_PX - 1, _INSET_PX - 1), _WHITE, 2)
-        ends = np.stack([low, contact + _AROUND_PX])
+        inset = _inset(grey, contact, lines)
+        ends = np.stack([contact - _AROUND_PX, contact + _AROUND_PX])
         start, end = np.round(scale * (ends - corner)).astype(int).tolist()
         cv2.rectangle(panel, start, end, _WHITE, 1)
         place = slice(-_EDGE_PX - _INSET_PX, -_EDGE_PX)
         panel[place, place] = inset
     return panel
+
+
+def _inset(grey: np.ndarray, contact_px: np.ndarray, lines: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the framed view (h, w, 3) of the contact (2,) enlarged, with the lines in it."""
+    size = (_INSET_PX, _INSET_PX)
+    scale = _INSET_PX / (2.0 * _AROUND_PX)
+    inset = _draw_view(grey, contact_px - _AROUND_PX, scale, size, lines)
+    cv2.rectangle(inset, (0, 0), (_INSET_PX - 1, _INSET_PX - 1), _WHITE, 2)
+    return inset
 
 
 def _draw_view(
@@ -143,10 +149,14 @@ def _draw_view(
     view = cv2.cvtColor(part, cv2.COLOR_GRAY2RGB)
     for name, colour in (("bar_left", _BAR), ("bar_right", _BAR), ("wire", _WIRE)):
         polyline(view, scale * lines[name] + shift, colour)
-    contact = scale * np.asarray(lines["contact"], dtype=float) + shift
-    for arm in np.eye(2) * _CROSS_PX:
-        polyline(view, np.stack([contact - arm, contact + arm]), _CONTACT)
+    _draw_cross(view, scale * np.asarray(lines["contact"], dtype=float) + shift)
     return view
+
+
+def _draw_cross(view: np.ndarray, place_px: np.ndarray) -> None:
+    """Draw the contact's cross at a place (2,) of a view."""
+    for arm in np.eye(2) * _CROSS_PX:
+        polyline(view, np.stack([place_px - arm, place_px + arm]), _CONTACT)
 
 
 def _whisker_view(shape: tuple[int, ...], wire: np.ndarray) -> tuple[np.ndarray, float]:

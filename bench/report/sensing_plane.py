@@ -79,10 +79,7 @@ def draw_sensing_plane(
     _draw_slip(axes, points)
     _write_names(axes, points)
     _write_values(axes, whisk)
-    corners = np.array([_P0, points.contact, points.virtual])
-    left, bottom = corners.min(axis=0) - _MARGIN_MM
-    right, top = corners.max(axis=0) + _MARGIN_MM
-    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+    _set_limits(axes, points)
     axes.set(xlabel="y  [mm]", ylabel="z  [mm]")
     theta_deg = np.degrees(whisk.at.theta_rad)
     title = f"{result.trial.name}, whisk {whisk.whisk}, θ = {theta_deg:.2f}°"
@@ -90,6 +87,14 @@ def draw_sensing_plane(
     axes.legend(
         loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=7, columnspacing=1.2
     )
+
+
+def _set_limits(axes: Axes, points: PlanePoints) -> None:
+    """Let the axes hold P0, P and V with a margin, a millimetre of one as long as of the other."""
+    corners = np.array([_P0, points.contact, points.virtual])
+    left, bottom = corners.min(axis=0) - _MARGIN_MM
+    right, top = corners.max(axis=0) + _MARGIN_MM
+    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
 
 
 def _draw_line(axes: Axes, points: Sequence[np.ndarray], **style: object) -> None:

@@ -18,7 +18,7 @@ from bench.report.pooled import read_run
 from bench.report.record import SESSION, read_record
 from bench.report.run_facts import CameraFacts
 from bench.session.footage import read_frames
-from bench.session.frame_times import frame_times
+from bench.session.frame_times import FrameTimes, frame_times
 from bench.session.session import load_session
 from bench.session.trial import Trial
 from vision.geometry import Camera, Wire, one_curve
@@ -129,21 +129,30 @@ def _film(
     for whisk in result.seen.whisks:
         if whisk.frames is None:
             continue
-        count = len(whisk.frames.index)
-        for start in range(0, count, _FRAMES_READ):
-            rows = range(start, min(start + _FRAMES_READ, count))
-            read = {}
+        for k, greys in enumerate(_frames_of(trial, times, cameras, whisk)):
+            pictures = []
             for camera in cameras:
-                index = times.picture[camera.name][whisk.frames.index[rows]]
-                source = trial.camera_sources[camera.name]
-                read[camera.name] = read_frames(source, index[index >= 0].tolist())
-            for k in rows:
-                frame = whisk.frames.index[k]
-                pictures = []
-                for camera in cameras:
-                    grey = read[camera.name].get(int(times.picture[camera.name][frame]))
-                    pictures.append(_camera_picture(grey, camera, result, whisk, k))
-                yield with_curves(_side_by_side(pictures), whisk, k)
+                pictures.append(_camera_picture(greys[camera.name], camera, result, whisk, k))
+            yield with_curves(_side_by_side(pictures), whisk, k)
+
+
+def _frames_of(
+    trial: Trial, times: FrameTimes, cameras: Sequence[CameraFacts], whisk: SeenWhisk
+) -> Iterator[dict[str, np.ndarray | None]]:
+    """Yield the pictures of each frame of a whisk, by camera; None where a camera has none."""
+    frames = whisk.frames.index
+    for start in range(0, len(frames), _FRAMES_READ):
+        chosen = frames[start : start + _FRAMES_READ]
+        read = {}
+        for camera in cameras:
+            index = times.picture[camera.name][chosen]
+            source = trial.camera_sources[camera.name]
+            read[camera.name] = read_frames(source, index[index >= 0].tolist())
+        for frame in chosen:
+            greys = {}
+            for name, pictures in read.items():
+                greys[name] = pictures.get(int(times.picture[name][frame]))
+            yield greys
 
 
 def _camera_picture(
@@ -179,15 +188,20 @@ def _draw_lines(
 
     for edge in _bar_edges(camera, result.seen, whisk):
         polyline(picture, project(edge), _BAR)
-    points_mm = whisk.frames.point_mm.value[: k + 1]
-    touching = np.asarray(whisk.frames.touching[: k + 1], dtype=bool)
-    contact_mm = points_mm[k] if touching[k] else None
+    path_mm = _contact_path(whisk, k)
+    contact_mm = path_mm[-1] if whisk.frames.touching[k] else None
     polyline(picture, project(_wire(result, whisk, k, contact_mm)), _WIRE)
-    if np.count_nonzero(touching) > 1:
-        polyline(picture, project(points_mm[touching]), _PATH)
+    if len(path_mm) > 1:
+        polyline(picture, project(path_mm), _PATH)
     if contact_mm is not None:
         ((x, y),) = project(contact_mm[None])
         cv2.circle(picture, (round(x), round(y)), 5, _CONTACT, 1, cv2.LINE_AA)
+
+
+def _contact_path(whisk: SeenWhisk, k: int) -> np.ndarray:
+    """Return the contact (n, 3), mm, in those frames up to k in which the whisker touches."""
+    touching = np.asarray(whisk.frames.touching[: k + 1], dtype=bool)
+    return whisk.frames.point_mm.value[: k + 1][touching]
 
 
 def _bar_edges(camera: Camera, seen: SeenTrial, whisk: SeenWhisk) -> list[np.ndarray]:

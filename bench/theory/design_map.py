@@ -13,7 +13,7 @@ from bench.base.atomic import lock_output, write_whole
 from bench.base.drawing import publish, style
 from bench.base.tables import Column, Table
 from bench.rig.elastic_rod import Rod
-from bench.theory.design import (
+from bench.theory.best_design import (
     Design,
     Equipment,
     ExpectedError,

@@ -8,8 +8,9 @@ it stops, `evaluate` goes on from there.
 """
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from bench.base.errors import BadInput
@@ -152,40 +153,51 @@ def watch(
     check_outside(out, session_path)
     if not session_path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(session_path))
+    evaluate_trials = partial(
+        evaluate,
+        session_path,
+        out,
+        settings,
+        workers=workers,
+        dask=dask,
+        progress=progress,
+        figure_formats=figure_formats,
+        announce=announce,
+        verdict_alone=True,
+    )
     trials = _CompleteTrials(session_path, announce, settings.follow_links)
-    evaluated = _Recording()
     code = DONE
+    for ready in _recordings(trials, partial(pause, every_s)):
+        announce(f"{len(ready.trials)} complete: {', '.join(ready.trials)}")
+        try:
+            code = evaluate_trials(trials=set(ready.trials))
+        except (BadInput, Refused) as problem:
+            announce(f"not yet: {problem}")
+    return code
+
+
+def _recordings(trials: _CompleteTrials, wait: Callable[[], object]) -> Iterator[_Recording]:
+    """Yield the session so far, complete trials alone, whenever it is to be evaluated (anew).
+
+    Ends where the waiting is interrupted. The user is told once if every evaluation calibrates.
+    """
+    evaluated = _Recording()
     has_hinted = False
     while True:
         trials.update()
         ready = _Recording(trials.recording.shared, trials.complete)
         if not ready.trials or ready == evaluated or trials.are_changing(evaluated.trials):
             try:
-                pause(every_s)
+                wait()
             except KeyboardInterrupt:
-                return code
+                return
             continue
         # the first evaluation calibrates in any case
-        if evaluated.trials and not has_hinted and _calibrates_cameras(session_path):
-            announce(_HINT)
+        if evaluated.trials and not has_hinted and _calibrates_cameras(trials.path):
+            trials.announce(_HINT)
             has_hinted = True
         evaluated = ready
-        announce(f"{len(ready.trials)} complete: {', '.join(ready.trials)}")
-        try:
-            code = evaluate(
-                session_path,
-                out,
-                settings,
-                workers=workers,
-                dask=dask,
-                progress=progress,
-                figure_formats=figure_formats,
-                announce=announce,
-                verdict_alone=True,
-                trials=set(ready.trials),
-            )
-        except (BadInput, Refused) as problem:
-            announce(f"not yet: {problem}")
+        yield ready
 
 
 def _calibrates_cameras(session: Path) -> bool:

@@ -81,11 +81,7 @@ def check_contents(session: Session, doubts: Doubts) -> None:
     """
     if session.cameras_toml is None and session.board is not None:
         with doubts.guard():  # one board for all cameras: its first fault is enough
-            for name, source in session.board_sources.items():
-                _check_board_views(source, name, session.board)
-                picture = session.rig_pictures.get(name)
-                if picture is not None:
-                    _check_rig_board(picture, session.board, doubts)
+            _check_boards(session, session.board, doubts)
     if session.whisker is not None:
         with doubts.guard():
             given_gauges(session)
@@ -93,20 +89,39 @@ def check_contents(session: Session, doubts: Doubts) -> None:
     for name, picture in session.rig_pictures.items():
         with doubts.guard():
             rig[name] = rig_picture(picture)
-    pushes_V: list[np.ndarray] = []
-    for trial in session.trials:
-        if trial.purpose != "weight":
-            with doubts.guard():
-                signals = read_signals(trial)
-                strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
-                if trial.purpose == "gauge" and signals.kind == "V":
-                    pushes_V += _pushes_V(strokes)
-                _check_trial(trial, signals, strokes, rig, doubts)
+    pushes_V = _check_trials(session, rig, doubts)
     has_own_gauges = session.gauges_toml is not None or session.gauges is not None
     if not has_own_gauges and pushes_V and not in_two_directions(np.array(pushes_V)):
         doubts.note(
             f"trials: the gauge trials push in one direction, which does not fix both channels; {RECORD}"
         )
+
+
+def _check_boards(session: Session, board: Board, doubts: Doubts) -> None:
+    """Check each camera's pictures of the board, and of the board on the rig. Raise BadInput."""
+    for name, source in session.board_sources.items():
+        _check_board_views(source, name, board)
+        picture = session.rig_pictures.get(name)
+        if picture is not None:
+            _check_rig_board(picture, board, doubts)
+
+
+def _check_trials(session: Session, rig: dict[str, np.ndarray], doubts: Doubts) -> list[np.ndarray]:
+    """Check every trial but the weights'; return the volts (2,) of the pushes of the gauge trials.
+
+    rig: pictures of the rig, by camera.
+    """
+    pushes_V: list[np.ndarray] = []
+    for trial in session.trials:
+        if trial.purpose == "weight":
+            continue
+        with doubts.guard():
+            signals = read_signals(trial)
+            strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
+            if trial.purpose == "gauge" and signals.kind == "V":
+                pushes_V += _pushes_V(strokes)
+            _check_trial(trial, signals, strokes, rig, doubts)
+    return pushes_V
 
 
 def _check_trial(

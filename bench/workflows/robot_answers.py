@@ -262,22 +262,11 @@ def _expected_whisk(whisk: _ConvertedWhisk, theta_rad: float) -> Whisk:
 
     What they leave out changes its moments to first order (docs/maps.md).
     """
-    seen = whisk.seen
     beam = whisk.task.unit.session.whisker.beam
-    reach_mm = sum(whisk.radii_mm)  # NaN where the bar's diameter is not known
-    d_x_mm = seen.d_x_mm.value
-    beta_rad = seen.beta_rad.value
-    alpha_rad, _ = seen_friction(seen)
-    if np.isfinite(alpha_rad):
-        alpha_rad = max(alpha_rad, 0.0)
-    else:
-        alpha_rad = whisk.task.unit.settings.alpha_est_rad
-    phi_rad = float(slip_angle(beta_rad, alpha_rad))
-    share = first_order.leaning(theta_rad, seen.psi_rad.value, phi_rad, alpha_rad)
-    if np.isfinite(reach_mm):
-        left = 1.0 - beam.taper * d_x_mm / beam.length_mm  # of the base's diameter
-        share += first_order.rolling(theta_rad, reach_mm, phi_rad, alpha_rad, d_x_mm, left)
-    as_cylinder_mm = float(beam.as_cylinder_mm(d_x_mm))
+    alpha_rad = _friction_angle_rad(whisk)
+    share = _share_left_out(whisk, theta_rad, alpha_rad)
+    as_cylinder_mm = float(beam.as_cylinder_mm(whisk.seen.d_x_mm.value))
+    beta_rad = whisk.seen.beta_rad.value
     moments_Nmm = np.array(moments(as_cylinder_mm, theta_rad, beta_rad, alpha_rad, beam.C_Nmm2))
     m_y_Nmm, m_z_Nmm = (moments_Nmm / (1.0 + share)).tolist()
     no_samples = np.zeros(0)
@@ -293,3 +282,25 @@ def _expected_whisk(whisk: _ConvertedWhisk, theta_rad: float) -> Whisk:
         theta_sigma_rad=0.0,
         beam=beam,
     )
+
+
+def _friction_angle_rad(whisk: _ConvertedWhisk) -> float:
+    """Return the friction angle as it was seen, not below 0; α_est where it was not."""
+    alpha_rad, _ = seen_friction(whisk.seen)
+    if np.isfinite(alpha_rad):
+        return max(alpha_rad, 0.0)
+    return whisk.task.unit.settings.alpha_est_rad
+
+
+def _share_left_out(whisk: _ConvertedWhisk, theta_rad: float, alpha_rad: float) -> float:
+    """Return by what share leaning and rolling lower the moments, to first order."""
+    seen = whisk.seen
+    beam = whisk.task.unit.session.whisker.beam
+    reach_mm = sum(whisk.radii_mm)  # NaN where the bar's diameter is not known
+    d_x_mm = seen.d_x_mm.value
+    phi_rad = float(slip_angle(seen.beta_rad.value, alpha_rad))
+    share = first_order.leaning(theta_rad, seen.psi_rad.value, phi_rad, alpha_rad)
+    if np.isfinite(reach_mm):
+        left = 1.0 - beam.taper * d_x_mm / beam.length_mm  # of the base's diameter
+        share += first_order.rolling(theta_rad, reach_mm, phi_rad, alpha_rad, d_x_mm, left)
+    return share

@@ -6,6 +6,7 @@ Expected: (13), (14) and docs/maps.md at the slope and friction seen, and the no
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +21,14 @@ from bench.base.drawing import colour_of, label_of, publish, style
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
+from bench.records.trial_result import TrialResult
 from bench.report.evaluation import finished
 from bench.session.inside import check_outside
 from bench.session.session_check import checked_session
 from bench.session.signals import read_signals
 from bench.trials.lost import evaluate_units
 from bench.trials.of_session import placed_units, require_some, trials_with_whisks, with_gauges
+from bench.trials.unit import Unit
 from bench.workflows.robot_answers import Answer, Converter, Task, answers_of_trial, range_of
 from bench.workflows.robot_points import ROBOT_TRADE, Point, front, pool_answers
 
@@ -78,13 +81,17 @@ def _answers_of_session(
         *_, units = with_gauges(units, pool, doubts)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
         results = finished(evaluate_units(chosen, pool), session.whisker, settings).results
-        ranges_V = [range_of(read_signals(unit.trial)) for unit in chosen]
-        range_V = np.max(ranges_V, axis=0, initial=0.0)
-        tasks = [Task(unit, result, CONVERTERS, range_V) for unit, result in zip(chosen, results)]
         answers = []
-        for of_trial in pool.run(answers_of_trial, tasks, "answers"):
+        for of_trial in pool.run(answers_of_trial, _tasks(chosen, results), "answers"):
             answers += of_trial
     return answers
+
+
+def _tasks(units: Sequence[Unit], results: Sequence[TrialResult]) -> list[Task]:
+    """Return a task a trial: through every converter, its bits over the range that all signals fill."""
+    ranges_V = [range_of(read_signals(unit.trial)) for unit in units]
+    range_V = np.max(ranges_V, axis=0, initial=0.0)
+    return [Task(unit, result, CONVERTERS, range_V) for unit, result in zip(units, results)]
 
 
 def draw(points: Sequence[Point], on_front: Sequence[bool]) -> Figure:
@@ -93,28 +100,42 @@ def draw(points: Sequence[Point], on_front: Sequence[bool]) -> Figure:
     The last three are at the push nearest to _USUAL_PUSH_DEG.
     """
     figure = Figure(figsize=(9.0, 6.4), layout="constrained")
-    time, cutoff, rate, bits = figure.subplots(2, 2).ravel()
+    time, *others = figure.subplots(2, 2).ravel()
     names = list(dict.fromkeys(point.estimator for point in points))
     _draw_against_time(time, points, on_front, names)
     pushes_deg = {point.push_deg for point in points}
     push_deg = min(pushes_deg, key=lambda deg: abs(deg - _USUAL_PUSH_DEG))
     usual = [point for point in points if point.push_deg == push_deg]
-    full_rate_Hz = max(point.rate_Hz for point in usual)
-    at_full_rate = [point for point in usual if point.rate_Hz == full_rate_Hz]
-    filtered = [point for point in at_full_rate if np.isfinite(point.cutoff_Hz)]
-    thinned = [point for point in usual if point.is_unfiltered_and_unrounded]
-    rounded = [point for point in at_full_rate if np.isfinite(point.bits)]
-    panels = (
-        (cutoff, "cutoff_Hz", "cut-off, Hz", filtered),
-        (rate, "rate_Hz", "samples a second", thinned),
-        (bits, "bits", "bits of the converter", rounded),
-    )
-    for axes, column, label, of_panel in panels:
-        _draw_against(axes, of_panel, column, names)
-        axes.set(xlabel=label, ylabel="error of d$_x$, RMS, %", title=f"pushed by {push_deg:g}°")
+    for axes, panel in zip(others, _panels(usual)):
+        _draw_against(axes, panel.points, panel.column, names)
+        title = f"pushed by {push_deg:g}°"
+        axes.set(xlabel=panel.label, ylabel="error of d$_x$, RMS, %", title=title)
     handles, labels = time.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(names) + 2)
     return figure
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """A panel of the figure: the column of ROBOT_TRADE that it goes over, its label, its points."""
+
+    column: str
+    label: str
+    points: Sequence[Point]
+
+
+def _panels(points: Sequence[Point]) -> tuple[_Panel, ...]:
+    """Return the panels over cut-off, rate and bits, one changed at a time. points: at one push."""
+    full_rate_Hz = max(point.rate_Hz for point in points)
+    at_full_rate = [point for point in points if point.rate_Hz == full_rate_Hz]
+    filtered = [point for point in at_full_rate if np.isfinite(point.cutoff_Hz)]
+    thinned = [point for point in points if point.is_unfiltered_and_unrounded]
+    rounded = [point for point in at_full_rate if np.isfinite(point.bits)]
+    return (
+        _Panel("cutoff_Hz", "cut-off, Hz", filtered),
+        _Panel("rate_Hz", "samples a second", thinned),
+        _Panel("bits", "bits of the converter", rounded),
+    )
 
 
 def _draw_against_time(

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from bench.base.settings import Settings
 from bench.records.trial_result import SeenTrial, TrialResult
-from bench.report.figures import draw_trial
+from bench.report.trial_figures import TrialToDraw, draw_trial
 from bench.session.signals import read_signals
 from bench.trials.seen import see_trial
 from bench.trials.unit import Unit
@@ -49,4 +49,5 @@ def draw_all(results: Sequence[tuple[Unit, TrialResult]]) -> None:
     with TemporaryDirectory() as folder:
         for unit, result in results:
             alpha = (unit.settings.alpha_est_rad, "assumed")
-            draw_trial((unit.trial, result, alpha, Path(folder)))
+            whisker = unit.session.whisker
+            draw_trial(TrialToDraw(unit.trial, result, whisker, alpha, Path(folder)))

@@ -161,7 +161,7 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
         analysis.write(out, found)
     figures = []
     if evaluation.settings.figures:
-        from bench.report.figures import draw_trials  # with all of matplotlib
+        from bench.report.trial_figures import draw_trials  # with all of matplotlib
 
         figures += draw_trials(evaluation, pool)
         for analysis, found in findings.items():

@@ -13,7 +13,7 @@ from bench.base.settings import Settings
 from bench.base.tables import Table
 from bench.gauges.gauges_file import FileKeys
 from bench.report.run_facts import BoardFacts, CameraFacts
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session import manifest
 from bench.trials import seeing
 from bench.workflows.session_evaluation import evaluate

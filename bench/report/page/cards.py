@@ -11,14 +11,16 @@ from bench.gauges.felt import lateness
 from bench.records.trial_result import EstimateRow
 from bench.report.assembly import status_of
 from bench.report.page.thumbnails import picture_source
-from bench.report.page.words import MISSING, Row, number, value_text, with_sigma
+from bench.report.page.words import MISSING, WhiskRow, number, value_text, with_sigma
 from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
-from vision import UNKNOWN, BeamCheck, Value
+from vision import UNKNOWN, BeamCheck, TruthAtAngle, Value
 from vision.geometry import counted
 
 SOUND = "sound"
 _DEGREES = math.degrees(1.0)
+
+_Quantity = tuple[str, Value, str]  # name, value (an angle in rad), unit that it is shown in
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Card:
     doubts: tuple[tuple[str, str], ...]
 
 
-def card(row: Row, out: Path, whisks: int) -> Card:
+def card(row: WhiskRow, out: Path, whisks: int) -> Card:
     """Return the card of one whisk. whisks: how many the whole session has."""
     warnings = []
     for code, sentence in status_of(row.seen, row.felt).parts:
@@ -67,7 +69,7 @@ def card(row: Row, out: Path, whisks: int) -> Card:
     )
 
 
-def _subtitle(row: Row) -> str:
+def _subtitle(row: WhiskRow) -> str:
     """Return surface, speed, purpose and what the truth rests on, as far as they are known."""
     trial = row.result.trial
     parts = [trial.surface] if trial.surface else []
@@ -81,7 +83,7 @@ def _subtitle(row: Row) -> str:
     return ", ".join(parts)
 
 
-def _pictures(row: Row, out: Path, whisks: int) -> tuple[tuple[str, str], ...]:
+def _pictures(row: WhiskRow, out: Path, whisks: int) -> tuple[tuple[str, str], ...]:
     """Return (alt text, source) of the pictures of a whisk that are in the results' folder."""
     which = f"{row.trial}_{row.seen.whisk}.png"
     found = []
@@ -95,46 +97,54 @@ def _pictures(row: Row, out: Path, whisks: int) -> tuple[tuple[str, str], ...]:
     return tuple((f"{row.name}: {alt}", source) for alt, source in found if source)
 
 
-def numbers(row: Row) -> list[tuple[str, str]]:
+def numbers(row: WhiskRow) -> list[tuple[str, str]]:
     """Return each quantity with one sigma; what is not known is left out."""
-    seen = row.seen
-    felt = row.felt
-    quantities = [
-        ("d_x", seen.d_x_mm, "mm"),
-        ("touch seen", seen.touch_rad, "°"),
-        ("touch felt", felt.touch_felt_rad, "°"),
-        ("slope β", seen.beta_rad, "°"),
-        ("tilt ψ", seen.psi_rad, "°"),
-    ]
-    if seen.at is not None:
-        quantities += [
-            ("slip σ at θ", seen.at.slip_mm, "mm"),
-            ("slip along the whisker", seen.at.longitudinal_slip_mm, "mm"),
-            ("deflection d_y", seen.at.d_y_mm, "mm"),
-            ("deflection d_z", seen.at.d_z_mm, "mm"),
-            ("force angle φ seen", seen.at.phi_rad, "°"),
-            ("friction angle α seen", seen.at.alpha_rad, "°"),
-        ]
-    quantities += [
-        ("moment m_y felt", felt.m_y_Nmm, "N·mm"),
-        ("moment m_z felt", felt.m_z_Nmm, "N·mm"),
-        ("force angle φ felt", felt.phi_felt_rad, "°"),
-    ]
-    if seen.truth.beam is not None:
-        quantities += _beam_changes(seen.truth.beam)
+    beam = row.seen.truth.beam
+    quantities = _quantities(row)
+    if beam is not None:
+        quantities += _beam_changes(beam)
     found = []
     for name, value, unit in quantities:
         text = value_text(value, degrees=unit == "°")
         if text != MISSING:
             found.append((name, f"{text} {unit}"))
-    if seen.truth.beam is not None:
-        chance = number(100.0 * seen.truth.beam.chance, 1)
+    if beam is not None:
+        chance = number(100.0 * beam.chance, 1)
         if chance != MISSING:
             found.append(("chance that a beam departs so far", f"{chance} %"))
     return found
 
 
-def _beam_changes(beam: BeamCheck) -> list[tuple[str, Value, str]]:
+def _quantities(row: WhiskRow) -> list[_Quantity]:
+    """Return what was seen and felt of a whisk, known or not."""
+    seen = row.seen
+    felt = row.felt
+    return [
+        ("d_x", seen.d_x_mm, "mm"),
+        ("touch seen", seen.touch_rad, "°"),
+        ("touch felt", felt.touch_felt_rad, "°"),
+        ("slope β", seen.beta_rad, "°"),
+        ("tilt ψ", seen.psi_rad, "°"),
+        *(_quantities_at(seen.at) if seen.at is not None else ()),
+        ("moment m_y felt", felt.m_y_Nmm, "N·mm"),
+        ("moment m_z felt", felt.m_z_Nmm, "N·mm"),
+        ("force angle φ felt", felt.phi_felt_rad, "°"),
+    ]
+
+
+def _quantities_at(at: TruthAtAngle) -> list[_Quantity]:
+    """Return what was seen at the pushing angle."""
+    return [
+        ("slip σ at θ", at.slip_mm, "mm"),
+        ("slip along the whisker", at.longitudinal_slip_mm, "mm"),
+        ("deflection d_y", at.d_y_mm, "mm"),
+        ("deflection d_z", at.d_z_mm, "mm"),
+        ("force angle φ seen", at.phi_rad, "°"),
+        ("friction angle α seen", at.alpha_rad, "°"),
+    ]
+
+
+def _beam_changes(beam: BeamCheck) -> list[_Quantity]:
     """Return by how much a curve left free moves what the beam with a point load gives."""
     changes = []
     for name, compared, unit in (
@@ -147,7 +157,7 @@ def _beam_changes(beam: BeamCheck) -> list[tuple[str, Value, str]]:
     return changes
 
 
-def _estimate(row: Row, estimate: EstimateRow) -> tuple[str, ...]:
+def _estimate(row: WhiskRow, estimate: EstimateRow) -> tuple[str, ...]:
     """Return estimator, distance, 95 % interval, error in mm, in per cent, status."""
     truth = row.seen.d_x_mm
     low = estimate.d_x_est_low_mm
@@ -193,7 +203,7 @@ def _head(text: str, *, wide: bool = False) -> Cell:
     return Cell(text, math.nan, wide)
 
 
-def cells(row: Row, estimators: list[str]) -> list[Cell]:
+def cells(row: WhiskRow, estimators: list[str]) -> list[Cell]:
     """Return the row of a whisk, in the columns' order, the trial's name apart."""
     seen = row.seen
     trial = row.result.trial
@@ -213,12 +223,12 @@ def cells(row: Row, estimators: list[str]) -> list[Cell]:
     return [*fixed, *errors, Cell(status_of(seen, row.felt) or SOUND)]
 
 
-def is_flagged(row: Row) -> bool:
+def is_flagged(row: WhiskRow) -> bool:
     """Return whether a whisk has a warning that the user should read."""
     return not is_silent(status_of(row.seen, row.felt))
 
 
-def _error(row: Row, estimator: str) -> Cell:
+def _error(row: WhiskRow, estimator: str) -> Cell:
     """Return the error of one estimator, per cent of the true distance."""
     truth = row.seen.d_x_mm
     for estimate in row.felt.estimates:

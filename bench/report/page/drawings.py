@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 
 from bench.analyses.analysis import EvaluatedRun
 from bench.base.drawing import style, svg_of
-from bench.report.page.words import Row, by_whisk
+from bench.report.page.words import WhiskRow, by_whisk
 from bench.report.run_facts import RunRecord
 
 if TYPE_CHECKING:
@@ -42,10 +42,13 @@ class Drawings:
     gauge_residuals: Markup | None = None
 
 
-def draw(record: RunRecord, rows: Sequence[Row], run: EvaluatedRun) -> Drawings:
+def draw(record: RunRecord, rows: Sequence[WhiskRow], run: EvaluatedRun) -> Drawings:
     """Return all drawings that the results allow."""
-    from bench.report.figures import gauge_residuals, variance_of_truth  # with all of matplotlib
     from bench.report.paper import session_figures
+    from bench.report.trial_figures import (
+        gauge_residuals,
+        variance_of_truth,
+    )  # with all of matplotlib
 
     figures = []
     variance = residuals = None
@@ -64,7 +67,7 @@ def draw(record: RunRecord, rows: Sequence[Row], run: EvaluatedRun) -> Drawings:
     return Drawings(tuple(figures), variance, residuals)
 
 
-def inside(figure: "Figure", name: str, alt: str, rows: Sequence[Row]) -> Markup:
+def inside(figure: "Figure", name: str, alt: str, rows: Sequence[WhiskRow]) -> Markup:
     """Return a figure as SVG inside the page. alt: for readers who do not see it."""
     at = by_whisk(rows)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.gauges.certificate import U95
-from bench.report.page.words import Row, by_whisk, number
+from bench.report.page.words import WhiskRow, by_whisk, number
 from bench.report.run_facts import GaugeFacts, GaugePoints
 
 
@@ -23,7 +23,7 @@ class GaugePart:
     whisks: tuple[tuple[str, ...], ...]
 
 
-def gauge_part(facts: GaugeFacts | None, rows: Sequence[Row]) -> GaugePart | None:
+def gauge_part(facts: GaugeFacts | None, rows: Sequence[WhiskRow]) -> GaugePart | None:
     """Return what the page says of the gauges; None where there are none."""
     if facts is None:
         return None
@@ -50,7 +50,7 @@ def _coefficients(facts: GaugeFacts) -> tuple[tuple[str, ...], ...]:
     return tuple(table)
 
 
-def _whisk(points: GaugePoints, row: Row) -> tuple[str, ...]:
+def _whisk(points: GaugePoints, row: WhiskRow) -> tuple[str, ...]:
     """Return the row of a whisk that calibrated."""
     is_seen = row.seen.deflection is not None
     source = "seen in pictures" if is_seen else "set: nominal distance"

@@ -8,7 +8,7 @@ from bench.analyses.friction_tables import SurfaceFriction
 from bench.report.estimator_accuracy import Accuracy
 from bench.report.evaluation import Finished
 from bench.report.page.words import MISSING, number, with_sigma
-from bench.report.run_facts import RunRecord
+from bench.report.run_facts import CameraFacts, RunRecord
 
 _PAPER = """@article{solomon2008artificial,
   author  = {Solomon, Joseph H. and Hartmann, Mitra J. Z.},
@@ -67,17 +67,22 @@ def _truth(record: RunRecord, run: Finished) -> Iterator[str]:
     if not record.cameras:
         yield "No pictures were recorded, so that no truth stands beside the estimates."
         return
-    rms = ", ".join(f"{camera.name} {camera.rms_px:.3f} px" for camera in record.cameras)
-    sizes = {f"{camera.size_px[0]} × {camera.size_px[1]} px" for camera in record.cameras}
-    yield (
-        f"{len(record.cameras)} calibrated cameras ({', '.join(sorted(sizes))}; RMS reprojection error: {rms}) saw "
-        "wire and bar; their centrelines were fitted together over all frames and cameras, and gave first touch, "
-        "contact, slope of the bar and slip without any use of the gauges."
-    )
+    yield _sentence_on_cameras(record.cameras)
     yield (
         f"The true radial distance d_x is known for {truth.known} of {truth.measured} whisks, with a median standard "
         f"uncertainty of {number(truth.d_x_mm, 4)} mm (touch {number(truth.touch_deg, 4)}°, slope "
         f"{number(truth.beta_deg, 3)}°, slip {number(truth.slip_mm, 4)} mm)."
+    )
+
+
+def _sentence_on_cameras(cameras: Sequence[CameraFacts]) -> str:
+    """Return the sentence on the cameras, their pictures' sizes, and what was fitted to these."""
+    rms = ", ".join(f"{camera.name} {camera.rms_px:.3f} px" for camera in cameras)
+    sizes = {f"{camera.size_px[0]} × {camera.size_px[1]} px" for camera in cameras}
+    return (
+        f"{len(cameras)} calibrated cameras ({', '.join(sorted(sizes))}; RMS reprojection error: {rms}) saw "
+        "wire and bar; their centrelines were fitted together over all frames and cameras, and gave first touch, "
+        "contact, slope of the bar and slip without any use of the gauges."
     )
 
 

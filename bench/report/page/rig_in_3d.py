@@ -3,7 +3,7 @@
 import numpy as np
 
 from bench.records.trial_result import SeenWhisk
-from bench.report.page.words import Row
+from bench.report.page.words import WhiskRow
 from bench.report.run_facts import BoardFacts, CameraFacts, RunRecord
 
 ELLIPSOID_FACTOR = 100  # ellipsoids of one sigma are drawn so much larger
@@ -13,7 +13,7 @@ _MOST_FRAMES = 24
 _BAR_HALF_MM = 60.0
 
 
-def scene(record: RunRecord, rows: list[Row]) -> dict:
+def scene(record: RunRecord, rows: list[WhiskRow]) -> dict:
     """Return cameras, board, and each whisk with a truth: bar, wire and contact frame by frame."""
     whisker = record.whisker
     whisks = [row for row in rows if row.seen.has_truth and row.seen.frames is not None]
@@ -49,7 +49,7 @@ def _board(board: BoardFacts) -> dict:
     }
 
 
-def _whisk(row: Row) -> dict:
+def _whisk(row: WhiskRow) -> dict:
     """Return one whisk.
 
     motor: rad. points: the contact where it touches, null before. axes: of the ellipsoid of one

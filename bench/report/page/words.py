@@ -8,11 +8,11 @@ from bench.base.numbers import MISSING, number, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from vision import Value
 
-__all__ = ["MISSING", "Row", "by_whisk", "number", "rows_of", "value_text", "with_sigma"]
+__all__ = ["MISSING", "WhiskRow", "by_whisk", "number", "rows_of", "value_text", "with_sigma"]
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class WhiskRow:
     """One whisk of the page: its key, unique in the page, and its result, seen and felt."""
 
     key: str
@@ -31,15 +31,15 @@ class Row:
         return self.trial + (f", whisk {self.seen.whisk}" if self.seen.whisk else "")
 
 
-def rows_of(results: Iterable[TrialResult]) -> list[Row]:
+def rows_of(results: Iterable[TrialResult]) -> list[WhiskRow]:
     """Return all whisks in their order."""
     rows = []
     for number_of, (result, seen, felt) in enumerate(whisks(results)):
-        rows.append(Row(f"w{number_of}", result, seen, felt))
+        rows.append(WhiskRow(f"w{number_of}", result, seen, felt))
     return rows
 
 
-def by_whisk(rows: Iterable[Row]) -> dict[tuple[str, int], Row]:
+def by_whisk(rows: Iterable[WhiskRow]) -> dict[tuple[str, int], WhiskRow]:
     """Return the rows by trial and number of the whisk."""
     return {(row.trial, row.seen.whisk): row for row in rows}
 

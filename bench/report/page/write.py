@@ -20,7 +20,7 @@ from bench.report.page.drawings import Drawings, draw
 from bench.report.page.gauge_tables import gauge_part
 from bench.report.page.methods import bibliography, methods
 from bench.report.page.rig_in_3d import ELLIPSOID_FACTOR, scene
-from bench.report.page.words import by_whisk, number, rows_of
+from bench.report.page.words import WhiskRow, by_whisk, number, rows_of
 from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run_facts import CameraFacts, RunRecord
@@ -77,36 +77,56 @@ def write_report(out: Path, record: RunRecord, run: Finished) -> list[Path]:
 def page(out: Path, record: RunRecord, run: Finished) -> str:
     """Return the page as HTML. out: the folder of its pictures and of the analyses' tables."""
     rows = rows_of(run.results)
-    estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
-    row_of = by_whisk(rows)
-    drawn = scene(record, rows)
-    drawings = Drawings()
-    if record.settings.figures:
-        drawings = draw(record, rows, run)
-    doubt_cures = [cure_of(codes) for codes in record.doubt_codes]
-    settings = [(f.name, _setting(getattr(record.settings, f.name))) for f in fields(Settings)]
+    drawings = draw(record, rows, run) if record.settings.figures else Drawings()
     template = _environment().get_template("report.html.j2")
     text = template.render(
+        **_of_whisks(out, rows),
+        **_of_run(record, run, rows),
+        **_of_scene(record, rows),
         record=record,
-        rows=[(row, cells(row, estimators), is_flagged(row)) for row in rows],
-        columns=columns(estimators),
-        cards=[card(row, out, len(rows)) for row in rows],
-        accuracies=[(one, row_of.get(one.worst_at)) for one in run.accuracy.estimators],
-        truth=run.accuracy.truth,
-        doubts=list(zip(record.doubts, doubt_cures)),
         drawings=drawings,
         page_tables=page_tables(out),
-        scene=as_script(drawn),
-        scene_known=bool(drawn["cameras"] or drawn["whisks"]),
-        settings=settings,
-        factor=ELLIPSOID_FACTOR,
-        cameras=[(camera, _distance(camera)) for camera in record.cameras],
-        gauges=gauge_part(record.gauges, rows),
-        others=[one for one in record.sections if one.code not in _WITH_OWN_PLACE],
         citation=bibliography(record),
         number=number,
     )
     return text + "\n"
+
+
+def _of_whisks(out: Path, rows: Sequence[WhiskRow]) -> dict[str, object]:
+    """Return what the template shows of each whisk: the rows of the table, its head, the cards."""
+    estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
+    return {
+        "rows": [(row, cells(row, estimators), is_flagged(row)) for row in rows],
+        "columns": columns(estimators),
+        "cards": [card(row, out, len(rows)) for row in rows],
+    }
+
+
+def _of_run(record: RunRecord, run: Finished, rows: Sequence[WhiskRow]) -> dict[str, object]:
+    """Return what the template shows of the run as a whole: errors, doubts, settings, gauges."""
+    row_of = by_whisk(rows)
+    doubt_cures = [cure_of(codes) for codes in record.doubt_codes]
+    return {
+        "accuracies": [(one, row_of.get(one.worst_at)) for one in run.accuracy.estimators],
+        "truth": run.accuracy.truth,
+        "doubts": list(zip(record.doubts, doubt_cures)),
+        "settings": [
+            (f.name, _setting(getattr(record.settings, f.name))) for f in fields(Settings)
+        ],
+        "gauges": gauge_part(record.gauges, rows),
+        "others": [one for one in record.sections if one.code not in _WITH_OWN_PLACE],
+    }
+
+
+def _of_scene(record: RunRecord, rows: list[WhiskRow]) -> dict[str, object]:
+    """Return what the template shows of the rig in three dimensions, and the cameras' distances, mm."""
+    drawn = scene(record, rows)
+    return {
+        "scene": as_script(drawn),
+        "scene_known": bool(drawn["cameras"] or drawn["whisks"]),
+        "factor": ELLIPSOID_FACTOR,
+        "cameras": [(camera, _distance(camera)) for camera in record.cameras],
+    }
 
 
 def page_tables(out: Path) -> list[PageTable]:

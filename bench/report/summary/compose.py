@@ -93,15 +93,7 @@ def summary_of(
     scores: lines on a synthetic session's truth. figures: names of the pictures.
     """
     results = evaluation.results
-    settings = evaluation.settings
-    session = evaluation.session
     doubtful = (*evaluation.doubts, *scatter_warnings(results), *whisk_warnings(results))
-    has_pictures = any(trial.camera_sources for trial in session.trials)
-    spoken = (
-        *verdict(session.name, has_pictures, evaluation.accuracy, settings, len(doubtful)),
-        *gauge_source_lines(evaluation.gauges),
-        *preset_lines(results, settings),
-    )
     of_analyses = _sections_of_analyses(evaluation, findings)
     last = [of_analyses.pop(code) for code in _ANALYSES_LAST if code in of_analyses]
     sections = (
@@ -109,15 +101,35 @@ def summary_of(
         *of_analyses.values(),
         _section("gauges", "Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges)),
         *last,
-        _section("cameras", "Cameras", evaluation.calibration.notes),
-        _section("light", "Light from one side", light_lines(results)),
-        _section("frames", "Frames", frame_lines(results)),
+        *_sections_of_pictures(evaluation),
         _section("doubtful", DOUBTFUL, doubtful),
         _section("score", SCORE, scores),
-        _section("exact", "Taken as exact, for no sigma was given", taken_as_exact(session)),
+        _section(
+            "exact",
+            "Taken as exact, for no sigma was given",
+            taken_as_exact(evaluation.session),
+        ),
         _section("files", "Files", [_file_list(figures)]),
     )
-    return Summary(spoken, doubtful, tuple(section for section in sections if section.lines))
+    shown = tuple(section for section in sections if section.lines)
+    return Summary(tuple(_verdict_lines(evaluation, len(doubtful))), doubtful, shown)
+
+
+def _verdict_lines(evaluation: Evaluation, doubts: int) -> Iterator[str]:
+    """Yield the lines that the summary begins with. doubts: how many there are."""
+    session = evaluation.session
+    settings = evaluation.settings
+    has_pictures = any(trial.camera_sources for trial in session.trials)
+    yield from verdict(session.name, has_pictures, evaluation.accuracy, settings, doubts)
+    yield from gauge_source_lines(evaluation.gauges)
+    yield from preset_lines(evaluation.results, settings)
+
+
+def _sections_of_pictures(evaluation: Evaluation) -> Iterator[Section]:
+    """Yield the sections on cameras, light and frames."""
+    yield _section("cameras", "Cameras", evaluation.calibration.notes)
+    yield _section("light", "Light from one side", light_lines(evaluation.results))
+    yield _section("frames", "Frames", frame_lines(evaluation.results))
 
 
 def _sections_of_errors(evaluation: Evaluation) -> Iterator[Section]:

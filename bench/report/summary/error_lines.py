@@ -15,11 +15,7 @@ _NARROWEST = 17  # letters of a column
 
 def error_lines(judged: Sequence[Judged]) -> Iterator[str]:
     """Yield a head and a line a whisk, a column an estimator: estimate less truth in percent."""
-    known = []
-    for one in judged:
-        is_shown = not one.one_factor or one.estimator == "with_friction"
-        if np.isfinite(one.error_percent) and is_shown:
-            known.append(one)
+    known = [one for one in judged if _is_shown(one)]
     if not known:
         return
     by_factor = sorted(known, key=lambda one: one.one_factor)
@@ -31,6 +27,12 @@ def error_lines(judged: Sequence[Judged]) -> Iterator[str]:
             errors[_column(one)] = f"{one.error_percent:+.2f} ± {one.error_sigma_percent:.2f}"
         cells = _in_columns(heads.values(), errors.values())
         yield f"{trial:<18}{whisk:>5}  {mine[0].beta_deg:>5.1f}°   {cells}"
+
+
+def _is_shown(judged: Judged) -> bool:
+    """Return whether an error is known, and of the estimators by one factor the one with friction."""
+    is_wanted = not judged.one_factor or judged.estimator == "with_friction"
+    return bool(np.isfinite(judged.error_percent)) and is_wanted
 
 
 def _column(judged: Judged) -> tuple[str, bool]:

@@ -10,7 +10,7 @@ from bench.analyses.turning_phi import turn, with_turn
 from bench.base.settings import Settings
 from bench.base.statuses import reason
 from bench.records.trial_result import EstimateRow, FeltAt
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.whisker import Whisker
 from bench.workflows.session_evaluation import evaluate
 from estimator import curvature

@@ -8,7 +8,7 @@ import pytest
 from bench.analyses.figure_8 import figure_8
 from bench.base.settings import Settings
 from bench.report.pooled import pooled
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.workflows.session_evaluation import evaluate
 from estimator.beam import moment_in_EI_per_metre
 

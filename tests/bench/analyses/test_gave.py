@@ -13,7 +13,7 @@ from bench.records.trial_result import (
     SeenWhisk,
     TrialResult,
 )
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from tests.scenes.results import seen_whisk, trial_result
 from tests.scenes.rig_sessions import protocol_file, rows

@@ -10,7 +10,7 @@ from bench.analyses import back_strokes as both_ways
 from bench.analyses import moving_objects as moving
 from bench.base.settings import Settings
 from bench.base.statuses import reason
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.workflows.session_evaluation import evaluate
 from tests.scenes.rig_sessions import protocol_file
 

@@ -7,7 +7,7 @@ import pytest
 
 from bench.analyses.table_i_sensors import SENSORS
 from bench.base.settings import Settings
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.workflows.session_evaluation import evaluate
 from tests.scenes.rig_sessions import protocol_file
 

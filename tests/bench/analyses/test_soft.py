@@ -8,7 +8,7 @@ import pytest
 from bench.analyses.soft import NO_PUSH, NOT_SOFT, Place, Softness, softness
 from bench.base.settings import Settings
 from bench.records.trial_result import TrialFacts
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.whisker import Whisker
 from bench.workflows.session_evaluation import evaluate
 from estimator.compliance import compliance_on_soft_object

@@ -14,7 +14,7 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.report.compare_runs import compare_runs
 from bench.report.video import write_video
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.workflows.preflight import check
 from bench.workflows.session_evaluation import evaluate
 from tests.scenes.rig_sessions import protocol_file

@@ -11,7 +11,7 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.tables import sigma_name
 from bench.report.score import truth_of
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.array_view import load_views
 from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import codes

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from tests.scenes.rig_sessions import TINY, protocol_file
 
 

@@ -12,7 +12,7 @@ from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.protocol import Protocol
 from bench.rig.protocol_tables import ColumnTable, TrialTable
 from bench.rig.recording import Recording
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from tests.scenes.rig_sessions import protocol_file
 
 TRIAL = TrialTable(

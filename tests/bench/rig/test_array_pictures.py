@@ -10,7 +10,7 @@ from bench.rig import build
 from bench.rig.light import Light, Material
 from bench.rig.parts import Job
 from bench.rig.protocol import load
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.rig.tube import Tube, draw_tubes
 from bench.rig.window import Window
 from tests.scenes.rig_sessions import TINY, contents, protocol_file

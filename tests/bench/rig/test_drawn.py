@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from tests.scenes.rig_sessions import bar_of, protocol_file, rows
 
 EVENLY_LIT = """

@@ -8,7 +8,7 @@ from bench.rig.force_sensor import sample_forces_N
 from bench.rig.protocol import Protocol, load
 from bench.rig.protocol_tables import GaugesTable, LoadCellTable, TrialTable
 from bench.rig.recording import Recording
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from tests.scenes.rig_sessions import protocol_file
 from tests.scenes.six_axes import pushed
 

@@ -10,7 +10,7 @@ from bench.base.errors import BadInput
 from bench.rig.protocol import Protocol, load
 from bench.rig.protocol_tables import TrialTable
 from bench.rig.recording import Recording
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from tests.scenes.rig_sessions import protocol_file
 
 EXACTLY = {"beta_scatter_deg": 0.0, "d_x_scatter_mm": 0.0, "touch_scatter_deg": 0.0}

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from tests.scenes.rig_sessions import TINY, protocol_file
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.rig.protocol import FOLDER, load
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from tests.scenes.rig_sessions import TINY, protocol_file
 
 

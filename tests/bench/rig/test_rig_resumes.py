@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bench.base.errors import BadInput
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from tests.scenes.rig_sessions import TINY, contents, protocol_file
 
 
@@ -66,7 +66,7 @@ def test_a_folder_of_something_else_is_left_alone(tiny, tmp_path):
 
 _RUN = """
 import sys
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 if __name__ == "__main__":
     simulate(sys.argv[1], protocol=sys.argv[2], seed=5, workers=2)
 """

@@ -11,7 +11,7 @@ from bench.rig.elastic_rod import Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.protocol import load
 from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.whisk_mechanics import WhiskMechanics
 from tests.scenes.rig_sessions import protocol_file

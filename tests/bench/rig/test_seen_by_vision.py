@@ -6,7 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
 from bench.session.session import load_session

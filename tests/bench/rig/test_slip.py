@@ -12,7 +12,7 @@ from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Elastica
 from bench.rig.linear import rotate_about_z
 from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.surface_slip import slips_mm
 from bench.rig.whisk_mechanics import WhiskMechanics

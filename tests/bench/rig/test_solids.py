@@ -14,7 +14,7 @@ from bench.rig.light import Light, Material
 from bench.rig.linear import rotate_about_z
 from bench.rig.pinhole import PinholeCamera
 from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.rig.solid import Solid
 from bench.rig.tube import Tube, draw_tubes
 from bench.rig.window import Window

@@ -9,7 +9,7 @@ import pytest
 from bench.rig.loading import quasi_static_Nmm
 from bench.rig.protocol import load
 from bench.rig.recording import Recording
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.rig.stroke import Stroke
 from bench.rig.whisk_mechanics import ContactPath
 from tests.scenes.rig_sessions import protocol_file, rows

@@ -5,7 +5,7 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import table

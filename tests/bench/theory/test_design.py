@@ -7,7 +7,7 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.commands import cli
-from bench.theory.design import (
+from bench.theory.best_design import (
     Design,
     Equipment,
     Region,

@@ -15,7 +15,7 @@ from bench.gauges.matrix import (
     GaugeMatrix,
     to_follicle,
 )
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.trials.agreement import agreement
 from bench.trials.differences import LEAST_CHANCE
 from bench.trials.felt_trial import against_shape

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.base.settings import Settings
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.workflows.session_evaluation import evaluate
 from tests.scenes.rig_sessions import protocol_file
 

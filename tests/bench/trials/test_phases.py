@@ -11,7 +11,7 @@ from bench.base.settings import Settings
 from bench.gauges.felt import strokes_of
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Phases
 from bench.records.plain import from_plain, to_plain
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
 from bench.trials.stick_slip_phases import felt_phases, seen_phases

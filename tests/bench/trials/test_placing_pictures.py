@@ -13,7 +13,7 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.cameras.session_cameras import SessionCalibration, on_the_rig
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from bench.trials.placing import place_rig
 from bench.trials.trial_evaluation import see_unit

@@ -14,7 +14,7 @@ from bench.base.results import hash_of
 from bench.base.settings import Settings
 from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.gauges_file import read_gauges
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.workflows.gauge_calibration import calibrate_gauges_command
 from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import codes

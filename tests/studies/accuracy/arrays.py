@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from bench.array.shape_verdict import SURFACE_POINTS
 from bench.array.size import SIZE
 from bench.base.settings import Settings
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.workflows.session_evaluation import evaluate
 
 COLUMNS = """

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from bench import api
 from bench.base.settings import Settings
 from bench.report.score import truth_of
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.array_view import load_views
 from bench.workflows.session_evaluation import evaluate
 

@@ -32,7 +32,7 @@ from bench.rig.protocol_tables import (
 )
 from bench.rig.recording import Recording
 from bench.session.signals import Signals
-from bench.theory.design import Design, Equipment, Region, best_design, expected_error
+from bench.theory.best_design import Design, Equipment, Region, best_design, expected_error
 from bench.theory.design_map import rod_and_beam
 from bench.trials.readout import Readout, whisk_at
 from estimator.builtin import with_friction

@@ -114,13 +114,13 @@ def study(folder: Path, name: str) -> None:
 
 def without_figures() -> None:
     """A fault costs 10 s so, 25 with them."""
-    import bench.report.figures
+    import bench.report.trial_figures
     from bench.analyses.analysis import Analysis
 
     def nothing(*_, **__) -> list:
         return []
 
-    bench.report.figures.draw_trials = nothing
+    bench.report.trial_figures.draw_trials = nothing
     Analysis.draw = nothing
 
 

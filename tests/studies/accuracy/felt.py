@@ -23,7 +23,7 @@ from bench.gauges.drift import drift_rate, free_slope
 from bench.gauges.felt import gauge_delay, strokes_of
 from bench.gauges.gauges_file import given_gauges
 from bench.report.score import Score
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
 from bench.trials.estimates import answer, as_felt

@@ -26,7 +26,7 @@ from bench.plan.outlook import QUANTITIES
 from bench.plan.plan_files import SIGMAS, STATED
 from bench.plan.plan_rows import Row
 from bench.plan.run_plan import Options, plan_rig, plan_session
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from tests.scenes.planned import TWO_CAMERAS
 from vision.geometry.refusals import Refused
 

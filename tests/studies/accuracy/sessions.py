@@ -20,7 +20,7 @@ from bench import api
 from bench.report.pooled import read_run
 from bench.report.score import truth_of
 from bench.report.summary.shared import shared_distance
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.session import Session, load_session
 from tests.studies.accuracy.rows import HALF_WIDTH_95, all_rows
 

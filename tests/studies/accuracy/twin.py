@@ -26,7 +26,7 @@ from bench.base.atomic import write_whole
 from bench.base.settings import Settings
 from bench.cameras.session_cameras import calibrate_session
 from bench.rig.protocol import load
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
 from bench.trials.seen import see_trial

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.base.settings import Settings
-from bench.rig.simulate import simulate
+from bench.rig.simulation import simulate
 from bench.workflows.session_evaluation import evaluate
 
 COLUMN = """

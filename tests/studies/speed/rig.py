@@ -24,7 +24,7 @@ from bench.rig.elastic_rod import Rod
 from bench.rig.parts import Job, Part, render_frames
 from bench.rig.protocol import load
 from bench.rig.recording import Recording
-from bench.rig.simulate import make_part
+from bench.rig.simulation import make_part
 from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.whisk_mechanics import WhiskMechanics
 

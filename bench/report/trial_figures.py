@@ -1,10 +1,12 @@
 """Drawings of an evaluated session that no analysis makes: each trial's, the truth's variance, the gauges."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bench.analyses.surfaces import FittedSurface
@@ -12,7 +14,7 @@ from bench.base.drawing import blank, draw_whisks, style, whisk_url
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.records.trial_result import TrialResult, whisks
+from bench.records.trial_result import SeenWhisk, TrialResult, whisks
 from bench.report.evaluation import Evaluation
 from bench.report.overlays import draw_overlays
 from bench.report.planes import draw_planes
@@ -29,6 +31,23 @@ _MOST_POINTS = 500
 # [trials] A layout: in a legend.
 _MOST_NAMED = 8
 
+_WhiskOfTrial = tuple[str, SeenWhisk]  # name of the trial, whisk
+
+
+@dataclass(frozen=True)
+class TrialToDraw:
+    """One trial's drawing as a task.
+
+    friction: half the opening of the friction cone, rad, and where it comes from. out: the results'
+    folder.
+    """
+
+    trial: Trial
+    result: TrialResult
+    whisker: Whisker
+    friction: tuple[float, str]
+    out: Path
+
 
 def draw_trials(evaluation: Evaluation, pool: Workers) -> list[str]:
     """Draw the figures of each trial; return the names of the files.
@@ -40,7 +59,7 @@ def draw_trials(evaluation: Evaluation, pool: Workers) -> list[str]:
     for result in evaluation.results:
         trial = evaluation.session.trial(result.trial.name)
         friction = _friction_of(result, fitted, evaluation.settings)
-        tasks.append((trial, result, evaluation.whisker, friction, evaluation.out))
+        tasks.append(TrialToDraw(trial, result, evaluation.whisker, friction, evaluation.out))
     names = []
     for of_trial in pool.run(draw_trial, tasks, "figures"):
         names += of_trial
@@ -57,13 +76,13 @@ def _friction_of(
     return settings.alpha_est_rad, "assumed"
 
 
-def draw_trial(task: tuple[Trial, TrialResult, Whisker, tuple[float, str], Path]) -> list[str]:
+def draw_trial(task: TrialToDraw) -> list[str]:
     """Draw planes and overlays of one trial; return their names, relative to the results' folder."""
-    trial, result, whisker, friction, out = task
-    stamp = hash_of(result.hash, friction, hash_of_code(DRAWING))
+    result = task.result
+    stamp = hash_of(result.hash, task.friction, hash_of_code(DRAWING))
     with style():
-        planes = draw_planes(result, whisker, friction, out, stamp)
-        return [*planes, *draw_overlays(trial, result, out, stamp)]
+        planes = draw_planes(result, task.whisker, task.friction, task.out, stamp)
+        return [*planes, *draw_overlays(task.trial, result, task.out, stamp)]
 
 
 def variance_of_truth(results: Sequence[TrialResult]) -> Figure | None:
@@ -72,14 +91,29 @@ def variance_of_truth(results: Sequence[TrialResult]) -> Figure | None:
     Returns None where no whisk has a truth. Of more than `_MOST_BARS` whisks those of the largest
     sigma are drawn.
     """
-    known = [(r.trial.name, seen) for r, seen, _ in whisks(results) if seen.has_truth]
-    known = [(trial, seen) for trial, seen in known if seen.truth.budget]
-    known.sort(key=lambda one: -one[1].d_x_mm.sigma)
-    known = known[:_MOST_BARS]
+    known = _least_sure(results)
     if not known:
         return None
     figure = blank(8.0, 1.4 + 0.2 * len(known))
     axes = figure.subplots()
+    _draw_shares(axes, known)
+    _write_whisks(axes, known)
+    axes.set(xlabel="share of the variance of d$_x$  [%]", xlim=(0.0, 115.0))
+    axes.invert_yaxis()
+    figure.legend(loc="outside lower center", ncols=4)
+    return figure
+
+
+def _least_sure(results: Sequence[TrialResult]) -> list[_WhiskOfTrial]:
+    """Return the whisks whose variance of d_x has known causes, those of the largest sigma first."""
+    known = [(r.trial.name, seen) for r, seen, _ in whisks(results) if seen.has_truth]
+    known = [(trial, seen) for trial, seen in known if seen.truth.budget]
+    known.sort(key=lambda one: -one[1].d_x_mm.sigma)
+    return known[:_MOST_BARS]
+
+
+def _draw_shares(axes: Axes, known: Sequence[_WhiskOfTrial]) -> None:
+    """Draw the bars, a whisk below the other: the shares of each cause, per cent, end to end."""
     places = np.arange(len(known))
     ends = np.zeros(len(known))
     for number, cause in enumerate(CAUSES):
@@ -89,14 +123,14 @@ def variance_of_truth(results: Sequence[TrialResult]) -> Figure | None:
         for bar, (trial, seen) in zip(bars, known):
             bar.set_url(whisk_url(trial, seen.whisk))
         ends += shares
-    for place, (_, seen) in zip(places, known):
+
+
+def _write_whisks(axes: Axes, known: Sequence[_WhiskOfTrial]) -> None:
+    """Write trial and whisk before each bar, and the sigma of d_x after it."""
+    for place, (_, seen) in enumerate(known):
         axes.annotate(f"± {seen.d_x_mm.sigma:.3f} mm", (101.0, place), va="center", fontsize=7)
     names = [trial + (f" {seen.whisk}" if seen.whisk else "") for trial, seen in known]
-    axes.set_yticks(places, names, fontsize=7)
-    axes.set(xlabel="share of the variance of d$_x$  [%]", xlim=(0.0, 115.0))
-    axes.invert_yaxis()
-    figure.legend(loc="outside lower center", ncols=4)
-    return figure
+    axes.set_yticks(np.arange(len(known)), names, fontsize=7)
 
 
 def gauge_residuals(points: Sequence[GaugePoints]) -> Figure:
@@ -106,28 +140,36 @@ def gauge_residuals(points: Sequence[GaugePoints]) -> Figure:
     """
     figure = blank(9.6, 4.3)
     every = 1 + sum(len(p.moments_Nmm) for p in points) // _MOST_POINTS
-    trials = list(dict.fromkeys(p.trial for p in points))
+    by_trial: dict[str, list[GaugePoints]] = {}
+    for of_whisk in points:
+        by_trial.setdefault(of_whisk.trial, []).append(of_whisk)
     for channel, axes in enumerate(figure.subplots(1, 2)):
+        _draw_residuals(axes, by_trial, channel, every)
         name = ("m$_y$", "m$_z$")[channel]
-        for number, trial in enumerate(trials):
-            mine = [p for p in points if p.trial == trial]
-            urls = []
-            for p in mine:
-                urls += [whisk_url(p.trial, p.whisk)] * len(p.moments_Nmm)
-            draw_whisks(
-                axes,
-                np.concatenate([p.moments_Nmm[:, channel] for p in mine])[::every],
-                np.concatenate([p.residuals_Nmm[:, channel] for p in mine])[::every],
-                np.concatenate([p.moments_sigma_Nmm[:, channel] for p in mine])[::every],
-                urls[::every],
-                marker=_MARKERS[number % len(_MARKERS)],
-                colour=f"C{number % 10}",
-                size_points=4.0,
-                label=trial if len(trials) <= _MOST_NAMED else None,
-            )
         axes.axhline(0.0, color="0.6", lw=0.8, zorder=0)
         axes.set(xlabel=f"{name} known  [N·mm]", ylabel="gauge less known  [N·mm]")
-    if len(trials) <= _MOST_NAMED:
+    if len(by_trial) <= _MOST_NAMED:
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure
+
+
+def _draw_residuals(
+    axes: Axes, by_trial: Mapping[str, Sequence[GaugePoints]], channel: int, every: int
+) -> None:
+    """Draw the residuals of one moment, m_y (channel 0) or m_z (1), N·mm, of each `every`-th frame."""
+    for number, (trial, mine) in enumerate(by_trial.items()):
+        urls = []
+        for p in mine:
+            urls += [whisk_url(p.trial, p.whisk)] * len(p.moments_Nmm)
+        draw_whisks(
+            axes,
+            np.concatenate([p.moments_Nmm[:, channel] for p in mine])[::every],
+            np.concatenate([p.residuals_Nmm[:, channel] for p in mine])[::every],
+            np.concatenate([p.moments_sigma_Nmm[:, channel] for p in mine])[::every],
+            urls[::every],
+            marker=_MARKERS[number % len(_MARKERS)],
+            colour=f"C{number % 10}",
+            size_points=4.0,
+            label=trial if len(by_trial) <= _MOST_NAMED else None,
+        )
