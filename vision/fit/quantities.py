@@ -56,7 +56,7 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     d_y, d_z = _deflection(problem, vector, touch, point)
     force = _force_direction(curves, touch, arc, d_y, d_z)
     frame = {
-        "slip": np.sum(contact_moved * touched.direction[..., None, :], axis=-1),
+        "slip": _along_mm(contact_moved, touched.direction),
         "longitudinal_slip": arc - touch.arc_mm[..., None],
         "d_y": d_y,
         "d_z": d_z,
@@ -79,6 +79,11 @@ def _of_whisk(
         "psi": psi_rad,
         **_by_axis(touch.point_mm),
     }
+
+
+def _along_mm(moved_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Return how far (…, f) frames' displacements (…, f, 3) lead along a direction (…, 3)."""
+    return np.sum(moved_mm * direction[..., None, :], axis=-1)
 
 
 def _by_axis(points_mm: np.ndarray) -> dict[str, np.ndarray]:
