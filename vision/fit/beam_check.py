@@ -107,22 +107,12 @@ def check_beam(
     """
     last = np.flatnonzero(problem.touching)[-1]
     departure, slip_by = _estimate_departure(problem, state, last)
-
-    def compare(value: float, gradient: np.ndarray, directly: np.ndarray | float) -> Compared:
-        """Return a quantity with gradient (size,) that also changes `directly` (k,) with the
-        departure.
-        """
-        row = gradient @ departure.parameters_by[: problem.size] + directly
-        difference_sigma = float(np.sqrt(row @ departure.covariance @ row))
-        sigma = float(np.sqrt(gradient @ covariance @ gradient))
-        beam = float(value)
-        return Compared(beam, beam + float(row @ departure.values), difference_sigma, sigma)
-
+    comparison = _Comparison(departure, covariance)
     touch = measured.whisk["touch"]
     return BeamCheck(
-        d_x=compare(measured.whisk["d_x"], by.whisk["d_x"], 0.0),
-        touch=compare(touch, by.whisk["touch"], 0.0),
-        slip=compare(measured.frame["slip"][last], by.frame["slip"][last], slip_by),
+        d_x=comparison.of(measured.whisk["d_x"], by.whisk["d_x"], 0.0),
+        touch=comparison.of(touch, by.whisk["touch"], 0.0),
+        slip=comparison.of(measured.frame["slip"][last], by.frame["slip"][last], slip_by),
         theta_rad=float(problem.motor_rad[last] - touch),
         chance=_chance(departure.values, departure.covariance),
     )
@@ -165,6 +155,28 @@ class _Departure:
     values: np.ndarray
     covariance: np.ndarray
     parameters_by: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _Comparison:
+    """Beam and spline, as quantities are compared.
+
+    covariance (size, size): of the fit's parameters, as it is stated.
+    """
+
+    departure: _Departure
+    covariance: np.ndarray
+
+    def of(self, value: float, gradient: np.ndarray, directly: np.ndarray | float) -> Compared:
+        """Return a quantity with gradient (size,) that also changes `directly` (k,) with the
+        departure.
+        """
+        departure = self.departure
+        row = gradient @ departure.parameters_by[: len(gradient)] + directly
+        difference_sigma = float(np.sqrt(row @ departure.covariance @ row))
+        sigma = float(np.sqrt(gradient @ self.covariance @ gradient))
+        beam = float(value)
+        return Compared(beam, beam + float(row @ departure.values), difference_sigma, sigma)
 
 
 def _estimate_departure(

@@ -124,18 +124,14 @@ class Blocks:
         bar_axis = layout.add(BAR_PRIOR, axis_step)
         rest_shape = layout.add(np.tile(REST_PRIOR_MM, 2), _STEP_MM)
         reach = layout.add([max(reach_sigma_mm, _LEAST_REACH_MM)], _STEP_MM)
-        wire_offsets = []
-        bar_offsets = []
-        for sigma_px in offset_sigma_px:
-            wire_offsets.append(layout.add(sigma_px[:WIRE_OFFSETS]))
-            bar_offsets.append(layout.add(sigma_px[WIRE_OFFSETS:]))
+        wire_offsets, bar_offsets = _add_line_offsets(layout, offset_sigma_px)
         outline_sigma = touched.outline_sigma_px * len(offset_sigma_px)
         return cls(
             bar_axis=bar_axis,
             rest_shape=rest_shape,
             reach=reach,
-            wire_offsets=tuple(wire_offsets),
-            bar_offsets=tuple(bar_offsets),
+            wire_offsets=wire_offsets,
+            bar_offsets=bar_offsets,
             motion=layout.add(motion_sigma, _STEP_MM),
             shift_along=layout.add(touched.along_sigma_mm, _STEP_MM),
             outline_bias=layout.add(outline_sigma, _STEP_MM),
@@ -193,6 +189,21 @@ class _Layout:
         block = Block(self.size, np.asarray(sigma, dtype=float), step)
         self.size += len(block)
         return block
+
+
+def _add_line_offsets(
+    layout: _Layout, sigma_px: np.ndarray
+) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
+    """Add the blocks of each camera's lines of wire and bar, and return those of wires and of bars.
+
+    sigma_px (cameras, 12): see `Blocks.laid_out`.
+    """
+    wires = []
+    bars = []
+    for own in sigma_px:
+        wires.append(layout.add(own[:WIRE_OFFSETS]))
+        bars.append(layout.add(own[WIRE_OFFSETS:]))
+    return tuple(wires), tuple(bars)
 
 
 def columns_of(*blocks: Block) -> np.ndarray:

@@ -129,13 +129,9 @@ def _resting_points(
     """Return points, to a pixel or two, of a wire that lies alike from the straight one in all
     frames; none where none is surely seen.
     """
-    straight = next(iter(curves.values()))
-    _, px_per_mm = outline(sight.view.camera, straight.points_mm, straight.tangents, 1.0)
-    # Of offset, slope and curvature.
-    most_px = _REST_SIGMAS * REST_PRIOR_MM[:3] * np.max(px_per_mm)
+    most_px = _most_rest_px(sight.view, next(iter(curves.values())))
     found = sight.votes(curves, int(np.ceil(most_px[1])))
-    along = found.pieces.place / sight.rods.wire.length_mm
-    shapes = np.stack([1.0 - along, along, along * (1.0 - along)], axis=1)
+    shapes = _rest_modes(found.pieces.place / sight.rods.wire.length_mm)
     grids = [np.arange(-n, n + 1) * _STEP_PX for n in np.ceil(most_px / _STEP_PX)]
     best, is_sure = likely_curve([found], shapes, grids)
     if not is_sure:
@@ -143,6 +139,17 @@ def _resting_points(
     points = found.points(shapes @ best)
     source = found.pieces.source
     return [Observed(k, camera, points.select(source == own)) for k, own in enumerate(curves)]
+
+
+def _most_rest_px(view: View, straight: Curves) -> np.ndarray:
+    """Return the largest offset, slope and curvature (3,) that are tried of a resting wire, px."""
+    _, px_per_mm = outline(view.camera, straight.points_mm, straight.tangents, 1.0)
+    return _REST_SIGMAS * REST_PRIOR_MM[:3] * np.max(px_per_mm)
+
+
+def _rest_modes(along: np.ndarray) -> np.ndarray:
+    """Return offset, slope and curvature (s, 3) of a resting wire at shares (s,) of its length."""
+    return np.stack([1.0 - along, along, along * (1.0 - along)], axis=1)
 
 
 def follow_bends(

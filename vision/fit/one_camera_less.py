@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from vision.fit.blocks import columns_of
+from vision.fit.blocks import Blocks, columns_of
 from vision.fit.covariance import Uncertainty, camera_rows, times_residual_covariance
 from vision.fit.problem import Problem, State, point_rows
 from vision.fit.quantities import Jacobians
@@ -144,10 +144,7 @@ def _leave_out(
     camera: int,
 ) -> OneLess:
     """Return the fit without one camera; gradients (4, size): of what `OneLess.moved` holds."""
-    kept = observations.without(camera)
-    inverse_normal = np.linalg.inv(kept.T @ kept)
-    change = inverse_normal @ kept.T - fitted.inverse_normal @ observations.jacobian.T  # (size, n)
-    step = -inverse_normal @ (kept.T @ observations.residual)
+    step, change = _step_without(observations, fitted, camera)
     moved = gradients @ step
     spread = observations.spread(gradients @ change)
     lines = _LinesOff.of(observations, state, fitted.inverse_normal, camera)
@@ -165,6 +162,18 @@ def _leave_out(
         chance=min(1.0, 2 * len(names) * least),
     )
     return replace(one, spread=observations.spread(change)) if one.contradicts else one
+
+
+def _step_without(
+    observations: _Observations, fitted: Uncertainty, camera: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the step (size,) to the fit without one camera, and its derivatives (size, n) by the
+    errors of the observations.
+    """
+    kept = observations.without(camera)
+    inverse_normal = np.linalg.inv(kept.T @ kept)
+    change = inverse_normal @ kept.T - fitted.inverse_normal @ observations.jacobian.T
+    return -inverse_normal @ (kept.T @ observations.residual), change
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,10 +202,8 @@ class _LinesOff:
     ) -> "_LinesOff":
         """Return how far one camera's lines are off."""
         problem = observations.problem
-        blocks = problem.blocks
-        wire = columns_of(blocks.wire_offsets[camera])
-        off = np.append(wire[:2], columns_of(blocks.bar_offsets[camera]))
-        sigma_px = blocks.prior_sigma[off]
+        off = _offset_columns(problem.blocks, camera)
+        sigma_px = problem.blocks.prior_sigma[off]
         own = inverse_normal[np.ix_(off, off)] / np.outer(sigma_px, sigma_px)
         determined, directions = _determined_directions(own)
         gain = inverse_normal[off] @ observations.jacobian.T  # (4, n)
@@ -220,6 +227,12 @@ class _LinesOff:
         is_determined = np.sum(self.directions**2, axis=1) > 0.5
         worst = int(np.argmax(np.where(is_determined, in_sigmas, 0.0)))
         return float(off_px[worst]), float(sigma_px[worst])
+
+
+def _offset_columns(blocks: Blocks, camera: int) -> np.ndarray:
+    """Return the columns (4,) of a camera's lines: offset and tilt of the wire's and the bar's."""
+    wire = columns_of(blocks.wire_offsets[camera])
+    return np.append(wire[:2], columns_of(blocks.bar_offsets[camera]))
 
 
 def _determined_directions(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -52,18 +52,11 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     _, arc, point = clearance(curves, each)
     touched = bar_axis(problem, vector).bar_at(touch.point_mm)
     beta, psi = contact_frame_angles(touched.direction, touch.motor_rad)
-    contact_moved = point - touch.point_mm[..., None, :] - _bar_moved_mm(problem, vector, touch)
+    contact_moved = _contact_moved_mm(problem, vector, touch, point)
     d_y, d_z = _deflection(problem, vector, touch, point)
     force = _force_direction(curves, touch, arc, d_y, d_z)
-    whisk = {
-        "touch": touch.motor_rad,
-        "d_x": np.linalg.norm(touch.point_mm, axis=-1),
-        "beta": beta,
-        "psi": psi,
-        **_by_axis(touch.point_mm),
-    }
     frame = {
-        "slip": np.sum(contact_moved * touched.direction[..., None, :], axis=-1),
+        "slip": _along_mm(contact_moved, touched.direction),
         "longitudinal_slip": arc - touch.arc_mm[..., None],
         "d_y": d_y,
         "d_z": d_z,
@@ -72,7 +65,25 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
         "alpha": _angle_to_normal(force, each.bar_at(point), point, beta),
         **_by_axis(point),
     }
-    return Measured(whisk, frame)
+    return Measured(_of_whisk(touch, beta, psi), frame)
+
+
+def _of_whisk(
+    touch: FirstTouch, beta_rad: np.ndarray, psi_rad: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return by name the values (…) of a whisk as a whole, all of them at touch."""
+    return {
+        "touch": touch.motor_rad,
+        "d_x": np.linalg.norm(touch.point_mm, axis=-1),
+        "beta": beta_rad,
+        "psi": psi_rad,
+        **_by_axis(touch.point_mm),
+    }
+
+
+def _along_mm(moved_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Return how far (…, f) frames' displacements (…, f, 3) lead along a direction (…, 3)."""
+    return np.sum(moved_mm * direction[..., None, :], axis=-1)
 
 
 def _by_axis(points_mm: np.ndarray) -> dict[str, np.ndarray]:
@@ -84,6 +95,15 @@ def _bar_moved_mm(problem: Problem, vector: np.ndarray, touch: FirstTouch) -> np
     """Return how far (…, f, 3) the bar has moved since touch, (…, 1, 3) where it stands."""
     at_touch = shift_at_mm(problem, vector, touch.motor_rad)[..., None, :]
     return shifts_mm(problem, vector) - at_touch
+
+
+def _contact_moved_mm(
+    problem: Problem, vector: np.ndarray, touch: FirstTouch, point_mm: np.ndarray
+) -> np.ndarray:
+    """Return how far (…, f, 3) the contact, at points (…, f, 3), has moved on the bar since
+    touch.
+    """
+    return point_mm - touch.point_mm[..., None, :] - _bar_moved_mm(problem, vector, touch)
 
 
 def _deflection(

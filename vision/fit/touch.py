@@ -54,12 +54,23 @@ def first_touch(problem: Problem, vector: np.ndarray) -> FirstTouch:
     gap, arc, point = _gap(problem, vector, angle)
     for _ in range(_SECANT_STEPS):
         is_open = np.abs(gap) > _TOUCH_GAP_MM
-        slope = np.divide(gap - gap_before, angle - before, out=np.ones_like(gap), where=is_open)
+        change = _secant_change(gap, gap - gap_before, angle - before, is_open)
         before = np.where(is_open, angle, before)
         gap_before = np.where(is_open, gap, gap_before)
-        angle = np.where(is_open, angle - gap / slope, angle)
+        angle = np.where(is_open, angle - change, angle)
         gap, arc, point = _gap(problem, vector, angle)
     return FirstTouch(angle, point, arc)
+
+
+def _secant_change(
+    gap_mm: np.ndarray, rise_mm: np.ndarray, run_rad: np.ndarray, is_open: np.ndarray
+) -> np.ndarray:
+    """Return how far (…) the motor is, rad, past the angle that closes gaps (…) where they are
+    open.
+
+    rise_mm, run_rad (…): the last change of the gap, and that of the motor angle which made it.
+    """
+    return gap_mm / np.divide(rise_mm, run_rad, out=np.ones_like(gap_mm), where=is_open)
 
 
 def _about_touch(problem: Problem, vector: np.ndarray) -> tuple[float, float]:

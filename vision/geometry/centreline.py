@@ -192,12 +192,17 @@ def centrelines(
     lateral = lateral + _slope_by_bend(
         np.asarray(bend_rad), np.asarray(pull)[..., None], arc, np.asarray(contact_mm), wire
     )
-    forward2 = np.maximum(1.0 - np.sum(lateral**2, axis=-1, keepdims=True), _LEAST_FORWARD2)
-    tangents = np.concatenate([np.sqrt(forward2), lateral], axis=-1)
+    tangents = _tangents(lateral)
     points = simpson() @ tangents * arc[1]
     points[..., 1:] += rest_mm[..., None, :, 0]
     rotation = np.swapaxes(rotation_z(motor_rad), -1, -2)
     return Curves(arc, points @ rotation, tangents @ rotation)
+
+
+def _tangents(lateral: np.ndarray) -> np.ndarray:
+    """Return tangents (…, m, 3) with these y and z (…, m, 2): unit, where they do not turn back."""
+    forward2 = np.maximum(1.0 - np.sum(lateral**2, axis=-1, keepdims=True), _LEAST_FORWARD2)
+    return np.concatenate([np.sqrt(forward2), lateral], axis=-1)
 
 
 def _slope_by_bend(

@@ -98,8 +98,7 @@ class Ring(Rounded):
 
         The distances of points along each sight are compared with the tube's radius.
         """
-        diameter_mm = self.ring_diameter_mm
-        steps_mm = np.arange(-1.0, 1.0, radius_mm / diameter_mm) * (diameter_mm + radius_mm)
+        steps_mm = self._steps_mm(radius_mm)
         batch = (*at.point_mm.shape[:-1], -1, 3)
         ahead = unit(points_mm - centre_mm).reshape(batch)
         start = points_mm.reshape(batch) - at.point_mm[..., None, :]
@@ -109,6 +108,11 @@ class Ring(Rounded):
         across = np.sqrt(np.maximum(distance2 - height**2, 0.0)) - self.ring_radius_mm
         is_within = across**2 + height**2 < radius_mm**2
         return np.any(is_within, axis=-1).reshape(points_mm.shape[:-1])
+
+    def _steps_mm(self, radius_mm: float) -> np.ndarray:
+        """Return steps (n,) along a sight that lead across the ring, wherever on it they begin."""
+        diameter_mm = self.ring_diameter_mm
+        return np.arange(-1.0, 1.0, radius_mm / diameter_mm) * (diameter_mm + radius_mm)
 
     def balls(self, at: RoundedAxis, radius_mm: float, reach_mm: float, stations: int) -> Balls:
         """Return balls of one size along the circle, all round it if reach_mm is infinite."""

@@ -62,12 +62,8 @@ class Balls:
 
     def silhouette(self, centre_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute where sights graze the surface of the balls, see `RoundedAxis.silhouette`."""
-        sight = self.middle_mm - centre_mm
-        along = np.sum(sight * self.ahead, axis=-1, keepdims=True)
-        towards = sight - along * self.ahead
-        distance = np.linalg.norm(towards, axis=-1, keepdims=True)
-        towards = towards / distance
         root = np.sqrt(1.0 - self.growth**2)
+        towards, along, distance = self._sights(centre_mm)
         cosine = (self.growth * along - self.radius_mm) / (root * distance)
         cosine = np.where(np.abs(cosine) < 1.0, cosine, np.nan)
         between = root * cosine * towards - self.growth * self.ahead
@@ -75,6 +71,18 @@ class Balls:
         normals = np.stack([between + sideways, between - sideways], axis=-3)
         both_mm = self.middle_mm[..., None, :, :] + self.radius_mm[..., None, :, :] * normals
         return both_mm, normals
+
+    def _sights(self, centre_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the sights from a centre to the balls, in parts.
+
+        These are the unit direction (..., m, 3) across the middle, and the lengths (..., m, 1)
+        along and across it, mm.
+        """
+        sight = self.middle_mm - centre_mm
+        along = np.sum(sight * self.ahead, axis=-1, keepdims=True)
+        towards = sight - along * self.ahead
+        distance = np.linalg.norm(towards, axis=-1, keepdims=True)
+        return towards / distance, along, distance
 
 
 @dataclass(frozen=True)

@@ -362,17 +362,36 @@ def compute_evidence(
     modes, precisions = rod.observable_modes(
         root_weight[:, None] * picture, with_smooth_priors=with_smooth_priors
     )
+    normal = _normal_at_positions(profiles, tried, modes, radius_px, blur_px)
+    models = [rod.marginalise(normal, precision) for precision in precisions]
+    bar_deviance, misfit = np.moveaxis(models, 0, -1)  # (k, g, r) each
+    best_misfit = _misfit_at_best(bar_deviance, misfit)
+    return Evidence(blur_px, tried.shift_px, bar_deviance, best_misfit, rod.without_rod[0])
+
+
+def _misfit_at_best(deviance: np.ndarray, misfit: np.ndarray) -> np.ndarray:
+    """Return the misfit (k,) of each segment at its best position and prior, of all of them.
+
+    deviance, misfit (k, g, r): of g positions under r priors.
+    """
+    segments = len(deviance)
+    best = np.argmin(deviance.reshape(segments, -1), axis=1)
+    return misfit.reshape(segments, -1)[np.arange(segments), best]
+
+
+def _normal_at_positions(
+    profiles: Profiles, tried: _Positions, modes: np.ndarray, radius_px: float, blur_px: float
+) -> np.ndarray:
+    """Compute the matrices of `_normal_matrices` (k, g, m, m) for middles at all positions tried.
+
+    modes (splines, r): of the light on a rod of this radius.
+    """
     matrices = []
     for fraction_px in tried.fractions_px:
         design = _Design.at(tried.offset_px(fraction_px), modes, radius_px, blur_px)
         matrices.append(_normal_matrices(profiles, tried, design))
     normal = np.stack(matrices, axis=2)  # (k, s, p, m, m)
-    normal = normal.reshape(len(profiles), -1, *normal.shape[-2:])
-    models = [rod.marginalise(normal, precision) for precision in precisions]
-    bar_deviance, misfit = np.moveaxis(models, 0, -1)  # (k, g, r) each
-    best = np.argmin(bar_deviance.reshape(len(profiles), -1), axis=1)
-    misfit = misfit.reshape(len(profiles), -1)[np.arange(len(profiles)), best]
-    return Evidence(blur_px, tried.shift_px, bar_deviance, misfit, rod.without_rod[0])
+    return normal.reshape(len(profiles), -1, *normal.shape[-2:])
 
 
 def _visible_steps(profiles: Profiles, most: int) -> np.ndarray:

@@ -370,12 +370,20 @@ def _evaluate_lines(
     deviance = deviance.reshape(segments, shifts, -1)
     least = deviance.min(axis=1)
     excess = _excess_of_lines(profiles, lines, shift_px, deviance - least[:, None])
-    total = excess.sum(axis=0)
-    total = least.sum(axis=0) + total / _misfit_of_line(total, profiles)
+    total = _total_deviance(least, excess, profiles)
     line, other = np.unravel_index(np.argmin(total), total.shape)
     segment_deviance = temperature * (least[:, other] + excess[:, line, other])
     total = total.reshape(-1, priors, blurs)
     return _LineGrid(lines, log_blurs, total, segment_deviance, temperature)
+
+
+def _total_deviance(least: np.ndarray, excess: np.ndarray, profiles: Profiles) -> np.ndarray:
+    """Return the deviance (n, m) of lines, of all segments.
+
+    least (k, m): of each segment at its own best shift. excess (k, n, m): over that, at the line.
+    """
+    total = excess.sum(axis=0)
+    return least.sum(axis=0) + total / _misfit_of_line(total, profiles)
 
 
 def _excess_of_lines(

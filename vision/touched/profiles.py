@@ -256,30 +256,72 @@ def _average_patches(
 
     place_mm: of the patches, by segment, in their order along the bar. offset_px (b,): of the bins.
     """
-    segment = np.repeat(np.arange(len(place_mm)), [len(some) for some in place_mm])
-    membership = (segment == np.arange(len(place_mm))[:, None]).astype(float)  # (k, s)
-    total = membership @ patches.weight
-    is_observed = total > 0
-    divisor = np.where(is_observed, total, 1.0)
-    texture, variance_inflation = _estimate_texture(membership[:, 1:-1], patches)
-    squares = np.where(is_observed, membership @ patches.weight**2, 1.0)
-    number = np.where(is_observed, total**2 / squares, 1.0)  # effective number of patches
-
-    def mean(sums: np.ndarray) -> np.ndarray:
-        """Return the segments' means (k, b) of sums (s, b) over patches."""
-        return membership @ sums / divisor
-
+    averages = _Averages(_membership([len(some) for some in place_mm]), patches.weight)
+    texture, variance_inflation = _estimate_texture(averages.membership[:, 1:-1], patches)
+    background = averages.mean(patches.background)
     return Profiles(
         offset_px=offset_px,
-        light=mean(patches.light),
-        sigma=np.where(is_observed, np.sqrt(1.0 / divisor + texture / number), np.inf),
-        background=_about_median(mean(patches.background), is_observed),
-        background_slope=mean(patches.background_slope),
-        light_per_grey=mean(patches.light_per_grey),
+        light=averages.mean(patches.light),
+        sigma=averages.sigma(texture),
+        background=_about_median(background, averages.is_observed),
+        background_slope=averages.mean(patches.background_slope),
+        light_per_grey=averages.mean(patches.light_per_grey),
         place_mm=np.array([some.mean() for some in place_mm]),
         radius_px=radius_px,
         variance_inflation=variance_inflation,
     )
+
+
+def _membership(counts: Sequence[int]) -> np.ndarray:
+    """Return a matrix (k, s), 1 for the patches of each of k segments and 0 for all others.
+
+    counts (k,): how many patches each segment has, one segment's behind the other's.
+    """
+    segment = np.repeat(np.arange(len(counts)), counts)
+    return (segment == np.arange(len(counts))[:, None]).astype(float)
+
+
+@dataclass(frozen=True, eq=False)
+class _Averages:
+    """The averages of k segments over their patches, bin by bin.
+
+    membership (k, s): 1 for the patches of each segment. weight (s, b): of the patches' bins.
+    """
+
+    membership: np.ndarray
+    weight: np.ndarray
+
+    @cached_property
+    def _total(self) -> np.ndarray:
+        """Return the segments' weight (k, b)."""
+        return self.membership @ self.weight
+
+    @cached_property
+    def is_observed(self) -> np.ndarray:
+        """Return which bins (k, b) have a weight."""
+        return self._total > 0
+
+    @cached_property
+    def _divisor(self) -> np.ndarray:
+        """Return the segments' weight (k, b), 1 where they have none."""
+        return np.where(self.is_observed, self._total, 1.0)
+
+    @cached_property
+    def _number(self) -> np.ndarray:
+        """Return the effective number (k, b) of patches that make an average."""
+        squares = np.where(self.is_observed, self.membership @ self.weight**2, 1.0)
+        return np.where(self.is_observed, self._total**2 / squares, 1.0)
+
+    def mean(self, sums: np.ndarray) -> np.ndarray:
+        """Return the segments' means (k, b) of sums (s, b) over patches."""
+        return self.membership @ sums / self._divisor
+
+    def sigma(self, texture: np.ndarray) -> np.ndarray:
+        """Return the sigma (k, b) of means with the variance (k, b) between patches beyond their
+        noise, infinite where nothing is observed.
+        """
+        variance = 1.0 / self._divisor + texture / self._number
+        return np.where(self.is_observed, np.sqrt(variance), np.inf)
 
 
 def _about_median(background: np.ndarray, is_observed: np.ndarray) -> np.ndarray:

@@ -233,6 +233,32 @@ class _Rows:
         return filled
 
 
+@dataclass(frozen=True)
+class _PixelLight:
+    """The light of n pixels near one side of a silhouette, in grey levels of `FULL_SCALE`.
+
+    grey, background (n,): with the object and without it. slope (n,): of the background across the
+    side outwards, per px. weight (n,): one over the noise of the grey value.
+    """
+
+    grey: np.ndarray
+    background: np.ndarray
+    slope: np.ndarray
+    weight: np.ndarray
+
+    @classmethod
+    def of(cls, view: View, side: OutlineSide, found: _SidePixels) -> "_PixelLight":
+        """Return the light of pixels in a view."""
+        column, row = found.pixels.astype(int).T
+        grey = view.mean[row, column]
+        background = view.background[row, column]
+        scale = FULL_SCALE / view.full_scale
+        across = side.normal[side.station_at(found.along_px)]
+        slope = np.sum(_gradient(view.background, row, column) * across, axis=1)
+        weight = _weights(view, grey, background)
+        return cls(grey * scale, background * scale, slope * scale, weight / scale)
+
+
 def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) -> Pieces:
     """Return pieces of length_px along the side, with their pixels as rows, filled up with pixels
     of no weight.
@@ -242,23 +268,18 @@ def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) 
     rows = _Rows.of((found.along_px // length_px).astype(int))
     if not len(rows.pieces):
         return _no_pieces()
-    column, row = found.pixels.astype(int).T
-    grey = view.mean[row, column]
-    background = view.background[row, column]
-    scale = FULL_SCALE / view.full_scale
-    across = side.normal[side.station_at(found.along_px)]
-    slope = np.sum(_gradient(view.background, row, column) * across, axis=1)
+    light = _PixelLight.of(view, side, found)
     half_px = side.model_half_px
     middle = (rows.pieces + 0.5) * length_px
     station = side.station_at(middle)
     offset_px = rows.table(found.offset_px + half_px, 0.0)
     return Pieces(
         offset_px=offset_px,
-        grey=rows.table(grey * scale, 1.0),
-        background=rows.table(background * scale, 1.0),
-        slope=rows.table(slope * scale, 0.0),
+        grey=rows.table(light.grey, 1.0),
+        background=rows.table(light.background, 1.0),
+        slope=rows.table(light.slope, 0.0),
         curvature=np.zeros_like(offset_px),
-        weight=rows.table(_weights(view, grey, background) / scale, 0.0),
+        weight=rows.table(light.weight, 0.0),
         place=middle,
         radius_px=np.full(len(rows.pieces), half_px),
         foot_px=side.px[station],

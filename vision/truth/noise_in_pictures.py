@@ -20,7 +20,7 @@ from vision.touched.one_view import seen_from_one_side
 from vision.truth.known_whisk import KnownWhisk
 from vision.truth.predicted_lines import PredictedLines
 from vision.truth.traced_lines import TracedLines
-from vision.wire.points import Observed
+from vision.wire.points import LinePoints, Observed
 
 _USUAL = VisionSettings()
 
@@ -79,20 +79,46 @@ def _bar_sigmas_px(
     views = [own.view(dict.fromkeys(place.curves, own.with_bar)) for own in pictures]
     wires_px = {view.camera.name: place.wire_px(view.camera) for view in views}
     lines = _bar_middles(known, views, wires_px, settings)
-    cameras = Cameras(tuple(view.camera for view in views))
-    needs_edges = len(lines) == 1 or seen_from_one_side(cameras, known.axis)
+    edges = {}
+    if _needs_edges(known, views, lines):
+        shown = [view for view in views if view.camera.name in lines]
+        edges = _bar_edges(known, shown, wires_px, settings)
     found = {}
-    for view in views:
-        name = view.camera.name
-        points = {}  # by side of the bar
-        if name in lines and needs_edges:
-            radius_mm = known.rods.bar.radius_mm
-            points = measure_edges(view, known.axis, radius_mm, wires_px[name], settings)
+    for name in wires_px:
+        points = edges.get(name) or {}  # by side of the bar
         if name in lines and not points:
             points = {0: lines[name].points}
-        rows = [[side, *own.sigma_px] for side, own in points.items()]
-        found[name] = np.array(rows, dtype=float).reshape(-1, 3)
+        found[name] = _side_and_sigmas(points)
     return found
+
+
+def _side_and_sigmas(points: Mapping[int, LinePoints]) -> np.ndarray:
+    """Return side and sigmas (k, 3), px, of two points each by side of the bar."""
+    rows = [[side, *own.sigma_px] for side, own in points.items()]
+    return np.array(rows, dtype=float).reshape(-1, 3)
+
+
+def _needs_edges(
+    known: KnownWhisk, views: Sequence[View], lines: Mapping[str, BarLineEstimate]
+) -> bool:
+    """Return whether the bar's middle, by camera, does not locate it along the line of sight."""
+    cameras = Cameras(tuple(view.camera for view in views))
+    return len(lines) == 1 or seen_from_one_side(cameras, known.axis)
+
+
+def _bar_edges(
+    known: KnownWhisk,
+    views: Sequence[View],
+    wires_px: Mapping[str, Sequence[np.ndarray]],
+    settings: VisionSettings,
+) -> dict[str, dict[int, LinePoints] | None]:
+    """Return by camera and side of the bar the points of its edges, None where they do not show."""
+    radius_mm = known.rods.bar.radius_mm
+    edges = {}
+    for view in views:
+        name = view.camera.name
+        edges[name] = measure_edges(view, known.axis, radius_mm, wires_px[name], settings)
+    return edges
 
 
 def _bar_middles(

@@ -132,9 +132,7 @@ def _whisks_of(
     cameras = shrunk_cameras(cameras, settings.picture_scale)
     time_s = np.asarray(pictures.time_s, dtype=float)
     motor_rad = np.asarray(pictures.motor_rad, dtype=float)
-    cameras, left_out = _facing(cameras, rods.wire, motor_rad)
-    views = pictures.views(cameras)
-    used = cameras.subset([view.camera.name for view in views])
+    views, used, left_out = _views_facing(pictures, cameras, rods.wire, motor_rad)
     strokes = [range(*where.indices(len(time_s)))[:: settings.every_frame] for where in whisks]
     velocity, still = _stated_motion(pictures, strokes, views, rods)
     found = find_object(SearchScene(still, used, rods, motor_rad, settings))
@@ -156,6 +154,19 @@ def _whisks_of(
         )
         seen.append(whisk)
     return _TrialScene(seen, found, still)
+
+
+def _views_facing(
+    pictures: TrialPictures, cameras: Cameras, wire: Wire, motor_rad: np.ndarray
+) -> tuple[Sequence[View], Cameras, list[Reason]]:
+    """Return the views of cameras that have the whisker before them, the cameras of these, and a
+    reason for each camera that is left out.
+
+    Raises Refused where none has.
+    """
+    facing, left_out = _facing(cameras, wire, motor_rad)
+    views = pictures.views(facing)
+    return views, facing.subset([view.camera.name for view in views]), left_out
 
 
 def _stated_motion(

@@ -61,6 +61,68 @@ def find_sight(
 ) -> Sight:
     """Find what a camera has in sight of a whisk in the frames that make its truth."""
     curves = known.place.curves
+    pieces = _pieces_of(known, camera, settings)
+    points_mm = _points_mm(pieces, curves)
+    visible = _Visible(
+        is_inside=np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE,
+        is_clear=clear_of_bar(pieces, *_bar_discs(known, camera), BESIDE_BAR_PX),
+        is_hidden=_hidden(camera, points_mm, hides),
+    )
+    return Sight(
+        pieces=pieces.select(visible.is_traced),
+        points_mm=points_mm[visible.is_traced],
+        outside=visible.outside(_pieces_in_large_picture(camera, curves, settings)),
+        behind_bar=visible.behind_bar,
+        hidden=visible.hidden,
+        is_bar_nearer=known.is_bar_nearer(camera),
+        angle_to_bar_rad=known.angle_to_bar_rad(camera),
+        is_along_bar=known.is_seen_along_bar(camera),
+        bar_share=_bar_share(known, camera),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Visible:
+    """Which of a wire's segments (s,) are in the picture, clear of the bar's outline, and behind
+    something else.
+    """
+
+    is_inside: np.ndarray
+    is_clear: np.ndarray
+    is_hidden: np.ndarray
+
+    @property
+    def _count(self) -> int:
+        """Return the number of segments, at least 1."""
+        return max(len(self.is_inside), 1)
+
+    @property
+    def is_traced(self) -> np.ndarray:
+        """Return which segments (s,) can be traced."""
+        return self.is_inside & self.is_clear & ~self.is_hidden
+
+    @property
+    def behind_bar(self) -> float:
+        """Return the share of segments at the bar's outline."""
+        return float(np.sum(self.is_inside & ~self.is_clear)) / self._count
+
+    @property
+    def hidden(self) -> float:
+        """Return the share of segments behind something else."""
+        return float(np.sum(self.is_inside & self.is_clear & self.is_hidden)) / self._count
+
+    def outside(self, in_large_picture: float) -> float:
+        """Return the share of segments outside the picture.
+
+        in_large_picture: how many there are in a picture that holds all of them. Bands end at the
+        picture's edges, so that pieces beyond them are counted apart.
+        """
+        return 1.0 - self.is_inside.sum() / max(in_large_picture, self._count)
+
+
+def _pieces_of(known: KnownWhisk, camera: Camera, settings: VisionSettings) -> Pieces:
+    """Return the segments of the wire in a camera's picture, those at the clamp left out."""
+    curves = known.place.curves
     pieces = wire_pieces(
         blank_view(camera, curves),
         curves,
@@ -68,27 +130,17 @@ def find_sight(
         settings.wire_piece_px,
         settings.wire_margin_px,
     )
-    pieces = pieces.select(pieces.place > NEAR_CLAMP_MM)
-    points_mm = _points_mm(pieces, curves)
-    middle_px, radius_px = known.axis.covering_discs(camera, known.rods.bar.radius_mm)
-    is_inside = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
-    is_clear = clear_of_bar(pieces, middle_px, radius_px, BESIDE_BAR_PX)
-    is_hidden = np.zeros(len(pieces), dtype=bool) if hides is None else hides(camera, points_mm)
-    count = max(len(pieces), 1)
-    # Bands end at the picture's edges, so that pieces beyond them are counted apart.
-    count_in_large_picture = max(_pieces_in_large_picture(camera, curves, settings), count)
-    is_traced = is_inside & is_clear & ~is_hidden
-    return Sight(
-        pieces=pieces.select(is_traced),
-        points_mm=points_mm[is_traced],
-        outside=1.0 - is_inside.sum() / count_in_large_picture,
-        behind_bar=float(np.sum(is_inside & ~is_clear)) / count,
-        hidden=float(np.sum(is_inside & is_clear & is_hidden)) / count,
-        is_bar_nearer=known.is_bar_nearer(camera),
-        angle_to_bar_rad=known.angle_to_bar_rad(camera),
-        is_along_bar=known.is_seen_along_bar(camera),
-        bar_share=_bar_share(known, camera),
-    )
+    return pieces.select(pieces.place > NEAR_CLAMP_MM)
+
+
+def _bar_discs(known: KnownWhisk, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middles and radii, px, of discs that cover the bar in a camera's picture."""
+    return known.axis.covering_discs(camera, known.rods.bar.radius_mm)
+
+
+def _hidden(camera: Camera, points_mm: np.ndarray, hides: Hides | None) -> np.ndarray:
+    """Return which of points (s, 3) something else hides from a camera; none by default."""
+    return np.zeros(len(points_mm), dtype=bool) if hides is None else hides(camera, points_mm)
 
 
 def _pieces_in_large_picture(

@@ -240,8 +240,7 @@ def _smooth(fitted: FittedWhisk) -> Smooth:
 def _frames(whisk: WhiskPictures, fitted: FittedWhisk, touch: Value) -> FrameTruth:
     """Return a row for every frame of the whisk, NaN for those not seen or not touching."""
     indices = np.array(whisk.indices)
-    position = {f: k for k, f in enumerate(fitted.frames)}
-    rows = np.array([position.get(f, -1) for f in whisk.indices])
+    rows = _rows_of(whisk, fitted)
     touching = (rows >= 0) & fitted.problem.touching[rows]
 
     def column(name: str) -> Value:
@@ -262,6 +261,12 @@ def _frames(whisk: WhiskPictures, fitted: FittedWhisk, touch: Value) -> FrameTru
         status=_statuses(whisk, fitted, rows),
         **{field: column(name) for name, field in FIELDS.items()},
     )
+
+
+def _rows_of(whisk: WhiskPictures, fitted: FittedWhisk) -> np.ndarray:
+    """Return the number (n,) of each frame of the whisk among those of the fit, -1 without one."""
+    position = {f: k for k, f in enumerate(fitted.frames)}
+    return np.array([position.get(f, -1) for f in whisk.indices])
 
 
 def _column(values: np.ndarray, rows: np.ndarray, touching: np.ndarray) -> np.ndarray:

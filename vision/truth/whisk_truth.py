@@ -109,15 +109,27 @@ def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures,
     bend = np.array([coarse[f] for f in whisk.frames])
     touching, free = touch.part_by_bends(whisk.angles_rad, bend)
     curves, arcs_mm = coarse_curves(whisk, rest, coarse)
-    came = np.zeros((1, 3)) if whisk.motion is None else whisk.motion.expected_mm
+    came = _expected_to_come_mm(whisk)
     if whisk.gives is not None:
         came = _given_way(whisk, list(curves.values()), touching)
-        first = int(np.argmax(touching))
-        last_free = np.flatnonzero(free[:first])[-1]
-        touch_rad = float(np.mean(whisk.angles_rad[[last_free, first]]))
-        whisk = whisk.yielding(came, touch_rad)
+        whisk = whisk.yielding(came, _coarse_touch_rad(whisk, touching, free))
     place = WhiskPlace(whisk.bar.axis, curves, whisk.bar_swept_mm, came)
     return whisk, ExpectedWhisk(place, rest, bend, arcs_mm, touching, free)
+
+
+def _expected_to_come_mm(whisk: WhiskPictures) -> np.ndarray:
+    """Return how far (f, 3) the bar is expected to come, mm, (1, 3) where it stands."""
+    return np.zeros((1, 3)) if whisk.motion is None else whisk.motion.expected_mm
+
+
+def _coarse_touch_rad(whisk: WhiskPictures, touching: np.ndarray, free: np.ndarray) -> float:
+    """Return the motor angle between the first frame that touches and the last free one before.
+
+    touching, free (f,) bool.
+    """
+    first = int(np.argmax(touching))
+    last_free = np.flatnonzero(free[:first])[-1]
+    return float(np.mean(whisk.angles_rad[[last_free, first]]))
 
 
 def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarray]]:
@@ -209,10 +221,7 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     bent = {f for f, is_bent in zip(fitted.frames, problem.bent) if is_bent}
     whisk = whisk.during([f for f in whisk.frames if f not in bent])
     place = _resting_place(whisk, bar_axis(problem, vector), rest_shape(problem, vector))
-    lines = TracedLines(whisk, blur_px=blurs_px(whisk))
-    seen = []
-    for on_wire in lines.wire_points(place, last=True).values():
-        seen += on_wire
+    seen = _wire_points(whisk, place)
     nothing = np.zeros(len(place.curves), dtype=bool)
     alone = replace(
         problem,
@@ -226,6 +235,15 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     state = State(vector[: problem.first_bend], middle_mm)
     state, _ = solve(alone, state, scales=[LAST_SCALE] * 3)
     return inflated_by_residuals(alone, state, _FREE_SHARED), state
+
+
+def _wire_points(whisk: WhiskPictures, place: WhiskPlace) -> list[Observed]:
+    """Return the points of the wire by all cameras, traced with the blur of each."""
+    lines = TracedLines(whisk, blur_px=blurs_px(whisk))
+    seen = []
+    for on_wire in lines.wire_points(place, last=True).values():
+        seen += on_wire
+    return seen
 
 
 def _resting_place(whisk: WhiskPictures, axis: Axis, rest_mm: np.ndarray) -> WhiskPlace:
