@@ -275,7 +275,7 @@ _TABLE = (
         "trials {names} have one and the same {file}: all but one have another's",
         "find the recordings that belong to these trials, and copy them anew",
     ),
-    Status("signals_mended", WARNING, "{shown}: {count} {cause} mended", _LOOK_AT_FILE),
+    Status("signals_mended", WARNING, "{label}: {count} {cause} mended", _LOOK_AT_FILE),
     Status(
         "speed_unlike_stated",
         WARNING,
@@ -291,7 +291,7 @@ _TABLE = (
     Status(
         "no_forward_stroke",
         WARNING,
-        "{shown}: no forward stroke of the motor, so no whisk",
+        "{label}: no forward stroke of the motor, so no whisk",
         "take the trial out, or let the motor turn forward in it",
     ),
     Status(
