@@ -179,19 +179,3 @@ def two_distances_spread(
     d_near, give_near = two_distances_moved(d_x, give, shift, C, near_sigma, 0.0, taper_per_mm)
     d_far, give_far = two_distances_moved(d_x, give, shift, C, 0.0, far_sigma, taper_per_mm)
     return np.hypot(d_near, d_far), np.hypot(give_near, give_far)
-
-
-def two_distances_sigma(
-    d_x: ArrayLike,
-    stiffness: ArrayLike,
-    shift: ArrayLike,
-    C: ArrayLike,
-    near_sigma: ArrayLike,
-    far_sigma: ArrayLike,
-) -> tuple[Numbers, Numbers]:
-    """Return the sigmas of d_x (mm) and k (N/mm) of `two_distances`, as in
-    `two_distances_spread`.
-    """
-    stiffness = np.asarray(stiffness, dtype=float)
-    d_sigma, give_sigma = two_distances_spread(d_x, 1 / stiffness, shift, C, near_sigma, far_sigma)
-    return d_sigma, (give_sigma * stiffness**2)[()]

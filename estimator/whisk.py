@@ -1,5 +1,6 @@
 """What an estimator receives of one whisk, its settings, and the estimate that it returns."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import nan
 
@@ -100,6 +101,37 @@ class Whisk:
             kept = np.array(getattr(self, name), dtype=float)
             kept.setflags(write=False)
             object.__setattr__(self, name, kept)
+
+    @classmethod
+    def without_samples(
+        cls,
+        theta_at_rad: float,
+        moments_at_Nmm: Sequence[float],
+        covariance_at: np.ndarray,
+        beam: Beam,
+        *,
+        theta_sigma_rad: float = 0.0,
+        theta_moment_covariance_at: Sequence[float] = (0.0, 0.0),
+    ) -> "Whisk":
+        """Return a whisk that is known at its pushing angle alone: all that (10) needs.
+
+        moments_at_Nmm (2,): m_y and m_z there.
+        """
+        m_y_Nmm, m_z_Nmm = moments_at_Nmm
+        nothing = np.zeros(0)
+        return cls(
+            time_s=nothing,
+            theta_rad=nothing,
+            m_y_Nmm=nothing,
+            m_z_Nmm=nothing,
+            theta_at_rad=theta_at_rad,
+            m_y_at_Nmm=m_y_Nmm,
+            m_z_at_Nmm=m_z_Nmm,
+            covariance_at=covariance_at,
+            theta_sigma_rad=theta_sigma_rad,
+            beam=beam,
+            theta_moment_covariance_at=theta_moment_covariance_at,
+        )
 
     @property
     def felt_covariance(self) -> np.ndarray:

@@ -7,7 +7,7 @@ summary, the page and docs/formats.md ask each of `bench.analyses.catalogue.ANAL
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -43,6 +43,13 @@ class EvaluatedRun:
     friction: tuple["SurfaceFriction", ...]
     alpha_est_sigma_rad: float
     session: Session | None = None
+    _findings: dict["Analysis", Any] = field(default_factory=dict, init=False, repr=False)
+
+    def found(self, analysis: "Analysis") -> Any:
+        """Return what an analysis finds in this run; it is computed at first use."""
+        if analysis not in self._findings:
+            self._findings[analysis] = analysis.compute(self)
+        return self._findings[analysis]
 
 
 @dataclass(frozen=True)
@@ -114,7 +121,7 @@ class Analysis(ABC):
             if rows or self.in_every_run:
                 table.write(out, rows)
 
-    def draw(self, out: Path, run: EvaluatedRun, found: Any) -> list[str]:
+    def draw(self, out: Path, run: EvaluatedRun) -> list[str]:
         """Write its figure into a folder; return the names of the files.
 
         The file has the hash of what it shows, and stays as it is where that has not changed.
@@ -126,7 +133,7 @@ class Analysis(ABC):
         stamp = hash_of(hashes, run.settings, hash_of_code(_FIGURE_CODE))
         if not is_drawn(path, stamp):
             with style():
-                figure = self.figure(found)
+                figure = self.figure(run.found(self))
                 if figure is None:
                     return []
                 save(figure, path, stamp)

@@ -34,7 +34,7 @@ def session_figures(run: EvaluatedRun) -> list[SessionFigure]:
     for analysis in ANALYSES:
         if not analysis.figure_name or analysis.needs_session:
             continue
-        drawing = analysis.figure(analysis.compute(run))
+        drawing = analysis.figure(run.found(analysis))
         if drawing is not None:
             title = analysis.figure_title
             caption = analysis.figure_caption

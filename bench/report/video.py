@@ -21,7 +21,7 @@ from bench.session.footage import read_frames
 from bench.session.frame_times import FrameTimes, frame_times
 from bench.session.session import load_session
 from bench.session.trial import Trial
-from vision.geometry import Camera, Wire, one_curve
+from vision.geometry import Camera, Wire, centrelines
 
 FOURCC = {".webm": "VP90", ".avi": "MJPG"}
 _WIDTH_PX = 720  # of each camera's picture
@@ -231,7 +231,7 @@ def _wire(
     for row in np.flatnonzero(shape.index == whisk.frames.index[k]):
         bend_rad = shape.bend_rad[row]
         arc_mm = shape.arc_mm[row]
-    return one_curve(shape.rest_mm, bend_rad, arc_mm, motor_rad, wire).points_mm
+    return centrelines(shape.rest_mm, bend_rad, arc_mm, motor_rad, wire).points_mm
 
 
 def wire_between(motor_rad: float, contact_mm: np.ndarray | None, length_mm: float) -> np.ndarray:

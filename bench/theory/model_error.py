@@ -76,11 +76,9 @@ def feel(push: Push, rod: Rod = ROD, beam: Beam = _BEAM) -> tuple[Whisk, float]:
     )
     touch = find_first_touch(rod, bar, 0.0, push.d_x_mm)
     theta = np.radians(push.theta_deg)
-    m_y, m_z = _end_moments_Nmm(March(rod, bar, _friction(push), touch), theta)
+    moments_at_Nmm = _end_moments_Nmm(March(rod, bar, _friction(push), touch), theta)
     covariance = _NOISE_NMM**2 * np.eye(2)
-    none = np.zeros(0)
-    whisk = Whisk(none, none, none, none, theta, m_y, m_z, covariance, 0.0, beam)
-    return whisk, touch.d_x_mm
+    return Whisk.without_samples(theta, moments_at_Nmm, covariance, beam), touch.d_x_mm
 
 
 def _friction(push: Push) -> FrictionCoefficients:

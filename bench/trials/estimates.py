@@ -101,18 +101,12 @@ def felt_at(whisk: Whisk, estimates: tuple[EstimateRow, ...] = ()) -> FeltAt:
 
 def whisk_of(felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam) -> Whisk:
     """Return the whisk of a record at its pushing angle, without samples: all that (10) needs."""
-    nothing = np.zeros(0)
-    return Whisk(
-        time_s=nothing,
-        theta_rad=nothing,
-        m_y_Nmm=nothing,
-        m_z_Nmm=nothing,
-        theta_at_rad=theta_rad,
-        m_y_at_Nmm=felt.m_y_Nmm.value,
-        m_z_at_Nmm=felt.m_z_Nmm.value,
-        covariance_at=felt.covariance_at,
+    return Whisk.without_samples(
+        theta_rad,
+        (felt.m_y_Nmm.value, felt.m_z_Nmm.value),
+        felt.covariance_at,
+        beam,
         theta_sigma_rad=felt.theta_sigma_rad,
-        beam=beam,
         theta_moment_covariance_at=felt.theta_moment_covariance_at,
     )
 

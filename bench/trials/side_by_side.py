@@ -24,7 +24,7 @@ from bench.trials.other_wires import has_lines, lines_in, write_lines
 from bench.trials.trial_frames import TrialFrames
 from bench.trials.unit import Unit
 from vision import lines_of, wire_lines
-from vision.geometry import REST_POWERS, Refused, one_curve
+from vision.geometry import REST_POWERS, Refused, unbent_curves
 from vision.pictures import RodLines
 
 _PASSES = 3  # wires that others cross are up to 38 px off after the first, 18 after the second, 2 after the third
@@ -95,10 +95,7 @@ def _write_straight(unit: Unit) -> None:
     times = frame_times(unit.trial)
     motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
     wire = unit.session.whisker.wire
-    rest_mm = np.zeros((2, REST_POWERS))
-    curves = {}
-    for frame, angle in enumerate(motor_rad):
-        curves[frame] = one_curve(rest_mm, np.zeros(2), wire.length_mm, angle, wire)
+    curves = unbent_curves(np.zeros((2, REST_POWERS)), dict(enumerate(motor_rad)), wire)
     lines = {camera.name: lines_of(camera, wire, curves) for camera in unit.calibration.cameras}
     write_lines(unit.seen_path, key, lines)
 

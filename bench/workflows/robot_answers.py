@@ -268,20 +268,8 @@ def _expected_whisk(whisk: _ConvertedWhisk, theta_rad: float) -> Whisk:
     as_cylinder_mm = float(beam.as_cylinder_mm(whisk.seen.d_x_mm.value))
     beta_rad = whisk.seen.beta_rad.value
     moments_Nmm = np.array(moments(as_cylinder_mm, theta_rad, beta_rad, alpha_rad, beam.C_Nmm2))
-    m_y_Nmm, m_z_Nmm = (moments_Nmm / (1.0 + share)).tolist()
-    no_samples = np.zeros(0)
-    return Whisk(
-        time_s=no_samples,
-        theta_rad=no_samples,
-        m_y_Nmm=no_samples,
-        m_z_Nmm=no_samples,
-        theta_at_rad=theta_rad,
-        m_y_at_Nmm=m_y_Nmm,
-        m_z_at_Nmm=m_z_Nmm,
-        covariance_at=np.zeros((2, 2)),
-        theta_sigma_rad=0.0,
-        beam=beam,
-    )
+    felt_Nmm = (moments_Nmm / (1.0 + share)).tolist()
+    return Whisk.without_samples(theta_rad, felt_Nmm, np.zeros((2, 2)), beam)
 
 
 def _friction_angle_rad(whisk: _ConvertedWhisk) -> float:

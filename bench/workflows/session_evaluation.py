@@ -156,18 +156,17 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
 
     out = evaluation.out
     write_tables(out, evaluation.results)
-    findings = {analysis: analysis.compute(evaluation) for analysis in ANALYSES}
-    for analysis, found in findings.items():
-        analysis.write(out, found)
+    for analysis in ANALYSES:
+        analysis.write(out, evaluation.found(analysis))
     figures = []
     if evaluation.settings.figures:
         from bench.report.trial_figures import draw_trials  # with all of matplotlib
 
         figures += draw_trials(evaluation, pool)
-        for analysis, found in findings.items():
-            figures += analysis.draw(out, evaluation, found)
+        for analysis in ANALYSES:
+            figures += analysis.draw(out, evaluation)
     scores = score(evaluation.session, out, evaluation.gauges)
-    summary = summary_of(evaluation, findings, scores, figures)
+    summary = summary_of(evaluation, scores, figures)
     written = record_of(evaluation, summary, figures)
     record = write_record(out, written, evaluation.session.path)
     write_report(out, record, evaluation)

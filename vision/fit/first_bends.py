@@ -13,7 +13,7 @@ from vision.fit.blocks import REST_PRIOR_MM
 from vision.fit.problem import Problem, rest_shape, start
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import REST_POWERS, Curves, centrelines, one_curve
+from vision.geometry.centreline import REST_POWERS, Curves, centrelines, unbent_curves
 from vision.geometry.contact import closest_arc
 from vision.geometry.newton import cauchy_weights
 from vision.geometry.refusals import Refused
@@ -105,10 +105,7 @@ def find_rest(
     Raises Refused where no whisker is seen to swing.
     """
     rods = sights[0].rods
-    straight = np.zeros((2, REST_POWERS))
-    curves = {}
-    for frame, angle in motor_rad.items():
-        curves[frame] = one_curve(straight, np.zeros(2), rods.wire.length_mm, angle, rods.wire)
+    curves = unbent_curves(np.zeros((2, REST_POWERS)), motor_rad, rods.wire)
     seen = []
     for camera, sight in enumerate(sights):
         seen += _resting_points(sight, camera, curves)
@@ -168,7 +165,7 @@ def follow_bends(
     for frame, motor in motor_rad.items():
         guess = 2 * bends_rad[-1] - bends_rad[-2]
         arc = contact_arc(rest_mm, guess, motor, axis, wire)
-        curve = one_curve(rest_mm, guess, arc, motor, wire)
+        curve = centrelines(rest_mm, guess, arc, motor, wire)
         seen = [sight.votes({frame: curve}) for sight in sights]
         model = _BendModel(views, rest_mm, arc, motor, wire)
         bend, points = _bend_by_votes(model, seen, guess)
@@ -286,7 +283,7 @@ def contact_arc(
 
     rest_mm (2, 4): its rest shape, mm. bend (2,): rad.
     """
-    straight = one_curve(rest_mm, np.zeros(2), wire.length_mm, motor, wire)
+    straight = centrelines(rest_mm, np.zeros(2), wire.length_mm, motor, wire)
     arc = np.clip(closest_arc(straight, axis), 1.0, wire.length_mm)
-    bent = one_curve(rest_mm, bend, arc, motor, wire)
+    bent = centrelines(rest_mm, bend, arc, motor, wire)
     return float(np.clip(closest_arc(bent, axis), 1.0, wire.length_mm))

@@ -10,7 +10,7 @@ from vision.geometry.lazy_names import lazy_names
 NAMES = {
     "board": ("Board",),
     "camera": ("Camera", "Cameras"),
-    "centreline": ("REST_POWERS", "one_curve", "rotation_z"),
+    "centreline": ("REST_POWERS", "centrelines", "unbent_curves", "rotation_z"),
     "contact": ("BarAxis",),
     "forms": ("touched_object",),
     "lens": ("LENS_TERMS",),

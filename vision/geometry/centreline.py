@@ -9,6 +9,7 @@ contact, so that a bent rod has shorter levers towards its base: the bend's squa
 `bend_growth` says, and so does friction along it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -253,28 +254,22 @@ def rotation_z(angle_rad: float | np.ndarray) -> np.ndarray:
     return R
 
 
-def one_curve(
-    rest_mm: np.ndarray,
-    bend_rad: np.ndarray,
-    contact_mm: float,
-    motor_rad: float,
-    wire: Wire,
-    pull: float = 0.0,
-) -> Curves:
-    """Return the centreline (m, 3) of one frame, see `centrelines`."""
-    return centrelines(rest_mm, bend_rad, contact_mm, motor_rad, wire, pull)
+def unbent_curves(
+    rest_mm: np.ndarray, motor_rad: Mapping[int, float], wire: Wire
+) -> dict[int, Curves]:
+    """Return the centrelines of an unbent wire by frame; motor_rad: motor angle by frame."""
+    curves = {}
+    for frame, angle in motor_rad.items():
+        curves[frame] = centrelines(rest_mm, np.zeros(2), wire.length_mm, angle, wire)
+    return curves
 
 
 def resting_lines(camera: Camera, wire: Wire, motor_rad: np.ndarray) -> list[np.ndarray]:
     """Return lines (m, 2) px in one camera of a straight, unbent wire at each of the motor angles
     (n,).
     """
-    straight = np.zeros((2, REST_POWERS))
-    lines = []
-    for angle in motor_rad:
-        curve = one_curve(straight, np.zeros(2), wire.length_mm, angle, wire)
-        lines.append(camera.project(curve.points_mm))
-    return lines
+    curves = unbent_curves(np.zeros((2, REST_POWERS)), dict(enumerate(motor_rad)), wire)
+    return [camera.project(curve.points_mm) for curve in curves.values()]
 
 
 def is_before(camera: Camera, wire: Wire, motor_rad: np.ndarray) -> bool:

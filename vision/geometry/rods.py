@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from vision.geometry.checks import require, require_length, require_sigma
-from vision.geometry.touched import StatedSizes, Touched
+from vision.geometry.touched import OneDiameter, Touched
 
 SHAPES = ("cylinder", "cone", "tapered")
 
@@ -65,31 +65,13 @@ class Wire:
 
 
 @dataclass(frozen=True)
-class Bar(Touched):
+class Bar(OneDiameter):
     """A straight round bar. Refused where its diameter is no length."""
-
-    diameter_mm: float
-    diameter_sigma_mm: float = 0.0
 
     name: ClassVar[str] = "bar"
     may_move: ClassVar[bool] = True
     along_sigma_mm: ClassVar[tuple[float, ...]] = ()
     outline_sigma_px: ClassVar[tuple[float, ...]] = ()
-
-    def __post_init__(self):
-        """Raise Refused where there is no such bar."""
-        require_length("bar", diameter_mm=self.diameter_mm)
-        require_sigma("bar", diameter_sigma_mm=self.diameter_sigma_mm)
-
-    @classmethod
-    def from_sizes(cls, stated: StatedSizes) -> "Bar":
-        """Return the bar of a stated diameter. Raises Refused where there is none."""
-        return cls(stated.diameter_mm, stated.diameter_sigma_mm)
-
-    @property
-    def sizes(self) -> StatedSizes:
-        """Return the bar's diameter and its sigma."""
-        return StatedSizes(self.diameter_mm, self.diameter_sigma_mm)
 
     @property
     def label(self) -> str:

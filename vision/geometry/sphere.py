@@ -5,10 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from vision.geometry.checks import require_length, require_sigma
 from vision.geometry.rotation import unit
 from vision.geometry.rounded import Balls, Local, Rounded, RoundedAxis
-from vision.geometry.touched import StatedSizes
+from vision.geometry.touched import OneDiameter
 
 # [—] A layout: the direction along which slopes count.
 _UP = np.array([0.0, 0.0, 1.0])
@@ -17,29 +16,11 @@ _SKEWED = 0.01
 
 
 @dataclass(frozen=True)
-class Sphere(Rounded):
+class Sphere(OneDiameter, Rounded):
     """A sphere of so many mm. Refused where that is no length."""
-
-    diameter_mm: float
-    diameter_sigma_mm: float = 0.0
 
     name: ClassVar[str] = "sphere"
     search_reach_mm: ClassVar[float] = 30.0
-
-    def __post_init__(self):
-        """Raise Refused where there is no such sphere."""
-        require_length("bar", diameter_mm=self.diameter_mm)
-        require_sigma("bar", diameter_sigma_mm=self.diameter_sigma_mm)
-
-    @classmethod
-    def from_sizes(cls, stated: StatedSizes) -> "Sphere":
-        """Return the sphere of a stated diameter. Raises Refused where there is none."""
-        return cls(stated.diameter_mm, stated.diameter_sigma_mm)
-
-    @property
-    def sizes(self) -> StatedSizes:
-        """Return the sphere's diameter and its sigma."""
-        return StatedSizes(self.diameter_mm, self.diameter_sigma_mm)
 
     @property
     def label(self) -> str:

@@ -17,6 +17,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from vision.geometry.camera import Camera
+from vision.geometry.checks import require_length, require_sigma
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,29 @@ class Touched(ABC):
     @abstractmethod
     def label(self) -> str:
         """Return the form with its size, for a message."""
+
+
+@dataclass(frozen=True)
+class OneDiameter(Touched):
+    """An object whose only size is its diameter. Refused where that is no length."""
+
+    diameter_mm: float
+    diameter_sigma_mm: float = 0.0
+
+    def __post_init__(self):
+        """Raise Refused where there is no such object."""
+        require_length("bar", diameter_mm=self.diameter_mm)
+        require_sigma("bar", diameter_sigma_mm=self.diameter_sigma_mm)
+
+    @classmethod
+    def from_sizes(cls, stated: StatedSizes) -> Self:
+        """Return the object of a stated diameter. Raises Refused where there is none."""
+        return cls(stated.diameter_mm, stated.diameter_sigma_mm)
+
+    @property
+    def sizes(self) -> StatedSizes:
+        """Return the diameter and its sigma."""
+        return StatedSizes(self.diameter_mm, self.diameter_sigma_mm)
 
 
 class Axis(ABC):

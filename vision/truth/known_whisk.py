@@ -8,7 +8,7 @@ import numpy as np
 
 from vision.fit.problem import Problem, State
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.centreline import REST_POWERS, Curves, one_curve
+from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import BarAxis
 from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
@@ -61,7 +61,7 @@ class KnownWhisk:
         """Return the wire's centreline by frame."""
         curves = {}
         for f in frames:
-            curves[f] = one_curve(
+            curves[f] = centrelines(
                 self.rest_mm, self.bend_rad[f], self.arc_mm[f], self.motor_rad[f], self.rods.wire
             )
         return curves

@@ -10,7 +10,7 @@ from vision.fit.problem import Problem, State, bar_axis, bends, curves_of, rest_
 from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.fit.touch import begins_free
-from vision.geometry.centreline import Curves, one_curve
+from vision.geometry.centreline import Curves, centrelines, unbent_curves
 from vision.geometry.contact import clearance
 from vision.geometry.refusals import Misled, Refused, TooFewFrames
 from vision.geometry.touched import Axis
@@ -159,7 +159,7 @@ def coarse_curves(
     arcs_mm = []
     for f, motor_rad in whisk.motor.items():
         arc_mm = contact_arc(rest_mm, bend_rad[f], motor_rad, whisk.bar.axis, wire)
-        curves[f] = one_curve(rest_mm, bend_rad[f], arc_mm, motor_rad, wire)
+        curves[f] = centrelines(rest_mm, bend_rad[f], arc_mm, motor_rad, wire)
         arcs_mm.append(arc_mm)
     return curves, np.array(arcs_mm)
 
@@ -248,10 +248,7 @@ def _wire_points(whisk: WhiskPictures, place: WhiskPlace) -> list[Observed]:
 
 def _resting_place(whisk: WhiskPictures, axis: Axis, rest_mm: np.ndarray) -> WhiskPlace:
     """Return where an object and a wire of this rest shape (2, 4) are that is nowhere bent."""
-    wire = whisk.rods.wire
-    curves = {}
-    for f, motor_rad in whisk.motor.items():
-        curves[f] = one_curve(rest_mm, np.zeros(2), wire.length_mm, motor_rad, wire)
+    curves = unbent_curves(rest_mm, whisk.motor, whisk.rods.wire)
     return WhiskPlace(axis, curves, whisk.bar_swept_mm)
 
 

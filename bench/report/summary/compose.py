@@ -1,11 +1,10 @@
 """summary.txt: the verdict first, then what it rests on. Verdict and warnings appear in the terminal."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from bench.analyses.analysis import Analysis
+from bench.analyses.catalogue import ANALYSES
 from bench.analyses.friction_tables import FrictionAngles
 from bench.report.evaluation import Evaluation
 from bench.report.run_facts import Section
@@ -46,9 +45,6 @@ _ANALYSES_LAST = ("ledger",)
 # Figures in the order in which the files are listed; others come after these.
 _FIGURES_FIRST = ("fig8.png", "error_against_slope.png", "against_theta.png", "moving.png")
 
-# What each analysis found in a run.
-Findings = Mapping[Analysis, Any]
-
 
 @dataclass(frozen=True)
 class Summary:
@@ -85,16 +81,14 @@ def section_lines(sections: Iterable[Section]) -> Iterator[str]:
         yield ""
 
 
-def summary_of(
-    evaluation: Evaluation, findings: Findings, scores: Sequence[str], figures: Sequence[str]
-) -> Summary:
+def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[str]) -> Summary:
     """Return the summary of a run.
 
     scores: lines on a synthetic session's truth. figures: names of the pictures.
     """
     results = evaluation.results
     doubtful = (*evaluation.doubts, *scatter_warnings(results), *whisk_warnings(results))
-    of_analyses = _sections_of_analyses(evaluation, findings)
+    of_analyses = _sections_of_analyses(evaluation)
     last = [of_analyses.pop(code) for code in _ANALYSES_LAST if code in of_analyses]
     sections = (
         *_sections_of_errors(evaluation),
@@ -150,20 +144,20 @@ def _sections_of_errors(evaluation: Evaluation) -> Iterator[Section]:
     yield _section("errors", title, [*error_lines(judge(results)), *contact_lines(results)])
 
 
-def _sections_of_analyses(evaluation: Evaluation, findings: Findings) -> dict[str, Section]:
+def _sections_of_analyses(evaluation: Evaluation) -> dict[str, Section]:
     """Return the sections of the analyses by their codes, in the summary's order.
 
     Analyses of one code share a section. (10) with what is known of the friction stands with it.
     """
     titles = {}
     lines: dict[str, list[str]] = {code: [] for code in _ANALYSES_FIRST}
-    for analysis, found in findings.items():
+    for analysis in ANALYSES:
         heading = analysis.heading
         if heading is None:
             continue
         titles[heading.code] = heading.title
         of_section = lines.setdefault(heading.code, [])
-        of_section += analysis.lines(found)
+        of_section += analysis.lines(evaluation.found(analysis))
         if isinstance(analysis, FrictionAngles):
             of_section += known_friction_lines(evaluation.accuracy, evaluation.settings)
     return {code: _section(code, titles[code], lines[code]) for code in lines if code in titles}

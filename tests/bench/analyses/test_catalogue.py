@@ -49,7 +49,7 @@ def test_what_is_written_is_declared(analysis, tmp_path):
     declared = {table.file for table in analysis.tables} if analysis.in_every_run else set()
     assert {path.name for path in tmp_path.iterdir()} == declared
     assert list(analysis.lines(found)) == []
-    assert analysis.draw(tmp_path, run, found) == []
+    assert analysis.draw(tmp_path, run) == []
     table = analysis.page_table(tmp_path)
     assert table is None or table.rows == ()
 
@@ -61,6 +61,15 @@ def test_rows_have_the_cells_of_their_tables(analysis):
         assert table.name in {declared.name for declared in analysis.tables}
         for row in rows:
             assert set(row) <= {name for one in analysis.tables for name in one.names}
+
+
+def test_an_analysis_is_computed_once_a_run():
+    calls = []
+    count = Count()
+    count.compute = lambda run: calls.append(run) or len(run.results)
+    run = run_of(result(40.0))
+    assert [run.found(count), run.found(count)] == [1, 1] and calls == [run]
+    assert run_of(result(40.0), result(60.0)).found(Count()) == 2
 
 
 def test_files_and_figures_have_one_analysis_each():
@@ -79,6 +88,7 @@ def test_one_more_analysis_is_in_all_that_a_run_writes(
 ):
     with_count = (*ANALYSES, Count())
     monkeypatch.setattr("bench.workflows.session_evaluation.ANALYSES", with_count)
+    monkeypatch.setattr("bench.report.summary.compose.ANALYSES", with_count)
     monkeypatch.setattr("bench.report.page.write.ANALYSES", with_count)
     evaluate(steel_signals, tmp_path, Settings(figures=False), workers=0, announce=lambda text: 0)
     (row,) = COUNTS.read(tmp_path)

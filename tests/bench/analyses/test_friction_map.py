@@ -19,7 +19,7 @@ def test_cells_hold_what_was_measured_and_agree_with_theory(tmp_path):
     assert [(c.beta_deg, len(c.errors)) for c in cells] == [(27.5, 2), (57.5, 4)]
     assert all(c.errors == pytest.approx(c.predicted, abs=0.02) for c in cells)
     ErrorMap().write(tmp_path, found)
-    assert ErrorMap().draw(tmp_path, run, found) == ["error_map.png"]
+    assert ErrorMap().draw(tmp_path, run) == ["error_map.png"]
     with (tmp_path / "error_map.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["whisks"] for row in rows] == ["2", "4"]
@@ -35,7 +35,7 @@ def test_nothing_measured_no_picture(tmp_path):
     run = run_of()
     found = ErrorMap().compute(run)
     ErrorMap().write(tmp_path, found)
-    assert ErrorMap().draw(tmp_path, run, found) == []
+    assert ErrorMap().draw(tmp_path, run) == []
     assert (tmp_path / "error_map.csv").read_text().count("\n") == 1
 
 

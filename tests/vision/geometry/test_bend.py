@@ -5,7 +5,7 @@ import pytest
 
 from bench.rig.elastic_rod import Rod
 from bench.rig.elastica import Bent, Elastica
-from vision.geometry.centreline import one_curve
+from vision.geometry.centreline import centrelines
 from vision.geometry.rods import Wire
 
 ARC_MM, CONTACT_MM, BEND_RAD = np.linspace(0.0, 100.0, 41), 60.0, 0.6
@@ -31,6 +31,6 @@ def test_large_bends_are_those_of_an_elastica(shape, most_mm, pull):
     """A beam of small bends, 2u - u², is 0.05 mm and more away from it."""
     elastica, exact = bent(Rod(shape, 100.0, 1.0, 60.0), pull)
     wire = Wire(shape, 100.0, 1.0)
-    curve = one_curve(np.zeros((2, 4)), np.array([BEND_RAD, 0.0]), CONTACT_MM, 0.0, wire, pull)
+    curve = centrelines(np.zeros((2, 4)), np.array([BEND_RAD, 0.0]), CONTACT_MM, 0.0, wire, pull)
     true = elastica.curve_mm(exact, ARC_MM)
     assert np.abs(curve.points_mm[:, :2] - true).max() < most_mm
