@@ -60,7 +60,7 @@ def see_all(folders: Sequence[Path], out: Path) -> dict[str, list[dict]]:
         for name, settings in PRESETS.items():
 
             def row(number: int, settings=settings) -> dict:
-                return row_of(*see_scene(number, folders[number], settings))
+                return row_of(*see_scene(folders[number], settings)) | {"seed": number}
 
             by_preset[name] = all_rows(out / f"{name}.csv", COLUMNS, [number], row)
     return by_preset

@@ -4,15 +4,22 @@ import csv
 import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
+Key = TypeVar("Key", int, str)
 HALF_WIDTH_95 = 1.959964
+# Columns of words; the others hold numbers.
+_WORDS = ("scene", "look", "status")
 
 
 def all_rows(
-    table: Path, columns: Sequence[str], keys: Iterable[int], make: Callable[[int], dict]
+    table: Path, columns: Sequence[str], keys: Iterable[Key], make: Callable[[Key], dict]
 ) -> list[dict]:
-    """Rows of a CSV table by its first column, a whole number: those of other keys and those there already as they
-    are, the rest made and each written as soon as it is known."""
+    """Return the rows of a CSV table by its first column, a whole number or a name.
+
+    Rows of other keys and those that are there stay as they are; the others are made, and each is written as soon as
+    it is known.
+    """
     rows = read_rows(table, columns)
     table.parent.mkdir(parents=True, exist_ok=True)
     with table.open("w", newline="") as file:
@@ -28,19 +35,27 @@ def all_rows(
 
 
 def read_rows(table: Path, columns: Sequence[str]) -> list[dict]:
-    """Rows with numbers as floats (NaN where empty), the first column an int, `status` a text; without a last row that
-    was cut off. None where there is no table."""
+    """Return the rows of a table, none where there is no table; a last row that was cut off is left out.
+
+    Numbers are floats, NaN where empty; the first column is a whole number or a name.
+    """
     if not table.exists():
         return []
     with table.open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if row[columns[-1]] is not None]
-    return [
-        {name: _value(name, row[name]) for name in columns} | {columns[0]: int(row[columns[0]])}
-        for row in rows
-    ]
+    return [_values(row, columns) for row in rows]
 
 
-def _value(name: str, text: str):
-    if name == "status":
+def _values(row: dict[str, str], columns: Sequence[str]) -> dict:
+    """Return a row's cells as words and numbers."""
+    values = {name: _value(name, row[name]) for name in columns}
+    if columns[0] not in _WORDS:
+        values[columns[0]] = int(row[columns[0]])
+    return values
+
+
+def _value(name: str, text: str) -> str | float:
+    """Return the cell of a column as a word or a number."""
+    if name in _WORDS:
         return text
     return float(text) if text else math.nan

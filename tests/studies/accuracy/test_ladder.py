@@ -154,9 +154,24 @@ def test_the_last_rung_is_a_path_traced_scene(name, most_mm):
     the sigmas that such scenes have. The slope stays open to some degrees; a clamp's edge taken for the bar in the
     camera above once made 10 degrees of it, at a stated 0.7.
     """
-    row = row_of(*path_traced.see_scene(0, path_traced.ROOT / "fixtures" / "scenes" / name))
-    assert not path_traced.odd(row)
+    row = path_traced.scene_row(path_traced.ROOT / "fixtures" / "scenes" / name)
+    assert not path_traced.is_far(row)
     assert abs(row["d_x_mm_error"]) < most_mm
+
+
+def test_a_table_of_path_traced_scenes_has_a_row_for_each_light():
+    """Two scenes in a lamp's light, one of them 2 sigma off, and one in the sun without a truth."""
+    errors = {f"{name}_error": 0.01 for name in path_traced.QUANTITIES}
+    sigmas = {f"{name}_sigma": 0.01 for name in path_traced.QUANTITIES}
+    good = {"scene": "s1", "look": "lamp", "slip_rms_mm": 0.004, **errors, **sigmas}
+    wide = {**good, "scene": "s2", "d_x_mm_error": 0.02}
+    lost = {"scene": "s3", "look": "sun", "status": "no bar"}
+    _, _, lamp, sun, total = "\n".join(path_traced.table_lines([good, wide, lost])).splitlines()
+    assert lamp.startswith("| lamp | 2, 2 | 0.015, 0.019 mm")
+    assert "| 2.0 | 50, 100, 100, 100 % | 1.58, 1.00, 1.00, 1.00 |" in lamp
+    assert sun == "| sun | 1, 0 | | | | | |"
+    assert total.startswith("| all | 3, 2 |")
+    assert not path_traced.is_far(wide) and path_traced.is_far(lost)
 
 
 def test_what_a_ball_does_to_10_is_its_first_order():

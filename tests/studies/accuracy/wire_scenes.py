@@ -71,7 +71,7 @@ def look_at(folder: Path) -> dict[str, tuple[float, float, float, float]]:
     recorder = Recorder(float(np.radians(frames["motor_deg"][frames["contact"] > 0].min())) - 1e-6)
     usual, seeing.trace_wire = seeing.trace_wire, recorder
     try:
-        see_scene(0, folder)
+        see_scene(folder)
     finally:
         seeing.trace_wire = usual
     return recorder.rows
