@@ -69,14 +69,14 @@ class Run:
         return self.record.verdict
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """Return the warnings, a line each."""
-        return self.record.doubts
+        return self.record.warnings
 
     @property
-    def doubtful(self) -> bool:
+    def has_warnings(self) -> bool:
         """Return whether there is any warning; the command line's exit code is then 1."""
-        return bool(self.doubts)
+        return bool(self.warnings)
 
     @property
     def whisks(self) -> np.ndarray:
@@ -116,18 +116,18 @@ class Run:
 class ArrayRun:
     """An evaluated session of several whiskers.
 
-    verdict, doubts: of all of them. whiskers: each one's own run, by its name.
+    verdict, warnings: of all of them. whiskers: each one's own run, by its name.
     """
 
     out: Path
     verdict: tuple[str, ...]
-    doubts: tuple[str, ...]
+    warnings: tuple[str, ...]
     whiskers: dict[str, Run]
 
     @property
-    def doubtful(self) -> bool:
+    def has_warnings(self) -> bool:
         """Return whether there is any warning; the command line's exit code is then 1."""
-        return bool(self.doubts)
+        return bool(self.warnings)
 
     def table(self, name: str) -> np.ndarray:
         """Return a table of all whiskers: whisks, estimates or surface. Raise KeyError for
@@ -207,7 +207,7 @@ def read(out: Folder) -> Run | ArrayRun:
     for base in array.bases:
         folder = folder_of(out, base.name)
         whiskers[base.name] = Run(folder, read_record(folder))
-    return ArrayRun(out, array.verdict, array.doubtful, whiskers)
+    return ArrayRun(out, array.verdict, array.warnings, whiskers)
 
 
 def plan(

@@ -19,8 +19,8 @@ from bench.analyses.pooling import (
     rms,
     value_cells,
 )
-from bench.base.doubts import in_one_status
 from bench.base.drawing import label_of
+from bench.base.input_problems import in_one_status
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from vision import UNKNOWN, Value, WhiskTruth

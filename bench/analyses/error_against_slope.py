@@ -218,7 +218,9 @@ def _draw_group(
     colour = colour_of(judged[0].estimator, number)
     for is_filled in (True, False):
         drawn = [
-            (place, j) for place, j in zip(x, judged) if (j.doubtful or j.one_factor) != is_filled
+            (place, j)
+            for place, j in zip(x, judged)
+            if (j.has_warning or j.one_factor) != is_filled
         ]
         if drawn:
             draw_whisks(

@@ -167,7 +167,7 @@ def _whisks(
     """Yield (β in degrees, α in rad, error in percent, beam, d_x in mm) of whisks with all known."""
     sound = {}
     for judged in judge(results):
-        if judged.estimator == "with_friction" and not (judged.one_factor or judged.doubtful):
+        if judged.estimator == "with_friction" and not (judged.one_factor or judged.has_warning):
             sound[judged.trial, judged.whisk] = judged
     for surface in friction:
         seen = surface.alpha("seen")[0]

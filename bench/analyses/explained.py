@@ -64,7 +64,7 @@ class Explained(Analysis):
     )
 
     def compute(self, run: EvaluatedRun) -> list[dict]:
-        """Return a row a whisk, and last the mean over those of which nothing is doubtful."""
+        """Return a row a whisk, and last the mean over those without a warning."""
         rows = list(explained_rows(run.results, run.whisker))
         if not rows:
             return []

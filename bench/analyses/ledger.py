@@ -18,7 +18,7 @@ from bench.analyses.left_out import (
     effect_on_truth,
 )
 from bench.analyses.pooling import grouped
-from bench.base.doubts import in_one_status
+from bench.base.input_problems import in_one_status
 from bench.base.tables import TRIAL, WHISK, Column, Kind, Table, alike, status
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.whisker import Whisker

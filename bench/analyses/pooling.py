@@ -32,7 +32,7 @@ def measured(results: Iterable[TrialResult]) -> list[TrialResult]:
 def sound_measured_whisks(
     results: Iterable[TrialResult],
 ) -> Iterator[tuple[TrialResult, SeenWhisk, FeltWhisk]]:
-    """Yield the whisks of trials that measure, seen and felt, of which nothing is doubtful."""
+    """Yield the whisks of trials that measure, seen and felt, without a warning."""
     for result, seen, felt in whisks(measured(results)):
         if is_sound(seen, felt):
             yield result, seen, felt

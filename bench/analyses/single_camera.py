@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import angle_cells, as_cell, column, coverage, grouped, rms, value_cells
-from bench.base.doubts import in_one_status
+from bench.base.input_problems import in_one_status
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, status, with_sigma
 from bench.records.trial_result import ByOneCamera, SeenWhisk, TrialResult, whisks
 from estimator.uncertainty import Z_95

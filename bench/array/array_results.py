@@ -29,7 +29,7 @@ from bench.report.evaluation import Finished, finished
 from bench.report.pooled import read_run
 from bench.report.record import ARRAY, RUNS, read_record
 from bench.report.run_facts import RunRecord, Section
-from bench.report.summary.compose import DOUBTFUL, SCORE, Summary
+from bench.report.summary.compose import SCORE, WARNINGS, Summary
 from bench.report.summary.verdict import verdict
 from bench.report.whisk_tables import ESTIMATES, WHISKS
 from bench.session.session import Base, Session
@@ -45,18 +45,18 @@ TABLES = {table.name: table for table in (ARRAY_WHISKS, ARRAY_ESTIMATES, SURFACE
 class ArrayRecord:
     """All that array.json holds of an array, without its whiskers' runs.
 
-    doubts: warnings about the session as a whole. scores: of all whiskers against the truth files of a
-    synthetic session. surfaces: objects as the manifests state them, by trial. verdict, doubtful:
+    session_warnings: about the session as a whole. scores: of all whiskers against the truth files of a
+    synthetic session. surfaces: objects as the manifests state them, by trial. verdict, warnings:
     as the summary has them, once it is made.
     """
 
     session: str
     bases: tuple[Base, ...]
-    doubts: tuple[str, ...] = ()
+    session_warnings: tuple[str, ...] = ()
     scores: tuple[str, ...] = ()
     surfaces: dict[str, ObjectSurface] = field(default_factory=dict)
     verdict: tuple[str, ...] = ()
-    doubtful: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ def folder_of(out: Path, whisker: str) -> Path:
 
 
 def array_record(
-    views: Sequence[Session], doubts: Sequence[str], scores: Sequence[str]
+    views: Sequence[Session], warnings: Sequence[str], scores: Sequence[str]
 ) -> ArrayRecord:
     """Return the record of an array's views, one a whisker."""
     surfaces = {}
@@ -102,7 +102,7 @@ def array_record(
         if surface is not None:
             surfaces[trial.name] = surface
     bases = tuple(view.base for view in views)
-    return ArrayRecord(views[0].whole_name, bases, tuple(doubts), tuple(scores), surfaces)
+    return ArrayRecord(views[0].whole_name, bases, tuple(warnings), tuple(scores), surfaces)
 
 
 def write_array_record(out: Path, record: ArrayRecord) -> None:
@@ -150,7 +150,7 @@ def write_array(out: Path) -> Summary:
         figures = write_figures(out, cloud, _seen_surfaces(runs) | record.surfaces)
     write_page(out, record.session, summary, [(run.base.name, run.record) for run in runs], figures)
     write_whole(out / "summary.txt", summary.text)
-    write_array_record(out, replace(record, verdict=summary.verdict, doubtful=summary.doubtful))
+    write_array_record(out, replace(record, verdict=summary.verdict, warnings=summary.warnings))
     return summary
 
 
@@ -180,10 +180,10 @@ def _named_by_whisker(result: TrialResult, run: WhiskerRun) -> TrialResult:
     return replace(result, trial=trial)
 
 
-def _sections(record, cloud, sizes, first_lines, doubtful) -> tuple[Section, ...]:
+def _sections(record, cloud, sizes, first_lines, warnings) -> tuple[Section, ...]:
     """Return the sections that have lines, in their order.
 
-    first_lines: a verdict a whisker. doubtful: see `_doubtful_lines`.
+    first_lines: a verdict a whisker. warnings: see `_warning_lines`.
     """
     files = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
     surface_title = "Surface: contacts from the object, mm (surface.csv)"
@@ -192,19 +192,19 @@ def _sections(record, cloud, sizes, first_lines, doubtful) -> tuple[Section, ...
         Section("whiskers", "Whiskers", tuple(first_lines)),
         Section("surface", surface_title, tuple(surface_lines(cloud))),
         Section("size", size_title, tuple(size_lines(sizes))),
-        Section("doubtful", DOUBTFUL, tuple(doubtful)),
+        Section("warnings", WARNINGS, tuple(warnings)),
         Section("score", SCORE, record.scores),
         Section("files", "Files", (files,)),
     ]
     return tuple(section for section in sections if section.lines)
 
 
-def _doubtful_lines(record: ArrayRecord, runs: Sequence[WhiskerRun]) -> list[str]:
+def _warning_lines(record: ArrayRecord, runs: Sequence[WhiskerRun]) -> list[str]:
     """Return the warnings about the session, about exchanged whiskers, and about each run."""
     by_whisker = {run.base.name: run.results for run in runs}
-    lines = [*record.doubts, *exchanged(by_whisker)]
+    lines = [*record.session_warnings, *exchanged(by_whisker)]
     for run in runs:
-        lines += [f"{run.base.name}: {line}" for line in run.record.doubts]
+        lines += [f"{run.base.name}: {line}" for line in run.record.warnings]
     return lines
 
 
@@ -215,7 +215,7 @@ def _summarise(
     sizes: Sequence[FeltSize],
 ) -> Summary:
     """Return verdict and sections of the array's summary; sections without lines are left out."""
-    doubtful = _doubtful_lines(record, runs)
+    warnings = _warning_lines(record, runs)
     results = []
     first_lines = []
     for run in runs:
@@ -224,6 +224,6 @@ def _summarise(
     title = f"{record.session}, {counted(len(runs), 'whisker')}"
     has_pictures = any(run.record.has_pictures for run in runs)
     settings = runs[0].record.settings
-    general = verdict(title, has_pictures, RunAccuracy.of_results(results), settings, len(doubtful))
-    kept = _sections(record, cloud, sizes, first_lines, doubtful)
-    return Summary((*surface_verdict(cloud), *general), tuple(doubtful), kept)
+    general = verdict(title, has_pictures, RunAccuracy.of_results(results), settings, len(warnings))
+    kept = _sections(record, cloud, sizes, first_lines, warnings)
+    return Summary((*surface_verdict(cloud), *general), tuple(warnings), kept)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.array.surface import ObjectSurface, seen_surface
-from bench.base.doubts import in_one_status
+from bench.base.input_problems import in_one_status
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.assembly import Z_C_MM
 from bench.session.session import Base

@@ -4,7 +4,7 @@ At first touch each whisker is a straight line that just touches the surface: it
 is known by the angle of touch, to hundredths of a millimetre, and the place along it by the felt
 distance. Shape, direction of the axis and a ring's thickness are those of the manifest; place and
 size are fitted to both, weighted by their covariance, in which the error of the assumed friction
-angle is one for all. Where a distance is doubtful the touch counts alone.
+angle is one for all. Where a distance has a warning the touch counts alone.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -18,7 +18,7 @@ from scipy.special import chdtrc
 from bench.array.cloud import ContactPoint
 from bench.array.shape_verdict import FELT
 from bench.array.surface import STATED, ObjectSurface
-from bench.base.doubts import in_one_status
+from bench.base.input_problems import in_one_status
 from bench.base.statuses import reason
 from bench.base.tables import TRIAL, Column, Kind, Table, sigma_name, status, with_sigma
 from estimator.uncertainty import Z_95
@@ -111,7 +111,7 @@ def fit_size(trial: str, contacts: Sequence[ContactPoint], surface: ObjectSurfac
 
 
 def _status(size: Value, chance: float) -> Reason:
-    """Return what is doubtful of a fitted size."""
+    """Return the warnings about a fitted size."""
     if chance < _LEAST_CHANCE:
         return reason("contacts_off_surface", chance=chance)
     return reason("size_may_be_zero") if size.value < Z_95 * size.sigma else NO_REASON

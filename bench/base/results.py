@@ -31,7 +31,7 @@ SEEING = (
     ),
     *(
         "bench/records",
-        "bench/base/doubts.py",
+        "bench/base/input_problems.py",
         "bench/base/statuses.py",
         "bench/base/results.py",
         "bench/base/settings.py",

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from vision.geometry import UNNAMED, Reason, as_reason
 
-# Severities. A note leaves distance and moments what they are; a warning makes them doubtful; a
+# Severities. A note leaves distance and moments what they are; a warning flags them; a
 # refusal says why there are none.
 NOTE = "note"
 WARNING = "warning"

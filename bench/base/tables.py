@@ -57,7 +57,7 @@ def alike(names: Iterable[str], meaning: str, kind: Kind = Kind.NUMBER) -> tuple
 
 
 def status(meaning: str) -> Column:
-    """Return the column that says in a sentence why something is missing, or what is doubtful."""
+    """Return the column that says in a sentence why something is missing, or what the warnings are."""
     return Column("status", meaning, Kind.SENTENCE)
 
 

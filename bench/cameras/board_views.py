@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.base.doubts import refused_as_bad_input
 from bench.base.errors import BadInput
+from bench.base.input_problems import refused_as_bad_input
 from bench.base.threads import in_threads
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.session import Session

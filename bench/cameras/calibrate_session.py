@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.base.doubts import refused_as_bad_input
 from bench.base.errors import BadInput
+from bench.base.input_problems import refused_as_bad_input
 from bench.cameras.board_views import SessionViews, read_board_views, rig_view
 from bench.cameras.cameras_toml import write_cameras
 from bench.cameras.known_scale import check_scale

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from bench.base.doubts import refused_as_bad_input
+from bench.base.input_problems import refused_as_bad_input
 from bench.base.threads import in_threads
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import Session

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.digests import Digests
-from bench.base.doubts import refused_as_bad_input
 from bench.base.errors import BadInput
+from bench.base.input_problems import refused_as_bad_input
 from bench.base.results import (
     SEEING,
     hash_of,

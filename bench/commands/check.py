@@ -1,4 +1,4 @@
-"""The verb `check`: everything that is wrong or doubtful in a session (bench/workflows/preflight.py)."""
+"""The verb `check`: all that is wrong in a session, and all warnings (bench/workflows/preflight.py)."""
 
 import argparse
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 DONE = 0
-DOUBTFUL = 1
+WITH_WARNINGS = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
 FAULT_OF_OURS = 70  # EX_SOFTWARE: neither a result nor the user's input

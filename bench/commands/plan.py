@@ -6,7 +6,7 @@ from pathlib import Path
 from bench.base.errors import BadInput
 from bench.commands.options import (
     DONE,
-    DOUBTFUL,
+    WITH_WARNINGS,
     Verbs,
     add_follow_links,
     add_verb,
@@ -71,4 +71,4 @@ def run(options: argparse.Namespace) -> int:
         workers=options.workers,
         progress=shows_progress(),
     )
-    return DOUBTFUL if made.lacks_truth else DONE
+    return WITH_WARNINGS if made.lacks_truth else DONE

@@ -10,7 +10,7 @@ import numpy as np
 import tomli_w
 
 from bench.base.atomic import write_whole
-from bench.base.doubts import Doubts
+from bench.base.input_problems import InputProblems
 from bench.gauges.matrix import FROM_FILE, FROM_MANIFEST, GaugeCalibration, GaugeMatrix
 from bench.session import manifest
 from bench.session.session import Session
@@ -62,7 +62,7 @@ def read_gauges(path: Path, C_Nmm2: float) -> GaugeCalibration:
 
     C so cancels in d_x. Raises BadInput where the file is not as the session format says.
     """
-    keys = as_keys(read_toml(path, path.name), FileKeys, path.name, Doubts())
+    keys = as_keys(read_toml(path, path.name), FileKeys, path.name, InputProblems())
     covariance = keys.covariance
     if covariance is None and keys.matrix_sigma_Nmm_per_V is not None:
         covariance = np.diag(np.ravel(keys.matrix_sigma_Nmm_per_V) ** 2)

@@ -9,8 +9,8 @@ import msgspec
 import numpy as np
 
 from bench.base.atomic import lock_output, whole_file
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.plan.camera_places import place_cameras
@@ -264,14 +264,14 @@ def _drawn(staged: Iterable[StagedWhisk]) -> list[StagedWhisk]:
 def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
     """Return the plan of a session as recorded, and draw it. Raises BadInput."""
     check_outside(out, path)
-    doubts = Doubts()
-    session = checked_session(path, doubts, follow_links=options.follow_links)
+    problems = InputProblems()
+    session = checked_session(path, problems, follow_links=options.follow_links)
     trials = [trial for trial in trials_with_whisks(session) if trial.camera_sources]
     if not trials:
         raise BadInput("has no pictures: there is nothing to plan", file="trials")
     settings = Settings(theta_deg=options.theta_deg)
     with lock_output(out):
-        calibration, units = placed_units(session, trials, out, settings, pool, doubts)
+        calibration, units = placed_units(session, trials, out, settings, pool, problems)
         tasks = _see_whisks(units, calibration.cameras, options, pool)
         rows = pool.run(plan_seen, tasks, "whisks")
         staged = [stage_again(task) for task, row in zip(tasks, rows) if row.outlook.has_truth]

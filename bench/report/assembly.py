@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.analyses.pooling import angle_cells, degrees, value_cells
-from bench.base.doubts import in_one_status
+from bench.base.input_problems import in_one_status
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.whisk_tables import BEAM, BUDGET, ESTIMATES, PLACE, TRACK, WHISKS
 from estimator.distance import cartesian, contact_point

@@ -161,14 +161,14 @@ def _accuracy(name: str, mine: Sequence[Judged], holding: dict[Key, bool]) -> Ac
         has_distance = math.isfinite(one.error_percent)
         if not has_distance:
             without_distance.append(one)
-        elif one.doubtful:
+        elif one.has_warning:
             left_out.append(one)
         else:
             judged.append(one)
         if has_distance and one.status:
             warned.append(one)
         key = (one.trial, one.whisk, name)
-        if key in holding and not one.doubtful:
+        if key in holding and not one.has_warning:
             intervals.append(holding[key])
     return Accuracy(
         estimator=name,

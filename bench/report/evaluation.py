@@ -15,7 +15,7 @@ from bench.gauges.matrix import GaugeCalibration
 from bench.records.trial_result import TrialResult
 from bench.report.estimator_accuracy import RunAccuracy
 from bench.session.whisker import Whisker
-from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
+from bench.trials.clocks import shared_touch, shared_touch_warning, with_shared_touch
 from vision.geometry import Reason
 
 
@@ -23,11 +23,11 @@ from vision.geometry import Reason
 class Finished(EvaluatedRun):
     """Results of all trials, brought together.
 
-    Each whisk has (10) by the session's friction, and the error of touch that all whisks share. doubt:
-    what is doubtful of that error; empty for nothing.
+    Each whisk has (10) by the session's friction, and the error of touch that all whisks share.
+    touch_warning: the warning about that error; empty for none.
     """
 
-    doubt: Reason
+    touch_warning: Reason
 
     @cached_property
     def accuracy(self) -> RunAccuracy:
@@ -40,7 +40,7 @@ class Evaluation(Finished):
     """A run with what its report needs, its results in the folder `out`.
 
     calibration: the cameras as placed in the rig, with its notes. gauges: None where volts cannot become
-    moments; certificate: of gauges that the session's own trials calibrated. doubts: lines that the user
+    moments; certificate: of gauges that the session's own trials calibrated. warnings: lines that the user
     should read, each a Reason where it has a code. recordings: hash of each trial's files, by name.
     """
 
@@ -48,7 +48,7 @@ class Evaluation(Finished):
     gauges: GaugeCalibration | None
     certificate: Certificate | None
     calibration: SessionCalibration
-    doubts: tuple[str, ...]
+    warnings: tuple[str, ...]
     recordings: Mapping[str, str]
 
 
@@ -56,7 +56,7 @@ def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Setting
     """Return the results brought together, as they stand in trials/."""
     results = tuple(with_runs(results, whisker, settings))
     shared = shared_touch(results)
-    doubt = shared_doubt(shared)
+    warning = shared_touch_warning(shared)
     results = with_shared_touch(results, shared)
     friction = tuple(friction_of(results, whisker, settings.alpha_est_rad))
     sigma_rad = alpha_est_sigma([one.surface for one in friction], settings)
@@ -66,5 +66,5 @@ def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Setting
         results=results,
         friction=friction,
         alpha_est_sigma_rad=sigma_rad,
-        doubt=doubt,
+        touch_warning=warning,
     )

@@ -72,8 +72,8 @@ class GaugeFacts:
 class RunRecord:
     """The findings of a run, and by what they were found.
 
-    verdict, doubts and sections: as the summary has them. doubt_codes: codes of the statuses in each
-    doubt. figures: names of the pictures in the folder. recordings: hash of each trial's files, by
+    verdict, warnings and sections: as the summary has them. warning_codes: codes of the statuses in each
+    warning. figures: names of the pictures in the folder. recordings: hash of each trial's files, by
     name. results: of each trial's result. versions: by distribution.
     """
 
@@ -81,8 +81,8 @@ class RunRecord:
     whisker: Whisker
     settings: Settings
     verdict: tuple[str, ...]
-    doubts: tuple[str, ...]
-    doubt_codes: tuple[tuple[str, ...], ...]
+    warnings: tuple[str, ...]
+    warning_codes: tuple[tuple[str, ...], ...]
     sections: tuple[Section, ...]
     figures: tuple[str, ...]
     has_pictures: bool

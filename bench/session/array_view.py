@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.session import manifest
 from bench.session.daq import Channel, DaqFile
 from bench.session.session import (
@@ -39,7 +39,7 @@ _OWN_GAUGES = "give each of [[whiskers]] its own: [whiskers.gauges]"
 
 def load_views(
     path: Path | str,
-    doubts: Doubts | None = None,
+    problems: InputProblems | None = None,
     *,
     trials: Collection[str] | None = None,
     follow_links: bool = False,
@@ -50,16 +50,16 @@ def load_views(
     used twice, bases that touch, and whiskers that share a channel.
     """
     path = Path(path)
-    doubts = doubts or Doubts()
-    keys = read_manifest(path, doubts, follow_links)
-    session = session_of(path, keys, doubts, trials=trials)
+    problems = problems or InputProblems()
+    keys = read_manifest(path, problems, follow_links)
+    session = session_of(path, keys, problems, trials=trials)
     if not keys.whiskers:
         return (session,)
     _check_tables(session, keys)
     bases = [_base(whisker) for whisker in keys.whiskers]
     _check_names([base.name for base in bases])
     _check_distances(bases, keys.whiskers)
-    trials_of = _trials_of_all(session, keys.whiskers, bases, doubts)
+    trials_of = _trials_of_all(session, keys.whiskers, bases, problems)
     if session.has_pictures and session.T_rig_board is None and session.cameras_toml is None:
         cure = "measure it, or bring cameras.toml: of several wires it says which is whose"
         raise BadInput(f"[rig] T_rig_board is missing; {cure}", file=MANIFEST)
@@ -71,12 +71,12 @@ def _trials_of_all(
     session: Session,
     keys: Sequence[manifest.ArrayWhiskerKeys],
     bases: Sequence[Base],
-    doubts: Doubts,
+    problems: InputProblems,
 ) -> dict[str, list[Trial]]:
     """Return the trials that can be read as each whisker would have recorded them, by its name."""
     trials: dict[str, list[Trial]] = {base.name: [] for base in bases}
     for trial in session.trials:
-        with doubts.guard():
+        with problems.guard():
             channels = _channels_of_all(trial, keys)
             _check_motors(bases, channels)
             _check_cone(bases, trial)

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from vision.pictures import FILM_SUFFIXES, PICTURE_SUFFIXES
 
 _MOST_NAMED = 3  # names in one line
@@ -19,14 +19,14 @@ _CAMERA_DEPTH = {"boards": 2, "trials": 3}
 _NOT_REGULAR = "is no regular file (a pipe, socket or device)"
 
 
-def check_inside(session: Path, doubts: Doubts, follow_links: bool = False) -> None:
+def check_inside(session: Path, problems: InputProblems, follow_links: bool = False) -> None:
     """Refuse entries that would hang a reader, and links that lead out of the session or nowhere.
 
     Pipes, sockets and devices hang a reader. follow_links: links of cameras may lead out. Hidden
     entries are not read, and not checked. Raises BadInput, naming the first ones.
     """
     found = list(_Inspection(session.resolve(), follow_links).refused(session, PurePath()))
-    with doubts.guard():
+    with problems.guard():
         if found:
             more = f", and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
             raise BadInput("; ".join(found[:_MOST_NAMED]) + more)

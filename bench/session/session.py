@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.base.doubts import Doubts, refused_as_bad_input
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems, refused_as_bad_input
 from bench.session import manifest
 from bench.session.daq import daq_file
 from bench.session.footage import camera_sources, single_pictures, visible
@@ -114,7 +114,7 @@ class Session:
 
 def load_session(
     path: Path | str,
-    doubts: Doubts | None = None,
+    problems: InputProblems | None = None,
     *,
     lenses_known: bool = False,
     trials: Collection[str] | None = None,
@@ -124,31 +124,31 @@ def load_session(
 
     lenses_known: board views of each camera are not required. trials: names of those that are read;
     None: all. follow_links: pictures and videos may lie elsewhere. Raises BadInput at the first
-    thing that is wrong; with a collecting `doubts`, reads on where it can.
+    thing that is wrong; with a collecting `problems`, reads on where it can.
     """
     path = Path(path)
-    doubts = doubts or Doubts()
-    keys = read_manifest(path, doubts, follow_links)
+    problems = problems or InputProblems()
+    keys = read_manifest(path, problems, follow_links)
     if keys.whiskers:
         found = "has several whiskers ([[whiskers]]); evaluate and check alone take them"
         raise BadInput(found, file=MANIFEST)
-    return session_of(path, keys, doubts, lenses_known=lenses_known, trials=trials)
+    return session_of(path, keys, problems, lenses_known=lenses_known, trials=trials)
 
 
 def session_of(
     path: Path,
     keys: manifest.SessionKeys,
-    doubts: Doubts,
+    problems: InputProblems,
     *,
     lenses_known: bool = False,
     trials: Collection[str] | None = None,
 ) -> Session:
     """Return the session of a manifest; options and errors are those of `load_session`."""
-    whisker, board, T_rig_board = _stated_bench(keys, doubts)
+    whisker, board, T_rig_board = _stated_bench(keys, problems)
     bar_mm, bar_sigma_mm = _bar_diameter(keys.bar)
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
-    found = _ordered_trials(path, keys, doubts, trials)
+    found = _ordered_trials(path, keys, problems, trials)
     session = Session(
         path=path,
         name=keys.name or path.resolve().name,
@@ -167,16 +167,16 @@ def session_of(
         cameras_toml=_existing(path / "cameras.toml"),
         gauges_toml=_existing(path / "gauges.toml"),
     )
-    _note_unused_cameras(session, keys.cameras, doubts)
-    _check_cameras(session, doubts, lenses_known)
+    _warn_of_unused_cameras(session, keys.cameras, problems)
+    _check_cameras(session, problems, lenses_known)
     return session
 
 
 def _stated_bench(
-    keys: manifest.SessionKeys, doubts: Doubts
+    keys: manifest.SessionKeys, problems: InputProblems
 ) -> tuple[Whisker | None, Board | None, np.ndarray | None]:
     """Return whisker, board and T_rig_board (3, 4), each None where it is not stated."""
-    return doubts.each(
+    return problems.each(
         [
             partial(_whisker, keys.whisker),
             partial(_board, keys.board),
@@ -191,23 +191,23 @@ def _bar_diameter(keys: manifest.BarKeys | None) -> tuple[float | None, float]:
 
 
 def _ordered_trials(
-    path: Path, keys: manifest.SessionKeys, doubts: Doubts, names: Collection[str] | None
+    path: Path, keys: manifest.SessionKeys, problems: InputProblems, names: Collection[str] | None
 ) -> tuple[Trial, ...]:
     """Return the trials of these names, None for all, in the session's order of surfaces."""
-    found = _by_surface(_trials(path, keys, doubts, names), keys.surfaces)
+    found = _by_surface(_trials(path, keys, problems, names), keys.surfaces)
     if names is None:
-        _note_unused_surfaces(found, keys.surfaces, doubts)
+        _warn_of_unused_surfaces(found, keys.surfaces, problems)
     return found
 
 
-def read_manifest(path: Path, doubts: Doubts, follow_links: bool) -> manifest.SessionKeys:
+def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> manifest.SessionKeys:
     """Read session.toml of a folder that holds nothing else than a session may. Raises BadInput."""
     if not path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(path))
     if not (path / MANIFEST).is_file():
         found = f"there is no {MANIFEST} in this folder, so it is not a session"
         raise BadInput(found, file=str(path))
-    check_inside(path, doubts, follow_links)
+    check_inside(path, problems, follow_links)
     tables = read_toml(path / MANIFEST, MANIFEST)
     if tables.get("format", FORMAT) != FORMAT:
         found = f"format is {tables['format']!r}; this version reads format {FORMAT}"
@@ -215,7 +215,7 @@ def read_manifest(path: Path, doubts: Doubts, follow_links: bool) -> manifest.Se
     needed = []
     if visible(path / "trials"):
         needed = ["bar"] if "whiskers" in tables else ["whisker", "bar"]
-    return as_keys(tables, manifest.SessionKeys, MANIFEST, doubts, needed)
+    return as_keys(tables, manifest.SessionKeys, MANIFEST, problems, needed)
 
 
 def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
@@ -294,17 +294,17 @@ def given_gauges(keys: manifest.GaugeKeys | None) -> GivenGauges | None:
 
 
 def _trials(
-    path: Path, keys: manifest.SessionKeys, doubts: Doubts, names: Collection[str] | None
+    path: Path, keys: manifest.SessionKeys, problems: InputProblems, names: Collection[str] | None
 ) -> list[Trial]:
     """Return the trials of these names that can be read; None: of all."""
     found = []
     daq = None
-    with doubts.guard():
+    with problems.guard():
         daq = daq_file(keys.signals, MANIFEST)
     for entry in visible(path / "trials"):
         if entry.is_dir() and (names is None or entry.name in names):
-            with doubts.guard():
-                found.append(load_trial(entry, keys, doubts, daq))
+            with problems.guard():
+                found.append(load_trial(entry, keys, problems, daq))
     return found
 
 
@@ -317,13 +317,15 @@ def _by_surface(trials: Iterable[Trial], order: Sequence[str]) -> tuple[Trial, .
     return tuple(sorted(trials, key=lambda trial: rank.get(trial.surface, len(rank))))
 
 
-def _note_unused_surfaces(trials: Iterable[Trial], order: Sequence[str], doubts: Doubts) -> None:
-    """Note each surface that no trial has: it is misspelt, or not recorded yet."""
+def _warn_of_unused_surfaces(
+    trials: Iterable[Trial], order: Sequence[str], problems: InputProblems
+) -> None:
+    """Warn of each surface that no trial has: it is misspelt, or not recorded yet."""
     recorded = sorted({trial.surface for trial in trials})
     for name in order:
         if recorded and name not in recorded:
             found = f"surfaces has {name!r}, which is no trial's; there are {_listed(recorded)}"
-            doubts.note(Reason("surface_unused", f"{MANIFEST}: {found}"))
+            problems.warn(Reason("surface_unused", f"{MANIFEST}: {found}"))
 
 
 def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tuple[str, ...]:
@@ -332,24 +334,24 @@ def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tu
     return tuple(sorted(names, key=lambda name: natural_order(Path(name))))
 
 
-def _note_unused_cameras(
-    session: Session, cameras: Iterable[manifest.CameraKeys], doubts: Doubts
+def _warn_of_unused_cameras(
+    session: Session, cameras: Iterable[manifest.CameraKeys], problems: InputProblems
 ) -> None:
-    """Note each of [[cameras]] that has no pictures."""
+    """Warn of each of [[cameras]] that has no pictures."""
     for camera in cameras:
         if session.camera_names and camera.name not in session.camera_names:
             found = f"[[cameras]] {camera.name!r} has no pictures in boards/ or trials/"
-            doubts.note(Reason("camera_unused", f"{MANIFEST}: {found}"))
+            problems.warn(Reason("camera_unused", f"{MANIFEST}: {found}"))
 
 
-def _check_cameras(session: Session, doubts: Doubts, lenses_known: bool) -> None:
+def _check_cameras(session: Session, problems: InputProblems, lenses_known: bool) -> None:
     """Raise BadInput where a camera lacks frames of a trial, or what it is calibrated from."""
     for trial in session.trials:
-        with doubts.guard():
+        with problems.guard():
             _check_trial_cameras(trial, session.camera_names)
     if session.has_pictures and session.cameras_toml is None and not lenses_known:
         for name in session.camera_names:
-            with doubts.guard():
+            with problems.guard():
                 _check_camera_boards(session, name)
 
 

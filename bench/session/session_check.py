@@ -7,8 +7,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from bench.base.doubts import Doubts, refused_as_bad_input
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems, refused_as_bad_input
 from bench.base.results import hash_of_files
 from bench.base.statuses import reason
 from bench.session.array_view import load_views
@@ -33,44 +33,44 @@ _MOST_NAMED = 5  # frames in one line
 
 def checked_session(
     path: Path | str,
-    doubts: Doubts | None = None,
+    problems: InputProblems | None = None,
     trials: Collection[str] | None = None,
     *,
     follow_links: bool = False,
 ) -> Session:
     """Load a session, and read every trial's signals, frame times and picture sizes once.
 
-    Raises BadInput at the first thing that is wrong; with a collecting `doubts` only where
+    Raises BadInput at the first thing that is wrong; with a collecting `problems` only where
     session.toml is.
     """
-    doubts = doubts or Doubts()
-    session = load_session(path, doubts, trials=trials, follow_links=follow_links)
-    _check((session,), doubts)
+    problems = problems or InputProblems()
+    session = load_session(path, problems, trials=trials, follow_links=follow_links)
+    _check((session,), problems)
     return session
 
 
 def checked_views(
     path: Path | str,
-    doubts: Doubts | None = None,
+    problems: InputProblems | None = None,
     trials: Collection[str] | None = None,
     *,
     follow_links: bool = False,
 ) -> tuple[Session, ...]:
     """Load a session, or a view for each whisker of an array, and check it as `checked_session`."""
-    doubts = doubts or Doubts()
-    views = load_views(path, doubts, trials=trials, follow_links=follow_links)
-    _check(views, doubts)
+    problems = problems or InputProblems()
+    views = load_views(path, problems, trials=trials, follow_links=follow_links)
+    _check(views, problems)
     return views
 
 
-def _check(views: Sequence[Session], doubts: Doubts) -> None:
+def _check(views: Sequence[Session], problems: InputProblems) -> None:
     """Check every recording of each whisker; pictures and files are the same for all."""
     for view in views:
         for trial in view.trials:
-            check_recording(trial, doubts)
-    check_sizes(views[0], doubts)
+            check_recording(trial, problems)
+    check_sizes(views[0], problems)
     for line in _copies(views[0]):
-        doubts.note(line)
+        problems.warn(line)
 
 
 def _copies(session: Session) -> Iterator[Reason]:
@@ -87,34 +87,36 @@ def _copies(session: Session) -> Iterator[Reason]:
             yield reason("signals_copied", names=", ".join(names), file=file)
 
 
-def check_recording(trial: Trial, doubts: Doubts) -> None:
+def check_recording(trial: Trial, problems: InputProblems) -> None:
     """Check signals and frame times of one trial, and that they share a clock."""
     signals = None
     times = None
-    with doubts.guard():
+    with problems.guard():
         signals = read_signals(trial)
-        _note_signals(trial, signals, doubts)
-    with doubts.guard():
+        _warn_of_signals(trial, signals, problems)
+    with problems.guard():
         times = frame_times(trial)
         for warning in times.warnings:
-            doubts.note(warning)
+            problems.warn(warning)
     if signals is not None and times is not None and len(times):
-        with doubts.guard():
-            _check_clock(trial, signals.time_s, times.time_s, doubts)
+        with problems.guard():
+            _check_clock(trial, signals.time_s, times.time_s, problems)
 
 
-def _note_signals(trial: Trial, signals: Signals, doubts: Doubts) -> None:
-    """Note warnings about a trial's signals, and what was mended in them."""
+def _warn_of_signals(trial: Trial, signals: Signals, problems: InputProblems) -> None:
+    """Warn of what is odd in a trial's signals, and of what was mended in them."""
     label = trial.label(trial.signals_path.name)
     for warning in signals.warnings:
-        doubts.note(warning)
+        problems.warn(warning)
     for cause, count in signals.dropped.items():
-        doubts.note(reason("signals_mended", label=label, count=count, cause=cause))
+        problems.warn(reason("signals_mended", label=label, count=count, cause=cause))
     if trial.purpose != "weight" and not signals.warnings and not forward_strokes(signals):
-        doubts.note(reason("no_forward_stroke", label=label))
+        problems.warn(reason("no_forward_stroke", label=label))
 
 
-def _check_clock(trial: Trial, signals_s: np.ndarray, frames_s: np.ndarray, doubts: Doubts) -> None:
+def _check_clock(
+    trial: Trial, signals_s: np.ndarray, frames_s: np.ndarray, problems: InputProblems
+) -> None:
     """Raise BadInput where most frames were not taken while signals were recorded; note the rest."""
     first = signals_s[0]
     last = signals_s[-1]
@@ -128,16 +130,16 @@ def _check_clock(trial: Trial, signals_s: np.ndarray, frames_s: np.ndarray, doub
         raise BadInput(f"{found}. {hint}", file=f"trials/{trial.name}")
     if outside:
         taken = f"{counted(outside, 'frame')} taken while no signals were ({found})"
-        doubts.note(Reason("frames_without_signals", f"trials/{trial.name}: {taken}"))
+        problems.warn(Reason("frames_without_signals", f"trials/{trial.name}: {taken}"))
 
 
-def check_sizes(session: Session, doubts: Doubts) -> None:
+def check_sizes(session: Session, problems: InputProblems) -> None:
     """Check that each camera has one picture size: in its boards, on the rig, in every trial."""
     calibrated: dict[str, Size] = {}
-    with doubts.guard():
+    with problems.guard():
         calibrated = _calibrated_sizes(session)
     for camera in session.camera_names:
-        with doubts.guard():
+        with problems.guard():
             _check_camera_sizes(session, camera, calibrated.get(camera))
 
 
@@ -212,7 +214,7 @@ def _px(size: Size) -> str:
 
 
 def find_damage(
-    session: Session, doubts: Doubts, each: Callable[[Iterable], Iterable] = iter
+    session: Session, problems: InputProblems, each: Callable[[Iterable], Iterable] = iter
 ) -> None:
     """Decode every picture of every trial and note those that cannot be read.
 
@@ -223,7 +225,7 @@ def find_damage(
         found = _damage(source)
         if found:
             label = source.relative_to(session.path).as_posix()
-            doubts.note(Reason("frames_damaged", f"{label}: {found}"))
+            problems.warn(Reason("frames_damaged", f"{label}: {found}"))
 
 
 def _damage(source: Path) -> str:

@@ -14,8 +14,8 @@ from typing import Any, TypeAlias, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.session import plausible
 from bench.session.text_files import check_size, read_text
 
@@ -56,22 +56,26 @@ def _bad_toml(problem: str, text: str, label: str) -> BadInput:
 
 
 def as_keys(
-    tables: dict[str, Any], kind: type[Keys], label: str, doubts: Doubts, needed: Sequence[str] = ()
+    tables: dict[str, Any],
+    kind: type[Keys],
+    label: str,
+    problems: InputProblems,
+    needed: Sequence[str] = (),
 ) -> Keys:
     """Check a file's tables against `kind`: names, types, plausible values. Return them as `kind`.
 
-    needed: tables that must be there. Raises BadInput with the key's path. A collecting `doubts`
+    needed: tables that must be there. Raises BadInput with the key's path. A collecting `problems`
     keeps every key that is unknown, missing or implausible; unknown ones are left out.
     """
     absent = [f"[{name}] is missing" for name in needed if name not in tables]
     for line in (*_unknown_keys(tables, kind), *absent, *_missing_keys(tables, kind)):
-        with doubts.guard():
+        with problems.guard():
             raise BadInput(line, file=label)
     try:
         keys = msgspec.convert(tables, kind, strict=True)
     except msgspec.ValidationError as problem:
         raise BadInput(_in_plain_words(str(problem), kind), file=label) from None
-    doubts.each(_value_checks(tables, kind, label))
+    problems.each(_value_checks(tables, kind, label))
     return keys
 
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.session import manifest
 from bench.session.daq import DaqFile
 from bench.session.footage import camera_sources
@@ -107,7 +107,7 @@ class Trial:
 
 
 def load_trial(
-    folder: Path, session: manifest.SessionKeys, doubts: Doubts, daq: DaqFile | None = None
+    folder: Path, session: manifest.SessionKeys, problems: InputProblems, daq: DaqFile | None = None
 ) -> Trial:
     """Read trial.toml over the session's defaults and find the trial's files. Raises BadInput.
 
@@ -115,7 +115,7 @@ def load_trial(
     """
     place = f"trials/{folder.name}"
     label = f"{place}/{MANIFEST}"
-    keys = _trial_keys(folder, session.trial, label, doubts)
+    keys = _trial_keys(folder, session.trial, label, problems)
     if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
         raise BadInput('purpose = "weight" needs force_N and at_mm', file=label)
     if keys.object_gives_way and keys.object_velocity_mm_s is not None:
@@ -138,7 +138,7 @@ def load_trial(
 
 
 def _trial_keys(
-    folder: Path, defaults: manifest.TrialKeys, label: str, doubts: Doubts
+    folder: Path, defaults: manifest.TrialKeys, label: str, problems: InputProblems
 ) -> manifest.TrialKeys:
     """Return trial.toml, with absent keys from the session's [trial].
 
@@ -148,7 +148,7 @@ def _trial_keys(
     if not file.is_file():
         return defaults
     given = read_toml(file, label)
-    own = values(as_keys(given, manifest.TrialKeys, label, doubts))
+    own = values(as_keys(given, manifest.TrialKeys, label, problems))
     stated = set(given) | {manifest.sigma_key(key) for key in given}
     kept = {name: value for name, value in own.items() if name in stated}
     return manifest.TrialKeys(**values(defaults) | kept)

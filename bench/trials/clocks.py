@@ -176,7 +176,7 @@ def _with_error(seen: SeenWhisk, shared: SharedTouch) -> SeenWhisk:
     return replace(seen, truth=truth, touch_shared_rad=error)
 
 
-def shared_doubt(shared: SharedTouch | None) -> Reason:
+def shared_touch_warning(shared: SharedTouch | None) -> Reason:
     """Return what to say of an error that all whisks share, with its most probable causes.
 
     Nothing is said where there is no such error.

@@ -14,7 +14,7 @@ class Judged:
     """One estimate with its truth, which is NaN where there is none.
 
     beta_deg: the slope as seen, else the nominal one. one_factor: made with one gauge factor a
-    channel. status: the estimate's. doubtful: the whisk itself has a warning.
+    channel. status: the estimate's. has_warning: the whisk itself has a warning.
     """
 
     trial: str
@@ -30,7 +30,7 @@ class Judged:
     d_x_est_sigma_mm: float
     one_factor: bool = False
     status: str = ""
-    doubtful: bool = False
+    has_warning: bool = False
 
     @property
     def error_mm(self) -> float:
@@ -76,16 +76,16 @@ def judge(results: Iterable[TrialResult]) -> list[Judged]:
     """Return every estimate of every whisk with its truth."""
     found = []
     for result, seen, felt in whisks(results):
-        doubtful = not is_sound(seen, felt)
+        has_warning = not is_sound(seen, felt)
         for row in felt.estimates:
-            found.append(_judged(result, seen, row, one_factor=False, doubtful=doubtful))
+            found.append(_judged(result, seen, row, one_factor=False, has_warning=has_warning))
         for row in felt.one_factor:
-            found.append(_judged(result, seen, row, one_factor=True, doubtful=doubtful))
+            found.append(_judged(result, seen, row, one_factor=True, has_warning=has_warning))
     return found
 
 
 def _judged(
-    result: TrialResult, seen: SeenWhisk, row: EstimateRow, *, one_factor: bool, doubtful: bool
+    result: TrialResult, seen: SeenWhisk, row: EstimateRow, *, one_factor: bool, has_warning: bool
 ) -> Judged:
     """Return one estimate with its truth."""
     trial = result.trial
@@ -103,5 +103,5 @@ def _judged(
         float(row.d_x_est_mm.sigma),
         one_factor,
         row.status,
-        doubtful,
+        has_warning,
     )

@@ -5,7 +5,7 @@ A result that stands for a lost trial has no hash, so that the same command trie
 
 from collections.abc import Sequence
 
-from bench.base.doubts import Doubts
+from bench.base.input_problems import InputProblems
 from bench.base.results import read_result, write_result
 from bench.base.statuses import reason
 from bench.base.workers import MOST_DEATHS, Workers
@@ -19,7 +19,9 @@ from bench.trials.unit import Unit
 LOST = reason("trial_lost", deaths=MOST_DEATHS)
 
 
-def see_units(units: Sequence[Unit], pool: Workers, name: str, doubts: Doubts) -> list[SeenTrial]:
+def see_units(
+    units: Sequence[Unit], pool: Workers, name: str, problems: InputProblems
+) -> list[SeenTrial]:
     """Return the seen half of every unit, and note those whose process died.
 
     name: of the step.
@@ -27,8 +29,8 @@ def see_units(units: Sequence[Unit], pool: Workers, name: str, doubts: Doubts) -
     trials = pool.run(see_unit, units, name, lost=_lost_seen)
     for unit, seen in zip(units, trials):
         line = LOST.about(f"{unit.trial.name}, among the {name}")
-        if seen.notes == (LOST,) and line not in doubts.notes:
-            doubts.note(line)
+        if seen.notes == (LOST,) and line not in problems.warnings:
+            problems.warn(line)
     return trials
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.digests import Digests
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.base.results import hash_of_files
 from bench.base.settings import Settings
 from bench.base.workers import Workers
@@ -81,12 +81,12 @@ def placed_units(
     out: Path,
     settings: Settings,
     pool: Workers,
-    doubts: Doubts,
+    problems: InputProblems,
 ) -> tuple[SessionCalibration, list[Unit]]:
     """Return the session's cameras in the rig frame and a unit of work for each trial, without
     gauges. Raise BadInput.
     """
-    return units_in_rig(session, first_units(session, trials, out, settings), pool, doubts)
+    return units_in_rig(session, first_units(session, trials, out, settings), pool, problems)
 
 
 def first_units(
@@ -111,23 +111,23 @@ def first_units(
 
 
 def units_in_rig(
-    session: Session, units: Sequence[Unit], pool: Workers, doubts: Doubts
+    session: Session, units: Sequence[Unit], pool: Workers, problems: InputProblems
 ) -> tuple[SessionCalibration, list[Unit]]:
     """Return the cameras in the rig frame of board and free strokes, and the units with these.
     Raise BadInput.
     """
-    calibration = place_rig(session, units[0].calibration, units, pool, doubts)
+    calibration = place_rig(session, units[0].calibration, units, pool, problems)
     return calibration, [replace(unit, calibration=calibration) for unit in units]
 
 
 def with_gauges(
-    units: Sequence[Unit], pool: Workers, doubts: Doubts
+    units: Sequence[Unit], pool: Workers, problems: InputProblems
 ) -> tuple[GaugeCalibration | None, Certificate | None, list[Unit]]:
     """Return the session's gauges, their certificate where its own trials calibrated them, and the
     units with the gauges and the drift of the channels.
     """
     rate, force_rate = session_drift(units, pool)
-    gauges, certificate = session_gauges(units, rate, pool, doubts)
+    gauges, certificate = session_gauges(units, rate, pool, problems)
     complete = []
     for unit in units:
         complete.append(replace(unit, drift_rate=rate, force_drift_rate=force_rate, gauges=gauges))
@@ -147,7 +147,7 @@ def session_drift(units: Sequence[Unit], pool: Workers) -> tuple[np.ndarray, np.
 
 
 def session_gauges(
-    units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts
+    units: Sequence[Unit], rate: np.ndarray, pool: Workers, problems: InputProblems
 ) -> tuple[GaugeCalibration | None, Certificate | None]:
     """Return the session's gauges, and their certificate where its own trials calibrate them.
 
@@ -166,12 +166,12 @@ def session_gauges(
     if gauges is not None or not chosen:
         return gauges, None
     try:
-        certificate = fit_certificate(chosen, rate, pool, doubts)
+        certificate = fit_certificate(chosen, rate, pool, problems)
     except Undetermined as refusal:
         parts = [str(refusal), *_lacking_truth(chosen)]
         if any(_has_volts(unit) for unit in others):
             parts.append(_MORE)
-        doubts.note(Reason("gauges_undetermined", "; ".join(parts)))
+        problems.warn(Reason("gauges_undetermined", "; ".join(parts)))
         return None, None
     if from_all:
         return replace(certificate.gauges, source=FROM_ALL), certificate
@@ -184,7 +184,7 @@ def _has_volts(unit: Unit) -> bool:
 
 
 def fit_certificate(
-    units: Sequence[Unit], rate: np.ndarray, pool: Workers, doubts: Doubts
+    units: Sequence[Unit], rate: np.ndarray, pool: Workers, problems: InputProblems
 ) -> Certificate:
     """Fit the gauges to the pictures and signals of these trials, and return all that they rest on.
 
@@ -201,7 +201,7 @@ def fit_certificate(
         check_alive(strokes[-1])
         back += reversals(unit.trial, signals, settings)
     pairs = []
-    seen = see_units(units, pool, "gauge trials", doubts)
+    seen = see_units(units, pool, "gauge trials", problems)
     for unit, trial_seen, trial_strokes in zip(units, seen, strokes):
         pairs += _pairs(unit, trial_seen, trial_strokes, rate)
     return Certificate(

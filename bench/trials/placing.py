@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.base.results import hash_of
 from bench.base.workers import Workers
 from bench.cameras.first_look import by_first_look, first_look, spread
@@ -46,13 +46,13 @@ def place_rig(
     calibration: SessionCalibration,
     units: Sequence[Unit],
     pool: Workers,
-    doubts: Doubts,
+    problems: InputProblems,
 ) -> SessionCalibration:
     """Return the calibration with the cameras in the rig frame of board and free strokes together,
     and notes on both.
 
     Cameras that were brought along, or whose T_rig_board is taken as exact, stay; an alarm is then
-    a note in `doubts`. Raises BadInput where neither board nor strokes determine the rig frame.
+    a warning in `problems`. Raises BadInput where neither board nor strokes determine the rig frame.
     """
     if calibration.cameras is None:
         return calibration
@@ -62,21 +62,21 @@ def place_rig(
     stays = session.cameras_toml is not None or not board.covariance.any()
     try:
         if stays:
-            strokes = _placement_by_strokes(chosen, pool, doubts)
+            strokes = _placement_by_strokes(chosen, pool, problems)
             placement = _with_scale_alarm(combine(board, strokes), session, board, strokes)
             placed_here = calibration
         else:
-            placed_here, placement = _converge(calibration, board, chosen, pool, doubts)
+            placed_here, placement = _converge(calibration, board, chosen, pool, problems)
     except Refused as refusal:
         if strokes_only:
             raise _without_rig_frame(refusal) from None
         if isinstance(refusal, _Unread):
-            doubts.notes += _turning_elsewhere(session, calibration)
+            problems.warnings += _turning_elsewhere(session, calibration)
         return calibration.with_notes(f"The free strokes do not tell where the rig is: {refusal}")
     if strokes_only or (not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
-        _require_swing(placement, doubts)
+        _require_swing(placement, problems)
     if placement.alarm and not strokes_only:
-        doubts.note(Reason("board_misplaced", placement.alarm))
+        problems.warn(Reason("board_misplaced", placement.alarm))
     notes = placement.notes[:1] if stays or strokes_only else placement.notes
     return placed_here.with_notes(*notes, *[_STAYS] * stays)
 
@@ -135,14 +135,14 @@ def _turning_elsewhere(session: Session, calibration: SessionCalibration) -> lis
     return [Reason("board_misplaced", line)]
 
 
-def _require_swing(placement: Placement, doubts: Doubts) -> None:
+def _require_swing(placement: Placement, problems: InputProblems) -> None:
     """Raise BadInput where the strokes are too short to place the rig; note where they nearly are."""
     try:
         warning = check_swing_suffices(placement)
     except Refused as refusal:
         raise BadInput(str(refusal), file="trials") from None
     if warning:
-        doubts.note(Reason("board_misplaced", warning))
+        problems.warn(Reason("board_misplaced", warning))
 
 
 def _converge(
@@ -150,7 +150,7 @@ def _converge(
     board: Placement,
     chosen: Sequence[Unit],
     pool: Workers,
-    doubts: Doubts,
+    problems: InputProblems,
 ) -> tuple[SessionCalibration, Placement]:
     """Return the calibration moved to the rig frame of board and strokes together, and that
     placement.
@@ -162,7 +162,7 @@ def _converge(
     here = _moved(calibration, board, exact)
     for round_number in range(_MOST_ROUNDS):
         units = [replace(unit, calibration=here, stage=f"swing{round_number}") for unit in chosen]
-        both = combine(board, _placement_by_strokes(units, pool, doubts))
+        both = combine(board, _placement_by_strokes(units, pool, problems))
         if np.all(np.abs(both.step) < _SMALL_STEP):
             break
         here = _moved(here, exact, replace(both, covariance=exact.covariance))
@@ -194,13 +194,15 @@ def _placement_before(session: Session) -> Placement:
     return by_board(T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad)
 
 
-def _placement_by_strokes(units: Sequence[Unit], pool: Workers, doubts: Doubts) -> Placement:
+def _placement_by_strokes(
+    units: Sequence[Unit], pool: Workers, problems: InputProblems
+) -> Placement:
     """Return the placement by the free strokes of these trials.
 
     It takes every whisk whose base is seen before touch. Raises Refused without any.
     """
     lines = []
-    for trial in see_units(units, pool, "free strokes", doubts):
+    for trial in see_units(units, pool, "free strokes", problems):
         for whisk in trial.whisks:
             if whisk.truth.base is not None:
                 lines.append(whisk.truth.base)

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import msgspec
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.base.settings import Seeing, Settings
 from bench.session.plausible import PlausibleRange
 from bench.session.strict_toml import Keys, as_keys, plausible_ranges, read_toml, values
@@ -54,7 +54,7 @@ def by_preset(name: str) -> Seeing:
 
 def from_file(path: Path) -> Seeing:
     """Return the settings of a TOML file. Raise BadInput, naming the key that is wrong."""
-    keys = as_keys(read_toml(path, path.name), SettingsFile, path.name, Doubts()).seeing
+    keys = as_keys(read_toml(path, path.name), SettingsFile, path.name, InputProblems()).seeing
     given = {}
     for name, value in values(keys, ("preset", "cameras")).items():
         if value is not None:

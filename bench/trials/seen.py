@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from bench.base.doubts import in_one_status
+from bench.base.input_problems import in_one_status
 from bench.base.settings import Seeing, Settings
 from bench.base.statuses import reason
 from bench.cameras.session_cameras import SessionCalibration

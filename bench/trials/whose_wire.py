@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.base.doubts import in_one_status
+from bench.base.input_problems import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import Drawing, SeenTrial, SeenWhisk
 from vision import REST_PRIOR_MM

@@ -7,8 +7,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from bench.base.atomic import whole_file
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.gauges.certificate import Certificate, page
@@ -36,10 +36,10 @@ def calibrate_gauges_command(
     Return 0, or 1 with warnings. every_trial: all trials with whisks, not only those marked
     "gauge". Raise BadInput.
     """
-    doubts = Doubts()
-    loaded = checked_session(session, doubts, follow_links=follow_links)
+    problems = InputProblems()
+    loaded = checked_session(session, problems, follow_links=follow_links)
     trials = trials_to_use(loaded, every_trial)
-    certificate = calibrate_gauges(loaded, trials, doubts, workers=workers, progress=progress)
+    certificate = calibrate_gauges(loaded, trials, problems, workers=workers, progress=progress)
     header = certificate.lines()
     zeros = zeros_of(certificate.strokes)
     write_gauges(out, certificate.gauges, zeros, certificate.stiffness, header)
@@ -47,10 +47,10 @@ def calibrate_gauges_command(
         undated = {"CreationDate": None, "Producer": None, "Creator": None}
         page(certificate).savefig(temporary, metadata=undated)
     print(*header, "", sep="\n")
-    for note in doubts.notes:
-        print(f"doubtful: {note}")
+    for warning in problems.warnings:
+        print(f"doubtful: {warning}")
     print(f"written: {out}, {out.stem}.pdf")
-    return 1 if doubts.notes else 0
+    return 1 if problems.warnings else 0
 
 
 def trials_to_use(session: Session, every_trial: bool) -> list[Trial]:
@@ -79,7 +79,7 @@ def trials_to_use(session: Session, every_trial: bool) -> list[Trial]:
 def calibrate_gauges(
     session: Session,
     trials: list[Trial],
-    doubts: Doubts,
+    problems: InputProblems,
     *,
     workers: int = 1,
     progress: bool = False,
@@ -92,10 +92,10 @@ def calibrate_gauges(
     names = {trial.name for trial in trials}
     recorded = trials_with_whisks(session)
     with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
-        _, units = placed_units(session, recorded, Path(folder), Settings(), pool, doubts)
+        _, units = placed_units(session, recorded, Path(folder), Settings(), pool, problems)
         drift_rate, _ = session_drift(units, pool)
         chosen = [unit for unit in units if unit.trial.name in names]
-        certificate = fit_certificate(chosen, drift_rate, pool, doubts)
+        certificate = fit_certificate(chosen, drift_rate, pool, problems)
     zero_V, scatter_V = zeros_of(certificate.strokes)
     gauges = certificate.gauges.all
     weighed = scale_by_weights(session.trials, gauges, zero_V, scatter_V)

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.threads import in_threads
 from bench.gauges.felt import FeltStroke, strokes_of
@@ -52,21 +52,21 @@ def check(path: Path, progress: bool, *, follow_links: bool = False) -> int:
 
     Return the exit code: 2 where there is a refusal, 1 where there is a warning, else 0.
     """
-    doubts = Doubts(stop_at_first=False)
+    problems = InputProblems(stop_at_first=False)
     bar = partial(tqdm, desc="pictures", disable=not progress, leave=False)
-    with doubts.guard():
-        views = checked_views(path, doubts, follow_links=follow_links)
+    with problems.guard():
+        views = checked_views(path, problems, follow_links=follow_links)
         session = views[0]
-        find_damage(session, doubts, each=bar)
+        find_damage(session, problems, each=bar)
         for view in views:
-            check_contents(view, doubts)
-    for line in dict.fromkeys(doubts.refusals):
+            check_contents(view, problems)
+    for line in dict.fromkeys(problems.refusals):
         print(f"bad: {line}")
-    for line in dict.fromkeys(doubts.notes):
+    for line in dict.fromkeys(problems.warnings):
         print(f"doubtful: {line}")
-    if doubts.refusals:
+    if problems.refusals:
         return 2
-    if doubts.notes:
+    if problems.warnings:
         return 1
     whiskers = f", {counted(len(views), 'whisker')}" if session.base else ""
     trials = counted(len(session.trials), "trial")
@@ -74,39 +74,41 @@ def check(path: Path, progress: bool, *, follow_links: bool = False) -> int:
     return 0
 
 
-def check_contents(session: Session, doubts: Doubts) -> None:
+def check_contents(session: Session, problems: InputProblems) -> None:
     """Check boards, gauges, strokes, frames and scene of a session whose files are sound.
 
-    What is found is added to `doubts`.
+    What is found is added to `problems`.
     """
     if session.cameras_toml is None and session.board is not None:
-        with doubts.guard():  # one board for all cameras: its first fault is enough
-            _check_boards(session, session.board, doubts)
+        with problems.guard():  # one board for all cameras: its first fault is enough
+            _check_boards(session, session.board, problems)
     if session.whisker is not None:
-        with doubts.guard():
+        with problems.guard():
             given_gauges(session)
     rig: dict[str, np.ndarray] = {}
     for name, picture in session.rig_pictures.items():
-        with doubts.guard():
+        with problems.guard():
             rig[name] = rig_picture(picture)
-    pushes_V = _check_trials(session, rig, doubts)
+    pushes_V = _check_trials(session, rig, problems)
     has_own_gauges = session.gauges_toml is not None or session.gauges is not None
     if not has_own_gauges and pushes_V and not in_two_directions(np.array(pushes_V)):
-        doubts.note(
+        problems.warn(
             f"trials: the gauge trials push in one direction, which does not fix both channels; {RECORD}"
         )
 
 
-def _check_boards(session: Session, board: Board, doubts: Doubts) -> None:
+def _check_boards(session: Session, board: Board, problems: InputProblems) -> None:
     """Check each camera's pictures of the board, and of the board on the rig. Raise BadInput."""
     for name, source in session.board_sources.items():
         _check_board_views(source, name, board)
         picture = session.rig_pictures.get(name)
         if picture is not None:
-            _check_rig_board(picture, board, doubts)
+            _check_rig_board(picture, board, problems)
 
 
-def _check_trials(session: Session, rig: dict[str, np.ndarray], doubts: Doubts) -> list[np.ndarray]:
+def _check_trials(
+    session: Session, rig: dict[str, np.ndarray], problems: InputProblems
+) -> list[np.ndarray]:
     """Check every trial but the weights'; return the volts (2,) of the pushes of the gauge trials.
 
     rig: pictures of the rig, by camera.
@@ -115,12 +117,12 @@ def _check_trials(session: Session, rig: dict[str, np.ndarray], doubts: Doubts) 
     for trial in session.trials:
         if trial.purpose == "weight":
             continue
-        with doubts.guard():
+        with problems.guard():
             signals = read_signals(trial)
             strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
             if trial.purpose == "gauge" and signals.kind == "V":
                 pushes_V += _pushes_V(strokes)
-            _check_trial(trial, signals, strokes, rig, doubts)
+            _check_trial(trial, signals, strokes, rig, problems)
     return pushes_V
 
 
@@ -129,9 +131,9 @@ def _check_trial(
     signals: Signals,
     strokes: Sequence[FeltStroke],
     rig: dict[str, np.ndarray],
-    doubts: Doubts,
+    problems: InputProblems,
 ) -> None:
-    """Add the warnings of a trial to `doubts`. rig: pictures of the rig, by camera. Raise
+    """Add the warnings of a trial to `problems`. rig: pictures of the rig, by camera. Raise
     BadInput."""
     times = frame_times(trial)
     lines = [
@@ -140,7 +142,7 @@ def _check_trial(
         *_scene_warnings(trial, times, rig),
     ]
     for line in lines:
-        doubts.note(f"{trial.place}: {line}")
+        problems.warn(f"{trial.place}: {line}")
 
 
 def _pushes_V(strokes: Sequence[FeltStroke]) -> Iterator[np.ndarray]:
@@ -173,7 +175,7 @@ def _check_board_views(source: Path, camera: str, board: Board) -> None:
         raise BadInput(why_not_found(greys, board) or none, file=place)
 
 
-def _check_rig_board(picture: Path, board: Board, doubts: Doubts) -> None:
+def _check_rig_board(picture: Path, board: Board, problems: InputProblems) -> None:
     """Add a warning where a camera's picture of the board on the rig is blurred.
 
     Raise BadInput where the board is not in it.
@@ -186,7 +188,7 @@ def _check_rig_board(picture: Path, board: Board, doubts: Doubts) -> None:
     blur_px = edge_blur_px(grey, board)
     if blur_px > _LARGEST_BLUR_PX:
         blurred = f"edges are blurred by {blur_px:.1f} px, {_LARGEST_BLUR_PX:g} is a lot"
-        doubts.note(f"{place}: {blurred}: focus on the whisker, or let the camera rest")
+        problems.warn(f"{place}: {blurred}: focus on the whisker, or let the camera rest")
 
 
 def _shows_board(grey: np.ndarray, board: Board) -> bool:

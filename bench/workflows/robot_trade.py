@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, ScalarFormatter
 
 from bench.base.atomic import lock_output
-from bench.base.doubts import Doubts
 from bench.base.drawing import colour_of, label_of, publish, style
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.records.trial_result import TrialResult
@@ -72,13 +72,13 @@ def _answers_of_session(
     session_path: Path, out: Path, settings: Settings, workers: int, progress: bool
 ) -> list[Answer]:
     """Evaluate the session into `out`; return all answers about its whisks. Raise BadInput."""
-    doubts = Doubts()
-    session = checked_session(session_path, doubts, follow_links=settings.follow_links)
+    problems = InputProblems()
+    session = checked_session(session_path, problems, follow_links=settings.follow_links)
     recorded = trials_with_whisks(session)
     require_some(recorded, settings)
     with lock_output(out), Workers(workers, progress) as pool:
-        _, units = placed_units(session, recorded, out, settings, pool, doubts)
-        *_, units = with_gauges(units, pool, doubts)
+        _, units = placed_units(session, recorded, out, settings, pool, problems)
+        *_, units = with_gauges(units, pool, problems)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
         results = finished(evaluate_units(chosen, pool), session.whisker, settings).results
         answers = []

@@ -16,9 +16,9 @@ from matplotlib.ticker import FormatStrFormatter
 from tqdm import tqdm
 
 from bench.base.atomic import lock_output, write_whole
-from bench.base.doubts import Doubts
 from bench.base.drawing import publish, style
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.base.settings import Seeing, Settings
 from bench.base.tables import Column, Kind, Table
 from bench.base.workers import Workers
@@ -141,16 +141,16 @@ def tradeoff(
     timed. Raise BadInput.
     """
     check_outside(out, path)
-    doubts = Doubts()
-    session = checked_session(path, doubts, follow_links=settings.follow_links)
+    problems = InputProblems()
+    session = checked_session(path, problems, follow_links=settings.follow_links)
     recorded = trials_with_whisks(session)
     wanted = [trial for trial in recorded if settings.takes(trial.name) and trial.camera_sources]
     names = {trial.name for trial in wanted}
     if not names:
         raise BadInput(f"--trials {settings.trials}: no trial with pictures has such a name")
     with lock_output(out), Workers(1, progress) as pool:
-        _, units = placed_units(session, recorded, out, settings, pool, doubts)
-        *_, units = with_gauges(units, pool, doubts)
+        _, units = placed_units(session, recorded, out, settings, pool, problems)
+        *_, units = with_gauges(units, pool, problems)
         chosen = [unit for unit in units if unit.trial.name in names]
         ladder = list(settings_to_try(tuple(wanted[0].camera_sources)))
         trades = []

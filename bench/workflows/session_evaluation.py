@@ -5,7 +5,7 @@ from pathlib import Path
 
 from bench.analyses.catalogue import ANALYSES
 from bench.base.atomic import lock_output, write_whole
-from bench.base.doubts import Doubts
+from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.report.assembly import write_tables
@@ -30,7 +30,7 @@ from bench.trials.side_by_side import array_units
 from bench.trials.unit import Unit
 
 DONE = 0
-DOUBTFUL = 1
+WITH_WARNINGS = 1
 
 
 def evaluate(
@@ -57,8 +57,8 @@ def evaluate(
         session_path = session_path.absolute()
         out = out.absolute()
     check_outside(out, session_path)
-    doubts = Doubts()
-    views = checked_views(session_path, doubts, trials, follow_links=settings.follow_links)
+    problems = InputProblems()
+    views = checked_views(session_path, problems, trials, follow_links=settings.follow_links)
     require_camera(views[0], settings)
     recorded = [trials_with_whisks(view) for view in views]
     require_some(recorded[0], settings)
@@ -66,12 +66,14 @@ def evaluate(
         if views[0].base is None:
             units = first_units(views[0], recorded[0], out, settings)
             summary = _evaluate_whisker(
-                views[0], units, out, settings, pool, doubts, figure_formats
+                views[0], units, out, settings, pool, problems, figure_formats
             )
         else:
-            summary = _evaluate_array(views, recorded, out, settings, pool, doubts, figure_formats)
+            summary = _evaluate_array(
+                views, recorded, out, settings, pool, problems, figure_formats
+            )
     announce("\n".join(summary.verdict) if verdict_alone else summary.on_screen(out))
-    return DOUBTFUL if summary.doubtful else DONE
+    return WITH_WARNINGS if summary.warnings else DONE
 
 
 def _evaluate_array(
@@ -80,7 +82,7 @@ def _evaluate_array(
     out: Path,
     settings: Settings,
     pool: Workers,
-    doubts: Doubts,
+    problems: InputProblems,
     figure_formats: Sequence[str],
 ) -> Summary:
     """Evaluate each whisker of an array as a run of its own, and then all whiskers together."""
@@ -91,9 +93,9 @@ def _evaluate_array(
     units_of_views = array_units(views, recorded, out, folders, settings, pool)
     for view, folder, units in zip(views, folders, units_of_views):
         with lock_output(folder):
-            _evaluate_whisker(view, units, folder, settings, pool, Doubts(), figure_formats)
+            _evaluate_whisker(view, units, folder, settings, pool, InputProblems(), figure_formats)
     scores = score_all(list(zip(views, folders)))
-    write_array_record(out, array_record(views, doubts.notes, scores))
+    write_array_record(out, array_record(views, problems.warnings, scores))
     return write_array(out)
 
 
@@ -103,33 +105,33 @@ def _evaluate_whisker(
     out: Path,
     settings: Settings,
     pool: Workers,
-    doubts: Doubts,
+    problems: InputProblems,
     figure_formats: Sequence[str],
 ) -> Summary:
     """Evaluate the trials of one whisker's session, a unit each, into the folder `out`.
 
     The folder is locked.
     """
-    calibration, units = units_in_rig(session, units, pool, doubts)
-    gauges, certificate, units = with_gauges(units, pool, doubts)
+    calibration, units = units_in_rig(session, units, pool, problems)
+    gauges, certificate, units = with_gauges(units, pool, problems)
     chosen = [unit for unit in units if settings.takes(unit.trial.name)]
     whole = finished(evaluate_units(chosen, pool), session.whisker, settings)
-    if whole.doubt:
-        doubts.notes.append(whole.doubt)
-    doubts.notes += exchanged_signals(chosen, whole.results)
+    if whole.touch_warning:
+        problems.warnings.append(whole.touch_warning)
+    problems.warnings += exchanged_signals(chosen, whole.results)
     evaluation = Evaluation(
         whisker=session.whisker,
         settings=settings,
         results=whole.results,
         friction=whole.friction,
         alpha_est_sigma_rad=whole.alpha_est_sigma_rad,
-        doubt=whole.doubt,
+        touch_warning=whole.touch_warning,
         session=session,
         out=out,
         gauges=gauges,
         certificate=certificate,
         calibration=calibration,
-        doubts=tuple(doubts.notes),
+        warnings=tuple(problems.warnings),
         recordings={unit.trial.name: unit.files for unit in chosen},
     )
     return report(evaluation, pool, figure_formats)

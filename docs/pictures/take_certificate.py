@@ -6,7 +6,7 @@ python docs/pictures/take_certificate.py SESSION
 import argparse
 from pathlib import Path
 
-from bench.base.doubts import Doubts
+from bench.base.input_problems import InputProblems
 from bench.gauges.certificate import page
 from bench.session.session_check import checked_session
 from bench.workflows.gauge_calibration import calibrate_gauges, trials_to_use
@@ -20,7 +20,9 @@ def main() -> None:
     )
     parser.add_argument("session", type=Path)
     session = checked_session(parser.parse_args().session)
-    certificate = calibrate_gauges(session, trials_to_use(session, every_trial=False), Doubts())
+    certificate = calibrate_gauges(
+        session, trials_to_use(session, every_trial=False), InputProblems()
+    )
     page(certificate).savefig(HERE / "certificate.png", dpi=90)
     print("\n".join(certificate.lines()))
 

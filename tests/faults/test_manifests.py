@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from bench.base.doubts import Doubts
+from bench.base.input_problems import InputProblems
 from bench.session.session import load_session
 from bench.session.session_check import checked_session
 from tests.scenes.refusals import refusal
@@ -18,9 +18,9 @@ def edit(file, old: str, new: str) -> None:
 
 
 def test_the_unspoilt_session_is_taken(session):
-    doubts = Doubts()
-    checked_session(session, doubts)
-    assert doubts.notes == []
+    problems = InputProblems()
+    checked_session(session, problems)
+    assert problems.warnings == []
 
 
 def test_no_such_folder(tmp_path):
@@ -209,9 +209,9 @@ def test_check_collects_what_evaluate_would_stop_at(session):
     edit(session / "trials" / "b30_3" / "trial.toml", "beta_deg", "betta_deg")
     shutil.rmtree(session / "trials" / "b60_4" / "low")
     edit(session / "trials" / "gauge_roll0" / "signals.csv", "0.0010", "text")
-    doubts = Doubts(stop_at_first=False)
-    checked_session(session, doubts)
-    assert [line.split(":")[0].split(",")[0] for line in doubts.refusals] == [
+    problems = InputProblems(stop_at_first=False)
+    checked_session(session, problems)
+    assert [line.split(":")[0].split(",")[0] for line in problems.refusals] == [
         "trials/b30_3/trial.toml",
         "trials/b60_4",
         "trials/gauge_roll0/signals.csv",
@@ -223,9 +223,9 @@ def test_check_collects_every_unknown_key(session):
     edit(session / "session.toml", 'name = "high"', 'nmae = "x"\nname = "high"')
     edit(session / "trials" / "b30_3" / "trial.toml", "beta_deg", "betta_deg")
     edit(session / "trials" / "b30_3" / "trial.toml", "surface", "suface")
-    doubts = Doubts(stop_at_first=False)
-    checked_session(session, doubts)
-    assert [line.split(" is not")[0] for line in doubts.refusals] == [
+    problems = InputProblems(stop_at_first=False)
+    checked_session(session, problems)
+    assert [line.split(" is not")[0] for line in problems.refusals] == [
         "session.toml: [board] legasy",
         "session.toml: [[cameras]] nmae",
         "trials/b30_3/trial.toml: suface",
@@ -235,10 +235,10 @@ def test_check_collects_every_unknown_key(session):
 
 def refusals(session) -> list[str]:
     """All that `check` would refuse, where a manifest cannot be used."""
-    doubts = Doubts(stop_at_first=False)
-    with doubts.guard():
-        checked_session(session, doubts)
-    return list(dict.fromkeys(doubts.refusals))
+    problems = InputProblems(stop_at_first=False)
+    with problems.guard():
+        checked_session(session, problems)
+    return list(dict.fromkeys(problems.refusals))
 
 
 def test_check_names_every_missing_key(session):

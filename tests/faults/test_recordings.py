@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.base.doubts import Doubts
+from bench.base.input_problems import InputProblems
 from bench.session.footage import read_frames
 from bench.session.frame_times import frame_times
 from bench.session.session import load_session
@@ -28,9 +28,9 @@ def frames(session):
 
 
 def notes(session) -> list[str]:
-    doubts = Doubts()
-    checked_session(session, doubts)
-    return doubts.notes
+    problems = InputProblems()
+    checked_session(session, problems)
+    return problems.warnings
 
 
 def trial(session):
@@ -239,9 +239,11 @@ def test_an_undecodable_picture_keeps_its_place(session):
     frames = read_frames(low, range(11))
     assert [index for index, grey in frames.items() if grey is None] == [3]
     assert len(frames) == len(frame_times(trial(session))) == 11
-    doubts = Doubts()
-    find_damage(checked_session(session, doubts), doubts)
-    assert doubts.notes == [f"trials/{TRIAL}/low: frame 3 cannot be read (damaged or cut short)"]
+    problems = InputProblems()
+    find_damage(checked_session(session, problems), problems)
+    assert problems.warnings == [
+        f"trials/{TRIAL}/low: frame 3 cannot be read (damaged or cut short)"
+    ]
 
 
 def test_a_video_in_place_of_pictures_is_taken(session, as_video):
@@ -255,14 +257,16 @@ def test_a_truncated_video_gives_damaged_frames(session, as_video):
     video, pictures = as_video(session / "trials" / TRIAL / "low", ".avi", "MJPG")
     data = video.read_bytes()
     video.write_bytes(data[: int(0.6 * len(data))])
-    doubts = Doubts()
-    loaded = checked_session(session, doubts)
-    find_damage(loaded, doubts)
+    problems = InputProblems()
+    loaded = checked_session(session, problems)
+    find_damage(loaded, problems)
     frames = read_frames(video, range(len(pictures)))
     lost = [index for index, grey in frames.items() if grey is None]
     assert len(frames) == len(pictures)
     assert lost == list(range(lost[0], len(pictures)))
-    assert any(note.startswith(f"trials/{TRIAL}/low.avi: frame {lost[0]}") for note in doubts.notes)
+    assert any(
+        note.startswith(f"trials/{TRIAL}/low.avi: frame {lost[0]}") for note in problems.warnings
+    )
 
 
 def test_a_video_that_does_not_open_is_the_trials_trouble(session, as_video):

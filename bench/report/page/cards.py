@@ -40,7 +40,7 @@ class Card:
     """A whisk's card.
 
     numbers: (name, value with sigma). estimates: rows of the table of estimators. pictures: (alt
-    text, source) of each. doubts: (what is doubtful, cure).
+    text, source) of each. warnings: (sentence, cure) of each.
     """
 
     key: str
@@ -49,7 +49,7 @@ class Card:
     numbers: tuple[tuple[str, str], ...]
     estimates: tuple[tuple[str, ...], ...]
     pictures: tuple[tuple[str, str], ...]
-    doubts: tuple[tuple[str, str], ...]
+    warnings: tuple[tuple[str, str], ...]
 
 
 def card(row: WhiskRow, out: Path, whisks: int) -> Card:

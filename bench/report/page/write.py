@@ -32,7 +32,7 @@ BIBLIOGRAPHY = "results.bib"
 _WITH_OWN_PLACE = {
     "truth",
     "errors",
-    "doubtful",
+    "warnings",
     "cameras",
     "gauges",
     "exact",
@@ -103,13 +103,13 @@ def _of_whisks(out: Path, rows: Sequence[WhiskRow]) -> dict[str, object]:
 
 
 def _of_run(record: RunRecord, run: Finished, rows: Sequence[WhiskRow]) -> dict[str, object]:
-    """Return what the template shows of the run as a whole: errors, doubts, settings, gauges."""
+    """Return what the template shows of the run as a whole: errors, warnings, settings, gauges."""
     row_of = by_whisk(rows)
-    doubt_cures = [cure_of(codes) for codes in record.doubt_codes]
+    cures = [cure_of(codes) for codes in record.warning_codes]
     return {
         "accuracies": [(one, row_of.get(one.worst_at)) for one in run.accuracy.estimators],
         "truth": run.accuracy.truth,
-        "doubts": list(zip(record.doubts, doubt_cures)),
+        "warnings": list(zip(record.warnings, cures)),
         "settings": [
             (f.name, _setting(getattr(record.settings, f.name))) for f in fields(Settings)
         ],

@@ -27,7 +27,7 @@ from bench.report.summary.warning_lines import (
 )
 from bench.trials.estimate_errors import judge
 
-DOUBTFUL = "Doubtful"
+WARNINGS = "Doubtful"
 SCORE = "Score against the truth files of this synthetic session (no result knows them)"
 _MOST_ON_SCREEN = 20  # lines: a screen
 # Codes of the sections of analyses in their order; those of other analyses come after these.
@@ -48,10 +48,10 @@ _FIGURES_FIRST = ("fig8.png", "error_against_slope.png", "against_theta.png", "m
 
 @dataclass(frozen=True)
 class Summary:
-    """The verdict, what is doubtful, and titled sections, of which one has what is doubtful."""
+    """The verdict, the warnings, and titled sections, of which one has the warnings."""
 
     verdict: tuple[str, ...]
-    doubtful: tuple[str, ...]
+    warnings: tuple[str, ...]
     sections: tuple[Section, ...]
 
     @property
@@ -60,14 +60,14 @@ class Summary:
         return "\n".join([*self.verdict, "", *section_lines(self.sections)]).rstrip() + "\n"
 
     def on_screen(self, out: Path) -> str:
-        """Return what is seen at a glance: the verdict, what is doubtful, and where the rest is."""
+        """Return what is seen at a glance: the verdict, the warnings, and where the rest is."""
         lines = [*self.verdict, ""]
-        if self.doubtful:
-            doubtful = list(self.doubtful[:_MOST_ON_SCREEN])
-            more = len(self.doubtful) - len(doubtful)
+        if self.warnings:
+            shown = list(self.warnings[:_MOST_ON_SCREEN])
+            more = len(self.warnings) - len(shown)
             if more:
-                doubtful.append(f"and {more} more, in summary.txt")
-            lines += section_lines([Section("doubtful", DOUBTFUL, tuple(doubtful))])
+                shown.append(f"and {more} more, in summary.txt")
+            lines += section_lines([Section("warnings", WARNINGS, tuple(shown))])
         lines.append(f"All of it: {out / 'report.html'}, {out / 'summary.txt'}")
         return "\n".join(lines)
 
@@ -87,7 +87,7 @@ def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[
     scores: lines on a synthetic session's truth. figures: names of the pictures.
     """
     results = evaluation.results
-    doubtful = (*evaluation.doubts, *scatter_warnings(results), *whisk_warnings(results))
+    warnings = (*evaluation.warnings, *scatter_warnings(results), *whisk_warnings(results))
     of_analyses = _sections_of_analyses(evaluation)
     last = [of_analyses.pop(code) for code in _ANALYSES_LAST if code in of_analyses]
     sections = (
@@ -96,7 +96,7 @@ def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[
         _section("gauges", "Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges)),
         *last,
         *_sections_of_pictures(evaluation),
-        _section("doubtful", DOUBTFUL, doubtful),
+        _section("warnings", WARNINGS, warnings),
         _section("score", SCORE, scores),
         _section(
             "exact",
@@ -106,15 +106,15 @@ def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[
         _section("files", "Files", [_file_list(figures)]),
     )
     shown = tuple(section for section in sections if section.lines)
-    return Summary(tuple(_verdict_lines(evaluation, len(doubtful))), doubtful, shown)
+    return Summary(tuple(_verdict_lines(evaluation, len(warnings))), warnings, shown)
 
 
-def _verdict_lines(evaluation: Evaluation, doubts: int) -> Iterator[str]:
-    """Yield the lines that the summary begins with. doubts: how many there are."""
+def _verdict_lines(evaluation: Evaluation, warnings: int) -> Iterator[str]:
+    """Yield the lines that the summary begins with. warnings: how many there are."""
     session = evaluation.session
     settings = evaluation.settings
     has_pictures = any(trial.camera_sources for trial in session.trials)
-    yield from verdict(session.name, has_pictures, evaluation.accuracy, settings, doubts)
+    yield from verdict(session.name, has_pictures, evaluation.accuracy, settings, warnings)
     yield from gauge_source_lines(evaluation.gauges)
     yield from preset_lines(evaluation.results, settings)
 

@@ -54,7 +54,7 @@ def _in_columns(heads: Iterable[str], cells: Iterable[str]) -> str:
 def contact_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     """Yield how far contact points, deflections and slip by (10) are from those seen.
 
-    RMS over whisks of which nothing is doubtful, and what was stated of each.
+    RMS over whisks without a warning, and what was stated of each.
     """
     results = list(results)
     sound = sound_whisks(results)

@@ -35,7 +35,7 @@ def verdict(
 ) -> Iterator[str]:
     """Yield the lines of the verdict.
 
-    session: its name. has_pictures: whether it has any. warnings: how many lines are doubtful.
+    session: its name. has_pictures: whether it has any. warnings: how many there are.
     """
     yield _truth_line(session, has_pictures, accuracy.truth, warnings)
     compared = [one for one in accuracy.estimators if one.estimator not in RUNS]
@@ -59,8 +59,8 @@ def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warni
         )
     else:
         known = f"the true distance is known for none of {count}"
-    doubtful = f"{counted(warnings, 'doubt')}, see below" if warnings else "nothing doubtful"
-    return f"{session}: {known}; {doubtful}."
+    warned = f"{counted(warnings, 'doubt')}, see below" if warnings else "nothing doubtful"
+    return f"{session}: {known}; {warned}."
 
 
 def accuracy_line(accuracy: Accuracy, settings: Settings) -> str:
@@ -102,7 +102,7 @@ def _coverage(accuracy: Accuracy) -> str:
 
 
 def _missing(accuracy: Accuracy) -> str:
-    """Return how many whisks have no distance, a warning, or are left out as doubtful."""
+    """Return how many whisks have no distance, a warning, or are left out for one."""
     parts = []
     if accuracy.without_distance:
         why = accuracy.without_distance[0].status

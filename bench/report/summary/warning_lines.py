@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from bench.analyses.runs import RUNS
-from bench.base.doubts import in_one_status
+from bench.base.input_problems import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.session import Session
@@ -21,7 +21,7 @@ def is_silent(status: Reason) -> bool:
 
 
 def whisk_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:
-    """Yield a line for each whisk that something is doubtful of.
+    """Yield a line for each whisk that has a warning.
 
     A gauge trial that cannot be judged is as it should be.
     """

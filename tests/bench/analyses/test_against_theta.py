@@ -34,7 +34,7 @@ def _at(theta_deg: float, d_x_mm: float) -> FeltAt:
 
 
 def test_errors_are_pooled_angle_by_angle_over_sound_whisks():
-    """Errors of 0.6 and -1.2 mm of 60: mean -0.5 %, RMS √2.5 %; a doubtful whisk and its 30 mm do not count."""
+    """Errors of 0.6 and -1.2 mm of 60: mean -0.5 %, RMS √2.5 %; a whisk with a warning and its 30 mm do not count."""
     wrong = with_errors(result(30.0), {1.0: 30.0}, status="channels exchanged")
     whisks = [
         with_errors(result(20.0), {1.0: 0.6, 3.0: 0.3}),

@@ -39,7 +39,7 @@ def test_nothing_measured_no_picture(tmp_path):
     assert (tmp_path / "error_map.csv").read_text().count("\n") == 1
 
 
-def test_where_every_whisk_is_doubtful_there_is_no_mean():
+def test_where_every_whisk_has_a_warning_there_is_no_mean():
     assert mean_row([]) == {"trial": TOTAL}
 
 

@@ -88,7 +88,7 @@ def test_a_whisk_alone_on_its_surface_has_no_fitted_run_but_a_seen_one():
     assert list(errors(results, SEEN)) == ["b60"]
 
 
-def test_doubt_about_friction_is_in_the_sigma():
+def test_uncertainty_of_friction_is_in_the_sigma():
     row = next(
         r
         for r in estimate_rows(with_runs([result(70)], WHISKER, Settings()))

@@ -19,7 +19,7 @@ def session(sigma_mm: float = 0.0):
     )
 
 
-def doubtful(one):
+def flagged(one):
     (felt,) = one.felt.whisks
     return replace(
         one, felt=replace(one.felt, whisks=(replace(felt, status="channels exchanged"),))
@@ -32,7 +32,7 @@ def test_distance_and_friction_are_those_of_the_whisks(tmp_path):
         result(5.0),
         result(40.0),
         result(60.0),
-        doubtful(result(70.0)),
+        flagged(result(70.0)),
         result(50.0, nominal_mm=80.0),
     ]
     (found,) = tilted_whisks(session(0.1), whisks)

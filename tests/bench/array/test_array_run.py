@@ -47,7 +47,7 @@ def out(session, tmp_path_factory):
 
 def test_each_row_names_its_whisker(out):
     run = api.read(out)
-    assert isinstance(run, ArrayRun) and list(run.whiskers) == ["w1", "w2"] and not run.doubtful
+    assert isinstance(run, ArrayRun) and list(run.whiskers) == ["w1", "w2"] and not run.has_warnings
     assert isinstance(run.whiskers["w2"], Run)
     assert run.table("whisks")["whisker"].tolist() == ["w1", "w2"]
     for name in run.whiskers:

@@ -121,9 +121,9 @@ def test_distances_from_a_cone():
     )
 
 
-def test_doubtful_contacts_are_in_the_table_and_not_in_the_verdict():
+def test_flagged_contacts_are_in_the_table_and_not_in_the_verdict():
     surface, base = bar(0.0)
-    sound, doubtful = cloud(felt(), surface, base), cloud(felt(80.0, status="odd"), surface, base)
-    (line,) = surface_verdict([*sound, *doubtful])
+    sound, flagged = cloud(felt(), surface, base), cloud(felt(80.0, status="odd"), surface, base)
+    (line,) = surface_verdict([*sound, *flagged])
     assert "1 contact felt by 1 whisker lie 0.00 mm RMS off the object (manifest)" in line
-    assert not list(surface_verdict(doubtful)) and not list(surface_lines(doubtful))
+    assert not list(surface_verdict(flagged)) and not list(surface_lines(flagged))

@@ -83,7 +83,7 @@ def test_every_kind_in_the_table_is_raised_and_has_a_cure():
 
 def _decisions_on_text(tree: ast.Module) -> Iterator[int]:
     """Yield the lines where the text of a status is split, searched or compared."""
-    texts = {"status", "doubt", "doubts", "doubtful"}
+    texts = {"status", "warning"}
     methods = {"split", "startswith", "endswith", "find", "index", "partition"}
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
@@ -119,7 +119,7 @@ def test_decisions_on_text_are_found():
         'status.split("; ")',
         'row.status == "no gauges"',
         '"sigma" in felt.status',
-        "re.search(p, doubt)",
+        "re.search(p, warning)",
     ):
         assert list(_decisions_on_text(ast.parse(code)))
 
@@ -147,7 +147,7 @@ def test_the_first_kind_of_the_table_has_the_cure_of_a_line():
     assert cure_of([]) == status_of_code(UNNAMED).cure
 
 
-def test_notes_alone_make_nothing_doubtful():
+def test_notes_alone_are_no_warning():
     short = Reason("pushed_short", "pushed to 1 deg only")
     assert has_only_notes(NO_REASON) and has_only_notes(joined(reason("no_pictures"), short))
     assert not has_only_notes(joined(short, NO_RISE))

@@ -107,7 +107,7 @@ def test_check_of_a_sound_session(small_session, capsys):
     assert "4 trials, nothing wrong or doubtful" in capsys.readouterr().out
 
 
-def test_check_of_a_doubtful_session(small_copy, capsys):
+def test_check_of_a_session_with_a_warning(small_copy, capsys):
     manifest = small_copy / "trials" / "b30_3" / "trial.toml"
     manifest.write_text(manifest.read_text().replace("speed_deg_s = 10.0", "speed_deg_s = 90.0"))
     assert cli.main(["check", str(small_copy)]) == 1

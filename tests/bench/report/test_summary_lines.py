@@ -45,16 +45,16 @@ def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
 
 
 @pytest.mark.parametrize(
-    "filter_Hz, late_deg, doubt_deg",
+    "filter_Hz, late_deg, sigma_deg",
     [(800.0, 0.0468, 0.0), (None, 0.0468, 0.0270), (0.0, 0.0, 0.0)],
 )
-def test_the_filters_delay_is_taken_out_of_felt_touch(filter_Hz, late_deg, doubt_deg):
+def test_the_filters_delay_is_taken_out_of_felt_touch(filter_Hz, late_deg, sigma_deg):
     """At 90 deg/s 0.52 ms are 0.047 deg; whose filter is not named may have any delay up to twice the paper's."""
     own = np.radians(0.001)
     felt = as_felt(0, FeltTouch(0.0508, own), None, np.radians(90.0), gauge_delay(filter_Hz))
     late = lateness(seen_whisk(touch_rad=Value(0.05, own)), felt)
     assert np.degrees(late.value) == pytest.approx(np.degrees(8e-4) - late_deg, abs=1e-4)
-    assert np.degrees(late.sigma) == pytest.approx(np.hypot(0.001 * 2**0.5, doubt_deg), abs=1e-4)
+    assert np.degrees(late.sigma) == pytest.approx(np.hypot(0.001 * 2**0.5, sigma_deg), abs=1e-4)
     assert felt.theta_sigma_rad == own  # touch and moments are late alike
 
 
@@ -91,13 +91,13 @@ def test_beam_and_spline_stand_side_by_side():
     assert list(beam_lines([result()])) == []
 
 
-def test_the_screen_shows_the_verdict_and_what_is_doubtful(tmp_path):
-    doubts = tuple(f"t{k}, whisk 0: slips in jumps" for k in range(30))
+def test_the_screen_shows_the_verdict_and_the_warnings(tmp_path):
+    warnings = tuple(f"t{k}, whisk 0: slips in jumps" for k in range(30))
     sections = (
         Section("cameras", "Cameras", ("camera high: 10 views",)),
-        Section("doubtful", "Doubtful", doubts),
+        Section("warnings", "Doubtful", warnings),
     )
-    shown = Summary(("(2) is wrong.",), doubts, sections).on_screen(tmp_path).splitlines()
+    shown = Summary(("(2) is wrong.",), warnings, sections).on_screen(tmp_path).splitlines()
     assert shown[:3] == ["(2) is wrong.", "", "Doubtful"]
     where = f"All of it: {tmp_path}/report.html, {tmp_path}/summary.txt"
     assert shown[-3:] == ["  and 10 more, in summary.txt", "", where]
@@ -109,12 +109,12 @@ def test_the_screen_shows_the_verdict_and_what_is_doubtful(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("doubts", "said"),
+    ("warnings", "said"),
     [(0, "nothing doubtful."), (1, "1 doubt, see below."), (2, "2 doubts, see below.")],
 )
-def test_doubts_are_counted_apart_from_whisks(doubts, said):
+def test_warnings_are_counted_apart_from_whisks(warnings, said):
     """Of one whisk there may be two."""
-    first, *_ = verdict("s", True, RunAccuracy.of_results([result()]), Settings(), doubts)
+    first, *_ = verdict("s", True, RunAccuracy.of_results([result()]), Settings(), warnings)
     assert first == f"s: the true distance is known for 1 of 1 measured whisk, to ± 0.01 mm; {said}"
 
 

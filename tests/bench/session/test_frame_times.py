@@ -53,7 +53,7 @@ def test_a_stated_sigma_of_the_first_frame_is_the_clocks(small_copy, folder):
     assert times(small_copy).clock_sigma_s == 0.002
 
 
-def test_stated_rate_without_a_start_is_doubtful(small_copy, folder):
+def test_stated_rate_without_a_start_is_a_warning(small_copy, folder):
     replace_frames_csv(folder, "frame_rate_Hz = 20.0\n")
     assert times(small_copy).warnings[0].codes == ("first_frame_not_stated",)
 
@@ -83,7 +83,7 @@ def test_own_times_of_one_camera_only_are_refused(small_copy, folder):
         times(small_copy)
 
 
-def test_container_times_are_doubtful(small_copy, folder, as_video):
+def test_container_times_are_a_warning(small_copy, folder, as_video):
     replace_frames_csv(folder, "first_frame_s = 0.0005\n")
     for camera in ("high", "low"):
         as_video(folder / camera, ".mkv", "FFV1")
@@ -99,7 +99,7 @@ def test_container_times_are_doubtful(small_copy, folder, as_video):
     ("rate_Hz", "toml", "count"),
     [(20.0, "", 0), (30.0, "", 2), (30.0, "frame_rate_Hz = 20.0\n", 0)],
 )
-def test_a_header_with_another_rate_is_doubtful_until_settled(
+def test_a_header_with_another_rate_is_a_warning_until_settled(
     small_copy, folder, as_video, rate_Hz, toml, count
 ):
     """A film of 500 frames a second is often stored to play at 30."""
@@ -109,7 +109,7 @@ def test_a_header_with_another_rate_is_doubtful_until_settled(
         file.write(toml)
     found = times(small_copy)
     assert (found.source, len(found.warnings)) == ("frames.csv", count)
-    assert all(doubt.codes == ("rate_unlike_header",) for doubt in found.warnings)
+    assert all(one.codes == ("rate_unlike_header",) for one in found.warnings)
 
 
 def test_frames_of_a_session_without_pictures(small_copy, folder):

@@ -5,8 +5,8 @@ import shutil
 import numpy as np
 import pytest
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.session.session import load_session
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
@@ -68,10 +68,10 @@ def test_trials_come_in_the_order_of_the_sessions_surfaces(small_copy):
         "format = 1",
         'format = 1\nsurfaces = ["steel", "sandpaper", "glas"]',
     )
-    doubts = Doubts(stop_at_first=False)
-    names = [t.name for t in load_session(small_copy, doubts).trials if t.purpose == "measure"]
+    problems = InputProblems(stop_at_first=False)
+    names = [t.name for t in load_session(small_copy, problems).trials if t.purpose == "measure"]
     assert names == ["b60_4", "b30_3"]
-    (unused,) = (note for note in doubts.notes if "surface_unused" in as_reason(note).codes)
+    (unused,) = (note for note in problems.warnings if "surface_unused" in as_reason(note).codes)
     assert "'glas'" in unused
 
 

@@ -4,8 +4,8 @@ import tomllib
 
 import pytest
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.commands.cli import main
 from bench.session.manifest import SessionKeys
 from bench.session.strict_toml import as_keys
@@ -31,7 +31,10 @@ def options(numbers) -> list[str]:
 
 def read(path):
     return as_keys(
-        tomllib.loads((path / "session.toml").read_text()), SessionKeys, "session.toml", Doubts()
+        tomllib.loads((path / "session.toml").read_text()),
+        SessionKeys,
+        "session.toml",
+        InputProblems(),
     )
 
 

@@ -11,7 +11,7 @@ from bench.records.trial_result import (
     FeltWhisk,
     SeenTrial,
 )
-from bench.trials.clocks import shared_doubt, shared_touch, with_shared_touch
+from bench.trials.clocks import shared_touch, shared_touch_warning, with_shared_touch
 from tests.scenes.results import seen_whisk, trial_result
 from vision.truth.records import FrameTruth
 from vision.truth.value import UNKNOWN, Value
@@ -62,12 +62,12 @@ def rng():
     return np.random.default_rng(5)
 
 
-def test_a_clock_at_one_speed_is_a_doubt_and_in_the_sigma_of_touch(rng):
+def test_a_clock_at_one_speed_is_a_warning_and_in_the_sigma_of_touch(rng):
     """12 whisks at 10 deg/s, the clock 4 ms off: nine sigma each, and nothing was said."""
     results = session(rng, [10.0] * 12, clock_s=0.004)
     shared = shared_touch(results)
     assert shared.chance < 1e-6
-    assert shared_doubt(shared).codes == ("touch_apart",)
+    assert shared_touch_warning(shared).codes == ("touch_apart",)
     for before, after in zip(results, with_shared_touch(results, shared)):
         one, other = (result.seen.whisks[0].touch_rad for result in (before, after))
         assert other.value == one.value  # what is felt moves no truth
@@ -95,21 +95,21 @@ def test_back_strokes_and_speeds_tell_a_clock_from_a_zero(rng, how, clock_s, zer
     off = shared.values - [np.radians(zero_deg), clock_s]
     assert np.all(np.abs(off) < 4 * np.sqrt(np.diag(shared.covariance)))
     assert shared.covariance[1, 1] ** 0.5 < 1.5 * gauge_delay(None).value
-    assert words in shared_doubt(shared)
+    assert words in shared_touch_warning(shared)
 
 
-def test_sound_sessions_raise_no_doubt(rng):
+def test_sound_sessions_raise_no_warning(rng):
     """One in a thousand may, by its own word; sigmas of what all whisks share are taken as shared."""
     found = [shared_touch(session(rng, [10.0] * 8, back=k % 2 == 0)) for k in range(300)]
     assert sum(one.is_error for one in found) <= 2
     results = session(rng, [10.0] * 8)
     assert list(with_shared_touch(results, shared_touch(results))) == results
-    assert not shared_doubt(shared_touch(results))
+    assert not shared_touch_warning(shared_touch(results))
 
 
 def test_no_touch_no_word():
     nothing = trial(seen_whisk(0, reason("no_pictures")), UNKNOWN)
-    assert shared_touch([nothing]) is None and not shared_doubt(None)
+    assert shared_touch([nothing]) is None and not shared_touch_warning(None)
     assert with_shared_touch([nothing], None) == (nothing,)
 
 

@@ -33,7 +33,7 @@ SPEED = np.radians(18.0)  # rad/s: 0.9° a frame, 20 frames a second
 FRAMES = 9
 
 
-def doubt(rng, spoil=None, kept=None) -> str:
+def warning(rng, spoil=None, kept=None) -> str:
     """What is said of a whisk whose motor angles are not those at which its pictures (noise 0.05 px) were taken.
 
     spoil: of the true motor angles (f,) those recorded; kept: by frame, which picture it shows.
@@ -53,30 +53,30 @@ def doubt(rng, spoil=None, kept=None) -> str:
 
 
 @pytest.mark.parametrize("draw", range(4))
-def test_a_sound_whisk_is_not_doubted(draw):
-    assert doubt(np.random.default_rng(draw)) == ""
+def test_a_sound_whisk_is_without_a_warning(draw):
+    assert warning(np.random.default_rng(draw)) == ""
 
 
 def test_a_clamp_at_another_angle_is_no_fault(rng):
-    assert doubt(rng, lambda motor: motor + np.radians(0.8)) == ""
+    assert warning(rng, lambda motor: motor + np.radians(0.8)) == ""
 
 
 @pytest.mark.parametrize("factor", [1.1, 0.9, 1.03])
 def test_encoder_scale_or_frame_rate(rng, factor):
-    said = doubt(rng, lambda motor: factor * motor)
+    said = warning(rng, lambda motor: factor * motor)
     found = float(said.split("it turns ")[1].split(" times")[0])
     assert found == pytest.approx(1.0 / factor, abs=0.01)
 
 
 @pytest.mark.parametrize("before", [1, 3, 6])
 def test_an_encoder_jump(rng, before):
-    said = doubt(rng, lambda motor: motor + np.radians(0.4) * (np.arange(FRAMES) >= before))
+    said = warning(rng, lambda motor: motor + np.radians(0.4) * (np.arange(FRAMES) >= before))
     size = float(said.split("motor_deg jumps by ")[1].split("°")[0])
     assert size == pytest.approx(0.4, abs=0.06)
 
 
 def test_a_frame_that_shows_the_one_before_it(rng):
-    assert "frame 5 looks the same as the one before it" in doubt(
+    assert "frame 5 looks the same as the one before it" in warning(
         rng, kept=[0, 1, 2, 3, 4, 4, 6, 7, 8]
     )
 
@@ -86,11 +86,11 @@ def test_a_frame_lost_whose_time_stayed(rng):
         """Pictures 4 and later are the next ones: their true angle is a frame's more than what is recorded."""
         return motor - 0.9 * np.radians(np.arange(FRAMES) >= 4)
 
-    assert "a frame before frame 4 looks lost" in doubt(rng, recorded)
+    assert "a frame before frame 4 looks lost" in warning(rng, recorded)
 
 
 def test_a_frame_at_another_time(rng):
-    said = doubt(rng, lambda motor: motor - np.radians(0.36) * (np.arange(FRAMES) == 3))
+    said = warning(rng, lambda motor: motor - np.radians(0.36) * (np.arange(FRAMES) == 3))
     late_ms = float(said.split("frame 3 looks taken ")[1].split(" ms")[0])
     assert late_ms == pytest.approx(20.0, abs=4.0)  # 0.36° at 18°/s
 
@@ -103,7 +103,7 @@ def trial(small_session):
 BOARD = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
 
 
-def test_a_bar_as_thick_as_said_is_not_doubted(trial):
+def test_a_bar_as_thick_as_said_is_without_a_warning(trial):
     assert check_bar_width({"low": Value(0.97, 0.03), "high": Value(1.0, 0.02)}, trial, BOARD) == ""
     assert check_bar_width({}, trial, BOARD) == ""
 

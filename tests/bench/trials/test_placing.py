@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.statuses import reason
 from bench.base.workers import Workers
@@ -31,7 +31,7 @@ OFF = np.array(
 
 @pytest.fixture
 def place(small_copy, monkeypatch):
-    """A function (step of the true rig, T_rig_board's sigma in mm) that gives the placed calibration, the doubts and
+    """A function (step of the true rig, T_rig_board's sigma in mm) that gives the placed calibration, the warnings and
     the stages at which trials were looked at."""
 
     def placed(step, sigma_mm=0.0, frames=30, width_deg=8.0, board=True):
@@ -61,15 +61,19 @@ def place(small_copy, monkeypatch):
         session = session if board else replace(session, T_rig_board=None)
         before = SessionCalibration(CAMERAS, {}, "before", ("calibrated",), session.T_rig_board)
         units = [Unit(session, t, "", before, Settings(), small_copy) for t in session.trials]
-        doubts = Doubts()
-        return place_rig(session, before, units, Workers(0), doubts), doubts.notes, set(stages)
+        problems = InputProblems()
+        return (
+            place_rig(session, before, units, Workers(0), problems),
+            problems.warnings,
+            set(stages),
+        )
 
     return placed
 
 
 def test_what_was_learnt_is_said_and_an_exact_board_stays(place):
-    made, doubts, stages = place(0 * OFF)
-    assert made.cameras is CAMERAS and made.hash == "before" and not doubts
+    made, warnings, stages = place(0 * OFF)
+    assert made.cameras is CAMERAS and made.hash == "before" and not warnings
     assert stages == {
         "seen"
     }  # what was looked at is the trial's own result and is not looked at again
@@ -79,17 +83,17 @@ def test_what_was_learnt_is_said_and_an_exact_board_stays(place):
 
 
 def test_a_disagreement_is_an_alarm(place):
-    made, doubts, _ = place(OFF)
+    made, warnings, _ = place(OFF)
     assert made.cameras is CAMERAS
-    assert len(doubts) == 1 and doubts[0].codes == ("board_misplaced",)
-    assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubts[0])[1]) == pytest.approx(
-        0.8, abs=0.02
-    )
+    assert len(warnings) == 1 and warnings[0].codes == ("board_misplaced",)
+    assert float(
+        re.search(r"across the whisker by ([+-][0-9.]+)", warnings[0])[1]
+    ) == pytest.approx(0.8, abs=0.02)
 
 
 def test_a_board_with_a_sigma_gives_way(place):
-    made, doubts, stages = place(OFF, sigma_mm=0.5)
-    assert not doubts and made.hash != "before" and stages == {"swing0", "swing1"}
+    made, warnings, stages = place(OFF, sigma_mm=0.5)
+    assert not warnings and made.hash != "before" and stages == {"swing0", "swing1"}
     moved = made.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
     np.testing.assert_allclose(moved, CAMERAS["one"].T_camera_rig[:, :3] @ OFF[3:], atol=0.05)
     # The board on the rig has not moved in the pictures: it stands elsewhere in the rig's frame.
@@ -100,33 +104,33 @@ def test_a_board_with_a_sigma_gives_way(place):
     np.testing.assert_allclose(after, before, atol=1e-6)
 
 
-def test_strokes_too_short_to_tell_are_no_doubt(place, monkeypatch):
+def test_strokes_too_short_to_tell_are_no_warning(place, monkeypatch):
     monkeypatch.setattr(
         "bench.trials.placing.first_look", None
     )  # which would decode every trial: not asked
-    made, doubts, _ = place(OFF, frames=3)
-    assert not doubts and "needs 4 frames" in made.notes[-1]
+    made, warnings, _ = place(OFF, frames=3)
+    assert not warnings and "needs 4 frames" in made.notes[-1]
 
 
-def test_where_no_stroke_can_be_read_what_turns_elsewhere_is_a_doubt(place, monkeypatch):
+def test_where_no_stroke_can_be_read_what_turns_elsewhere_is_a_warning(place, monkeypatch):
     """A wrong square_mm has the wire looked for where it is not."""
     T = np.eye(3, 4)
     T[1, 3] = 12.0
     monkeypatch.setattr("bench.trials.placing.first_look", lambda *_: FirstRig(T, 0, 0))
-    made, doubts, _ = place(OFF, frames=0)
-    assert doubts[0].codes == ("board_misplaced",)
+    made, warnings, _ = place(OFF, frames=0)
+    assert warnings[0].codes == ("board_misplaced",)
     assert "none of them can be read" in made.notes[-1]
 
 
 def test_a_board_by_ruler_wants_strokes_wide_enough(place):
-    _, (doubt,), _ = place(0 * OFF, sigma_mm=2.0, width_deg=1.5)
-    assert doubt.codes == ("board_misplaced",)
+    _, (warning,), _ = place(0 * OFF, sigma_mm=2.0, width_deg=1.5)
+    assert warning.codes == ("board_misplaced",)
 
 
 def test_without_a_board_the_strokes_place_the_rig(place):
     """A first look may be off by millimetres; no alarm compares it with the strokes, and no board is weighed in."""
-    made, doubts, _ = place(10 * OFF, board=False, width_deg=20.0)
-    assert not doubts and not any("board" in note for note in made.notes[1:])
+    made, warnings, _ = place(10 * OFF, board=False, width_deg=20.0)
+    assert not warnings and not any("board" in note for note in made.notes[1:])
     moved = made.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
     np.testing.assert_allclose(
         moved, CAMERAS["one"].T_camera_rig[:, :3] @ (10 * OFF[3:]), atol=0.05

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.base.doubts import Doubts
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.cameras.session_cameras import SessionCalibration, on_the_rig
@@ -79,18 +79,18 @@ def moved(session, T_world_rig):
 
 
 def place(session, cameras, T_rig_board, out):
-    """place_rig's calibration, the doubts, and the trial as a unit under that calibration."""
+    """place_rig's calibration, the warnings, and the trial as a unit under that calibration."""
     background = {name: read_picture(path) for name, path in session.rig_pictures.items()}
     before = SessionCalibration(cameras, background, "given", (), T_rig_board)
     unit = Unit(session, session.trials[0], "", before, Settings(), out)
-    doubts = Doubts()
-    made = place_rig(session, before, [unit], Workers(0), doubts)
-    return made, doubts.notes, replace(unit, calibration=made)
+    problems = InputProblems()
+    made = place_rig(session, before, [unit], Workers(0), problems)
+    return made, problems.warnings, replace(unit, calibration=made)
 
 
 def test_a_right_board_is_agreed_with(wide, tmp_path):
-    made, doubts, _ = place(wide, exact_cameras(wide.path), wide.T_rig_board, tmp_path)
-    assert not doubts
+    made, warnings, _ = place(wide, exact_cameras(wide.path), wide.T_rig_board, tmp_path)
+    assert not warnings
     (note,) = (note for note in made.notes if note.startswith("A free stroke of 2"))
     # A whole line may be off by 0.25 px, 0.07 mm in these small pictures, and two cameras on one side triple it.
     assert float(re.search(r"± ([0-9.]+) mm across", note)[1]) < 0.3
@@ -99,9 +99,9 @@ def test_a_right_board_is_agreed_with(wide, tmp_path):
 def test_a_board_1_mm_across_is_an_alarm(wide, tmp_path):
     # The board is said to stand 1 mm nearer along rig y than it does, and takes the cameras with it.
     shift = np.column_stack([np.eye(3), [0.0, -1.0, 0.0]])
-    _, (doubt,), _ = place(wide, moved(wide, shift), compose(shift, wide.T_rig_board), tmp_path)
+    _, (warning,), _ = place(wide, moved(wide, shift), compose(shift, wide.T_rig_board), tmp_path)
     # Three of the 0.13 mm that the stroke tells the centre to across the whisker.
-    assert float(re.search(r"across the whisker by ([+-][0-9.]+)", doubt)[1]) == pytest.approx(
+    assert float(re.search(r"across the whisker by ([+-][0-9.]+)", warning)[1]) == pytest.approx(
         -1.0, abs=0.4
     )
 
@@ -113,9 +113,9 @@ def test_the_swing_alone_places_the_rig(wide, tmp_path):
         session, moved(wide, invert_transform(wide.T_rig_board)), np.eye(3, 4)
     )
     assert "a first look at 1 stroke " in note
-    _, (doubt,), unit = place(session, cameras, T_rig_board, tmp_path)
+    _, (warning,), unit = place(session, cameras, T_rig_board, tmp_path)
     assert re.search(
-        r"22\.8 degrees fix the centre of rotation to 0\.05\d mm along the whisker only", doubt
+        r"22\.8 degrees fix the centre of rotation to 0\.05\d mm along the whisker only", warning
     )
     truth = tomllib.loads((unit.trial.folder / "truth.toml").read_text())
     (seen,) = see_unit(unit).whisks
@@ -155,5 +155,5 @@ def test_squares_a_sixth_too_large_are_what_a_stroke_that_cannot_be_read_leads_t
         replace(c, T_camera_rig=compose(c.T_camera_rig, invert_transform(wide.T_rig_board)))
         for c in far
     ]
-    _, (doubt,), _ = place(wide, Cameras(tuple(on_rig)), wide.T_rig_board, tmp_path)
-    assert "square_mm" in doubt
+    _, (warning,), _ = place(wide, Cameras(tuple(on_rig)), wide.T_rig_board, tmp_path)
+    assert "square_mm" in warning

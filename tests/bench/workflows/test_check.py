@@ -1,4 +1,4 @@
-"""`check` finds in seconds what `evaluate` would refuse or doubt after a minute."""
+"""`check` finds in seconds what `evaluate` would refuse or warn of after a minute."""
 
 import re
 import shutil
@@ -7,26 +7,26 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.base.doubts import Doubts
+from bench.base.input_problems import InputProblems
 from bench.session.frame_times import FrameTimes
 from bench.session.session_check import checked_session
 from bench.workflows.preflight import check_contents
 from tests.scenes.faults import FAULTS, TRIAL, change_picture
 
 
-def found(folder, *, boards=False) -> Doubts:
+def found(folder, *, boards=False) -> InputProblems:
     """What a look ahead says of a session; boards only where asked, which takes a second."""
-    doubts = Doubts(stop_at_first=False)
-    session = checked_session(folder, doubts)
+    problems = InputProblems(stop_at_first=False)
+    session = checked_session(folder, problems)
     if not boards:
         session.board_sources.clear()
-    check_contents(session, doubts)
-    return doubts
+    check_contents(session, problems)
+    return problems
 
 
 def test_a_sound_session(small_session):
-    doubts = found(small_session, boards=True)
-    assert (doubts.refusals, doubts.notes) == ([], [])
+    problems = found(small_session, boards=True)
+    assert (problems.refusals, problems.warnings) == ([], [])
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_a_sound_session(small_session):
 )
 def test_a_fault_of_a_trial(small_copy, fault, expected):
     FAULTS[fault](small_copy)
-    notes = found(small_copy).notes
+    notes = found(small_copy).warnings
     assert any(note.startswith(f"trials/{TRIAL}: ") and expected in note for note in notes), notes
 
 
@@ -67,7 +67,7 @@ def test_a_rig_picture_out_of_focus(small_copy):
     change_picture(rig, lambda grey: cv2.GaussianBlur(grey, (0, 0), 1.5))
     (line,) = [
         note
-        for note in found(small_copy, boards=True).notes
+        for note in found(small_copy, boards=True).warnings
         if note.startswith("boards/rig/low.png")
     ]
     assert float(line.split("blurred by ")[1].split(" px")[0]) == pytest.approx(
@@ -78,7 +78,7 @@ def test_a_rig_picture_out_of_focus(small_copy):
 def test_signals_of_another_trial(small_copy):
     FAULTS["another trial's signals"](small_copy)
     said = "trials b30_3, b60_4 have one and the same signals.csv: all but one have another's"
-    assert said in found(small_copy).notes
+    assert said in found(small_copy).warnings
 
 
 DICTIONARY = 'is not found, but one with dictionary = "DICT_5X5_50" is'
@@ -109,7 +109,7 @@ def test_too_few_views_of_the_board(small_copy):
 
 def test_gauge_trials_that_push_in_one_direction(small_copy):
     shutil.rmtree(small_copy / "trials" / "gauge_roll90")
-    (note,) = found(small_copy).notes
+    (note,) = found(small_copy).warnings
     assert note.startswith(
         "trials: the gauge trials push in one direction, which does not fix both channels; record"
     )

@@ -1,4 +1,4 @@
-"""Faults of a lab made one by one, and what a run says of each: exit code, status, doubts, and errors in stated sigmas.
+"""Faults of a lab made one by one, and what a run says of each: exit code, status, warnings, and errors in stated sigmas.
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/accuracy/faults.py OUT [PART OF A NAME ...]
 
@@ -79,8 +79,8 @@ def prepared(folder: Path) -> tuple[Path, Path]:
     return made, gauges
 
 
-def doubtful(printed: str) -> list[str]:
-    """Lines on what is doubtful; all where there is no verdict."""
+def warning_lines(printed: str) -> list[str]:
+    """Warnings; all lines where there is no verdict."""
     lines = printed.splitlines()
     if "Doubtful" not in lines:
         return [] if any(line.startswith("All of it: ") for line in lines) else lines
@@ -101,12 +101,12 @@ def study(folder: Path, name: str) -> None:
     print(f"== {name}\n   check {code} in {check_s:.1f} s: {told}")
     code, printed, seconds = run("evaluate", session, "--out", out)
     z = errors(out)
-    doubts = doubtful(printed)
+    warnings = warning_lines(printed)
     worst = max((abs(one) for one in z.values() if np.isfinite(one)), default=0.0)
     silent = "  SILENT" if code == 0 and worst > SILENT_SIGMAS else ""
     numbers = "  ".join(f"{quantity} z {one:+.1f}" for quantity, one in z.items())
     print(f"   evaluate {code} in {seconds:.0f} s: {numbers}  {estimate(out)}{silent}")
-    for line in doubts:
+    for line in warnings:
         print(f"     {line.strip()}")
     head = printed.splitlines()[:2]
     print(f"   verdict: {head[1] if len(head) > 1 and code < 2 else ''}", flush=True)

@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.analyses.surfaces import FittedSurface
 from bench.commands import cli
-from bench.commands.options import DONE, DOUBTFUL
+from bench.commands.options import DONE, WITH_WARNINGS
 from bench.records.trial_result import TrialResult
 from bench.report.pooled import pooled, read_run
 from bench.rig.protocol import FOLDER as PROTOCOLS
@@ -123,7 +123,7 @@ def record(folder: Path, tables: dict, seed: int, workers: int) -> tuple[float, 
 
 
 def _require(code: int) -> None:
-    if code not in (DONE, DOUBTFUL):
+    if code not in (DONE, WITH_WARNINGS):
         raise SystemExit(code)
 
 

@@ -27,10 +27,10 @@ def test_a_scene_is_seen_and_said():
 def test_what_is_far_off_without_a_word_is_counted():
     names = ("d_x_mm", "touch_deg", "beta_deg", "slip_mm")
     wrong = {f"{name}_sigma": 0.1 for name in names} | {f"{name}_error": 0.5 for name in names}
-    silent, doubted, none = (
+    silent, flagged, none = (
         {"value": 1.0, "status": status} for status in ("", "doubtful", "no truth")
     )
-    rows = [silent | wrong, doubted | wrong, none]
+    rows = [silent | wrong, flagged | wrong, none]
     (line,) = lines("beta_deg", rows)
     assert "2 of 3 with a truth" in line and "1 off by more than 4 sigma without a word" in line
 

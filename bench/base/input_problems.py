@@ -24,12 +24,12 @@ def in_one_status(*said: str | None) -> Reason:
 
 
 @dataclass
-class Doubts:
-    """Refusals (bad input) and notes (usable, but to be checked), in the order in which they were found."""
+class InputProblems:
+    """Refusals (bad input) and warnings (usable, but to be checked), in the order in which they were found."""
 
     stop_at_first: bool = True
     refusals: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
     @contextmanager
     def guard(self) -> Iterator[None]:
@@ -55,6 +55,6 @@ class Doubts:
             raise BadInput(self.refusals[before])
         return given
 
-    def note(self, line: str) -> None:
+    def warn(self, line: str) -> None:
         """Keep a line that the user should read (with a code: a `Reason`); the run goes on."""
-        self.notes.append(line)
+        self.warnings.append(line)
