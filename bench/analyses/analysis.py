@@ -8,11 +8,13 @@ summary, the page and docs/formats.md ask each of `bench.analyses.catalogue.ANAL
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from bench.analyses.estimator_accuracy import RunAccuracy
 from bench.base.drawing import is_drawn, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.settings import Settings
@@ -44,6 +46,11 @@ class EvaluatedRun:
     alpha_est_sigma_rad: float
     session: Session | None = None
     _findings: dict["Analysis", Any] = field(default_factory=dict, init=False, repr=False)
+
+    @cached_property
+    def accuracy(self) -> RunAccuracy:
+        """Return how well the truth is known, and how far off each estimator is."""
+        return RunAccuracy.of_results(self.results)
 
     def found(self, analysis: "Analysis") -> Any:
         """Return what an analysis finds in this run; it is computed at first use."""

@@ -10,6 +10,7 @@ from bench.analyses.explained import Explained
 from bench.analyses.figure_8 import Figure8
 from bench.analyses.friction_tables import FrictionAngles
 from bench.analyses.gave import GivesWay
+from bench.analyses.known_friction import KnownFriction
 from bench.analyses.ledger import Ledger
 from bench.analyses.moving_objects import MovingObjects
 from bench.analyses.single_camera import OneCamera
@@ -19,6 +20,7 @@ from bench.analyses.tilted import Tilts
 
 ANALYSES: tuple[Analysis, ...] = (
     FrictionAngles(),
+    KnownFriction(),
     Figure8(),
     ErrorAgainstSlope(),
     ErrorAgainstFriction(),

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from bench.analyses.estimator_accuracy import RunAccuracy
 from bench.analyses.runs import alpha_est_sigma
 from bench.array.array_page import write_page
 from bench.array.cloud import ContactPoint, Mount, contacts
@@ -24,7 +25,6 @@ from bench.base.tables import WHISKER
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import TrialResult, whisks
 from bench.report.assembly import estimate_rows, whisk_rows
-from bench.report.estimator_accuracy import RunAccuracy
 from bench.report.evaluation import Finished, finished
 from bench.report.pooled import read_run
 from bench.report.record import ARRAY, RUNS, read_record

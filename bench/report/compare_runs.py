@@ -5,11 +5,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.analyses.estimator_accuracy import Accuracy
 from bench.base.drawing import label_of
 from bench.base.errors import BadInput
 from bench.base.tables import TRIAL, WHISK, Column, Kind, Table
 from bench.records.trial_result import FeltWhisk, SeenWhisk, whisks
-from bench.report.estimator_accuracy import Accuracy
 from bench.report.evaluation import finished
 from bench.report.page.words import MISSING, number, with_sigma
 from bench.report.pooled import read_run

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 from bench.analyses.analysis import EvaluatedRun
@@ -13,7 +12,6 @@ from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.certificate import Certificate
 from bench.gauges.matrix import GaugeCalibration
 from bench.records.trial_result import TrialResult
-from bench.report.estimator_accuracy import RunAccuracy
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_touch, shared_touch_warning, with_shared_touch
 from vision.geometry import Reason
@@ -28,11 +26,6 @@ class Finished(EvaluatedRun):
     """
 
     touch_warning: Reason
-
-    @cached_property
-    def accuracy(self) -> RunAccuracy:
-        """Return how well the truth is known, and how far off each estimator is."""
-        return RunAccuracy.of_results(self.results)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from bench.analyses.estimator_accuracy import Accuracy
 from bench.analyses.friction_tables import SurfaceFriction
-from bench.report.estimator_accuracy import Accuracy
 from bench.report.evaluation import Finished
 from bench.report.page.words import MISSING, number, with_sigma
 from bench.report.run_facts import CameraFacts, RunRecord

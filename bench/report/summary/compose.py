@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.analyses.catalogue import ANALYSES
-from bench.analyses.friction_tables import FrictionAngles
 from bench.report.evaluation import Evaluation
 from bench.report.run_facts import Section
 from bench.report.run_tables import RUN_TABLES
@@ -15,7 +14,6 @@ from bench.report.summary.shared import scatter_warnings, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
 from bench.report.summary.verdict import (
     gauge_source_lines,
-    known_friction_lines,
     preset_lines,
     verdict,
 )
@@ -147,7 +145,7 @@ def _sections_of_errors(evaluation: Evaluation) -> Iterator[Section]:
 def _sections_of_analyses(evaluation: Evaluation) -> dict[str, Section]:
     """Return the sections of the analyses by their codes, in the summary's order.
 
-    Analyses of one code share a section. (10) with what is known of the friction stands with it.
+    Analyses of one code share a section.
     """
     titles = {}
     lines: dict[str, list[str]] = {code: [] for code in _ANALYSES_FIRST}
@@ -158,8 +156,6 @@ def _sections_of_analyses(evaluation: Evaluation) -> dict[str, Section]:
         titles[heading.code] = heading.title
         of_section = lines.setdefault(heading.code, [])
         of_section += analysis.lines(evaluation.found(analysis))
-        if isinstance(analysis, FrictionAngles):
-            of_section += known_friction_lines(evaluation.accuracy, evaluation.settings)
     return {code: _section(code, titles[code], lines[code]) for code in lines if code in titles}
 
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from bench.analyses.estimator_accuracy import accuracies, truth_uncertainty
 from bench.commands.cli import main
-from bench.report.estimator_accuracy import accuracies, truth_uncertainty
 from bench.report.page import words
 from bench.report.page.thumbnails import MOST_BYTES, MOST_INSIDE, picture_source
 from bench.report.page.write import BIBLIOGRAPHY, METHODS, REPORT, as_script

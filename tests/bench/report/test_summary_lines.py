@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
+from bench.analyses.estimator_accuracy import RunAccuracy
 from bench.base.settings import Settings
 from bench.gauges.felt import gauge_delay, lateness
 from bench.records.plain import from_plain, to_plain
@@ -15,7 +16,6 @@ from bench.records.trial_result import (
     TrialResult,
 )
 from bench.report.assembly import beam_rows, budget_rows
-from bench.report.estimator_accuracy import RunAccuracy
 from bench.report.run_facts import Section
 from bench.report.summary.compose import Summary
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
