@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bench.base.tables import SPEED, SURFACE, TRIAL, WHISK, Column, Table, sigma_name
 from bench.report.whisk_tables import WHISKS
-from bench.session.strict_toml import Keys
+from bench.session.strict_toml import Keys, key_names
 
 PAGE = Path(__file__).with_suffix(".md")
 PART = re.compile(r"<!-- made from ([\w.]+) -->\n.*?<!-- end -->", re.DOTALL)
@@ -61,7 +61,7 @@ def _own_keys(keys: type[Keys]) -> Iterator[tuple[str, str]]:
     lines = source.splitlines()
     meaning = ""
     for node in ast.parse(source).body[0].body:
-        if isinstance(node, ast.AnnAssign) and node.target.id in keys.__struct_fields__:
+        if isinstance(node, ast.AnnAssign) and node.target.id in key_names(keys):
             meaning = _comment_above(lines, node) or meaning
             yield node.target.id, meaning
 

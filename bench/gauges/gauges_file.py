@@ -1,7 +1,7 @@
 """gauges.toml and [gauges]: coefficients brought along, or made by `calibrate gauges` and copied here."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +14,7 @@ from bench.base.input_problems import InputProblems
 from bench.gauges.matrix import FROM_FILE, FROM_MANIFEST, GaugeCalibration, GaugeMatrix
 from bench.session import manifest
 from bench.session.session import Session
-from bench.session.strict_toml import Keys, as_keys, read_toml
+from bench.session.strict_toml import as_keys, read_toml
 
 Rows4 = Annotated[
     list[manifest.Row4],
@@ -22,14 +22,15 @@ Rows4 = Annotated[
 ]
 
 
-class WithoutKeys(Keys, kw_only=True, forbid_unknown_fields=True):
+class WithoutKeys(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Coefficients without one trial; no matrix where the others do not fix it."""
 
     matrix_Nmm_per_V: manifest.Matrix | None = None
     covariance: Rows4 | None = None
 
 
-class FileKeys(manifest.GaugeKeys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class FileKeys(manifest.GaugeKeys):
     """The keys of [gauges], and what `calibrate gauges` adds to them."""
 
     # 4 × 4, of the matrix row by row

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import lru_cache
 from types import NoneType, UnionType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -66,7 +66,7 @@ def from_plain(kind: type[Record], value: Any) -> Record:
 
 def _read(kind: Any, value: Any) -> Any:
     """Convert a plain value by its annotation; values of other types stay as they are."""
-    if isinstance(kind, UnionType):
+    if get_origin(kind) in (Union, UnionType):
         if value is None:
             return None
         kind = next(k for k in get_args(kind) if k is not NoneType)

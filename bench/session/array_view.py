@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.session import manifest
-from bench.session.daq import Channel, DaqFile
+from bench.session.daq import DaqFile
+from bench.session.manifest import ChannelKeys
 from bench.session.session import (
     MANIFEST,
     Base,
@@ -156,12 +157,12 @@ def _channels(trial: Trial, keys: manifest.ArrayWhiskerKeys) -> DaqFile:
     if trial.daq is not None:
         channels = dict(trial.daq.channels)
         for column, name in named.items():
-            channels[column] = replace(channels.get(column, Channel("")), channel=name)
+            channels[column] = replace(channels.get(column, ChannelKeys(channel="")), channel=name)
         return replace(trial.daq, channels=channels)
     columns = _tagged_columns(trial, keys.name) | named
     if not any(column in columns for column in (*VOLTS, *MOMENTS)):
         columns |= {column: _tagged(column, keys.name) for column in VOLTS}
-    channels = {column: Channel(name) for column, name in columns.items()}
+    channels = {column: ChannelKeys(channel=name) for column, name in columns.items()}
     return DaqFile(trial.signals_path.name, None, channels)
 
 

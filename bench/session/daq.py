@@ -14,6 +14,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.session import manifest
+from bench.session.manifest import ChannelKeys
 from bench.session.strict_toml import values
 from bench.session.table import NumberTable, column_names, read_table
 from bench.session.text_files import check_size
@@ -31,15 +32,6 @@ _NOT_TDMS = (ValueError, OSError, KeyError, EOFError, IndexError)
 
 
 @dataclass(frozen=True)
-class Channel:
-    """A channel of the file, and how its raw values become those of a column."""
-
-    channel: str
-    scale: float = 1.0
-    offset: float = 0.0
-
-
-@dataclass(frozen=True)
 class DaqFile:
     """The file that a DAQ leaves in each trial's folder.
 
@@ -48,7 +40,7 @@ class DaqFile:
 
     file: str
     rate_Hz: float | None
-    channels: dict[str, Channel]
+    channels: dict[str, ChannelKeys]
 
 
 def daq_file(keys: manifest.SignalKeys | None, label: str) -> DaqFile | None:
@@ -68,7 +60,7 @@ def daq_file(keys: manifest.SignalKeys | None, label: str) -> DaqFile | None:
     channels = {}
     for column, channel in values(keys, leave_out=("file", "rate_Hz")).items():
         if channel is not None:
-            channels[column] = Channel(channel.channel, channel.scale, channel.offset)
+            channels[column] = channel
     return DaqFile(keys.file, keys.rate_Hz, channels)
 
 
@@ -109,7 +101,7 @@ def frame_edges(path: Path, daq: DaqFile, time_s: np.ndarray, label: str) -> np.
     return time_s[k] + share * (time_s[k + 1] - time_s[k])
 
 
-def _read(path: Path, channels: list[Channel], label: str) -> list[np.ndarray]:
+def _read(path: Path, channels: list[ChannelKeys], label: str) -> list[np.ndarray]:
     """Read the values (n,) of channels."""
     check_size(path, _MOST_BYTES, "record in several trials", label)
     reader = _READERS[path.suffix.lower()]
@@ -117,7 +109,7 @@ def _read(path: Path, channels: list[Channel], label: str) -> list[np.ndarray]:
     return [_scaled(series, channel, label) for series, channel in zip(raw, channels)]
 
 
-def _scaled(series: Any, channel: Channel, label: str) -> np.ndarray:
+def _scaled(series: Any, channel: ChannelKeys, label: str) -> np.ndarray:
     """Return the values (n,) of a raw series. Raise BadInput where it is none of finite numbers."""
     name = f"channel {channel.channel}"
     try:

@@ -5,12 +5,13 @@ The comment above a key is what docs/formats.md says of it (`docs/formats.py`); 
 keys below, too, down to the next comment.
 """
 
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import msgspec
 
 from bench.session import plausible
-from bench.session.strict_toml import Keys
+from bench.session.strict_toml import Keys, key_names
 
 # Lists of so many numbers.
 _TWO = msgspec.Meta(min_length=2, max_length=2)
@@ -39,7 +40,8 @@ Force = Annotated[float, plausible.FORCE]
 Filter = Annotated[float, plausible.FILTER]
 
 
-class WhiskerKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class WhiskerKeys(Keys):
     """[whisker] of session.toml."""
 
     # "cylinder" (default), "cone": base diameter to a point at `length_mm`, or "tapered": to
@@ -61,7 +63,8 @@ class WhiskerKeys(Keys, kw_only=True):
     flexural_rigidity_sigma_Nmm2: float = 0.0
 
 
-class BarKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class BarKeys(Keys):
     """[bar] of session.toml."""
 
     # diameter of the round bar that is touched
@@ -69,7 +72,8 @@ class BarKeys(Keys, kw_only=True):
     diameter_sigma_mm: float = 0.0
 
 
-class BoardKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class BoardKeys(Keys):
     """[board] of session.toml."""
 
     # how many squares [along x, along y]
@@ -88,7 +92,8 @@ class BoardKeys(Keys, kw_only=True):
     inverted: bool = False
 
 
-class RigKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class RigKeys(Keys):
     """[rig] of session.toml."""
 
     # 3 × 4, mm: rig = rows · [board x, y, z, 1] for the board in boards/rig; absent: it is
@@ -100,7 +105,8 @@ class RigKeys(Keys, kw_only=True):
     T_rig_board_sigma_deg: float = 0.0
 
 
-class CameraKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class CameraKeys(Keys):
     """One [[cameras]] of session.toml."""
 
     # name of the folder or film
@@ -111,7 +117,8 @@ class CameraKeys(Keys, kw_only=True):
     exposure_sigma_s: float = 0.0
 
 
-class GaugeKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class GaugeKeys(Keys):
     """[gauges] of session.toml, and gauges.toml."""
 
     # [y, z] where there is no moment
@@ -122,7 +129,8 @@ class GaugeKeys(Keys, kw_only=True):
     matrix_sigma_Nmm_per_V: Matrix | None = None
 
 
-class ChannelNames(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class ChannelNames(Keys):
     """[whiskers.channels] of session.toml: the file's own names of a whisker's columns."""
 
     # whiskers on one motor share it; no other channel is shared
@@ -137,7 +145,8 @@ class ChannelNames(Keys, kw_only=True):
     f_z_N: str | None = None
 
 
-class ArrayWhiskerKeys(WhiskerKeys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class ArrayWhiskerKeys(WhiskerKeys):
     """One [[whiskers]] of session.toml."""
 
     # its own name; letters, digits, `_`, `-`, `.`
@@ -147,7 +156,7 @@ class ArrayWhiskerKeys(WhiskerKeys, kw_only=True):
     base_sigma_mm: float = 0.0
     # its base frame, turned about the rig's x, then y, then z ([0, 0, 0]): z is the axis that it
     # turns about, x the whisker at motor angle 0
-    base_deg: Turns = msgspec.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    base_deg: Turns = field(default_factory=lambda: [0.0, 0.0, 0.0])
     base_sigma_deg: float = 0.0
     # the table `[whiskers.gauges]`, with the keys of `[gauges]`
     gauges: GaugeKeys | None = None
@@ -156,7 +165,8 @@ class ArrayWhiskerKeys(WhiskerKeys, kw_only=True):
     channels: ChannelNames = ChannelNames()
 
 
-class ObjectKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class ObjectKeys(Keys):
     """[object] of trial.toml: what the object is, and perhaps where it stands, in the rig frame."""
 
     # "bar" (default), "ring": a bar bent to a circle, "sphere" or "cone"
@@ -174,7 +184,8 @@ class ObjectKeys(Keys, kw_only=True):
     half_angle_deg: HalfAngle | None = None
 
 
-class TrialKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class TrialKeys(Keys):
     """trial.toml, and [trial] of session.toml for all trials."""
 
     # groups trials in fits and plots
@@ -227,7 +238,8 @@ class TrialKeys(Keys, kw_only=True):
     object: ObjectKeys | None = None
 
 
-class ChannelKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class ChannelKeys(Keys):
     """A channel of [signals]: scale · raw + offset."""
 
     channel: str
@@ -235,7 +247,8 @@ class ChannelKeys(Keys, kw_only=True):
     offset: float = 0.0
 
 
-class SignalKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class SignalKeys(Keys):
     """[signals] of session.toml: the DAQ's file in each trial's folder, and its channels."""
 
     # its name in each trial's folder: .csv, .mat, .h5, .hdf5 or .tdms. HDF5 (and .mat of version
@@ -263,7 +276,8 @@ class SignalKeys(Keys, kw_only=True):
     frame_V: ChannelKeys | None = None
 
 
-class SessionKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class SessionKeys(Keys):
     """session.toml."""
 
     # version of this format: 1
@@ -287,7 +301,7 @@ class SessionKeys(Keys, kw_only=True):
 
 def sigma_key(key: str) -> str:
     """Return the key of a value's standard deviation: 'd_x_mm' -> 'd_x_sigma_mm'; '' without one."""
-    for name in TrialKeys.__struct_fields__:
+    for name in key_names(TrialKeys):
         if "_sigma_" in name and name.replace("_sigma_", "_") == key:
             return name
     return ""

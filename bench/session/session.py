@@ -14,7 +14,7 @@ from bench.session.daq import daq_file
 from bench.session.footage import camera_sources, single_pictures, visible
 from bench.session.inside import check_inside
 from bench.session.plausible import YOUNGS_MODULUS
-from bench.session.strict_toml import as_keys, read_toml, values
+from bench.session.strict_toml import as_keys, key_names, read_toml, values
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker
 from vision.geometry import Board, Reason, invert_transform, nearest_rotation
@@ -225,9 +225,9 @@ def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
 
 def stated_whisker(keys: manifest.WhiskerKeys, table: str) -> Whisker:
     """Return the whisker of a table, which messages name so. Raise BadInput for an impossible one."""
-    fields = {name: getattr(keys, name) for name in manifest.WhiskerKeys.__struct_fields__}
+    sizes = {name: getattr(keys, name) for name in key_names(manifest.WhiskerKeys)}
     try:
-        whisker = Whisker(**fields)
+        whisker = Whisker(**sizes)
     except ValueError as problem:
         raise BadInput(f"{table} {problem}", file=MANIFEST) from None
     _check_rigidity(whisker, table)

@@ -1,13 +1,15 @@
 """TOML files of people: every unknown key is named with the one probably meant, every value checked.
 
 A file is declared as a tree of `Keys`: the type of a key says what it holds, the range of plausible
-values (`Annotated[float, PlausibleRange(...)]`), or that it is a table of its own.
+values (`Annotated[float, PlausibleRange(...)]`), or that it is a table of its own. What a table
+states is used under the names of its keys: `Whisker` and `Trial` derive from theirs.
 """
 
 import difflib
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import MISSING, dataclass, fields
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeAlias, get_args, get_origin, get_type_hints
@@ -27,7 +29,8 @@ _SET_BY_PROTRACTOR = ("beta_deg", "follicle_roll_deg")
 TablePath: TypeAlias = tuple[str, ...]
 
 
-class Keys(msgspec.Struct, frozen=True):
+@dataclass(frozen=True, kw_only=True)
+class Keys:
     """A table of a file: its keys with their types and defaults."""
 
 
@@ -79,9 +82,15 @@ def as_keys(
     return keys
 
 
+@lru_cache
+def key_names(kind: type[Keys]) -> tuple[str, ...]:
+    """Return the names of a table's keys."""
+    return tuple(field.name for field in fields(kind))
+
+
 def values(keys: Keys, leave_out: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return a table's values by key."""
-    return {name: getattr(keys, name) for name in keys.__struct_fields__ if name not in leave_out}
+    return {name: getattr(keys, name) for name in key_names(type(keys)) if name not in leave_out}
 
 
 @lru_cache
@@ -99,9 +108,9 @@ def inner_tables(kind: type[Keys]) -> dict[str, type[Keys]]:
 def _declared(kind: type[Keys], is_wanted: Callable[[Any], bool]) -> dict[str, Any]:
     """Return the first wanted part of each key's type, by key; keys without one are left out."""
     found = {}
-    for field in msgspec.structs.fields(kind):
-        for part in filter(is_wanted, _parts(field.type)):
-            found.setdefault(field.name, part)
+    for name, annotation in get_type_hints(kind, include_extras=True).items():
+        for part in filter(is_wanted, _parts(annotation)):
+            found.setdefault(name, part)
     return found
 
 
@@ -131,7 +140,7 @@ def _unknown_keys(tables: dict[str, Any], top: type[Keys]) -> Iterator[str]:
     """Yield a line for each key that its table does not have."""
     for table, kind, path in _tables(tables, top):
         for key in table:
-            if key not in kind.__struct_fields__:
+            if key not in key_names(kind):
                 place = _key_path([*path, key])
                 yield f"{place} is not a key of this file; {_probably_meant(key, kind, top)}"
 
@@ -139,8 +148,9 @@ def _unknown_keys(tables: dict[str, Any], top: type[Keys]) -> Iterator[str]:
 def _missing_keys(tables: dict[str, Any], top: type[Keys]) -> Iterator[str]:
     """Yield a line for each key that a table needs and lacks."""
     for table, kind, path in _tables(tables, top):
-        for field in msgspec.structs.fields(kind):
-            if field.required and field.name not in table:
+        for field in fields(kind):
+            is_needed = field.default is MISSING and field.default_factory is MISSING
+            if is_needed and field.name not in table:
                 yield f"{_key_path([*path, field.name])} is missing"
 
 
@@ -150,7 +160,7 @@ def _value_checks(
     """Yield a check of each value, tables within included."""
     for table, kind, path in _tables(tables, top):
         for key, value in table.items():
-            if key not in kind.__struct_fields__:
+            if key not in key_names(kind):
                 continue
             if "_sigma_" in key:
                 plausible_range = plausible.SIGMA
@@ -183,11 +193,11 @@ def _numbers(value: Any) -> Iterator[float]:
 
 def _probably_meant(key: str, kind: type[Keys], top: type[Keys]) -> str:
     """Return which key was meant: one like it, the same one of another table, or which there are."""
-    allowed = kind.__struct_fields__
+    allowed = key_names(kind)
     if near := difflib.get_close_matches(key, allowed, n=1, cutoff=0.6):
         return f"did you mean {near[0]!r}?"
     tables = inner_tables(top).items()
-    if homes := [f"[{name}]" for name, table in tables if key in table.__struct_fields__]:
+    if homes := [f"[{name}]" for name, table in tables if key in key_names(table)]:
         return f"it belongs in {' or '.join(homes)}."
     return f"allowed are {', '.join(name for name in allowed if '_sigma_' not in name)}."
 

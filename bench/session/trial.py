@@ -1,6 +1,6 @@
 """One trial of a session: its settings and where its files are. The files are read elsewhere."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bench.base.errors import BadInput
@@ -16,65 +16,19 @@ _UPRIGHT = (0.0, 0.0, 1.0)  # axis of an object that stands somewhere, where it 
 _SHAPE_OF_SIZE = {"ring_diameter_mm": "ring", "half_angle_deg": "cone"}
 
 
-@dataclass(frozen=True)
-class StatedObject:
-    """The object by trial.toml, and where it stands in the rig frame; None where that is not stated.
+@dataclass(frozen=True, kw_only=True)
+class Trial(manifest.TrialKeys):
+    """One recording: what trial.toml and [trial] state, and where its files are.
 
-    point_mm (3,): of a bar's axis, the centre of a ring or sphere, or a cone's tip, with one sigma
-    of each coordinate. axis (3,): the bar's direction, the normal of the ring's plane, or where the
-    cone points.
-    """
-
-    shape: str
-    point_mm: tuple[float, ...] | None
-    point_sigma_mm: float
-    axis: tuple[float, ...] | None
-    ring_diameter_mm: float | None
-    half_angle_deg: float | None = None
-
-
-@dataclass(frozen=True)
-class Trial:
-    """Settings of one recording; nominal values are None where not given, sigmas 0 where exact.
-
-    purpose: "measure", "gauge" or "weight" (then force_N hung at_mm from the base).
-    follicle_roll_deg: how the follicle was turned about the whisker. both_ways: each way back is
-    evaluated, too. object_velocity_mm_s: (3,) in the rig frame, of an object that moves at constant
-    speed, with one sigma each way. object_gives_way: it moves as it is pushed. camera_sources:
-    camera to folder of pictures or video, empty where the trial has none. whisker: of an array,
-    whose channels `daq` names; '' where it is the only one.
+    Nominal values are None where not given, sigmas 0 where exact. bar_diameter_mm: the session's
+    where the trial has no own. camera_sources: camera to folder of pictures or video, empty where the
+    trial has none. whisker: of an array, whose channels `daq` names; '' where it is the only one.
     """
 
     name: str
     folder: Path
     camera_sources: dict[str, Path]
     signals_path: Path
-    surface: str
-    purpose: str
-    speed_deg_s: float | None
-    speed_sigma_deg_s: float
-    beta_deg: float | None
-    beta_sigma_deg: float
-    d_x_mm: float | None
-    d_x_sigma_mm: float
-    bar_diameter_mm: float
-    bar_diameter_sigma_mm: float
-    follicle_roll_deg: float
-    follicle_roll_sigma_deg: float
-    force_N: float | None
-    force_sigma_N: float
-    at_mm: float | None
-    at_sigma_mm: float
-    frame_rate_Hz: float | None
-    frame_rate_sigma_Hz: float
-    first_frame_s: float | None
-    first_frame_sigma_s: float
-    gauge_filter_Hz: float | None
-    object: StatedObject | None = None
-    both_ways: bool = False
-    object_velocity_mm_s: list[float] | None = None
-    object_velocity_sigma_mm_s: float = 0.0
-    object_gives_way: bool = False
     daq: DaqFile | None = None
     whisker: str = ""
 
@@ -156,23 +110,17 @@ def _trial_keys(
 
 def _stated_object(
     keys: manifest.ObjectKeys | None, thickness_mm: float | None, label: str
-) -> StatedObject | None:
+) -> manifest.ObjectKeys | None:
     """Return the object of trial.toml; None where there is none. Raise BadInput for an impossible one.
 
-    thickness_mm: bar_diameter_mm.
+    One that stands somewhere, and says not how, stands upright. thickness_mm: bar_diameter_mm.
     """
     if keys is None:
         return None
     _check_object(keys, thickness_mm, label)
-    is_placed = keys.point_mm is not None
-    return StatedObject(
-        shape=keys.shape,
-        point_mm=tuple(keys.point_mm) if is_placed else None,
-        point_sigma_mm=keys.point_sigma_mm,
-        axis=tuple(keys.axis or _UPRIGHT) if is_placed else None,
-        ring_diameter_mm=keys.ring_diameter_mm,
-        half_angle_deg=keys.half_angle_deg,
-    )
+    if keys.point_mm is not None and keys.axis is None:
+        return replace(keys, axis=list(_UPRIGHT))
+    return keys
 
 
 def _check_object(keys: manifest.ObjectKeys, thickness_mm: float | None, label: str) -> None:

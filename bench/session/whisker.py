@@ -3,28 +3,18 @@
 import math
 from dataclasses import dataclass
 
+from bench.session.manifest import WhiskerKeys
 from estimator.beam import Beam, flexural_rigidity
 from vision.geometry import Wire
 
 
-@dataclass(frozen=True)
-class Whisker:
+@dataclass(frozen=True, kw_only=True)
+class Whisker(WhiskerKeys):
     """Shape, size and stiffness, each with one standard deviation (0: taken as exact).
 
     diameter_mm is the base's; a "tapered" whisker, and no other, has a tip_diameter_mm below it. Exactly one of
     `youngs_modulus_GPa` and `flexural_rigidity_Nmm2` (at the base) is given. Raises ValueError for anything else.
     """
-
-    shape: str
-    length_mm: float
-    diameter_mm: float
-    youngs_modulus_GPa: float | None = None
-    flexural_rigidity_Nmm2: float | None = None
-    length_sigma_mm: float = 0.0
-    diameter_sigma_mm: float = 0.0
-    youngs_modulus_sigma_GPa: float = 0.0
-    flexural_rigidity_sigma_Nmm2: float = 0.0
-    tip_diameter_mm: float | None = None
 
     def __post_init__(self):
         """Raise ValueError where the keys contradict each other."""

@@ -2,11 +2,9 @@
 other setting.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
-
-import msgspec
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
@@ -25,7 +23,8 @@ STANDARD = "standard"
 _OWN_TABLE = "seeing"
 
 
-class SeeingKeys(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class SeeingKeys(Keys):
     """Table [seeing] of a settings file; the preset has what is not given."""
 
     preset: str = STANDARD
@@ -39,10 +38,11 @@ class SeeingKeys(Keys, kw_only=True):
     check_beam: bool | None = None
 
 
-class SettingsFile(Keys, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class SettingsFile(Keys):
     """A settings file, which `evaluate --settings` reads and `tradeoff` writes."""
 
-    seeing: SeeingKeys = msgspec.field(default_factory=SeeingKeys)
+    seeing: SeeingKeys = SeeingKeys()
 
 
 def by_preset(name: str) -> Seeing:

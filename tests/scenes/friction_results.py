@@ -13,7 +13,7 @@ from bench.session.whisker import Whisker
 from estimator import slip
 from estimator.distance import with_friction
 
-WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=60.0)
+WHISKER = Whisker(shape="cylinder", length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
 C, THETA, ALPHA = WHISKER.C_Nmm2, np.radians(3.0), np.radians(14.0)
 WHISKER_FACTS = WhiskerFacts("cylinder", 100.0, 1.0, WHISKER.EI_Nmm2)
 # A whisk whose only frame is one before touch.

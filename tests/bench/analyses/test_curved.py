@@ -17,7 +17,7 @@ from estimator import curvature
 from tests.scenes.rig_sessions import protocol_file
 from vision.truth.value import Value
 
-WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=60.0)
+WHISKER = Whisker(shape="cylinder", length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
 D_X, ALPHA, THETAS = 60.0, np.radians(10.0), np.radians([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0])
 PROTOCOL = """
 name = "thick"

@@ -87,7 +87,7 @@ def test_a_cone_is_a_cone_here_too():
     """(10) as the estimator has it, for both shapes."""
     theta, m_y, m_z, alpha = np.radians(3.0), 2.0, 7.0, np.radians(10.0)
     for shape in ("cylinder", "cone"):
-        whisker = Whisker(shape, 100.0, 1.0, youngs_modulus_GPa=60.0)
+        whisker = Whisker(shape=shape, length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
         beam, nothing = Beam(whisker.C_Nmm2, 100.0, shape), np.zeros(0)
         felt = Whisk(nothing, nothing, nothing, nothing, theta, m_y, m_z, np.eye(2), 0.0, beam)
         expected = with_friction(felt, EstimatorSettings(alpha)).d_x_mm

@@ -229,7 +229,7 @@ def test_at_the_bound_of_the_search_there_is_no_angle():
 @pytest.mark.parametrize("shape", ["cylinder", "cone"])
 def test_smoothness_finds_the_friction_of_bars_along_one_edge(shape):
     """(13), (14) exactly, at two distances in turn: the α that they were made with."""
-    whisker = Whisker(shape, 100.0, 1.0, youngs_modulus_GPa=60.0)
+    whisker = Whisker(shape=shape, length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
     bars = [
         along(beta, (45.0, 60.0)[k % 2], whisker)
         for k, beta in enumerate((-60, -45, -20, 0, 30, 50, 65))

@@ -109,7 +109,9 @@ def test_taper_drift_cross_talk_and_teeth_are_the_estimate_made_again():
     assert found["drift"].effects["touch_felt_deg"] == pytest.approx(0.02)
     assert found["second friction coefficient"].effects["d_x_est_mm"] == pytest.approx(d_x - 58.0)
     assert found["taper"].effects["d_x_est_mm"] == 0
-    cone = by_name(whisk, Whisker("cone", 100.0, 1.0, youngs_modulus_GPa=60.0))["taper"]
+    cone = by_name(
+        whisk, Whisker(shape="cone", length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
+    )["taper"]
     assert 1 / (d_x + cone.effects["d_x_est_mm"]) == pytest.approx(1 / d_x - 1 / 100.0)
 
 

@@ -15,7 +15,7 @@ from estimator.compliance import compliance_on_soft_object
 from tests.scenes.rig_sessions import protocol_file
 from vision.truth.value import Value
 
-WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=60.0)
+WHISKER = Whisker(shape="cylinder", length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
 FACTS = TrialFacts("soft", "measure", "sponge", 10.0)
 NOTHING_SHARED, FRICTIONLESS = np.zeros(1), Value(0.0, 0.0)
 PROTOCOL = """
@@ -45,7 +45,9 @@ def places(stiffness: float, sigma: float = 1e-6, whisker: Whisker = WHISKER) ->
 @pytest.mark.parametrize("shape, tip", [("cylinder", None), ("cone", None), ("tapered", 0.4)])
 def test_two_places_tell_the_stiffness_to_what_is_corrected(shape, tip):
     """At θ = 1e-4 what (2) leaves out is nothing."""
-    whisker = Whisker(shape, 100.0, 1.0, youngs_modulus_GPa=60.0, tip_diameter_mm=tip)
+    whisker = Whisker(
+        shape=shape, length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0, tip_diameter_mm=tip
+    )
     found = softness(whisker, FACTS, *places(0.5, whisker=whisker), 1e-4, FRICTIONLESS)
     assert found.give_mm_N.value == pytest.approx(2.0, abs=1e-3)
     k, low, high = found.stiffness_N_mm

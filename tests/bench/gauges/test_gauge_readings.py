@@ -21,7 +21,7 @@ from bench.session.signals import forward_strokes, read_signals
 from bench.session.whisker import Whisker
 from estimator.signal import FeltTouch
 
-WHISKER = Whisker("cylinder", 100.0, 1.0, 60.0)
+WHISKER = Whisker(shape="cylinder", length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
 
 
 @pytest.fixture

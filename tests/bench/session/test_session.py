@@ -7,7 +7,9 @@ import pytest
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.session.manifest import TrialKeys, WhiskerKeys
 from bench.session.session import load_session
+from bench.session.strict_toml import key_names
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from vision.geometry.reasons import as_reason
@@ -147,7 +149,13 @@ def test_sigmas_arrive_in_the_units_of_the_code(small_copy):
 
 
 def test_uncertain_diameter_counts_fourfold():
-    whisker = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=60.0, diameter_sigma_mm=0.01)
+    whisker = Whisker(
+        shape="cylinder",
+        length_mm=100.0,
+        diameter_mm=1.0,
+        youngs_modulus_GPa=60.0,
+        diameter_sigma_mm=0.01,
+    )
     assert whisker.C_sigma_Nmm2 == pytest.approx(0.04 * whisker.C_Nmm2)
 
 
@@ -193,3 +201,9 @@ def test_real_board_videos_make_a_session(real, tmp_path):
         "cam_2": "cam_2.mp4",
     }
     assert session.board.inverted
+
+
+@pytest.mark.parametrize(("kind", "keys"), [(Trial, TrialKeys), (Whisker, WhiskerKeys)])
+def test_what_a_table_states_is_declared_by_its_keys_alone(kind, keys):
+    assert issubclass(kind, keys)
+    assert not set(key_names(keys)) & set(kind.__annotations__)

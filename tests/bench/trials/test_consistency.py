@@ -144,7 +144,9 @@ def test_a_diameter_known_badly_is_not_contradicted(trial):
     ],
 )
 def test_a_whisker_of_another_length_is_told_by_two_cameras(ends_mm, length_mm, said):
-    whisker = Whisker("cylinder", length_mm, 1.0, 200.0)
+    whisker = Whisker(
+        shape="cylinder", length_mm=length_mm, diameter_mm=1.0, youngs_modulus_GPa=200.0
+    )
     found = check_length({str(k): Value(end, 2.0) for k, end in enumerate(ends_mm)}, whisker)
     assert found.endswith(said) and bool(found) == bool(said)
 
@@ -171,7 +173,13 @@ def test_a_whisker_of_another_length_is_told_by_two_cameras(ends_mm, length_mm, 
 def test_a_whisker_of_another_diameter_is_told_by_cameras_that_do_not_contradict_each_other(
     looks, sigma_mm, said
 ):
-    whisker = Whisker("cylinder", 100.0, 1.5, 60.0, diameter_sigma_mm=sigma_mm)
+    whisker = Whisker(
+        shape="cylinder",
+        length_mm=100.0,
+        diameter_mm=1.5,
+        youngs_modulus_GPa=60.0,
+        diameter_sigma_mm=sigma_mm,
+    )
     found = check_wire_width({str(k): one for k, one in enumerate(looks)}, whisker)
     assert said in found and bool(found) == bool(said)
 

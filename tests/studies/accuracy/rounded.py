@@ -35,7 +35,7 @@ from estimator.whisk import EstimatorSettings, Whisk
 from vision.truth.value import Value
 
 ROD = Rod("cylinder", 120.0, 1.0, 60.0)
-WHISKER = Whisker("cylinder", 120.0, 1.0, youngs_modulus_GPa=60.0)
+WHISKER = Whisker(shape="cylinder", length_mm=120.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
 D_X_MM, THETA, ALPHA = 60.0, math.radians(3.0), math.radians(10.5)
 THETAS = np.radians(np.arange(1.0, 8.0))
 NOISE_NMM, TUBE_MM = (

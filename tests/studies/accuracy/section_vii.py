@@ -38,7 +38,7 @@ SCATTER_DEG, SCATTER_MM, GAUGE_SHARE, NOISE_NMM, WHISKS = 0.4, 0.4, 0.004, 0.02,
 SHIFT_MM, SHIFT_SIGMA_MM = 20.0, 0.1  # of the base, along the whisker
 DRAWS = 10  # of noise and gauges, of a soft object at its two distances
 ALPHA_EST_DEG, ALPHA_EST_SIGMA_DEG = 12.0, 5.0  # as assumed
-WHISKER = Whisker("cylinder", 100.0, 1.0, youngs_modulus_GPa=E_GPA)
+WHISKER = Whisker(shape="cylinder", length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=E_GPA)
 
 
 def session(
@@ -69,7 +69,13 @@ def two_places(
     noise and gauges."""
     rod, _ = rod_and_beam(shape)
     tip = TIP_MM if shape == "tapered" else None
-    whisker = Whisker(shape, LENGTH_MM, DIAMETER_MM, youngs_modulus_GPa=E_GPA, tip_diameter_mm=tip)
+    whisker = Whisker(
+        shape=shape,
+        length_mm=LENGTH_MM,
+        diameter_mm=DIAMETER_MM,
+        youngs_modulus_GPa=E_GPA,
+        tip_diameter_mm=tip,
+    )
     near, exact = rng.uniform(35.0, 55.0), []
     for nominal in (near, near + SHIFT_MM):
         d_x = nominal + SHIFT_SIGMA_MM / np.sqrt(2.0) * rng.normal()

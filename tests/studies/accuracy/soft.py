@@ -96,7 +96,9 @@ def two_distances(stiffness_N_mm: float, near_m_z: float) -> float:
     places = (
         place(d, compliance=THETA_RAD / m_z) for d, m_z in ((NEAR_MM, near_m_z), (FAR_MM, far_m_z))
     )
-    whisker = Whisker("cylinder", LENGTH_MM, DIAMETER_MM, youngs_modulus_GPa=E_GPA)
+    whisker = Whisker(
+        shape="cylinder", length_mm=LENGTH_MM, diameter_mm=DIAMETER_MM, youngs_modulus_GPa=E_GPA
+    )
     facts = TrialFacts("soft", "measure", "soft", 10.0, bar_diameter_mm=2 * RADIUS_MM)
     return softness(whisker, facts, *places, THETA_RAD, Value(ALPHA_RAD, 0.0)).give_mm_N.value
 

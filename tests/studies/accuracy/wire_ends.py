@@ -35,7 +35,12 @@ def ends(folder: Path, factor: float) -> tuple[dict, str]:
     (whisk,) = observe_trial(
         pictures, everything, cameras, Rods(wire, rods.bar), PRESETS["draft"]
     ).whisks
-    stated = Whisker(wire.shape, wire.length_mm, wire.diameter_mm, youngs_modulus_GPa=1.0)
+    stated = Whisker(
+        shape=wire.shape,
+        length_mm=wire.length_mm,
+        diameter_mm=wire.diameter_mm,
+        youngs_modulus_GPa=1.0,
+    )
     return whisk.ends, check_length(whisk.ends, stated) or whisk.status
 
 
