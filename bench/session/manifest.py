@@ -5,13 +5,15 @@ The comment above a key is what docs/formats.md says of it (`docs/formats.py`); 
 keys below, too, down to the next comment.
 """
 
+import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Annotated, Literal
 
 import msgspec
 
 from bench.session import plausible
-from bench.session.strict_toml import Keys, key_names
+from bench.session.strict_toml import Keys, declared_parts, key_names
 
 # Lists of so many numbers.
 _TWO = msgspec.Meta(min_length=2, max_length=2)
@@ -32,12 +34,22 @@ Modulus = Annotated[float, plausible.YOUNGS_MODULUS]
 Rigidity = Annotated[float, plausible.RIGIDITY]
 Angle = Annotated[float, plausible.ANGLE]
 Slope = Annotated[float, plausible.SLOPE]
-HalfAngle = Annotated[float, plausible.HALF_ANGLE]
 Speed = Annotated[float, plausible.SPEED]
 Rate = Annotated[float, plausible.RATE]
 Exposure = Annotated[float, plausible.EXPOSURE]
 Force = Annotated[float, plausible.FORCE]
 Filter = Annotated[float, plausible.FILTER]
+
+
+@dataclass(frozen=True)
+class SizeOf:
+    """Says of a key of [object] that it states a size of one shape, and of no other."""
+
+    shape: str
+
+
+RingDiameter = Annotated[float, plausible.LENGTH, SizeOf("ring")]
+HalfAngle = Annotated[float, plausible.HALF_ANGLE, SizeOf("cone")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,10 +190,22 @@ class ObjectKeys(Keys):
     # ([0, 0, 1])
     axis: Annotated[list[float], _THREE] | None = None
     # diameter of the circle that the ring's axis is
-    ring_diameter_mm: Length | None = None
+    ring_diameter_mm: RingDiameter | None = None
     # angle of the cone between its axis and its surface. `bar_diameter_mm` then is twice its radius
     # across, along its normal, where it is touched; nothing of the cloud asks for it
     half_angle_deg: HalfAngle | None = None
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Return the sizes of its shape, in mm and rad, by their names in `StatedSizes`."""
+        stated = {}
+        for key in shape_of_size():
+            value = getattr(self, key)
+            if value is not None and key.endswith("_deg"):
+                stated[f"{key.removesuffix('_deg')}_rad"] = math.radians(value)
+            elif value is not None:
+                stated[key] = value
+        return stated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,6 +321,13 @@ class SessionKeys(Keys):
     gauges: GaugeKeys | None = None
     signals: SignalKeys | None = None
     trial: TrialKeys = TrialKeys()
+
+
+@lru_cache
+def shape_of_size() -> dict[str, str]:
+    """Return of which shape a key of [object] is a size, by key."""
+    declared = declared_parts(ObjectKeys, SizeOf)
+    return {key: size.shape for key, size in declared.items()}
 
 
 def sigma_key(key: str) -> str:

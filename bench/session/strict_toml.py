@@ -96,7 +96,12 @@ def values(keys: Keys, leave_out: tuple[str, ...] = ()) -> dict[str, Any]:
 @lru_cache
 def plausible_ranges(kind: type[Keys]) -> dict[str, plausible.PlausibleRange]:
     """Return the ranges of plausible values that a table declares, by key."""
-    return _declared(kind, lambda part: isinstance(part, plausible.PlausibleRange))
+    return declared_parts(kind, plausible.PlausibleRange)
+
+
+def declared_parts(kind: type[Keys], wanted: type) -> dict[str, Any]:
+    """Return what each key's type has of this class in `Annotated`, by key; keys without are left out."""
+    return _declared(kind, lambda part: isinstance(part, wanted))
 
 
 @lru_cache

@@ -13,7 +13,6 @@ from bench.session.strict_toml import as_keys, read_toml, values
 MANIFEST = "trial.toml"
 SIGNALS = "signals.csv"
 _UPRIGHT = (0.0, 0.0, 1.0)  # axis of an object that stands somewhere, where it is not stated
-_SHAPE_OF_SIZE = {"ring_diameter_mm": "ring", "half_angle_deg": "cone"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +124,7 @@ def _stated_object(
 
 def _check_object(keys: manifest.ObjectKeys, thickness_mm: float | None, label: str) -> None:
     """Raise BadInput for an impossible object. thickness_mm: bar_diameter_mm."""
-    for key, shape in _SHAPE_OF_SIZE.items():
+    for key, shape in manifest.shape_of_size().items():
         if (keys.shape == shape) != (getattr(keys, key) is not None):
             found = f'{key} belongs to shape = "{shape}", and to no other shape'
             raise BadInput(f"[object] {found}", file=label)

@@ -103,12 +103,7 @@ def stated_object(trial: Trial) -> Touched:
     given = trial.object
     if given is None:
         return Bar.from_sizes(thickness)
-    stated = replace(
-        thickness,
-        ring_diameter_mm=given.ring_diameter_mm or 0.0,
-        half_angle_rad=float(np.radians(given.half_angle_deg or 0.0)),
-    )
-    return touched_object(given.shape, stated)
+    return touched_object(given.shape, replace(thickness, **given.sizes))
 
 
 def _back_frames(trial: Trial, signals: Signals, times: FrameTimes) -> dict[int, slice]:
