@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.base.weighted import independent_mean
 from vision import NAN
 
 STATIC = "static"
@@ -36,15 +37,11 @@ class Phases:
         Both are NaN with less than two angles.
         """
         chosen = [angle for angle in self.angles if angle.kind == kind]
-        count = len(chosen)
-        if count < 2:
+        if len(chosen) < 2:
             return NAN, NAN
         values = np.array([angle.alpha_rad for angle in chosen])
-        precisions = np.array([angle.sigma_rad for angle in chosen]) ** -2.0
-        weights = precisions / np.sum(precisions)
-        mean = float(weights @ values)
-        scatter = np.sqrt(count / (count - 1) * np.sum(weights**2 * (values - mean) ** 2))
-        return mean, float(max(scatter, np.sum(precisions) ** -0.5))
+        sigmas = np.array([angle.sigma_rad for angle in chosen])
+        return independent_mean(values, sigmas)
 
 
 NO_PHASES = Phases(0, 0, ())
