@@ -157,40 +157,6 @@ def _radius_lines(found: Sequence[CurvedWhisk]) -> Iterator[str]:
     )
 
 
-def curved(
-    felt: Iterable[FeltAt], whisker: Whisker, alpha_rad: float, alpha_sigma_rad: float
-) -> Curved:
-    """Return the curvature by the moments of a whisk at successive pushing angles.
-
-    Where φ turns far, only the first angles count. alpha_rad, alpha_sigma_rad: the assumed friction
-    angle and its standard deviation.
-    """
-    chosen = independent_angles(felt)
-    if len(chosen) < _FEWEST:
-        return Curved(len(chosen), status=reason("angles_few", least=_FEWEST))
-    slip = _slip_angle(chosen)
-    while slip.turns_far and len(chosen) > _FEWEST:
-        chosen = chosen[:-1]
-        slip = _slip_angle(chosen)
-    count = len(chosen)
-    phi = slip.at_touch
-    if slip.turns_far:
-        too_far = reason("phi_turns_far", degrees=np.degrees(slip.span_rad))
-        return Curved(count, phi_0_rad=phi, status=too_far)
-    distances = np.array([_distance(at, alpha_rad, whisker.beam) for at in chosen])
-    if not np.isfinite(distances).all():
-        return Curved(count, phi_0_rad=phi, status=reason("distances_missing"))
-    d_x, creep = _at_touch(column(chosen, "theta_rad"), distances[:, 0], distances[:, 1])
-    alpha = Value(alpha_rad, alpha_sigma_rad)
-    if slip.is_held:
-        radius = _radius(d_x.value, creep, 0.0, alpha, 0.0, whisker)
-        return Curved(count, radius, phi, status=reason("no_lateral_slip"))
-    turned = _turned(d_x.value, phi.value, slip.rate, alpha_rad)
-    radius = _radius(d_x.value, creep, phi.value, alpha, turned, whisker)
-    lateral, printed = _lateral(phi.value, slip.rate, d_x.value, alpha_rad)
-    return Curved(count, radius, phi, lateral, printed)
-
-
 @dataclass(frozen=True)
 class _SlipAngle:
     """φ over a push: at touch, rad, its rate with θ, and the span of its values, rad."""
@@ -210,6 +176,54 @@ class _SlipAngle:
         phi = self.at_touch
         most_rad = _MOST_TURN * abs(phi.value) + _HELD_SIGMAS * phi.sigma
         return not self.is_held and self.span_rad > most_rad
+
+
+def curved(
+    felt: Iterable[FeltAt], whisker: Whisker, alpha_rad: float, alpha_sigma_rad: float
+) -> Curved:
+    """Return the curvature by the moments of a whisk at successive pushing angles.
+
+    Where φ turns far, only the first angles count. alpha_rad, alpha_sigma_rad: the assumed friction
+    angle and its standard deviation.
+    """
+    chosen = independent_angles(felt)
+    if len(chosen) < _FEWEST:
+        return Curved(len(chosen), status=reason("angles_few", least=_FEWEST))
+    chosen, slip = _before_phi_turns_far(chosen)
+    if slip.turns_far:
+        too_far = reason("phi_turns_far", degrees=np.degrees(slip.span_rad))
+        return Curved(len(chosen), phi_0_rad=slip.at_touch, status=too_far)
+    return _by_slip(chosen, slip, whisker, Value(alpha_rad, alpha_sigma_rad))
+
+
+def _before_phi_turns_far(felt: Sequence[FeltAt]) -> tuple[Sequence[FeltAt], _SlipAngle]:
+    """Return the first pushing angles, over which φ does not turn far, and φ over them.
+
+    Where φ turns far even over the fewest angles, these are returned.
+    """
+    slip = _slip_angle(felt)
+    while slip.turns_far and len(felt) > _FEWEST:
+        felt = felt[:-1]
+        slip = _slip_angle(felt)
+    return felt, slip
+
+
+def _by_slip(felt: Sequence[FeltAt], slip: _SlipAngle, whisker: Whisker, alpha: Value) -> Curved:
+    """Return the curvature by the distances at the pushing angles and by how φ turns over them."""
+    count = len(felt)
+    phi = slip.at_touch
+    alpha_rad = alpha.value
+    distances = np.array([_distance(at, alpha_rad, whisker.beam) for at in felt])
+    if not np.isfinite(distances).all():
+        return Curved(count, phi_0_rad=phi, status=reason("distances_missing"))
+    d_x, creep = _at_touch(column(felt, "theta_rad"), distances[:, 0], distances[:, 1])
+    if slip.is_held:
+        radius = _radius(d_x.value, creep, 0.0, alpha, 0.0, whisker)
+        return Curved(count, radius, phi, status=reason("no_lateral_slip"))
+    turned = _turned(d_x.value, phi.value, slip.rate, alpha_rad)
+    radius = _radius(d_x.value, creep, phi.value, alpha, turned, whisker)
+    lateral, printed = _lateral(phi.value, slip.rate, d_x.value, alpha_rad)
+    return Curved(count, radius, phi, lateral, printed)
 
 
 def _slip_angle(felt: Sequence[FeltAt]) -> _SlipAngle:

@@ -183,12 +183,17 @@ def _draw_panel(top: "Axes", bottom: "Axes", surface: FittedSurface, letter: str
     fitted = ""
     if surface.fit is not None:
         fitted = _draw_fit(top, bottom, surface)
-    top.set_title(f"{letter} {surface.title}", loc="left")
-    nominal = " (nominal)" if surface.felt[0].nominal else ""
-    bottom.set(xlabel=f"slope β  [°]{nominal}", xlim=(-2, 82), ylim=(-3, 82))
     spread = 100.0 * float(np.median(m_sd_Nmm / m_Nmm))
     scaled = f"|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)"
     top.annotate(fitted + scaled, (0.04, 0.04), **_NOTE)
+    _label_panel(top, bottom, surface, letter)
+
+
+def _label_panel(top: "Axes", bottom: "Axes", surface: FittedSurface, letter: str) -> None:
+    """Write the title of a panel above, and the slopes below."""
+    top.set_title(f"{letter} {surface.title}", loc="left")
+    nominal = " (nominal)" if surface.felt[0].nominal else ""
+    bottom.set(xlabel=f"slope β  [°]{nominal}", xlim=(-2, 82), ylim=(-3, 82))
 
 
 def _draw_fit(top: "Axes", bottom: "Axes", surface: FittedSurface) -> str:

@@ -222,24 +222,36 @@ def _least_scatter(some: Sequence[FeltContact], whisker: Whisker, degree: int) -
         distances = _distances(some, alphas_rad, whisker)  # (contacts, α)
         return np.array([_residuals(of_alpha, heights, degree) for of_alpha in distances.T])
 
-    on_grid = np.sum(residuals(_GRID_RAD) ** 2, axis=1)
+    def squares(alphas_rad: np.ndarray) -> np.ndarray:
+        """Return the sums (α,) of squared residuals."""
+        return np.sum(residuals(alphas_rad) ** 2, axis=1)
+
+    on_grid = squares(_GRID_RAD)
     last = int(np.flatnonzero(np.isfinite(on_grid))[-1])
     best = int(np.nanargmin(on_grid))
     if best in (0, last):
         status = reason("friction_at_bound", bound_deg=np.degrees(_GRID_RAD[best]))
         return _AlphaFit(np.nan, status=status)
-    found = minimize_scalar(
-        lambda alpha_rad: np.sum(residuals(np.array([alpha_rad])) ** 2),
-        bounds=(_GRID_RAD[best - 1], _GRID_RAD[best + 1]),
-        method="bounded",
-        options={"xatol": 1e-7},
-    )
-    alpha_rad = float(found.x)
+    bounds = (_GRID_RAD[best - 1], _GRID_RAD[best + 1])
+    alpha_rad, least = _bounded_minimum(squares, bounds)
     freedom = len(some) - degree - 2  # the object's coefficients, and α
     if freedom < 1:
         return _AlphaFit(alpha_rad)
-    sigma = _fit_sigma(residuals, alpha_rad, found.fun / freedom)
+    sigma = _fit_sigma(residuals, alpha_rad, least / freedom)
     return _AlphaFit(alpha_rad, sigma, freedom)
+
+
+def _bounded_minimum(
+    squares: Callable[[np.ndarray], np.ndarray], bounds: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the α between two bounds, rad, at which the sum of squares is least, and that sum."""
+    found = minimize_scalar(
+        lambda alpha_rad: squares(np.array([alpha_rad]))[0],
+        bounds=bounds,
+        method="bounded",
+        options={"xatol": 1e-7},
+    )
+    return float(found.x), found.fun
 
 
 def _fit_sigma(

@@ -278,18 +278,17 @@ def softness(
     taper = beam.taper / whisker.length_mm
     shift_mm = far.nominal_mm - near.nominal_mm
     k_theta = []  # of near and far place, rad/(N·mm)
+    shared = []  # (k,) of each place
     for place in (near, far):
-        k_theta.append(
-            _corrected(place, whisker, trial.bar_diameter_mm, theta_rad, alpha_est.value)
-        )
+        corrected = _corrected(place, whisker, trial.bar_diameter_mm, theta_rad, alpha_est.value)
+        k_theta.append(corrected)
+        of_model = _model_sigma(place, beam, theta_rad, alpha_est)
+        shared.append(np.append(place.shared, of_model))
     d_x, _ = compliance.two_distances(*k_theta, shift_mm, beam.C_Nmm2, taper)
     soft = Soft(*trial.panel, near, far)
     if not np.isfinite(d_x):
         return replace(soft, status=NO_PUSH)
     give = compliance.give(d_x, k_theta[0], beam.C_Nmm2, taper)
-    shared = []  # (k,) of each place
-    for place in (near, far):
-        shared.append(np.append(place.shared, _model_sigma(place, beam, theta_rad, alpha_est)))
     d_x_sigma, give_sigma = _sigmas(soft, d_x, give, beam.C_Nmm2, taper, shared)
     return replace(
         soft,

@@ -1,7 +1,7 @@
 """Every view of the board in a session: held before the cameras, standing on the rig, and in the trials' frames."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -71,13 +71,29 @@ def read_board_views(session: Session) -> SessionViews:
     return SessionViews(boards, sizes_px, rig, trials, _times(session, boards), tuple(notes))
 
 
+@dataclass
+class _Samples:
+    """Some grey pictures of a series, with and without a board; of every so many frames one."""
+
+    every: int
+    with_board: list[np.ndarray] = field(default_factory=list)
+    without_board: list[np.ndarray] = field(default_factory=list)
+
+    def add(self, index: int, grey: np.ndarray | None, view: Corners) -> None:
+        """Keep a frame if it is one of the samples; the first with a board is kept in any case."""
+        is_sample = grey is not None and index % self.every == 0
+        if len(view):
+            if len(self.with_board) < _SAMPLES and (is_sample or not self.with_board):
+                self.with_board.append(grey)
+        elif is_sample and len(self.without_board) < _SAMPLES:
+            self.without_board.append(grey)
+
+
 def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
     """Return a view a frame; frames that are not sampled or damaged count as without a board."""
     views = []
-    without_board: list[np.ndarray] = []  # some grey pictures
-    with_board: list[np.ndarray] = []
     chosen = sampled_frames(frames.count)
-    every = max(1, len(chosen) // _SAMPLES)
+    samples = _Samples(every=max(1, len(chosen) // _SAMPLES))
 
     def find(frame: tuple[int, np.ndarray | None]) -> tuple[int, np.ndarray | None, Corners]:
         """Return a frame with its view of the board."""
@@ -88,15 +104,11 @@ def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
 
     for index, grey, view in in_threads(find, frames.read()):
         views.append(view)
-        is_sample = grey is not None and index % every == 0
-        if len(view) and len(with_board) < _SAMPLES and (is_sample or not with_board):
-            with_board.append(grey)
-        elif not len(view) and len(without_board) < _SAMPLES and is_sample:
-            without_board.append(grey)
+        samples.add(index, grey, view)
     if sum(fixes_pose(view, board) for view in views) < MIN_VIEWS:
-        _require_no_reason(without_board, board, name)
+        _require_no_reason(samples.without_board, board, name)
     with refused_as_bad_input(f"boards/{name}"):
-        check_marker_size(with_board, board)
+        check_marker_size(samples.with_board, board)
     return views
 
 

@@ -70,15 +70,29 @@ def place_rig(
     except Refused as refusal:
         if strokes_only:
             raise _without_rig_frame(refusal) from None
-        if isinstance(refusal, _Unread):
-            problems.warnings += _turning_elsewhere(session, calibration)
-        return calibration.with_notes(f"The free strokes do not tell where the rig is: {refusal}")
-    if strokes_only or (not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
+        return _placed_by_board_alone(session, calibration, refusal, problems)
+    is_by_ruler = not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM
+    if strokes_only or is_by_ruler:
         _require_swing(placement, problems)
     if placement.alarm and not strokes_only:
         problems.warn(Reason("board_misplaced", placement.alarm))
     notes = placement.notes[:1] if stays or strokes_only else placement.notes
     return placed_here.with_notes(*notes, *[_STAYS] * stays)
+
+
+def _placed_by_board_alone(
+    session: Session,
+    calibration: SessionCalibration,
+    refusal: Refused,
+    problems: InputProblems,
+) -> SessionCalibration:
+    """Return the calibration as the board places it, with a note on why no free stroke serves.
+
+    Where no stroke can be read, what turns elsewhere than the board has it is a warning.
+    """
+    if isinstance(refusal, _Unread):
+        problems.warnings += _turning_elsewhere(session, calibration)
+    return calibration.with_notes(f"The free strokes do not tell where the rig is: {refusal}")
 
 
 def _without_rig_frame(refusal: Refused) -> BadInput:

@@ -90,14 +90,12 @@ def _see(
     presets = [_with_clock(preset, clock_sigma_s) for preset in presets_for(settings)]
     truth, whisks = _observe(frames, calibration, presets, settings.accuracy_mm)
     back = dict(zip(frames.back, truth.whisks[len(whisks) :]))
-    warnings = frames.scene.left_out.values()
     of_trial = _trial_contradictions(truth, session, trial)
+    warnings = frames.scene.left_out.values()
     seen = []
     for name, whisk in whisks:
-        contradictions = [*of_trial, *_whisk_contradictions(whisk, session, trial, settings)]
-        record = whisk_record(whisk, settings, warnings, contradictions)
-        alone = by_one_camera(whisk, session.whisker, settings)
-        seen.append(replace(record, looked=name, by_one_camera=alone))
+        record = _whisk_of_trial(session, trial, whisk, settings, warnings, of_trial)
+        seen.append(replace(record, looked=name))
     return SeenTrial(
         tuple(seen),
         notes=_notes(frames),
@@ -110,6 +108,23 @@ def _see(
         back=_back_stroke(back.get(0)),
         ways_back=_ways_back(back, len(whisks), settings) if trial.both_ways else (),
     )
+
+
+def _whisk_of_trial(
+    session: Session,
+    trial: Trial,
+    whisk: WhiskTruth,
+    settings: Settings,
+    warnings: Iterable[Reason],
+    of_trial: Iterable[Reason],
+) -> SeenWhisk:
+    """Return the record of a whisk, with what contradicts it and what one camera alone sees.
+
+    warnings: of the recording. of_trial: contradictions of the trial as a whole.
+    """
+    contradictions = [*of_trial, *_whisk_contradictions(whisk, session, trial, settings)]
+    record = whisk_record(whisk, settings, warnings, contradictions)
+    return replace(record, by_one_camera=by_one_camera(whisk, session.whisker, settings))
 
 
 def _notes(frames: TrialFrames) -> tuple[str, ...]:

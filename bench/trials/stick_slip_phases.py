@@ -90,15 +90,17 @@ def _seen_angles(
     d_y = frames.d_y_mm.value[index]
     d_z = frames.d_z_mm.value[index]
     turning = np.abs(d_z) * d_x_mm / (d_y**2 + d_z**2)  # dα/dθ of a contact at rest
+    alpha = frames.alpha_rad.value[index]
+    sigma = frames.alpha_rad.sigma[index]
     angles = []
     for first, last in jumps:
         middle = float(0.5 * (theta[first] + theta[last]))
         width = theta[last] - theta[first]
         for kind, k, half in ((STATIC, first, 0.5), (KINETIC, last, -0.5)):
-            alpha = frames.alpha_rad.value[index[k]] + half * width * turning[k]
+            carried = alpha[k] + half * width * turning[k]
             by_width = turning[k] * width / np.sqrt(12.0)
-            spread = np.hypot(frames.alpha_rad.sigma[index[k]], by_width)
-            angles.append(Angle(kind, middle, float(alpha), float(spread)))
+            spread = np.hypot(sigma[k], by_width)
+            angles.append(Angle(kind, middle, float(carried), float(spread)))
     return angles
 
 

@@ -11,6 +11,7 @@ from bench.base.input_problems import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import Drawing, SeenTrial, SeenWhisk
 from vision import REST_PRIOR_MM
+from vision.geometry import Reason
 from vision.pictures import Others, RodLines
 
 _MOSTLY = 0.5  # of a wire's length: of two wires in one place most is, of two that cross little
@@ -68,16 +69,26 @@ def _checked(
     for camera, wire in wires.items():
         offsets.append(_base_offset(wire, straight[camera], frame, own, radius_mm))
     offset_mm, nearest = max(offsets)
-    is_off_base = offset_mm > _MOST_BESIDE_MM
-    if is_off_base and nearest not in (own, *taken):
-        taken.append(nearest)
-    found = []
-    if is_off_base:
-        found.append(reason("wire_off_its_base", beside_mm=offset_mm))
-    if taken:
-        found.append(reason("wire_of_another", names=" or ".join(taken)))
+    found = _wire_reasons(offset_mm, nearest, taken, own)
     status = in_one_status(whisk.status, *found)
     return replace(whisk, status=status, contradicted=whisk.contradicted or bool(found))
+
+
+def _wire_reasons(offset_mm: float, nearest: str, taken: list[str], own: str) -> list[Reason]:
+    """Return why a wire may be another whisker's.
+
+    offset_mm: of the wire from its base. nearest: whisker whose base is nearest to it. taken:
+    whiskers on whose wires it lies. own: the whisker's name.
+    """
+    found = []
+    names = list(taken)
+    if offset_mm > _MOST_BESIDE_MM:
+        found.append(reason("wire_off_its_base", beside_mm=offset_mm))
+        if nearest not in (own, *taken):
+            names.append(nearest)
+    if names:
+        found.append(reason("wire_of_another", names=" or ".join(names)))
+    return found
 
 
 def _wires(drawing: Drawing, straight: Mapping[str, Others]) -> dict[str, np.ndarray]:

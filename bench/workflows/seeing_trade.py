@@ -27,6 +27,7 @@ from bench.session.inside import check_outside
 from bench.session.session import Session
 from bench.session.session_check import checked_session
 from bench.session.signals import forward_strokes, read_signals
+from bench.session.trial import Trial
 from bench.trials.of_session import placed_units, trials_with_whisks, with_gauges
 from bench.trials.seeing import PRESETS, STANDARD, as_toml, by_preset
 from bench.trials.trial_evaluation import trial_result
@@ -144,10 +145,8 @@ def tradeoff(
     problems = InputProblems()
     session = checked_session(path, problems, follow_links=settings.follow_links)
     recorded = trials_with_whisks(session)
-    wanted = [trial for trial in recorded if settings.takes(trial.name) and trial.camera_sources]
+    wanted = _trials_to_time(recorded, settings)
     names = {trial.name for trial in wanted}
-    if not names:
-        raise BadInput(f"--trials {settings.trials}: no trial with pictures has such a name")
     with lock_output(out), Workers(1, progress) as pool:
         _, units = placed_units(session, recorded, out, settings, pool, problems)
         *_, units = with_gauges(units, pool, problems)
@@ -159,6 +158,14 @@ def tradeoff(
         trades.append(_time_drawing(chosen, _standard(trades), repeats))
         trades = _with_errors(session, chosen, trades)
     return _write(out, trades)
+
+
+def _trials_to_time(recorded: Sequence[Trial], settings: Settings) -> list[Trial]:
+    """Return the trials with pictures that the settings name. Raise BadInput where none is."""
+    wanted = [trial for trial in recorded if settings.takes(trial.name) and trial.camera_sources]
+    if not wanted:
+        raise BadInput(f"--trials {settings.trials}: no trial with pictures has such a name")
+    return wanted
 
 
 def settings_to_try(cameras: Sequence[str]) -> Iterator[Seeing]:
