@@ -192,11 +192,11 @@ def _draw_errors(
     """
     for one_factor in (False, True):
         for place, surface in enumerate(fitted):
-            chosen = [
-                j
-                for j in judged
-                if j.one_factor == one_factor and (j.surface, j.speed_deg_s) == surface.panel
-            ]
+            chosen = []
+            for j in judged:
+                is_of_panel = (j.surface, j.speed_deg_s) == surface.panel
+                if is_of_panel and j.one_factor == one_factor:
+                    chosen.append(j)
             if chosen:
                 label = label_of(chosen[0].estimator)
                 label += ", one gauge factor a channel" if one_factor else ""
@@ -217,11 +217,11 @@ def _draw_group(
     """Draw errors of one estimator over x (n,); hollow where flagged or of one gauge factor."""
     colour = colour_of(judged[0].estimator, number)
     for is_filled in (True, False):
-        drawn = [
-            (place, j)
-            for place, j in zip(x, judged)
-            if (j.has_warning or j.one_factor) != is_filled
-        ]
+        drawn = []
+        for place, j in zip(x, judged):
+            is_hollow = j.has_warning or j.one_factor
+            if is_hollow != is_filled:
+                drawn.append((place, j))
         if drawn:
             draw_whisks(
                 axes,

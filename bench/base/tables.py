@@ -126,10 +126,9 @@ class Table:
                 names, *rows = csv.reader(file)
             single = [row for row in rows if _is_single(names, row)]
             by_column = list(zip(*single)) or [()] * len(names)
-            values = [
-                _values(cells, kinds.get(name, Kind.NUMBER))
-                for name, cells in zip(names, by_column)
-            ]
+            values = []
+            for name, cells in zip(names, by_column):
+                values.append(_values(cells, kinds.get(name, Kind.NUMBER)))
         except (OSError, ValueError, csv.Error) as problem:
             raise BadInput(
                 f"cannot be read ({problem}); evaluate the session again into this folder",

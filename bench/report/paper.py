@@ -71,11 +71,9 @@ def _remove_links(figure: Figure) -> None:
 
 def _columns(figure: Figure) -> int:
     """Return how many panels are side by side."""
-    return max(
-        (
-            axes.get_subplotspec().get_gridspec().ncols
-            for axes in figure.axes
-            if axes.get_subplotspec()
-        ),
-        default=1,
-    )
+    counts = []
+    for axes in figure.axes:
+        place = axes.get_subplotspec()
+        if place is not None:
+            counts.append(place.get_gridspec().ncols)
+    return max(counts, default=1)

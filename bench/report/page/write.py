@@ -131,10 +131,19 @@ def _of_scene(record: RunRecord, rows: list[WhiskRow]) -> dict[str, object]:
 
 def page_tables(out: Path) -> list[PageTable]:
     """Return the tables on whisks together that have rows. Raises BadInput if a file is damaged."""
-    tables = [analysis.page_table(out) for analysis in ANALYSES]
-    shown = [table for table in tables if table is not None and table.rows]
-    first = [table for name in _TABLES_FIRST for table in shown if table.file == name]
-    return [*first, *(table for table in shown if table not in first)]
+    shown = []
+    for analysis in ANALYSES:
+        table = analysis.page_table(out)
+        if table is not None and table.rows:
+            shown.append(table)
+
+    def place(table: PageTable) -> int:
+        """Return the place of a table's file in `_TABLES_FIRST`, or one behind all of these."""
+        if table.file in _TABLES_FIRST:
+            return _TABLES_FIRST.index(table.file)
+        return len(_TABLES_FIRST)
+
+    return sorted(shown, key=place)
 
 
 def _setting(value: object) -> str:
