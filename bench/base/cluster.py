@@ -23,7 +23,7 @@ from bench.base.workers import DIED, Workers, has_one_thread, pictures_by_one_th
 _CODE = ("bench", "vision", "estimator")
 # Libraries that results are computed by.
 _LIBRARIES = ("numpy", "scipy", "scikit-image", "opencv-contrib-python-headless")
-# [s] For a scheduler to answer. Set by eye.
+# [s] For a scheduler to answer. Stated.
 _LONG_ENOUGH_S = 10.0
 # of one task; Dask warns from 10 MB on, and a task holds the rig pictures of all cameras
 _LARGE = "1GB"

@@ -32,7 +32,8 @@ from vision.geometry import LENS_TERMS, Camera, Cameras
 HOLD_EVERY = 4
 # A distortion term this many sigmas from zero is one that the views need.
 _NEEDED_SIGMAS = 2.0
-_MOST_LEFT_OUT = 0.1  # of a camera's corners: a tenth beyond 4.5 sigma is no noise. Set by eye
+# [1] Of a camera's corners. Noise puts 7 in a million beyond 4.5 sigma: a tenth is something else. Stated.
+_MOST_LEFT_OUT = 0.1
 # Bars stand beyond this share of the whisker.
 _NEAREST_BAR = 0.4
 # [mm] A bar is seen by so much on either side of the whisker.

@@ -19,7 +19,8 @@ FRAME = "frame"
 TIME = "time_s"
 # A gap of so many usual steps inside a whisk is a dropped frame.
 _DROPPED_STEPS = 1.5
-# Of the interval stated, beyond the steps in which times are written. Set by eye.
+# [1] Of the interval stated, beyond the steps in which times are written. Study: no time and no
+# warning of the sessions of tests/studies/net.py changes at half or at twice of it.
 _RATE_TOLERANCE = 1e-3
 # A header's rate is nominal: crystals are right to 1e-4, a computer's timers to some 1e-3.
 _HEADER_TOLERANCE = 1e-2

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.ndimage import median_filter
 
-# [rad] Less is a motor that settles, or its encoder's steps. Set by eye.
+# [rad] Less is a motor that settles, or its encoder's steps. Study: no stroke of the sessions of
+# tests/studies/net.py changes at half or at twice of it.
 SMALLEST_STROKE_RAD = np.radians(0.3)
 # Of the largest stroke: a shorter one is kept (a recording may start mid-stroke), a settling motor is not.
 _SMALLEST_SHARE = 0.2

@@ -24,18 +24,27 @@ from estimator.signal import FeltTouch
 from estimator.uncertainty import slip_angle_sigma
 from vision import FrameTruth
 
-# mm: less slip shows neither rest nor jump. Set by eye
+# [mm] Less slip shows neither rest nor jump. Study: tests/bench/trials/test_phases.py, which holds at half and
+# at twice of it.
 _LEAST_SLIP_MM = 0.1
-_LEAST_FRAMES = 3  # fewer show neither rest nor jump. Set by eye
+# [frames] Fewer show neither rest nor jump: three have two intervals, of which one may rest. Derived.
+_LEAST_FRAMES = 3
 _FIRST_RAD = np.radians(0.5)  # before, the slip angle is mostly noise
 _REST_SHARE = 0.5  # of the slope of a slip that never rests, σ/θ: below it the contact rests
 _LONGEST_JUMP = 2  # intervals between frames
 _SIGMAS = 3.0  # a rest is told from free slip where they differ by so many
 _JUMP_SIGMAS = 6.0  # in thousands of samples noise reaches 4
-_WINDOW_RAD = np.radians(0.12)  # rad: half a window in which a slope is taken. Set by eye
-_WINDOW_S = 0.012  # s: half a window, where that is less. Set by eye
-_FEWEST = 4  # samples in half a window, at least. Set by eye
-_MOST = 40  # samples in half a window, at most. Set by eye
+# [rad] Half a window in which a slope is taken. Study: tests/bench/trials/test_phases.py, which holds at half and
+# at twice of it.
+_WINDOW_RAD = np.radians(0.12)
+# [s] Half a window, where that is less: what `_WINDOW_RAD` takes at 10°/s. Derived.
+_WINDOW_S = 0.012
+# [samples] In half a window, at least. Study: tests/bench/trials/test_phases.py, which holds at half and at
+# twice of it.
+_FEWEST = 4
+# [samples] In half a window, at most. Study: tests/bench/trials/test_phases.py, which fails at half
+# of it.
+_MOST = 40
 _GUARD = 3  # samples at a jump that the gauges' own filter smears
 
 
