@@ -1,7 +1,7 @@
 """The friction angle α of each whisk: seen (no gauge) and felt (β seen, φ from the moments), in rad."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -119,8 +119,8 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
     centred = d.across_y_mm - d.across_y_mm.mean()
     weights = centred / np.sum(centred**2)  # (frames,) of the slope of a line
     alpha, slope = _straight_line(d, beta, weights)
-    # To first order an error of d_y acts as one of d_z times the slope; rows of z and y take turns.
-    gradient = np.stack([weights, -slope * weights], axis=1).ravel()  # (2 frames,)
+    # To first order an error of d_y acts as one of d_z times the slope; rows of along, z and y take turns.
+    gradient = np.stack([np.zeros_like(weights), weights, -slope * weights], axis=1).ravel()
     slope_sigma = float(np.sqrt(gradient @ d.covariance @ gradient))
     return alpha, float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
 
@@ -168,9 +168,9 @@ def _near_touch(d: Deflection) -> Deflection:
     near = d.theta_rad <= _FARTHEST_RAD
     if np.all(near) or np.sum(near) < _FEWEST_NEAR:
         return d
-    both = np.repeat(near, 2)
-    parts = {f.name: getattr(d, f.name)[near] for f in fields(d) if f.name != "covariance"}
-    return Deflection(**parts, covariance=d.covariance[np.ix_(both, both)])
+    rows = np.repeat(near, 3)
+    of_frames = {name: values[near] for name, values in vars(d).items() if np.ndim(values) == 1}
+    return replace(d, **of_frames, covariance=d.covariance[np.ix_(rows, rows)])
 
 
 def _heading(d: Deflection, theta_rad: float | np.ndarray) -> float | np.ndarray:

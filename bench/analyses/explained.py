@@ -120,7 +120,7 @@ def explained_rows(results: Iterable[TrialResult], whisker: Whisker) -> Iterator
     """Yield the rows of whisks with truth and estimate; cells that cannot be known are NaN."""
     for result, seen, felt in whisks(results):
         answers = [row for row in felt.estimates if row.estimator == "with_friction"]
-        if not answers or seen.deflection is None:
+        if not answers or not seen.has_truth:
             continue
         alpha_rad, sigma_rad = seen_friction(seen)
         yield {

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.gauges.felt import FeltStroke
-from bench.gauges.gauge_readings import Pairs
+from bench.gauges.gauge_readings import NOMINAL, WIRE_ALONE, Pairs
 from bench.gauges.matrix import GaugeCalibration, GaugeMatrix
 from bench.gauges.reversal import Reversal, in_percent
 from bench.gauges.weights import NewtonScale
@@ -168,12 +168,15 @@ class Certificate:
         without = self.gauges.without
         yield f"Range of validity: |m_y| up to {most[0]:.2f} N·mm, |m_z| up to {most[1]:.2f} N·mm (full scale)"
         yield f"Points used: {len(self.moments)} frames of {len(self.pairs)} whisks"
+        for source in (WIRE_ALONE, NOMINAL):
+            names = dict.fromkeys(p.trial for p in self.pairs if p.source == source)
+            if names:
+                yield f"Moments {source}: {_few(list(names))}"
         yield f"Saturated samples left out: {sum(stroke.saturated for stroke in self.strokes)}"
         yield f"Trials used: {len(without)}, each judged by coefficients fitted without it"
         missing = [name for name, rest in without.items() if rest is None]
         if missing:
-            named = ", ".join(missing) if len(missing) <= _MOST_NAMED else f"{len(missing)} of them"
-            yield f"Not known without one of these, so that they are not judged: {named}"
+            yield f"Not known without one of these, so that they are not judged: {_few(missing)}"
         yield ""
 
     def _assumed(self) -> Iterator[str]:
@@ -201,6 +204,11 @@ class Certificate:
         yield f"{C:.1f} ± {U95 * C_sigma:.1f} N·mm², E = {E:.2f} ± {U95 * E_sigma:.2f} GPa. C cancels between"
         yield "calibration and estimate: an error of E never shows in a distance. The rod is held by one force;"
         yield "friction along it is anything from 0 to 0.4 of the normal force."
+
+
+def _few(names: Sequence[str]) -> str:
+    """Return names in one line, or how many there are where they are many."""
+    return ", ".join(names) if len(names) <= _MOST_NAMED else f"{len(names)} of them"
 
 
 def _curvature(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:

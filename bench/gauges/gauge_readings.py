@@ -32,8 +32,16 @@ NOMINAL_SHARE = 0.01
 _NOMINAL_SLOPE_DEG = 5.0
 # [rad] A stroke's usual range, where no frame has the angles.
 _NOMINAL_THETA_RAD = np.radians(np.linspace(1.0, 4.0, 6))
+# [mm] Step of differences: far above rounding, far below what curves. Derived.
+_STEP_MM = 1e-3
+# [mm²] Where the places are exact, their common error is nothing by this. Derived.
+_LEAST_VARIANCE_MM2 = 1e-18
 # [rad] As the estimators average over (estimator.signal.HALF_WINDOW_RAD).
 _MOST_HALF_WINDOW_RAD = np.radians(0.5)
+# Where moments come from.
+SEEN = "seen in pictures"
+WIRE_ALONE = "seen in pictures, by the wire alone"
+NOMINAL = "set: nominal distance"
 
 
 @dataclass(frozen=True)
@@ -42,8 +50,9 @@ class Pairs:
 
     moments, volts (n, 2), in the follicle's axes and above the free stroke; their covariances (2n,
     2n), of y and z pair by pair, with everything that the pairs share but scale_sigma, their common
-    share of error (that of the distance); theta_rad (n,). paper_moment, paper_volts (2,): the one
-    pair that the paper takes, (2) at one pushing angle; NaN where not reached.
+    share of error (that of the contact's place along the wire); theta_rad (n,). paper_moment, paper_volts (2,): the one
+    pair that the paper takes, (2) at one pushing angle; NaN where not reached. source: where the
+    moments come from.
     """
 
     trial: str
@@ -57,6 +66,7 @@ class Pairs:
     paper_moment: np.ndarray
     paper_volts: np.ndarray
     scale_sigma: float = 0.0
+    source: str = SEEN
 
     def __len__(self) -> int:
         """Return the number of pairs."""
@@ -118,14 +128,17 @@ def pairs_of(
     if reference is None:
         return None
     rigid_Nmm = whisker.beam.moment_Nmm(theta_rad, reference.d_x_mm)
-    return _paired(trial, seen.whisk, reference, stroke, touch, rigid_Nmm, theta_rad)
+    pairs = _paired(trial, seen.whisk, reference, stroke, touch, rigid_Nmm, theta_rad)
+    return None if pairs is None else replace(pairs, source=source_of(seen))
 
 
 def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMoments | None:
     """Return the moments of the frames in which the whisker touches; None where there are none.
 
-    They are those of the exact rod through the contact that was seen. The deflection is from the
-    unbent whisker as the free stroke has it, so a sag or a set of the wire is no moment.
+    They are those of the exact rod through the contact that was seen, whose place and deflection
+    are the wire's: neither the slope of the bar nor the slip is needed, and a whisk without a truth
+    serves too. The deflection is from the unbent whisker as the free stroke has it, so a sag or a
+    set of the wire is no moment. The force lies in the plane in which the wire is bent.
     """
     d = seen.deflection
     good = d.theta_rad > _LEAST_THETA_RAD
@@ -133,29 +146,82 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
         return None
     across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
     along = d.along_mm[good]
-    share = _share_along_rod(across, along, d.slip_mm[good])
-    moments, by_friction = _with_friction(along, across, share, whisker)
-    Nmm_per_mm = np.repeat(moments_per_mm(moments, across), 2)
-    rows = np.repeat(good, 2)
-    covariance = d.covariance[np.ix_(rows, rows)] * np.outer(Nmm_per_mm, Nmm_per_mm)
+    share = _share_along_rod(across, along, d.slip_mm[good], d.slip_sigma_mm[good])
+    moments, by_friction = _with_friction(along, across, share.value, whisker)
+    by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
+    by_place = _by_place(along, across, share.value, whisker)
+    rows = np.repeat(good, 3)
+    of_places = d.covariance[np.ix_(rows, rows)]
+    by_arc, covariance = _common_and_own(by_place, of_places)
+    scale_sigma = float(np.sum(by_arc * moments) / np.sum(moments**2))
     return ReferenceMoments(
-        seen.touch_rad.value,
-        seen.d_x_mm.value,
+        d.touch_rad.value,
+        d.d_x_mm,
         d.motor_rad[good],
         d.theta_rad[good],
         moments,
-        covariance + _common_cause(_FRICTION_SIGMA * by_friction),
-        scale_sigma=2.0 * seen.d_x_mm.sigma / seen.d_x_mm.value,
+        covariance
+        + _common_cause(by_arc - scale_sigma * moments)
+        + _common_cause(_FRICTION_SIGMA * by_friction)
+        + _common_cause(by_share),
+        scale_sigma=abs(scale_sigma),
     )
 
 
-def _share_along_rod(across: np.ndarray, along: np.ndarray, slip: np.ndarray) -> np.ndarray:
-    """Return the share (n,) of the sliding that goes along the rod.
+def source_of(seen: SeenWhisk) -> str:
+    """Return where the moments of a whisk come from, for people."""
+    if seen.deflection is None:
+        return NOMINAL
+    return SEEN if seen.has_truth else WIRE_ALONE
 
-    It is the arc's excess over its chord, 0.6 w²/x; the slip across is the rest.
+
+def _by_place(
+    along: np.ndarray, across: np.ndarray, share: np.ndarray, whisker: Whisker
+) -> np.ndarray:
+    """Return the derivatives (2n, 3n) of moments by where contacts are along, across z and across y.
+
+    Further along the wire the deflection grows too; what is left of both is in the covariance of
+    the places.
+    """
+    n = len(along)
+    frames = np.arange(n)
+    here, _ = _with_friction(along, across, share, whisker)
+    rows = np.zeros((n, 2, n, 3))
+    for k, step in enumerate(_STEP_MM * np.eye(3)):
+        moved, _ = _with_friction(along + step[0], across + step[1:], share, whisker)
+        rows[frames, :, frames, k] = (moved - here) / _STEP_MM
+    return rows.reshape(2 * n, 3 * n)
+
+
+def _common_and_own(by_place: np.ndarray, of_places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return by how much (n, 2) one sigma of the contact's mean place moves all moments, and the
+    covariance (2n, 2n) of what else they are off by.
+
+    of_places (3n, 3n): covariance of the places by which the moments have derivatives (2n, 3n).
+    """
+    covariance = by_place @ of_places @ by_place.T
+    mean_place = np.zeros(len(of_places))
+    mean_place[::3] = 3.0 / len(of_places)
+    variance = mean_place @ of_places @ mean_place
+    common = by_place @ of_places @ mean_place / np.sqrt(max(variance, _LEAST_VARIANCE_MM2))
+    return common.reshape(-1, 2), covariance - np.outer(common, common)
+
+
+def _share_along_rod(
+    across: np.ndarray, along: np.ndarray, slip: np.ndarray, slip_sigma: np.ndarray
+) -> Value:
+    """Return the share (n,) of the sliding that goes along the rod, with its sigma.
+
+    It is the arc's excess over its chord, 0.6 w²/x; the slip across is the rest. It is the mean of
+    three slips that have the mean and the variance of the one seen: where the slope of the bar is
+    hardly known, nor is the slip along it.
     """
     drawn = 0.6 * np.sum(across**2, axis=1) / along
-    return drawn / np.hypot(drawn, slip)
+    slips = slip + np.sqrt(3.0) * np.outer([-1.0, 0.0, 1.0], slip_sigma)  # (3, n)
+    shares = drawn / np.hypot(drawn, slips)
+    weights = np.array([1.0, 4.0, 1.0]) / 6.0
+    mean = weights @ shares
+    return Value(mean, np.sqrt(weights @ (shares - mean) ** 2))
 
 
 def _with_friction(
@@ -175,11 +241,6 @@ def _with_friction(
     rough = moment_at_clamp(along, size, rigidity, -_FRICTION * share)
     smooth = moment_at_clamp(along, size, rigidity)
     return direction_times(rough), direction_times((rough - smooth) / _FRICTION)
-
-
-def moments_per_mm(moments: np.ndarray, across: np.ndarray) -> np.ndarray:
-    """Return the stiffness (n,) of each pair: moment over deflection."""
-    return np.linalg.norm(moments, axis=1) / np.linalg.norm(across, axis=1)
 
 
 def _common_cause(effect: np.ndarray) -> np.ndarray:

@@ -52,19 +52,24 @@ class WhiskerFacts:
 class Deflection:
     """Place of the contact in the hub's axes while it touches, relative to the unbent whisker.
 
-    Each array is (frames,). slip_mm: along the bar. past_mm: how far the whisker's material has
-    moved along itself past the bar, from any zero (rolling is no such motion). covariance
-    (2 frames, 2 frames): of across_z_mm and across_y_mm, frame by frame.
+    It is known by the wire alone, in a whisk without a truth too. Each array is (frames,).
+    slip_mm: along the bar. past_mm: how far the whisker's material has moved along itself past the
+    bar, from any zero (rolling is no such motion). covariance (3 frames, 3 frames): of along_mm,
+    across_z_mm and across_y_mm, frame by frame. touch_rad, d_x_mm: by the fit, which need not be
+    known as well as a truth is.
     """
 
     theta_rad: np.ndarray
     motor_rad: np.ndarray
     slip_mm: np.ndarray
+    slip_sigma_mm: np.ndarray
     along_mm: np.ndarray
     across_y_mm: np.ndarray
     across_z_mm: np.ndarray
     past_mm: np.ndarray
     covariance: np.ndarray
+    touch_rad: Value
+    d_x_mm: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +108,8 @@ class SeenWhisk:
     wanted pushing angle. overlay: lines by moment, "touch" and "theta". touch_shared_rad: part
     of touch's sigma that comes from felt touches of all whisks (`bench.trials.clocks`). looked:
     preset or settings file of the evaluation. contradicted: two records of the same quantity
-    disagree (`bench.trials.consistency`). by_one_camera: only where the settings name one.
+    disagree (`bench.trials.consistency`). deflection: also of a whisk whose distance or slope is
+    not known; None where no frame is seen to touch. by_one_camera: only where the settings name one.
     """
 
     truth: WhiskTruth

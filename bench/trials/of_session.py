@@ -228,12 +228,12 @@ def _pairs(
 
 
 def _lacking_truth(units: Sequence[Unit]) -> Iterator[str]:
-    """Yield a line on each trial with whisks that were evaluated and have no truth."""
+    """Yield a line on each trial with whisks that were evaluated and show no moments, and why."""
     for unit in units:
         seen = kept_seen(unit)
         if seen is None:
             continue
-        statuses = [whisk.status for whisk in seen.whisks if not whisk.has_truth]
+        statuses = [whisk.status for whisk in seen.whisks if whisk.deflection is None]
         lacking = dict.fromkeys(filter(None, statuses))
         if lacking:
             yield f"{unit.trial.name} has no truth: {', '.join(lacking)}"

@@ -35,13 +35,18 @@ from bench.trials.consistency import (
 from bench.trials.one_camera import by_one_camera
 from bench.trials.seeing import presets_for
 from bench.trials.trial_frames import TrialFrames
-from vision import Smooth, TrialTruth, WhiskTruth, observe_trial
+from vision import Smooth, TrialTruth, Value, WhiskTruth, observe_trial
 from vision.geometry import Reason, Refused
 from vision.pictures import Others
 
 NO_PICTURES = reason("no_pictures")
 _MOST_DEFLECTIONS = 12  # frames of a whisk, kept with their joint covariance
 _MOST_NAMED = 5  # frames in a line
+# [1] Of the contact's distance along the wire: a place that is known worse gives no moment. At this one
+# the second order of a moment is 1 %, its sigma 2 to 10 %. Derived.
+_MOST_PLACE_SHARE = 0.05
+# [1] Of that distance: farther across no rod is bent by a push. Stated.
+_MOST_ACROSS_SHARE = 0.5
 
 # The truth of a whisk, and the name of the preset or file with whose settings it was found.
 Evaluated = tuple[str, WhiskTruth]
@@ -251,10 +256,25 @@ def whisk_record(
         truth=replace(truth, overlay={}, ends={}, widths={}, smooth=None, problem=None),
         status=in_one_status(truth.status, at.status, *contradictions, *warnings),
         at=at,
-        deflection=_deflection(truth),
+        deflection=_known_deflection(truth),
         overlay=_overlay(truth, at.theta_rad),
         contradicted=any(contradictions),
     )
+
+
+def _known_deflection(truth: WhiskTruth) -> Deflection | None:
+    """Return the deflection of a whisk with a truth, or of one whose wire alone shows it.
+
+    How well slope, touch and slip are known does not matter to a moment; the contact's place along
+    the wire and across it does.
+    """
+    d = _deflection(truth)
+    if d is None or np.isfinite(truth.d_x_mm.value):
+        return d
+    sigmas_mm = np.sqrt(np.diag(d.covariance)).reshape(-1, 3)
+    across_mm = np.hypot(d.across_y_mm, d.across_z_mm)
+    is_known = np.all(sigmas_mm < _MOST_PLACE_SHARE * d.along_mm[:, None])
+    return d if is_known and np.all(across_mm < _MOST_ACROSS_SHARE * d.along_mm) else None
 
 
 def _deflection(truth: WhiskTruth) -> Deflection | None:
@@ -264,43 +284,33 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
         return None
     count = len(smooth.theta_rad)
     chosen = np.unique(np.linspace(0, count - 1, _MOST_DEFLECTIONS).round().astype(int))
-    theta = smooth.theta_rad[chosen]
-    cos = np.cos(theta)
-    sin = np.sin(theta)
-    d_y = smooth.values["d_y"][chosen]
     frames = truth.frames
-    d_x = truth.d_x_mm.value
-    beyond = _beyond_mm(truth)[chosen]
+    shown = np.flatnonzero(frames.touching)[chosen]
+    motor = frames.motor_rad[shown]
+    theta = smooth.theta_rad[chosen]
+    touch = float(motor[0] - theta[0])
+    x, y, _ = frames.point_mm.value[shown].T
     return Deflection(
         theta_rad=theta,
-        motor_rad=truth.touch_rad.value + theta,
+        motor_rad=motor,
         slip_mm=smooth.values["slip"][chosen],
-        along_mm=d_x / cos - d_y * sin + beyond * cos,
-        across_y_mm=d_y * cos + beyond * sin,
+        slip_sigma_mm=frames.slip_mm.sigma[shown],
+        along_mm=smooth.values["along"][chosen],
+        across_y_mm=smooth.values["across_y"][chosen],
         across_z_mm=smooth.values["d_z"][chosen],
-        past_mm=beyond - frames.arc_mm[frames.touching][chosen],
+        past_mm=np.cos(touch) * x + np.sin(touch) * y - smooth.d_x_mm - frames.arc_mm[shown],
         covariance=_deflection_covariance(smooth, chosen),
+        touch_rad=Value(touch, float(frames.theta_rad.sigma[shown[0]])),
+        d_x_mm=smooth.d_x_mm,
     )
 
 
-def _beyond_mm(truth: WhiskTruth) -> np.ndarray:
-    """Return how far the contact of each touching frame (n,) lies beyond that at touch.
-
-    Along the unbent whisker there.
-    """
-    frames = truth.frames
-    x, y, _ = frames.point_mm.value[frames.touching].T
-    touch = truth.touch_rad.value
-    return np.cos(touch) * x + np.sin(touch) * y - truth.d_x_mm.value
-
-
 def _deflection_covariance(smooth: Smooth, chosen: np.ndarray) -> np.ndarray:
-    """Return the covariance (2n, 2n) of across_z_mm and across_y_mm, in turns, of n chosen frames."""
-    cos = np.cos(smooth.theta_rad[chosen])[:, None]
-    by_z = smooth.jacobians["d_z"][chosen]  # (frames, parameters)
-    by_y = cos * smooth.jacobians["d_y"][chosen]
-    jacobian = np.stack([by_z, by_y], axis=1).reshape(2 * len(chosen), -1)
-    return jacobian @ smooth.covariance @ jacobian.T
+    """Return the covariance (3n, 3n) of along_mm, across_z_mm and across_y_mm of n chosen frames."""
+    names = ("along", "d_z", "across_y")
+    jacobian = np.stack([smooth.jacobians[name][chosen] for name in names], axis=1)
+    rows = jacobian.reshape(3 * len(chosen), -1)
+    return rows @ smooth.covariance @ rows.T
 
 
 def _overlay(truth: WhiskTruth, theta_rad: float) -> dict[str, Drawing]:

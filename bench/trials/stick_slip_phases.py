@@ -53,7 +53,7 @@ def slips(seen: SeenWhisk) -> bool:
     friction cone.
     """
     deflection = seen.deflection
-    if deflection is None or len(deflection.theta_rad) < _LEAST_FRAMES:
+    if deflection is None or not seen.has_truth or len(deflection.theta_rad) < _LEAST_FRAMES:
         return False
     return bool(np.ptp(deflection.slip_mm) >= _LEAST_SLIP_MM)
 
@@ -144,7 +144,7 @@ def phases_of(
     """Find felt phases, with slope and distance as seen, or nominal ones where no picture shows
     them.
     """
-    if seen.deflection is None:
+    if not seen.has_truth:
         beta_rad = trial.beta_deg and np.radians(trial.beta_deg)
         d_x_mm = trial.d_x_mm
     elif slips(seen):

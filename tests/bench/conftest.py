@@ -50,6 +50,11 @@ def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
         "phi": phi,
         "alpha": abs(beta) - np.abs(phi),
     }
+    beyond = contact[:, 0] - d_x
+    in_hub = {
+        "along": d_x / np.cos(theta) - d_y * np.sin(theta) + beyond * np.cos(theta),
+        "across_y": d_y * np.cos(theta) + beyond * np.sin(theta),
+    }
     first = d_x * np.array([np.cos(touch), np.sin(touch), 0.0])
     return WhiskTruth(
         number,
@@ -61,7 +66,7 @@ def exact_truth(folder: Path, number: int, rows: np.ndarray) -> WhiskTruth:
         Value(np.radians(at["psi_deg"]), SIGMA_RAD),
         2,
         len(theta),
-        smooth=_smooth(theta, touching, values),
+        smooth=_smooth(theta, touching, values | in_hub, d_x),
     )
 
 
@@ -85,7 +90,7 @@ def _frames(table, theta, touching, points, values) -> FrameTruth:
     )
 
 
-def _smooth(theta, touching, values) -> Smooth:
+def _smooth(theta, touching, values, d_x) -> Smooth:
     """What is told between frames."""
     # One parameter a value and frame: every number has the same sigma and no number shares another's error.
     n, kinds = int(touching.sum()), len(values)
@@ -96,6 +101,7 @@ def _smooth(theta, touching, values) -> Smooth:
         {k: v[touching] for k, v in values.items()},
         own,
         SIGMA_MM**2 * np.eye(n * kinds),
+        d_x,
     )
 
 

@@ -54,47 +54,33 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     beta, psi = contact_frame_angles(touched.direction, touch.motor_rad)
     contact_moved = _contact_moved_mm(problem, vector, touch, point)
     d_y, d_z = _deflection(problem, vector, touch, point)
+    along, across_y = _in_hub(problem, touch, point, d_y)
     force = _force_direction(curves, touch, arc, d_y, d_z)
     frame = {
-        "slip": _along_mm(contact_moved, touched.direction),
+        "slip": np.sum(contact_moved * touched.direction[..., None, :], axis=-1),
         "longitudinal_slip": arc - touch.arc_mm[..., None],
         "d_y": d_y,
         "d_z": d_z,
+        "along": along,
+        "across_y": across_y,
         "arc": arc,
         "phi": np.arctan2(d_z, d_y),
         "alpha": _angle_to_normal(force, each.bar_at(point), point, beta),
         **_by_axis(point),
     }
-    return Measured(_of_whisk(touch, beta, psi), frame)
-
-
-def _of_whisk(
-    touch: FirstTouch, beta_rad: np.ndarray, psi_rad: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Return by name the values (…) of a whisk as a whole, all of them at touch."""
-    return {
+    whisk = {
         "touch": touch.motor_rad,
         "d_x": np.linalg.norm(touch.point_mm, axis=-1),
-        "beta": beta_rad,
-        "psi": psi_rad,
+        "beta": beta,
+        "psi": psi,
         **_by_axis(touch.point_mm),
     }
-
-
-def _along_mm(moved_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return how far (…, f) frames' displacements (…, f, 3) lead along a direction (…, 3)."""
-    return np.sum(moved_mm * direction[..., None, :], axis=-1)
+    return Measured(whisk, frame)
 
 
 def _by_axis(points_mm: np.ndarray) -> dict[str, np.ndarray]:
     """Return the coordinates (…) of points (…, 3) by name."""
     return dict(zip("xyz", np.moveaxis(points_mm, -1, 0)))
-
-
-def _bar_moved_mm(problem: Problem, vector: np.ndarray, touch: FirstTouch) -> np.ndarray:
-    """Return how far (…, f, 3) the bar has moved since touch, (…, 1, 3) where it stands."""
-    at_touch = shift_at_mm(problem, vector, touch.motor_rad)[..., None, :]
-    return shifts_mm(problem, vector) - at_touch
 
 
 def _contact_moved_mm(
@@ -103,7 +89,9 @@ def _contact_moved_mm(
     """Return how far (…, f, 3) the contact, at points (…, f, 3), has moved on the bar since
     touch.
     """
-    return point_mm - touch.point_mm[..., None, :] - _bar_moved_mm(problem, vector, touch)
+    at_touch = shift_at_mm(problem, vector, touch.motor_rad)[..., None, :]
+    bar_moved = shifts_mm(problem, vector) - at_touch  # (…, f, 3), (…, 1, 3) where it stands
+    return point_mm - touch.point_mm[..., None, :] - bar_moved
 
 
 def _deflection(
@@ -119,6 +107,21 @@ def _deflection(
     x, y, _ = np.moveaxis(rotation_z(touch.motor_rad)[..., None, :, :], -1, 0)  # (…, 1, 3)
     offset = _virtual_point(unbent, touch, x) - point_mm
     return np.sum(offset * y, axis=-1), -offset[..., 2]
+
+
+def _in_hub(
+    problem: Problem, touch: FirstTouch, point_mm: np.ndarray, d_y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far contacts (…, f, 3) are along and across the unbent whisker (…, f), mm.
+
+    Both are the wire's: what touch and distance are off by cancels in them.
+    """
+    theta = problem.motor_rad - touch.motor_rad[..., None]
+    x = rotation_z(touch.motor_rad)[..., None, :, 0]
+    d_x = np.linalg.norm(touch.point_mm, axis=-1)[..., None]
+    beyond = np.sum(point_mm * x, axis=-1) - d_x
+    along = d_x / np.cos(theta) - d_y * np.sin(theta) + beyond * np.cos(theta)
+    return along, d_y * np.cos(theta) + beyond * np.sin(theta)
 
 
 def _virtual_point(unbent: Curves, touch: FirstTouch, x: np.ndarray) -> np.ndarray:

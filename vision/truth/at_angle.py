@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import chdtri, stdtrit
 
 from vision.geometry.reasons import NO_REASON, Reason
-from vision.truth.value import FIELDS, Value, WhileTouching, propagated_sigma
+from vision.truth.value import FIELDS, NAN, Value, WhileTouching, propagated_sigma
 
 # [rad] To either side of the wanted angle, of the local fit. Set by eye. Study: thresholds.py
 # truth.at_angle _WINDOW_RAD ….
@@ -54,6 +54,8 @@ class TruthAtAngle(WhileTouching):
 class Smooth:
     """The touching frames, for interpolation: values (f,) by name, their Jacobians (f, p) by the
     parameters, that of the angle of touch (p,), and the parameters' covariance (p, p).
+
+    d_x_mm: radial distance by the fit, which need not be known as well as a truth is.
     """
 
     theta_rad: np.ndarray
@@ -61,6 +63,7 @@ class Smooth:
     values: dict[str, np.ndarray]
     jacobians: dict[str, np.ndarray]
     covariance: np.ndarray
+    d_x_mm: float = NAN
 
 
 def at_angle(smooth: Smooth | None, theta_rad: float, without: Reason) -> TruthAtAngle:

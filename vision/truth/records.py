@@ -130,7 +130,8 @@ class WhiskTruth:
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Return the truth at a pushing angle, by a fit over the frames around it."""
-        return at_angle(self.smooth, theta_rad, self.status)
+        smooth = self.smooth if np.isfinite(self.d_x_mm.value) else None
+        return at_angle(smooth, theta_rad, self.status)
 
 
 @dataclass(frozen=True)

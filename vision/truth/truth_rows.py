@@ -16,7 +16,7 @@ from vision.geometry.touched import Axis, Touched
 from vision.pictures.pyramid import full_px
 from vision.truth.at_angle import Smooth
 from vision.truth.records import FrameTruth, GaveWay, SeenObject, WhiskTruth, WireShape
-from vision.truth.value import FIELDS, Value, propagated_sigma
+from vision.truth.value import FIELDS, IN_HUB, Value, propagated_sigma
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 # [frame intervals] Of the median one, beyond which a frame was lost: between one and two.
@@ -63,6 +63,7 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
         budget=_budget(fitted),
         lines=line_noise(fitted.problem),
         shape=_shape(fitted),
+        smooth=_smooth(fitted),
         velocity_mm_s=_velocity(whisk, fitted),
         problem=fitted.problem,
     )
@@ -83,7 +84,6 @@ def _with_contact(
         psi_rad=fitted.of_whisk("psi"),
         point_mm=_stacked(point),
         point_covariance_mm2=by_parameter @ fitted.covariance @ by_parameter.T,
-        smooth=_smooth(fitted),
         gave=None if whisk.gives is None else _gave(fitted),
         rounded=_seen_object(fitted.problem.rods.bar, fitted),
     )
@@ -224,16 +224,18 @@ def _lost_at_touch(whisk: WhiskPictures, touch_rad: float) -> str:
 
 
 def _smooth(fitted: FittedWhisk) -> Smooth:
-    """Return what `WhiskTruth.at` needs of the touching frames."""
+    """Return what the touching frames determine, whether or not there is a truth."""
     measured = fitted.measured
     by_parameter = fitted.by_parameter
     touching = fitted.problem.touching
+    names = (*FIELDS, *IN_HUB)
     return Smooth(
         fitted.problem.motor_rad[touching] - measured.whisk["touch"],
         by_parameter.whisk["touch"],
-        {name: measured.frame[name][touching] for name in FIELDS},
-        {name: by_parameter.frame[name][touching] for name in FIELDS},
+        {name: measured.frame[name][touching] for name in names},
+        {name: by_parameter.frame[name][touching] for name in names},
         fitted.covariance,
+        float(measured.whisk["d_x"]),
     )
 
 

@@ -45,3 +45,5 @@ class WhileTouching:
 
 # Fields of WhileTouching by the names that the fit has for them (`vision.fit.quantities`).
 FIELDS = {field.rpartition("_")[0]: field for field in WhileTouching.__dataclass_fields__}
+# Where the wire has the contact in the hub's axes, from the unbent wire: d_z is the third.
+IN_HUB = ("along", "across_y")

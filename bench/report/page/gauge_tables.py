@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.gauges.certificate import U95
+from bench.gauges.gauge_readings import source_of
 from bench.report.page.words import WhiskRow, by_whisk, number
 from bench.report.run_facts import GaugeFacts, GaugePoints
 
@@ -52,8 +53,7 @@ def _coefficients(facts: GaugeFacts) -> tuple[tuple[str, ...], ...]:
 
 def _whisk(points: GaugePoints, row: WhiskRow) -> tuple[str, ...]:
     """Return the row of a whisk that calibrated."""
-    is_seen = row.seen.deflection is not None
-    source = "seen in pictures" if is_seen else "set: nominal distance"
+    source = source_of(row.seen)
     rms_y, rms_z = np.sqrt(np.mean(points.residuals_Nmm**2, axis=0))
     turn = f"{points.roll_deg:g}°"
     count = str(len(points.moments_Nmm))

@@ -11,7 +11,14 @@ from bench.base.settings import Settings
 from bench.gauges.drift import drift_rate, free_slope
 from bench.gauges.felt import gauge_delay, strokes_of
 from bench.gauges.fit import fit_gauges
-from bench.gauges.gauge_readings import pairs_of, reference_from_nominal, reference_from_pictures
+from bench.gauges.gauge_readings import (
+    SEEN,
+    WIRE_ALONE,
+    _share_along_rod,
+    pairs_of,
+    reference_from_nominal,
+    reference_from_pictures,
+)
 from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
@@ -20,6 +27,7 @@ from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.whisker import Whisker
 from estimator.signal import FeltTouch
+from vision import WhiskTruth
 
 WHISKER = Whisker(shape="cylinder", length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
 
@@ -62,6 +70,47 @@ def test_coefficients_of_the_sample_session(session, exactly_seen):
     cross = made.all.matrix / np.diag(made.all.matrix) - true / np.diag(true)
     assert np.abs(cross).max() < 0.01
     assert np.all(np.abs(made.all.matrix - true) < 1.96 * made.all.sigma)
+
+
+def test_a_whisk_without_a_truth_serves_by_its_wire(session, exactly_seen):
+    """Its pairs are those that it has with one, and the certificate can say so."""
+    trial = session.trial("gauge_roll0")
+    seen = exactly_seen(trial)
+    stroke = strokes_of(read_signals(trial), trial, Settings())[0]
+    with_truth, without = (
+        pairs_of(trial, whisk, stroke, np.zeros(2), WHISKER, 0.05)
+        for whisk in (seen, replace(seen, truth=WhiskTruth(0)))
+    )
+    np.testing.assert_array_equal(without.moments, with_truth.moments)
+    np.testing.assert_array_equal(without.paper_moment, with_truth.paper_moment)
+    assert (with_truth.source, without.source) == (SEEN, WIRE_ALONE)
+
+
+def test_a_badly_known_place_along_the_wire_counts_little_and_not_nothing(session, exactly_seen):
+    """An error of the contact's place that all frames share is a share of their moments: 2/x of it, where the
+    deflection is that of the place. It is in scale_sigma and nowhere twice."""
+    seen = exactly_seen(session.trial("gauge_roll0"))
+    d = seen.deflection
+    n = len(d.theta_rad)
+    by_place = np.tile([1.0, 0.0, 0.0], n)
+    sigma_mm = 0.5
+    vague = replace(d, covariance=d.covariance + sigma_mm**2 * np.outer(by_place, by_place))
+    sharp, wide = (
+        reference_from_pictures(replace(seen, deflection=one), WHISKER) for one in (d, vague)
+    )
+    assert wide.scale_sigma == pytest.approx(2 * sigma_mm / d.d_x_mm, rel=0.02)
+    np.testing.assert_allclose(wide.covariance, sharp.covariance, atol=1e-4)
+
+
+def test_slip_that_is_hardly_known_leaves_open_how_much_friction_acts_along_the_rod():
+    """A rod drawn along itself by 0.6 · 2² / 50 mm: all of its sliding without slip, and anything down to a tenth of it
+    where half a millimetre of slip is possible."""
+    across = np.array([[0.0, 2.0]] * 3)
+    along = np.full(3, 50.0)
+    share = _share_along_rod(across, along, np.array([0.0, 0.048, 0.0]), np.array([0.0, 0.0, 0.5]))
+    assert share.value[:2] == pytest.approx([1.0, np.sqrt(0.5)])
+    assert share.sigma[:2] == pytest.approx([0.0, 0.0])
+    assert share.value[2] - share.sigma[2] > 0.2 and share.value[2] + 1.5 * share.sigma[2] > 1.0
 
 
 def test_a_nominal_bar_gives_the_moments_of_2(session):

@@ -1,11 +1,17 @@
 """What the pictures' side of a run says of lost frames, and what it takes for background where no rig picture is."""
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from bench.base.settings import Settings
 from bench.cameras.session_cameras import _background
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import load_session
-from bench.trials.seen import _missing_frames
+from bench.trials.seen import _missing_frames, whisk_record
+from tests.bench.conftest import exact_truth, read_csv
+from vision import UNKNOWN
 from vision.pictures.files import read_picture
 
 
@@ -20,6 +26,21 @@ def test_damaged_frames_are_counted_and_named(small_copy):
     assert list(_missing_frames(read_trial(trial, times), times)) == [
         f"camera low: 1 of {len(times)} frames damaged (2)"
     ]
+
+
+@pytest.mark.parametrize(("wider", "is_known"), [(1.0, True), (1e6, False)])
+def test_a_whisk_without_a_truth_has_its_wire_s_deflection_where_that_is_known(
+    steel_signals, wider, is_known
+):
+    """Sigmas of 5 µm do; thousandfold ones of 5 mm at 50 mm are no place to compute a moment from."""
+    folder = steel_signals / "trials" / "gauge_roll0"
+    rows = np.arange(len(read_csv(folder / "truth.csv")["frame"]))
+    whisk = exact_truth(folder, 0, rows)
+    smooth = replace(whisk.smooth, covariance=wider * whisk.smooth.covariance)
+    without = replace(whisk, d_x_mm=UNKNOWN, touch_rad=UNKNOWN, smooth=smooth)
+    record = whisk_record(without, Settings())
+    assert not record.has_truth and np.isnan(record.at.slip_mm.value)
+    assert (record.deflection is not None) == is_known
 
 
 def test_without_a_rig_picture_the_trials_median_is_the_background(small_session, monkeypatch):

@@ -4,7 +4,9 @@ import csv
 import json
 import re
 import shutil
+import sys
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from bench.rig.simulation import simulate
 from bench.workflows.gauge_calibration import calibrate_gauges_command
 from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import codes
+from vision import WhiskTruth
 
 
 @pytest.fixture
@@ -47,6 +50,26 @@ def test_sample_session(calibrate, steel_signals, tmp_path, capsys, every_trial)
     assert "Zero return: not measured" in said and "Repeatability" in said
     assert (tmp_path / "gauges.pdf").read_bytes().startswith(b"%PDF")
     assert (made.for_trial("gauge_roll0") is None) == (not every_trial)
+
+
+def test_gauge_trials_without_a_truth_serve_by_their_wire(
+    calibrate, steel_signals, tmp_path, capsys, monkeypatch
+):
+    """The coefficients are those with a truth, and the certificate names what they rest on."""
+    calibrate(steel_signals, tmp_path / "with.toml")
+    see_trial = sys.modules["bench.trials.trial_evaluation"].see_trial
+
+    def see(*arguments):
+        seen = see_trial(*arguments)
+        whisks = tuple(replace(whisk, truth=WhiskTruth(whisk.whisk)) for whisk in seen.whisks)
+        return replace(seen, whisks=whisks)
+
+    monkeypatch.setattr("bench.trials.trial_evaluation.see_trial", see)
+    calibrate(steel_signals, tmp_path / "without.toml")
+    said = capsys.readouterr().out
+    assert "Moments seen in pictures, by the wire alone: gauge_roll0, gauge_roll90" in said
+    known, alone = (read_gauges(tmp_path / f"{name}.toml", 8835.7) for name in ("with", "without"))
+    np.testing.assert_array_equal(alone.all.matrix, known.all.matrix)
 
 
 def test_another_modulus_scales_the_coefficients_so_that_c_cancels(

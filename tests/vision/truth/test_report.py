@@ -11,6 +11,7 @@ from vision.fit.solve import solve
 from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
 from vision.truth.truth_rows import to_whisk
+from vision.truth.value import propagated_sigma
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 
@@ -65,3 +66,14 @@ def test_a_slope_that_the_cameras_do_not_tell_is_doubted(by_deg, doubted):
 def test_where_nothing_is_linear_there_is_no_truth(noise_of, code):
     _, whisk = row_of(noise_of)
     assert np.isnan(whisk.d_x_mm.value) and code in whisk.status.codes
+    assert np.isnan(whisk.at(np.radians(3.0)).slip_mm.value)
+
+
+def test_where_the_wire_is_held_is_known_without_the_slope():
+    """A bar tilted by 30 degrees more or less moves the contact along the wire by half a per cent of its distance at
+    most, and the wire across itself hardly at all."""
+    _, whisk = row_of(tilted(30.0))
+    smooth = whisk.smooth
+    along_mm = propagated_sigma(smooth.jacobians["along"], smooth.covariance)
+    across_mm = propagated_sigma(smooth.jacobians["across_y"], smooth.covariance)
+    assert np.all(along_mm < 0.005 * smooth.d_x_mm) and np.all(across_mm < 0.1)
