@@ -4,16 +4,20 @@ Each camera gives points of the bar's middle line. The axis has four degrees of 
 across itself and two tilts; Gauss–Newton finds the one whose projected outline has its middle on
 all the points, in units of their sigmas and with Cauchy weights against lines of something else. A
 wide prior keeps what no camera determines.
+
+A camera and the axis span a plane. Any two such planes, each of another camera, meet in an axis.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import BarAxis, axis_frame
 from vision.geometry.newton import gauss_newton
+from vision.geometry.rotation import unit
 from vision.geometry.silhouette import edges
+from vision.touched.pieces import ARM_MM
 from vision.wire.points import LinePoints
 
 # [mm, rad] Prior sigmas of the axis about where it was: wide, they keep only what no camera
@@ -52,6 +56,40 @@ def settle_axis(
 
     vector = gauss_newton(residuals_of, _PRIOR, _STEPS, _GAUSS_NEWTON, _CAUCHY_SIGMAS)
     return axis.shifted(across, vector).upward()
+
+
+def sight_planes(cameras: Iterable[Camera], axis: BarAxis) -> np.ndarray:
+    """Return the unit normals (c, 3) of the planes that cameras span with an axis."""
+    sights = np.array([axis.point_mm - camera.centre_mm for camera in cameras])
+    return unit(np.cross(axis.direction, sights))
+
+
+def offset_px(camera: Camera, axis: BarAxis, other: BarAxis) -> float:
+    """Return how far a camera sees one axis from another, px: the largest offset within ARM_MM.
+
+    Without distortion, which is alike for two axes that are near to each other.
+    """
+    (normal,) = sight_planes([camera], other)
+    ends_mm = axis.point_mm + np.array([[-ARM_MM], [ARM_MM]]) * axis.direction
+    focal_px = float(np.mean(np.diag(camera.matrix)[:2]))
+    return focal_px * float(np.max(np.abs(unit(ends_mm - camera.centre_mm) @ normal)))
+
+
+def meeting_axis(camera: Camera, axis: BarAxis, other_camera: Camera, other: BarAxis) -> BarAxis:
+    """Return the axis that one camera sees where it sees an axis, another camera where the other is.
+
+    It is the farther off the nearer the planes of both are to one, where it is NaN.
+    """
+    (normal,) = sight_planes([camera], axis)
+    (other_normal,) = sight_planes([other_camera], other)
+    direction = unit(np.cross(normal, other_normal))
+    planes = np.stack([normal, other_normal, direction])
+    distances = [
+        normal @ camera.centre_mm,
+        other_normal @ other_camera.centre_mm,
+        direction @ axis.point_mm,
+    ]
+    return BarAxis(np.linalg.solve(planes, distances), direction).upward()
 
 
 def _residuals(axes: BarAxis, camera: Camera, points: LinePoints, radius_mm: float) -> np.ndarray:

@@ -54,11 +54,11 @@ _X_STEP = 0.7
 _TOUCH_STEP = 0.8
 # [mm] Nearest contact to the whisker's base. Stated.
 _NEAREST_MM = 10.0
-# [hypotheses] Of the grid that go on. With 12 in place of 24, and 4 in place of 8, two of 53
+# [hypotheses] Of the grid that go on. With 12 in place of 24, and 4 in place of 8 kept, two of 53
 # path-traced scenes more were lost. Study: bar_scenes.py.
 _STARTS = 24
 # [hypotheses] That each pass keeps. Study: bar_scenes.py.
-_KEPT = (8, 8, 4)
+_KEPT = 8
 # [steps] Least separation of two hypotheses of the grid. Study: bar_scenes.py.
 _SEPARATION = 4.0
 # [hypotheses] Evaluated together: arrays that stay in the processor's cache; no result depends on
@@ -69,7 +69,7 @@ _BATCH = 1000
 def find_bars(
     edge_maps: Sequence[EdgeMap], rods: Rods, motor_rad: tuple[float, float]
 ) -> list[BarAxis]:
-    """Find axes of what may be the bar, the best first; a few pixels off, and four at most.
+    """Find axes of what may be the bar, the best first; a few pixels off.
 
     motor_rad: lowest and highest motor angle, between which the whisker touches.
     """
@@ -86,6 +86,21 @@ def find_bars(
     return search_bars(edge_maps, [x_mm, touch_rad, _BETA_RAD, _PSI_RAD], axes_of, radius_mm)
 
 
+def can_touch(axis: BarAxis, rods: Rods, motor_rad: tuple[float, float]) -> bool:
+    """Return whether the straight whisker comes to touch a bar in its stroke, to a radius of it.
+
+    motor_rad: lowest and highest motor angle.
+    """
+    radius_mm = rods.bar.radius_mm
+    whiskers = rotation_z(np.array(motor_rad))[:, :, 0]  # directions (2, 3)
+    before_mm, after_mm = axis.distance_mm(np.zeros((2, 3)), whiskers)
+    in_plane_mm = axis.point_mm - axis.point_mm[2] / axis.direction[2] * axis.direction
+    x_mm = float(np.linalg.norm(in_plane_mm))
+    reach_mm = rods.reach_mm(x_mm)
+    is_passed = before_mm > reach_mm - radius_mm and after_mm < reach_mm + radius_mm
+    return bool(is_passed and x_mm < rods.wire.length_mm + radius_mm)
+
+
 def search_bars(
     edge_maps: Sequence[EdgeMap],
     values: Sequence[np.ndarray],
@@ -98,7 +113,7 @@ def search_bars(
     returns their axes, points and directions (n, 3).
     """
     passes = []
-    for blur, kept in zip(_BLURS, _KEPT):
+    for blur in _BLURS:
         is_last = blur == _BLURS[-1]
         score = EdgeScore(
             objects_of=axes_of,
@@ -107,7 +122,7 @@ def search_bars(
             weights=_WEIGHTS if is_last else np.maximum(_WEIGHTS, 0.0),
             along_mm=_ALONG_MM if is_last else _ALONG_MM[::2],
         )
-        passes.append(SearchPass(score, blur / _BLURS[0], 1.0, kept))
+        passes.append(SearchPass(score, blur / _BLURS[0], 1.0, _KEPT))
     best = axes_of(coarse_to_fine(values, half_steps(values), passes, _SEPARATION, _STARTS))
     found = zip(best.point_mm, best.direction)
     return [BarAxis(point_mm, direction).upward() for point_mm, direction in found]

@@ -22,7 +22,6 @@ from vision.pictures.view import SATURATED, View
 from vision.touched.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces, beside_wires
 from vision.touched.posterior import (
     Posterior,
-    find_most_probable,
     fit_coarse,
     fit_quick,
     refine,
@@ -31,11 +30,11 @@ from vision.touched.profiles import FULL_SCALE
 from vision.wire.bands import Pieces
 from vision.wire.points import SHARED, LinePoints
 
-# [px] Largest error of an axis that was found by a highlight in place of both edges. Study:
-# bar_scenes.py.
-FAR_PX = 9.0
 # [px] Largest error of an axis that its lines were fitted to. Study: bar_scenes.py.
 NEAR_PX = 3.0
+# [log] What a camera that shows the place but no edge takes from the score of a hypothesis: bars
+# score 5 to 9. Study: bar_scenes.py.
+_NO_EDGES = 3.0
 # [px] Reach of a coarse pass: an axis fitted to coarse lines was 1.7 off at most in 61 path-traced
 # scenes. Study: bar_scenes.py.
 _COARSE_REACH_PX = 2.0
@@ -100,6 +99,16 @@ class BarLineEstimate:
         tried."""
         return self.is_bar and self.unresolved_share < _LARGEST_UNRESOLVED
 
+    @property
+    def joint_score(self) -> float:
+        """Return what the line adds to the detection score of all cameras.
+
+        A camera that does not resolve the edges counts against the bar. Where a highlight hides
+        the edges of a bar, its score outweighs that.
+        """
+        score = max(self.detection_score, 0.0)
+        return score if self.has_edges else score - _NO_EDGES
+
     def posteriors_about(self, pieces: Pieces) -> dict[float, Posterior]:
         """Return the posteriors by gamma, with their lines counted from the axis of other
         pieces."""
@@ -125,26 +134,11 @@ def find_lines(
 
     wires_px: by camera lines (m, 2) where the wire lies in some frame.
     """
-    pieces = clear_pieces(views, axis, radius_mm, wires_px, settings)
-    return {name: _find_line(some, np.zeros(2)) for name, some in pieces.items()}
-
-
-def find_lines_farther(lines: Mapping[str, BarLineEstimate]) -> dict[str, BarLineEstimate]:
-    """Find the bar's lines in the same pixels about the most probable ones up to FAR_PX off.
-
-    Where the most probable line lies within reach of the quick pass, that pass's line is kept.
-    """
-    farther = {}
-    for name, estimate in lines.items():
-        line = find_most_probable(estimate.pieces, FAR_PX)
-        is_near = np.all(np.abs(line) < NEAR_PX)
-        farther[name] = estimate if is_near else _find_line(estimate.pieces, line)
-    return farther
-
-
-def _find_line(pieces: Pieces, about: np.ndarray) -> BarLineEstimate:
-    """Find the line within NEAR_PX of a line (2,) by one quick pass."""
-    return _average_posteriors(pieces, {1.0: fit_quick(pieces, about, NEAR_PX)}, np.ones(1))
+    lines = {}
+    for name, pieces in clear_pieces(views, axis, radius_mm, wires_px, settings).items():
+        posterior = fit_quick(pieces, np.zeros(2), NEAR_PX)
+        lines[name] = _average_posteriors(pieces, {1.0: posterior}, np.ones(1))
+    return lines
 
 
 def measure_bars(

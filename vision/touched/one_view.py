@@ -20,6 +20,7 @@ from vision.geometry.rods import Rods, Wire
 from vision.geometry.rotation import unit
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
+from vision.touched.axis import sight_planes
 from vision.touched.edge_map import EdgeMap
 from vision.touched.edges import measure_edges
 from vision.touched.find import search_bars
@@ -114,8 +115,7 @@ def seen_from_one_side(cameras: Cameras, axis: BarAxis) -> bool:
 
 def widest_angle_rad(cameras: Cameras, axis: BarAxis) -> float:
     """Return the widest angle, rad, between the planes that two cameras span with the bar."""
-    sights = np.array([axis.point_mm - camera.centre_mm for camera in cameras])
-    normals = unit(np.cross(axis.direction, sights))
+    normals = sight_planes(cameras, axis)
     least_cosine = np.min(np.abs(normals @ normals.T))
     return float(np.arccos(min(least_cosine, 1.0)))
 

@@ -43,9 +43,6 @@ _BLURS_PX = (0.6, 0.85, 1.2, 1.7)
 # [px] The one lens blur of a quick pass, which distinguishes a bar from none. Study:
 # bar_scenes.py.
 _QUICK_BLUR_PX = 1.0
-# [px] The one lens blur of the far search: the widest, so that no peak lies between its
-# positions. Study: bar_scenes.py.
-_FAR_BLUR_PX = 1.6
 # [blurs] Between positions of a coarse pass, with a cubic spline between: at 0.83 of a blur that
 # undershot, and a transfer curve's probability was 0.2 in place of 0.99 in one of 18 scenes.
 # Study: bar_scenes.py.
@@ -60,9 +57,6 @@ _LINES = 25
 _BLURS = 9
 # [px] Largest step between lines of a wide window. Study: bar_scenes.py.
 _SPACING_PX = 0.1
-# [px] Largest step between lines of the far search, where another pass begins: at 0.56 px lines
-# stepped over the right one in one of 53 path-traced scenes. Study: bar_scenes.py.
-_FAR_SPACING_PX = 0.3
 # [blurs] Of a refined window: fewer allow no spline. Derived.
 _REFINED_BLURS = 4
 # [px] Largest reach of a pass. Derived.
@@ -89,19 +83,17 @@ class LineWindow:
     most_px (2,): largest shift, and largest tilt over ARM_MM. blurs_px (n,): lens blurs. is_coarse:
     only the roughest prior of the light, and positions half a blur apart. positions: how many for
     each step of the profiles' grid.
-    spacing_px: largest step between lines.
     """
 
     most_px: np.ndarray
     blurs_px: np.ndarray
     is_coarse: bool = True
     positions: int = 1
-    spacing_px: float = _SPACING_PX
 
     @property
     def lines(self) -> int:
         """Return how many lines are tried by shift, and how many by tilt."""
-        return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / self.spacing_px)))
+        return max(_LINES, 1 + int(np.ceil(2.0 * np.max(self.most_px) / _SPACING_PX)))
 
     @property
     def cell_px2(self) -> float:
@@ -220,15 +212,6 @@ def fit_quick(pieces: Pieces, line: np.ndarray, reach_px: float) -> Posterior:
     """Return the posterior under a single blur, good enough to distinguish a bar from none."""
     window = LineWindow(np.full(2, reach_px), np.array([_QUICK_BLUR_PX]))
     return _fit(pieces, line, window, 1.0)
-
-
-def find_most_probable(pieces: Pieces, reach_px: float) -> np.ndarray:
-    """Find the most probable line (2,) within reach_px, to _FAR_SPACING_PX, under a wide blur."""
-    blurs_px = np.array([_FAR_BLUR_PX])
-    window = LineWindow(np.full(2, reach_px), blurs_px, spacing_px=_FAR_SPACING_PX)
-    profiles = compute_profiles(pieces, SEGMENTS, reach_px, 1.0)
-    grid = _evaluate_lines(_evidences(profiles, window, reach_px), profiles, window)
-    return grid.lines[np.argmin(grid.deviance[:, 0, 0])]
 
 
 def estimate_log_width(pieces: Pieces) -> tuple[float, float]:

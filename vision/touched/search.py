@@ -3,21 +3,27 @@
 A bar is found in three stages. First, its edges: a search over all places where the whisker may
 touch it gives a few axes whose two edges are strong in all cameras (`vision.touched.find`). Second,
 its lines: the pixels about each of these axes say in every camera where the bar's line is and how
-clearly it is a bar (`vision.touched.line`); the axis through these lines is computed
-(`vision.touched.axis`), and measured once more if it moved. The axis with the highest detection
-score over all cameras wins. Third, where not all cameras see it or their planes through it nearly
-coincide, each camera is evaluated alone as well, by the bar's width (`vision.touched.one_view`),
-and replaces the axis if it scores clearly higher. Rings, spheres and cones have their own searches,
-in `vision.touched.rounded_search`. Which search a form of object has is registered below.
+clearly it is a bar (`vision.touched.line`). Any two of these lines, each of another camera, are an
+axis (`vision.touched.axis`), so the bar is found even if no axis of the first stage was right in
+two cameras. It is measured again until its lines lie where they were expected: only then are
+detection scores comparable, for a line that still moves scores high beside a bar. All pairs that
+could win are measured, and the axis with the highest detection score over all cameras wins. Third,
+where not all cameras see it or their planes through it nearly coincide, each camera is evaluated
+alone as well, by the bar's width (`vision.touched.one_view`), and replaces the axis if it scores
+clearly higher. Rings, spheres and cones have their own searches, in
+`vision.touched.rounded_search`. Which search a form of object has is registered below.
 """
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import singledispatch
+from itertools import combinations, product
+from operator import itemgetter
 
 import numpy as np
 
+from vision.geometry.camera import Camera
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.ring import Ring
@@ -26,10 +32,10 @@ from vision.geometry.rounded import Rounded
 from vision.geometry.touched import Axis, Touched
 from vision.pictures.change import HALF
 from vision.pictures.view import View
-from vision.touched.axis import settle_axis
+from vision.touched.axis import meeting_axis, offset_px, settle_axis
 from vision.touched.edge_map import EdgeMap, compute_edge_map
-from vision.touched.find import find_bars
-from vision.touched.line import BarLineEstimate, find_lines, find_lines_farther, measure_bars
+from vision.touched.find import can_touch, find_bars
+from vision.touched.line import BarLineEstimate, find_lines, measure_bars
 from vision.touched.one_view import (
     find_bars_alone,
     see_bar_alone,
@@ -42,16 +48,17 @@ from vision.touched.search_scene import SearchScene, still_picture
 # [rad] Where the cameras' planes through the bar are nearer to each other than this, a small error
 # of one line gives it another slope. Study: bar_scenes.py.
 _NARROW_RAD = np.radians(8.0)
-# [log] What a camera that shows the place but no edge takes from the score of a hypothesis: bars
-# score 5 to 9. Study: bar_scenes.py.
-_NO_EDGES = 3.0
-# [px] Lines that lie so near to where they were expected are not measured again: half of a quick
-# measurement's blur. From 1.5 px the width in one camera moved by 3.8 of its sigma. Study:
-# bar_scenes.py.
+# [px] An axis that its lines move by less is not measured again: half of a quick measurement's
+# blur. From 1.5 px the width in one camera moved by 3.8 of its sigma. Study: bar_scenes.py.
 _CONVERGED_PX = 0.5
+# [px] Lines nearer to each other than this are one: half the reach of a quick measurement. Derived.
+_SAME_LINE_PX = 1.5
 # [log] By so much one camera's axis must score higher than one that edges in all cameras led to;
 # two measurements about the same axis differ by 0.5. Study: bar_scenes.py.
 _CLEARER = 1.0
+# [passes] Most measurements of one axis: each moves a line by up to 3 px, so all of them by 36 px, more
+# than the width of most bars. Derived.
+_MOST_PASSES = 12
 
 
 @dataclass(frozen=True)
@@ -59,42 +66,31 @@ class SeenBar:
     """The axis of the touched object, and by camera the bar's lines that it passes through.
 
     Of a rounded object there are no lines.
+    converged: another measurement about the axis would give the same axis. alternatives: bars
+    elsewhere that have converged, too, and score less by no more than _CLEARER, the best first;
+    each has its axis, lines and detection_score, and no alternatives of its own.
     """
 
     axis: Axis
     lines: Mapping[str, BarLineEstimate]
+    converged: bool = True
+    alternatives: tuple["SeenBar", ...] = ()
 
     @property
     def seen_by(self) -> list[str]:
-        """Return the names of the cameras that see a bar there, and its edges."""
-        return [name for name, line in self.lines.items() if line.has_edges]
+        """Return the names of the cameras that see a bar there."""
+        return [
+            name for name, line in self.lines.items() if line.has_edges or line.joint_score > 0.0
+        ]
 
     @property
     def detection_score(self) -> float:
         """Return how clearly all cameras see a bar there: a sum of logs, higher is clearer.
 
-        A camera that shows the place and no edge there counts against it. The evidence is no such
-        score: each hypothesis has its own pixels, and a wrong one along something bright in one
-        camera has more evidence there than the bar has in both.
+        The evidence is no such score: each hypothesis has its own pixels, and a wrong one along
+        something bright in one camera has more evidence there than the bar has in both.
         """
-        scores = [
-            max(line.detection_score, 0.0) if line.has_edges else -_NO_EDGES
-            for line in self.lines.values()
-        ]
-        return sum(scores)
-
-    @property
-    def highest_score(self) -> float:
-        """Return the detection score that it would have if all cameras saw its edges."""
-        return sum(max(line.detection_score, 0.0) for line in self.lines.values())
-
-    @property
-    def converged(self) -> bool:
-        """Return whether the lines lie where they were expected.
-
-        Another measurement from there would give the same.
-        """
-        return all(np.all(np.abs(line.line) < _CONVERGED_PX) for line in self.lines.values())
+        return sum(line.joint_score for line in self.lines.values())
 
 
 def find_object(scene: SearchScene) -> SeenBar:
@@ -137,6 +133,19 @@ def _search_bar(touched: Bar, scene: SearchScene) -> SeenBar:
     return search.measured_finely(search.best_with_single_cameras(by_all))
 
 
+@dataclass
+class LineCandidate:
+    """A line that may be the bar's in one camera.
+
+    axis: one that passes through it; the search moves it to where the line converges. joint_score:
+    as of `BarLineEstimate`, where it was measured first.
+    """
+
+    camera: Camera
+    axis: BarAxis
+    joint_score: float
+
+
 class BarSearch:
     """The search for a straight bar in one scene, stage by stage, see the module's introduction."""
 
@@ -154,15 +163,66 @@ class BarSearch:
             )
 
     def best_by_all_cameras(self) -> SeenBar:
-        """Find the bar by the edges in all cameras: that with the highest detection score."""
+        """Find the bar by its lines in all cameras: that with the highest detection score.
+
+        Pairs of lines are measured until they converge, as long as they could come within _CLEARER
+        of the best so far.
+        """
         scene = self.scene
         axes = find_bars(list(self.edge_maps.values()), scene.rods, scene.motor_range_rad)
-        best = self._most_probable([self._measured(axis) for axis in axes])
-        # A bar whose rims are dark was found by its highlight: its lines lie farther away.
-        farther = find_lines_farther(best.lines)
-        there = SeenBar(self._axis_through(best.axis, farther), farther)
-        best = max(best, there, key=_detection_score)
-        return best if best.converged else self._measured(best.axis)
+        found: list[SeenBar] = []
+        for highest, one, other in _pairs_of(self._candidates(axes)):
+            if highest < _highest_score(found) - _CLEARER:
+                break
+            axis = meeting_axis(one.camera, one.axis, other.camera, other.axis)
+            if can_touch(axis, scene.rods, scene.motor_range_rad):
+                one.axis = other.axis = self._converge(axis, found)
+        if not found:
+            self._converge(axes[0], found)
+        return _best_with_alternatives(found)
+
+    def _candidates(self, axes: Sequence[BarAxis]) -> list["LineCandidate"]:
+        """Measure the bar's line about each axis, once where a camera sees two axes as one."""
+        scene = self.scene
+        candidates: list[LineCandidate] = []
+        for axis, view in product(axes, scene.views):
+            camera = view.camera
+            others = [one.axis for one in candidates if one.camera is camera]
+            if any(offset_px(camera, axis, other) < _SAME_LINE_PX for other in others):
+                continue
+            for line in self._lines([view], axis).values():
+                if line.is_bar:
+                    through = self._axis_through(axis, {camera.name: line})
+                    candidates.append(LineCandidate(camera, through, line.joint_score))
+        return candidates
+
+    def _converge(self, axis: BarAxis, found: list[SeenBar]) -> BarAxis:
+        """Measure the lines about an axis, and again those that it has left, until it converges.
+
+        Adds the bar to those found before, unless it arrives at one of them, and returns its axis.
+        """
+        lines: dict[str, BarLineEstimate] = {}
+        about: dict[str, BarAxis] = {}  # by camera, the axis that its line was measured about
+        for _ in range(_MOST_PASSES):
+            for before in found:
+                if self._is_same(axis, before.axis):
+                    return before.axis
+            left = [one for one in self.scene.views if _has_left(one.camera, axis, about)]
+            if not left:
+                found.append(SeenBar(axis, lines))
+                return axis
+            names = [view.camera.name for view in left]
+            about |= dict.fromkeys(names, axis)
+            kept = {name: line for name, line in lines.items() if name not in names}
+            lines = kept | self._lines(left, axis)
+            axis = self._axis_through(axis, lines)
+        found.append(SeenBar(axis, lines, converged=False))
+        return axis
+
+    def _is_same(self, axis: BarAxis, other: BarAxis) -> bool:
+        """Return whether every camera sees two axes as one."""
+        cameras = self.scene.cameras
+        return all(offset_px(camera, axis, other) < _SAME_LINE_PX for camera in cameras)
 
     def best_with_single_cameras(self, by_all: SeenBar) -> SeenBar:
         """Return the bar by all cameras, or by a single one where that scores clearly higher.
@@ -211,9 +271,13 @@ class BarSearch:
 
     def _measured(self, axis: BarAxis) -> SeenBar:
         """Measure the lines about an axis quickly, and return the axis through them."""
-        scene = self.scene
-        lines = find_lines(scene.views, axis, scene.radius_mm, scene.wires_px, scene.settings)
+        lines = self._lines(self.scene.views, axis)
         return SeenBar(self._axis_through(axis, lines), lines)
+
+    def _lines(self, views: Sequence[View], axis: BarAxis) -> dict[str, BarLineEstimate]:
+        """Measure the lines about an axis quickly, in some views."""
+        scene = self.scene
+        return find_lines(views, axis, scene.radius_mm, scene.wires_px, scene.settings)
 
     def _axis_through(self, axis: BarAxis, lines: Mapping[str, BarLineEstimate]) -> BarAxis:
         """Return the axis through those lines that are a bar's.
@@ -223,22 +287,55 @@ class BarSearch:
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         return settle_axis(axis, self.scene.cameras, bars, self.scene.radius_mm)
 
-    def _most_probable(self, bars: Sequence[SeenBar]) -> SeenBar:
-        """Return the bar with the highest detection score after a second measurement.
-
-        Bars that have converged are not measured again, nor those that would score lower than the
-        best so far even if all cameras saw their edges.
-        """
-        best = None
-        for bar in sorted(bars, key=lambda one: one.highest_score, reverse=True):
-            if best is not None and bar.highest_score <= best.detection_score:
-                continue
-            again = bar if bar.converged else self._measured(bar.axis)
-            if best is None or again.detection_score > best.detection_score:
-                best = again
-        return best
-
 
 def _detection_score(bar: SeenBar) -> float:
     """Return a bar's detection score, as a key to compare bars by."""
     return bar.detection_score
+
+
+def _pairs_of(
+    candidates: Sequence[LineCandidate],
+) -> list[tuple[float, LineCandidate, LineCandidate]]:
+    """Return each pair of lines of two cameras, with the highest score that its axis may have.
+
+    Any two lines, each of another camera, are one axis. Cameras that have no part in the pair
+    count as with their clearest line. The pair with the highest score comes first.
+    """
+    clearest: dict[str, float] = {}
+    for one in candidates:
+        name = one.camera.name
+        clearest[name] = max(one.joint_score, clearest.get(name, 0.0))
+    pairs = []
+    for one, other in combinations(candidates, 2):
+        if one.camera is not other.camera:
+            less = clearest[one.camera.name] + clearest[other.camera.name]
+            highest = sum(clearest.values()) - less + one.joint_score + other.joint_score
+            pairs.append((highest, one, other))
+    return sorted(pairs, key=itemgetter(0), reverse=True)
+
+
+def _has_left(camera: Camera, axis: BarAxis, about: Mapping[str, BarAxis]) -> bool:
+    """Return whether a camera sees an axis elsewhere than that which its line was measured about.
+
+    about: axes by camera, of those in which a line was measured.
+    """
+    before = about.get(camera.name)
+    return before is None or offset_px(camera, axis, before) > _CONVERGED_PX
+
+
+def _highest_score(bars: Sequence[SeenBar]) -> float:
+    """Return the highest detection score of those bars that have converged, -inf of none."""
+    return max((bar.detection_score for bar in bars if bar.converged), default=-np.inf)
+
+
+def _best_with_alternatives(bars: Sequence[SeenBar]) -> SeenBar:
+    """Return the bar with the highest detection score of those that have converged.
+
+    Those that score nearly as high are its alternatives. Where none has converged it is the one
+    with the highest score, without alternatives.
+    """
+    converged = [bar for bar in bars if bar.converged]
+    ranked = sorted(converged or bars, key=_detection_score, reverse=True)
+    least = ranked[0].detection_score - _CLEARER
+    close = [bar for bar in ranked[1:] if bar.converged and bar.detection_score > least]
+    return replace(ranked[0], alternatives=tuple(close))

@@ -1,0 +1,80 @@
+"""The search for a bar in all cameras: each line where it converges, and every pair of lines that could win."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.studies.accuracy.bar_scenes import FOUND_PX, axis_off_px, read_scene
+from vision.geometry.contact import BarAxis
+from vision.geometry.vision_settings import VisionSettings
+from vision.touched import search
+from vision.touched.axis import meeting_axis, offset_px
+from vision.touched.find import axis_from_angles, can_touch
+from vision.touched.search_scene import SearchScene
+
+LAMP = Path(__file__).parents[3] / "fixtures" / "scenes" / "lamp"
+
+
+@pytest.fixture(scope="module")
+def lamp():
+    """A path-traced scene of two cameras, and its true axis."""
+    views, cameras, rods, motor_rad, true = read_scene(LAMP)
+    return SearchScene(views, cameras, rods, motor_rad, VisionSettings()), true
+
+
+def farther(axis: BarAxis, camera, shift_mm: float) -> BarAxis:
+    """The axis moved so that the camera sees it farther to one side."""
+    across = np.cross(axis.direction, axis.point_mm - camera.centre_mm)
+    return replace(axis, point_mm=axis.point_mm + shift_mm * across / np.linalg.norm(across))
+
+
+def test_a_bar_is_found_by_lines_that_no_hypothesis_has_right_in_two_cameras(lamp, monkeypatch):
+    """Each is 20 px off in one camera, two half-widths of the bar; from there a line does not come to the bar at once."""
+    scene, true = lamp
+    one, other = scene.cameras
+    right_in_one = meeting_axis(one, true, other, farther(true, other, 6.0))
+    right_in_other = meeting_axis(one, farther(true, one, -6.0), other, true)
+    assert offset_px(other, right_in_one, true) > 15.0
+    assert offset_px(one, right_in_other, true) > 15.0
+    monkeypatch.setattr(search, "find_bars", lambda *_: [right_in_one, right_in_other])
+    found = search.BarSearch(scene).best_by_all_cameras()
+    assert found.converged
+    for camera in scene.cameras:
+        assert axis_off_px(camera, true, found.axis, scene.radius_mm) < FOUND_PX
+
+
+def test_a_line_is_followed_until_it_converges(lamp, monkeypatch):
+    """A pass reads 3 px to either side; this hypothesis is 10 px off in one camera."""
+    scene, true = lamp
+    one, other = scene.cameras
+    start = meeting_axis(one, true, other, farther(true, other, 3.0))
+    assert offset_px(other, start, true) > 7.0
+    monkeypatch.setattr(search, "find_bars", lambda *_: [start])
+    found = search.BarSearch(scene).best_by_all_cameras()
+    assert found.converged
+    assert max(offset_px(camera, found.axis, true) for camera in scene.cameras) < FOUND_PX
+
+
+def test_planes_of_two_cameras_meet_in_the_axis_that_both_see(lamp):
+    scene, true = lamp
+    one, other = scene.cameras
+    moved = replace(true, point_mm=true.point_mm + 15.0 * true.direction)
+    meeting = meeting_axis(one, true, other, moved)
+    assert np.allclose(np.abs(meeting.direction @ true.direction), 1.0)
+    assert max(offset_px(camera, meeting, true) for camera in (one, other)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "x_mm, touch_deg, is_touched",
+    [(60.0, 5.0, True), (60.0, -20.0, False), (60.0, 25.0, False), (130.0, 5.0, False)],
+)
+@pytest.mark.parametrize("beta_deg", [-60.0, 0.0, 60.0])
+def test_a_whisker_touches_what_lies_along_it_and_in_its_stroke(
+    lamp, x_mm, touch_deg, is_touched, beta_deg
+):
+    rods = lamp[0].rods
+    angles = np.radians([touch_deg, beta_deg, 3.0])
+    axis = axis_from_angles(x_mm, *angles, rods.reach_mm(x_mm)).upward()
+    assert can_touch(axis, rods, tuple(np.radians([0.0, 10.0]))) is is_touched
