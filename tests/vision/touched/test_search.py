@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -78,3 +79,15 @@ def test_a_whisker_touches_what_lies_along_it_and_in_its_stroke(
     angles = np.radians([touch_deg, beta_deg, 3.0])
     axis = axis_from_angles(x_mm, *angles, rods.reach_mm(x_mm)).upward()
     assert can_touch(axis, rods, tuple(np.radians([0.0, 10.0]))) is is_touched
+
+
+def test_what_scores_nearly_as_high_elsewhere_is_an_alternative_if_it_has_converged(lamp):
+    true = lamp[1]
+    bars = []
+    for score, converged in ((8.9, True), (9.9, False), (7.0, True), (9.4, True)):
+        lines = {"a": SimpleNamespace(joint_score=score)}
+        bars.append(search.SeenBar(true, lines, converged=converged))
+    best = search._best_with_alternatives(bars)
+    assert best.detection_score == 9.4
+    assert [bar.detection_score for bar in best.alternatives] == [8.9]
+    assert not search._best_with_alternatives([bars[1]]).converged
