@@ -3,7 +3,7 @@
 Kept in OUT/calibration with the hash of what it was made from, and made again only where that changed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,10 +28,11 @@ from bench.cameras.first_look import by_first_look, first_look
 from bench.cameras.known_scale import check_scale
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.session import Session
-from vision.boards import camera_moved, refine_corners
+from vision.boards import camera_moved, estimate_optics, refine_corners
 from vision.calibration import Placement, by_board, move_rig_frame, read_cameras
 from vision.geometry import (
     NO_REASON,
+    Board,
     Cameras,
     Reason,
     Refused,
@@ -92,9 +93,35 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
         found = f"has no camera {missing[0]}, which has frames; calibrate it"
         raise BadInput(found, file="cameras.toml")
     background = {name: _background(session, name) for name in cameras.names}
+    cameras = _with_optics(cameras, background, session.board)
     of_cameras = [[c, cameras.covariance, cameras.placement] for c in cameras.cameras]
     made = hash_of(of_cameras, list(background.values()))
-    return SessionCalibration(cameras, background, made, tuple(notes), T_rig_board)
+    notes = (*notes, *_optics_notes(cameras))
+    return SessionCalibration(cameras, background, made, notes, T_rig_board)
+
+
+def _with_optics(
+    cameras: Cameras, background: Mapping[str, np.ndarray | None], board: Board | None
+) -> Cameras:
+    """Return the cameras with the transfer curve and lens blur that the board on the rig shows."""
+    if board is None:
+        return cameras
+    known = []
+    for camera in cameras:
+        picture = background[camera.name]
+        optics = camera.optics if picture is None else estimate_optics(picture, board)
+        known.append(replace(camera, optics=optics))
+    return replace(cameras, cameras=tuple(known))
+
+
+def _optics_notes(cameras: Cameras) -> Iterator[str]:
+    """Yield a line on the optics of each camera that the board on the rig shows."""
+    for camera in cameras:
+        optics = camera.optics
+        if optics.is_known:
+            curve = f"gamma {optics.gamma:.2f} ± {optics.gamma * optics.log_gamma_sigma:.2f}"
+            blur = f"{optics.blur_px:.2f} ± {optics.blur_px * optics.log_blur_sigma:.2f} px"
+            yield f"camera {camera.name}, by the board on the rig: {curve}, lens blur {blur}"
 
 
 def at_base(calibration: SessionCalibration, view: Session) -> SessionCalibration:

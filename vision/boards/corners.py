@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from vision.boards.edge_pixels import Windows, cut_windows
 from vision.boards.saddle import Saddles, fit_saddles
 from vision.geometry.board import Board
 from vision.geometry.refusals import Refused
@@ -137,9 +138,24 @@ def _fit_corners(
     frames = _local_frames(px_guess, ids, board)
     if frames is None:
         return None
-    # The white rim between a marker and its square's edge, in squares.
-    border = 0.5 * (1.0 - board.marker_mm / board.square_mm)
-    return fit_saddles(grey, px_guess, frames, border)
+    return fit_saddles(grey, px_guess, frames, _border_squares(board))
+
+
+def cut_corners(
+    grey: np.ndarray, px: np.ndarray, ids: np.ndarray, board: Board
+) -> tuple[Windows, np.ndarray] | None:
+    """Return the pixels about known corners (n, 2), and one square in the picture at each, (n, 2,
+    2) px. None where the corners fix no plane.
+    """
+    frames = _local_frames(px, ids, board)
+    if frames is None:
+        return None
+    return cut_windows(grey, px, frames, _border_squares(board)), frames
+
+
+def _border_squares(board: Board) -> float:
+    """Return the white rim between a marker and its square's edge, in squares."""
+    return 0.5 * (1.0 - board.marker_mm / board.square_mm)
 
 
 def _local_frames(px: np.ndarray, ids: np.ndarray, board: Board) -> np.ndarray | None:

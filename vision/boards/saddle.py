@@ -10,6 +10,7 @@ of a picture are fitted side by side (Levenberg–Marquardt, a damping each), to
 edges and away from the markers.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -62,6 +63,11 @@ LINEAR = slice(6, 10)
 # [columns] The light's slope along x and y. A layout, no threshold.
 SLOPE = slice(8, 10)
 CONTRAST, LEVEL = range(6, 8)
+# [columns] Of a saddle besides its place: they converge with it. A layout, no threshold.
+_NOT_WATCHED = slice(2, 10)
+
+# Grey (n, k) of windows by parameters (n, m), and its Jacobian (n, m, k).
+Predict = Callable[[Windows, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,15 +96,15 @@ def fit_saddles(
     marker, in squares.
     """
     windows = cut_windows(grey, px_guess, frames, border)
-    start = _start_parameters(windows, px_guess, frames)
-    parameters, converged = _levenberg_marquardt(windows, start)
+    start = start_parameters(windows, px_guess, frames)
+    parameters, converged = fit_windows(windows, start, predict_saddles)
     saddles = _report(windows, parameters, converged)
     plausible = converged & _is_plausible(saddles, px_guess, frames)
     has_pixels = windows.weight.sum(axis=1) >= _MIN_PIXELS
     return replace(saddles, converged=plausible & has_pixels)
 
 
-def _start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Return the parameters (n, 10) that the fit starts from.
 
     Edges as the homography has them; contrast, level and slope by least squares.
@@ -111,13 +117,13 @@ def _start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray
     p[:, TURN] = np.column_stack([normal_1, normal_2])
     p[:, BLUR] = np.log(_FIRST_BLUR_PX)
     p[:, CONTRAST] = 1.0
-    _, J = _model(windows, p)
+    _, J = predict_saddles(windows, p)
     normal, gradient = _normal_equations(J[:, LINEAR], windows.grey, windows.weight)
     p[:, LINEAR] = _solve(normal, gradient, np.zeros(len(p)))
     return p
 
 
-def _model(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def predict_saddles(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Predict the grey (n, k) by the parameters p (n, 10), with its Jacobian (n, 10, k)."""
     offset = windows.offset - p[:, PLACE, None]  # (n, 2, k) px from the corner
     crossing, by_edge = _crossing(offset, p)
@@ -187,12 +193,16 @@ def _solve(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.
     return np.linalg.solve(raised, gradient[:, :, None])[:, :, 0]
 
 
-def _levenberg_marquardt(windows: Windows, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit all corners side by side: return their parameters (n, 10) and which converged (n,).
+def fit_windows(
+    windows: Windows, start: np.ndarray, predict: Predict
+) -> tuple[np.ndarray, np.ndarray]:
+    """Fit all corners side by side: return their parameters (n, m) and which converged (n,).
 
-    Corners leave the iteration as they converge. SciPy fits one corner at a time.
+    start (n, m): parameters to begin with, those of a saddle first. predict: the model. Levenberg
+    and Marquardt's method; corners leave the iteration as they converge. SciPy fits one corner at a
+    time.
     """
-    fit = _evaluate(windows, start.copy())
+    fit = _evaluate(windows, start.copy(), predict)
     damping = np.full(len(start), 1e-3)
     converged = np.zeros(len(start), dtype=bool)
     for _ in range(_ITERATIONS):
@@ -200,23 +210,26 @@ def _levenberg_marquardt(windows: Windows, start: np.ndarray) -> tuple[np.ndarra
         if not len(active):
             break
         step = fit.step(active, damping)
-        trial = _evaluate(windows.select(active), _within_search(fit.p[active] + step))
+        there = _within_search(fit.p[active] + step)
+        trial = _evaluate(windows.select(active), there, predict)
         is_better = trial.cost <= fit.cost[active]
         fit.accept(active, trial, is_better)
         damping[active] *= np.where(is_better, 0.2, 10.0)
-        converged[active] = np.linalg.norm(step[:, PLACE], axis=1) < _CONVERGED_PX
+        converged[active] = (
+            np.linalg.norm(np.delete(step, _NOT_WATCHED, axis=1), axis=1) < _CONVERGED_PX
+        )
     return fit.p, converged
 
 
 def _within_search(p: np.ndarray) -> np.ndarray:
-    """Return the parameters (n, 10) with blurs within the limits of the search."""
+    """Return the parameters (n, m) with blurs within the limits of the search."""
     limited = p.copy()
     limited[:, BLUR] = np.clip(p[:, BLUR], *np.log(_BLUR_SEARCH_PX))
     return limited
 
 
 class _Fit(NamedTuple):
-    """A state of the fit: parameters p (n, 10), cost (n,), JᵀWJ (n, 10, 10) and JᵀWr (n, 10)."""
+    """A state of the fit: parameters p (n, m), cost (n,), JᵀWJ (n, m, m) and JᵀWr (n, m)."""
 
     p: np.ndarray
     cost: np.ndarray
@@ -224,18 +237,18 @@ class _Fit(NamedTuple):
     gradient: np.ndarray
 
     def step(self, rows: np.ndarray, damping: np.ndarray) -> np.ndarray:
-        """Return Marquardt's step (m, 10) of some corners."""
+        """Return Marquardt's step (rows, m) of some corners."""
         return _solve(self.normal[rows], self.gradient[rows], damping[rows])
 
     def accept(self, rows: np.ndarray, trial: "_Fit", is_better: np.ndarray) -> None:
-        """Take over the corners that are better in a trial of some corners (m,), in place."""
+        """Take over the corners that are better in a trial of some corners (rows,), in place."""
         for values, trial_values in zip(self, trial):
             values[rows[is_better]] = trial_values[is_better]
 
 
-def _evaluate(windows: Windows, p: np.ndarray) -> _Fit:
-    """Return the state of the fit at the parameters p (n, 10)."""
-    grey, J = _model(windows, p)
+def _evaluate(windows: Windows, p: np.ndarray, predict: Predict) -> _Fit:
+    """Return the state of the fit of a model at its parameters p (n, m)."""
+    grey, J = predict(windows, p)
     residual = windows.grey - grey
     cost = np.sum(windows.weight * residual**2, axis=1)
     normal, gradient = _normal_equations(J, residual, windows.weight)
@@ -244,7 +257,7 @@ def _evaluate(windows: Windows, p: np.ndarray) -> _Fit:
 
 def _report(windows: Windows, p: np.ndarray, converged: np.ndarray) -> Saddles:
     """Return the corners of the parameters p (n, 10), with their sigmas."""
-    grey, J = _model(windows, p)
+    grey, J = predict_saddles(windows, p)
     residual = (windows.grey - grey) * windows.weight
     freedom = np.maximum(windows.weight.sum(axis=1) - p.shape[1], 1)
     misfit = np.sqrt(np.sum(residual**2, axis=1) / freedom)

@@ -12,6 +12,7 @@ import numpy as np
 
 from vision.geometry import lens as lens_model
 from vision.geometry.checks import require
+from vision.geometry.optics import UNKNOWN, Optics
 from vision.geometry.rotation import apply, exp_rotation, nearest_rotation, skew
 
 # [parameters] A layout, no threshold: nine of the lens, six of the pose.
@@ -26,10 +27,12 @@ class Camera:
     """One calibrated camera, placed in the rig frame.
 
     size_px: (width, height). matrix: (3, 3), px. distortion: (5,) k1 k2 p1 p2 k3. T_camera_rig: (3,
-    4), mm. Its 15 parameters (for Jacobians and covariances, see PARAMETERS) are fx fy cx cy k1 k2
-    p1 p2 k3 and a small rotation w and shift v in the camera frame: x_camera = Exp(w) R x_rig + t +
-    v, with w = v = 0 at the stored pose. Raises Refused where numbers are missing, not finite, or
-    no camera's.
+    4), mm. optics: transfer curve and lens blur.
+
+    Its 15 parameters (for Jacobians and covariances, see PARAMETERS) are fx fy cx cy k1 k2 p1 p2 k3
+    and a small rotation w and shift v in the camera frame: x_camera = Exp(w) R x_rig + t + v, with
+    w = v = 0 at the stored pose. Raises Refused where numbers are missing, not finite, or no
+    camera's.
     """
 
     name: str
@@ -38,6 +41,7 @@ class Camera:
     distortion: np.ndarray
     T_camera_rig: np.ndarray
     rms_px: float = 0.0
+    optics: Optics = UNKNOWN
 
     def __post_init__(self):
         """Raise Refused where a field cannot be, and store read-only arrays with an exact rotation."""

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import softmax
 
 from vision.geometry.contact import BarAxis
+from vision.geometry.optics import LEAST_PROBABILITY, Optics, probable_gammas
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
 from vision.touched.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces, beside_wires
@@ -38,11 +39,6 @@ _NO_EDGES = 3.0
 # [px] Reach of a coarse pass: an axis fitted to coarse lines was 1.7 off at most in 61 path-traced
 # scenes. Study: bar_scenes.py.
 _COARSE_REACH_PX = 2.0
-# [1] Transfer curves: of a sensor itself, and of a picture that was encoded for a screen (sRGB,
-# nearly). All cameras weigh them together. Stated.
-_GAMMAS = (1.0, 2.2)
-# [probability] Least one of a transfer curve that is used. Study: chosen.
-_LEAST_PROBABILITY = 1e-3
 # [probability] Least one of a transfer curve after the first pass, which was wrong by a factor of
 # 150 at most in 15 path-traced scenes. Study: chosen.
 _LEAST_AT_FIRST = 1e-6
@@ -158,11 +154,16 @@ def measure_bars(
     pieces = clear_pieces(views, axis, radius_mm, wires_px, settings)
     if not pieces:
         return {}
-    starts = _starts_nearby(pieces, before) if before else _coarse_starts(pieces)
+    optics = {view.camera.name: view.camera.optics for view in views}
+    prior = probable_gammas(optics.values())
+    if before:
+        starts = _starts_nearby(pieces, before, optics)
+    else:
+        starts = _coarse_starts(pieces, prior, optics)
     refined = {}
     for name, by_gamma in starts.items():
-        refined[name] = _refine(pieces[name], by_gamma, 2 if before else 1)
-    probabilities = _probable_gammas(refined, _LEAST_PROBABILITY)
+        refined[name] = _refine(pieces[name], by_gamma, 2 if before else 1, optics[name])
+    probabilities = _probable_gammas(refined, prior, LEAST_PROBABILITY)
     lines = {}
     for name, by_gamma in _under(refined, probabilities).items():
         weights = np.array(list(probabilities.values()))
@@ -171,7 +172,9 @@ def measure_bars(
 
 
 def _starts_nearby(
-    pieces: Mapping[str, Pieces], before: Mapping[str, BarLineEstimate]
+    pieces: Mapping[str, Pieces],
+    before: Mapping[str, BarLineEstimate],
+    optics: Mapping[str, Optics],
 ) -> CameraPosteriors:
     """Return the posteriors of lines measured about an axis nearby; of other cameras new ones."""
     gammas = list(next(iter(before.values())).posteriors)
@@ -180,14 +183,18 @@ def _starts_nearby(
         if name in before:
             starts[name] = before[name].posteriors_about(some)
         else:
-            starts[name] = _refine(some, _fit_coarse(some, gammas), 1)
+            coarse = _fit_coarse(some, gammas, optics[name])
+            starts[name] = _refine(some, coarse, 1, optics[name])
     return starts
 
 
-def _coarse_starts(pieces: Mapping[str, Pieces]) -> CameraPosteriors:
-    """Return the coarse posteriors under all transfer curves that are probable by these."""
-    starts = {name: _fit_coarse(some, _GAMMAS) for name, some in pieces.items()}
-    return _under(starts, _probable_gammas(starts, _LEAST_AT_FIRST))
+def _coarse_starts(
+    pieces: Mapping[str, Pieces], prior: Mapping[float, float], optics: Mapping[str, Optics]
+) -> CameraPosteriors:
+    """Return the coarse posteriors under all transfer curves that are probable by these and by
+    their prior probabilities."""
+    starts = {name: _fit_coarse(some, prior, optics[name]) for name, some in pieces.items()}
+    return _under(starts, _probable_gammas(starts, prior, _LEAST_AT_FIRST))
 
 
 def _under(posteriors: CameraPosteriors, gammas: Iterable[float]) -> CameraPosteriors:
@@ -198,19 +205,22 @@ def _under(posteriors: CameraPosteriors, gammas: Iterable[float]) -> CameraPoste
     return selected
 
 
-def _fit_coarse(pieces: Pieces, gammas: Iterable[float]) -> dict[float, Posterior]:
+def _fit_coarse(pieces: Pieces, gammas: Iterable[float], optics: Optics) -> dict[float, Posterior]:
     """Return the coarse posterior under each transfer curve."""
-    return {gamma: fit_coarse(pieces, np.zeros(2), _COARSE_REACH_PX, gamma) for gamma in gammas}
+    coarse = {}
+    for gamma in gammas:
+        coarse[gamma] = fit_coarse(pieces, np.zeros(2), _COARSE_REACH_PX, gamma, optics)
+    return coarse
 
 
 def _refine(
-    pieces: Pieces, posteriors: Mapping[float, Posterior], positions: int
+    pieces: Pieces, posteriors: Mapping[float, Posterior], positions: int, optics: Optics
 ) -> dict[float, Posterior]:
     """Return the refined posterior under each transfer curve, with `positions` for each step
     across."""
     refined = {}
     for gamma, posterior in posteriors.items():
-        refined[gamma] = refine(pieces, posterior, gamma, positions)
+        refined[gamma] = refine(pieces, posterior, gamma, positions, optics)
     return refined
 
 
@@ -236,14 +246,19 @@ def clear_pieces(
     return clear
 
 
-def _probable_gammas(cameras: CameraPosteriors, least: float) -> dict[float, float]:
+def _probable_gammas(
+    cameras: CameraPosteriors, prior: Mapping[float, float], least: float
+) -> dict[float, float]:
     """Return the probability of each transfer curve that has at least so much, by its gamma.
+
+    prior: its prior probability, by gamma.
 
     All segments of a bar are lit nearly alike, so that the evidence of their light counts once for
     a camera: its mean. The evidence of segments that no curve explains is tempered. The
     probabilities that are returned add up to 1.
     """
-    total = 0.0
+    gammas = next(iter(cameras.values()))
+    total = -2.0 * np.log([prior[gamma] for gamma in gammas])
     for posteriors in cameras.values():
         temperature = np.max([one.temperature for one in posteriors.values()], axis=0)
         deviance = np.array([one.segment_deviance for one in posteriors.values()]) / temperature
@@ -254,7 +269,6 @@ def _probable_gammas(cameras: CameraPosteriors, least: float) -> dict[float, flo
     probabilities = softmax(-0.5 * total)
     kept = np.where(probabilities > least, probabilities, 0.0)
     kept = kept / kept.sum()
-    gammas = next(iter(cameras.values()))
     return {gamma: float(share) for gamma, share in zip(gammas, kept) if share > 0.0}
 
 

@@ -22,6 +22,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from vision.geometry.optics import UNKNOWN, Optics
 from vision.touched.evidence import Evidence, LitRod, compute_evidence
 from vision.touched.pieces import ARM_MM
 from vision.touched.profiles import STEP_PX, Profiles, compute_profiles
@@ -38,8 +39,10 @@ _LINE_LIMITS_PX = (0.25, 2.0)
 # [1] Least and largest half width of a refined window of the blur's logarithm: a tenth has three
 # points of its posterior. Study: bar_starts.py.
 _LOG_BLUR_LIMITS = (0.1, 0.5)
-# [px] Lens blurs of the first pass. Study: bar_starts.py.
-_BLURS_PX = (0.6, 0.85, 1.2, 1.7)
+# [px] Lens blurs of the first pass, where none is known. Study: bar_starts.py.
+_BLURS_PX = np.array([0.6, 0.85, 1.2, 1.7])
+# [sigma] Of the logarithm of a known blur, for the first pass. Derived.
+_BLUR_SIGMAS = np.array([-2.0, -0.7, 0.7, 2.0])
 # [px] The one lens blur of a quick pass, which distinguishes a bar from none. Study:
 # bar_scenes.py.
 _QUICK_BLUR_PX = 1.0
@@ -83,12 +86,14 @@ class LineWindow:
     most_px (2,): largest shift, and largest tilt over ARM_MM. blurs_px (n,): lens blurs. is_coarse:
     only the roughest prior of the light, and positions half a blur apart. positions: how many for
     each step of the profiles' grid.
+    optics: prior of the blurs.
     """
 
     most_px: np.ndarray
     blurs_px: np.ndarray
     is_coarse: bool = True
     positions: int = 1
+    optics: Optics = UNKNOWN
 
     @property
     def lines(self) -> int:
@@ -113,14 +118,14 @@ class LineWindow:
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
     @classmethod
-    def about(cls, posterior: "Posterior", positions: int) -> "LineWindow":
+    def about(cls, posterior: "Posterior", positions: int, optics: Optics) -> "LineWindow":
         """Return the refined window about a posterior, with `positions` for each step across."""
         sigma_px = np.sqrt(np.diag(posterior.covariance))
         most_px = np.clip(_WITHIN_SIGMAS * sigma_px, *_LINE_LIMITS_PX)
         wide = np.hypot(_WITHIN_SIGMAS * posterior.log_blur_sigma, posterior.log_blur_step)
         wide = np.clip(wide, *_LOG_BLUR_LIMITS)
         blurs_px = posterior.blur_px * np.exp(np.linspace(-wide, wide, _REFINED_BLURS))
-        return cls(most_px, blurs_px, is_coarse=False, positions=positions)
+        return cls(most_px, blurs_px, is_coarse=False, positions=positions, optics=optics)
 
 
 @dataclass(frozen=True)
@@ -195,17 +200,29 @@ class _LineGrid:
         return mean, float(np.sqrt(probability @ (self.log_blurs - mean) ** 2))
 
 
-def fit_coarse(pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float) -> Posterior:
-    """Return the posterior about a line (2,) that may be reach_px off, on a coarse grid of
-    blurs."""
-    window = LineWindow(np.full(2, reach_px), np.array(_BLURS_PX))
+def fit_coarse(
+    pieces: Pieces, line: np.ndarray, reach_px: float, gamma: float, optics: Optics
+) -> Posterior:
+    """Return the posterior about a line (2,) that may be reach_px off, on a coarse grid of blurs.
+
+    optics: prior of the blur.
+    """
+    blurs_px = _BLURS_PX
+    if np.isfinite(optics.log_blur_sigma):
+        blurs_px = optics.blur_px * np.exp(optics.log_blur_sigma * _BLUR_SIGMAS)
+    window = LineWindow(np.full(2, reach_px), blurs_px, optics=optics)
     return _fit(pieces, line, window, gamma)
 
 
-def refine(pieces: Pieces, before: Posterior, gamma: float, positions: int) -> Posterior:
+def refine(
+    pieces: Pieces, before: Posterior, gamma: float, positions: int, optics: Optics
+) -> Posterior:
     """Return the posterior on a finer grid about an earlier one, with `positions` for each step
-    across."""
-    return _fit(pieces, before.line, LineWindow.about(before, positions), gamma)
+    across.
+
+    optics: prior of the blur.
+    """
+    return _fit(pieces, before.line, LineWindow.about(before, positions, optics), gamma)
 
 
 def fit_quick(pieces: Pieces, line: np.ndarray, reach_px: float) -> Posterior:
@@ -354,6 +371,7 @@ def _evaluate_lines(
     least = deviance.min(axis=1)
     excess = _excess_of_lines(profiles, lines, shift_px, deviance - least[:, None])
     total = _total_deviance(least, excess, profiles)
+    total += np.tile(window.optics.deviance_of_blurs(log_blurs), priors)
     line, other = np.unravel_index(np.argmin(total), total.shape)
     segment_deviance = temperature * (least[:, other] + excess[:, line, other])
     total = total.reshape(-1, priors, blurs)

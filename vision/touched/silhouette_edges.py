@@ -19,6 +19,7 @@ from itertools import compress
 import numpy as np
 from scipy.special import logsumexp, softmax
 
+from vision.geometry.optics import LEAST_PROBABILITY, probable_gammas
 from vision.geometry.rounded import RoundedAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
@@ -41,11 +42,6 @@ _FINE_BLUR_FACTORS = np.exp(np.array([-0.2, -0.1, 0.0, 0.1, 0.2]))
 _COARSE_BLURS_PX = (1.0,)
 # [steps] Of the grid between positions of a coarse pass, as of a bar. Stated.
 _COARSE_EVERY = 2
-# [1] Transfer curves, as of a bar's line. Under the wrong one an outline is read half a pixel too
-# far out. Study: rounded_seen.py.
-_GAMMAS = (1.0, 2.2)
-# [probability] Least one of a transfer curve, over the most probable one's. Study: chosen.
-_LEAST_PROBABILITY = 0.001
 # [pieces] Of a side, each of 12 px: fewer constrain no texture. Stated.
 _FEWEST_PIECES = 4
 # [px] How far off a fitted outline may be. Stated.
@@ -76,25 +72,27 @@ class SilhouetteEdges:
 class _EdgePass:
     """How the edges near an outline are measured in one pass.
 
-    reach_px: how far from the outline. blurs_px (b,): of the lens. gammas: of the transfer curves.
+    reach_px: how far from the outline. gammas: of the transfer curves. blurs_px (b,): of the lens.
     every: steps of the grid between positions. is_fine: with two positions a step, and with all
     priors of the light.
     """
 
     reach_px: float
+    gammas: Sequence[float]
     blurs_px: Sequence[float] = _BLURS_PX
-    gammas: Sequence[float] = _GAMMAS
     every: int = 1
     is_fine: bool = False
 
 
-def _choose_pass(reach_px: float, before: SilhouetteEdges | None, coarse: bool) -> _EdgePass:
+def _choose_pass(
+    reach_px: float, gammas: Sequence[float], before: SilhouetteEdges | None, coarse: bool
+) -> _EdgePass:
     """Return a coarse pass, a fine one where there is an earlier one, or the first one."""
     if coarse:
-        return _EdgePass(reach_px, _COARSE_BLURS_PX, _GAMMAS[:1], _COARSE_EVERY)
+        return _EdgePass(reach_px, gammas, _COARSE_BLURS_PX, _COARSE_EVERY)
     if before is None:
-        return _EdgePass(reach_px)
-    return _EdgePass(_FINE_REACH_PX, before.blur_px * _FINE_BLUR_FACTORS, is_fine=True)
+        return _EdgePass(reach_px, gammas)
+    return _EdgePass(_FINE_REACH_PX, gammas, before.blur_px * _FINE_BLUR_FACTORS, is_fine=True)
 
 
 @dataclass(frozen=True)
@@ -129,10 +127,12 @@ def measure_silhouette_edges(
     by camera lines (m, 2) where the wire lies in some frame.
     """
     before = before or {}
+    prior = probable_gammas(view.camera.optics for view in views)
+    gammas = list(prior)[:1] if coarse else list(prior)
     outlines = {}
     for view in views:
         name = view.camera.name
-        one_pass = _choose_pass(reach_px, before.get(name), coarse)
+        one_pass = _choose_pass(reach_px, gammas, before.get(name), coarse)
         sides = predict_sides(view, axis, radius_mm, settings)
         pieces = []
         for side in sides:
@@ -141,14 +141,14 @@ def measure_silhouette_edges(
             )
         outlines[name] = _fit_outline(sides, pieces, one_pass)
     deviance = np.sum([outline.curve_deviances for outline in outlines.values()], axis=0)
-    probabilities = _probable_alone(deviance)
+    probabilities = _probable_alone(deviance - 2.0 * np.log([prior[gamma] for gamma in gammas]))
     return {name: outline.average(probabilities) for name, outline in outlines.items()}
 
 
 def _probable_alone(deviance: np.ndarray) -> np.ndarray:
     """Return the probabilities (g,) of transfer curves, 0 of those that are hardly possible."""
     weights = np.exp(-0.5 * (deviance - deviance.min()))
-    weights = np.where(weights < _LEAST_PROBABILITY, 0.0, weights)
+    weights = np.where(weights < LEAST_PROBABILITY, 0.0, weights)
     return weights / weights.sum()
 
 

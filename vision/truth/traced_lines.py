@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vision.geometry.optics import known_gamma
 from vision.pictures.view import SATURATED, View
 from vision.truth.line_source import LineSource, WhiskPlace
 from vision.truth.readers import ObjectReader, WhereAbout
@@ -85,7 +86,8 @@ def trace_wire(
     pieces = clear_pieces(whisk, view, place)
     if len(pieces) == 0:
         return []
-    traced = trace(pieces, wire_knots(whisk), seen_blur_px=blur_px, last=last)
+    optics = view.camera.optics
+    traced = trace(pieces, wire_knots(whisk), optics, seen_blur_px=blur_px, last=last)
     width = seen_width(traced.pieces, traced.blur_px)
     whisk.light[name] = WireAppearance(traced.blur_px, width, float(np.sqrt(traced.misfit)))
     points, source = to_points(traced)
@@ -93,7 +95,8 @@ def trace_wire(
 
 
 def clear_pieces(whisk: WhiskPictures, view: View, place: WhiskPlace) -> Pieces:
-    """Return the wire's segments near its curves in one camera, clear of clamp and object."""
+    """Return the wire's segments near its curves in one camera, clear of clamp and object, in light
+    where the transfer curve is known."""
     settings = whisk.settings
     pieces = wire_pieces(
         view, place.curves, whisk.rods.wire, settings.wire_piece_px, settings.wire_margin_px
@@ -103,7 +106,9 @@ def clear_pieces(whisk: WhiskPictures, view: View, place: WhiskPlace) -> Pieces:
     pieces = pieces.below(SATURATED * view.full_scale)
     middle_px, radius_px = place.axis.covering_discs(view.camera, place.swept_mm)
     is_clear = clear_of_bar(pieces, middle_px, radius_px, BESIDE_BAR_PX)
-    return pieces.select(is_clear & (pieces.place > NEAR_CLAMP_MM))
+    pieces = pieces.select(is_clear & (pieces.place > NEAR_CLAMP_MM))
+    gamma = known_gamma(one.camera.optics for one in whisk.views)
+    return pieces.in_light(gamma, view.full_scale)
 
 
 def wire_knots(whisk: WhiskPictures) -> Knots:

@@ -210,6 +210,27 @@ class Pieces(Rows):
         """Return the segments with weight 0 for pixels of this grey level or above."""
         return replace(self, weight=np.where(self.grey < grey, self.weight, 0.0))
 
+    def in_light(self, gamma: float, full_scale: float) -> "Pieces":
+        """Return the segments with light in place of grey levels, of the same full scale.
+
+        gamma: of the transfer curve, grey = full scale · light^(1 / gamma).
+        """
+        if gamma == 1.0:
+            return self
+        grey = np.maximum(self.grey, 1.0) / full_scale
+        behind = np.maximum(self.background, 1.0) / full_scale
+        by_grey = gamma * grey ** (gamma - 1.0)
+        by_behind = gamma * behind ** (gamma - 1.0)
+        by_square = gamma * (gamma - 1.0) * behind ** (gamma - 2.0) / full_scale
+        return replace(
+            self,
+            grey=full_scale * grey**gamma,
+            background=full_scale * behind**gamma,
+            slope=by_behind * self.slope,
+            curvature=by_behind * self.curvature + by_square * self.slope**2,
+            weight=self.weight / by_grey,
+        )
+
     def moved(self, shift_px: np.ndarray) -> "Pieces":
         """Return the same pixels seen from curves moved by shift_px (s,) along their normals."""
         return replace(

@@ -11,6 +11,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
+from vision.geometry.optics import UNKNOWN, Optics
 from vision.geometry.rods import Wire
 from vision.geometry.silhouette import edges, normals
 from vision.pictures.others import RodLines, mask_rods
@@ -19,7 +20,7 @@ from vision.wire.bands import Pieces, cut_pieces, read_band
 from vision.wire.binned import binned, without
 from vision.wire.joint import Solved, settle, solve_jointly
 from vision.wire.points import SHARED, LinePoints, Observed
-from vision.wire.shaded_segments import ShadedSegments
+from vision.wire.shaded_segments import BLUR_SIGMA, ShadedSegments
 from vision.wire.shading import Knots
 
 # [mm] Hub and set-screw hide or shade the wire up to here. Stated.
@@ -140,22 +141,23 @@ class Traced:
 def trace(
     pieces: Pieces,
     knots: Knots,
-    blur_px: float = _BLUR_PX,
+    optics: Optics = UNKNOWN,
     *,
     seen_blur_px: float | None = None,
     last: bool = True,
 ) -> Traced:
     """Find where the rod lies in segments that are a few pixels off at most.
 
-    blur_px: prior of the lens blur. seen_blur_px: the blur of an earlier pass that predicted these
+    optics: what is known of the lens blur. seen_blur_px: the blur of an earlier pass that predicted these
     segments, which are then some tenths of a pixel off at most.
     last: this is the last pass. Averaged pixels serve for all but the last step of the last pass.
     """
     averaged, variance_px2 = binned(pieces, BIN_PX)
+    blur_px, blur_sigma = optics.blur_with(_BLUR_PX, BLUR_SIGMA)
     prior_px = float(np.hypot(blur_px, np.sqrt(variance_px2)))
     if seen_blur_px is not None:
         seen_blur_px = float(np.hypot(seen_blur_px, np.sqrt(variance_px2)))
-    task = ShadedSegments(averaged, WIRE_WAVES, knots, prior_px, seen_blur_px=seen_blur_px)
+    task = ShadedSegments(averaged, WIRE_WAVES, knots, prior_px, blur_sigma, seen_blur_px)
     solved = solve_jointly(task, last=last)
     blur_px = without(solved.blur_px, variance_px2)
     if last:

@@ -8,16 +8,19 @@ from scipy.stats import chi2
 
 from tests.studies.accuracy.bar_lines import (
     AWAY_MM,
+    BLUR_PX,
     CENTRE,
     FOCAL_PX,
     RADIUS_MM,
     SCENES,
+    edges_px,
     errors_and_sigmas,
     measured,
     noisy_view,
 )
 from vision.fit.blocks import BAR_OFFSET_PX
 from vision.geometry.contact import BarAxis
+from vision.geometry.optics import Optics
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.touched.line import clear_pieces, find_lines
@@ -115,3 +118,22 @@ def test_what_lies_beside_a_bar_is_less_clearly_one(rng):
         for axis in (there, beside)
     ]
     assert clear[1] < 0.25 * clear[0]
+
+
+def test_a_camera_whose_optics_are_known_is_read_by_them_alone(rng):
+    """A picture encoded for a screen, of a bar half as bright on one side: with its curve and blur known, the line is
+    measured under no other curve, its blur is the known one to its sigma, and its sigma is no wider."""
+    view = noisy_view(*SCENES["polished, flat background"], 1.3, 0.4, rng)
+    encoded = {k: 255.0 * (grey / 255.0) ** (1.0 / 2.2) for k, grey in view.frames.items()}
+    background = 255.0 * (view.background / 255.0) ** (1.0 / 2.2)
+    view = replace(view, frames=encoded, background=background)
+    optics = Optics(2.1, 0.15, BLUR_PX, 0.05)
+    known = replace(view, camera=replace(view.camera, optics=optics))
+    across = np.array([-np.sin(1.3), np.cos(1.3), 0.0])
+    axis = BarAxis(0.4 * across, np.array([np.cos(1.3), np.sin(1.3), 0.0]))
+    line, unknown = (measured(one, axis) for one in (known, view))
+    assert list(line.posteriors) == [2.2]
+    assert abs(np.log(line.posteriors[2.2].blur_px / BLUR_PX)) < 0.1
+    error = (line.points.px - CENTRE) @ across[:2] - np.mean(edges_px(0.4))
+    assert np.all(np.abs(error) < 3.0 * np.hypot(line.points.sigma_px, BAR_OFFSET_PX))
+    assert np.all(line.points.sigma_px < 1.1 * unknown.points.sigma_px)
