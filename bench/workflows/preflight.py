@@ -29,7 +29,7 @@ from vision import FEWEST_FREE
 from vision.boards import (
     MIN_CORNERS,
     MIN_VIEWS,
-    edge_blur_px,
+    estimate_optics,
     find_corners,
     fixes_pose,
     why_not_found,
@@ -185,7 +185,7 @@ def _check_rig_board(picture: Path, board: Board, problems: InputProblems) -> No
     if len(find_corners(grey, board)) < MIN_CORNERS:
         hint = "the board must stand in view of every camera"
         raise BadInput(f"the board on the rig is not seen; {hint}", file=place)
-    blur_px = edge_blur_px(grey, board)
+    blur_px = estimate_optics(grey, board).blur_px
     if blur_px > _LARGEST_BLUR_PX:
         blurred = f"edges are blurred by {blur_px:.1f} px, {_LARGEST_BLUR_PX:g} is a lot"
         problems.warn(f"{place}: {blurred}: focus on the whisker, or let the camera rest")

@@ -9,7 +9,7 @@ from vision.geometry.lazy_names import lazy_names
 
 NAMES = {
     "board_optics": ("estimate_optics",),
-    "corners": ("Corners", "MIN_CORNERS", "edge_blur_px", "find_corners", "refine_corners"),
+    "corners": ("Corners", "MIN_CORNERS", "find_corners", "refine_corners"),
     "diagnosis": ("why_not_found",),
     "marker_size": ("check_marker_size",),
     "static_board": ("camera_moved",),

@@ -87,17 +87,6 @@ def refine_corners(
     return Corners(ids[good], saddles.px[good], saddles.sigma_px[good])
 
 
-def edge_blur_px(grey: np.ndarray, board: Board) -> float:
-    """Return the median blur of the board's edges, px, one sigma of a Gaussian; NaN without a
-    board.
-    """
-    ids, px = detect(grey, board)
-    saddles = _fit_corners(grey, px, ids, board)
-    if saddles is None or not saddles.converged.any():
-        return float("nan")
-    return float(np.median(saddles.blur_px[saddles.converged]))
-
-
 def detect(grey: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray]:
     """Return OpenCV's own corners: ids (n,) and px (n, 2), good to about 0.2 px."""
     ids, px, _ = detect_with_markers(grey, board)
