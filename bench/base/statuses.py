@@ -50,6 +50,10 @@ class Status:
     cure: str = _USUAL_CURE
 
 
+_OTHER_SIDE = (
+    "look at the overlays: the drawn bar must lie on the bar; add a camera or another light"
+)
+
 # Of several statuses in one line the cure of the first in this table is shown.
 _TABLE = (
     Status("never_touches", REFUSAL, "the whisker never touches", _PUSH_FARTHER),
@@ -97,6 +101,18 @@ _TABLE = (
         REFUSAL,
         "no camera shows enough of wire or bar",
         "free the sight: nothing else may stand before or behind wire and bar",
+    ),
+    Status(
+        "two_explanations",
+        REFUSAL,
+        "the bar at another place explains the pictures equally well",
+        _OTHER_SIDE,
+    ),
+    Status(
+        "bar_elsewhere",
+        WARNING,
+        "another place of the bar explains more of the pictures",
+        _OTHER_SIDE,
     ),
     Status(
         "camera_lines_scatter",

@@ -31,13 +31,14 @@ from vision.pictures.view import View
 from vision.touched.search import SeenBar, find_object
 from vision.touched.search_scene import SearchScene
 from vision.touched.width import measure_relative_widths
+from vision.truth.explanations import Explanation, explain
 from vision.truth.moving_bar import in_one_frame
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.trial_pictures import TrialPictures
 from vision.truth.truth_rows import to_whisk
 from vision.truth.value import Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
-from vision.truth.whisk_truth import coarse_curves, coarse_shapes, fit_whisk, free_stroke
+from vision.truth.whisk_truth import coarse_curves, coarse_shapes, free_stroke
 from vision.truth.wire_end import wire_ends
 from vision.truth.wire_width import wire_widths
 from vision.wire.one_sided import one_sided_widths
@@ -68,13 +69,17 @@ def observe_trial(
         scene = _whisks_of(pictures, whisks, cameras, rods, settings)
     except Refused as reason:
         return _nothing(whisks, reason.reason)
-    rows = tuple(_see_whisk(whisk) for whisk in scene.whisks)
-    axis = scene.found.axis.as_bar()
+    rows = []
+    found = scene.found
+    for whisk in scene.whisks:
+        row, found = _see_whisk(replace(whisk, bar=found))
+        rows.append(row)
+    axis = found.axis.as_bar()
     light = [whisk.light for whisk in scene.whisks]
     bars = {}
-    for name, width in measure_relative_widths(scene.found).items():
+    for name, width in measure_relative_widths(found).items():
         bars[name] = Value(*width)
-    return TrialTruth(axis.point_mm, axis.direction, rows, one_sided_widths(light), bars)
+    return TrialTruth(axis.point_mm, axis.direction, tuple(rows), one_sided_widths(light), bars)
 
 
 def wire_lines(
@@ -247,8 +252,9 @@ def _facing(cameras: Cameras, wire: Wire, motor_rad: np.ndarray) -> tuple[Camera
     return cameras.subset(facing), left_out
 
 
-def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
-    """Return the truth of one whisk, or its status where there is none.
+def _see_whisk(whisk: WhiskPictures) -> tuple[WhiskTruth, SeenBar]:
+    """Return the truth of one whisk, or its status where there is none, and the bar to begin the
+    next whisk from: another one where the pictures showed it elsewhere.
 
     A camera that shows something else than the others is left out, and the others are evaluated
     again.
@@ -261,21 +267,21 @@ def _see_whisk(whisk: WhiskPictures) -> WhiskTruth:
                 f"{_FEWEST_FRAMES} are needed"
             )
             status = joined(Reason("too_few_frames", few), *whisk.left_out)
-            return WhiskTruth(whisk.number, None, status=status)
+            return WhiskTruth(whisk.number, None, status=status), whisk.bar
         try:
-            fitted = fit_whisk(whisk)
+            explained = explain(whisk)
             break
         except TooFewFrames:
             whisk = whisk.with_all_frames()
         except Misled as reason:
             if len(whisk.views) == 1:
-                return _refused(whisk, reason.reason)
+                return _refused(whisk, reason.reason), whisk.bar
             whisk = whisk.without(reason.camera, reason.reason)
         except Refused as reason:
-            return _refused(whisk, reason.reason)
+            return _refused(whisk, reason.reason), whisk.bar
         except np.linalg.LinAlgError:
-            return _refused(whisk, NOT_CONVERGED)
-    return _truth(whisk, fitted)
+            return _refused(whisk, NOT_CONVERGED), whisk.bar
+    return _truth(explained), explained.whisk.bar
 
 
 def _refused(whisk: WhiskPictures, status: Reason) -> WhiskTruth:
@@ -289,13 +295,14 @@ def _refused(whisk: WhiskPictures, status: Reason) -> WhiskTruth:
     )
 
 
-def _truth(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
+def _truth(explained: Explanation) -> WhiskTruth:
     """Return the truth of a fitted whisk, with its checks and the whisker's base before touch."""
-    whisk = whisk.yielding_as(fitted.problem, fitted.state)
+    fitted = explained.fitted
+    whisk = explained.whisk.yielding_as(fitted.problem, fitted.state)
     truth = to_whisk(whisk, fitted)
     checks_beam = whisk.settings.check_beam
     beam = _check_beam(fitted) if checks_beam else None
-    status = joined(truth.status, *_warnings(whisk, fitted, beam))
+    status = joined(truth.status, explained.warning, *_warnings(whisk, fitted, beam))
     # Before the free stroke is traced, which changes whisk.light.
     refinements = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
     free = (fitted.problem, fitted.state)

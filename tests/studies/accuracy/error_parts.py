@@ -29,15 +29,21 @@ from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.whisk_truth import fit_whisk
 
 
-def fit_scene(folder: Path) -> tuple[FittedWhisk, BarAxis]:
-    """The fit of a scene's whisk, and the true axis of its bar. Raises Refused where there is no fit."""
+def read_whisk(folder: Path) -> tuple[WhiskPictures, BarAxis]:
+    """The whisk of a scene with its bar found, and the bar's true axis. Raises Refused where none is found."""
     views, cameras, rods, motor_rad, axis = read_scene(folder)
     settings, time_s = VisionSettings(), np.arange(len(motor_rad), dtype=float)
     bar = find_object(SearchScene(views, cameras, rods, motor_rad, settings))
     whisk = WhiskPictures(
         0, range(len(motor_rad)), time_s, motor_rad, tuple(views), cameras, rods, bar, settings
     )
-    return fit_whisk(whisk.without_gaps()), axis
+    return whisk.without_gaps(), axis
+
+
+def fit_scene(folder: Path) -> tuple[FittedWhisk, BarAxis]:
+    """The fit of a scene's whisk, and the true axis of its bar. Raises Refused where there is no fit."""
+    whisk, axis = read_whisk(folder)
+    return fit_whisk(whisk), axis
 
 
 def by_camera(found: FittedWhisk, axis: BarAxis) -> dict[str, tuple[float, float, float]]:

@@ -1,0 +1,183 @@
+"""Which place of the bar explains a whisk's pictures: the fitted one, or another one nearby.
+
+A fit ends near the place from which it began. Where the pictures say that another one explains them
+better (`vision.truth.last_question`), the whisk is fitted from there as well, and the fit whose
+silhouettes explain more is the truth. Where two fits explain the pictures equally well and their
+distances differ, there is no number. A fit that ended far from its beginning may not have
+converged, and begins again from its end. So a false alarm costs the time of a fit.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from vision.fit.problem import bar_axis
+from vision.geometry.contact import BarAxis
+from vision.geometry.reasons import NO_REASON, Reason
+from vision.geometry.refusals import Refused
+from vision.touched.search import SeenBar
+from vision.truth.last_question import FRAMES, BarQuestion
+from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.whisk_truth import fit_whisk
+
+# [1] Of the bar's width, all cameras together: so much more must have changed under another place.
+# True places gain 0.06 at most (by the blur of a bright side), false ones 0.02 to 0.3. Study:
+# last_question.py.
+_LEAST_GAIN = 0.02
+# [sigmas] By which the best of all places exceeds the drawn one where that is asked about again.
+# Study: last_question.py.
+_SURE_SIGMAS = 2.5
+# [sigmas] By which one of two fits exceeds the other. Study: last_question.py.
+_LIKELY_SIGMAS = 2.0
+# [px] Places that are nearer to each other in all cameras are one, a lens blur or two; true fits end
+# within 1.4 px of where they began, others 2.9 to 8 px away. Study: last_question.py.
+_APART_PX = 2.0
+# [fits] From other places, at most; more than one are needed where the first ends on the way. Stated.
+_MOST_FITS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A fit that explains the pictures of a whisk best. warning: another place that might, too."""
+
+    whisk: WhiskPictures
+    fitted: FittedWhisk
+    warning: Reason = NO_REASON
+
+    @property
+    def axis(self) -> BarAxis:
+        """Return the axis of the fitted bar, its point opposite the first contact."""
+        axis = bar_axis(self.fitted.problem, self.fitted.state.vector).upward()
+        contact = np.array([self.fitted.measured.whisk[name] for name in ("x", "y", "z")])
+        along_mm = (contact - axis.point_mm) @ axis.direction
+        return BarAxis(axis.point_mm + along_mm * axis.direction, axis.direction)
+
+    def question(self) -> BarQuestion:
+        """Return the question about this fit to the pictures."""
+        curves = self.fitted.some_curves(FRAMES)
+        return BarQuestion(self.whisk.views, curves, self.axis, self.whisk.rods)
+
+    def from_place(self, bar: SeenBar) -> Self:
+        """Return the fit that begins from another place. Raises Refused where there is none."""
+        begin = replace(self.whisk, bar=bar, light={})
+        try:
+            return Explanation(begin, fit_whisk(begin))
+        except np.linalg.LinAlgError as error:
+            raise Refused(str(error), code="fit_not_converged") from error
+
+
+def explain(whisk: WhiskPictures) -> Explanation:
+    """Fit a whisk, and again from a place that explains its pictures better, if there is one.
+
+    Fills whisk.light with how each camera sees the wire. Raises Refused where there is no touch to
+    fit, or two places explain the pictures equally well.
+    """
+    return best_explanation(Explanation(whisk, fit_whisk(whisk)))
+
+
+def best_explanation(first: Explanation) -> Explanation:
+    """Return a fit, or that from another place which explains the pictures better.
+
+    Raises Refused where both explain them equally well.
+    """
+    if not _may_be_asked(first.whisk):
+        return first
+    best = first
+    for _ in range(_MOST_FITS):
+        other = _better(best)
+        if other.fitted is best.fitted:
+            best = other
+            break
+        best = other
+    if best.fitted is first.fitted:
+        return best
+    light = first.whisk.light
+    light.clear()
+    light.update(best.whisk.light)
+    return replace(best, whisk=replace(best.whisk, bar=SeenBar(best.axis, {}), light=light))
+
+
+def _may_be_asked(whisk: WhiskPictures) -> bool:
+    """Return whether the bar is straight, stands, and is seen before a known background."""
+    is_straight = isinstance(whisk.bar.axis, BarAxis)
+    is_known = all(np.any(view.background) for view in whisk.views)
+    return is_straight and is_known and whisk.motion is None
+
+
+def _better(fit: Explanation) -> Explanation:
+    """Return the fit from a better place where that explains the pictures better, else this one.
+
+    Raises Refused where both explain them equally well.
+    """
+    question = fit.question()
+    place = question.best()
+    if _is_better(question, place, fit.axis, _SURE_SIGMAS):
+        return _better_from(place, fit, question)
+    if question.apart_px(fit.whisk.bar.axis, fit.axis) > _APART_PX:
+        return _converged(fit, question)
+    return fit
+
+
+def _better_from(place: BarAxis, fit: Explanation, question: BarQuestion) -> Explanation:
+    """Return the fit from a better place, or this one with a warning.
+
+    Raises Refused where both explain the pictures equally well.
+    """
+    try:
+        other = fit.from_place(SeenBar(place, {}))
+    except Refused:
+        return replace(fit, warning=_unexplained(question, place, fit.axis))
+    if _is_better(question, other.axis, fit.axis, _LIKELY_SIGMAS):
+        return other
+    if _is_better(question, fit.axis, other.axis, _LIKELY_SIGMAS):
+        return replace(fit, warning=_unexplained(question, place, fit.axis))
+    _require_one(fit, other)
+    return fit
+
+
+def _converged(fit: Explanation, question: BarQuestion) -> Explanation:
+    """Return the fit that begins where this one ended, far from its own beginning.
+
+    Its lines are measured in windows about where they are expected, so that they may not have
+    converged. A fit that explains less is not taken.
+    """
+    try:
+        again = fit.from_place(replace(fit.whisk.bar, axis=fit.axis))
+    except Refused:
+        return fit
+    is_worse = _is_better(question, fit.axis, again.axis, _LIKELY_SIGMAS)
+    return fit if is_worse else again
+
+
+def _is_better(question: BarQuestion, place: BarAxis, other: BarAxis, sigmas: float) -> bool:
+    """Return whether a place explains the pictures better than another one, and is not the same.
+
+    sigmas: by which its gain must exceed chance.
+    """
+    gain, sigma = question.gain(place, other)
+    is_sure = gain > max(_LEAST_GAIN, sigmas * sigma)
+    return is_sure and question.apart_px(place, other) > _APART_PX
+
+
+def _unexplained(question: BarQuestion, place: BarAxis, drawn: BarAxis) -> Reason:
+    """Return the warning that no fit was found at a place that explains the pictures better."""
+    away_px = question.apart_px(place, drawn)
+    return Reason(
+        "bar_elsewhere",
+        f"the bar may be elsewhere: a place up to {away_px:.0f} px away explains more of the "
+        "pictures, and no whisk fits there",
+    )
+
+
+def _require_one(one: Explanation, other: Explanation) -> None:
+    """Raise Refused where two fits that explain the pictures equally well differ in distance."""
+    d_x = one.fitted.of_whisk("d_x")
+    other_d_x = other.fitted.of_whisk("d_x")
+    apart_mm = abs(d_x.value - other_d_x.value)
+    if apart_mm > max(d_x.sigma, other_d_x.sigma):
+        raise Refused(
+            f"two explanations: at {d_x.value:.2f} and at {other_d_x.value:.2f} mm the bar explains "
+            f"the pictures equally well, {apart_mm:.2f} mm apart",
+            code="two_explanations",
+        )

@@ -1,0 +1,388 @@
+"""The last question to a fit: does another place explain the pictures better than the drawn bar?
+
+Nothing here knows how the bar was found. A bar changes what a camera sees: inside its silhouette
+the picture is another one than that without rods, outside it is the same up to smooth light. So of
+all strips as wide as the bar, its silhouette covers most of what has changed, whatever the bar
+looks like. In each camera the pixels along the drawn silhouette are straightened into a band that
+reaches two diameters beyond it to either side. The wire is left out. How much of the silhouette's
+area has changed is then known at every shift and tilt, and summed over the cameras for every axis
+nearby in space.
+
+The number that decides is a share of area: by how much more of the bar's width has changed under
+another strip than under the drawn one, summed over the cameras. Its standard error is that of the
+mean over segments along the bar. Rims as dark as the background, shadows beside the bar and hidden
+pixels make many strips alike and are evidence for none. The blur of the lens widens what has
+changed by a pixel or two: a strip as near as that is no other place. A bar that moves, and an
+object that is no straight bar, are not asked about.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import cv2
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from vision.geometry.camera import Camera
+from vision.geometry.centreline import Curves
+from vision.geometry.contact import BarAxis, axis_frame
+from vision.geometry.rods import Rods
+from vision.geometry.silhouette import normals, outline
+from vision.pictures.others import mask_rods
+from vision.pictures.view import View
+
+# [mm] To either side of the contact: what is asked about. Bars are clamped farther out. Stated.
+_REACH_MM = 30.0
+# [radii] Half the band's width: two diameters beyond the silhouette. Stated.
+_BAND_RADII = 5.0
+# [samples] In a radius, at most: the lens blurs more. Study: last_question.py.
+_PER_RADIUS = 10.0
+# [samples] Along the bar, at most. Study: last_question.py.
+_ALONG = 128
+# [frames] Whose median is a picture without what moves. Study: last_question.py.
+FRAMES = 5
+# [segments] Along the bar in each camera: each is one observation. Study: last_question.py.
+_SEGMENTS = 16
+# [px] Beside the wire, where the lens mixes it with what is behind. Stated.
+_BESIDE_WIRE_PX = 3.0
+# [samples] Along the bar, over which differences are averaged. Study: last_question.py.
+_AVERAGED = 5
+# [sigmas] A difference up to here is none. Study: last_question.py.
+_NOISE_SIGMAS = 2.5
+# [sigmas] By so much more it is certain. Study: last_question.py.
+_SURE_SIGMAS = 4.0
+# [grey levels] Least standard deviation of a difference: rounding. Derived.
+_LEAST_SIGMA = 0.4
+# [1] Share of the pixels by which noise is measured: a hub may change more than half of a band.
+# Study: last_question.py.
+_QUIET_SHARE = 0.35
+# [1] That quantile of the size of a standard normal deviate. Derived.
+_QUIET_DEVIATE = 0.454
+# [classes] Of grey levels without rods, each with its noise. Study: last_question.py.
+_CLASSES = 6
+# [iterations] Of the weights with which the light is fitted. Stated.
+_ITERATIONS = 6
+# [1] Prior weight of unchanged light, over the number of pixels. Stated.
+_SAME_LIGHT = 1e-3
+# [1] A hidden sample has changed or not, with this probability. Derived.
+_UNKNOWN = 0.5
+# [radii] Farthest shift in space: two diameters. Stated.
+_FARTHEST_RADII = 4.0
+# [radii] Largest displacement by a tilt where the band ends: 8 deg of a bar of 6 mm. Stated.
+_MOST_TILT_RADII = 1.5
+# [radii] First step of the search in space. Derived.
+_COARSE_RADII = 0.5
+# [radii] Step of a camera's map of shifts and tilts. Derived.
+_MAP_STEP_RADII = 0.25
+# [radii] Next steps, about the best places and then the best one. Derived.
+_FINE_RADII = (0.25, 0.12, 0.06, 0.03)
+# [places] Of the first step that go on. Study: last_question.py.
+_KEPT = 4
+
+
+@dataclass(frozen=True)
+class _Line:
+    """The middle of the drawn silhouette in a picture, straight to a fraction of a pixel.
+
+    foot_px (m, 2), normal (m, 2): at m places along it. radius_px (m,): half its width there.
+    """
+
+    foot_px: np.ndarray
+    normal: np.ndarray
+    radius_px: np.ndarray
+
+    @classmethod
+    def of(cls, camera: Camera, axis: BarAxis, radius_mm: float) -> Self:
+        """Return the line of a bar in a camera, in equal steps of a pixel or more."""
+        middle_px, half_px = axis.outline(camera, radius_mm, _REACH_MM, _ALONG)
+        steps_px = np.linalg.norm(np.diff(middle_px, axis=0), axis=1)
+        arc_px = np.concatenate([[0.0], np.cumsum(steps_px)])
+        count = int(np.clip(arc_px[-1], _SEGMENTS, _ALONG))
+        at_px = np.linspace(0.0, arc_px[-1], count)
+        foot_px = np.stack([np.interp(at_px, arc_px, line) for line in middle_px.T], axis=1)
+        return cls(foot_px, normals(foot_px), np.interp(at_px, arc_px, half_px))
+
+    @property
+    def width_radius_px(self) -> float:
+        """Return half the width in the middle of the line."""
+        return float(np.median(self.radius_px))
+
+    def offsets(self, px: np.ndarray) -> np.ndarray:
+        """Return how far lines through two points (..., 2, 2) px are from this one at its ends.
+
+        Returns (..., 2) in radii, along the normal in its middle.
+        """
+        middle = len(self.foot_px) // 2
+        normal = self.normal[middle]
+        tangent = np.array([normal[1], -normal[0]])
+        away_px = px - self.foot_px[middle]
+        along = away_px @ tangent  # (..., 2)
+        across = away_px @ normal
+        ends = (self.foot_px[[0, -1]] - self.foot_px[middle]) @ tangent
+        slope = (across[..., 1] - across[..., 0]) / (along[..., 1] - along[..., 0])
+        at_ends = across[..., :1] + slope[..., None] * (ends - along[..., :1])
+        return at_ends / self.width_radius_px
+
+
+@dataclass(frozen=True, eq=False)
+class _Band:
+    """The pixels of one camera, straightened along the drawn silhouette.
+
+    changed (m, k): the confidence, 0 to 1, that a sample is not as without rods; m places along the
+    line, k across it, from −_BAND_RADII to _BAND_RADII. drawn: where the drawn axis passes, as
+    `_Line.offsets` has it.
+    """
+
+    camera: Camera
+    line: _Line
+    changed: np.ndarray
+    drawn: np.ndarray
+
+    @property
+    def ends(self) -> np.ndarray:
+        """Return where (m,) along the line the samples are, from −1 to 1."""
+        return np.linspace(-1.0, 1.0, len(self.changed))
+
+    def offsets(self, axes: BarAxis) -> np.ndarray:
+        """Return by how many radii (n, 2) axes (n, 3) pass beside the drawn one at the band's ends."""
+        return self.line.offsets(_projected(self.camera, axes)) - self.drawn
+
+    def covered(self, offsets: np.ndarray) -> np.ndarray:
+        """Return the share (n, m) of the width of strips that has changed, place by place.
+
+        offsets (n, 2): of the strips' middles at both ends, in radii.
+        """
+        share = 0.5 * (1.0 + self.ends)
+        middle = offsets[:, :1] * (1.0 - share) + offsets[:, 1:] * share
+        return 0.5 * (self._sum_to(middle + 1.0) - self._sum_to(middle - 1.0))
+
+    @cached_property
+    def _sums(self) -> np.ndarray:
+        """Return the integral (m, k + 1) of the change across the band, in radii."""
+        step = 2.0 * _BAND_RADII / self.changed.shape[1]
+        return np.pad(np.cumsum(self.changed, axis=1), ((0, 0), (1, 0))) * step
+
+    def _sum_to(self, radii: np.ndarray) -> np.ndarray:
+        """Return the integral of the change up to lateral positions (n, m), in radii."""
+        last = self.changed.shape[1]
+        position = np.clip((radii / _BAND_RADII + 1.0) * 0.5 * last, 0.0, last)
+        lower = np.minimum(position.astype(int), last - 1)
+        rows = np.arange(len(self.changed))
+        below = self._sums[rows, lower]
+        return below + (position - lower) * (self._sums[rows, lower + 1] - below)
+
+    @cached_property
+    def cover_map(self) -> np.ndarray:
+        """Return the mean share covered by strips, (shifts, tilts), in steps of _MAP_STEP_RADII."""
+        shifts, tilts = _map_axes()
+        shift, tilt = np.meshgrid(shifts, tilts, indexing="ij")
+        ends = np.stack([shift - tilt, shift + tilt], axis=-1).reshape(-1, 2)
+        return np.mean(self.covered(ends), axis=1).reshape(shift.shape)
+
+    def looked_up(self, offsets: np.ndarray) -> np.ndarray:
+        """Return the mean share (n,) covered by strips, by interpolation in the map."""
+        shifts, tilts = _map_axes()
+        shift = (0.5 * (offsets[:, 0] + offsets[:, 1]) - shifts[0]) / _MAP_STEP_RADII
+        tilt = (0.5 * (offsets[:, 1] - offsets[:, 0]) - tilts[0]) / _MAP_STEP_RADII
+        return map_coordinates(self.cover_map, [shift, tilt], order=1, mode="nearest")
+
+
+def _map_axes() -> tuple[np.ndarray, np.ndarray]:
+    """Return the shifts and the displacements at the end by tilts of a camera's map, in radii."""
+    most = (_FARTHEST_RADII, 2.0 * _MOST_TILT_RADII)
+    return tuple(np.arange(-far, far + _MAP_STEP_RADII, _MAP_STEP_RADII) for far in most)
+
+
+def _projected(camera: Camera, axes: BarAxis) -> np.ndarray:
+    """Return two points (..., 2, 2) px of axes (..., 3) in a camera, as far apart as a band is long."""
+    to_ends = np.array([-_REACH_MM, _REACH_MM])[:, None] * axes.direction[..., None, :]
+    return camera.project(axes.point_mm[..., None, :] + to_ends)
+
+
+class BarQuestion:
+    """The question for other places of a bar that explain the pictures, about one drawn axis."""
+
+    def __init__(
+        self,
+        views: Sequence[View],
+        curves: Mapping[int, Curves],
+        axis: BarAxis,
+        rods: Rods,
+    ):
+        """Straighten the pictures of each camera along the drawn bar.
+
+        curves: by frame, of the wire, which is left out; the frames whose pictures are used.
+        """
+        self.axis = axis
+        self.radius_mm = rods.bar.radius_mm
+        self.bands = []
+        for view in views:
+            line = _Line.of(view.camera, axis, self.radius_mm)
+            changed = _change(*_straightened(view, line, curves, rods))
+            drawn = line.offsets(_projected(view.camera, axis))
+            self.bands.append(_Band(view.camera, line, changed, drawn))
+
+    def best(self) -> BarAxis:
+        """Return the axis nearby that covers most of the change in all cameras together."""
+        across = axis_frame(self.axis.direction)
+        scale = self.radius_mm * np.array([1.0, 1.0, 1.0 / _REACH_MM, 1.0 / _REACH_MM])
+        slopes = [self._by_vector(band, across, scale) for band in self.bands]
+        shift = _steps(_FARTHEST_RADII, _COARSE_RADII)
+        tilt = _steps(_MOST_TILT_RADII, _COARSE_RADII)
+        vectors = _grid(shift, shift, tilt, tilt)
+        total = np.zeros(len(vectors))
+        for band, slope in zip(self.bands, slopes):
+            total += band.looked_up(vectors @ slope)
+        vectors = vectors[np.argsort(-total, kind="stable")[:_KEPT]]
+        for step in _FINE_RADII:
+            vectors = _around(vectors, step)
+            total = np.zeros(len(vectors))
+            for band, slope in zip(self.bands, slopes):
+                total += np.mean(band.covered(vectors @ slope), axis=1)
+            vectors = vectors[[np.argmax(total)]]
+        return self.axis.shifted(across, vectors[0] * scale)
+
+    def _by_vector(self, band: _Band, across: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """Return the offsets (4, 2) in a band by a radius of each shift and tilt."""
+        return band.offsets(self.axis.shifted(across, np.diag(scale)))
+
+    def gain(self, place: BarAxis, other: BarAxis) -> tuple[float, float]:
+        """Return how much more of the change a place covers than another one, and its sigma."""
+        total = variance = 0.0
+        for band in self.bands:
+            offsets = np.concatenate([band.offsets(_one(place)), band.offsets(_one(other))])
+            more = np.subtract(*band.covered(offsets))
+            parts = np.array([np.mean(part) for part in np.array_split(more, _SEGMENTS)])
+            total += np.mean(parts)
+            variance += np.var(parts, ddof=1) / _SEGMENTS
+        return float(total), float(np.sqrt(variance))
+
+    def apart_px(self, place: BarAxis, other: BarAxis) -> float:
+        """Return how far apart two places are at most in any camera, px."""
+        most = 0.0
+        for band in self.bands:
+            offsets = band.offsets(_one(place)) - band.offsets(_one(other))
+            most = max(most, float(np.max(np.abs(offsets))) * band.line.width_radius_px)
+        return most
+
+
+def _one(axis: BarAxis) -> BarAxis:
+    """Return an axis as a batch of one."""
+    return BarAxis(axis.point_mm[None], axis.direction[None])
+
+
+def _steps(farthest: float, step: float) -> np.ndarray:
+    """Return steps (n,) from −farthest to farthest, 0 among them."""
+    count = round(farthest / step)
+    return step * np.arange(-count, count + 1)
+
+
+def _around(vectors: np.ndarray, step: float) -> np.ndarray:
+    """Return vectors (81 n, 4) on a grid of one step about each of n, itself in the middle."""
+    near = _steps(step, step)
+    return (vectors[:, None] + _grid(near, near, near, near)).reshape(-1, vectors.shape[1])
+
+
+def _grid(*values: np.ndarray) -> np.ndarray:
+    """Return all combinations (n, k) of k lists of values."""
+    return np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
+
+
+def _straightened(
+    view: View, line: _Line, curves: Mapping[int, Curves], rods: Rods
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the picture with the bar, that without rods, and which samples show them, (m, k)."""
+    per_radius = min(_PER_RADIUS, line.width_radius_px)
+    count = 2 * int(np.ceil(_BAND_RADII * per_radius))
+    across = (np.arange(count) + 0.5) / count * 2.0 * _BAND_RADII - _BAND_RADII
+    offset_px = across[:, None] * line.radius_px[:, None, None]
+    px = (line.foot_px[:, None] + offset_px * line.normal[:, None]).astype(np.float32)
+
+    def read(picture: np.ndarray) -> np.ndarray:
+        """Return a picture's grey at the samples; NaN outside."""
+        grey = np.asarray(picture, dtype=np.float32)
+        nan = float("nan")
+        border = cv2.BORDER_CONSTANT
+        return cv2.remap(grey, px, None, cv2.INTER_LINEAR, borderMode=border, borderValue=nan)
+
+    pictures = [read(view.frames[frame]) for frame in curves]
+    still = np.median(pictures, axis=0)
+    empty = read(view.background)
+    hidden = np.zeros(view.background.shape, dtype=np.uint8)
+    for frame, curve in curves.items():
+        _hide_wire(hidden, view.camera, curve, rods)
+        others = mask_rods(view.others, frame, hidden.shape)
+        if others is not None:
+            hidden |= others.astype(np.uint8)
+    shows = np.isfinite(still) & np.isfinite(empty) & (read(hidden) == 0.0)
+    return still, empty, shows
+
+
+def _hide_wire(hidden: np.ndarray, camera: Camera, curve: Curves, rods: Rods) -> None:
+    """Mark the pixels (h, w) of a wire and beside it."""
+    points_mm = curve.points_mm
+    radius_mm = rods.wire.radius_mm(curve.arc_mm)
+    middle_px, half_px = outline(camera, points_mm, curve.tangents, radius_mm)
+    seen = np.all(np.isfinite(middle_px), axis=1)
+    width = int(np.ceil(2.0 * (np.max(half_px[seen], initial=0.0) + _BESIDE_WIRE_PX)))
+    nodes = np.round(middle_px[seen]).astype(np.int32)
+    cv2.polylines(hidden, [nodes], False, 1, thickness=width)
+
+
+def _change(still: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarray:
+    """Return the confidence (m, k) that samples are not as without rods; _UNKNOWN where hidden."""
+    difference = np.where(shows, still - _relit(still, empty, shows), 0.0).astype(np.float32)
+    along = (1, _AVERAGED)  # OpenCV's order: across, along
+    share = cv2.blur(shows.astype(np.float32), along)
+    seen = shows & (share > 0.5)
+    mean = cv2.blur(difference, along) / np.maximum(share, 0.5)
+    level = cv2.blur(np.where(shows, empty, 0.0).astype(np.float32), along) / np.maximum(share, 0.5)
+    if not np.any(seen):
+        return np.full(still.shape, _UNKNOWN)
+    z = np.abs(mean) / _noise(mean, level, seen)
+    changed = np.clip((z - _NOISE_SIGMAS) / _SURE_SIGMAS, 0.0, 1.0)
+    return np.where(seen, changed, _UNKNOWN)
+
+
+def _relit(still: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarray:
+    """Return the picture (m, k) without rods in the light of that with them.
+
+    Its gain is linear in both directions of the band, by weights that leave out what has changed.
+    """
+    along = np.linspace(-1.0, 1.0, len(empty))[:, None]
+    across = np.linspace(-1.0, 1.0, empty.shape[1])
+    design = np.stack([empty, empty * along, empty * across, np.ones_like(empty)], axis=-1)
+    rows = design[shows].astype(float)
+    grey = still[shows].astype(float)
+    if not len(grey):
+        return empty
+    unchanged = np.array([1.0, 0.0, 0.0, 0.0])
+    prior = _SAME_LIGHT * len(grey)
+    light = unchanged
+    for _ in range(_ITERATIONS):
+        residual = grey - rows @ light
+        scale = 2.0 * max(_quiet_sigma(residual), _LEAST_SIGMA)
+        weighted = rows / ((1.0 + (residual / scale) ** 2) ** 2)[:, None]
+        normal = weighted.T @ rows + prior * np.eye(4)
+        light = np.linalg.solve(normal, weighted.T @ grey + prior * unchanged)
+    return design @ light
+
+
+def _quiet_sigma(deviations: np.ndarray) -> float:
+    """Return the standard deviation of the least deviations' normal distribution."""
+    return float(np.quantile(np.abs(deviations), _QUIET_SHARE)) / _QUIET_DEVIATE
+
+
+def _noise(mean: np.ndarray, level: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """Return the standard deviation (m, k) of differences, by the grey level without rods."""
+    bounds = np.quantile(level[seen], np.linspace(0.0, 1.0, _CLASSES + 1))[1:-1]
+    classes = np.digitize(level, bounds)
+    sigma = np.ones_like(mean)
+    for k in range(_CLASSES):
+        members = classes == k
+        own = mean[members & seen]
+        if len(own):
+            sigma[members] = max(_quiet_sigma(own), _LEAST_SIGMA)
+    return sigma
