@@ -108,9 +108,12 @@ def _may_be_asked(whisk: WhiskPictures) -> bool:
 def _better(fit: Explanation) -> Explanation:
     """Return the fit from a better place where that explains the pictures better, else this one.
 
+    Where a camera looks past the bar, nothing is asked: a fit that reads it there could be worse.
     Raises Refused where both explain them equally well.
     """
     question = fit.question()
+    if len(question.bands) < len(fit.whisk.views):
+        return fit
     place = question.best()
     if _is_better(question, place, fit.axis, _SURE_SIGMAS):
         return _better_from(place, fit, question)

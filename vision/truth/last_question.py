@@ -68,6 +68,8 @@ _ITERATIONS = 6
 _SAME_LIGHT = 1e-3
 # [1] A hidden sample has changed or not, with this probability. Derived.
 _UNKNOWN = 0.5
+# [1] Share of hidden samples above which a camera is not asked: it looks past the bar. Stated.
+_MOST_HIDDEN = 0.5
 # [radii] Farthest shift in space: two diameters. Stated.
 _FARTHEST_RADII = 4.0
 # [radii] Largest displacement by a tilt where the band ends: 8 deg of a bar of 6 mm. Stated.
@@ -211,7 +213,7 @@ class BarQuestion:
         axis: BarAxis,
         rods: Rods,
     ):
-        """Straighten the pictures of each camera along the drawn bar.
+        """Straighten the pictures of each camera that shows the drawn bar along it.
 
         curves: by frame, of the wire, which is left out; the frames whose pictures are used.
         """
@@ -221,6 +223,8 @@ class BarQuestion:
         for view in views:
             line = _Line.of(view.camera, axis, self.radius_mm)
             changed = _change(*_straightened(view, line, curves, rods))
+            if np.mean(changed == _UNKNOWN) > _MOST_HIDDEN:
+                continue
             drawn = line.offsets(_projected(view.camera, axis))
             self.bands.append(_Band(view.camera, line, changed, drawn))
 

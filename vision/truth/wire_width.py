@@ -28,7 +28,9 @@ def wire_widths(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     for view in whisk.views:
         name = view.camera.name
         pieces = clear_pieces(whisk, view, place)
-        log_ratio = log_width(pieces, whisk.light[name].blur_px, knots) if len(pieces) else None
+        if not len(pieces) or name not in whisk.light:
+            continue
+        log_ratio = log_width(pieces, whisk.light[name].blur_px, knots)
         if log_ratio is None:
             continue
         value, sigma = log_ratio

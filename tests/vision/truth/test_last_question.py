@@ -165,6 +165,8 @@ class Placed(Explanation):
 class AskedPlaces:
     """Places on a line, x mm; COVERED: the share of the bar's width that each explains."""
 
+    bands = (None,)  # a camera
+
     def best(self) -> BarAxis:
         return at(BEST[0])
 
