@@ -43,6 +43,12 @@ def sigma_name(name: str) -> str:
     return f"{stem}_sigma_{unit}"
 
 
+def shared_name(name: str) -> str:
+    """Return the name of the part of a value's standard deviation that all whisks have in common."""
+    stem, _, unit = name.rpartition("_")
+    return f"{stem}_shared_sigma_{unit}"
+
+
 def with_sigma(name: str, meaning: str, sigma: str | None = None) -> tuple[Column, Column]:
     """Return the columns of a value and of its standard deviation.
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.analyses.pooling import angle_cells, degrees, value_cells
 from bench.base.input_problems import in_one_status
+from bench.base.tables import shared_name
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.whisk_tables import BEAM, BUDGET, ESTIMATES, PLACE, TRACK, WHISKS
 from estimator.distance import cartesian, contact_point
@@ -62,7 +63,7 @@ def whisk_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
         for source, fields in ((seen, _SEEN), (felt, _FELT), (seen.at, _AT_ANGLE)):
             for column, field in fields.items():
                 row |= _cells(column, getattr(source, field, UNKNOWN))
-        row |= _point_cells(seen.point_mm)
+        row |= _point_cells(seen.point_mm) | _shared_cells(seen)
         row["cameras"] = seen.truth.cameras
         row["frames_used"] = seen.truth.frames_used
         row["looked"] = seen.looked
@@ -121,6 +122,21 @@ def _point_cells(point_mm: Value) -> dict[str, float]:
     cells = {}
     for column, value, sigma in zip(PLACE, point_mm.value, point_mm.sigma):
         cells |= value_cells(column, Value(value, sigma))
+    return cells
+
+
+def _shared_cells(seen: SeenWhisk) -> dict[str, float]:
+    """Return the cells of what all whisks share of the sigmas; none where nothing is known of it."""
+    shared = seen.truth.shared
+    if shared is None:
+        return {}
+    cells = {}
+    for column, field in _SEEN.items():
+        sigma = getattr(shared, field)
+        cells[shared_name(column)] = degrees(sigma) if column.endswith("_deg") else sigma
+    for column, sigma in zip(PLACE, shared.point_mm):
+        cells[shared_name(column)] = float(sigma)
+    cells[shared_name("slip_mm")] = getattr(seen.at, "slip_shared_mm", NAN)
     return cells
 
 

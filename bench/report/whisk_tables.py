@@ -9,12 +9,15 @@ from bench.base.tables import (
     Kind,
     Table,
     alike,
+    shared_name,
     sigma_name,
     status,
     with_sigma,
 )
 
 PLACE = ("x_mm", "y_mm", "z_mm")
+# Columns of whisks.csv of whose sigmas is stated what all whisks of a session have in common.
+WITH_SHARED_SIGMA = ("touch_deg", "d_x_mm", "beta_deg", "psi_deg", "slip_mm", *PLACE)
 _ON_CENTRELINE = "contact on the whisker's centreline, rig frame"
 _AT_FIRST_TOUCH = "contact at first touch, rig frame"
 _DEFLECTION = "deflection of the contact, in contact-frame axes, at θ"
@@ -51,6 +54,10 @@ WHISKS = Table(
         *with_sigma("m_y_Nmm", "moments felt at θ, in the hub's axes"),
         *with_sigma("m_z_Nmm", "moments felt at θ, in the hub's axes"),
         *with_sigma("phi_felt_deg", "direction of the deflection as felt, atan2(m_y, m_z)"),
+        *alike(
+            map(shared_name, WITH_SHARED_SIGMA),
+            "the part of a sigma (of touch, d_x, …) which all whisks of the session have in common",
+        ),
         *with_sigma("x_mm", _AT_FIRST_TOUCH),
         *with_sigma("y_mm", _AT_FIRST_TOUCH),
         *with_sigma("z_mm", _AT_FIRST_TOUCH),

@@ -172,7 +172,11 @@ def _with_error(seen: SeenWhisk, shared: SharedTouch) -> SeenWhisk:
         return seen
     error = abs(shared.at(motor_speed(seen.frames))[0])
     sigma = float(np.hypot(touch.sigma, error))
-    truth = replace(seen.truth, touch_rad=Value(touch.value, sigma))
+    shared_sigmas = seen.truth.shared
+    if shared_sigmas is not None:
+        touch_rad = float(np.hypot(shared_sigmas.touch_rad, error))
+        shared_sigmas = replace(shared_sigmas, touch_rad=touch_rad)
+    truth = replace(seen.truth, touch_rad=Value(touch.value, sigma), shared=shared_sigmas)
     return replace(seen, truth=truth, touch_shared_rad=error)
 
 

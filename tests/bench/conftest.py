@@ -101,6 +101,7 @@ def _smooth(theta, touching, values, d_x) -> Smooth:
         {k: v[touching] for k, v in values.items()},
         own,
         SIGMA_MM**2 * np.eye(n * kinds),
+        np.zeros((n * kinds, n * kinds)),
         d_x,
     )
 

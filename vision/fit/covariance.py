@@ -83,6 +83,18 @@ def by_lens(problem: Problem, state: State, inverse_normal: np.ndarray) -> np.nd
     return -inverse_normal @ (linear.jacobian[linear.is_point].T @ by_camera)
 
 
+def shared_covariance(problem: Problem, state: State, fitted: Uncertainty) -> np.ndarray:
+    """Return the part (size, size) of a fit's covariance that all whisks of a session have in
+    common: by diameters, light, cameras and placement.
+    """
+    own_priors = problem.prior_rows.start
+    first = own_priors + problem.blocks.reach.start
+    behind = own_priors + problem.blocks.motion.start
+    rows = weighted_jacobian(problem, state)[first:behind]
+    by_row = fitted.inverse_normal @ rows.T
+    return by_row @ by_row.T + fitted.lens
+
+
 def variance_by_cause(
     problem: Problem, state: State, fitted: Uncertainty, gradient: np.ndarray
 ) -> dict[str, float]:

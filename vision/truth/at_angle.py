@@ -44,16 +44,21 @@ _ANGLES = ("phi", "alpha")  # of FIELDS; the others are lengths
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TruthAtAngle(WhileTouching):
-    """Truth at one pushing angle; NaN with a status where the whisk does not reach it."""
+    """Truth at one pushing angle; NaN with a status where the whisk does not reach it.
+
+    slip_shared_mm: the part of slip's sigma that all whisks of a session have in common.
+    """
 
     theta_rad: float
+    slip_shared_mm: float = NAN
     status: Reason = NO_REASON
 
 
 @dataclass(frozen=True)
 class Smooth:
     """The touching frames, for interpolation: values (f,) by name, their Jacobians (f, p) by the
-    parameters, that of the angle of touch (p,), and the parameters' covariance (p, p).
+    parameters, that of the angle of touch (p,), and the parameters' covariance (p, p), with the
+    part of it that all whisks of a session share.
 
     d_x_mm: radial distance by the fit, which need not be known as well as a truth is.
     """
@@ -63,6 +68,7 @@ class Smooth:
     values: dict[str, np.ndarray]
     jacobians: dict[str, np.ndarray]
     covariance: np.ndarray
+    shared_covariance: np.ndarray
     d_x_mm: float = NAN
 
 
@@ -83,7 +89,8 @@ def at_angle(smooth: Smooth | None, theta_rad: float, without: Reason) -> TruthA
     values = {}
     for name, field in FIELDS.items():
         values[field] = _smooth_value(smooth, name, theta_rad)
-    return TruthAtAngle(theta_rad=theta_rad, **values)
+    shared_mm = _shared_slip_mm(smooth, theta_rad, values["slip_mm"])
+    return TruthAtAngle(theta_rad=theta_rad, slip_shared_mm=shared_mm, **values)
 
 
 def _in_jump(smooth: Smooth, theta_rad: float) -> TruthAtAngle:
@@ -94,24 +101,42 @@ def _in_jump(smooth: Smooth, theta_rad: float) -> TruthAtAngle:
         values[field] = _value_in_jump(smooth, name, theta_rad, frames)
     first, last = np.degrees(smooth.theta_rad[frames][[0, -1]])
     sentence = f"slips in jumps: seen at {first:.2f} and {last:.2f} deg"
-    return TruthAtAngle(theta_rad=theta_rad, **values, status=Reason("slips_in_jumps", sentence))
+    return TruthAtAngle(
+        theta_rad=theta_rad,
+        slip_shared_mm=_shared_slip_mm(smooth, theta_rad, values["slip_mm"]),
+        **values,
+        status=Reason("slips_in_jumps", sentence),
+    )
+
+
+def _shared_slip_mm(smooth: Smooth, theta_rad: float, slip_mm: Value) -> float:
+    """Return the part of slip's sigma that all whisks of a session share, at most the whole."""
+    by_parameter, _ = _by_parameter(smooth, "slip", theta_rad)
+    shared_mm = propagated_sigma(by_parameter, smooth.shared_covariance)
+    return float(min(shared_mm, slip_mm.sigma))
+
+
+def _by_parameter(smooth: Smooth, name: str, theta_rad: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivatives (p,) of a quantity by the local fit, and the fit's weights (f,).
+
+    The error of touch moves all pushing angles together.
+    """
+    weights, slope_weights = _local_fit(smooth.theta_rad, theta_rad)
+    slope = slope_weights @ smooth.values[name]
+    return weights @ smooth.jacobians[name] + slope * smooth.touch_jacobian, weights
 
 
 def _smooth_value(smooth: Smooth, name: str, theta_rad: float) -> Value:
     """Return a smooth quantity by the local fit.
 
-    Its sigma is not below that of the best frame nearby; the fit's residuals are added to it. The
-    error of touch moves all pushing angles together.
+    Its sigma is not below that of the best frame nearby; the fit's residuals are added to it.
     """
-    weights, slope_weights = _local_fit(smooth.theta_rad, theta_rad)
-    values = smooth.values[name]
-    jacobian = smooth.jacobians[name]
-    by_parameter = weights @ jacobian + (slope_weights @ values) * smooth.touch_jacobian
+    by_parameter, weights = _by_parameter(smooth, name, theta_rad)
     near = _near(smooth.theta_rad - theta_rad)
-    least = np.min(propagated_sigma(jacobian[near], smooth.covariance))
+    least = np.min(propagated_sigma(smooth.jacobians[name][near], smooth.covariance))
     sigma = max(propagated_sigma(by_parameter, smooth.covariance), least)
     residual = _between_frames_sigma(smooth, name, theta_rad)
-    return Value(float(weights @ values), float(np.hypot(sigma, residual)))
+    return Value(float(weights @ smooth.values[name]), float(np.hypot(sigma, residual)))
 
 
 def _slip_jumps(smooth: Smooth, theta_rad: float) -> bool:

@@ -82,6 +82,19 @@ class SeenObject:
     half_angle_rad: float
 
 
+@dataclass(frozen=True, eq=False)
+class SharedSigmas:
+    """Standard deviations of the errors that all whisks of a session have in common, by diameters,
+    light, cameras, placement and the clock: parts of the sigmas of a whisk's truth. point_mm (3,).
+    """
+
+    touch_rad: float
+    d_x_mm: float
+    beta_rad: float
+    psi_rad: float
+    point_mm: np.ndarray
+
+
 @dataclass(frozen=True)
 class WhiskTruth:
     """The truth of one whisk: first touch, the contact then, the bar's slopes, and one row per
@@ -94,7 +107,7 @@ class WhiskTruth:
     truth would be without each part of the model, by name. lines: the precision of each camera's
     lines. ends: by camera how far from its base, mm, the whisker is seen to end; widths: its width
     in the pictures over the stated one, of a trial's first whisk. point_covariance_mm2 (3, 3): of
-    point_mm. shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of an object
+    point_mm. shared: parts of the sigmas. shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of an object
     that moves, as seen; None where it stands. gave: of one that gives way. rounded: one that is no
     straight bar. problem: what was fitted, from which `sights_of` takes one camera's share.
     """
@@ -122,6 +135,7 @@ class WhiskTruth:
     ends: dict[str, Value] = field(default_factory=dict, metadata=_OPTIONAL)
     widths: dict[str, Value] = field(default_factory=dict, metadata=_OPTIONAL)
     point_covariance_mm2: np.ndarray | None = None
+    shared: SharedSigmas | None = None
     shape: WireShape | None = None
     velocity_mm_s: Value | None = None
     gave: GaveWay | None = field(default=None, metadata=_OPTIONAL)

@@ -6,7 +6,7 @@ from functools import singledispatch
 
 import numpy as np
 
-from vision.fit.covariance import variance_by_cause
+from vision.fit.covariance import shared_covariance, variance_by_cause
 from vision.fit.line_noise import line_noise
 from vision.fit.problem import bar_axes, bar_axis, bends, curves_of, rest_shape, shifts_mm
 from vision.geometry.camera import Camera
@@ -15,7 +15,14 @@ from vision.geometry.rounded import Rounded
 from vision.geometry.touched import Axis, Touched
 from vision.pictures.pyramid import full_px
 from vision.truth.at_angle import Smooth
-from vision.truth.records import FrameTruth, GaveWay, SeenObject, WhiskTruth, WireShape
+from vision.truth.records import (
+    FrameTruth,
+    GaveWay,
+    SeenObject,
+    SharedSigmas,
+    WhiskTruth,
+    WireShape,
+)
 from vision.truth.value import FIELDS, IN_HUB, Value, propagated_sigma
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
@@ -52,6 +59,7 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     outside = Reason("touch_outside_frames", _outside(fitted, touch.value))
     slope = Reason("slope_vague", _slope_unresolved(beta.sigma))
     slip = Reason("slip_vague", _slip_unresolved(frames))
+    shared = shared_covariance(fitted.problem, fitted.state, fitted.uncertainty)
     is_known = not (lost or outside or slip) and not beta.sigma > _MOST_SLOPE_SIGMA_RAD
     truth = WhiskTruth(
         whisk.number,
@@ -63,17 +71,25 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
         budget=_budget(fitted),
         lines=line_noise(fitted.problem),
         shape=_shape(fitted),
-        smooth=_smooth(fitted),
+        smooth=_smooth(fitted, shared),
         velocity_mm_s=_velocity(whisk, fitted),
         problem=fitted.problem,
     )
-    return _with_contact(truth, whisk, fitted, touch, beta) if is_known else truth
+    return _with_contact(truth, whisk, fitted, touch, beta, shared) if is_known else truth
 
 
 def _with_contact(
-    truth: WhiskTruth, whisk: WhiskPictures, fitted: FittedWhisk, touch: Value, beta: Value
+    truth: WhiskTruth,
+    whisk: WhiskPictures,
+    fitted: FittedWhisk,
+    touch: Value,
+    beta: Value,
+    shared: np.ndarray,
 ) -> WhiskTruth:
-    """Return the row of a whisk with all that a known contact adds."""
+    """Return the row of a whisk with all that a known contact adds.
+
+    shared (size, size): the covariance of the parameters that all whisks share.
+    """
     point = [fitted.of_whisk(name) for name in _VECTORS]
     by_parameter = np.stack([fitted.by_parameter.whisk[name] for name in _VECTORS])
     return replace(
@@ -84,8 +100,27 @@ def _with_contact(
         psi_rad=fitted.of_whisk("psi"),
         point_mm=_stacked(point),
         point_covariance_mm2=by_parameter @ fitted.covariance @ by_parameter.T,
+        shared=_shared_sigmas(whisk, fitted, shared),
         gave=None if whisk.gives is None else _gave(fitted),
         rounded=_seen_object(fitted.problem.rods.bar, fitted),
+    )
+
+
+def _shared_sigmas(
+    whisk: WhiskPictures, fitted: FittedWhisk, covariance: np.ndarray
+) -> SharedSigmas:
+    """Return the sigmas by a covariance (size, size) of the parameters that all whisks share."""
+
+    def sigma(name: str) -> float:
+        """Return the standard deviation of a quantity of the whisk."""
+        return float(propagated_sigma(fitted.by_parameter.whisk[name], covariance))
+
+    return SharedSigmas(
+        touch_rad=float(np.hypot(sigma("touch"), _clock_sigma_rad(whisk, fitted))),
+        d_x_mm=sigma("d_x"),
+        beta_rad=sigma("beta"),
+        psi_rad=sigma("psi"),
+        point_mm=np.array([sigma(name) for name in _VECTORS]),
     )
 
 
@@ -161,9 +196,14 @@ def _contacts_mm(fitted: FittedWhisk) -> np.ndarray:
 def _touch(whisk: WhiskPictures, fitted: FittedWhisk) -> Value:
     """Return the motor angle of first touch, rad; its sigma counts the clock's."""
     touch = fitted.of_whisk("touch")
-    speed_rad_s = _speed(whisk.time_s[fitted.frames], fitted.problem.motor_rad, touch.value)
-    clock_rad = whisk.settings.clock_sigma_s * speed_rad_s
-    return Value(touch.value, float(np.hypot(touch.sigma, clock_rad)))
+    return Value(touch.value, float(np.hypot(touch.sigma, _clock_sigma_rad(whisk, fitted))))
+
+
+def _clock_sigma_rad(whisk: WhiskPictures, fitted: FittedWhisk) -> float:
+    """Return the part of touch's sigma that comes from the frames' clock, rad."""
+    touch_rad = float(fitted.measured.whisk["touch"])
+    speed_rad_s = _speed(whisk.time_s[fitted.frames], fitted.problem.motor_rad, touch_rad)
+    return whisk.settings.clock_sigma_s * speed_rad_s
 
 
 def _shape(fitted: FittedWhisk) -> WireShape:
@@ -223,8 +263,11 @@ def _lost_at_touch(whisk: WhiskPictures, touch_rad: float) -> str:
     return f"frame {near[0]} at touch was lost" if near else ""
 
 
-def _smooth(fitted: FittedWhisk) -> Smooth:
-    """Return what the touching frames determine, whether or not there is a truth."""
+def _smooth(fitted: FittedWhisk, shared: np.ndarray) -> Smooth:
+    """Return what the touching frames determine, whether or not there is a truth.
+
+    shared (size, size): the covariance of the parameters that all whisks share.
+    """
     measured = fitted.measured
     by_parameter = fitted.by_parameter
     touching = fitted.problem.touching
@@ -235,6 +278,7 @@ def _smooth(fitted: FittedWhisk) -> Smooth:
         {name: measured.frame[name][touching] for name in names},
         {name: by_parameter.frame[name][touching] for name in names},
         fitted.covariance,
+        shared,
         float(measured.whisk["d_x"]),
     )
 

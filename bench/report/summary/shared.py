@@ -6,15 +6,32 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from bench.records.trial_result import TrialResult, whisks
+from bench.records.trial_result import SeenWhisk, TrialResult, whisks
 from vision.geometry import Reason
 
-# Causes of `budget` that are the same wire, bar, lamp, lenses and board in every whisk.
-SHARED = ("diameters", "light", "cameras", "placement")
 # Chance by which whisks of one recording would scatter so much with a sound part of their own.
 _FALSE_ALARM = 1e-3
 # Angles whose scatter stands with that of the distance, by their names.
 _ANGLES = {"touch": "touch_rad", "β": "beta_rad"}
+_AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The part of a quantity's sigma that all whisks share, and each whisk's own, RMS."""
+
+    shared: float
+    own: float
+
+    @classmethod
+    def of(cls, sigma: np.ndarray, shared: np.ndarray) -> "Parts":
+        """Return the parts of sigmas (n,) of which so much (n,) is shared."""
+        own_variance = np.mean(np.maximum(sigma**2 - shared**2, 0.0))
+        return cls(float(np.sqrt(np.mean(shared**2))), float(np.sqrt(own_variance)))
+
+    def text(self, name: str, digits: int, unit: str) -> str:
+        """Return name and parts in words."""
+        return f"{name} {self.shared:.{digits}f} and {self.own:.{digits}f} {unit}"
 
 
 @dataclass(frozen=True)
@@ -46,20 +63,41 @@ class SharedDistance:
 
 
 def shared_distance(results: Sequence[TrialResult]) -> SharedDistance | None:
-    """Return shared and own error; None where fewer than two whisks have a truth with its budget."""
-    variances = []
-    shares = []
-    for _, seen, _ in whisks(results):
-        if seen.has_truth and seen.truth.budget:
-            variances.append(seen.d_x_mm.sigma**2)
-            shares.append(sum(np.nan_to_num(seen.truth.budget[cause]) for cause in SHARED))
-    if len(variances) < 2:
+    """Return shared and own error; None where fewer than two whisks have a truth."""
+    known = _known(results)
+    if len(known) < 2:
         return None
-    variance = np.array(variances)
-    share = np.array(shares)
-    shared_mm = float(np.sqrt(np.mean(variance * share)))
-    own_mm = float(np.sqrt(np.mean(variance * np.maximum(1.0 - share, 0.0))))
-    return SharedDistance(shared_mm, own_mm, len(variances), *_scatter(results, "d_x_mm"))
+    sigma = np.array([seen.d_x_mm.sigma for seen in known])
+    shared = np.array([seen.truth.shared.d_x_mm for seen in known])
+    parts = Parts.of(sigma, shared)
+    return SharedDistance(parts.shared, parts.own, len(known), *_scatter(results, "d_x_mm"))
+
+
+def _known(results: Sequence[TrialResult]) -> list[SeenWhisk]:
+    """Return the whisks with a truth of which is known what they share."""
+    seen = [one for _, one, _ in whisks(results)]
+    return [one for one in seen if one.has_truth and one.truth.shared is not None]
+
+
+def _other_parts(known: Sequence[SeenWhisk]) -> str:
+    """Return in words what whisks share of the sigmas of touch, slopes, slip and the contact."""
+    texts = []
+    for name, field in _ANGLES.items():
+        sigma = np.array([getattr(seen, field).sigma for seen in known])
+        shared = np.array([getattr(seen.truth.shared, field) for seen in known])
+        texts.append(Parts.of(np.degrees(sigma), np.degrees(shared)).text(name, 4, "deg"))
+    slips = []
+    for seen in known:
+        if seen.at is not None and np.isfinite(seen.at.slip_mm.sigma):
+            slips.append((seen.at.slip_mm.sigma, seen.at.slip_shared_mm))
+    if slips:
+        sigma, shared = np.array(slips).T
+        texts.append(Parts.of(sigma, shared).text("slip at θ", 4, "mm"))
+    sigmas = np.array([seen.point_mm.sigma for seen in known])
+    shared = np.array([seen.truth.shared.point_mm for seen in known])
+    for axis, own_sigma, own_shared in zip(_AXES, sigmas.T, shared.T):
+        texts.append(Parts.of(own_sigma, own_shared).text(f"contact {axis}", 3, "mm"))
+    return ", ".join(texts)
 
 
 def _scatter(results: Sequence[TrialResult], name: str) -> tuple[float, int]:
@@ -84,9 +122,10 @@ def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
         return
     yield (
         f"of d_x's sigma ± {shared.shared_mm:.4f} mm is one error that all {shared.n} whisks share "
-        f"({', '.join(SHARED)}), ± {shared.own_mm:.4f} mm each whisk's own: their mean is known to ± "
-        f"{shared.mean_sigma_mm:.4f} mm"
+        f"(diameters, light, cameras, placement, clock), ± {shared.own_mm:.4f} mm each whisk's own: "
+        f"their mean is known to ± {shared.mean_sigma_mm:.4f} mm"
     )
+    yield f"  shared by all and each whisk's own, one sigma: {_other_parts(_known(results))}"
     if shared.freedom:
         angles = []
         for name, field in _ANGLES.items():

@@ -5,7 +5,7 @@ import pytest
 
 from bench.report.summary.shared import scatter_warnings, shared_distance, shared_lines
 from tests.scenes.results import seen_whisk, trial_result
-from vision.fit.covariance import CAUSES
+from vision.truth.records import SharedSigmas
 from vision.truth.value import Value
 
 SHARED_MM, OWN_MM = 0.008, 0.002
@@ -13,12 +13,7 @@ SHARED_MM, OWN_MM = 0.008, 0.002
 
 def session(rng, trials, a_trial, own_mm=OWN_MM):
     """Results of whisks whose stated own part is OWN_MM, and which scatter by own_mm."""
-    share = SHARED_MM**2 / (SHARED_MM**2 + OWN_MM**2)
-    budget = dict.fromkeys(CAUSES, 0.0) | {
-        "light": 0.7 * share,
-        "diameters": 0.3 * share,
-        "wire": 1.0 - share,
-    }
+    shared = SharedSigmas(1e-4, SHARED_MM, 2e-3, 2e-3, np.array([SHARED_MM, 0.0, 0.06]))
     off = SHARED_MM * rng.standard_normal()
     results = []
     for _ in range(trials):
@@ -28,9 +23,10 @@ def session(rng, trials, a_trial, own_mm=OWN_MM):
             seen_whisk(
                 k,
                 d_x_mm=Value(60.0 + e, sigma),
-                budget=budget,
-                touch_rad=Value(0.04),
-                beta_rad=Value(0.5),
+                shared=shared,
+                touch_rad=Value(0.04, 2e-4),
+                beta_rad=Value(0.5, 3e-3),
+                point_mm=Value(np.zeros(3), np.array([sigma, 0.01, 0.061])),
             )
             for k, e in enumerate(errors)
         ]
@@ -62,8 +58,9 @@ def test_scatter_within_recordings_tests_the_own_part():
 
 def test_single_whisks_say_nothing_of_their_scatter():
     rng = np.random.default_rng(5)
-    (line,) = shared_lines(session(rng, 3, 1))
+    line, parts = shared_lines(session(rng, 3, 1))
     assert "one error that all 3 whisks share" in line
+    assert "contact z 0.060 and 0.011 mm" in parts and "touch 0.0057 and 0.0099 deg" in parts
     assert (
         list(shared_lines(session(rng, 1, 1))) == list(scatter_warnings(session(rng, 3, 1))) == []
     )

@@ -75,7 +75,8 @@ def told(
     own = {name: SIGMAS[of] * np.eye(count, count + 1) for name, of in names.items()}
     covariance = np.diag([1.0] * count + [TOUCH_SIGMA_RAD**2])
     shown = theta_rad + TOUCH_SIGMA_RAD * rng.standard_normal()
-    return at_angle(Smooth(shown, np.eye(count + 1)[-1], values, own, covariance), wanted_rad, "")
+    smooth = Smooth(shown, np.eye(count + 1)[-1], values, own, covariance, 0.0 * covariance)
+    return at_angle(smooth, wanted_rad, "")
 
 
 def line(

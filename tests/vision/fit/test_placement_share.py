@@ -18,7 +18,7 @@ from tests.studies.accuracy.scenes import (
     line_points,
 )
 from vision.calibration.cameras_file import read_cameras
-from vision.fit.covariance import uncertainty, variance_by_cause
+from vision.fit.covariance import shared_covariance, uncertainty, variance_by_cause
 from vision.fit.quantities import jacobians
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
@@ -91,3 +91,23 @@ def test_the_budget_tells_rig_board_from_lenses(loose):
     assert np.sqrt(touch) < 0.02 * np.radians(0.1)
     # a board known to 0.1 mm shifts d_x by about as much, its turns on top
     assert 0.05 < np.sqrt(told["placement"]) < 0.3
+
+
+def test_what_whisks_share_is_diameters_light_cameras_and_placement(loose):
+    """The causes of the budget add up to it, for d_x and for the contact; a rig board known to 0.1 mm shifts the
+    contact by as much, which all whisks have in common."""
+    scene = scene_of(0.1)
+    rng = np.random.default_rng(2)
+    problem = as_problem(scene, loose, *given(scene, rng), line_points(scene, rng))
+    state, gain = solve(problem, begin(problem), scales=SCALES)
+    _, by = jacobians(problem, state)
+    fitted = uncertainty(problem, state, gain)
+    shared = shared_covariance(problem, state, fitted)
+    for name in ("d_x", "touch", "beta", "x", "y", "z"):
+        gradient = by.whisk[name]
+        causes = variance_by_cause(problem, state, fitted, gradient)
+        parts = [causes[cause] for cause in ("diameters", "light", "cameras", "placement")]
+        assert gradient @ shared @ gradient == pytest.approx(sum(parts), rel=1e-6)
+        assert gradient @ shared @ gradient < gradient @ fitted.covariance @ gradient
+    along_z = by.whisk["z"]
+    assert 0.1 < np.sqrt(along_z @ shared @ along_z) < 0.4

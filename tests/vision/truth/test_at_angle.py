@@ -12,7 +12,8 @@ THETA_RAD = np.radians(np.arange(0.5, 6.0, 0.5))
 def frames(covariance: np.ndarray, values: np.ndarray, name: str) -> Smooth:
     """Each frame's value is one of the parameters."""
     size = len(THETA_RAD)
-    return Smooth(THETA_RAD, np.zeros(size), {name: values}, {name: np.eye(size)}, covariance)
+    jacobian = {name: np.eye(size)}
+    return Smooth(THETA_RAD, np.zeros(size), {name: values}, jacobian, covariance, 0.0 * covariance)
 
 
 @pytest.mark.parametrize("shared", [0.0, 0.8])
@@ -66,6 +67,7 @@ def test_frames_in_step_with_teeth_are_told_by_those_further_away(first):
         {"phi": 0.5 - 0.05 * phase + 0.001 * rng.standard_normal(len(theta))},
         {"phi": np.eye(len(theta))},
         1e-6 * np.eye(len(theta)),
+        np.zeros((len(theta), len(theta))),
     )
     assert _between_frames_sigma(smooth, "phi", np.radians(3.0)) > 0.01
 
@@ -94,7 +96,11 @@ def test_what_jumps_holds_the_jump_in_its_sigma(step_deg):
         own = {name: np.eye(size, size + 1) for name in values}
         covariance = np.diag([SIGMA_MM**2] * size + [TOUCH_RAD**2])
         shown = theta + TOUCH_RAD * rng.standard_normal()
-        at = at_angle(Smooth(shown, np.eye(size + 1)[-1], values, own, covariance), wanted, "")
+        touch_jacobian = np.eye(size + 1)[-1]
+        shared = np.diag([0.0] * size + [TOUCH_RAD**2])
+        smooth = Smooth(shown, touch_jacobian, values, own, covariance, shared)
+        at = at_angle(smooth, wanted, "")
+        assert 0.0 < at.slip_shared_mm <= at.slip_mm.sigma
         assert "slips_in_jumps" in at.status.codes and at.theta_rad == wanted
         told = [
             (getattr(at, field), truth)
