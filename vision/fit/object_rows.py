@@ -153,8 +153,12 @@ class BarRows(ObjectRows):
         return [both_mm[int(np.argmax(seen.side * offset_px))]]
 
     def sigmas_px(self, seen: Observed) -> list[list[float]]:
-        """Return side and two sigmas of a line of the bar."""
-        return [[seen.side, *seen.points.sigma_px]]
+        """Return side and two sigmas of a line of the bar, with what its points have in common
+        beyond the prior of lines that are handed on.
+        """
+        in_common = np.mean(seen.points.shared_px**2, axis=0)[:2] - BAR_MODES_PX**2
+        sigma_px = np.sqrt(seen.points.sigma_px**2 + max(float(np.sum(in_common)), 0.0))
+        return [[seen.side, *sigma_px]]
 
 
 class SilhouetteRows(ObjectRows):

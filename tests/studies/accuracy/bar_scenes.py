@@ -3,10 +3,10 @@
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/accuracy/bar_scenes.py FOLDER [PATTERN]
 
 FOLDER holds sessions of one whisk each (trials/w) with exact cameras and truth.toml: d_x_mm, touch_deg, beta_deg and
-psi_deg, which are the axis. A row a camera: how far off the line is at 20 mm to either side of the contact (px), the
-stated sigma, and z with the error that the fit takes every line to have besides (BAR_OFFSET_PX); how
-wide the bar looks over how wide it is; then the share of scenes whose axis is within 1 px in every camera that sees it,
-and z's RMS and largest, of the line and of the width's logarithm.
+psi_deg, which are the axis. A row a camera: how far off the line is at 20 mm to either side of the contact (px), with
+its sigma; how wide the bar looks over how wide it is; then the share of scenes whose axis is within 1 px in every camera
+that sees it, and z's RMS and largest, of the line's shift, of its tilt (over 20 mm), and of the width's logarithm. Sigmas
+hold what both points have in common.
 """
 
 import sys
@@ -19,7 +19,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from vision.calibration.cameras_file import read_cameras
-from vision.fit.blocks import BAR_OFFSET_PX
 from vision.geometry.camera import Camera
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
@@ -29,7 +28,8 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.view import View
 from vision.touched.find import axis_from_angles
-from vision.touched.search import SeenBar, find_object
+from vision.touched.line import BarLineEstimate, measure_bars
+from vision.touched.search import find_object
 from vision.touched.search_scene import SearchScene
 from vision.touched.width import combine_widths, measure_relative_widths
 
@@ -91,11 +91,13 @@ def main() -> None:
     ):
         views, cameras, rods, motor, true = read_scene(folder)
         try:
-            seen = find_object(SearchScene(views, cameras, rods, motor, VisionSettings()))
+            scene = SearchScene(views, cameras, rods, motor, VisionSettings())
+            seen = find_object(scene)
         except Refused as reason:
             print(f"{folder.name:<6} {reason}", flush=True)
             worst.append(np.inf)
             continue
+        by_name = {camera.name: camera for camera in cameras}
         worst.append(
             max(axis_off_px(camera, true, seen.axis, rods.bar.radius_mm) for camera in cameras)
         )
@@ -105,35 +107,50 @@ def main() -> None:
             widths.append(np.log(share) / (sigma / share))
             print(f"       looks {share:.3f} ± {sigma:.3f} times as wide as it is", flush=True)
         every += [
-            row for camera in cameras for row in line_rows(camera, seen, true, rods.bar.radius_mm)
+            row
+            for name, line in measured_finely(scene, seen.axis).items()
+            for row in line_rows(by_name[name], line, true, rods.bar.radius_mm)
         ]
-    error, sigma = np.abs(np.array(every)).T
-    z = error / np.hypot(sigma, BAR_OFFSET_PX)
     found = np.mean(np.array(worst) < FOUND_PX)
-    print(
-        f"{found:.0%} of {len(worst)} axes within {FOUND_PX:g} px; {len(error)} points: median error "
-        f"{np.median(error):.3f} px, sigma {np.median(sigma):.3f}; z RMS {np.sqrt(np.mean(z**2)):.2f}, median "
-        f"{np.median(z):.2f}, over 3 {np.mean(z > 3):.1%}, largest {z.max():.1f}"
-    )
+    print(f"{found:.0%} of {len(worst)} axes within {FOUND_PX:g} px")
+    modes = np.abs(np.array(every))  # (lines, 2, 2): shift and tilt, error and sigma
+    for name, (error, sigma) in zip(("shift", "tilt"), np.moveaxis(modes, 0, -1)):
+        z = error / sigma
+        print(
+            f"{name} of {len(z)} lines: median error {np.median(error):.3f} px, sigma {np.median(sigma):.3f}; "
+            f"z RMS {np.sqrt(np.mean(z**2)):.2f}, median {np.median(z):.2f}, largest {z.max():.1f}"
+        )
     print(
         f"z of widths: RMS {np.sqrt(np.mean(np.square(widths))):.2f}, largest {np.max(np.abs(widths)):.1f}"
     )
 
 
+def measured_finely(scene: SearchScene, axis: BarAxis) -> dict[str, BarLineEstimate]:
+    """By camera the line of the bar about an axis, as the fit measures it at last."""
+    about = (scene.views, axis, scene.radius_mm, scene.wires_px, scene.settings)
+    return measure_bars(*about, measure_bars(*about))
+
+
 def line_rows(
-    camera: Camera, seen: SeenBar, true: BarAxis, radius_mm: float
-) -> list[tuple[float, float]]:
-    """Error and sigma, px, of both points of a camera's line, which are printed, too."""
-    line = seen.lines.get(camera.name)
-    if line is None or not line.is_bar:
+    camera: Camera, line: BarLineEstimate, true: BarAxis, radius_mm: float
+) -> list[list[tuple[float, float]]]:
+    """Error and sigma, px, of shift and tilt of a camera's line, whose two points are printed."""
+    if not line.is_bar:
         return []
-    error = off_px(camera, true, radius_mm, line.points.px, line.points.normal)
-    parts = [f"{e:+.3f} ± {s:.3f}" for e, s in zip(error, line.points.sigma_px)]
+    points = line.points
+    error = off_px(camera, true, radius_mm, points.px, points.normal)
+    sigma = np.sqrt(points.sigma_px**2 + np.sum(points.shared_px**2, axis=1))
+    parts = [f"{e:+.3f} ± {s:.3f}" for e, s in zip(error, sigma)]
     print(
         f"       {camera.name:<6} {'   '.join(parts)}   evidence {line.evidence_for_bar:.0f}, left {line.unresolved_share:.3f}",
         flush=True,
     )
-    return list(zip(error, line.points.sigma_px))
+    own = np.sqrt(np.mean(points.sigma_px**2) / 2.0)  # of shift and tilt alike
+    modes = []
+    for mode, weights in enumerate(np.array([[0.5, 0.5], [-0.5, 0.5]])):
+        in_common = np.sqrt(np.mean(points.shared_px[:, mode] ** 2))
+        modes.append((float(weights @ error), float(np.hypot(own, in_common))))
+    return [modes]
 
 
 if __name__ == "__main__":

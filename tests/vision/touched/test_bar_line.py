@@ -23,7 +23,7 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.optics import Optics
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
-from vision.touched.line import clear_pieces, find_lines
+from vision.touched.line import OVERSTATED_PX, clear_pieces, find_lines
 from vision.touched.pieces import ARM_MM
 from vision.touched.posterior import estimate_log_width
 from vision.touched.width import SIGMA_SHARE
@@ -88,6 +88,26 @@ def test_a_line_forgets_where_it_was_looked_for(bar, rng):
         np.abs(np.array(at[1:]) - at[0]) / np.hypot(points[0].sigma_px, BAR_OFFSET_PX), axis=1
     )
     assert moved[0] < 0.2 and moved[1] < 0.5
+
+
+def test_two_points_hand_on_what_is_known_of_shift_and_tilt(rng):
+    """By their own sigmas and what both have in common they are the posterior's, with a tilt that segments in one light
+    know better than segments each in its own. Of the correlation four fifths of the smaller variance are kept."""
+    view = noisy_view(*SCENES["painted, step of a fifth"], 1.3, 0.4, rng)
+    across = np.array([-np.sin(1.3), np.cos(1.3), 0.0])
+    found = measured(view, BarAxis(0.4 * across, np.array([np.cos(1.3), np.sin(1.3), 0.0])))
+    (posterior,) = found.posteriors.values()
+    points = found.points
+    modes = np.array([[0.5, 0.5], [-0.5, 0.5]])  # shift and tilt of two points
+    own = modes @ np.diag(points.sigma_px**2) @ modes.T
+    in_common = np.mean(points.shared_px[:, :2] ** 2, axis=0)
+    temperature = np.median(posterior.temperature)
+    overstated = max(temperature - 1.0, 0.01) * OVERSTATED_PX**2
+    scale = np.array([1.0, 0.65])
+    expected = posterior.covariance * np.outer(scale, scale)
+    assert np.diag(own) + in_common == pytest.approx(np.diag(expected) + overstated)
+    most = 0.8 * np.min(np.diag(expected))
+    assert own[0, 1] == pytest.approx(np.clip(expected[0, 1], -most, most))
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.25])
