@@ -60,7 +60,8 @@ _LARGEST_UNRESOLVED = 1.0 / 6.0
 OVERSTATED_PX = np.array([0.025, 0.0125])
 # [1] Sigma of a line's tilt over that of segments each with its own light: what the model of light
 # lacks is alike along a bar, and cancels in its tilt. Over 48 path-traced views z of the tilt was
-# 0.56 RMS, over 28 painted ones 0.61, over 6 of steel-sample 0.86. Study: bar_scenes.py.
+# 0.56 RMS, over 28 painted ones 0.61, over 6 of steel-sample 0.86, and with this one it is 0.77 in
+# 64 path-traced ones. Study: bar_scenes.py.
 _TILT_SHARE = 0.65
 # [1] Most correlation of shift and tilt that is handed on. Stated.
 _MOST_CORRELATED = 0.8
