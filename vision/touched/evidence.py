@@ -43,6 +43,10 @@ _RIM_SHARE = 0.2
 # smooth to rough; the last is as free as `_STEP_SHARE`. Averaged over by evidence, which selects
 # 0.03 to 0.1 for matt bars. Study: bar_starts.py.
 _CURVATURE_SHARES = (0.03, 0.1, 0.3)
+# [1] Range of the light of a highlight that saturates its pixels, over the range that is seen: no
+# pixel says more. With 1, the border of a highlight was taken for the edge of the bar, 0.9 px and 11
+# sigma off. Study: bar_scenes.py.
+_UNSEEN_RANGE = 10.0
 # [px] Margin inside each edge without which the range of light on the bar is measured: two lens
 # blurs, where the background contributes. Derived.
 _RIM_BLURRED_PX = 2.0
@@ -98,10 +102,17 @@ class LitRod:
     @cached_property
     def _rod_precisions(self) -> list[np.ndarray]:
         """Return the prior precisions (splines, splines) of the light on the rod, from smooth to
-        rough."""
+        rough.
+
+        The last is that of light with a saturated highlight, if there is one.
+        """
         scale = np.hypot(self._inner_range, _RIM_SHARE * self.profiles.contrast)
         level = self._level_sigma**-2.0 * np.eye(_SPLINES)
-        return [level + roughness / scale**2 for roughness in _roughness_penalties()]
+        penalties = _roughness_penalties()
+        precisions = [level + roughness / scale**2 for roughness in penalties]
+        if self.profiles.is_saturated:
+            precisions.append(level + penalties[-1] / (_UNSEEN_RANGE * scale) ** 2)
+        return precisions
 
     @cached_property
     def _rough_root(self) -> np.ndarray:

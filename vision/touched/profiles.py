@@ -25,6 +25,7 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from vision.pictures.view import SATURATED
 from vision.wire.bands import Pieces
 
 # [grey] Largest value of a picture of 8 bit. Stated.
@@ -69,6 +70,7 @@ class Profiles:
     light_per_grey (k, b): derivative of the light by the grey level.
     place_mm (k,): the segments' middles along the bar. radius_px: half the bar's width.
     variance_inflation: variance of a mean over bins, over that of independent bins.
+    is_saturated: whether the light on the bar is brighter somewhere than its pixels can say.
     """
 
     offset_px: np.ndarray
@@ -80,6 +82,7 @@ class Profiles:
     place_mm: np.ndarray
     radius_px: float
     variance_inflation: float
+    is_saturated: bool
 
     def __len__(self) -> int:
         """Return the number of segments."""
@@ -224,7 +227,9 @@ def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: floa
     number = max(1, min(segments, len(pieces) // 2))
     place_mm = np.array_split(np.sort(pieces.place), number)  # of the patches of each segment
     grid_px = STEP_PX * np.arange(-half, half + 1)
-    return _average_patches(patches, place_mm, grid_px, radius_px)
+    is_bright = np.nan_to_num(pieces.grey) >= SATURATED * FULL_SCALE
+    is_saturated = bool(np.any(is_bright & (np.abs(offset_px) < radius_px)))
+    return _average_patches(patches, place_mm, grid_px, radius_px, is_saturated)
 
 
 def _sum_in_bins(weight, value, position, size: int) -> np.ndarray:
@@ -250,11 +255,16 @@ def _linearise_grey(grey, gamma: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _average_patches(
-    patches: _PatchSums, place_mm: Sequence[np.ndarray], offset_px: np.ndarray, radius_px: float
+    patches: _PatchSums,
+    place_mm: Sequence[np.ndarray],
+    offset_px: np.ndarray,
+    radius_px: float,
+    is_saturated: bool,
 ) -> Profiles:
     """Average patches into the profiles of k segments.
 
     place_mm: of the patches, by segment, in their order along the bar. offset_px (b,): of the bins.
+    radius_px, is_saturated: as of `Profiles`.
     """
     averages = _Averages(_membership([len(some) for some in place_mm]), patches.weight)
     texture, variance_inflation = _estimate_texture(averages.membership[:, 1:-1], patches)
@@ -269,6 +279,7 @@ def _average_patches(
         place_mm=np.array([some.mean() for some in place_mm]),
         radius_px=radius_px,
         variance_inflation=variance_inflation,
+        is_saturated=is_saturated,
     )
 
 

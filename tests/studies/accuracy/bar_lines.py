@@ -26,6 +26,7 @@ from vision.pictures.view import View
 from vision.touched.line import BarLineEstimate, measure_bars
 
 SIZE, FOCAL_PX, AWAY_MM, RADIUS_MM, BLUR_PX, FRAMES = (420, 300), 2010.0, 376.0, 3.0, 0.9, 13
+WHITE = 255.0  # grey levels: brighter light saturates
 CENTRE = np.array([209.5, 149.5])
 
 
@@ -41,12 +42,19 @@ def metal(t):
     ) ** 0.5
 
 
+def glossy(t):
+    """A dark mirror with the picture of a lamp near one edge, brighter than any pixel can say."""
+    rims = 18.0 - 14.0 * np.abs(t) ** 6
+    return np.where((t > 0.4) & (t < 0.78), 550.0, rims)
+
+
 SCENES: dict[str, tuple[Callable, Callable]] = {
     "painted, flat background": (painted, lambda x, y: 60.0 + 0.0 * x),
     "painted, step of a fifth": (painted, lambda x, y: np.where(x > 210.0, 60.0, 40.0)),
     "painted, printed squares": (painted, squares),
     "polished, flat background": (metal, lambda x, y: 110.0 + 0.0 * x),
     "polished, printed squares": (metal, squares),
+    "glossy, as dark a background": (glossy, lambda x, y: 18.0 + 0.0 * x),
 }
 
 
@@ -78,7 +86,9 @@ def _seen(fine):
 def noisy_view(shade, behind, angle: float, across_mm: float, rng) -> View:
     """A bar in some frames of a camera, and the picture without it, each with its noise."""
     picture, background = drawn(shade, behind, angle, across_mm)
-    frames = {k: picture + NOISE * rng.standard_normal(picture.shape) for k in range(FRAMES)}
+    frames = {}
+    for k in range(FRAMES):
+        frames[k] = np.minimum(picture + NOISE * rng.standard_normal(picture.shape), WHITE)
     background = background + NOISE * rng.standard_normal(picture.shape)
     matrix = [[FOCAL_PX, 0, CENTRE[0]], [0, FOCAL_PX, CENTRE[1]], [0, 0, 1]]
     camera = Camera("c", SIZE, matrix, np.zeros(5), np.column_stack([np.eye(3), [0, 0, AWAY_MM]]))
