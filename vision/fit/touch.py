@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.fit.problem import Problem, bar_axis, resting_curves, shift_at_mm
+from vision.fit.problem import Problem, State, bar_axis, bends, resting_curves, shift_at_mm
+from vision.fit.solve import LAST_SCALE, linearise, robust_weights
 from vision.geometry.contact import clearance
 
 # [frames] Before touch: one gives the rest shape, two show that it swings with the motor. Derived.
@@ -29,6 +30,11 @@ _STARTS_PER_FRAME = 10
 _SURE_SIGMAS = 3.0
 # [rad] The least distance from touch of a frame that is not left undecided: a motor's step. Stated.
 _LEAST_MARGIN_RAD = np.radians(0.02)
+# [chi²] By which a fit in which a frame bends is better than one in which it is free, before it is
+# taken as bent: five sigma, as of a bend against none (`fit/bend_onset.py`). In nine path-traced
+# scenes the last free frame has 6 at most, one of two that touch from the start 220 at least.
+# Study: thresholds.py fit.touch _LEAST_BEND ….
+_LEAST_BEND = 25.0
 
 
 @dataclass(frozen=True)
@@ -140,23 +146,12 @@ def frames_that_touch(motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.n
     return touching, (motor_rad < touch - step) | first
 
 
-def begins_free(motor_rad: np.ndarray, bend_rad: np.ndarray) -> bool:
-    """Return whether coarse bends (f, 2) show that the first frames come before touch.
-
-    They do by more than the motor turns until a bend is sure. Without any sure bend there is no
-    touch.
-    """
-    touching, _ = frames_that_touch(motor_rad, bend_rad)
-    if not np.any(touching):
-        return True
-    return motor_rad[FEWEST_FREE - 1] < _hinge(motor_rad, bend_rad) - _SURE_BEND_RAD
-
-
 def _hinge(motor_rad: np.ndarray, bend_rad: np.ndarray) -> float:
     """Find the motor angle up to which there is no bend and from which on it grows in proportion:
     that of the least absolute misfit."""
     last = bend_rad[-max(2, len(bend_rad) // 3) :]
-    towards = np.median(last, axis=0)
+    sure = np.linalg.norm(last, axis=1) > _SURE_BEND_RAD  # of few that bend the median has none
+    towards = np.median(last[sure] if np.any(sure) else last, axis=0)
     direction = towards / max(np.linalg.norm(towards), 1e-12)
     bend = bend_rad @ direction  # (f,)
     starts = np.linspace(motor_rad[0], motor_rad[-2], _STARTS_PER_FRAME * len(motor_rad))
@@ -179,6 +174,61 @@ def frames_by_touch(
     free = motor_rad < touch_rad - margin
     free[:FEWEST_FREE] |= motor_rad[:FEWEST_FREE] < touch_rad
     return motor_rad > touch_rad + margin, free
+
+
+def unbent_frames(problem: Problem, state: State, free: np.ndarray) -> np.ndarray:
+    """Return which frames (f,) bool a fit still shows to be free: the last is dropped while it is
+    bent.
+
+    free (f,) bool: frames taken as free, the first of the stroke. Frames that touch from the start
+    would else pass for a rest shape, and touch for later than it is.
+    """
+    free = free.copy()
+    loose = replace(problem, bent=np.ones(len(free), dtype=bool))
+    vector = np.zeros(loose.size)
+    vector[: problem.first_bend] = state.vector[: problem.first_bend]
+    bend_rad = np.where(free[:, None], 0.0, bends(problem, state.vector))
+    vector[problem.first_bend :] = bend_rad.ravel()
+    linear, _ = linearise(loose, replace(state, vector=vector))
+    root = np.sqrt(robust_weights(linear, LAST_SCALE))
+    jacobian = linear.jacobian * root[:, None]
+    residual = linear.residual * root
+    while np.sum(free) >= FEWEST_FREE:
+        last = int(np.flatnonzero(free)[-1])
+        if _bend_chi2(loose, jacobian, residual, free, last) < _LEAST_BEND:
+            break
+        free[last] = False
+    return free
+
+
+def _bend_chi2(
+    loose: Problem, jacobian: np.ndarray, residual: np.ndarray, free: np.ndarray, frame: int
+) -> float:
+    """Return by how much chi² falls where one of the free frames (f,) bool may bend.
+
+    loose: problem in which all may. jacobian (n, size), residual (n,): over their sigma.
+    """
+    varies = np.ones(loose.size, dtype=bool)
+    for one in np.flatnonzero(free).tolist():
+        varies[loose.bend_of(one)] = one == frame
+    rows = jacobian[:, varies]
+    covariance = np.linalg.inv(rows.T @ rows)
+    step = -covariance @ (rows.T @ residual)
+    first = int(np.sum(varies[: loose.bend_of(frame).start]))
+    own = slice(first, first + 2)
+    return float(step[own] @ np.linalg.solve(covariance[own, own], step[own]))
+
+
+def bent_frames(problem: Problem, state: State, covariance: np.ndarray) -> np.ndarray:
+    """Return which frames (f,) bool surely bend by a fit; covariance (size, size): of its
+    parameters.
+    """
+    is_bent = np.zeros(len(problem.bent), dtype=bool)
+    for frame in np.flatnonzero(problem.bent).tolist():
+        own = problem.bend_of(frame)
+        bend = state.vector[own]
+        is_bent[frame] = bend @ np.linalg.solve(covariance[own, own], bend) > _LEAST_BEND
+    return is_bent
 
 
 def bends_tell_more(motor_rad: np.ndarray, sigma_rad: float) -> bool:

@@ -20,10 +20,6 @@ class Refused(ValueError):
         return Reason(self.code, str(self))
 
 
-class TooFewFrames(Refused):
-    """Too few of a stroke's frames were evaluated; all of them may suffice."""
-
-
 class Misled(Refused):
     """One camera contradicts the others: `camera` is its name. Without it there may be a truth."""
 

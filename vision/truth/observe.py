@@ -22,7 +22,7 @@ from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before
 from vision.geometry.number_words import counted
 from vision.geometry.reasons import Reason, joined
-from vision.geometry.refusals import Misled, Refused, TooFewFrames
+from vision.geometry.refusals import Misled, Refused
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.others import RodLines
@@ -46,6 +46,9 @@ from vision.wire.trace import lines_of
 
 # [frames] Of a whisk that every camera sees: two of free stroke, two that touch. Derived.
 _FEWEST_FRAMES = 4
+
+# Refusals of a thinned stroke whose frames between may be what is missing.
+_TOO_LITTLE_FREE = ("starts_touching", "bends_from_start")
 
 # Why a whisk has no truth whose fit diverges.
 NOT_CONVERGED = Reason("fit_not_converged", "the fit of wire and bar does not settle")
@@ -271,14 +274,14 @@ def _see_whisk(whisk: WhiskPictures) -> tuple[WhiskTruth, SeenBar]:
         try:
             explained = explain(whisk)
             break
-        except TooFewFrames:
-            whisk = whisk.with_all_frames()
         except Misled as reason:
             if len(whisk.views) == 1:
                 return _refused(whisk, reason.reason), whisk.bar
             whisk = whisk.without(reason.camera, reason.reason)
         except Refused as reason:
-            return _refused(whisk, reason.reason), whisk.bar
+            if not whisk.is_thinned or reason.code not in _TOO_LITTLE_FREE:
+                return _refused(whisk, reason.reason), whisk.bar
+            whisk = whisk.with_all_frames()
         except np.linalg.LinAlgError:
             return _refused(whisk, NOT_CONVERGED), whisk.bar
     return _truth(explained), explained.whisk.bar

@@ -17,9 +17,11 @@ from vision.fit.solve import solve
 from vision.fit.touch import (
     FEWEST_FREE,
     bends_tell_more,
+    bent_frames,
     frames_by_touch,
     frames_that_touch,
     touch_and_sigma,
+    unbent_frames,
 )
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
@@ -106,9 +108,9 @@ class TouchByClearance(Touch):
     def part_by_bends(
         self, motor_rad: np.ndarray, bend_rad: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return which frames touch and which are free. Raises Refused where none touches."""
+        """Return which frames touch and which are free. Raises Refused where all are free."""
         touching, free = frames_that_touch(motor_rad, bend_rad)
-        if not np.any(touching):
+        if np.all(free):
             raise Refused(NEVER_TOUCHES, code="never_touches")
         return touching, free
 
@@ -123,8 +125,9 @@ class TouchByClearance(Touch):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return which frames touch and which are free, by the touch of the fit and its sigma.
 
-        Where bends part them better, both count. Raises Refused where fewer than two are free, or
-        none touches.
+        Where bends part them better, both count; no frame is free that surely bends, and where the
+        clearance decides on none, those touch that surely bend. Raises Refused where fewer than two
+        are free, or none touches.
         """
         touch_rad, sigma_rad = touch_and_sigma(problem, state.vector, covariance)
         touching, free = frames_by_touch(problem.motor_rad, touch_rad, sigma_rad)
@@ -133,8 +136,11 @@ class TouchByClearance(Touch):
             free_by_bends = ~problem.bent & ~touching
             touching = touching | touching_by_bends
             free = free | free_by_bends
+        free = unbent_frames(problem, state, free)
         if np.sum(free) < FEWEST_FREE:
             raise Refused(STARTS_TOUCHING, code="starts_touching")
+        if not np.any(touching):
+            touching = bent_frames(problem, state, covariance) & ~free
         if not np.any(touching):
             raise Refused(NEVER_TOUCHES, code="never_touches")
         return touching, free

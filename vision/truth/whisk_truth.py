@@ -9,10 +9,9 @@ from vision.fit.first_bends import SwingPictures, contact_arc, find_rest, follow
 from vision.fit.problem import Problem, State, bar_axis, bends, curves_of, rest_shape, shifts_mm
 from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
-from vision.fit.touch import begins_free
 from vision.geometry.centreline import Curves, centrelines, unbent_curves
 from vision.geometry.contact import clearance
-from vision.geometry.refusals import Misled, Refused, TooFewFrames
+from vision.geometry.refusals import Misled, Refused
 from vision.geometry.touched import Axis
 from vision.truth.line_source import LineSource, WhiskPlace
 from vision.truth.strategies import Strategy, Touch, early, strategies
@@ -56,7 +55,7 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
     for strategy in others:
         try:
             return _fit_by(whisk, strategy)
-        except (Misled, TooFewFrames):
+        except Misled:
             raise
         except Refused:
             continue
@@ -94,17 +93,13 @@ def fit_lines(
         )
     seen = lines.all_points(expected.place, last=True)
     problem, state, covariance = _fit(whisk, expected, seen, touch)
+    touch.part_by_fit(problem, state, covariance)  # raises where the last fit shows no free stroke
     return FittedWhisk.of(problem, state, covariance, whisk.frames)
 
 
 def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, ExpectedWhisk]:
-    """Return the whisk in the frames to fit, and what coarse points say of them.
-
-    Raises TooFewFrames where a thinned stroke has too few frames before touch.
-    """
+    """Return the whisk in the frames to fit, and what coarse points say of them."""
     rest, coarse = coarse_shapes(whisk)
-    if whisk.is_thinned and not begins_free(whisk.angles_rad, np.array(list(coarse.values()))):
-        raise TooFewFrames("too few of the frames before touch were looked at")
     whisk = whisk.during(touch.frames_to_fit(whisk.motor, coarse))
     bend = np.array([coarse[f] for f in whisk.frames])
     touching, free = touch.part_by_bends(whisk.angles_rad, bend)

@@ -99,6 +99,14 @@ def test_a_stroke_that_ends_before_the_bar_never_touches(steep):
     assert np.isnan(seen.d_x_mm.value) and "never_touches" in seen.status.codes
 
 
+def test_a_stroke_that_ends_half_a_frame_after_touch_has_a_truth(steep):
+    """Its last frame alone bends, by some pixels; "never touches" it said."""
+    seen, truth = steep.see(slice(0, 5)), steep.truth
+    assert seen.status == ""
+    assert abs(seen.d_x_mm.value - truth["d_x_mm"]) < 3 * seen.d_x_mm.sigma
+    assert abs(seen.touch_rad.value - np.radians(truth["touch_deg"])) < 3 * seen.touch_rad.sigma
+
+
 def test_a_stroke_that_begins_on_the_bar_has_no_truth(steep):
     seen = steep.see(slice(5, None))
     assert np.isnan(seen.d_x_mm.value) and "starts_touching" in seen.status.codes
