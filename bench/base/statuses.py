@@ -115,6 +115,12 @@ _TABLE = (
         _OTHER_SIDE,
     ),
     Status(
+        "bar_unconverged",
+        WARNING,
+        "the bar's place did not converge",
+        _OTHER_SIDE,
+    ),
+    Status(
         "camera_lines_scatter",
         WARNING,
         "a camera's lines of the wire scatter, and it was left out",

@@ -8,15 +8,14 @@ axis (`vision.touched.axis`), so the bar is found even if no axis of the first s
 two cameras. It is measured again until its lines lie where they were expected: only then are
 detection scores comparable, for a line that still moves scores high beside a bar. All pairs that
 could win are measured, and the axis with the highest detection score over all cameras wins. Third,
-where not all cameras see it or their planes through it nearly coincide, each camera is evaluated
-alone as well, by the bar's width (`vision.touched.one_view`), and replaces the axis if it scores
-clearly higher. Rings, spheres and cones have their own searches, in
-`vision.touched.rounded_search`. Which search a form of object has is registered below.
+where no camera sees a bar there, or all of them see it from one side, each camera is evaluated
+alone, by the bar's width (`vision.touched.one_view`). Rings, spheres and cones have their own
+searches, in `vision.touched.rounded_search`. Which search a form of object has is registered below.
 """
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import singledispatch
 from itertools import combinations, product
 from operator import itemgetter
@@ -35,26 +34,18 @@ from vision.pictures.view import View
 from vision.touched.axis import meeting_axis, offset_px, settle_axis
 from vision.touched.edge_map import EdgeMap, compute_edge_map
 from vision.touched.find import can_touch, find_bars
-from vision.touched.line import BarLineEstimate, find_lines, measure_bars
-from vision.touched.one_view import (
-    find_bars_alone,
-    see_bar_alone,
-    seen_from_one_side,
-    widest_angle_rad,
-)
+from vision.touched.line import BarLineEstimate, find_lines
+from vision.touched.one_view import find_bars_alone, see_bar_alone, seen_from_one_side
 from vision.touched.rounded_search import find_by_coverage, find_by_silhouette
 from vision.touched.search_scene import SearchScene, still_picture
 
-# [rad] Where the cameras' planes through the bar are nearer to each other than this, a small error
-# of one line gives it another slope. Study: bar_scenes.py.
-_NARROW_RAD = np.radians(8.0)
 # [px] An axis that its lines move by less is not measured again: half of a quick measurement's
 # blur. From 1.5 px the width in one camera moved by 3.8 of its sigma. Study: bar_scenes.py.
 _CONVERGED_PX = 0.5
 # [px] Lines nearer to each other than this are one: half the reach of a quick measurement. Derived.
 _SAME_LINE_PX = 1.5
-# [log] By so much one camera's axis must score higher than one that edges in all cameras led to;
-# two measurements about the same axis differ by 0.5. Study: bar_scenes.py.
+# [log] A pair of lines whose highest score is so much less than that of a bar is not measured: two
+# measurements about the same axis differ by 0.5. Study: bar_scenes.py.
 _CLEARER = 1.0
 # [passes] Most measurements of one axis: each moves a line by up to 3 px, so all of them by 36 px, more
 # than the width of most bars. Derived.
@@ -66,15 +57,10 @@ class SeenBar:
     """The axis of the touched object, and by camera the bar's lines that it passes through.
 
     Of a rounded object there are no lines.
-    converged: another measurement about the axis would give the same axis. alternatives: bars
-    elsewhere that have converged, too, and score less by no more than _CLEARER, the best first;
-    each has its axis, lines and detection_score, and no alternatives of its own.
     """
 
     axis: Axis
     lines: Mapping[str, BarLineEstimate]
-    converged: bool = True
-    alternatives: tuple["SeenBar", ...] = ()
 
     @property
     def seen_by(self) -> list[str]:
@@ -121,16 +107,22 @@ def _search_ring(touched: Ring, scene: SearchScene) -> SeenBar:
 
 @_search.register
 def _search_bar(touched: Bar, scene: SearchScene) -> SeenBar:
-    """Find a straight bar by its two edges."""
+    """Find a straight bar by its two edges. Raises Refused where no camera sees one."""
     search = BarSearch(scene)
-    views = scene.views
-    if len(views) == 1:
-        return SeenBar(search.axis_of_one_camera(views[0]), {})
+    if len(scene.views) == 1:
+        return SeenBar(search.axis_of_one_camera(scene.views[0]), {})
     by_all = search.best_by_all_cameras()
-    sees_all = len(by_all.seen_by) == len(views)
-    if sees_all and widest_angle_rad(scene.cameras, by_all.axis) > _NARROW_RAD:
+    is_seen = bool(by_all.seen_by)
+    if is_seen and not seen_from_one_side(scene.cameras, by_all.axis):
         return by_all
-    return search.measured_finely(search.best_with_single_cameras(by_all))
+    found = search.bars_of_single_cameras() or [by_all] * is_seen
+    if not found:
+        raise Refused(
+            f"no {touched.label} is seen near the whisker; "
+            "record with the bar in view of every camera",
+            code="no_bar_seen",
+        )
+    return max(found, key=_detection_score)
 
 
 @dataclass
@@ -166,20 +158,21 @@ class BarSearch:
         """Find the bar by its lines in all cameras: that with the highest detection score.
 
         Pairs of lines are measured until they converge, as long as they could come within _CLEARER
-        of the best so far.
+        of the best so far. Where none converges, the bar is where edges are the strongest.
         """
         scene = self.scene
         axes = find_bars(list(self.edge_maps.values()), scene.rods, scene.motor_range_rad)
         found: list[SeenBar] = []
         for highest, one, other in _pairs_of(self._candidates(axes)):
-            if highest < _highest_score(found) - _CLEARER:
+            clearest = max(map(_detection_score, found), default=-np.inf)
+            if highest < clearest - _CLEARER:
                 break
             axis = meeting_axis(one.camera, one.axis, other.camera, other.axis)
             if can_touch(axis, scene.rods, scene.motor_range_rad):
-                one.axis = other.axis = self._converge(axis, found)
+                one.axis = other.axis = self._converge(axis, found).axis
         if not found:
-            self._converge(axes[0], found)
-        return _best_with_alternatives(found)
+            return self._converge(axes[0], found)
+        return max(found, key=_detection_score)
 
     def _candidates(self, axes: Sequence[BarAxis]) -> list["LineCandidate"]:
         """Measure the bar's line about each axis, once where a camera sees two axes as one."""
@@ -196,58 +189,45 @@ class BarSearch:
                     candidates.append(LineCandidate(camera, through, line.joint_score))
         return candidates
 
-    def _converge(self, axis: BarAxis, found: list[SeenBar]) -> BarAxis:
+    def _converge(self, axis: BarAxis, found: list[SeenBar]) -> SeenBar:
         """Measure the lines about an axis, and again those that it has left, until it converges.
 
-        Adds the bar to those found before, unless it arrives at one of them, and returns its axis.
+        Returns the bar, or that of those found before at which it arrives. Adds it to these where
+        it has converged.
         """
         lines: dict[str, BarLineEstimate] = {}
         about: dict[str, BarAxis] = {}  # by camera, the axis that its line was measured about
         for _ in range(_MOST_PASSES):
             for before in found:
                 if self._is_same(axis, before.axis):
-                    return before.axis
+                    return before
             left = [one for one in self.scene.views if _has_left(one.camera, axis, about)]
             if not left:
                 found.append(SeenBar(axis, lines))
-                return axis
+                break
             names = [view.camera.name for view in left]
             about |= dict.fromkeys(names, axis)
             kept = {name: line for name, line in lines.items() if name not in names}
             lines = kept | self._lines(left, axis)
             axis = self._axis_through(axis, lines)
-        found.append(SeenBar(axis, lines, converged=False))
-        return axis
+        return SeenBar(axis, lines)
 
     def _is_same(self, axis: BarAxis, other: BarAxis) -> bool:
         """Return whether every camera sees two axes as one."""
         cameras = self.scene.cameras
         return all(offset_px(camera, axis, other) < _SAME_LINE_PX for camera in cameras)
 
-    def best_with_single_cameras(self, by_all: SeenBar) -> SeenBar:
-        """Return the bar by all cameras, or by a single one where that scores clearly higher.
-
-        Where all cameras stand on one side of the bar, the single cameras come first: they alone
-        know how far away it is. Raises Refused where no camera sees a bar.
-        """
-        found = [by_all] if by_all.seen_by else []
+    def bars_of_single_cameras(self) -> list[SeenBar]:
+        """Return the bar by each camera alone that sees one."""
+        found = []
         for view in self.scene.views:
             with suppress(Refused):
-                alone = self._measured(self.axis_of_one_camera(view))
+                axis = self.axis_of_one_camera(view)
+                lines = self._lines(self.scene.views, axis)
+                alone = SeenBar(self._axis_through(axis, lines), lines)
                 if view.camera.name in alone.seen_by:
                     found.append(alone)
-        if not found:
-            raise Refused(
-                f"no {self.scene.rods.bar.label} is seen near the whisker; "
-                "record with the bar in view of every camera",
-                code="no_bar_seen",
-            )
-        if len(found) > 1 and seen_from_one_side(self.scene.cameras, found[1].axis):
-            found = found[1:]
-        first = found[0]
-        clearest = max(found, key=_detection_score)
-        is_clearer = clearest.detection_score > first.detection_score + _CLEARER
-        return clearest if is_clearer else first
+        return found
 
     def axis_of_one_camera(self, view: View) -> BarAxis:
         """Compute the axis by one camera alone.
@@ -259,20 +239,6 @@ class BarSearch:
         first = find_bars_alone(edges, scene.rods, float(np.mean(scene.motor_rad)))[0]
         wire = scene.rods.wire
         return see_bar_alone(first, view, wire, scene.radius_mm, scene.motor_rad, scene.settings)
-
-    def measured_finely(self, bar: SeenBar) -> SeenBar:
-        """Return the bar with its axis through finely measured lines.
-
-        A quick measurement may turn the axis about the line of sight.
-        """
-        scene = self.scene
-        lines = measure_bars(scene.views, bar.axis, scene.radius_mm, scene.wires_px, scene.settings)
-        return replace(bar, axis=self._axis_through(bar.axis, lines))
-
-    def _measured(self, axis: BarAxis) -> SeenBar:
-        """Measure the lines about an axis quickly, and return the axis through them."""
-        lines = self._lines(self.scene.views, axis)
-        return SeenBar(self._axis_through(axis, lines), lines)
 
     def _lines(self, views: Sequence[View], axis: BarAxis) -> dict[str, BarLineEstimate]:
         """Measure the lines about an axis quickly, in some views."""
@@ -321,21 +287,3 @@ def _has_left(camera: Camera, axis: BarAxis, about: Mapping[str, BarAxis]) -> bo
     """
     before = about.get(camera.name)
     return before is None or offset_px(camera, axis, before) > _CONVERGED_PX
-
-
-def _highest_score(bars: Sequence[SeenBar]) -> float:
-    """Return the highest detection score of those bars that have converged, -inf of none."""
-    return max((bar.detection_score for bar in bars if bar.converged), default=-np.inf)
-
-
-def _best_with_alternatives(bars: Sequence[SeenBar]) -> SeenBar:
-    """Return the bar with the highest detection score of those that have converged.
-
-    Those that score nearly as high are its alternatives. Where none has converged it is the one
-    with the highest score, without alternatives.
-    """
-    converged = [bar for bar in bars if bar.converged]
-    ranked = sorted(converged or bars, key=_detection_score, reverse=True)
-    least = ranked[0].detection_score - _CLEARER
-    close = [bar for bar in ranked[1:] if bar.converged and bar.detection_score > least]
-    return replace(ranked[0], alternatives=tuple(close))

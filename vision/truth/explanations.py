@@ -4,7 +4,8 @@ A fit ends near the place from which it began. Where the pictures say that anoth
 better (`vision.truth.last_question`), the whisk is fitted from there as well, and the fit whose
 silhouettes explain more is the truth. Where two fits explain the pictures equally well and their
 distances differ, there is no number. A fit that ended far from its beginning may not have
-converged, and begins again from its end. So a false alarm costs the time of a fit.
+converged, and begins again from its end; one that has not converged at last says so. So a false
+alarm costs the time of a fit.
 """
 
 from dataclasses import dataclass, replace
@@ -90,6 +91,8 @@ def best_explanation(first: Explanation) -> Explanation:
             best = other
             break
         best = other
+    else:
+        best = replace(best, warning=_unconverged(best.question(), best))
     if best.fitted is first.fitted:
         return best
     light = first.whisk.light
@@ -143,14 +146,15 @@ def _converged(fit: Explanation, question: BarQuestion) -> Explanation:
     """Return the fit that begins where this one ended, far from its own beginning.
 
     Its lines are measured in windows about where they are expected, so that they may not have
-    converged. A fit that explains less is not taken.
+    converged. A fit that explains less is not taken; this one has a warning then.
     """
+    unconverged = replace(fit, warning=_unconverged(question, fit))
     try:
         again = fit.from_place(replace(fit.whisk.bar, axis=fit.axis))
     except Refused:
-        return fit
+        return unconverged
     is_worse = _is_better(question, fit.axis, again.axis, _LIKELY_SIGMAS)
-    return fit if is_worse else again
+    return unconverged if is_worse else again
 
 
 def _is_better(question: BarQuestion, place: BarAxis, other: BarAxis, sigmas: float) -> bool:
@@ -170,6 +174,17 @@ def _unexplained(question: BarQuestion, place: BarAxis, drawn: BarAxis) -> Reaso
         "bar_elsewhere",
         f"the bar may be elsewhere: a place up to {away_px:.0f} px away explains more of the "
         "pictures, and no whisk fits there",
+    )
+
+
+def _unconverged(question: BarQuestion, fit: Explanation) -> Reason:
+    """Return the warning that a fit ended far from its beginning; no reason where it did not."""
+    moved_px = question.apart_px(fit.whisk.bar.axis, fit.axis)
+    if moved_px <= _APART_PX:
+        return NO_REASON
+    return Reason(
+        "bar_unconverged",
+        f"the bar's place did not converge: the last fit moved it by {moved_px:.1f} px",
     )
 
 

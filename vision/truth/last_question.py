@@ -142,13 +142,8 @@ class _Band:
     changed: np.ndarray
     drawn: np.ndarray
 
-    @property
-    def ends(self) -> np.ndarray:
-        """Return where (m,) along the line the samples are, from −1 to 1."""
-        return np.linspace(-1.0, 1.0, len(self.changed))
-
     def offsets(self, axes: BarAxis) -> np.ndarray:
-        """Return by how many radii (n, 2) axes (n, 3) pass beside the drawn one at the band's ends."""
+        """Return by how many radii (..., 2) axes (..., 3) pass beside the drawn one at the ends."""
         return self.line.offsets(_projected(self.camera, axes)) - self.drawn
 
     def covered(self, offsets: np.ndarray) -> np.ndarray:
@@ -156,7 +151,7 @@ class _Band:
 
         offsets (n, 2): of the strips' middles at both ends, in radii.
         """
-        share = 0.5 * (1.0 + self.ends)
+        share = np.linspace(0.0, 1.0, len(self.changed))
         middle = offsets[:, :1] * (1.0 - share) + offsets[:, 1:] * share
         return 0.5 * (self._sum_to(middle + 1.0) - self._sum_to(middle - 1.0))
 
@@ -232,13 +227,12 @@ class BarQuestion:
         """Return the axis nearby that covers most of the change in all cameras together."""
         across = axis_frame(self.axis.direction)
         scale = self.radius_mm * np.array([1.0, 1.0, 1.0 / _REACH_MM, 1.0 / _REACH_MM])
-        slopes = [self._by_vector(band, across, scale) for band in self.bands]
+        moved = self.axis.shifted(across, np.diag(scale))
+        slopes = [band.offsets(moved) for band in self.bands]  # (4, 2) each
         shift = _steps(_FARTHEST_RADII, _COARSE_RADII)
         tilt = _steps(_MOST_TILT_RADII, _COARSE_RADII)
         vectors = _grid(shift, shift, tilt, tilt)
-        total = np.zeros(len(vectors))
-        for band, slope in zip(self.bands, slopes):
-            total += band.looked_up(vectors @ slope)
+        total = sum(band.looked_up(vectors @ slope) for band, slope in zip(self.bands, slopes))
         vectors = vectors[np.argsort(-total, kind="stable")[:_KEPT]]
         for step in _FINE_RADII:
             vectors = _around(vectors, step)
@@ -248,15 +242,11 @@ class BarQuestion:
             vectors = vectors[[np.argmax(total)]]
         return self.axis.shifted(across, vectors[0] * scale)
 
-    def _by_vector(self, band: _Band, across: np.ndarray, scale: np.ndarray) -> np.ndarray:
-        """Return the offsets (4, 2) in a band by a radius of each shift and tilt."""
-        return band.offsets(self.axis.shifted(across, np.diag(scale)))
-
     def gain(self, place: BarAxis, other: BarAxis) -> tuple[float, float]:
         """Return how much more of the change a place covers than another one, and its sigma."""
         total = variance = 0.0
         for band in self.bands:
-            offsets = np.concatenate([band.offsets(_one(place)), band.offsets(_one(other))])
+            offsets = np.array([band.offsets(place), band.offsets(other)])
             more = np.subtract(*band.covered(offsets))
             parts = np.array([np.mean(part) for part in np.array_split(more, _SEGMENTS)])
             total += np.mean(parts)
@@ -267,14 +257,9 @@ class BarQuestion:
         """Return how far apart two places are at most in any camera, px."""
         most = 0.0
         for band in self.bands:
-            offsets = band.offsets(_one(place)) - band.offsets(_one(other))
+            offsets = band.offsets(place) - band.offsets(other)
             most = max(most, float(np.max(np.abs(offsets))) * band.line.width_radius_px)
         return most
-
-
-def _one(axis: BarAxis) -> BarAxis:
-    """Return an axis as a batch of one."""
-    return BarAxis(axis.point_mm[None], axis.direction[None])
 
 
 def _steps(farthest: float, step: float) -> np.ndarray:
@@ -337,14 +322,14 @@ def _hide_wire(hidden: np.ndarray, camera: Camera, curve: Curves, rods: Rods) ->
 
 def _change(still: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarray:
     """Return the confidence (m, k) that samples are not as without rods; _UNKNOWN where hidden."""
-    difference = np.where(shows, still - _relit(still, empty, shows), 0.0).astype(np.float32)
     along = (1, _AVERAGED)  # OpenCV's order: across, along
     share = cv2.blur(shows.astype(np.float32), along)
     seen = shows & (share > 0.5)
-    mean = cv2.blur(difference, along) / np.maximum(share, 0.5)
-    level = cv2.blur(np.where(shows, empty, 0.0).astype(np.float32), along) / np.maximum(share, 0.5)
     if not np.any(seen):
         return np.full(still.shape, _UNKNOWN)
+    difference = np.where(shows, still - _relit(still, empty, shows), 0.0).astype(np.float32)
+    mean = cv2.blur(difference, along) / np.maximum(share, 0.5)
+    level = cv2.blur(np.where(shows, empty, 0.0).astype(np.float32), along) / np.maximum(share, 0.5)
     z = np.abs(mean) / _noise(mean, level, seen)
     changed = np.clip((z - _NOISE_SIGMAS) / _SURE_SIGMAS, 0.0, 1.0)
     return np.where(seen, changed, _UNKNOWN)
@@ -360,8 +345,6 @@ def _relit(still: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarra
     design = np.stack([empty, empty * along, empty * across, np.ones_like(empty)], axis=-1)
     rows = design[shows].astype(float)
     grey = still[shows].astype(float)
-    if not len(grey):
-        return empty
     unchanged = np.array([1.0, 0.0, 0.0, 0.0])
     prior = _SAME_LIGHT * len(grey)
     light = unchanged

@@ -244,6 +244,28 @@ def test_a_fit_that_ends_far_from_its_beginning_begins_again(world):
     assert best_explanation(placed(0.0, 60.0, begin_mm=1.0)).fitted.d_x_mm == 60.2
 
 
+@pytest.mark.parametrize("end", ["no fit there", "a fit that explains less", "always elsewhere"])
+def test_a_fit_that_does_not_converge_has_a_warning(world, end):
+    COVERED.update({5.0: 0.5, 4.0: 0.5})
+    if end == "no fit there":
+        OTHERS[0.0] = Refused("nothing there")
+    elif end == "a fit that explains less":
+        OTHERS[0.0] = placed(4.0, 61.0)
+        COVERED[4.0] = 0.3
+    else:
+        OTHERS.update({0.0: placed(4.0, 61.0, 0.0), 4.0: placed(0.0, 60.0, 4.0)})
+    best = best_explanation(placed(0.0, 60.0, begin_mm=1.0))
+    assert best.warning.codes == ("bar_unconverged",)
+
+
+def test_the_last_fit_may_converge(world):
+    COVERED.update(dict.fromkeys([0.0, 1.0, 2.0, 2.1, 5.0], 0.5))
+    OTHERS.update({0.0: placed(1.0, 61.0, 0.0), 1.0: placed(2.0, 62.0, 1.0)})
+    OTHERS[2.0] = placed(2.1, 62.1, 2.0)
+    best = best_explanation(placed(0.0, 60.0, begin_mm=-1.0))
+    assert best.fitted.d_x_mm == 62.1 and best.warning == NO_REASON
+
+
 def test_a_bar_that_moves_is_not_asked_about(world):
     first = placed(0.0, 60.0)
     moving = replace(first, whisk=replace(first.whisk, motion=object()))
