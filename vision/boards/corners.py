@@ -80,8 +80,12 @@ def refine_corners(
     """
     ids = np.asarray(ids, dtype=int)
     px_guess = np.asarray(px_guess, dtype=float).reshape(-1, 2)
-    saddles = _fit_corners(grey, px_guess, ids, board)
-    if saddles is None or not saddles.converged.any():
+    cut = cut_corners(grey, px_guess, ids, board)
+    if cut is None:
+        return Corners.none()
+    windows, frames = cut
+    saddles = fit_saddles(windows, frames, px_guess)
+    if not saddles.converged.any():
         return Corners.none()
     good = saddles.converged & _resemble_others(saddles, ids, board)
     return Corners(ids[good], saddles.px[good], saddles.sigma_px[good])
@@ -120,31 +124,18 @@ def to_8_bit(grey: np.ndarray) -> np.ndarray:
     return np.clip(grey * (255.0 / max(brightest, 1.0)), 0, 255).astype(np.uint8)
 
 
-def _fit_corners(
-    grey: np.ndarray, px_guess: np.ndarray, ids: np.ndarray, board: Board
-) -> Saddles | None:
-    """Fit a saddle at each guess (n, 2) px; None where the guesses fix no plane."""
-    frames = _local_frames(px_guess, ids, board)
-    if frames is None:
-        return None
-    return fit_saddles(grey, px_guess, frames, _border_squares(board))
-
-
 def cut_corners(
     grey: np.ndarray, px: np.ndarray, ids: np.ndarray, board: Board
 ) -> tuple[Windows, np.ndarray] | None:
-    """Return the pixels about known corners (n, 2), and one square in the picture at each, (n, 2,
-    2) px. None where the corners fix no plane.
+    """Return the pixels about corners at guesses (n, 2) px, and one square in the picture at each,
+    (n, 2, 2) px. None where the guesses fix no plane.
     """
     frames = _local_frames(px, ids, board)
     if frames is None:
         return None
-    return cut_windows(grey, px, frames, _border_squares(board)), frames
-
-
-def _border_squares(board: Board) -> float:
-    """Return the white rim between a marker and its square's edge, in squares."""
-    return 0.5 * (1.0 - board.marker_mm / board.square_mm)
+    # The white rim between a marker and its square's edge, in squares.
+    border = 0.5 * (1.0 - board.marker_mm / board.square_mm)
+    return cut_windows(grey, px, frames, border), frames
 
 
 def _local_frames(px: np.ndarray, ids: np.ndarray, board: Board) -> np.ndarray | None:

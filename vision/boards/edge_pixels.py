@@ -51,7 +51,12 @@ class Windows(Rows):
 def cut_windows(
     grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float
 ) -> Windows:
-    """Return the pixels that show the two edges of each corner; arguments as of `fit_saddles`."""
+    """Return the pixels that show the two edges of each corner.
+
+    grey (height, width). px_guess (n, 2). frames (n, 2, 2): px, in its columns one square along
+    board x and y in the picture at the corner. border: clear rim between a square's edge and its
+    marker, in squares.
+    """
     grid = _disc(_reach_px(frames))
     anchor = np.round(px_guess).astype(int)
     place = anchor[:, :, None] + grid  # (n, 2, cells) px

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.ndimage import convolve1d
 from scipy.special import erf
 
-from vision.boards.edge_pixels import Windows, cut_windows
+from vision.boards.edge_pixels import Windows
 
 # [px] A fit that runs farther than this from OpenCV's corner found another. moves nothing on the
 # fixtures between 2 and 8. Study: thresholds.py boards.saddle _MAX_SHIFT_PX ….
@@ -86,16 +86,8 @@ class Saddles:
     converged: np.ndarray
 
 
-def fit_saddles(
-    grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float
-) -> Saddles:
-    """Fit the corner nearest each guess.
-
-    grey (height, width). px_guess (n, 2). frames (n, 2, 2): px, in its columns one square along
-    board x and y in the picture at the corner. border: clear rim between a square's edge and its
-    marker, in squares.
-    """
-    windows = cut_windows(grey, px_guess, frames, border)
+def fit_saddles(windows: Windows, frames: np.ndarray, px_guess: np.ndarray) -> Saddles:
+    """Fit the corner nearest each guess (n, 2) px; windows and frames are as of `cut_windows`."""
     start = start_parameters(windows, px_guess, frames)
     parameters, converged = fit_windows(windows, start, predict_saddles)
     saddles = _report(windows, parameters, converged)

@@ -74,14 +74,12 @@ _MOST_HIDDEN = 0.5
 _FARTHEST_RADII = 4.0
 # [radii] Largest displacement by a tilt where the band ends: 8 deg of a bar of 6 mm. Stated.
 _MOST_TILT_RADII = 1.5
-# [radii] First step of the search in space. Derived.
+# [radii] First step of the search in space, and of the ends of strips in a camera. Derived.
 _COARSE_RADII = 0.5
-# [radii] Step of a camera's map of shifts and tilts. Derived.
-_MAP_STEP_RADII = 0.25
 # [radii] Next steps, about the best places and then the best one. Derived.
 _FINE_RADII = (0.25, 0.12, 0.06, 0.03)
 # [places] Of the first step that go on. Study: last_question.py.
-_KEPT = 4
+_KEPT = 8
 
 
 @dataclass(frozen=True)
@@ -170,26 +168,12 @@ class _Band:
         below = self._sums[rows, lower]
         return below + (position - lower) * (self._sums[rows, lower + 1] - below)
 
-    @cached_property
-    def cover_map(self) -> np.ndarray:
-        """Return the mean share covered by strips, (shifts, tilts), in steps of _MAP_STEP_RADII."""
-        shifts, tilts = _map_axes()
-        shift, tilt = np.meshgrid(shifts, tilts, indexing="ij")
-        ends = np.stack([shift - tilt, shift + tilt], axis=-1).reshape(-1, 2)
-        return np.mean(self.covered(ends), axis=1).reshape(shift.shape)
-
-    def looked_up(self, offsets: np.ndarray) -> np.ndarray:
-        """Return the mean share (n,) covered by strips, by interpolation in the map."""
-        shifts, tilts = _map_axes()
-        shift = (0.5 * (offsets[:, 0] + offsets[:, 1]) - shifts[0]) / _MAP_STEP_RADII
-        tilt = (0.5 * (offsets[:, 1] - offsets[:, 0]) - tilts[0]) / _MAP_STEP_RADII
-        return map_coordinates(self.cover_map, [shift, tilt], order=1, mode="nearest")
-
-
-def _map_axes() -> tuple[np.ndarray, np.ndarray]:
-    """Return the shifts and the displacements at the end by tilts of a camera's map, in radii."""
-    most = (_FARTHEST_RADII, 2.0 * _MOST_TILT_RADII)
-    return tuple(np.arange(-far, far + _MAP_STEP_RADII, _MAP_STEP_RADII) for far in most)
+    def coarsely_covered(self, offsets: np.ndarray) -> np.ndarray:
+        """Return the mean share (n,) covered by strips, interpolated between steps of their ends."""
+        ends = _steps(_FARTHEST_RADII + _MOST_TILT_RADII, _COARSE_RADII)
+        share = np.mean(self.covered(_grid(ends, ends)), axis=1).reshape(len(ends), -1)
+        position = (offsets - ends[0]).T / _COARSE_RADII
+        return map_coordinates(share, position, order=1, mode="nearest")
 
 
 def _projected(camera: Camera, axes: BarAxis) -> np.ndarray:
@@ -232,7 +216,9 @@ class BarQuestion:
         shift = _steps(_FARTHEST_RADII, _COARSE_RADII)
         tilt = _steps(_MOST_TILT_RADII, _COARSE_RADII)
         vectors = _grid(shift, shift, tilt, tilt)
-        total = sum(band.looked_up(vectors @ slope) for band, slope in zip(self.bands, slopes))
+        total = sum(
+            band.coarsely_covered(vectors @ slope) for band, slope in zip(self.bands, slopes)
+        )
         vectors = vectors[np.argsort(-total, kind="stable")[:_KEPT]]
         for step in _FINE_RADII:
             vectors = _around(vectors, step)

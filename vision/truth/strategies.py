@@ -45,8 +45,7 @@ _FEWEST_NEAR = 4
 # [1] The first of so many parts of a stroke, two frames at least, is taken as free before
 # anything is known. Set by eye. Study: thresholds.py truth.strategies _EARLY_PARTS ….
 _EARLY_PARTS = 7.0
-# [rad] Two sights nearer to each other determine no place along them, as planes through a bar do
-# (`_NARROW_RAD`). Stated.
+# [rad] Two sights nearer to each other determine no place along them. Stated.
 _LEAST_SIGHTS_RAD = np.radians(8.0)
 NEVER_TOUCHES = "the whisker never touches"
 STARTS_TOUCHING = "touches from the start: fewer than two frames of free stroke"
