@@ -9,17 +9,18 @@ complement). The shading is linear, so that at each step it is the most probable
 positions and this blur (variable projection: Golub and Pereyra 1973, in Kaufman's form).
 
 Two things can go wrong with what all share. A shift of all segments to one side, under another blur
-and shading, can be a minimum of its own, or as good as the best: several starts are followed, and
-the sigma of such a shift holds all that are probable (`common_shift.py`). And no model of light is
-right to a hundredth of the contrast, in all segments alike: what is shared is found with the
-weights of pixels bounded by that error.
+and shading, can be a minimum of its own, or as good as the best: several starts are followed, the
+descent is begun again where the probable shifts lie elsewhere, and the sigma of such a shift holds
+all that are probable (`common_shift.py`). And no model of light is right to a hundredth of the
+contrast, in all segments alike: what is shared is found with the weights of pixels bounded by that
+error.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.wire.common_shift import common_spread_px
+from vision.wire.common_shift import CommonShift, common_shift
 from vision.wire.descent import Point, Shared, descend
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import LEAST_POWER, Equations, PositionEquations
@@ -59,15 +60,44 @@ def solve_jointly(task: ShadedSegments, *, last: bool = True) -> Solved:
 
 
 def _with_all_shifts(task: ShadedSegments, shared: Shared) -> Shared:
-    """Return the solution with a sigma for its common shift that holds all probable shifts."""
+    """Return the solution with a sigma for its common shift that holds all probable shifts.
+
+    Where these lie elsewhere, the descent has ended in the wrong minimum: it is begun again from
+    their mean, and its end is taken where that lies nearer to what is probable about it.
+    """
+    here = _weighted_point(task, shared)
+    shift = _common_shift(task, here)
+    if shift.is_elsewhere:
+        other = _descend_from(task, shared, shift)
+        there = _weighted_point(task, other)
+        about_other = _common_shift(task, there)
+        if about_other.rms_px < shift.rms_px:
+            shared = other
+            here = there
+            shift = about_other
+    bent = shared.shared_px - np.average(shared.shared_px, axis=0, weights=here.robust)
+    common = np.full((len(bent), 1), shift.rms_px)
+    return replace(shared, shared_px=np.concatenate([bent, common], axis=1))
+
+
+def _weighted_point(task: ShadedSegments, shared: Shared) -> Point:
+    """Return the point at a solution, segments weighed by their misfit."""
     every = np.ones(len(task.pieces))
-    here = Point.at(task, shared.shift_px, np.log(shared.blur_px), every).weighted()
+    return Point.at(task, shared.shift_px, np.log(shared.blur_px), every).weighted()
+
+
+def _descend_from(task: ShadedSegments, shared: Shared, shift: CommonShift) -> Shared:
+    """Return where the descent ends from a solution moved by the mean of a common shift."""
+    moved_px = shared.shift_px + shift.mean_px
+    log_blur = np.log(shared.blur_px) + shift.log_blur
+    return descend(Point.at(task, moved_px, log_blur, np.ones(len(moved_px))).weighted())
+
+
+def _common_shift(task: ShadedSegments, here: Point) -> CommonShift:
+    """Return the posterior of a common shift, by _SPREAD_SEGMENTS of the segments."""
     some = slice(None, None, 1 + len(task.pieces) // _SPREAD_SEGMENTS)
     moved = replace(task, pieces=here.equations.pieces).of(some)
-    spread_px = common_spread_px(moved, here.robust[some], shared.blur_px)
-    bent = shared.shared_px - np.average(shared.shared_px, axis=0, weights=here.robust)
-    common = np.full((len(bent), 1), spread_px)
-    return replace(shared, shared_px=np.concatenate([bent, common], axis=1))
+    return common_shift(moved, here.robust[some], float(np.exp(here.log_blur)))
 
 
 def settle(task: ShadedSegments, shared: Shared) -> Solved:
