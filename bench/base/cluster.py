@@ -37,9 +37,9 @@ class Cluster(Workers):
     raises BadInput where Dask is not installed or no scheduler answers.
     """
 
-    def __init__(self, address: str, out: Path, progress: bool = False):
+    def __init__(self, address: str, out: Path):
         """Keep the address; the scheduler is not called yet."""
-        super().__init__(0, progress)
+        super().__init__(0)
         self.address = address
         self.out = out
 

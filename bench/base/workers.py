@@ -16,9 +16,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 
-from tqdm import tqdm
-
 from bench.base.errors import BadInput
+from bench.base.progress import count_parts
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _PICTURES = "OPENCV_FOR_THREADS_NUM"  # OpenCV's own number, as it is loaded
@@ -34,10 +33,9 @@ KILLED = (
 class Workers:
     """`count` processes; use as a context. Leaving it by an exception (Ctrl-C too) ends them at once."""
 
-    def __init__(self, count: int, progress: bool = False):
+    def __init__(self, count: int):
         """Start no process yet."""
         self.count = count
-        self.progress = progress
         # one process each: a death is the death of one task
         self._processes: list[ProcessPoolExecutor] = []
 
@@ -53,15 +51,14 @@ class Workers:
             _end_children()
 
     def run(self, job: Callable, tasks: Sequence, name: str, lost: Callable | None = None) -> list:
-        """Return job(task) of every task, in their order, with a bar where progress is wanted.
+        """Return job(task) of every task, in their order; log the progress.
 
         A task whose process dies is given to another, MOST_DEATHS times in all; then lost(task) stands
         for its result. Raises BadInput where there is no `lost`.
         """
         results = [None] * len(tasks)
-        hidden = not self.progress
         finished = self._finished(job, tasks)
-        for place, result in tqdm(finished, name, len(tasks), leave=False, disable=hidden):
+        for place, result in count_parts(finished, name, len(tasks)):
             if result is DIED and lost is None:
                 raise BadInput(KILLED)
             results[place] = lost(tasks[place]) if result is DIED else result

@@ -3,13 +3,13 @@
 import argparse
 from pathlib import Path
 
+from bench.base.progress import begin_step
 from bench.commands.options import (
     Verbs,
     add_out,
     add_recorded,
     add_verb,
     add_workers,
-    shows_progress,
 )
 
 
@@ -61,6 +61,7 @@ def _add_gauges(what: Verbs) -> None:
 
 def _run_cameras(options: argparse.Namespace) -> int:
     """Calibrate the cameras; return the exit code."""
+    begin_step(f"reading {options.session}, calibrating its cameras")
     from bench.cameras.calibrate_session import calibrate_cameras_command
 
     return calibrate_cameras_command(
@@ -70,6 +71,7 @@ def _run_cameras(options: argparse.Namespace) -> int:
 
 def _run_gauges(options: argparse.Namespace) -> int:
     """Calibrate the gauges; return the exit code."""
+    begin_step(f"reading {options.session}")
     from bench.workflows.gauge_calibration import calibrate_gauges_command
 
     return calibrate_gauges_command(
@@ -77,6 +79,5 @@ def _run_gauges(options: argparse.Namespace) -> int:
         options.out,
         every_trial=options.all,
         workers=options.workers,
-        progress=shows_progress(),
         follow_links=options.follow_links,
     )

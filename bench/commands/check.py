@@ -2,7 +2,8 @@
 
 import argparse
 
-from bench.commands.options import Verbs, add_recorded, add_verb, shows_progress
+from bench.base.progress import begin_step
+from bench.commands.options import Verbs, add_recorded, add_verb
 
 
 def add(verbs: Verbs) -> None:
@@ -19,6 +20,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Check the session; return the exit code."""
+    begin_step(f"reading {options.session}")
     from bench.workflows.preflight import check
 
-    return check(options.session, progress=shows_progress(), follow_links=options.follow_links)
+    return check(options.session, follow_links=options.follow_links)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from bench.base.errors import BadInput
+from bench.base.progress import show_progress
 from bench.commands.options import BAD_INPUT, DONE, FAULT_OF_OURS, INTERRUPTED
 from vision.geometry import Refused
 
@@ -42,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = make_parser().parse_args(arguments)
     level = logging.INFO if options.verbose else logging.WARNING
     logging.basicConfig(level=level, format="%(message)s")
+    show_progress()
     signal.signal(signal.SIGTERM, _interrupt)
     try:
         return _run(options)

@@ -3,6 +3,7 @@
 import argparse
 
 from bench.base.errors import BadInput
+from bench.base.progress import begin_step
 from bench.commands.options import DONE, Verbs, add_out, add_verb
 
 Range = tuple[float, float]
@@ -82,6 +83,7 @@ def run(options: argparse.Namespace) -> int:
         value = getattr(options, name)
         if not 0 < value < float("inf"):
             raise BadInput(f"{_option(name)} {value:g}: must be positive and finite")
+    begin_step("the best design over the region")
     from bench.theory.best_design import Equipment, Region
     from bench.theory.design_map import find_design, report_lines, write_design
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bench.base.errors import BadInput
+from bench.base.progress import begin_step
 from bench.commands.options import (
     Verbs,
     add_alpha_est,
@@ -17,7 +18,6 @@ from bench.commands.options import (
     add_trials,
     add_verb,
     add_workers,
-    shows_progress,
 )
 
 if TYPE_CHECKING:
@@ -150,6 +150,7 @@ def run(options: argparse.Namespace) -> int:
     """
     from bench.base.workers import single_thread
 
+    begin_step(f"reading {options.session}")
     single_thread()  # before NumPy is imported
     from bench.report.nwb import check_nwb, write_nwb
     from bench.workflows.live_evaluation import watch
@@ -172,7 +173,6 @@ def run(options: argparse.Namespace) -> int:
         settings,
         workers=options.workers,
         dask=options.dask,
-        progress=shows_progress(),
         figure_formats=options.figure_format,
         announce=partial(print, flush=True),
     )

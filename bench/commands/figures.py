@@ -4,7 +4,7 @@ error of (10)."""
 import argparse
 from pathlib import Path
 
-from bench.commands.options import DONE, Run, Verbs, add_out, add_verb, add_workers, shows_progress
+from bench.commands.options import DONE, Run, Verbs, add_out, add_verb, add_workers
 
 _MAPS = {
     "tilt": "map of the error of (10) over slope and tilt of the bar, by exact mechanics, as PNG, SVG and CSV",
@@ -72,6 +72,6 @@ def _run_map(options: argparse.Namespace) -> int:
     """Write a map of the error of (10), print the paths; return the exit code."""
     from bench.theory.model_error_maps import write_map
 
-    paths = write_map(options.name, options.out, workers=options.workers, progress=shows_progress())
+    paths = write_map(options.name, options.out, workers=options.workers)
     print(*paths, sep="\n")
     return DONE

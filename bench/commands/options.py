@@ -1,7 +1,6 @@
 """What the verbs share: how each is added, exit codes, and options that several of them have."""
 
 import argparse
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
@@ -40,11 +39,6 @@ def add_verb(
     verb.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
     verb.set_defaults(run=run, needs_sound_environment=needs_sound_environment)
     return verb
-
-
-def shows_progress() -> bool:
-    """Return whether somebody watches a progress bar: the error stream is a terminal."""
-    return sys.stderr.isatty()
 
 
 def add_session(verb: argparse.ArgumentParser) -> None:

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from bench.base.errors import BadInput
+from bench.base.progress import begin_step
 from bench.commands.options import (
     DONE,
     WITH_WARNINGS,
@@ -11,7 +12,6 @@ from bench.commands.options import (
     add_follow_links,
     add_verb,
     add_workers,
-    shows_progress,
 )
 
 
@@ -54,6 +54,8 @@ def run(options: argparse.Namespace) -> int:
 
     Raise BadInput where RIG.toml, SESSION or --out is missing.
     """
+    if not options.example:
+        begin_step(f"reading {options.what}")
     from bench.base.workers import single_thread
 
     single_thread()  # before NumPy is imported
@@ -69,6 +71,5 @@ def run(options: argparse.Namespace) -> int:
         options.out,
         Options(options.theta_deg, options.changes, options.follow_links),
         workers=options.workers,
-        progress=shows_progress(),
     )
     return WITH_WARNINGS if made.lacks_truth else DONE

@@ -2,6 +2,7 @@
 
 import argparse
 
+from bench.base.progress import begin_step
 from bench.commands.options import (
     DONE,
     Verbs,
@@ -11,7 +12,6 @@ from bench.commands.options import (
     add_trials,
     add_verb,
     add_workers,
-    shows_progress,
 )
 
 
@@ -39,6 +39,7 @@ def run(options: argparse.Namespace) -> int:
     """Write table and figure, print the front; return the exit code."""
     from bench.base.workers import single_thread
 
+    begin_step(f"reading {options.session}")
     single_thread()  # before NumPy is imported
     from bench.base.settings import Settings
     from bench.workflows.robot_points import trade_lines
@@ -54,7 +55,6 @@ def run(options: argparse.Namespace) -> int:
         options.out,
         settings,
         workers=options.workers,
-        progress=shows_progress(),
     )
     print(*trade_lines(points), sep="\n")
     return DONE

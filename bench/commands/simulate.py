@@ -9,7 +9,6 @@ from bench.commands.options import (
     add_session,
     add_verb,
     add_workers,
-    shows_progress,
 )
 
 
@@ -51,7 +50,6 @@ def run(options: argparse.Namespace) -> int:
         signals_only=options.signals_only,
         seed=options.seed,
         workers=options.workers,
-        progress=shows_progress(),
         announce=partial(print, flush=True),
     )
     return DONE

@@ -2,6 +2,7 @@
 
 import argparse
 
+from bench.base.progress import begin_step
 from bench.commands.options import (
     DONE,
     Verbs,
@@ -9,8 +10,8 @@ from bench.commands.options import (
     add_recorded,
     add_trials,
     add_verb,
+    add_workers,
     parse_count,
-    shows_progress,
 )
 
 
@@ -33,12 +34,14 @@ def add(verbs: Verbs) -> None:
         metavar="N",
         help="how often each is timed (default 2)",
     )
+    add_workers(verb)
 
 
 def run(options: argparse.Namespace) -> int:
     """Time all settings and print the table; return the exit code."""
     from bench.base.workers import single_thread
 
+    begin_step(f"reading {options.session}")
     single_thread()  # before NumPy is imported
     from bench.base.settings import Settings
     from bench.workflows.seeing_trade import tradeoff, tradeoff_lines
@@ -49,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
         options.out,
         settings,
         repeats=options.repeats,
-        progress=shows_progress(),
+        workers=options.workers,
     )
     print(*tradeoff_lines(rows), sep="\n")
     return DONE

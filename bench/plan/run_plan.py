@@ -11,6 +11,7 @@ import numpy as np
 from bench.base.atomic import lock_output, whole_file
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.base.progress import begin_step, count_parts
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.plan.camera_places import place_cameras
@@ -69,7 +70,6 @@ def plan(
     options: Options,
     *,
     workers: int = 1,
-    progress: bool = False,
     announce: Callable[[str], object] = print,
 ) -> Plan:
     """Write the plan of a RIG.toml or a SESSION into the folder `out`, and return it.
@@ -77,7 +77,7 @@ def plan(
     announce: is given the text. Raises BadInput.
     """
     make = plan_session if what.is_dir() else plan_rig
-    with Workers(workers, progress) as pool:
+    with Workers(workers) as pool:
         made = make(what, out, options, pool)
     announce(write_plan(out, made).rstrip())
     return made
@@ -100,6 +100,7 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
     except (Refused, ValueError, cv2.error) as problem:
         raise _on_one_line(problem, path) from None
     rows = pool.run(plan_run, _rig_tasks(rig, options), "trials")
+    begin_step("drawing")
     with lock_output(out):
         _draw_rig(out, rig.painter, rig.cameras, staged)
     return Plan(
@@ -132,6 +133,7 @@ def _place_rig(protocol: Protocol, whisks: Sequence[StagedWhisk]) -> _PlacedRig:
     Raises BadInput, Refused, ValueError or cv2.error where that cannot be.
     """
     target_mm = _mean_contact_mm(whisks)
+    begin_step("places of cameras, pictures of the board")
     placed = place_cameras(protocol, whisks, target_mm)
     painter = painter_of(placed)
     work = _board_work(painter)
@@ -142,6 +144,7 @@ def _rig_tasks(rig: _PlacedRig, options: Options) -> list[RigTask]:
     """Return a task for each trial of a rig."""
     changes: Sequence[Change] = ()
     if options.changes:
+        begin_step("changes to try")
         changes = list_changes(rig.cameras, rig.work, rig.target_mm, light=True)
     theta_rad = float(np.radians(options.theta_deg))
     runs = rig.protocol.runs()
@@ -180,7 +183,8 @@ def _on_one_line(problem: Exception, path: Path) -> BadInput:
 def _stage_runs(protocol: Protocol) -> dict[str, StagedWhisk]:
     """Return by trial the whisks that can be staged."""
     staged = {}
-    for run in protocol.runs():
+    runs = protocol.runs()
+    for run in count_parts(runs, "whisks staged", len(runs)):
         try:
             staged[run.name] = stage_run(protocol, run)
         except ArithmeticError:

@@ -27,7 +27,6 @@ def simulate(
     signals_only: bool = False,
     seed: int = 0,
     workers: int = 0,
-    progress: bool = False,
     announce: Callable[[str], object] | None = None,
 ) -> Path:
     """Write the session folder that a protocol describes; go on where an interrupted one stopped.
@@ -46,7 +45,7 @@ def simulate(
     left = [part for part in job.parts() if not part.folder.exists()]
     if announce is not None:
         announce(forecast(job, workers))
-    with Workers(workers, progress) as pool:
+    with Workers(workers) as pool:
         pool.run(partial(make_part, job), left, "parts")
     return job.session
 

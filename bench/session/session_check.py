@@ -1,7 +1,7 @@
 """Checks of a session before any of it is evaluated: `check` lists all, `evaluate` stops."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems, refused_as_bad_input
+from bench.base.progress import count_parts
 from bench.base.results import hash_of_files
 from bench.base.statuses import reason
 from bench.session.array_view import load_views
@@ -66,7 +67,8 @@ def checked_views(
 def _check(views: Sequence[Session], problems: InputProblems) -> None:
     """Check every recording of each whisker; pictures and files are the same for all."""
     for view in views:
-        for trial in view.trials:
+        trials = view.trials
+        for trial in count_parts(trials, "recordings read", len(trials)):
             check_recording(trial, problems)
     check_sizes(views[0], problems)
     for line in _copies(views[0]):
@@ -213,15 +215,10 @@ def _px(size: Size) -> str:
     return f"{size[0]} x {size[1]} px"
 
 
-def find_damage(
-    session: Session, problems: InputProblems, each: Callable[[Iterable], Iterable] = iter
-) -> None:
-    """Decode every picture of every trial and note those that cannot be read.
-
-    each: may show progress over an iterable.
-    """
+def find_damage(session: Session, problems: InputProblems) -> None:
+    """Decode every picture of every trial and note those that cannot be read."""
     sources = [source for trial in session.trials for source in trial.camera_sources.values()]
-    for source in each(sources):
+    for source in count_parts(sources, "pictures of trials", len(sources)):
         found = _damage(source)
         if found:
             label = source.relative_to(session.path).as_posix()

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.base.errors import BadInput
+from bench.base.progress import count_parts
 from bench.theory.sample_noise import StrokeNoise, stroke_noise
 from estimator import distance, first_order, slip, uncertainty
 from estimator.beam import flexural_rigidity
@@ -288,10 +289,8 @@ def costs_of_paper_values(
     It is infinite where there is no such design.
     """
     costs = {}
-    for name in NAMES:
-        low, high = ranges[name]
-        if low == high:
-            continue
+    free = [name for name in NAMES if ranges[name][0] < ranges[name][1]]
+    for name in count_parts(free, "searches with one value of the paper's", len(free)):
         value = getattr(Design(), name)
         try:
             _, costs[name] = best_design(ranges | {name: (value, value)}, region, equipment, seed)

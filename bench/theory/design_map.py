@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from bench.base.atomic import lock_output, write_whole
 from bench.base.drawing import publish, style
+from bench.base.progress import count_parts
 from bench.base.tables import Column, Table
 from bench.rig.elastic_rod import Rod
 from bench.theory.best_design import (
@@ -87,7 +88,9 @@ def find_design(
     """
     design, worst = best_design(ranges, region, equipment, seed)
     corners = region.corners().T
-    exact = [exact_percent(design, region, equipment, corner) for corner in corners]
+    exact = []
+    for corner in count_parts(corners, "corners by exact mechanics", len(corners)):
+        exact.append(exact_percent(design, region, equipment, corner))
     costs = costs_of_paper_values(ranges, region, equipment, seed)
     paper = Design()
     is_paper_sound = not faults(paper, region, equipment)

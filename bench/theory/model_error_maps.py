@@ -51,13 +51,13 @@ MAPS = {
 }
 
 
-def write_map(name: str, out: Path, *, workers: int = 1, progress: bool = False) -> list[Path]:
+def write_map(name: str, out: Path, *, workers: int = 1) -> list[Path]:
     """Compute a map and write error_by_<name>.png, .svg and .csv, each whole; return their paths.
 
     Raises KeyError for a name that no map has.
     """
     chosen = MAPS[name]
-    with Workers(workers, progress) as pool:
+    with Workers(workers) as pool:
         panels = chosen.compute(pool)
     stem = Path(out) / f"error_by_{name}"
     with style():

@@ -13,6 +13,7 @@ import numpy as np
 from bench.base.digests import Digests
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.base.progress import begin_step
 from bench.base.results import hash_of_files
 from bench.base.settings import Settings
 from bench.base.workers import Workers
@@ -100,7 +101,10 @@ def first_units(
 
     calibration: made from the session where it is None. Raises BadInput.
     """
-    calibration = calibration or calibrate_session(session, out)
+    if calibration is None:
+        begin_step("cameras from pictures of the board")
+        calibration = calibrate_session(session, out)
+    begin_step("what has changed since an earlier run")
     digests = Digests(out)
     units = []
     for trial in trials:

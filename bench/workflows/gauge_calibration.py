@@ -28,7 +28,6 @@ def calibrate_gauges_command(
     *,
     every_trial: bool = False,
     workers: int = 1,
-    progress: bool = False,
     follow_links: bool = False,
 ) -> int:
     """Calibrate the gauges, write `out` (TOML) and its certificate beside it as PDF, and print it.
@@ -39,7 +38,7 @@ def calibrate_gauges_command(
     problems = InputProblems()
     loaded = checked_session(session, problems, follow_links=follow_links)
     trials = trials_to_use(loaded, every_trial)
-    certificate = calibrate_gauges(loaded, trials, problems, workers=workers, progress=progress)
+    certificate = calibrate_gauges(loaded, trials, problems, workers=workers)
     header = certificate.lines()
     zeros = zeros_of(certificate.strokes)
     write_gauges(out, certificate.gauges, zeros, certificate.stiffness, header)
@@ -82,7 +81,6 @@ def calibrate_gauges(
     problems: InputProblems,
     *,
     workers: int = 1,
-    progress: bool = False,
 ) -> Certificate:
     """Fit the coefficients to what cameras and gauges show of these trials; return their
     certificate.
@@ -91,7 +89,7 @@ def calibrate_gauges(
     """
     names = {trial.name for trial in trials}
     recorded = trials_with_whisks(session)
-    with TemporaryDirectory() as folder, Workers(workers, progress) as pool:
+    with TemporaryDirectory() as folder, Workers(workers) as pool:
         _, units = placed_units(session, recorded, Path(folder), Settings(), pool, problems)
         drift_rate, _ = session_drift(units, pool)
         chosen = [unit for unit in units if unit.trial.name in names]

@@ -4,14 +4,13 @@ Files are read whole; of pictures a few are evaluated: two of each board series,
 """
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.base.progress import begin_step, count_parts
 from bench.base.settings import Settings
 from bench.base.threads import in_threads
 from bench.gauges.felt import FeltStroke, strokes_of
@@ -47,17 +46,16 @@ _LARGEST_BLUR_PX = 1.5
 _LARGEST_SATURATED_SHARE = 0.1
 
 
-def check(path: Path, progress: bool, *, follow_links: bool = False) -> int:
+def check(path: Path, *, follow_links: bool = False) -> int:
     """Print refusals and warnings of a session.
 
     Return the exit code: 2 where there is a refusal, 1 where there is a warning, else 0.
     """
     problems = InputProblems(stop_at_first=False)
-    bar = partial(tqdm, desc="pictures", disable=not progress, leave=False)
     with problems.guard():
         views = checked_views(path, problems, follow_links=follow_links)
         session = views[0]
-        find_damage(session, problems, each=bar)
+        find_damage(session, problems)
         for view in views:
             check_contents(view, problems)
     for line in dict.fromkeys(problems.refusals):
@@ -100,6 +98,7 @@ def check_contents(session: Session, problems: InputProblems) -> None:
 def _check_boards(session: Session, board: Board, problems: InputProblems) -> None:
     """Check each camera's pictures of the board, and of the board on the rig. Raise BadInput."""
     for name, source in session.board_sources.items():
+        begin_step(f"board of camera {name}")
         _check_board_views(source, name, board)
         picture = session.rig_pictures.get(name)
         if picture is not None:
@@ -114,7 +113,8 @@ def _check_trials(
     rig: pictures of the rig, by camera.
     """
     pushes_V: list[np.ndarray] = []
-    for trial in session.trials:
+    trials = session.trials
+    for trial in count_parts(trials, "strokes, exposure and scene of trials", len(trials)):
         if trial.purpose == "weight":
             continue
         with problems.guard():

@@ -44,7 +44,7 @@ _USUAL_PUSH_DEG = 3.0
 
 
 def robot_trade(
-    session_path: Path, out: Path, settings: Settings, *, workers: int = 1, progress: bool = False
+    session_path: Path, out: Path, settings: Settings, *, workers: int = 1
 ) -> list[Point]:
     """Write table and figure into `out`, and return the points.
 
@@ -52,7 +52,7 @@ def robot_trade(
     BadInput, also where no whisk has both a truth and moments.
     """
     check_outside(out, session_path)
-    answers = _answers_of_session(session_path, out, settings, workers, progress)
+    answers = _answers_of_session(session_path, out, settings, workers)
     if not answers:
         raise BadInput(
             "no whisk has both a sound truth and moments; evaluate says why", file=session_path
@@ -69,14 +69,14 @@ def robot_trade(
 
 
 def _answers_of_session(
-    session_path: Path, out: Path, settings: Settings, workers: int, progress: bool
+    session_path: Path, out: Path, settings: Settings, workers: int
 ) -> list[Answer]:
     """Evaluate the session into `out`; return all answers about its whisks. Raise BadInput."""
     problems = InputProblems()
     session = checked_session(session_path, problems, follow_links=settings.follow_links)
     recorded = trials_with_whisks(session)
     require_some(recorded, settings)
-    with lock_output(out), Workers(workers, progress) as pool:
+    with lock_output(out), Workers(workers) as pool:
         _, units = placed_units(session, recorded, out, settings, pool, problems)
         *_, units = with_gauges(units, pool, problems)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]

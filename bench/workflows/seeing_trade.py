@@ -8,17 +8,18 @@ simulated, else against the preset `fine`.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter
-from tqdm import tqdm
 
 from bench.base.atomic import lock_output, write_whole
 from bench.base.drawing import publish, style
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.base.progress import begin_step
 from bench.base.settings import Seeing, Settings
 from bench.base.tables import Column, Kind, Table
 from bench.base.workers import Workers
@@ -133,13 +134,14 @@ def tradeoff(
     settings: Settings,
     *,
     repeats: int = 2,
-    progress: bool = False,
+    workers: int = 1,
 ) -> list[dict]:
     """Time each setting on a session's trials; return the rows of TRADEOFF.
 
     Written into `out`: tradeoff.csv, tradeoff.png and .svg, and a settings file for each setting on
     the front. settings: of which the trials and follow_links hold. repeats: how often each is
-    timed. Raise BadInput.
+    timed. workers: so many settings are timed at once, each by a process of one thread; they share
+    the machine's memory, so times are longest with many. Raise BadInput.
     """
     check_outside(out, path)
     problems = InputProblems()
@@ -147,14 +149,13 @@ def tradeoff(
     recorded = trials_with_whisks(session)
     wanted = _trials_to_time(recorded, settings)
     names = {trial.name for trial in wanted}
-    with lock_output(out), Workers(1, progress) as pool:
+    with lock_output(out), Workers(workers) as pool:
         _, units = placed_units(session, recorded, out, settings, pool, problems)
         *_, units = with_gauges(units, pool, problems)
         chosen = [unit for unit in units if unit.trial.name in names]
         ladder = list(settings_to_try(tuple(wanted[0].camera_sources)))
-        trades = []
-        for seeing in tqdm(ladder, desc="settings", disable=not progress, leave=False):
-            trades.append(_time_seeing(chosen, seeing, repeats))
+        trades = pool.run(partial(_time_seeing, chosen, repeats), ladder, "settings")
+        begin_step("figures")
         trades.append(_time_drawing(chosen, _standard(trades), repeats))
         trades = _with_errors(session, chosen, trades)
     return _write(out, trades)
@@ -192,7 +193,7 @@ def front(trades: Sequence[Trade]) -> np.ndarray:
     return pareto_front(costs)
 
 
-def _time_seeing(units: Sequence[Unit], seeing: Seeing, repeats: int) -> Trade:
+def _time_seeing(units: Sequence[Unit], repeats: int, seeing: Seeing) -> Trade:
     """Time one setting over the trials, decoding included; the errors are NaN as yet."""
     settings = Settings(seeing=seeing)
     seen, timing = time_work(lambda: see_all(units, settings), repeats)

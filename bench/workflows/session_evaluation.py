@@ -6,6 +6,7 @@ from pathlib import Path
 from bench.analyses.catalogue import ANALYSES
 from bench.base.atomic import lock_output, write_whole
 from bench.base.input_problems import InputProblems
+from bench.base.progress import begin_step, count_parts
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.report.assembly import write_tables
@@ -40,7 +41,6 @@ def evaluate(
     *,
     workers: int = 1,
     dask: str | None = None,
-    progress: bool = False,
     figure_formats: Sequence[str] = (),
     announce: Callable[[str], object] = print,
     verdict_alone: bool = False,
@@ -62,7 +62,7 @@ def evaluate(
     require_camera(views[0], settings)
     recorded = [trials_with_whisks(view) for view in views]
     require_some(recorded[0], settings)
-    with lock_output(out), _workers(dask, workers, out, progress) as pool:
+    with lock_output(out), _workers(dask, workers, out) as pool:
         if views[0].base is None:
             units = first_units(views[0], recorded[0], out, settings)
             summary = _evaluate_whisker(
@@ -137,13 +137,13 @@ def _evaluate_whisker(
     return report(evaluation, pool, figure_formats)
 
 
-def _workers(dask: str | None, count: int, out: Path, progress: bool) -> Workers:
+def _workers(dask: str | None, count: int, out: Path) -> Workers:
     """Return processes here, or a cluster."""
     if dask is None:
-        return Workers(count, progress)
+        return Workers(count)
     from bench.base.cluster import Cluster
 
-    return Cluster(dask, out, progress)
+    return Cluster(dask, out)
 
 
 def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] = ()) -> Summary:
@@ -158,15 +158,16 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
 
     out = evaluation.out
     write_tables(out, evaluation.results)
-    for analysis in ANALYSES:
+    for analysis in count_parts(ANALYSES, "tables on whisks together", len(ANALYSES)):
         analysis.write(out, evaluation.found(analysis))
     figures = []
     if evaluation.settings.figures:
         from bench.report.trial_figures import draw_trials  # with all of matplotlib
 
         figures += draw_trials(evaluation, pool)
-        for analysis in ANALYSES:
+        for analysis in count_parts(ANALYSES, "figures on whisks together", len(ANALYSES)):
             figures += analysis.draw(out, evaluation)
+    begin_step("report")
     scores = score(evaluation.session, out, evaluation.gauges)
     summary = summary_of(evaluation, scores, figures)
     written = record_of(evaluation, summary, figures)

@@ -129,5 +129,5 @@ def test_arrays_are_compared_whisker_by_whisker(out, tmp_path):
 
 
 def test_check_takes_arrays(session, capsys):
-    assert check(session, progress=False) == 0
+    assert check(session) == 0
     assert "two, 2 whiskers: 1 trial, nothing wrong or doubtful" in capsys.readouterr().out

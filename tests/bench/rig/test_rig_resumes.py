@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from bench.base.errors import BadInput
+from bench.base.progress import show_progress
 from bench.rig.simulation import simulate
 from tests.scenes.rig_sessions import TINY, contents, protocol_file
 
@@ -99,15 +100,14 @@ def whole_parts(session):
     return [p for p in folders if not p.name.startswith(".")]
 
 
-def test_size_and_time_are_said_before_and_progress_after(tmp_path, capsys):
+def test_size_and_time_are_said_before_and_progress_after(tmp_path, caplog):
+    show_progress()
     said, path = [], protocol_file(tmp_path, TINY)
-    session = simulate(
-        tmp_path / "s", protocol=path, signals_only=True, progress=True, announce=said.append
-    )
+    session = simulate(tmp_path / "s", protocol=path, signals_only=True, announce=said.append)
     (line,) = said
     assert "4 trials, 6 whisks, 0 pictures" in line and "MB" in line and "minutes" in line
-    bar = capsys.readouterr().err
-    assert "parts" in bar and "/4 [" in bar
+    assert "parts: 4 ..." in caplog.messages
+    assert any(line.startswith("parts: 4 of 4, ") for line in caplog.messages)
     size = (
         sum(len(data) for name, data in contents(session).items() if name.endswith("signals.csv"))
         / 1e6

@@ -238,7 +238,6 @@ def test_the_way_back_tells_hysteresis_return_and_repeatability(calibrate, tmp_p
         signals_only=True,
         seed=2,
         workers=1,
-        progress=False,
     )
     capsys.readouterr()
     calibrate(session, tmp_path / "gauges.toml")
