@@ -37,6 +37,8 @@ ERROR_MAP = Table(
 )
 _BETA_DEG = 5.0  # width of a cell; slopes of 0, 5, 10 … lie in the middles of theirs
 _ALPHA_DEG = 2.5  # height of a cell
+# [cells] A map of fewer is nearly blank: its table says as much. Stated.
+_FEWEST_CELLS = 3
 _STEEPEST_DEG = 82.5  # the map's edge, the upper end of the cell of 80°
 
 
@@ -102,8 +104,11 @@ class ErrorMap(Analysis):
         return {ERROR_MAP: [_row(cell) for cell in found.cells]}
 
     def figure(self, found: MeasuredMap) -> "Figure | None":
-        """Draw the measured cells, and to their right the predicted field, in one scale of colours."""
-        if not found.cells:
+        """Draw the measured cells, and to their right the predicted field, in one scale of colours.
+
+        Return None where fewer than _FEWEST_CELLS were measured.
+        """
+        if len(found.cells) < _FEWEST_CELLS:
             return None
         drawing = blank(9.6, 3.9)
         left, right = drawing.subplots(1, 2, sharex=True, sharey=True)

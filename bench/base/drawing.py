@@ -55,6 +55,7 @@ _STYLE = {
     "legend.frameon": False,
     "legend.fontsize": 8,
     "axes.linewidth": 0.8,
+    "path.simplify_threshold": 0.01,  # px; by the usual 0.11 a curve on the page is chords
 }
 _PAPER = {
     **{"font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8, "legend.fontsize": 7},

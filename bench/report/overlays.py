@@ -31,6 +31,13 @@ _CROSS_PX = 6  # half width of a contact's cross
 _GAP_PX = 10  # between panels
 _TITLE_PX = 26
 _FONT_PX = 16
+_LEGEND_PX = 2 * _TITLE_PX  # below the panels
+_LEGEND = ((_WIRE, "wire"), (_BAR, "edges of the bar"), (_CONTACT, "contact"))
+_KEY_PX = 28  # length of a line in the legend
+_DARK_EDGE = (
+    "An edge drawn in the dark lies on the bar: the flank of a lit cylinder that faces away from the light "
+    "is as dark as the bench behind it."
+)
 
 
 def draw_overlays(trial: Trial, result: TrialResult, out: Path, stamp: str) -> list[str]:
@@ -60,9 +67,25 @@ def overlay(trial: Trial, whisk: SeenWhisk) -> Image.Image:
             border = ((_TITLE_PX, _GAP_PX), (0, _GAP_PX), (0, 0))
             panels.append(np.pad(panel, border, constant_values=255))
         rows.append(np.hstack(panels))
-    picture = Image.fromarray(np.vstack(rows))
-    _write_titles(ImageDraw.Draw(picture), cameras, drawings, whisk)
+    width = rows[0].shape[1]
+    below = np.full((_LEGEND_PX, width, 3), 255, np.uint8)
+    picture = Image.fromarray(np.vstack([*rows, below]))
+    pen = ImageDraw.Draw(picture)
+    _write_titles(pen, cameras, drawings, whisk)
+    _write_legend(pen, picture.height - _LEGEND_PX)
     return picture
+
+
+def _write_legend(pen: ImageDraw.ImageDraw, top: int) -> None:
+    """Write from the row `top` on what the colours are, and why an edge may lie in the dark."""
+    left = 0
+    for colour, name in _LEGEND:
+        middle = top + _FONT_PX // 2 + 2
+        pen.rectangle((left, middle - 2, left + _KEY_PX, middle + 2), fill=colour)
+        left += _KEY_PX + _GAP_PX
+        pen.text((left, top), name, fill=(0, 0, 0), font=_font())
+        left += round(_font().getlength(name)) + 2 * _GAP_PX
+    pen.text((0, top + _TITLE_PX), _DARK_EDGE, fill=(0, 0, 0), font=_font())
 
 
 def _write_titles(

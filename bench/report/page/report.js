@@ -26,6 +26,15 @@
   }
   heads.forEach((head, column) => head.querySelector("button").addEventListener("click", () => sortBy(column)));
 
+  function markScrolling() { // what is wider than its place says that it scrolls
+    for (const one of document.querySelectorAll(".scroll, pre")) {
+      if (one.clientWidth) one.classList.toggle("scrolls", one.scrollWidth > one.clientWidth + 1);
+    }
+  }
+  window.addEventListener("resize", markScrolling);
+  document.addEventListener("toggle", markScrolling, true);
+  markScrolling();
+
   const search = document.getElementById("search"), count = document.getElementById("count");
   function filter() {
     const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
@@ -41,12 +50,17 @@
   search.addEventListener("input", filter);
   filter();
 
+  function isCard(element) {
+    return element !== null && element.matches("dialog.card");
+  }
+
   function open(key) {
     const card = document.getElementById(key);
-    if (!card || !card.matches("dialog.card") || card.open) return;
+    if (!isCard(card) || card.open) return;
     document.querySelectorAll("dialog[open]").forEach((other) => other.close());
     card.showModal();
     card.scrollTop = 0;
+    markScrolling();
     history.replaceState(null, "", "#" + key);
     document.dispatchEvent(new CustomEvent("whisk", { detail: key }));
   }
@@ -58,10 +72,11 @@
   }
 
   document.addEventListener("click", (event) => {
-    const link = event.target.closest("a[href^='#w']"), card = event.target.closest("dialog.card");
-    if (link) {
+    const link = event.target.closest("a[href^='#']"), card = event.target.closest("dialog.card");
+    const key = link && link.getAttribute("href").slice(1);
+    if (link && isCard(document.getElementById(key))) { // other links lead to parts of the page
       event.preventDefault();
-      open(link.getAttribute("href").slice(1));
+      open(key);
     } else if (event.target.matches("[data-go]")) {
       const step = Number(event.target.dataset.go);
       if (step) go(card, step);

@@ -1,6 +1,7 @@
 """Figures: what is drawn is what was found, in the conventions' frame; and a figure is drawn once."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 from bench.analyses.error_against_slope import error_against_slope
 from bench.analyses.figure_8 import figure_8
 from bench.analyses.surfaces import Felt, FittedSurface
-from bench.base.drawing import is_drawn, save
+from bench.base.drawing import is_drawn, save, style, svg_of
 from bench.base.settings import Settings
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import (
@@ -128,3 +129,11 @@ def test_a_figure_carries_the_hash_of_what_it_shows(tmp_path):
     assert is_drawn(path, "x") and not is_drawn(path, "y")
     path.write_bytes(b"no picture")
     assert not is_drawn(path, "x")
+
+
+def test_the_line_of_figure_8_has_no_chords_on_the_page():
+    """Of 329 points of a smooth curve a drawing that is simplified keeps a dozen."""
+    with style():
+        found = svg_of(figure_8([surface(alpha_deg=0.0)]), "fig8")
+    paths = [path for path in re.findall(r' d="(M[^"]*)"', found) if path.count("L") > 8]
+    assert max(path.count("L") for path in paths) > 60

@@ -2,10 +2,17 @@
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from bench.base.drawing import is_drawn, save_picture
-from bench.report.overlays import _PANEL_PX, _draw_view, _panel, _whisker_view
+from bench.report.overlays import (
+    _LEGEND_PX,
+    _PANEL_PX,
+    _draw_view,
+    _panel,
+    _whisker_view,
+    _write_legend,
+)
 from bench.report.painting import as_8_bit, polyline
 
 GREY = np.full((720, 1280), 100, np.uint16)
@@ -81,3 +88,13 @@ def test_a_painted_picture_carries_its_hash(tmp_path):
     with Image.open(tmp_path / "a.png") as picture:
         picture.verify()  # the checksums of all parts
     assert np.array_equal(np.asarray(Image.open(tmp_path / "a.png")), painted)
+
+
+def test_the_legend_shows_each_colour_and_fits_below_the_panels():
+    picture = Image.new("RGB", (2 * _PANEL_PX[0] + 10, _LEGEND_PX), "white")
+    _write_legend(ImageDraw.Draw(picture), 0)
+    drawn = np.asarray(picture).astype(int)
+    for colour in (YELLOW, GREEN, RED):
+        assert np.any(np.all(drawn == colour, axis=-1))
+    for edge in (drawn[:, -8:], drawn[-2:]):
+        assert np.all(edge == 255)  # no word is cut off

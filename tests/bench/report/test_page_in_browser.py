@@ -75,7 +75,7 @@ def test_the_table_sorts_and_filters_and_so_do_the_points(report):
         assert page.run(first) == "b60_4"
         assert page.run("document.getElementById('count').innerText").startswith("1 of 5")
         off = page.run(
-            "[...document.querySelectorAll('.mark.off')].map(mark => mark.dataset.trial)"
+            "[...document.querySelectorAll('.mark.off')].map(mark => mark.querySelector('title').textContent)"
         )
         assert "<script>" in off and "b60_4" not in off
 
@@ -134,3 +134,22 @@ def test_it_prints(report, tmp_path):
         text = (tmp_path / "report.pdf").read_bytes()
     pages = [box for box in (b"594.95996 841.91998", b"595", b"594") if box in text]
     assert text.startswith(b"%PDF") and pages
+
+
+def test_a_link_to_a_part_of_the_page_leads_there_and_opens_no_card(report):
+    with Page(report) as page:
+        page.run("document.documentElement.style.scrollBehavior = 'auto'")
+        page.run("document.querySelector('nav a[href=\"#whisks\"]').click()")
+        assert page.run("location.hash") == "#whisks"
+        top_px = page.run("document.getElementById('whisks').getBoundingClientRect().top")
+        assert abs(top_px) < 2
+        assert page.run("document.querySelector('dialog[open]')") is None
+
+
+def test_what_is_wider_than_a_phone_says_that_it_scrolls(report):
+    wider = "[...document.querySelectorAll('.scroll, pre')].filter(one => one.scrollWidth > one.clientWidth + 1)"
+    with Page(report, 400) as page:
+        assert page.run(f"{wider}.length") > 0
+        assert page.run(f"{wider}.every(one => one.classList.contains('scrolls'))")
+        said = "getComputedStyle(document.querySelector('.scrolls'), '::before').content"
+        assert "scroll sideways" in page.run(said)
