@@ -4,6 +4,7 @@ Large recordings often lie on another disk: where the user says so, a camera's f
 a video may be a link that leads out. Nothing else may: manifests and tables stay in the session.
 """
 
+import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -16,6 +17,8 @@ _MOST_NAMED = 3  # names in one line
 _FOOTAGE = PICTURE_SUFFIXES | FILM_SUFFIXES
 # Depth of a camera's folder within the session: boards/<camera>, trials/<trial>/<camera>.
 _CAMERA_DEPTH = {"boards": 2, "trials": 3}
+# Names that a session gives to files, and to no folder.
+_FILES = {"session.toml", "trial.toml", "signals.csv", "frames.csv", "gauges.toml", "cameras.toml"}
 _NOT_REGULAR = "is no regular file (a pipe, socket or device)"
 
 
@@ -25,6 +28,7 @@ def check_inside(session: Path, problems: InputProblems, follow_links: bool = Fa
     Pipes, sockets and devices hang a reader. follow_links: links of cameras may lead out. Hidden
     entries are not read, and not checked. Raises BadInput, naming the first ones.
     """
+    _check_names(session)
     found = list(_Inspection(session.resolve(), follow_links).refused(session, PurePath()))
     with problems.guard():
         if found:
@@ -45,7 +49,9 @@ class _Inspection:
             name = label / path.name
             if path.name.startswith("."):
                 continue
-            if path.is_symlink():
+            if path.name in _FILES and path.is_dir():
+                yield f"{name.as_posix()}: is a folder; a file is expected there"
+            elif path.is_symlink():
                 yield from self._refused_link(path, name)
             elif path.is_dir():
                 yield from self.refused(path, name)
@@ -76,6 +82,26 @@ class _Inspection:
             yield f"{found}; {cure}, or give --follow-links where you know who made it"
         elif target.is_dir():
             yield from self.refused(target, name)
+
+
+def _check_names(session: Path) -> None:
+    """Raise BadInput for a name that no table or message could hold."""
+    for path in sorted(session.rglob("*")):
+        name = path.relative_to(session)
+        fault = _fault_of_name(path.name)
+        if fault and not any(part.startswith(".") for part in name.parts):
+            raise BadInput(f"{name.as_posix()!a}: {fault}")
+
+
+def _fault_of_name(name: str) -> str:
+    """Return what keeps a name from tables and messages; '' where nothing does."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return "the name is not UTF-8; rename it"
+    if any(unicodedata.category(letter) == "Cc" for letter in name):
+        return "the name holds a line break or another control character; rename it"
+    return ""
 
 
 def _is_footage(target: Path, name: PurePath) -> bool:

@@ -56,6 +56,8 @@ HalfAngle = Annotated[float, plausible.HALF_ANGLE, SizeOf("cone")]
 class WhiskerKeys(Keys):
     """[whisker] of session.toml."""
 
+    one_of = (("youngs_modulus_GPa", "flexural_rigidity_Nmm2"),)
+
     # "cylinder" (default), "cone": base diameter to a point at `length_mm`, or "tapered": to
     # `tip_diameter_mm` there
     shape: Literal["cylinder", "cone", "tapered"] = "cylinder"

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, TypeAlias, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, TypeAlias, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -31,7 +31,12 @@ TablePath: TypeAlias = tuple[str, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Keys:
-    """A table of a file: its keys with their types and defaults."""
+    """A table of a file: its keys with their types and defaults.
+
+    one_of: groups of keys of which the table needs one.
+    """
+
+    one_of: ClassVar[tuple[tuple[str, ...], ...]] = ()
 
 
 def read_toml(path: Path, label: str) -> dict[str, Any]:
@@ -157,6 +162,9 @@ def _missing_keys(tables: dict[str, Any], top: type[Keys]) -> Iterator[str]:
             is_needed = field.default is MISSING and field.default_factory is MISSING
             if is_needed and field.name not in table:
                 yield f"{_key_path([*path, field.name])} is missing"
+        for alternatives in kind.one_of:
+            if not any(name in table for name in alternatives):
+                yield f"{_key_path([*path, ' or '.join(alternatives)])} is missing"
 
 
 def _value_checks(

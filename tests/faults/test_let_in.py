@@ -101,6 +101,30 @@ def test_a_link_within_the_session_and_a_linked_session_are_taken(session, tmp_p
     assert len(checked_session(tmp_path / "link").trials) == 4
 
 
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [(b"b30\xff", "the name is not UTF-8"), (b"b30\n4", "the name holds a line break")],
+)
+def test_a_name_that_breaks_tables_is_one_clear_line(session, name, fault, tmp_path, capsys):
+    os.mkdir(os.path.join(os.fsencode(session), b"trials", name))
+    assert cli.main(["check", str(session)]) == 2
+    bad = [line for line in capsys.readouterr().out.splitlines() if line.startswith("bad: ")]
+    assert len(bad) == 1
+    assert fault in bad[0]
+    assert bad[0].isascii()
+    assert cli.main(["evaluate", str(session), "--out", str(tmp_path / "out")]) == 2
+    assert fault in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["trial.toml", "frames.csv"])
+def test_a_folder_in_place_of_a_file_is_no_absent_file(session, name):
+    file = session / "trials" / TRIAL / name
+    file.unlink(missing_ok=True)
+    file.mkdir()
+    with pytest.raises(BadInput, match=rf"trials/{TRIAL}/{name}: is a folder"):
+        checked_session(session)
+
+
 def test_a_picture_of_absurd_size_is_damaged(session):
     FAULTS["PNG of 60000 x 60000"](session)
     file = session / "trials" / TRIAL / "low" / "000003.png"

@@ -83,7 +83,7 @@ def test_no_manifest(session):
         (
             "youngs_modulus_GPa = 60.0",
             "",
-            r"\[whisker\] give either youngs_modulus_GPa or flexural",
+            r"\[whisker\] youngs_modulus_GPa or flexural_rigidity_Nmm2 is missing",
         ),
         (
             "youngs_modulus_GPa = 60.0",
@@ -267,7 +267,8 @@ def test_check_names_every_implausible_value(session):
 
 
 def test_check_names_what_does_not_go_together(session):
-    edit(session / "session.toml", "youngs_modulus_GPa = 60.0", "")
+    both = "youngs_modulus_GPa = 60.0\nflexural_rigidity_Nmm2 = 2945.2"
+    edit(session / "session.toml", "youngs_modulus_GPa = 60.0", both)
     edit(session / "session.toml", "marker_mm = 11.0", "marker_mm = 16.0")
     assert [
         "[whisker] give either" in refusals(session)[0],

@@ -103,3 +103,11 @@ def test_every_question_has_its_range():
     for question in QUESTIONS:
         with pytest.raises(BadInput):
             question.plausible_range.check(-1.0, question.key, "session.toml")
+
+
+def test_check_counts_as_many_missing_lines_as_new(tmp_path, capsys):
+    assert main(["new", str(tmp_path / "s")]) == 0
+    assert "6 lines are to be filled in" in capsys.readouterr().out
+    assert main(["check", str(tmp_path / "s")]) == 2
+    missing = [line for line in capsys.readouterr().out.splitlines() if "is missing" in line]
+    assert len(missing) == len(QUESTIONS) == 6
