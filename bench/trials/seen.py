@@ -104,6 +104,7 @@ def _see(
     return SeenTrial(
         tuple(seen),
         notes=_notes(frames),
+        damaged=in_one_status(*_damaged_frames(frames.by_camera, frames.times)),
         bar=BarLine(truth.bar_point_mm, truth.bar_direction),
         bar_radius_mm=0.5 * trial.bar_diameter_mm,
         wire_radius_mm=0.5 * frames.rods.wire.diameter_mm,
@@ -223,17 +224,25 @@ def _back_stroke(truth: WhiskTruth | None) -> BackStroke | None:
 
 
 def _missing_frames(frames: Mapping[str, Mapping], times: FrameTimes) -> Iterator[str]:
-    """Yield a line on the dropped and one on the damaged frames of each camera that has some."""
+    """Yield a line on the dropped frames of each camera that has some."""
+    count = len(times)
+    for name in frames:
+        is_recorded = times.picture[name] >= 0
+        lost = int(np.sum(~is_recorded))
+        if lost:
+            yield f"camera {name} dropped {lost} of {count} frames"
+
+
+def _damaged_frames(frames: Mapping[str, Mapping], times: FrameTimes) -> Iterator[Reason]:
+    """Yield a line on the damaged frames of each camera that has some."""
     count = len(times)
     for name, pictures in frames.items():
         is_recorded = times.picture[name] >= 0
-        lost = int(np.sum(~is_recorded))
         damaged = [str(k) for k in np.flatnonzero(is_recorded) if k not in pictures]
-        if lost:
-            yield f"camera {name} dropped {lost} of {count} frames"
         if damaged:
             named = ", ".join(damaged[:_MOST_NAMED])
-            yield f"camera {name}: {len(damaged)} of {count} frames damaged ({named})"
+            found = f"camera {name}: {len(damaged)} of {count} frames damaged ({named})"
+            yield Reason("frames_damaged", found)
 
 
 def whisk_record(

@@ -18,6 +18,7 @@ from bench.report.summary.verdict import (
     verdict,
 )
 from bench.report.summary.warning_lines import (
+    damage_warnings,
     frame_lines,
     light_lines,
     taken_as_exact,
@@ -85,7 +86,12 @@ def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[
     scores: lines on a synthetic session's truth. figures: names of the pictures.
     """
     results = evaluation.results
-    warnings = (*evaluation.warnings, *scatter_warnings(results), *whisk_warnings(results))
+    warnings = (
+        *evaluation.warnings,
+        *damage_warnings(results),
+        *scatter_warnings(results),
+        *whisk_warnings(results),
+    )
     of_analyses = _sections_of_analyses(evaluation)
     last = [of_analyses.pop(code) for code in _ANALYSES_LAST if code in of_analyses]
     sections = (

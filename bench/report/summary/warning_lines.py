@@ -39,6 +39,13 @@ def whisk_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:
                 yield as_reason(answer.status).about(f"{name}, {answer.estimator}")
 
 
+def damage_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:
+    """Yield a line for each trial with frames that cannot be read."""
+    for result in results:
+        if result.seen.damaged:
+            yield as_reason(result.seen.damaged).about(result.trial.name)
+
+
 def light_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     """Yield a line a camera that saw the wire lit from one side: the first trial's, and how many more."""
     lines: dict[str, list[str]] = {}  # by camera
@@ -52,7 +59,7 @@ def light_lines(results: Iterable[TrialResult]) -> Iterator[str]:
 
 
 def frame_lines(results: Iterable[TrialResult]) -> Iterator[str]:
-    """Yield a line for frames that were dropped, damaged, made good or left out."""
+    """Yield a line for frames that were dropped, made good or left out."""
     for result in results:
         for note in result.seen.notes:
             yield f"{result.trial.name}: {note}"

@@ -7,11 +7,15 @@ import pytest
 
 from bench.base.settings import Settings
 from bench.cameras.session_cameras import _background
+from bench.records.trial_result import SeenTrial
+from bench.report.summary.warning_lines import damage_warnings
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import load_session
-from bench.trials.seen import _missing_frames, whisk_record
+from bench.trials.seen import _damaged_frames, whisk_record
 from tests.bench.conftest import exact_truth, read_csv
+from tests.scenes.results import seen_whisk, trial_result
 from vision import UNKNOWN
+from vision.geometry import Reason
 from vision.pictures.files import read_picture
 
 
@@ -23,9 +27,21 @@ def test_damaged_frames_are_counted_and_named(small_copy):
     third.write_bytes(data[: len(data) // 2][:40])
     trial = next(t for t in load_session(small_copy).trials if t.name == "b60_4")
     times = frame_times(trial)
-    assert list(_missing_frames(read_trial(trial, times), times)) == [
-        f"camera low: 1 of {len(times)} frames damaged (2)"
+    (found,) = _damaged_frames(read_trial(trial, times), times)
+    assert found == f"camera low: 1 of {len(times)} frames damaged (2)"
+    assert found.codes == ("frames_damaged",)
+
+
+def test_damaged_frames_are_a_warning_of_the_run_as_they_are_of_check():
+    told = Reason("frames_damaged", "camera low: 1 of 11 frames damaged (2)")
+    whisk = (seen_whisk(),)
+    results = [
+        trial_result(SeenTrial(whisk, damaged=told), name="b60_4"),
+        trial_result(SeenTrial(whisk), name="b30_3"),
     ]
+    (warning,) = damage_warnings(results)
+    assert warning == "b60_4: camera low: 1 of 11 frames damaged (2)"
+    assert warning.codes == ("frames_damaged",)
 
 
 @pytest.mark.parametrize(("wider", "is_known"), [(1.0, True), (1e6, False)])
