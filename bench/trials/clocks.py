@@ -23,6 +23,9 @@ from vision.geometry import NO_REASON, Reason, counted
 
 # Chance by which sound sigmas would show as much: one session in a thousand.
 FALSE_ALARM = 1e-3
+# [sigma] Least error that all whisks share, over the median sigma of felt − seen of one stroke. By hundreds of
+# whisks an error is found that is far below what matters to any of them. Stated: as where a camera is left out.
+_LEAST_SHARE = 0.5
 # Before anything is known: wider than any bench has it.
 _PRIOR = np.array([np.radians(1.0), 0.05])
 # By so much (chi²) a clock must explain better than a zero, or the other way round, to be named alone: three sigma.
@@ -36,19 +39,21 @@ class SharedTouch:
 
     values (2,): zero (rad) and clock (s), with covariance (2, 2). chance: of as much by sound
     sigmas. clock_preference: by how much χ² the clock alone explains better than the zero alone.
+    share_of_sigma: the largest of it over the median sigma of felt − seen of a single stroke.
     speeds_rad_s (n,): of the strokes that show it, negative on the way back.
     """
 
     values: np.ndarray
     covariance: np.ndarray
     chance: float
+    share_of_sigma: float
     clock_preference: float
     speeds_rad_s: np.ndarray
 
     @property
     def is_error(self) -> bool:
-        """Return whether it is more than chance."""
-        return self.chance < FALSE_ALARM
+        """Return whether it is more than chance, and large enough to matter to a whisk."""
+        return self.chance < FALSE_ALARM and self.share_of_sigma > _LEAST_SHARE
 
     def at(self, speed_rad_s: float) -> tuple[float, float]:
         """Return felt − seen that whisks at this speed share, rad, and its sigma."""
@@ -97,11 +102,13 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
     prior = _PRIOR**-2.0
     covariance = np.linalg.inv(information + np.diag(prior))
     values = covariance @ gradient
+    largest_rad = float(np.max(np.abs(design @ values)))
     zero_alone, clock_alone = gradient**2 / (np.diag(information) + prior)
     return SharedTouch(
         values,
         covariance,
         chance=float(chdtrc(2, gradient @ values)),
+        share_of_sigma=largest_rad / float(np.median(np.hypot(seen, felt))),
         clock_preference=float(clock_alone - zero_alone),
         speeds_rad_s=speed,
     )

@@ -1,5 +1,7 @@
 """Felt less seen touch over a session's whisks: a clock and a zero told apart, chance, and what stays as it is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -105,6 +107,20 @@ def test_sound_sessions_raise_no_warning(rng):
     results = session(rng, [10.0] * 8)
     assert list(with_shared_touch(results, shared_touch(results))) == results
     assert not shared_touch_warning(shared_touch(results))
+
+
+def test_what_many_whisks_show_and_matters_to_none_is_no_error(rng):
+    """4 ms at 10°/s are five sigma of one whisk; a fifth of a sigma is none's concern, however sure."""
+    large = shared_touch(session(rng, [10.0] * 12, clock_s=0.004))
+    assert large.share_of_sigma == pytest.approx(
+        0.04 / np.degrees(np.hypot(SEEN_RAD, FELT_RAD)), rel=0.3
+    )
+    assert large.is_error
+    small = replace(large, share_of_sigma=0.2)
+    assert not small.is_error
+    assert not shared_touch_warning(small)
+    results = session(rng, [10.0] * 8)
+    assert list(with_shared_touch(results, small)) == results
 
 
 def test_no_touch_no_word():
