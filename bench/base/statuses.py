@@ -30,6 +30,9 @@ _RECORD_GAUGES = "record gauge trials in two positions of the follicle, or try -
 _CHECK_CHANNELS = "check that, and evaluate again"
 _CLEARER_TOUCH = "sample faster, push farther after touch, or damp vibration"
 _LOOK_AT_ESTIMATOR = "look at the estimator: its answer is none"
+_GENTLER = (
+    "expected of (10) on steep slopes: touch a gentler one, or tilt the whisker's base towards it"
+)
 _FRAMES_LOST = "record again with a slower frame rate or a faster disk, if it is near touch"
 _LOOK_AT_FILE = "look at the file that is named; where it is meant so, nothing is to be done"
 _MEASURE_BOARD = "measure a square of the board with a caliper, then T_rig_board"
@@ -241,19 +244,19 @@ _TABLE = (
         "past_whisker",
         WARNING,
         "gave {d_x_mm:.1f} mm, past the whisker's length of {length_mm:g} mm",
-        _LOOK_AT_ESTIMATOR,
+        "expected where its model leaves out what the push does; else look at its units",
     ),
     Status(
         "longer_than_whisker",
         WARNING,
         "the distance by (2) is longer than the whisker",
-        _LOOK_AT_ESTIMATOR,
+        "expected where the contact slips, which (2) ignores: take (10)",
     ),
     Status(
         "tip_contact",
         WARNING,
         "the distance came out longer than the whisker, and was set to its length",
-        _LOOK_AT_ESTIMATOR,
+        "take it as a contact near the tip; a touch nearer to the base is told better",
     ),
     Status("no_distance_given", REFUSAL, "gave no distance and no reason", _LOOK_AT_ESTIMATOR),
     Status(
@@ -401,7 +404,12 @@ _TABLE = (
     ),
     Status("no_way_back", REFUSAL, "no way back was recorded"),
     Status("deflection_impossible", WARNING, "gave a deflection of {given}, which is none"),
-    Status("only_nearer_known", WARNING, "the distance is known only to be nearer than a bound"),
+    Status(
+        "only_nearer_known",
+        WARNING,
+        "the distance is known only to be nearer than a bound",
+        _GENTLER,
+    ),
     Status("two_distances", WARNING, "an object that runs away is felt alike at two distances"),
     Status("motion_not_stated", REFUSAL, "nobody says how the object moves"),
     Status("object_runs_away", REFUSAL, "an object that moves as told would be touched nowhere"),
@@ -427,7 +435,7 @@ _TABLE = (
     Status("first_slope_too_steep", REFUSAL, "the slope beta_0 is 90 degrees or more"),
     Status("not_pushing", REFUSAL, "m_z is not positive"),
     Status("moments_up_slope", REFUSAL, "m_y points up the slope, too strongly for a contact"),
-    Status("beyond_friction", REFUSAL, "phi + alpha_est is 90 degrees or more"),
+    Status("beyond_friction", REFUSAL, "phi + alpha_est is 90 degrees or more", _GENTLER),
     Status("distance_not_positive", REFUSAL, "the distance d_x is not positive"),
     Status("distance_out_of_range", REFUSAL, "the distance is beyond the range of a float"),
     Status("radius_not_positive", REFUSAL, "the radius of curvature is not positive"),

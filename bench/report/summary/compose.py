@@ -19,6 +19,7 @@ from bench.report.summary.verdict import (
 )
 from bench.report.summary.warning_lines import (
     damage_warnings,
+    estimator_limits,
     frame_lines,
     light_lines,
     taken_as_exact,
@@ -101,6 +102,7 @@ def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[
         *last,
         *_sections_of_pictures(evaluation),
         _section("warnings", WARNINGS, warnings),
+        _section("limits", "Limits that estimators met", estimator_limits(results)),
         _section("score", SCORE, scores),
         _section(
             "exact",

@@ -1,11 +1,13 @@
 """Warnings of each whisk, what the light hides, and what was taken as exact."""
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 from bench.analyses.runs import RUNS
 from bench.base.input_problems import in_one_status
 from bench.base.statuses import reason
-from bench.records.trial_result import TrialResult, whisks
+from bench.records.trial_result import SeenWhisk, TrialResult, whisks
 from bench.session.session import Session
 from vision.geometry import Reason, as_reason, counted
 
@@ -14,29 +16,85 @@ SILENT = {"no_pictures", "own_gauges"}
 # (10) run again repeats what it said first; what the others miss is the result, no fault of the run.
 _EXPECTED = ("no_slip", "frictionless", *RUNS)
 
+# Codes of answers that are a fault of the estimator's code, not a limit of its model.
+FAILURES = {"estimator_raised", "no_distance_given", "distance_impossible", "sigma_impossible"}
+
 
 def is_silent(status: Reason) -> bool:
     """Return whether a status is as it should be, and no warning."""
     return SILENT.issuperset(status.codes)
 
 
-def whisk_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:
-    """Yield a line for each whisk that has a warning.
+@dataclass(frozen=True)
+class _Warned:
+    """A whisk by name with a status. sigma_mm: of its true distance, infinite without a truth."""
 
-    A gauge trial that cannot be judged is as it should be.
+    whisk: str
+    status: Reason
+    sigma_mm: float
+
+
+def whisk_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:
+    """Yield a line for each cause of warnings of whisks, and of estimators that failed.
+
+    A gauge trial that cannot be judged is as it should be; limits of estimators are in
+    `estimator_limits`.
     """
+    results = list(results)
+    by_cause: dict[tuple[str, ...], list[_Warned]] = {}
     for result, seen, felt in whisks(results):
         name = f"{result.trial.name}, whisk {seen.whisk}"
         statuses = [as_reason(status) for status in (seen.status, felt.status)]
         status = in_one_status(*(one for one in statuses if not is_silent(one)))
-        if status:
-            yield status.about(name)
+        found = [status] if status else []
         if felt.saturated:
             samples = counted(felt.saturated, "saturated sample")
-            yield reason("samples_saturated", samples=samples).about(name)
+            found.append(reason("samples_saturated", samples=samples))
+        for one in found:
+            warned = _Warned(name, one, _sigma_mm(seen))
+            by_cause.setdefault(one.codes, []).append(warned)
+    yield from map(_cause_line, by_cause.values())
+    for estimator, warned in _answers(results):
+        if FAILURES.intersection(warned[0].status.codes):
+            yield _cause_line(warned, f", {estimator}")
+
+
+def estimator_limits(results: Iterable[TrialResult]) -> Iterator[Reason]:
+    """Yield a line for each limit that estimators met: no doubt of the truth, nor of the recording."""
+    for estimator, warned in _answers(results):
+        if not FAILURES.intersection(warned[0].status.codes):
+            yield _cause_line(warned, f", {estimator}")
+
+
+def _answers(results: Iterable[TrialResult]) -> Iterator[tuple[str, list[_Warned]]]:
+    """Yield estimator and whisks of alike status of its answers, where that is not the result itself."""
+    alike: dict[tuple[str, ...], list[_Warned]] = {}
+    for result, seen, felt in whisks(results):
+        name = f"{result.trial.name}, whisk {seen.whisk}"
         for answer in felt.estimates:
             if answer.status and answer.estimator not in _EXPECTED:
-                yield as_reason(answer.status).about(f"{name}, {answer.estimator}")
+                status = as_reason(answer.status)
+                warned = _Warned(name, status, _sigma_mm(seen))
+                alike.setdefault((answer.estimator, *status.codes), []).append(warned)
+    for (estimator, *_), warned in alike.items():
+        yield estimator, warned
+
+
+def _sigma_mm(seen: SeenWhisk) -> float:
+    """Return the sigma of the true distance, mm; infinite without a truth."""
+    sigma_mm = float(seen.d_x_mm.sigma)
+    return sigma_mm if math.isfinite(sigma_mm) else math.inf
+
+
+def _cause_line(warned: Sequence[_Warned], whose: str = "") -> Reason:
+    """Return one line on whisks of one cause: how many, and the one whose truth is known least.
+
+    whose: what stands behind the whisk's name.
+    """
+    worst = max(warned, key=lambda one: one.sigma_mm)
+    if len(warned) == 1:
+        return worst.status.about(f"{worst.whisk}{whose}")
+    return worst.status.about(f"{len(warned)} whisks{whose}; of the least known, {worst.whisk}")
 
 
 def damage_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:

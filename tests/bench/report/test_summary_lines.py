@@ -8,10 +8,13 @@ from scipy.signal import butter, sosfilt
 
 from bench.analyses.estimator_accuracy import RunAccuracy
 from bench.base.settings import Settings
+from bench.base.statuses import cure_of
 from bench.gauges.felt import gauge_delay, lateness
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import (
     Clock,
+    EstimateRow,
+    FeltWhisk,
     SeenTrial,
     TrialResult,
 )
@@ -20,13 +23,19 @@ from bench.report.run_facts import Section
 from bench.report.summary.compose import Summary
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
 from bench.report.summary.verdict import verdict
-from bench.report.summary.warning_lines import frame_lines, light_lines
+from bench.report.summary.warning_lines import (
+    estimator_limits,
+    frame_lines,
+    light_lines,
+    whisk_warnings,
+)
 from bench.trials.estimates import as_felt
 from estimator.signal import FeltTouch
 from tests.scenes.results import seen_whisk, trial_result
 from vision.fit.beam_check import BeamCheck, Compared
 from vision.fit.covariance import CAUSES
 from vision.geometry.number_words import counted
+from vision.geometry.reasons import Reason
 from vision.truth.value import Value
 from vision.wire.one_sided import SeenWidth
 
@@ -139,3 +148,24 @@ def test_light_from_one_side_is_one_line_a_camera_whatever_notes_say():
 @pytest.mark.parametrize(("count", "said"), [(0, "0 frames"), (1, "1 frame"), (2, "2 frames")])
 def test_plurals(count, said):
     assert counted(count, "frame") == said
+
+
+def test_a_limit_of_an_estimator_is_one_line_and_no_warning():
+    """16 whisks at 75° had a line each among the doubts, with another's cure."""
+    limit = Reason("only_nearer_known", "known only to be nearer than 80.0 mm (95 %)")
+    failed = Reason("estimator_raised", "mine raised ValueError")
+    results = []
+    for number in range(3):
+        sigma_mm = 0.01 * (1 + number % 2)
+        estimates = (
+            EstimateRow("with_friction", Value(60.0, 1.0), status=limit),
+            EstimateRow("mine", Value(60.0, 1.0), status=failed),
+        )
+        whisk = seen_whisk(d_x_mm=Value(60.0, sigma_mm))
+        felt = FeltWhisk(0, estimates=estimates)
+        results.append(trial_result((whisk,), (felt,), name=f"b75_{number}"))
+    (line,) = estimator_limits(results)
+    assert line == f"3 whisks, with_friction; of the least known, b75_1, whisk 0: {limit}"
+    (warning,) = whisk_warnings(results)
+    assert warning.startswith("3 whisks, mine; ")
+    assert cure_of(line.codes) != cure_of(warning.codes)
