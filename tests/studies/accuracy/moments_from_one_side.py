@@ -133,7 +133,12 @@ def moment_errors(scene: Scene, seen: SeenWhisk) -> tuple[np.ndarray, np.ndarray
     """Return by how much all moments together are off, of their size and across it (2,), as shares
     of the size, with their sigmas (2,); None of a whisk that shows no moments.
     """
-    whisker = Whisker("cylinder", scene.wire.length_mm, scene.protocol.whisker.diameter_mm, 60.0)
+    whisker = Whisker(
+        shape="cylinder",
+        length_mm=scene.wire.length_mm,
+        diameter_mm=scene.protocol.whisker.diameter_mm,
+        youngs_modulus_GPa=60.0,
+    )
     if seen.deflection is None:
         return None
     reference = reference_from_pictures(seen, whisker)
