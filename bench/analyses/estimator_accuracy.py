@@ -103,10 +103,13 @@ class Accuracy:
 
     @property
     def is_covered(self) -> bool:
-        """Return whether as many 95 % intervals hold the truth as chance lets one expect."""
+        """Return whether as many 95 % intervals hold the truth as chance lets one expect.
+
+        Where none holds they cover nothing, however few there are.
+        """
         # The probability that no more than these hold.
         chance = bdtr(self.intervals_holding, self.intervals, INTERVAL_SHARE)
-        return self.intervals > 0 and bool(chance >= LEAST_CHANCE)
+        return self.intervals_holding > 0 and bool(chance >= LEAST_CHANCE)
 
     def is_worse_than(self, other: "Accuracy") -> bool:
         """Return whether the sum of squared errors is larger by more than the sigmas explain.
