@@ -83,7 +83,9 @@ def test_the_table_sorts_and_filters_and_so_do_the_points(report):
 def test_cards_open_from_points_and_go_by_keyboard(report):
     shown = "(document.querySelector('dialog[open]') || {id: ''}).id"
     with Page(report) as page:
-        key = page.run("document.querySelector('#figures .mark[data-trial=\"b60_4\"]').dataset.w")
+        marks = "[...document.querySelectorAll('#figures .mark')]"
+        is_b60 = "mark => mark.querySelector('title').textContent.includes('b60_4')"
+        key = page.run(f"{marks}.find({is_b60}).dataset.w")
         click = "dispatchEvent(new MouseEvent('click', {bubbles: true}))"
         page.run(f"document.querySelector('#figures .mark[data-w={key}]').{click}")
         assert page.run(shown) == key
@@ -96,7 +98,8 @@ def test_cards_open_from_points_and_go_by_keyboard(report):
 def test_every_picture_is_there(report):
     with Page(report) as page:
         loaded = "Promise.all([...document.images].map(i => (i.loading = 'eager', i.decode().then(() => i.naturalWidth))))"
-        assert page.run(loaded) == [256]
+        widths_px = page.run(loaded)
+    assert widths_px and min(widths_px) > 0
 
 
 def test_the_rig_turns_by_mouse_and_keyboard(report):
