@@ -33,6 +33,9 @@ _LOOK_AT_ESTIMATOR = "look at the estimator: its answer is none"
 _GENTLER = (
     "expected of (10) on steep slopes: touch a gentler one, or tilt the whisker's base towards it"
 )
+_LOOK_AT_BAR = (
+    "look at the overlays: the drawn bar must lie on the bar; add a camera or another light"
+)
 _FRAMES_LOST = "record again with a slower frame rate or a faster disk, if it is near touch"
 _LOOK_AT_FILE = "look at the file that is named; where it is meant so, nothing is to be done"
 _MEASURE_BOARD = "measure a square of the board with a caliper, then T_rig_board"
@@ -52,10 +55,6 @@ class Status:
     sentence: str
     cure: str = _USUAL_CURE
 
-
-_OTHER_SIDE = (
-    "look at the overlays: the drawn bar must lie on the bar; add a camera or another light"
-)
 
 # Of several statuses in one line the cure of the first in this table is shown.
 _TABLE = (
@@ -109,19 +108,19 @@ _TABLE = (
         "two_explanations",
         REFUSAL,
         "the bar at another place explains the pictures equally well",
-        _OTHER_SIDE,
+        _LOOK_AT_BAR,
     ),
     Status(
         "bar_elsewhere",
         WARNING,
         "another place of the bar explains more of the pictures",
-        _OTHER_SIDE,
+        _LOOK_AT_BAR,
     ),
     Status(
         "bar_unconverged",
         WARNING,
         "the bar's place did not converge",
-        _OTHER_SIDE,
+        _LOOK_AT_BAR,
     ),
     Status(
         "camera_lines_scatter",

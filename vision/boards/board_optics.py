@@ -17,11 +17,10 @@ from vision.boards.edge_pixels import Windows
 from vision.boards.saddle import BLUR, fit_windows, predict_saddles, start_parameters
 from vision.geometry.board import Board
 from vision.geometry.optics import UNKNOWN, Optics
+from vision.pictures.view import SATURATED
 
 # [corners] Fewer have no median that an odd one would not move. Derived.
 _FEWEST_CORNERS = 4
-# [grey levels] Of 8 bit: pixels as bright are cut off, as in `View`. Stated.
-_SATURATED = 250.0
 # [1] Sigma of the logarithm of gamma in common to all corners of a board: ink that spreads by an
 # eighth of a lens blur moves edges as much. Boards in 31 views of path-traced scenes are 0.16 off
 # at most, 0.07 RMS. Study: optics.py.
@@ -58,7 +57,7 @@ def estimate_optics(grey: np.ndarray, board: Board) -> Optics:
     if cut is None:
         return UNKNOWN
     windows, frames = cut
-    windows = replace(windows, weight=windows.weight * (windows.grey < _SATURATED))
+    windows = replace(windows, weight=windows.weight * (windows.grey < SATURATED * 255.0))
     light = 255.0 * (windows.grey / 255.0) ** _FIRST_GAMMA
     saddles = start_parameters(replace(windows, grey=light), corners.px, frames)
     log_gammas = np.full((len(saddles), 1), np.log(_FIRST_GAMMA))

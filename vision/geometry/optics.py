@@ -18,6 +18,15 @@ GAMMAS = (1.0, 2.2)
 LEAST_PROBABILITY = 1e-3
 
 
+def light_of(grey: np.ndarray, full_scale: float, gamma: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the light of grey levels in parts of full scale, and its derivative by the grey level.
+
+    Grey levels below 1 count as 1: noise makes some negative.
+    """
+    share = np.maximum(grey, 1.0) / full_scale
+    return share**gamma, gamma / full_scale * share ** (gamma - 1.0)
+
+
 @dataclass(frozen=True)
 class Optics:
     """What is known of a camera's transfer curve and lens blur; by default nothing.

@@ -25,6 +25,7 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from vision.geometry.optics import light_of
 from vision.pictures.view import SATURATED
 from vision.wire.bands import Pieces
 
@@ -153,8 +154,8 @@ class _PatchSums:
 
         is_used, position (s, p): of the pixels, which of them count and their places, in bins.
         """
-        light, light_per_grey = _linearise_grey(pieces.grey, gamma)
-        background, background_per_grey = _linearise_grey(pieces.background, gamma)
+        light, light_per_grey = light_of(pieces.grey, FULL_SCALE, gamma)
+        background, background_per_grey = light_of(pieces.background, FULL_SCALE, gamma)
         background_slope = background_per_grey * pieces.slope
         weight = np.where(is_used, (pieces.weight / light_per_grey) ** 2, 0.0)
         one = np.ones_like(light)
@@ -246,12 +247,6 @@ def _sum_in_bins(weight, value, position, size: int) -> np.ndarray:
     factor = share if value is None else np.tile(value.ravel(), 2)
     weighted = share * np.tile(weight.ravel(), 2)
     return np.bincount(bins, weighted * factor, len(position) * size).reshape(-1, size)
-
-
-def _linearise_grey(grey, gamma: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the light in parts of full scale, and its derivative by the grey level."""
-    share = np.maximum(grey, 1.0) / FULL_SCALE
-    return share**gamma, gamma / FULL_SCALE * share ** (gamma - 1.0)
 
 
 def _average_patches(

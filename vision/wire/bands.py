@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import correlate1d
 
+from vision.geometry.optics import light_of
 from vision.geometry.rows import Rows
 from vision.pictures.pixel_noise import Noise
 
@@ -217,15 +218,15 @@ class Pieces(Rows):
         """
         if gamma == 1.0:
             return self
-        grey = np.maximum(self.grey, 1.0) / full_scale
-        behind = np.maximum(self.background, 1.0) / full_scale
-        by_grey = gamma * grey ** (gamma - 1.0)
-        by_behind = gamma * behind ** (gamma - 1.0)
-        by_square = gamma * (gamma - 1.0) * behind ** (gamma - 2.0) / full_scale
+        light, light_per_grey = light_of(self.grey, full_scale, gamma)
+        behind, behind_per_grey = light_of(self.background, full_scale, gamma)
+        by_grey = full_scale * light_per_grey
+        by_behind = full_scale * behind_per_grey
+        by_square = (gamma - 1.0) * by_behind / np.maximum(self.background, 1.0)
         return replace(
             self,
-            grey=full_scale * grey**gamma,
-            background=full_scale * behind**gamma,
+            grey=full_scale * light,
+            background=full_scale * behind,
             slope=by_behind * self.slope,
             curvature=by_behind * self.curvature + by_square * self.slope**2,
             weight=self.weight / by_grey,
