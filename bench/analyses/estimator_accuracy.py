@@ -66,8 +66,7 @@ class Accuracy:
     @property
     def error_sigmas_mm(self) -> np.ndarray:
         """Return the standard deviations (whisks,) of the errors, of estimate and truth, mm."""
-        sigmas = [math.hypot(one.d_x_est_sigma_mm, one.d_x_sigma_mm) for one in self.judged]
-        return np.array(sigmas)
+        return np.array([one.error_sigma_mm for one in self.judged])
 
     @property
     def bias_percent(self) -> float:

@@ -49,9 +49,13 @@ class Certificate:
             return self
         pairs = []
         for p in self.pairs:
-            covariance = scale.factor**2 * p.moments_covariance
-            moments = scale.factor * p.moments
-            pairs.append(replace(p, moments=moments, moments_covariance=covariance))
+            scaled = replace(
+                p,
+                moments=scale.factor * p.moments,
+                moments_covariance=scale.factor**2 * p.moments_covariance,
+                by_camera_error=scale.factor * p.by_camera_error,
+            )
+            pairs.append(scaled)
         gauges = self.gauges.scaled(scale.factor)
         return replace(self, gauges=gauges, pairs=tuple(pairs), scale=scale)
 

@@ -1,6 +1,11 @@
-"""Four gauge coefficients from pairs of moment and volts: one weighted regression, errors on both sides."""
+"""Four gauge coefficients from pairs of moment and volts: one weighted regression, errors on both sides.
+
+The cameras' errors move the moments of all whisks together, so that more whisks do not average them
+away. They are unknowns of the regression beside the coefficients, each with its unit variance.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtri
@@ -53,8 +58,9 @@ def _moments(pairs: Sequence[Pairs]) -> np.ndarray:
 def fit_matrix(pairs: Sequence[Pairs]) -> GaugeMatrix | None:
     """Fit M · volts = moments by generalised least squares.
 
-    All that pairs of a whisk share is in their covariance. Where the residuals are wider than
-    stated, so is the result. None where the pairs do not fix the matrix.
+    All that pairs of a whisk share is in their covariance, and the cameras' errors are what all
+    whisks share. Where the residuals are wider than stated, so is the result. None where the pairs
+    do not fix the matrix.
     """
     if not fixes_matrix(pairs):
         return None
@@ -62,8 +68,8 @@ def fit_matrix(pairs: Sequence[Pairs]) -> GaugeMatrix | None:
     matrix = np.linalg.lstsq(volts, _moments(pairs), rcond=None)[0].T
     for _ in range(_ROUNDS):
         solution = _solve([_normal_equations(p, matrix) for p in pairs])
-        matrix = solution.matrix
-    return GaugeMatrix(matrix, solution.covariance * widening(pairs, matrix))
+        matrix = solution.gauges.matrix
+    return solution.widened(widening(pairs, solution))
 
 
 def leave_out(pairs: Sequence[Pairs], fitted: GaugeMatrix) -> dict[str, GaugeMatrix | None]:
@@ -73,13 +79,13 @@ def leave_out(pairs: Sequence[Pairs], fitted: GaugeMatrix) -> dict[str, GaugeMat
     subtractions.
     """
     equations = [_normal_equations(p, fitted.matrix) for p in pairs]
-    wider = widening(pairs, fitted.matrix)
+    wider = widening(pairs, _solve(equations))
     without: dict[str, GaugeMatrix | None] = {}
     for name in dict.fromkeys(p.trial for p in pairs):
         without[name] = None
         if fixes_matrix([p for p in pairs if p.trial != name]):
             rest = _solve([part for p, part in zip(pairs, equations) if p.trial != name])
-            without[name] = GaugeMatrix(rest.matrix, rest.covariance * wider)
+            without[name] = rest.widened(wider)
     return without
 
 
@@ -94,19 +100,47 @@ def in_two_directions(vectors: np.ndarray) -> bool:
     return bool(weak > _LEAST_DIRECTION * strong)
 
 
+@dataclass(frozen=True)
+class _Solution:
+    """The coefficients of a regression, and the cameras' errors (k,) as it has them."""
+
+    gauges: GaugeMatrix
+    camera_errors: np.ndarray
+
+    def widened(self, factor: float) -> GaugeMatrix:
+        """Return the coefficients with their covariance times a factor of 1 or more."""
+        return replace(self.gauges, covariance=factor * self.gauges.covariance)
+
+
 def _normal_equations(p: Pairs, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal matrix (4, 4) and right-hand side (4,) of one whisk's pairs."""
+    """Return the normal matrix (4 + k, 4 + k) and right-hand side (4 + k,) of one whisk's pairs.
+
+    The unknowns are the coefficients and the k errors of the cameras.
+    """
     # moment of each pair over the coefficients, (2n, 4)
-    design = np.concatenate([np.kron(np.eye(2), v[None, :]) for v in p.volts])
+    by_coefficient = np.concatenate([np.kron(np.eye(2), v[None, :]) for v in p.volts])
+    design = np.hstack([by_coefficient, p.by_camera_error])
     weighted = design.T @ _weight(p, matrix)
     return weighted @ design, weighted @ p.moments.ravel()
 
 
-def _solve(equations: Sequence[tuple[np.ndarray, np.ndarray]]) -> GaugeMatrix:
-    """Solve summed normal equations for the coefficients with their covariance."""
-    covariance = np.linalg.inv(sum(normal for normal, _ in equations))
-    coefficients = covariance @ sum(right for _, right in equations)
-    return GaugeMatrix(coefficients.reshape(2, 2), covariance)
+def _solve(equations: Sequence[tuple[np.ndarray, np.ndarray]]) -> _Solution:
+    """Solve summed normal equations.
+
+    An error of the coefficients and the cameras' true errors are correlated as the posterior of
+    both is, with the other sign: what the pictures are off by, the coefficients make up for.
+    """
+    size = max(len(right) for _, right in equations)
+    normal = np.diag(np.repeat([0.0, 1.0], [4, size - 4]))
+    right = np.zeros(size)
+    for own_normal, own_right in equations:
+        own = len(own_right)  # 4 of moments that no camera saw
+        normal[:own, :own] += own_normal
+        right[:own] += own_right
+    covariance = np.linalg.inv(normal)
+    unknowns = covariance @ right
+    gauges = GaugeMatrix(unknowns[:4].reshape(2, 2), covariance[:4, :4], -covariance[:4, 4:])
+    return _Solution(gauges, unknowns[4:])
 
 
 def _weight(p: Pairs, matrix: np.ndarray) -> np.ndarray:
@@ -122,15 +156,18 @@ def _weight(p: Pairs, matrix: np.ndarray) -> np.ndarray:
     return np.linalg.inv(covariance + through @ p.volts_covariance @ through.T)
 
 
-def widening(pairs: Sequence[Pairs], matrix: np.ndarray) -> float:
+def widening(pairs: Sequence[Pairs], solution: _Solution) -> float:
     """Return by how much the residuals' squares exceed what was stated.
 
     It is 1 where they do so no more than chance allows. Sound sigmas, widened whenever chance makes
     the residuals large, would be too wide in the mean: 95 % intervals would hold in 97 %.
     """
-    squares = 0.0
+    matrix = solution.gauges.matrix
+    errors = solution.camera_errors
+    squares = errors @ errors
     for p in pairs:
-        residuals = p.residuals(matrix).ravel()
+        by_cameras = p.by_camera_error @ errors[: p.by_camera_error.shape[1]]
+        residuals = p.residuals(matrix).ravel() + by_cameras
         squares += residuals @ _weight(p, matrix) @ residuals
     freedom = 2 * sum(len(p) for p in pairs) - 4
     return squares / freedom if freedom > 0 and squares > chdtri(freedom, _CHANCE) else 1.0

@@ -49,10 +49,12 @@ class Pairs:
     """n pairs of moments and volts of one whisk.
 
     moments, volts (n, 2), in the follicle's axes and above the free stroke; their covariances (2n,
-    2n), of y and z pair by pair, with everything that the pairs share but scale_sigma, their common
-    share of error (that of the contact's place along the wire); theta_rad (n,). paper_moment, paper_volts (2,): the one
-    pair that the paper takes, (2) at one pushing angle; NaN where not reached. source: where the
-    moments come from.
+    2n), of y and z pair by pair, with everything that the pairs share but two: scale_sigma, their
+    common share of error (that of the contact's place along the wire), and by_camera_error (2n, k),
+    how the moments change with each unit error of the cameras, which other whisks share as well (k
+    is 0 where no camera saw them). theta_rad (n,). paper_moment, paper_volts (2,): the one pair
+    that the paper takes, (2) at one pushing angle; NaN where not reached. source: where the moments
+    come from.
     """
 
     trial: str
@@ -66,7 +68,13 @@ class Pairs:
     paper_moment: np.ndarray
     paper_volts: np.ndarray
     scale_sigma: float = 0.0
+    by_camera_error: np.ndarray | None = None
     source: str = SEEN
+
+    def __post_init__(self):
+        """Set no camera's error where none is given."""
+        if self.by_camera_error is None:
+            object.__setattr__(self, "by_camera_error", np.zeros((2 * len(self), 0)))
 
     def __len__(self) -> int:
         """Return the number of pairs."""
@@ -79,8 +87,9 @@ class Pairs:
     @property
     def moments_sigma(self) -> np.ndarray:
         """Return one standard deviation (n, 2) of the known moments, N·mm."""
-        own = np.sqrt(np.diag(self.moments_covariance)).reshape(-1, 2)
-        return np.hypot(own, self.scale_sigma * self.moments)
+        by_cameras = np.sum(self.by_camera_error**2, axis=1)
+        apart = np.sqrt(np.diag(self.moments_covariance) + by_cameras).reshape(-1, 2)
+        return np.hypot(apart, self.scale_sigma * self.moments)
 
 
 ON_TIME = Value(0.0, 0.0)  # rad
@@ -91,8 +100,8 @@ class ReferenceMoments:
     """Known moments (n, 2) in the hub's axes, with covariance (2n, 2n); touch and distance.
 
     motor_rad (n,): motor angles of the moments. scale_sigma: share by which all moments may be
-    wrong together; not in the covariance. late_rad: by what the motor is ahead of the volts of a
-    moment.
+    wrong together, by_camera_error (2n, k): how they change with each unit error of the cameras;
+    neither is in the covariance. late_rad: by what the motor is ahead of the volts of a moment.
     """
 
     touch_rad: float
@@ -102,6 +111,7 @@ class ReferenceMoments:
     moments: np.ndarray
     covariance: np.ndarray
     scale_sigma: float
+    by_camera_error: np.ndarray
     late_rad: Value = ON_TIME
 
 
@@ -151,7 +161,8 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
     by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
     by_place = _by_place(along, across, share.value, whisker)
     rows = np.repeat(good, 3)
-    of_places = d.covariance[np.ix_(rows, rows)]
+    by_camera_error_mm = d.by_camera_error_mm[rows]
+    of_places = d.covariance[np.ix_(rows, rows)] - by_camera_error_mm @ by_camera_error_mm.T
     by_arc, covariance = _common_and_own(by_place, of_places)
     scale_sigma = float(np.sum(by_arc * moments) / np.sum(moments**2))
     return ReferenceMoments(
@@ -165,6 +176,7 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
         + _common_cause(_FRICTION_SIGMA * by_friction)
         + _common_cause(by_share),
         scale_sigma=abs(scale_sigma),
+        by_camera_error=by_place @ by_camera_error_mm,
     )
 
 
@@ -271,6 +283,7 @@ def reference_from_nominal(
         moments,
         _common_cause(by_touch) + _common_cause(_FRICTION_SIGMA * by_friction),
         scale_sigma=trial.d_x_sigma_mm / trial.d_x_mm or NOMINAL_SHARE,
+        by_camera_error=np.zeros((moments.size, 0)),
     )
 
 
@@ -313,6 +326,7 @@ def _paired(
     rows = (2 * kept[:, None] + np.arange(2)).ravel()
     covariance = reference.covariance[np.ix_(rows, rows)]
     moments, covariance = _in_follicle(trial, reference.moments[kept], covariance)
+    turn = np.kron(np.eye(len(kept)), to_follicle(roll_rad))
     volts = np.array([reading.values for reading in readings])
     by_delay = volts / theta[:, None] * late.sigma
     return Pairs(
@@ -327,6 +341,7 @@ def _paired(
         paper_moment=to_follicle(roll_rad) @ [0.0, rigid_Nmm],
         paper_volts=stroke.at(wanted, touch).values,
         scale_sigma=reference.scale_sigma,
+        by_camera_error=turn @ reference.by_camera_error[rows],
     )
 
 

@@ -18,11 +18,14 @@ FROM_ALL = "all trials that can serve (--gauges-from-all)"
 class GaugeMatrix:
     """[m_y, m_z] in the follicle's axes = matrix · [y_V, z_V] above the free stroke.
 
-    matrix (2, 2), N·mm/V; covariance (4, 4) of its coefficients, row after row.
+    matrix (2, 2), N·mm/V; covariance (4, 4) of its coefficients, row after row. by_camera_error (4,
+    k): how they change with each unit error of the session's cameras, which is in the covariance; k
+    is 0 of gauges that are not from these cameras.
     """
 
     matrix: np.ndarray
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
+    by_camera_error: np.ndarray = field(default_factory=lambda: np.zeros((4, 0)))
 
     @property
     def sigma(self) -> np.ndarray:
@@ -31,7 +34,9 @@ class GaugeMatrix:
 
     def scaled(self, factor: float) -> "GaugeMatrix":
         """Return the matrix in another unit of stiffness."""
-        return GaugeMatrix(factor * self.matrix, factor**2 * self.covariance)
+        return GaugeMatrix(
+            factor * self.matrix, factor**2 * self.covariance, factor * self.by_camera_error
+        )
 
     def changes_at(self, volts: np.ndarray) -> np.ndarray:
         """Return the changes (4, 2) of the moment of `volts` (2,), each at one sigma of its cause.
@@ -41,12 +46,21 @@ class GaugeMatrix:
         """
         variances, axes = np.linalg.eigh(self.covariance)
         root = axes * np.sqrt(np.maximum(variances, 0.0)) @ axes.T
-        return root @ np.kron(np.eye(2), np.asarray(volts)[None, :]).T
+        return root @ _design(volts).T
+
+    def by_camera_error_at(self, volts: np.ndarray) -> np.ndarray:
+        """Return how the moment of `volts` (2,) changes with each unit error of the cameras, (k, 2)."""
+        return (_design(volts) @ self.by_camera_error).T
 
     def covariance_at(self, volts: np.ndarray) -> np.ndarray:
         """Return the covariance (2, 2) that the coefficients' gives to the moment of `volts` (2,)."""
         changes = self.changes_at(volts)
         return changes.T @ changes
+
+
+def _design(volts: np.ndarray) -> np.ndarray:
+    """Return the derivatives (2, 4) of the moment of `volts` (2,) by the coefficients."""
+    return np.kron(np.eye(2), np.asarray(volts)[None, :])
 
 
 @dataclass(frozen=True)

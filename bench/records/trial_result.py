@@ -55,8 +55,9 @@ class Deflection:
     It is known by the wire alone, in a whisk without a truth too. Each array is (frames,).
     slip_mm: along the bar. past_mm: how far the whisker's material has moved along itself past the
     bar, from any zero (rolling is no such motion). covariance (3 frames, 3 frames): of along_mm,
-    across_z_mm and across_y_mm, frame by frame. touch_rad, d_x_mm: by the fit, which need not be
-    known as well as a truth is.
+    across_z_mm and across_y_mm, frame by frame; by_camera_error_mm (3 frames, k): how these change
+    with each unit error of the session's cameras, which is in the covariance. touch_rad, d_x_mm: by
+    the fit, which need not be known as well as a truth is.
     """
 
     theta_rad: np.ndarray
@@ -68,6 +69,7 @@ class Deflection:
     across_z_mm: np.ndarray
     past_mm: np.ndarray
     covariance: np.ndarray
+    by_camera_error_mm: np.ndarray
     touch_rad: Value
     d_x_mm: float
 
@@ -281,7 +283,8 @@ class FeltWhisk:
     theta_sigma_rad: of the pushing angle, which the gauges' delay does not move as it does the
     touch. covariance_at (2, 2): of the moments. theta_moment_covariance_at (2,): of the pushing
     angle with the moments. shared_Nmm (k, 2): change of the moments at one sigma of each cause
-    that all whisks have in common. agreement_chi2: of the moments less those of the seen shape,
+    that all whisks have in common; by_camera_error_Nmm (k, 2): of it, with each unit error of the
+    cameras that calibrated the gauges. agreement_chi2: of the moments less those of the seen shape,
     2 degrees of freedom. apart: they disagree, or the recording contradicts itself elsewhere, and
     nothing is concluded from the whisk. one_factor: estimates with one gauge factor a channel.
     by_theta: moments and estimates at other pushing angles, up to the stroke's end. delay_s: of
@@ -299,6 +302,7 @@ class FeltWhisk:
     covariance_at: np.ndarray | None = None
     theta_moment_covariance_at: np.ndarray | None = None
     shared_Nmm: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    by_camera_error_Nmm: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     status: Reason = NO_REASON
     saturated: int = 0
     agreement_chi2: float = NAN

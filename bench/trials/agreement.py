@@ -57,9 +57,8 @@ def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> Mo
     weights = pairs.theta_rad / (pairs.theta_rad @ pairs.theta_rad)  # (n,): slope through zero
     volts = weights @ pairs.volts
     seen = weights @ pairs.moments
-    covariance = _covariance(pairs, gauges, weights)
     scale = pairs.scale_sigma**2 + scale_sigma**2
-    covariance += gauges.covariance_at(volts) + scale * np.outer(seen, seen)
+    covariance = _covariance(pairs, gauges, weights) + scale * np.outer(seen, seen)
     felt = gauges.matrix @ volts
     difference = Difference(felt - seen, np.linalg.inv(covariance), 2)
     chi2 = difference.chi2
@@ -76,11 +75,21 @@ def agreement(pairs: Pairs, gauges: GaugeMatrix, scale_sigma: float = 0.0) -> Mo
 
 
 def _covariance(pairs: Pairs, gauges: GaugeMatrix, weights: np.ndarray) -> np.ndarray:
-    """Return the covariance (2, 2) of the slopes, felt less seen, from the pairs' own."""
+    """Return the covariance (2, 2) of the slopes, felt less seen, from the pairs and the gauges.
+
+    The cameras' errors are in both, and partly cancel.
+    """
     to_moments = np.kron(np.eye(len(pairs)), gauges.matrix)  # (2n, 2n)
     of_slopes = np.kron(weights, np.eye(2))  # (2, 2n)
     felt = to_moments @ pairs.volts_covariance @ to_moments.T
-    return of_slopes @ (pairs.moments_covariance + felt) @ of_slopes.T
+    volts = weights @ pairs.volts
+    felt_by_cameras = gauges.by_camera_error_at(volts).T
+    seen_by_cameras = of_slopes @ pairs.by_camera_error
+    apart = seen_by_cameras.copy()
+    apart[:, : felt_by_cameras.shape[1]] -= felt_by_cameras
+    of_gauges = gauges.covariance_at(volts) - felt_by_cameras @ felt_by_cameras.T
+    own = of_slopes @ (pairs.moments_covariance + felt) @ of_slopes.T
+    return own + of_gauges + apart @ apart.T
 
 
 def _exchanges(volts: np.ndarray, matrix: np.ndarray) -> Iterator[Cause]:

@@ -1,7 +1,15 @@
-"""Truth and estimate of every whisk: error = estimate − truth, always; per cent of the true d_x."""
+"""Truth and estimate of every whisk: error = estimate − truth, always; per cent of the true d_x.
+
+Gauges that were calibrated by the session's own cameras have the cameras' errors in them, and so has
+an estimate. A rig frame that lies ε farther from the bar than it is makes the truth ε too long. It
+makes the moments of a gauge trial, 3 EI δ / d_x² of the deflection δ, smaller by 2 ε / d_x, and with
+them the gauges; an estimate, which goes as 1 / moment, is then 2 ε too long. Lengths that are all
+too long by one share make both too long by it. So truth and estimate err together, and the sigma of
+their difference is not that of two independent errors.
+"""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,8 +21,9 @@ from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialR
 class Judged:
     """One estimate with its truth, which is NaN where there is none.
 
-    beta_deg: the slope as seen, else the nominal one. one_factor: made with one gauge factor a
-    channel. status: the estimate's. has_warning: the whisk itself has a warning.
+    beta_deg: the slope as seen, else the nominal one. covariance_mm2: of estimate and truth, by the
+    errors of the cameras. one_factor: made with one gauge factor a channel. status: the estimate's.
+    has_warning: the whisk itself has a warning.
     """
 
     trial: str
@@ -28,6 +37,7 @@ class Judged:
     d_x_sigma_mm: float
     d_x_est_mm: float
     d_x_est_sigma_mm: float
+    covariance_mm2: float = 0.0
     one_factor: bool = False
     status: str = ""
     has_warning: bool = False
@@ -43,9 +53,15 @@ class Judged:
         return 100.0 * self.error_mm / self.d_x_mm
 
     @property
-    def error_sigma_percent(self) -> float:
+    def error_sigma_mm(self) -> float:
         """Return the error's stated standard deviation, that of estimate and truth together."""
-        return 100.0 * float(np.hypot(self.d_x_est_sigma_mm, self.d_x_sigma_mm)) / self.d_x_mm
+        apart = self.d_x_est_sigma_mm**2 + self.d_x_sigma_mm**2
+        return float(np.sqrt(apart - 2.0 * self.covariance_mm2))
+
+    @property
+    def error_sigma_percent(self) -> float:
+        """Return the error's stated standard deviation, per cent of the truth."""
+        return 100.0 * self.error_sigma_mm / self.d_x_mm
 
 
 def is_sound(seen: SeenWhisk, felt: FeltWhisk) -> bool:
@@ -78,15 +94,29 @@ def judge(results: Iterable[TrialResult]) -> list[Judged]:
     for result, seen, felt in whisks(results):
         has_warning = not is_sound(seen, felt)
         for row in felt.estimates:
-            found.append(_judged(result, seen, row, one_factor=False, has_warning=has_warning))
+            judged = _judged(result, seen, row, has_warning=has_warning)
+            found.append(replace(judged, covariance_mm2=_covariance_mm2(seen, felt, row)))
         for row in felt.one_factor:
-            found.append(_judged(result, seen, row, one_factor=True, has_warning=has_warning))
+            judged = _judged(result, seen, row, has_warning=has_warning)
+            found.append(replace(judged, one_factor=True))
     return found
 
 
-def _judged(
-    result: TrialResult, seen: SeenWhisk, row: EstimateRow, *, one_factor: bool, has_warning: bool
-) -> Judged:
+def _covariance_mm2(seen: SeenWhisk, felt: FeltWhisk, row: EstimateRow) -> float:
+    """Return the covariance of estimate and truth, mm², by the errors of the cameras.
+
+    An estimate goes as 1 / moment. How the moment turns is left out: a placement that is off along
+    the whisker, or a scale, changes its size alone.
+    """
+    if seen.truth.shared is None or not len(felt.by_camera_error_Nmm):
+        return 0.0
+    moment_Nmm = np.array([felt.m_y_Nmm.value, felt.m_z_Nmm.value])
+    by_share = felt.by_camera_error_Nmm @ moment_Nmm / (moment_Nmm @ moment_Nmm)
+    of_truth_mm = seen.truth.shared.d_x_by_camera_error_mm
+    return float(-row.d_x_est_mm.value * by_share @ of_truth_mm)
+
+
+def _judged(result: TrialResult, seen: SeenWhisk, row: EstimateRow, *, has_warning: bool) -> Judged:
     """Return one estimate with its truth."""
     trial = result.trial
     return Judged(
@@ -101,7 +131,6 @@ def _judged(
         float(seen.d_x_mm.sigma),
         float(row.d_x_est_mm.value),
         float(row.d_x_est_mm.sigma),
-        one_factor,
-        row.status,
-        has_warning,
+        status=row.status,
+        has_warning=has_warning,
     )

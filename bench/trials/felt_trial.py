@@ -100,6 +100,7 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
         felt,
         status=_beyond_calibration(unit, readout, usable),
         shared_Nmm=readout.shared_Nmm(usable),
+        by_camera_error_Nmm=readout.by_camera_error_Nmm(usable),
         phases=phases_of(unit.trial, stroke, touch, readout, seen, usable.beam),
         one_factor=_one_factor(unit, kind, stroke),
         with_drift=_with_drift(unit, stroke, readout),

@@ -68,6 +68,14 @@ class Readout:
         moments = [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
         return self._shared_changes(np.linalg.solve(self.matrix, moments))
 
+    def by_camera_error_Nmm(self, whisk: Whisk) -> np.ndarray:
+        """Return how a whisk's moments change with each unit error of the cameras that the gauges
+        were calibrated with, (k, 2); it is part of `shared_Nmm`.
+        """
+        moments = [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
+        channels = np.linalg.solve(self.matrix, moments)
+        return self.gauges.by_camera_error_at(channels) @ to_follicle(self.roll_rad)
+
     def _shared_changes(self, channels: np.ndarray) -> np.ndarray:
         """Return the change (5, 2) of the moments of `channels` (2,) at one sigma of each cause."""
         by_gauges = self.gauges.changes_at(channels) @ to_follicle(self.roll_rad)

@@ -299,6 +299,7 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
     theta = smooth.theta_rad[chosen]
     touch = float(motor[0] - theta[0])
     x, y, _ = frames.point_mm.value[shown].T
+    rows = _by_parameter(smooth, chosen)
     return Deflection(
         theta_rad=theta,
         motor_rad=motor,
@@ -308,18 +309,18 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
         across_y_mm=smooth.values["across_y"][chosen],
         across_z_mm=smooth.values["d_z"][chosen],
         past_mm=np.cos(touch) * x + np.sin(touch) * y - smooth.d_x_mm - frames.arc_mm[shown],
-        covariance=_deflection_covariance(smooth, chosen),
+        covariance=rows @ smooth.covariance @ rows.T,
+        by_camera_error_mm=rows @ smooth.by_camera_error,
         touch_rad=Value(touch, float(frames.theta_rad.sigma[shown[0]])),
         d_x_mm=smooth.d_x_mm,
     )
 
 
-def _deflection_covariance(smooth: Smooth, chosen: np.ndarray) -> np.ndarray:
-    """Return the covariance (3n, 3n) of along_mm, across_z_mm and across_y_mm of n chosen frames."""
+def _by_parameter(smooth: Smooth, chosen: np.ndarray) -> np.ndarray:
+    """Return the derivatives (3n, p) of along_mm, across_z_mm and across_y_mm of n chosen frames."""
     names = ("along", "d_z", "across_y")
     jacobian = np.stack([smooth.jacobians[name][chosen] for name in names], axis=1)
-    rows = jacobian.reshape(3 * len(chosen), -1)
-    return rows @ smooth.covariance @ rows.T
+    return jacobian.reshape(3 * len(chosen), -1)
 
 
 def _overlay(truth: WhiskTruth, theta_rad: float) -> dict[str, Drawing]:

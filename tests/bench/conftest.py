@@ -102,6 +102,7 @@ def _smooth(theta, touching, values, d_x) -> Smooth:
         own,
         SIGMA_MM**2 * np.eye(n * kinds),
         np.zeros((n * kinds, n * kinds)),
+        np.zeros((n * kinds, 0)),
         d_x,
     )
 

@@ -26,12 +26,18 @@ class Uncertainty:
     """Covariances of the fit's parameters, (size, size) each.
 
     inverse_normal: (JᵀWJ)⁻¹, the factor of JᵀW in the parameters' sensitivity to observations.
-    noise, lens: covariances, by the observations' and priors' own errors and by the cameras'.
+    noise: the covariance by the observations' and priors' own errors. by_camera_error (size, k):
+    how the parameters change with each unit error of the cameras (`Cameras.by_error`).
     """
 
     inverse_normal: np.ndarray
     noise: np.ndarray
-    lens: np.ndarray
+    by_camera_error: np.ndarray
+
+    @property
+    def lens(self) -> np.ndarray:
+        """Return the covariance by the cameras' errors."""
+        return self.by_camera_error @ self.by_camera_error.T
 
     @property
     def covariance(self) -> np.ndarray:
@@ -47,10 +53,9 @@ def uncertainty(problem: Problem, state: State, inverse_normal: np.ndarray) -> U
     are propagated with their correlation.
     """
     by_row = inverse_normal @ weighted_jacobian(problem, state).T
-    by_camera = by_lens(problem, state, inverse_normal)
     noise = times_residual_covariance(problem, by_row) @ by_row.T
-    lens = by_camera @ problem.cameras.covariance @ by_camera.T
-    return Uncertainty(inverse_normal, noise, lens)
+    by_camera_error = by_lens(problem, state, inverse_normal) @ problem.cameras.by_error
+    return Uncertainty(inverse_normal, noise, by_camera_error)
 
 
 def times_residual_covariance(problem: Problem, rows: np.ndarray) -> np.ndarray:

@@ -133,6 +133,17 @@ def camera_matrix(lens: np.ndarray) -> np.ndarray:
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
 
 
+def _symmetric_root(covariance: np.ndarray) -> np.ndarray:
+    """Return a root R (n, n), with R Rᵀ equal to a covariance (n, n).
+
+    Parameters are in px, rad and mm: each is counted in its own sigma meanwhile.
+    """
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    scale = np.where(sigma > 0.0, sigma, 1.0)
+    variances, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return scale[:, None] * (axes * np.sqrt(np.maximum(variances, 0.0))) @ axes.T
+
+
 def _require_finite(name: str, value, shape: tuple[int, ...]) -> np.ndarray:
     """Return a read-only copy of `value`; raise Refused unless it is of this shape and finite."""
     array = np.array(value, dtype=float)
@@ -153,11 +164,15 @@ class Cameras:
     of zeros is a parameter held fixed. Left out, everything is taken as exact.
     placement (6, 6): the part of it that is the rig frame's own, of a rotation w (rad) and shift v
     (mm) that all cameras share, x = Exp(w) x_rig + v; None where it is not known.
+    by_error (15 n, k): how the parameters change with each of k independent errors of unit
+    variance, which make the covariance. Some of a rig's cameras have the errors of all of them, so
+    that what was measured by different cameras of one rig has its errors in common.
     """
 
     cameras: tuple[Camera, ...]
     covariance: np.ndarray = field(default=None)
     placement: np.ndarray | None = None
+    by_error: np.ndarray | None = None
 
     def __post_init__(self):
         """Raise Refused where names are used twice or a covariance cannot be."""
@@ -183,6 +198,8 @@ class Cameras:
         covariance.setflags(write=False)
         object.__setattr__(self, "covariance", covariance)
         object.__setattr__(self, "placement", self._known_placement())
+        if self.by_error is None:
+            object.__setattr__(self, "by_error", _symmetric_root(covariance))
 
     def _known_placement(self) -> np.ndarray | None:
         """Return the placement's covariance (6, 6), 0 for exact cameras; raise Refused where it
@@ -248,7 +265,8 @@ class Cameras:
         indices = np.arange(len(self.covariance))
         rows = np.concatenate([indices[self.parameters_of(name)] for name in names])
         covariance = self.covariance[np.ix_(rows, rows)]
-        return Cameras(tuple(self[name] for name in names), covariance, self.placement)
+        some = tuple(self[name] for name in names)
+        return Cameras(some, covariance, self.placement, self.by_error[rows])
 
     def moved(self, step: np.ndarray) -> "Cameras":
         """Return the cameras with all parameters changed by `step` (15 n,), in the same order, and

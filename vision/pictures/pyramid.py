@@ -37,7 +37,8 @@ def shrunk_cameras(cameras: Cameras, scale: int) -> Cameras:
     all_by_px = np.tile(by_px, len(cameras))
     covariance = cameras.covariance * np.outer(all_by_px, all_by_px)
     shrunk = tuple(_shrunk_camera(camera, scale) for camera in cameras)
-    return Cameras(shrunk, covariance, cameras.placement)
+    by_error = all_by_px[:, None] * cameras.by_error
+    return Cameras(shrunk, covariance, cameras.placement, by_error)
 
 
 def _shrunk_camera(camera: Camera, scale: int) -> Camera:

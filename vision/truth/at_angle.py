@@ -61,6 +61,7 @@ class Smooth:
     part of it that all whisks of a session share.
 
     d_x_mm: radial distance by the fit, which need not be known as well as a truth is.
+    by_camera_error (p, k): how the parameters change with each unit error of the session's cameras.
     """
 
     theta_rad: np.ndarray
@@ -69,6 +70,7 @@ class Smooth:
     jacobians: dict[str, np.ndarray]
     covariance: np.ndarray
     shared_covariance: np.ndarray
+    by_camera_error: np.ndarray
     d_x_mm: float = NAN
 
 

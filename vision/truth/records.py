@@ -86,6 +86,8 @@ class SeenObject:
 class SharedSigmas:
     """Standard deviations of the errors that all whisks of a session have in common, by diameters,
     light, cameras, placement and the clock: parts of the sigmas of a whisk's truth. point_mm (3,).
+    d_x_by_camera_error_mm (k,): how d_x changes with each unit error of the session's cameras, by
+    which it is correlated with what else was measured with them.
     """
 
     touch_rad: float
@@ -93,6 +95,7 @@ class SharedSigmas:
     beta_rad: float
     psi_rad: float
     point_mm: np.ndarray
+    d_x_by_camera_error_mm: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)

@@ -121,6 +121,8 @@ def _shared_sigmas(
         beta_rad=sigma("beta"),
         psi_rad=sigma("psi"),
         point_mm=np.array([sigma(name) for name in _VECTORS]),
+        d_x_by_camera_error_mm=fitted.by_parameter.whisk["d_x"]
+        @ fitted.uncertainty.by_camera_error,
     )
 
 
@@ -279,6 +281,7 @@ def _smooth(fitted: FittedWhisk, shared: np.ndarray) -> Smooth:
         {name: by_parameter.frame[name][touching] for name in names},
         fitted.covariance,
         shared,
+        fitted.uncertainty.by_camera_error,
         float(measured.whisk["d_x"]),
     )
 

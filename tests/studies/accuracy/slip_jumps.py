@@ -75,7 +75,10 @@ def told(
     own = {name: SIGMAS[of] * np.eye(count, count + 1) for name, of in names.items()}
     covariance = np.diag([1.0] * count + [TOUCH_SIGMA_RAD**2])
     shown = theta_rad + TOUCH_SIGMA_RAD * rng.standard_normal()
-    smooth = Smooth(shown, np.eye(count + 1)[-1], values, own, covariance, 0.0 * covariance)
+    no_cameras = np.zeros((count + 1, 0))
+    nothing = 0.0 * covariance
+    touch_jacobian = np.eye(count + 1)[-1]
+    smooth = Smooth(shown, touch_jacobian, values, own, covariance, nothing, no_cameras)
     return at_angle(smooth, wanted_rad, "")
 
 

@@ -7,13 +7,23 @@ from vision.truth.at_angle import Smooth, _between_frames_sigma, at_angle, scatt
 from vision.truth.value import FIELDS
 
 THETA_RAD = np.radians(np.arange(0.5, 6.0, 0.5))
+# An angle asks nothing of the cameras' errors.
+NO_CAMERAS = np.zeros((0, 0))
 
 
 def frames(covariance: np.ndarray, values: np.ndarray, name: str) -> Smooth:
     """Each frame's value is one of the parameters."""
     size = len(THETA_RAD)
     jacobian = {name: np.eye(size)}
-    return Smooth(THETA_RAD, np.zeros(size), {name: values}, jacobian, covariance, 0.0 * covariance)
+    return Smooth(
+        THETA_RAD,
+        np.zeros(size),
+        {name: values},
+        jacobian,
+        covariance,
+        0.0 * covariance,
+        NO_CAMERAS,
+    )
 
 
 @pytest.mark.parametrize("shared", [0.0, 0.8])
@@ -68,6 +78,7 @@ def test_frames_in_step_with_teeth_are_told_by_those_further_away(first):
         {"phi": np.eye(len(theta))},
         1e-6 * np.eye(len(theta)),
         np.zeros((len(theta), len(theta))),
+        NO_CAMERAS,
     )
     assert _between_frames_sigma(smooth, "phi", np.radians(3.0)) > 0.01
 
@@ -98,7 +109,7 @@ def test_what_jumps_holds_the_jump_in_its_sigma(step_deg):
         shown = theta + TOUCH_RAD * rng.standard_normal()
         touch_jacobian = np.eye(size + 1)[-1]
         shared = np.diag([0.0] * size + [TOUCH_RAD**2])
-        smooth = Smooth(shown, touch_jacobian, values, own, covariance, shared)
+        smooth = Smooth(shown, touch_jacobian, values, own, covariance, shared, NO_CAMERAS)
         at = at_angle(smooth, wanted, "")
         assert 0.0 < at.slip_shared_mm <= at.slip_mm.sigma
         assert "slips_in_jumps" in at.status.codes and at.theta_rad == wanted
