@@ -325,6 +325,12 @@ _TABLE = (
         _MEASURE_BOARD,
     ),
     Status(
+        "board_stretched",
+        WARNING,
+        "the board's print is longer along one direction than stretch_sigma lets it be",
+        "measure many squares along x and along y; print without scaling, or state the difference",
+    ),
+    Status(
         "bar_width_unlike_board",
         WARNING,
         "the bar looks thicker or thinner than said, or the board's squares are",

@@ -65,7 +65,7 @@ def calibrate_cameras_command(
         lengths, warnings = check_scale(loaded, calibration.cameras)
     measured = measure_held_out(loaded, views)
     lines = [*report_lines(calibration), *lengths, *held_out_lines(measured, calibration)]
-    warnings = [*views.notes, *warnings, *_corner_warnings(calibration)]
+    warnings = [*views.notes, *calibration.warnings, *warnings, *_corner_warnings(calibration)]
     return _write(out, calibration.cameras, lines, warnings)
 
 

@@ -32,14 +32,17 @@ from vision.boards import camera_moved, estimate_optics, refine_corners
 from vision.calibration import Placement, by_board, move_rig_frame, read_cameras
 from vision.geometry import (
     NO_REASON,
+    PRINT_TERMS,
     Board,
     Cameras,
     Reason,
     Refused,
+    apply,
     compose,
     counted,
     invert_transform,
     log_rotation,
+    printed_corners,
     skew,
 )
 
@@ -60,7 +63,8 @@ class SessionCalibration:
 
     cameras: None where the session has no pictures. background: the scene by camera, None where
     there is no such picture. hash: of both. notes: lines on what they rest on. T_rig_board: where
-    the board on the rig stands in the cameras' frame, (3, 4) mm, None where not known.
+    the board on the rig stands in the cameras' frame, (3, 4) mm, None where not known. board_print:
+    PRINT_TERMS of the board. warnings: where the board's views contradict what is stated.
     """
 
     cameras: Cameras | None
@@ -68,6 +72,8 @@ class SessionCalibration:
     hash: str
     notes: tuple[str, ...] = ()
     T_rig_board: np.ndarray | None = None
+    board_print: tuple[float, ...] = (0.0,) * len(PRINT_TERMS)
+    warnings: tuple[Reason, ...] = ()
 
     def with_notes(self, *notes: str) -> "SessionCalibration":
         """Return the calibration with more notes."""
@@ -84,10 +90,11 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
     if session.cameras_toml:
         with refused_as_bad_input("cameras.toml"):
             cameras = read_cameras(session.cameras_toml)
-        notes = ["cameras as given in cameras.toml"]
-        T_rig_board = session.T_rig_board
+        notes = ("cameras as given in cameras.toml",)
+        known = SessionCalibration(cameras, {}, "", notes, session.T_rig_board)
     else:
-        cameras, notes, T_rig_board = _from_boards(session, out / "calibration")
+        known = _from_boards(session, out / "calibration")
+        cameras = known.cameras
     missing = [name for name in session.camera_names if name not in cameras]
     if missing:
         found = f"has no camera {missing[0]}, which has frames; calibrate it"
@@ -95,9 +102,9 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
     background = {name: _background(session, name) for name in cameras.names}
     cameras = _with_optics(cameras, background, session.board)
     of_cameras = [[c, cameras.covariance, cameras.placement] for c in cameras.cameras]
-    made = hash_of(of_cameras, list(background.values()))
-    notes = (*notes, *_optics_notes(cameras))
-    return SessionCalibration(cameras, background, made, notes, T_rig_board)
+    made = hash_of(of_cameras, list(background.values()), known.board_print)
+    known = replace(known, cameras=cameras, background=background, hash=made)
+    return known.with_notes(*_optics_notes(cameras))
 
 
 def _with_optics(
@@ -172,8 +179,8 @@ def _step(T_from_to: np.ndarray, covariance: np.ndarray) -> Placement:
     return Placement(np.append(log_rotation(T_from_to[:, :3]), T_from_to[:, 3]), covariance)
 
 
-def _from_boards(session: Session, folder: Path) -> tuple[Cameras, list[str], np.ndarray | None]:
-    """Return cameras kept in `folder`, or calibrated there, notes and where the rig's board stands.
+def _from_boards(session: Session, folder: Path) -> SessionCalibration:
+    """Return the calibration kept in `folder`, or made there, without backgrounds and hash.
 
     The cameras are those that the file holds, in every run.
     """
@@ -184,7 +191,15 @@ def _from_boards(session: Session, folder: Path) -> tuple[Cameras, list[str], np
     if not (kept and kept.get("hash") == key and (folder / "cameras.toml").is_file()):
         kept = _calibrate_into(session, folder, key)
     T_rig_board = None if kept["T_rig_board"] is None else np.array(kept["T_rig_board"])
-    return read_cameras(folder / "cameras.toml"), kept["notes"], T_rig_board
+    return SessionCalibration(
+        cameras=read_cameras(folder / "cameras.toml"),
+        background={},
+        hash="",
+        notes=tuple(kept["notes"]),
+        T_rig_board=T_rig_board,
+        board_print=tuple(kept["board_print"]),
+        warnings=tuple(Reason(code, sentence) for code, sentence in kept["warnings"]),
+    )
 
 
 def _calibrate_into(session: Session, folder: Path, key: str) -> dict:
@@ -197,7 +212,15 @@ def _calibrate_into(session: Session, folder: Path, key: str) -> dict:
     folder.mkdir(parents=True, exist_ok=True)
     write_cameras(folder / "cameras.toml", cameras)
     notes = [*report_lines(made), *([note] if note else []), *lengths, *warnings]
-    kept = plain({"hash": key, "notes": notes, "T_rig_board": T_rig_board})
+    kept = plain(
+        {
+            "hash": key,
+            "notes": notes,
+            "T_rig_board": T_rig_board,
+            "board_print": made.board,
+            "warnings": [part for warning in made.warnings for part in warning.parts],
+        }
+    )
     write_result(folder / "cameras.json", kept)
     return kept
 
@@ -294,10 +317,11 @@ def _move_of(
     """Return what to say of a camera that moved; nothing where it did not."""
     camera = calibration.cameras[name]
     T = calibration.T_rig_board
-    points = session.board.corners_mm @ T[:, :3].T + T[:, 3]
+    printed_mm, _ = printed_corners(session.board.corners_mm, np.array(calibration.board_print))
+    points = apply(T, printed_mm)
     corners = refine_corners(grey, camera.project(points), np.arange(len(points)), session.board)
     try:
-        shift_px, sigma_px = camera_moved(camera, corners, session.board, T)
+        shift_px, sigma_px = camera_moved(camera, corners, points)
     except Refused:
         return NO_REASON
     if shift_px <= max(_MOVED_PX, _MOVED_SIGMAS * sigma_px):

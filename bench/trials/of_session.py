@@ -118,8 +118,10 @@ def units_in_rig(
     session: Session, units: Sequence[Unit], pool: Workers, problems: InputProblems
 ) -> tuple[SessionCalibration, list[Unit]]:
     """Return the cameras in the rig frame of board and free strokes, and the units with these.
-    Raise BadInput.
+
+    What the board's views contradict is a warning in `problems`. Raises BadInput.
     """
+    problems.warnings += units[0].calibration.warnings
     calibration = place_rig(session, units[0].calibration, units, pool, problems)
     return calibration, [replace(unit, calibration=calibration) for unit in units]
 

@@ -10,10 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from vision.boards.corners import Corners
-from vision.geometry.board import Board
 from vision.geometry.camera import Camera
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import apply
 
 # [sigma] Beyond, a frame's corner is another thing than the rig picture's: one Gaussian corner in
 # 8000 is, on either axis. Derived.
@@ -58,22 +56,20 @@ def _mean_corner(
     return precision @ px[is_near] / precision.sum(), float(precision.sum() ** -0.5)
 
 
-def camera_moved(
-    camera: Camera, corners: Corners, board: Board, T_rig_board: np.ndarray
-) -> tuple[float, float]:
+def camera_moved(camera: Camera, corners: Corners, board_mm: np.ndarray) -> tuple[float, float]:
     """Return how far the rig board has moved in this camera's picture, px, and one sigma of it.
 
-    A small motion of the camera (turn and shift) is fitted to where the corners are now; the shift
-    is what that motion does to them, root mean square. Corners that do not follow the rest (hidden,
-    disturbed) are left out. Raises Refused with fewer than six corners.
+    board_mm (m, 3): the board's corners as printed, in the rig frame. A small motion of the camera
+    (turn and shift) is fitted to where the corners are now; the shift is what that motion does to
+    them, root mean square. Corners that do not follow the rest (hidden, disturbed) are left out.
+    Raises Refused with fewer than six corners.
     """
     if len(corners) < _FEWEST_CORNERS:
         raise Refused(
             f"camera {camera.name}: {len(corners)} corners of the rig board in view, "
             f"{_FEWEST_CORNERS} are needed to tell whether it moved"
         )
-    points_mm = apply(T_rig_board, board.corners_mm[corners.ids])
-    px, _, by_camera = camera.project_with_jacobians(points_mm)
+    px, _, by_camera = camera.project_with_jacobians(board_mm[corners.ids])
     J = by_camera[:, :, 9:]  # (n, 2, 6) by the camera's pose
     residual = corners.px - px
     sigma_px = np.hypot(corners.sigma_px, np.nan_to_num(camera.rms_px) / np.sqrt(2))

@@ -4,7 +4,7 @@ from them.
 Every observation is a corner of the board, seen by one camera in one view. Parameters:
 
 - of each camera, CAMERA_COLUMNS: nine of the lens, w and v of its pose, clock offset (16);
-- of the board, BOARD_COLUMNS: relative size, warp along x and y (3);
+- of the board, PRINT_TERMS: relative size, stretch, warp along x and y (4);
 - of each view: w and v of the board's pose (6);
 - where the board moves and cameras are not triggered together, of each picture: how late it is (1).
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from vision.calibration.board_motion import Trajectory
 from vision.geometry import lens as lens_model
+from vision.geometry.board import PRINT_TERMS, printed_corners
 from vision.geometry.rotation import exp_rotation, left_jacobian, skew
 from vision.geometry.rows import Rows
 
@@ -31,9 +32,8 @@ CAMERA_COLUMNS = (
     "v_z",
     "clock_offset_s",
 )
-BOARD_COLUMNS = ("scale", "warp_x_mm", "warp_y_mm")
 N_CAMERA = len(CAMERA_COLUMNS)
-N_BOARD = len(BOARD_COLUMNS)
+N_BOARD = len(PRINT_TERMS)
 # [parameters] A layout, no threshold.
 N_VIEW = 6
 # [columns] A layout, no threshold.
@@ -70,7 +70,7 @@ class Sightings(Rows):
 class BundleState:
     """All parameters.
 
-    lens (C, 9). T_camera_world (C, 3, 4). T_world_board (V, 3, 4). board (3,): BOARD_COLUMNS. clock
+    lens (C, 9). T_camera_world (C, 3, 4). T_world_board (V, 3, 4). board (4,): PRINT_TERMS. clock
     (C,): offset, s. instants (V, C): how much later than it should each picture was taken, s.
     trajectory: the views in time, along which the board moves between pictures of one view; None
     where cameras are triggered together.
@@ -92,7 +92,7 @@ class BundleState:
             object.__setattr__(self, "instants", np.zeros((len(self.T_world_board), cameras)))
 
     def global_values(self) -> np.ndarray:
-        """Return the values that priors constrain, (16 C + 3,); poses stand as 0."""
+        """Return the values that priors constrain, (16 C + 4,); poses stand as 0."""
         per_camera = np.zeros((len(self.lens), N_CAMERA))
         per_camera[:, :9] = self.lens
         per_camera[:, CLOCK] = self.clock
@@ -101,7 +101,7 @@ class BundleState:
     def move(
         self, global_step: np.ndarray, view_steps: np.ndarray, instant_steps: np.ndarray
     ) -> "BundleState":
-        """Return the state moved by steps (16 C + 3,), (V, 6) and (V, C)."""
+        """Return the state moved by steps (16 C + 4,), (V, 6) and (V, C)."""
         cameras = global_step[:-N_BOARD].reshape(-1, N_CAMERA)
         return replace(
             self,
@@ -125,7 +125,7 @@ def _move_poses(T: np.ndarray, steps: np.ndarray) -> np.ndarray:
 class Priors:
     """What is known besides the pictures, and what is held.
 
-    free (16 C + 3,): bool. mean, sigma (16 C + 3,): of independent observations of the global
+    free (16 C + 4,): bool. mean, sigma (16 C + 4,): of independent observations of the global
     parameters, sigma inf where there is none (poses: always inf). view_free (V,): bool. pose_view,
     pose_T (3, 4), pose_sigma (6,): one view whose pose was measured (the board on the rig), in w
     rad and v mm; pose_view is None where there is none. late_sigma_s (C,): how far a picture's instant
@@ -145,12 +145,12 @@ class Priors:
 def predict(
     state: BundleState, seen: Sightings, corners_mm: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Predict the pixels (n, 2) of all sightings, and their Jacobian (n, 2, 25 or 37).
+    """Predict the pixels (n, 2) of all sightings, and their Jacobian (n, 2, 26 or 38).
 
-    Its columns: the camera's 16, the board's 3, the view's 6; with a trajectory also the 6 of
+    Its columns: the camera's 16, the board's 4, the view's 6; with a trajectory also the 6 of
     the view before and the 6 of the view after.
     """
-    points_mm, by_board = _printed_board(state.board, corners_mm)
+    points_mm, by_board = printed_corners(corners_mm, state.board)
     motion = _board_motion(state, seen)
     placed = _place_corners(state, seen, motion, points_mm)
     px, by_x, by_lens = _project(state, seen.camera, placed.in_camera)
@@ -162,20 +162,6 @@ def predict(
     by_print = by_world @ motion.turn @ placed.R_board @ by_board[seen.corner]
     by_views = motion.by_poses(by_turn, by_world)
     return px, np.concatenate([*by_camera, by_print, *by_views], axis=2)
-
-
-def _printed_board(board: np.ndarray, corners_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners as printed (m, 3), mm, and their derivatives by BOARD_COLUMNS (m, 3, 3).
-
-    Warp after mrcal: z = warp_x (1 − x²) + warp_y (1 − y²), x and y from −1 to 1 over the corners.
-    """
-    flat = corners_mm[:, :2]
-    half = np.maximum(np.ptp(flat, axis=0) / 2, 1e-9)
-    unit = (flat - flat.mean(axis=0)) / half
-    by_board = np.zeros((len(corners_mm), 3, N_BOARD))
-    by_board[:, :, 0] = corners_mm
-    by_board[:, 2, 1:] = 1.0 - unit**2
-    return corners_mm + by_board @ board, by_board
 
 
 def _project(

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtri
 
 from vision.boards.board_coverage import check_work, coverage
 from vision.boards.corners import Corners
@@ -29,15 +30,16 @@ from vision.boards.sufficiency import (
     without_strays,
 )
 from vision.calibration.adjust import adjust_bundle
-from vision.calibration.bundle import N_CAMERA, POSE, BundleState, Priors
+from vision.calibration.bundle import N_BOARD, N_CAMERA, POSE, BundleState, Priors
 from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
 from vision.calibration.layout import Alone, Layout, gather
 from vision.calibration.place import by_board
 from vision.calibration.tied import JointInput, Timing, lens_priors, timing_note
 from vision.calibration.views import BoardViews, MeasuredPose
-from vision.geometry.board import Board
+from vision.geometry.board import PRINT_TERMS, Board
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras, camera_matrix
+from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
 
 __all__ = ["Calibration", "CameraReport", "calibrate_cameras", "camera_moved"]
@@ -47,6 +49,11 @@ _WARP_GAIN = 18.4
 # [mm] A prior, wider than any print bows. moves nothing on the fixtures between 0.5 and 10 (they
 # do not call for a warp). Study: thresholds.py calibration.calibrate _WARP_SIGMA_MM ….
 _WARP_SIGMA_MM = 2.0
+# [chance] By which a print that is stretched as its sigma says would call for a warning: 2.6 sigma,
+# of which the views take nearly all into account. Stated.
+_STRETCH_ALARM = 0.01
+# [column] A layout, no threshold.
+_STRETCH = PRINT_TERMS.index("stretch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +83,8 @@ class Calibration:
     """Cameras in the rig frame with their covariance, a report each, and notes in plain sentences.
 
     together: whether the cameras saw the board at once. timing: None where pictures of one view
-    count as of one instant. board (3,): the board's relative size less 1, and its warps along x and
-    y, mm.
+    count as of one instant. board, board_sigma (4,): the board's print, PRINT_TERMS, sigma 0 of
+    what is held. warnings: where the views contradict what is stated.
     """
 
     cameras: Cameras
@@ -85,7 +92,9 @@ class Calibration:
     notes: tuple[str, ...]
     timing: Timing | None
     board: np.ndarray
+    board_sigma: np.ndarray
     together: bool
+    warnings: tuple[Reason, ...] = ()
 
 
 def calibrate_cameras(
@@ -113,16 +122,19 @@ def calibrate_cameras(
     _check_adjustment(alone, adjustment, triggered)
     if joint.timing is not None:
         notes.append(timing_note(alone, joint.timing))
+    stretch_notes, warnings = _stretch_lines(adjustment, board)
     cameras = _place(as_cameras(alone, views.sizes_px, adjustment), on_rig)
     reports = _checked_reports(cameras, alone, adjustment, board)
     check_work(cameras, alone, standing, work_points_mm)
     return Calibration(
         cameras=cameras,
         report=reports,
-        notes=(*joint.notes, *notes),
+        notes=(*joint.notes, *notes, *stretch_notes),
         timing=joint.timing,
         board=adjustment.solution.state.board,
+        board_sigma=_print_sigma(adjustment),
         together=joint.layout.trajectory is not None,
+        warnings=warnings,
     )
 
 
@@ -221,9 +233,39 @@ def _with_warp(layout: Layout, flat: Adjustment, board: Board) -> tuple[Adjustme
     adjustment = adjust_with_noise(
         warped.state, layout.seen, board.corners_mm, priors, error_px=flat.error_px, rounds=1
     )
-    x_mm, y_mm = adjustment.solution.state.board[1:]
+    x_mm, y_mm = adjustment.solution.state.board[2:]
     note = f"The board is bent by {x_mm:+.3f} mm along x and {y_mm:+.3f} mm along y; taken into account."
     return adjustment, [note]
+
+
+def _print_sigma(adjustment: Adjustment) -> np.ndarray:
+    """Return the standard deviations (4,) of PRINT_TERMS, 0 of what is held."""
+    variances = np.diag(adjustment.solution.covariance)[-N_BOARD:]
+    return np.sqrt(np.maximum(variances, 0.0))
+
+
+def _stretch_lines(adjustment: Adjustment, board: Board) -> tuple[list[str], tuple[Reason, ...]]:
+    """Return a note on how much longer the print is along y than along x, and a warning where that
+    is more than `stretch_sigma` lets chance make it.
+
+    What the views make of a prior of standard deviation σ scatters by √(σ² − s²), s being what they
+    leave of it. Nothing is said of a stretch that is taken as exact.
+    """
+    if not board.stretch_sigma:
+        return [], ()
+    stretch = adjustment.solution.state.board[_STRETCH]
+    sigma = _print_sigma(adjustment)[_STRETCH]
+    found = f"{100 * stretch:+.3f} ± {100 * sigma:.3f} %"
+    note = f"The board's print is longer along y than along x by {found}; taken into account."
+    by_chance = max(board.stretch_sigma**2 - sigma**2, sigma**2)
+    if stretch**2 <= chdtri(1, _STRETCH_ALARM) * by_chance:
+        return [note], ()
+    longer = "y" if stretch > 0 else "x"
+    warning = (
+        f"the board's print is {100 * abs(stretch):.2f} ± {100 * sigma:.2f} % longer along {longer}, "
+        f"stretch_sigma says ± {100 * board.stretch_sigma:.2g} %: measure both directions"
+    )
+    return [note], (Reason("board_stretched", warning),)
 
 
 def allow_warp(priors: Priors) -> Priors:

@@ -20,7 +20,7 @@ from vision.calibration.cameras_file import parse_toml
 from vision.calibration.corner_noise import adjust_with_noise
 from vision.calibration.first_guess import board_pose
 from vision.calibration.layout import gather
-from vision.calibration.tied import lens_priors
+from vision.calibration.tied import lens_priors, with_print
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
@@ -110,7 +110,7 @@ def place_on_rig(
     T_rig_board: np.ndarray,
 ) -> Cameras:
     """Place each camera by its view of the board on the rig, its lens held; the covariance is of
-    the poses only.
+    the poses only, with the share of the print's size and stretch.
 
     Raises Refused where a camera does not see the board.
     """
@@ -126,7 +126,7 @@ def place_on_rig(
         poses.append(compose(T_camera_board, T_board_rig))
         shots.append((k, 0, view))
     state = BundleState(np.array(lenses), np.array(poses), np.asarray(T_rig_board)[None])
-    priors = _camera_pose_priors(len(cameras))
+    priors = with_print(_camera_pose_priors(len(cameras)), board)
     adjustment = adjust_with_noise(state, gather(shots), board.corners_mm, priors)
     return as_cameras(cameras.names, {c.name: c.size_px for c in cameras}, adjustment)
 

@@ -2,7 +2,8 @@
 
 Three figures, each stricter than the one before. A board pose fitted to one camera by itself takes
 up much of what is wrong. One pose for all cameras tests whether they agree. Distances between
-neighbouring corners, triangulated, are compared in millimetres with the printed pitch.
+neighbouring corners, triangulated, are compared in millimetres with the pitch of the print as
+adjusted.
 
 Of cameras that are not triggered together, the last two are taken three ways, in the order of what
 is fitted to the held-out pictures themselves: nothing but the board's pose, the pictures being as
@@ -23,8 +24,8 @@ from vision.calibration.calibrate import Calibration
 from vision.calibration.first_guess import board_pose, has_pose
 from vision.calibration.layout import Alone, Layout, lay_out
 from vision.calibration.tied import lens_priors
-from vision.geometry.board import Board
-from vision.geometry.camera import Camera, Cameras
+from vision.geometry.board import Board, printed_corners
+from vision.geometry.camera import Camera
 from vision.geometry.triangulate import triangulate
 
 # [sigma] Board poses and instants are fitted robustly; residuals are then counted whole. Study:
@@ -88,7 +89,7 @@ def check_held_out(
     for camera in cameras:
         alone = _alone(camera, views[camera.name], board)
         usable[camera.name] = alone
-        alone_px[camera.name] = _alone_px(camera, alone, is_held, board)
+        alone_px[camera.name] = _alone_px(camera, alone, is_held, board, calibration.board)
     together = calibration.together if together is None else together
     if not together or len(cameras) < 2:
         return HeldOut(alone_px)
@@ -112,16 +113,25 @@ def _alone(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
     return Alone(camera.lens, camera.rms_px, usable, poses)
 
 
-def _alone_px(camera: Camera, alone: Alone, is_held: Sequence[bool], board: Board) -> float:
+def _alone_px(
+    camera: Camera,
+    alone: Alone,
+    is_held: Sequence[bool],
+    board: Board,
+    board_print: np.ndarray,
+) -> float:
     """Return the RMS of one camera's residuals with a pose fitted to each view, by plain least
     squares.
+
+    board_print (4,): PRINT_TERMS.
     """
     held = {k: view for k, view in alone.views.items() if is_held[k]}
     if not held:
         return np.nan
     layout = lay_out({camera.name: replace(alone, views=held)}, np.eye(3, 4)[None], together=False)
     seen = _with_equal_sigmas(layout.seen)
-    solution = adjust_bundle(layout.first, seen, board.corners_mm, _pose_priors(1, len(held)))
+    first = replace(layout.first, board=board_print)
+    solution = adjust_bundle(first, seen, board.corners_mm, _pose_priors(1, len(held)))
     return _rms(solution.residual_px)
 
 
@@ -217,39 +227,42 @@ class _JointFits:
         then_px, _ = predict(fitted.state, seen, corners_mm)
         still_px, _ = predict(replace(fitted.state, trajectory=None), seen, corners_mm)
         px = seen.px + still_px - then_px
-        cameras = self.calibration.cameras
-        errors_mm = _pitch_errors_mm(cameras, self.layout, px, self.rows, self.board)
+        errors_mm = self._pitch_errors_mm(px)
         mean_mm = float(errors_mm.mean()) if len(errors_mm) else np.nan
         joint_px = _rms(fitted.residual_px[self.rows])
         return Agreement(joint_px, _rms(errors_mm[:, None]), mean_mm, len(errors_mm))
 
+    def _pitch_errors_mm(self, px: np.ndarray) -> np.ndarray:
+        """Return the distances of neighbouring corners, triangulated by all cameras that see them,
+        less those of the print.
 
-def _pitch_errors_mm(
-    cameras: Cameras, layout: Layout, px: np.ndarray, rows: np.ndarray, board: Board
-) -> np.ndarray:
-    """Return the distances of neighbouring corners, triangulated by all cameras that see them, less
-    the pitch.
-    """
-    columns, lines = (squares - 1 for squares in board.squares)
-    count = len(layout.index) * lines * columns
-    place = layout.seen.view * lines * columns + layout.seen.corner  # (n,) among all corners
-    by_camera = {}
-    sigma = {}
-    for c, name in enumerate(cameras.names):
-        own = rows & (layout.seen.camera == c)
-        by_camera[name] = np.full((count, 2), np.nan)
-        by_camera[name][place[own]] = px[own]
-        sigma[name] = np.ones(count)
-    points_mm = triangulate(cameras, by_camera, sigma).mm.reshape(-1, lines, columns, 3)
-    errors_mm = np.append(_pitches(points_mm, 2), _pitches(points_mm, 1)) - board.square_mm
-    return errors_mm[np.isfinite(errors_mm)]
+        px (n, 2): of the sightings, at their view's own time.
+        """
+        columns, lines = (squares - 1 for squares in self.board.squares)
+        cameras = self.calibration.cameras
+        seen = self.layout.seen
+        count = len(self.layout.index) * lines * columns
+        place = seen.view * lines * columns + seen.corner  # (n,) among all corners
+        by_camera = {}
+        sigma = {}
+        for c, name in enumerate(cameras.names):
+            own = self.rows & (seen.camera == c)
+            by_camera[name] = np.full((count, 2), np.nan)
+            by_camera[name][place[own]] = px[own]
+            sigma[name] = np.ones(count)
+        points_mm = triangulate(cameras, by_camera, sigma).mm.reshape(-1, lines, columns, 3)
+        printed_mm, _ = printed_corners(self.board.corners_mm, self.calibration.board)
+        printed_mm = printed_mm.reshape(1, lines, columns, 3)
+        errors_mm = [_pitches(points_mm, axis) - _pitches(printed_mm, axis) for axis in (2, 1)]
+        errors_mm = np.concatenate([of_axis.ravel() for of_axis in errors_mm])
+        return errors_mm[np.isfinite(errors_mm)]
 
 
 def _pitches(points_mm: np.ndarray, axis: int) -> np.ndarray:
-    """Return the distances (n,) between neighbours of a grid of points (…, 3) along one of its
-    axes.
+    """Return the distances between neighbours of grids of points (views, lines, columns, 3) along
+    one of their axes.
     """
-    return np.linalg.norm(np.diff(points_mm, axis=axis), axis=-1).ravel()
+    return np.linalg.norm(np.diff(points_mm, axis=axis), axis=-1)
 
 
 def _rms(vectors: np.ndarray) -> float:

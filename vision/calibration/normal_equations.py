@@ -1,7 +1,7 @@
 """The normal equations of an adjustment, formed picture by picture with its instant eliminated.
 
-A picture's instant touches only that picture. Shapes: s pictures ("shots"), G = 16 C + 3 global
-parameters, V views, p = 25 or 37 parameters that a picture depends on: 19 of them global, the rest
+A picture's instant touches only that picture. Shapes: s pictures ("shots"), G = 16 C + 4 global
+parameters, V views, p = 26 or 38 parameters that a picture depends on: 20 of them global, the rest
 poses of its view and that view's neighbours.
 """
 
@@ -28,7 +28,7 @@ _GLOBAL = N_CAMERA + N_BOARD
 class Shots(NamedTuple):
     """Pictures, a row each: camera and view (s,), and where their p parameters stand.
 
-    columns (s, 19): among the globals. poses (s, 6 or 18): among all views' (6 V).
+    columns (s, 20): among the globals. poses (s, 6 or 18): among all views' (6 V).
     """
 
     camera: np.ndarray

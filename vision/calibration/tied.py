@@ -214,16 +214,25 @@ def lens_priors(n_cameras: int, n_views: int) -> Priors:
     )
 
 
+def with_print(priors: Priors, board: Board) -> Priors:
+    """Return the priors with size and stretch of the board's print free where they have a sigma,
+    and observed to be as stated within that.
+    """
+    sigmas = np.array([board.square_sigma_mm / board.square_mm, board.stretch_sigma])
+    free = priors.free.copy()
+    sigma = priors.sigma.copy()
+    free[-N_BOARD:-2] = sigmas > 0
+    sigma[-N_BOARD:-2] = np.where(sigmas > 0, sigmas, np.inf)
+    return replace(priors, free=free, sigma=sigma)
+
+
 def _priors(first: BundleState, board: Board, on_rig: MeasuredPose | None) -> Priors:
-    """Return the priors with the rig board's measured pose and the square's size, each held where
-    its sigma is 0 and an observation else.
+    """Return the priors with the rig board's measured pose and the print's size and stretch, each
+    held where its sigma is 0 and an observation else.
 
     Without a rig board the first camera is the world's frame.
     """
-    priors = lens_priors(len(first.lens), len(first.T_world_board))
-    if board.square_sigma_mm > 0:
-        priors.free[-N_BOARD] = True
-        priors.sigma[-N_BOARD] = board.square_sigma_mm / board.square_mm
+    priors = with_print(lens_priors(len(first.lens), len(first.T_world_board)), board)
     if on_rig is None:
         priors.free[POSE] = False
         return priors

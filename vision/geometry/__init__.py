@@ -8,7 +8,7 @@ Imports nothing else of vision.
 from vision.geometry.lazy_names import lazy_names
 
 NAMES = {
-    "board": ("Board",),
+    "board": ("Board", "PRINT_TERMS", "printed_corners"),
     "camera": ("Camera", "Cameras"),
     "centreline": ("REST_POWERS", "centrelines", "unbent_curves", "rotation_z"),
     "contact": ("BarAxis",),

@@ -55,7 +55,14 @@ def two_cameras() -> Cameras:
 
 
 def board_views(
-    camera: Camera, count: int, rng: np.random.Generator, *, tilt_rad=0.6, depth=(0.75, 1.25)
+    camera: Camera,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    tilt_rad=0.6,
+    spin_rad=0.5,
+    depth=(0.75, 1.25),
+    printed_mm=BOARD.corners_mm,
 ) -> list:
     """Exact corners of the board held before a camera: list of (ids, px), at random tilts, places and depths."""
     distance = np.linalg.norm(camera.centre_mm - [50, 0, 0])
@@ -63,16 +70,26 @@ def board_views(
     while len(views) < count:
         z = distance * rng.uniform(*depth)
         middle = camera.rays(rng.uniform(0.3, 0.7, (1, 2)) * camera.size_px)[0]
-        views += [view for view in [_view(camera, middle * z, tilt_rad, rng)] if len(view[0]) >= 12]
+        view = _view(camera, middle * z, tilt_rad, spin_rad, printed_mm, rng)
+        if len(view[0]) >= 12:
+            views.append(view)
     return views
 
 
-def _view(camera: Camera, toward_mm: np.ndarray, tilt_rad: float, rng: np.random.Generator):
+def _view(
+    camera: Camera,
+    toward_mm: np.ndarray,
+    tilt_rad: float,
+    spin_rad: float,
+    printed_mm: np.ndarray,
+    rng: np.random.Generator,
+):
     R = camera.T_camera_rig[:, :3]
-    spin, lean = [0, 0, rng.uniform(-0.5, 0.5)], [*rng.uniform(-tilt_rad, tilt_rad, 2), 0]
+    spin = [0, 0, rng.uniform(-spin_rad, spin_rad)]
+    lean = [*rng.uniform(-tilt_rad, tilt_rad, 2), 0]
     turn = exp_rotation(spin) @ exp_rotation(lean)
-    T_camera_board = np.column_stack([turn, R @ toward_mm - turn @ BOARD.corners_mm.mean(axis=0)])
-    rig = apply(compose(invert_transform(camera.T_camera_rig), T_camera_board), BOARD.corners_mm)
+    T_camera_board = np.column_stack([turn, R @ toward_mm - turn @ printed_mm.mean(axis=0)])
+    rig = apply(compose(invert_transform(camera.T_camera_rig), T_camera_board), printed_mm)
     return _inside(camera, rig)
 
 
@@ -82,9 +99,11 @@ def _inside(camera: Camera, points_mm: np.ndarray):
     return np.flatnonzero(seen), px[seen]
 
 
-def rig_view(camera: Camera, T_rig_board: np.ndarray = T_RIG_BOARD):
+def rig_view(
+    camera: Camera, T_rig_board: np.ndarray = T_RIG_BOARD, printed_mm: np.ndarray = BOARD.corners_mm
+):
     """Exact corners of the board on the rig, (ids, px)."""
-    return _inside(camera, apply(T_rig_board, BOARD.corners_mm))
+    return _inside(camera, apply(T_rig_board, printed_mm))
 
 
 def noisy(view, sigma_px: float, rng: np.random.Generator) -> Corners:
@@ -120,11 +139,17 @@ class Recording:
         return boards, {name: noisy(v, sigma_px, rng) for name, v in self.rig.items()}
 
 
-def a_recording(views: int = 10, seed: int = 1, **how) -> Recording:
-    """A session of `views` board views a camera."""
+def a_recording(
+    views: int = 10, seed: int = 1, printed_mm: np.ndarray = BOARD.corners_mm, **how
+) -> Recording:
+    """A session of `views` board views a camera, printed_mm (m, 3) being the board's corners."""
     rng, cameras = np.random.default_rng(seed), two_cameras()
-    boards = {camera.name: board_views(camera, views, rng, **how) for camera in cameras}
-    return Recording(cameras, boards, {camera.name: rig_view(camera) for camera in cameras})
+    boards = {}
+    rig = {}
+    for camera in cameras:
+        boards[camera.name] = board_views(camera, views, rng, printed_mm=printed_mm, **how)
+        rig[camera.name] = rig_view(camera, printed_mm=printed_mm)
+    return Recording(cameras, boards, rig)
 
 
 def moving_board(time_s: float) -> np.ndarray:

@@ -42,7 +42,7 @@ def a_state(moving):
         np.array([one, other]),
         cameras,
         boards,
-        board=np.array([0.01, 0.3, -0.4]),
+        board=np.array([0.01, 0.02, 0.3, -0.4]),
         clock=np.array([0, 0.05]),
         instants=rng.normal(0, 0.05, (VIEWS, CAMERAS)),
         trajectory=Trajectory(TIMES_S, np.arange(CAMERAS)) if moving else None,

@@ -1,10 +1,13 @@
 """Camera TOML of caliscope and aniposelib: read as they are meant, refused where they cannot be used."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.studies.accuracy.board_scenes import BOARD, T_RIG_BOARD, noisy, rig_view, two_cameras
 from vision.calibration.cameras_import import import_cameras, place_on_rig
+from vision.geometry.board import printed_corners
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import log_rotation
 
@@ -71,6 +74,21 @@ def test_what_cannot_be_used_is_refused(tmp_path, text, words):
     (tmp_path / "calibration.toml").write_text(text)
     with pytest.raises(Refused, match=words):
         import_cameras(tmp_path / "calibration.toml")
+
+
+def test_a_print_s_size_and_stretch_are_in_where_imported_cameras_stand():
+    true, rng = two_cameras(), np.random.default_rng(3)
+    printed_mm, _ = printed_corners(BOARD.corners_mm, np.array([0.002, -0.002, 0.0, 0.0]))
+    views = {c.name: noisy(rig_view(c, printed_mm=printed_mm), 0.05, rng) for c in true}
+    unsure = replace(BOARD, square_sigma_mm=0.002 * BOARD.square_mm, stretch_sigma=0.002)
+    for board, bounds in ((unsure, (0.0, 4.0)), (BOARD, (4.0, np.inf))):
+        made = place_on_rig(true, views, board, T_RIG_BOARD)
+        off_mm = [
+            camera.T_camera_rig[2, 3] - true[camera.name].T_camera_rig[2, 3] for camera in made
+        ]
+        sigma_mm = np.sqrt(np.diag(made.covariance)[14::15])
+        # One size for both cameras: in a Gaussian draw beyond 4 sigma once in 16 000.
+        assert bounds[0] < np.abs(off_mm / sigma_mm).max() < bounds[1]
 
 
 def test_imported_cameras_are_placed_by_the_board_on_the_rig():
