@@ -325,6 +325,12 @@ _TABLE = (
         _MEASURE_BOARD,
     ),
     Status(
+        "boards_exchanged",
+        REFUSAL,
+        "the board views of cameras are exchanged",
+        "give each camera the board views and the rig picture that it took",
+    ),
+    Status(
         "board_stretched",
         WARNING,
         "the board's print is longer along one direction than stretch_sigma lets it be",

@@ -32,6 +32,7 @@ from vision.boards.sufficiency import (
 from vision.calibration.adjust import adjust_bundle
 from vision.calibration.bundle import N_BOARD, N_CAMERA, POSE, BundleState, Priors
 from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
+from vision.calibration.exchanged import check_own_lenses
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
 from vision.calibration.layout import Alone, Layout, gather
 from vision.calibration.place import by_board
@@ -116,7 +117,8 @@ def calibrate_cameras(
     Raises Refused, saying what to record, where the views cannot give a calibration.
     """
     alone = {name: _alone(name, views, board, on_rig is not None) for name in views.boards}
-    standing = _standing(views, board) if on_rig else None
+    standing = standing_boards(views, board) if on_rig else None
+    lens_notes = _check_own_lenses(alone, standing, views, board)
     joint = JointInput(alone, standing, board, on_rig, views.times_s, triggered).adjust()
     adjustment, notes = _with_warp(joint.layout, joint.adjustment, board)
     _check_adjustment(alone, adjustment, triggered)
@@ -129,7 +131,7 @@ def calibrate_cameras(
     return Calibration(
         cameras=cameras,
         report=reports,
-        notes=(*joint.notes, *notes, *stretch_notes),
+        notes=(*joint.notes, *lens_notes, *notes, *stretch_notes),
         timing=joint.timing,
         board=adjustment.solution.state.board,
         board_sigma=_print_sigma(adjustment),
@@ -174,13 +176,28 @@ def _place(cameras: Cameras, on_rig: MeasuredPose | None) -> Cameras:
     return replace(cameras, placement=placement.covariance)
 
 
-def _standing(views: BoardViews, board: Board) -> dict[str, Corners]:
+def standing_boards(views: BoardViews, board: Board) -> dict[str, Corners]:
     """Return the board on the rig in each camera, averaged over its picture and the trials' frames."""
     standing = {}
     for name in views.boards:
         rig_view = without_strays(views.rig[name], board)
         standing[name] = mean_view(rig_view, views.trials.get(name, ()))
     return standing
+
+
+def _check_own_lenses(
+    alone: Mapping[str, Alone],
+    standing: Mapping[str, Corners] | None,
+    views: BoardViews,
+    board: Board,
+) -> list[str]:
+    """Return notes on whose lens is whose; none without a board on the rig. Raises Refused where
+    board views are exchanged.
+    """
+    if standing is None:
+        return []
+    same_in_trials = all(views.trials.get(name) for name in alone)
+    return check_own_lenses(alone, standing, board, same_in_trials=same_in_trials)
 
 
 def _alone(name: str, views: BoardViews, board: Board, with_rig: bool) -> Alone:

@@ -23,7 +23,7 @@ from vision.calibration.bundle import BundleState, Priors, Sightings, predict
 from vision.calibration.calibrate import Calibration
 from vision.calibration.first_guess import board_pose, has_pose
 from vision.calibration.layout import Alone, Layout, lay_out
-from vision.calibration.tied import lens_priors
+from vision.calibration.tied import pose_priors
 from vision.geometry.board import Board, printed_corners
 from vision.geometry.camera import Camera
 from vision.geometry.triangulate import triangulate
@@ -131,7 +131,7 @@ def _alone_px(
     layout = lay_out({camera.name: replace(alone, views=held)}, np.eye(3, 4)[None], together=False)
     seen = _with_equal_sigmas(layout.seen)
     first = replace(layout.first, board=board_print)
-    solution = adjust_bundle(first, seen, board.corners_mm, _pose_priors(1, len(held)))
+    solution = adjust_bundle(first, seen, board.corners_mm, pose_priors(1, len(held)))
     return _rms(solution.residual_px)
 
 
@@ -141,12 +141,6 @@ def _held_rows(layout: Layout, is_held: Sequence[bool]) -> np.ndarray:
     pictures = np.bincount(layout.seen.view[starts], minlength=len(layout.index))
     held_views = np.asarray(is_held)[layout.index] & (pictures > 1)
     return held_views[layout.seen.view]
-
-
-def _pose_priors(n_cameras: int, n_views: int) -> Priors:
-    """Return the priors with the board's poses free, and the cameras held."""
-    priors = lens_priors(n_cameras, n_views)
-    return replace(priors, free=np.zeros_like(priors.free))
 
 
 def _with_equal_sigmas(seen: Sightings) -> Sightings:
@@ -207,7 +201,7 @@ class _JointFits:
     @property
     def _priors(self) -> Priors:
         """Return the priors of all cameras and views."""
-        return _pose_priors(len(self.layout.first.lens), len(self.layout.index))
+        return pose_priors(len(self.layout.first.lens), len(self.layout.index))
 
     @property
     def _moving(self) -> BundleState:

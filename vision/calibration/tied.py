@@ -214,6 +214,12 @@ def lens_priors(n_cameras: int, n_views: int) -> Priors:
     )
 
 
+def pose_priors(n_cameras: int, n_views: int) -> Priors:
+    """Return the priors with the board's poses free, and the cameras held."""
+    priors = lens_priors(n_cameras, n_views)
+    return replace(priors, free=np.zeros_like(priors.free))
+
+
 def with_print(priors: Priors, board: Board) -> Priors:
     """Return the priors with size and stretch of the board's print free where they have a sigma,
     and observed to be as stated within that.

@@ -67,6 +67,23 @@ def test_a_whole_board_at_the_wrong_scale_is_told_by_the_bars(small_copy, refuse
     )
 
 
+def test_boards_exchanged_between_two_cameras(small_copy, refused):
+    boards = small_copy / "boards"
+    (boards / "high").rename(boards / "kept")
+    (boards / "low").rename(boards / "high")
+    (boards / "kept").rename(boards / "low")
+    said = refused()
+    assert "boards/high and boards/low are exchanged: camera high's picture" in said
+
+
+def test_rig_pictures_exchanged_between_two_cameras(small_copy, refused):
+    rig = small_copy / "boards" / "rig"
+    (rig / "high.png").rename(rig / "kept")
+    (rig / "low.png").rename(rig / "high.png")
+    (rig / "kept").rename(rig / "low.png")
+    assert "or their pictures in boards/rig, are exchanged" in refused()
+
+
 def test_too_few_views(small_copy, refused):
     for picture in sorted((small_copy / "boards" / "low").iterdir())[3:]:
         picture.unlink()

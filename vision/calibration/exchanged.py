@@ -1,0 +1,105 @@
+"""Whether each camera's board views are its own: its lens must explain its picture of the rig board.
+
+Boards exchanged between two cameras give each the other's lens, and all views agree with
+themselves. The board on the rig is a plane seen in perspective: a lens whose focal length,
+principal point or distortion is another's leaves residuals that no pose of it takes up.
+"""
+
+from collections.abc import Mapping
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from vision.boards.corners import Corners
+from vision.calibration.adjust import adjust_bundle
+from vision.calibration.bundle import BundleState
+from vision.calibration.first_guess import board_pose
+from vision.calibration.layout import Alone, gather
+from vision.calibration.tied import pose_priors
+from vision.geometry.board import Board
+from vision.geometry.refusals import Refused
+
+# [1] Residuals by the camera's own lens over those by another's, in each picture. What is wrong with
+# the right lens would have to point so far towards the other one, in both pictures, as directions in
+# the nine dimensions of lenses do once in 20 000. Lenses 4 % apart have 3 and more in one picture, 12
+# and 20 in the small session's. Derived; study: exchanged_boards.py.
+_CLEAR_RATIO = 1.5
+
+
+def check_own_lenses(
+    cameras: Mapping[str, Alone],
+    standing: Mapping[str, Corners],
+    board: Board,
+    *,
+    same_in_trials: bool,
+) -> list[str]:
+    """Return a note on each pair of cameras of which the rig's board does not tell whose lens is
+    whose.
+
+    standing: the board on the rig in each camera. same_in_trials: whether the trials' frames show
+    it as these pictures do. Raises Refused, naming the cameras, where other lenses explain the
+    pictures of two or more cameras clearly better than their own.
+    """
+    names = list(cameras)
+    lenses = {name: alone.lens for name, alone in cameras.items()}
+    residual_px = lens_residuals_px(lenses, standing, board)
+    own_px = np.diag(residual_px)
+    _, best = linear_sum_assignment(np.log(residual_px))
+    best_px = residual_px[np.arange(len(names)), best]
+    moved = np.flatnonzero(best != np.arange(len(names)))
+    if len(moved) and np.all(own_px[moved] > _CLEAR_RATIO * best_px[moved]):
+        found = []
+        for k in moved:
+            found.append(
+                f"camera {names[k]}'s picture of the board on the rig by the lens of boards/{names[best[k]]} "
+                f"to {best_px[k]:.3f} px, by that of boards/{names[k]} to {own_px[k]:.3f} px"
+            )
+        raise Refused(
+            _exchanged([names[k] for k in moved], found, same_in_trials), "boards_exchanged"
+        )
+    return [
+        f"The board on the rig does not tell whether boards/{names[a]} and boards/{names[b]} are "
+        "exchanged: the two lenses are too much alike."
+        for a, b in combinations(range(len(names)), 2)
+        if _are_alike(residual_px[np.ix_([a, b], [a, b])])
+    ]
+
+
+def lens_residuals_px(
+    lenses: Mapping[str, np.ndarray], standing: Mapping[str, Corners], board: Board
+) -> np.ndarray:
+    """Return the root mean square residual an axis of each camera's view (C, ) by each lens (, C).
+
+    lenses: of each camera, (9,). Each fit has a board pose of its own; infinite where a lens gives
+    none.
+    """
+    residual_px = np.empty((len(lenses), len(lenses)))
+    for row, name in enumerate(lenses):
+        for column, lens in enumerate(lenses.values()):
+            residual_px[row, column] = _residual_px(lens, standing[name], board)
+    return residual_px
+
+
+def _exchanged(names: list[str], found: list[str], same_in_trials: bool) -> str:
+    """Return the sentence on exchanged boards."""
+    folders = " and ".join(f"boards/{name}" for name in names)
+    pictures = "" if same_in_trials else ", or their pictures in boards/rig,"
+    return f"{folders}{pictures} are exchanged: {'; '.join(found)}: give each camera its own"
+
+
+def _are_alike(residual_px: np.ndarray) -> bool:
+    """Return whether two lenses explain two pictures (2, 2) nearly as well when exchanged."""
+    exchanged = residual_px[0, 1] * residual_px[1, 0]
+    return bool(exchanged < _CLEAR_RATIO**2 * residual_px[0, 0] * residual_px[1, 1])
+
+
+def _residual_px(lens: np.ndarray, view: Corners, board: Board) -> float:
+    """Return the root mean square residual an axis of a view by a lens, px, with a pose fitted."""
+    try:
+        T_camera_board = board_pose(view, board.corners_mm, lens)
+    except Refused:
+        return np.inf
+    state = BundleState(lens[None], np.eye(3, 4)[None], T_camera_board[None])
+    fitted = adjust_bundle(state, gather([(0, 0, view)]), board.corners_mm, pose_priors(1, 1))
+    return float(np.sqrt(np.mean(fitted.residual_px**2)))
