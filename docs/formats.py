@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bench.base.tables import SPEED, SURFACE, TRIAL, WHISK, Column, Table, sigma_name
 from bench.report.whisk_tables import WHISKS
+from bench.session.givens import GivenKeys, assumptions, unit_of
 from bench.session.strict_toml import Keys, key_names
 
 PAGE = Path(__file__).with_suffix(".md")
@@ -47,12 +48,24 @@ def named_parts(text: str) -> list[Table | type[Keys]]:
 
 def explained_keys(keys: type[Keys]) -> Iterator[tuple[str, str]]:
     """Yield the keys of a table of a TOML file, each with its meaning; first those of its bases,
-    which are explained where the bases are.
+    which are explained where the bases are. `exact`, of all tables, stands above them by hand.
     """
     for base in reversed(keys.__mro__):
-        if issubclass(base, Keys) and base is not Keys:
-            for name, meaning in _own_keys(base):
-                yield name, meaning if base is keys else "see there"
+        if issubclass(base, Keys) and base not in (Keys, GivenKeys):
+            own = list(_own_keys(base))
+            assumed = _assumed_of(base, own)
+            for name, meaning in own:
+                yield name, meaning + assumed.get(meaning, "") if base is keys else "see there"
+
+
+def _assumed_of(keys: type[Keys], explained: Sequence[tuple[str, str]]) -> dict[str, str]:
+    """Return what is assumed of sigmas that are not stated, by the meaning of their keys."""
+    found = {}
+    declared = assumptions(keys)
+    for name, meaning in explained:
+        if name in declared:
+            found[meaning] = f"; unsaid: {declared[name].text(unit_of(name))}"
+    return found
 
 
 def _own_keys(keys: type[Keys]) -> Iterator[tuple[str, str]]:

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fixtures.say_exact import exact_copy
+
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 
@@ -25,9 +27,10 @@ def shared() -> Path:
 
 
 @pytest.fixture(scope="session")
-def steel_sample(shared) -> Path:
-    """The recorded-like session of a Nitinol whisker on a steel bar."""
-    return shared / "sessions" / "steel-sample"
+def steel_sample(shared, tmp_path_factory) -> Path:
+    """The recorded-like session of a Nitinol whisker on a steel bar, whose givens are exact."""
+    out = tmp_path_factory.mktemp("shared") / "steel-sample"
+    return exact_copy(shared / "sessions" / "steel-sample", out)
 
 
 @pytest.fixture(scope="session")

@@ -13,8 +13,9 @@ from bench.base.atomic import write_whole
 from bench.base.input_problems import InputProblems
 from bench.gauges.matrix import FROM_FILE, FROM_MANIFEST, GaugeCalibration, GaugeMatrix
 from bench.session import manifest
+from bench.session.givens import with_sigmas
 from bench.session.session import Session
-from bench.session.strict_toml import as_keys, read_toml
+from bench.session.strict_toml import as_keys, convert, read_toml
 
 Rows4 = Annotated[
     list[manifest.Row4],
@@ -63,9 +64,12 @@ def read_gauges(path: Path, C_Nmm2: float) -> GaugeCalibration:
 
     C so cancels in d_x. Raises BadInput where the file is not as the session format says.
     """
-    keys = as_keys(read_toml(path, path.name), FileKeys, path.name, InputProblems())
+    table = read_toml(path, path.name)
+    as_keys(table, FileKeys, path.name, InputProblems())
+    filled, _ = with_sigmas(table, FileKeys)
+    keys = convert(filled, FileKeys)
     covariance = keys.covariance
-    if covariance is None and keys.matrix_sigma_Nmm_per_V is not None:
+    if covariance is None:
         covariance = np.diag(np.ravel(keys.matrix_sigma_Nmm_per_V) ** 2)
     without = {}
     for name, rest in (keys.without or {}).items():

@@ -20,11 +20,14 @@ def session_toml(
 ) -> str:
     """Return session.toml, with T_rig_board (3, 4) as someone would have measured it.
 
+    What has no sigma there is exact: the rig is made from it.
+
     whiskers: of an array, in place of [whisker].
     """
     measured = [trial.surface for trial in protocol.trials if trial.purpose == "measure"]
     session = {
         "format": 1,
+        "exact": True,
         "name": protocol.name,
         "surfaces": list(dict.fromkeys(measured)),
         "whisker": _whisker_keys(protocol),

@@ -28,6 +28,7 @@ from bench.session.session import (
     stated_whisker,
 )
 from bench.session.signals import FORCES, MOMENTS, MOTOR, TIME, VOLTS
+from bench.session.stated import whisker_label
 from bench.session.strict_toml import values
 from bench.session.table import column_names
 from bench.session.trial import Trial
@@ -52,8 +53,9 @@ def load_views(
     """
     path = Path(path)
     problems = problems or InputProblems()
-    keys = read_manifest(path, problems, follow_links)
-    session = session_of(path, keys, problems, trials=trials)
+    stated = read_manifest(path, problems, follow_links)
+    keys = stated.keys
+    session = session_of(path, stated, problems, trials=trials)
     if not keys.whiskers:
         return (session,)
     _check_tables(session, keys)
@@ -64,8 +66,11 @@ def load_views(
     if session.has_pictures and session.T_rig_board is None and session.cameras_toml is None:
         cure = "measure it, or bring cameras.toml: of several wires it says which is whose"
         raise BadInput(f"[rig] T_rig_board is missing; {cure}", file=MANIFEST)
-    whiskers = zip(keys.whiskers, bases)
-    return tuple(_view(session, one, base, trials_of[base.name]) for one, base in whiskers)
+    views = []
+    for one, base in zip(keys.whiskers, bases):
+        view = _view(session, one, base, trials_of[base.name])
+        views.append(replace(view, givens=stated.givens_of(base.name)))
+    return tuple(views)
 
 
 def _trials_of_all(
@@ -230,7 +235,7 @@ def _view(
     return replace(
         session,
         name=f"{session.name}, whisker {base.name}",
-        whisker=stated_whisker(keys, f"[[whiskers]] {base.name}:"),
+        whisker=stated_whisker(keys, f"{whisker_label(base.name)}:"),
         gauges=given_gauges(keys.gauges),
         trials=tuple(trials),
         base=base,

@@ -246,7 +246,7 @@ def _clock_sigma_s(trial: Trial, interval_s: float) -> float:
 
     It is the first frame's where stated, else half a frame.
     """
-    is_stated = trial.first_frame_s is not None and trial.first_frame_sigma_s > 0
+    is_stated = trial.first_frame_s is not None and trial.first_frame_sigma_s is not None
     return trial.first_frame_sigma_s if is_stated else 0.5 * interval_s
 
 

@@ -13,7 +13,8 @@ from typing import Annotated, Literal
 import msgspec
 
 from bench.session import plausible
-from bench.session.strict_toml import Keys, declared_parts, key_names
+from bench.session.givens import Assumed, AssumedOfRows, GivenKeys
+from bench.session.strict_toml import Keys, declared_parts, is_sigma, key_names
 
 # Lists of so many numbers.
 _TWO = msgspec.Meta(min_length=2, max_length=2)
@@ -48,12 +49,22 @@ class SizeOf:
     shape: str
 
 
+# What a sigma is where it is not stated: what a careful lab has. Each is Stated.
+# A caliper is read to 0.02 mm; drawn wire keeps its nominal diameter to 2 %, however thin it is.
+_CALIPER = Assumed(absolute=0.02, share=0.02, origin="a caliper, or as drawn")
+_RULER = Assumed(absolute=0.5, origin="a ruler")
+_DATA_SHEET = Assumed(share=0.05, origin="a data sheet's range")
+_BY_HAND = "placed by hand"
+LengthSigma = Annotated[float, _RULER]
+DiameterSigma = Annotated[float, _CALIPER]
+StiffnessSigma = Annotated[float, _DATA_SHEET]
+
 RingDiameter = Annotated[float, plausible.LENGTH, SizeOf("ring")]
 HalfAngle = Annotated[float, plausible.HALF_ANGLE, SizeOf("cone")]
 
 
 @dataclass(frozen=True, kw_only=True)
-class WhiskerKeys(Keys):
+class WhiskerKeys(GivenKeys):
     """[whisker] of session.toml."""
 
     one_of = (("youngs_modulus_GPa", "flexural_rigidity_Nmm2"),)
@@ -63,38 +74,38 @@ class WhiskerKeys(Keys):
     shape: Literal["cylinder", "cone", "tapered"] = "cylinder"
     # length from the base to the tip
     length_mm: Length
-    length_sigma_mm: float = 0.0
+    length_sigma_mm: LengthSigma = 0.0
     # diameter at the base
     diameter_mm: Thickness
-    diameter_sigma_mm: float = 0.0
+    diameter_sigma_mm: DiameterSigma = 0.0
     # diameter at `length_mm`; of "tapered", and of no other shape
     tip_diameter_mm: Thickness | None = None
     # Young's modulus; this, or the rigidity
     youngs_modulus_GPa: Modulus | None = None
-    youngs_modulus_sigma_GPa: float = 0.0
+    youngs_modulus_sigma_GPa: StiffnessSigma = 0.0
     # rigidity E I at the base
     flexural_rigidity_Nmm2: Rigidity | None = None
-    flexural_rigidity_sigma_Nmm2: float = 0.0
+    flexural_rigidity_sigma_Nmm2: StiffnessSigma = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class BarKeys(Keys):
+class BarKeys(GivenKeys):
     """[bar] of session.toml."""
 
     # diameter of the round bar that is touched
     diameter_mm: Width
-    diameter_sigma_mm: float = 0.0
+    diameter_sigma_mm: DiameterSigma = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class BoardKeys(Keys):
+class BoardKeys(GivenKeys):
     """[board] of session.toml."""
 
     # how many squares [along x, along y]
     squares: Annotated[list[int], _TWO]
     # side of a square; all lengths seen depend on it
     square_mm: Width
-    square_sigma_mm: float = 0.0
+    square_sigma_mm: Annotated[float, Assumed(share=1e-3, origin="a print")] = 0.0
     # side of a marker, used to find the board alone; its sigma enters nothing
     marker_mm: Width
     marker_sigma_mm: float = 0.0
@@ -107,16 +118,20 @@ class BoardKeys(Keys):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RigKeys(Keys):
+class RigKeys(GivenKeys):
     """[rig] of session.toml."""
 
     # 3 × 4, mm: rig = rows · [board x, y, z, 1] for the board in boards/rig; absent: it is
     # estimated from the free strokes
     T_rig_board: Annotated[list[Row4], _THREE] | None = None
     # standard deviation of each shift
-    T_rig_board_sigma_mm: float = 0.0
+    T_rig_board_sigma_mm: Annotated[
+        float, Assumed(absolute=0.2, of="T_rig_board", origin=_BY_HAND)
+    ] = 0.0
     # standard deviation of each turn
-    T_rig_board_sigma_deg: float = 0.0
+    T_rig_board_sigma_deg: Annotated[
+        float, Assumed(absolute=0.2, of="T_rig_board", origin=_BY_HAND)
+    ] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +147,7 @@ class CameraKeys(Keys):
 
 
 @dataclass(frozen=True, kw_only=True)
-class GaugeKeys(Keys):
+class GaugeKeys(GivenKeys):
     """[gauges] of session.toml, and gauges.toml."""
 
     # [y, z] where there is no moment
@@ -140,7 +155,9 @@ class GaugeKeys(Keys):
     offset_sigma_V: Pair | None = None
     # [m_y, m_z] in the follicle's axes = matrix · ([y_V, z_V] − offset)
     matrix_Nmm_per_V: Matrix
-    matrix_sigma_Nmm_per_V: Matrix | None = None
+    matrix_sigma_Nmm_per_V: Annotated[
+        Matrix | None, AssumedOfRows(share=0.01, origin="of a row's largest")
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,11 +184,11 @@ class ArrayWhiskerKeys(WhiskerKeys):
     name: str
     # [x, y, z] of its base in the rig frame
     base_mm: Place
-    base_sigma_mm: float = 0.0
+    base_sigma_mm: Annotated[float, Assumed(absolute=0.2, origin=_BY_HAND)] = 0.0
     # its base frame, turned about the rig's x, then y, then z ([0, 0, 0]): z is the axis that it
     # turns about, x the whisker at motor angle 0
     base_deg: Turns = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    base_sigma_deg: float = 0.0
+    base_sigma_deg: Annotated[float, Assumed(absolute=0.2, of="base_mm", origin=_BY_HAND)] = 0.0
     # the table `[whiskers.gauges]`, with the keys of `[gauges]`
     gauges: GaugeKeys | None = None
     # the table `[whiskers.channels]`; left out: `y_V@<name>` and so on in signals.csv, and
@@ -180,14 +197,14 @@ class ArrayWhiskerKeys(WhiskerKeys):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ObjectKeys(Keys):
+class ObjectKeys(GivenKeys):
     """[object] of trial.toml: what the object is, and perhaps where it stands, in the rig frame."""
 
     # "bar" (default), "ring": a bar bent to a circle, "sphere" or "cone"
     shape: Literal["bar", "ring", "sphere", "cone"] = "bar"
     # [x, y, z] of the bar's axis anywhere, the centre, or the cone's tip; left out: not known
     point_mm: Place | None = None
-    point_sigma_mm: float = 0.0
+    point_sigma_mm: LengthSigma = 0.0
     # with `point_mm`: the bar's direction, the normal of the ring's plane, or where the cone points
     # ([0, 0, 1])
     axis: Annotated[list[float], _THREE] | None = None
@@ -211,7 +228,7 @@ class ObjectKeys(Keys):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrialKeys(Keys):
+class TrialKeys(GivenKeys):
     """trial.toml, and [trial] of session.toml for all trials."""
 
     # groups trials in fits and plots
@@ -229,21 +246,25 @@ class TrialKeys(Keys):
     d_x_sigma_mm: float = 0.0
     # diameter of the bar where it differs from the session's (paper wrapped round it)
     bar_diameter_mm: Width | None = None
-    bar_diameter_sigma_mm: float = 0.0
+    bar_diameter_sigma_mm: DiameterSigma = 0.0
     # "measure" (default), "gauge" (calibrates the gauges), "weight" (a force hung on the whisker)
     purpose: Literal["measure", "gauge", "weight"] = "measure"
     # force of a weight, along rig −z
     force_N: Force | None = None
-    force_sigma_N: float = 0.0
+    force_sigma_N: Annotated[float, Assumed(share=0.005, origin="a balance")] = 0.0
     # where the weight hangs, from the base
     at_mm: Length | None = None
-    at_sigma_mm: float = 0.0
+    at_sigma_mm: LengthSigma = 0.0
     # gives the times of frames where no file has them; its sigma enters nothing
     frame_rate_Hz: Rate | None = None
     frame_rate_sigma_Hz: float = 0.0
     # time of frame 0 on the signals' clock; the sigma enters the touch seen
     first_frame_s: float | None = None
-    first_frame_sigma_s: float = 0.0
+    first_frame_sigma_s: Annotated[float | None, Assumed(origin="half a frame")] = None
+    # share by which a channel of moments may be scaled
+    moment_gain_sigma: Annotated[
+        float, Assumed(absolute=0.01, unstated="moments in N·mm", origin="a calibrated cell")
+    ] = 0.0
     # −3 dB of the low-pass before the converter, a Butterworth of fourth order; 0: none. Its delay
     # is taken out of touch felt. Left out: the paper's 800 Hz, with a sigma
     gauge_filter_Hz: Filter | None = None
@@ -252,13 +273,15 @@ class TrialKeys(Keys):
     # [x, y, z] in the rig frame of an object that moves at constant speed, and one sigma each way;
     # left out: it stands ([moving.md](moving.md))
     object_velocity_mm_s: Velocity | None = None
-    object_velocity_sigma_mm_s: float = 0.0
+    object_velocity_sigma_mm_s: Annotated[float, Assumed(share=0.01, origin="a stage's speed")] = (
+        0.0
+    )
     # true: the object stands until it is touched, gives way as it is pushed, and comes back; how
     # far is fitted to the pictures ([soft.md](soft.md))
     object_gives_way: bool = False
     # how far the follicle is turned about the whisker (+x)
     follicle_roll_deg: Angle = 0.0
-    follicle_roll_sigma_deg: float = 0.0
+    follicle_roll_sigma_deg: Annotated[float, Assumed(share=1 / 90, origin="1° in 90°")] = 0.0
     # the table `[object]` (`[trial.object]` in session.toml): what the object is, and where it
     # stands, which arrays are judged by
     object: ObjectKeys | None = None
@@ -310,6 +333,8 @@ class SessionKeys(Keys):
     format: int
     # shown in the summary; the folder's name where it is absent
     name: str = ""
+    # true: what has no sigma is exact, in tables that do not say otherwise
+    exact: bool = False
     # the order of surfaces in tables and figures, such as ["steel", "sandpaper"]; others follow by
     # the names of their trials
     surfaces: tuple[str, ...] = ()
@@ -335,6 +360,6 @@ def shape_of_size() -> dict[str, str]:
 def sigma_key(key: str) -> str:
     """Return the key of a value's standard deviation: 'd_x_mm' -> 'd_x_sigma_mm'; '' without one."""
     for name in key_names(TrialKeys):
-        if "_sigma_" in name and name.replace("_sigma_", "_") == key:
+        if is_sigma(name) and name.replace("_sigma", "") == key:
             return name
     return ""

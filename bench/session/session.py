@@ -12,8 +12,10 @@ from bench.base.input_problems import InputProblems, refused_as_bad_input
 from bench.session import manifest
 from bench.session.daq import daq_file
 from bench.session.footage import camera_sources, single_pictures, visible
+from bench.session.givens import Given
 from bench.session.inside import check_inside
 from bench.session.plausible import YOUNGS_MODULUS
+from bench.session.stated import StatedSession
 from bench.session.strict_toml import as_keys, key_names, read_toml, values
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker
@@ -34,7 +36,7 @@ _FARTHEST_BOARD_MM = 5000.0
 
 @dataclass(frozen=True)
 class GivenGauges:
-    """Gauge coefficients of [gauges]; sigmas 0: taken as exact.
+    """Gauge coefficients of [gauges]; sigmas 0: exact.
 
     [m_y, m_z] in the follicle's axes = matrix · ([y_V, z_V] − offset), N·mm.
     """
@@ -66,12 +68,12 @@ class Base:
 
 @dataclass(frozen=True)
 class Session:
-    """A recorded session by session.toml and its folders; sigmas are 0 where taken as exact.
+    """A recorded session by session.toml and its folders; sigmas are 0 where exact.
 
     T_rig_board: (3, 4), mm. whisker and bar are given wherever there are trials; board wherever
     there is no cameras.toml but pictures. base: of the whisker whose view of an array this is
     (`bench.session.array_view`), whole: the array's session, in the rig frame; both None where the
-    session is one whisker's.
+    session is one whisker's. givens: what session.toml states, without its trials'.
     """
 
     path: Path
@@ -92,6 +94,7 @@ class Session:
     gauges_toml: Path | None
     base: Base | None = None
     whole: "Session | None" = None
+    givens: tuple[Given, ...] = ()
 
     @property
     def whole_name(self) -> str:
@@ -128,27 +131,28 @@ def load_session(
     """
     path = Path(path)
     problems = problems or InputProblems()
-    keys = read_manifest(path, problems, follow_links)
-    if keys.whiskers:
+    stated = read_manifest(path, problems, follow_links)
+    if stated.keys.whiskers:
         found = "has several whiskers ([[whiskers]]); evaluate and check alone take them"
         raise BadInput(found, file=MANIFEST)
-    return session_of(path, keys, problems, lenses_known=lenses_known, trials=trials)
+    return session_of(path, stated, problems, lenses_known=lenses_known, trials=trials)
 
 
 def session_of(
     path: Path,
-    keys: manifest.SessionKeys,
+    stated: StatedSession,
     problems: InputProblems,
     *,
     lenses_known: bool = False,
     trials: Collection[str] | None = None,
 ) -> Session:
     """Return the session of a manifest; options and errors are those of `load_session`."""
+    keys = stated.keys
     whisker, board, T_rig_board = _stated_bench(keys, problems)
     bar_mm, bar_sigma_mm = _bar_diameter(keys.bar)
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
-    found = _ordered_trials(path, keys, problems, trials)
+    found = _ordered_trials(path, stated, problems, trials)
     session = Session(
         path=path,
         name=keys.name or path.resolve().name,
@@ -166,6 +170,7 @@ def session_of(
         trials=found,
         cameras_toml=_existing(path / "cameras.toml"),
         gauges_toml=_existing(path / "gauges.toml"),
+        givens=stated.givens_of(),
     )
     _warn_of_unused_cameras(session, keys.cameras, problems)
     _check_cameras(session, problems, lenses_known)
@@ -191,16 +196,17 @@ def _bar_diameter(keys: manifest.BarKeys | None) -> tuple[float | None, float]:
 
 
 def _ordered_trials(
-    path: Path, keys: manifest.SessionKeys, problems: InputProblems, names: Collection[str] | None
+    path: Path, stated: StatedSession, problems: InputProblems, names: Collection[str] | None
 ) -> tuple[Trial, ...]:
     """Return the trials of these names, None for all, in the session's order of surfaces."""
-    found = _by_surface(_trials(path, keys, problems, names), keys.surfaces)
+    surfaces = stated.keys.surfaces
+    found = _by_surface(_trials(path, stated, problems, names), surfaces)
     if names is None:
-        _warn_of_unused_surfaces(found, keys.surfaces, problems)
+        _warn_of_unused_surfaces(found, surfaces, problems)
     return found
 
 
-def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> manifest.SessionKeys:
+def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> StatedSession:
     """Read session.toml of a folder that holds nothing else than a session may. Raises BadInput."""
     if not path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(path))
@@ -215,7 +221,8 @@ def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> ma
     needed = []
     if visible(path / "trials"):
         needed = ["bar"] if "whiskers" in tables else ["whisker", "bar"]
-    return as_keys(tables, manifest.SessionKeys, MANIFEST, problems, needed)
+    as_keys(tables, manifest.SessionKeys, MANIFEST, problems, needed)
+    return StatedSession.of(tables)
 
 
 def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
@@ -252,7 +259,7 @@ def _board(keys: manifest.BoardKeys | None) -> Board | None:
     if keys is None:
         return None
     with refused_as_bad_input(MANIFEST):
-        return Board(**values(keys, leave_out=("marker_sigma_mm",)))
+        return Board(**values(keys, leave_out=("marker_sigma_mm", "exact")))
 
 
 def _board_pose(rows: list[list[float]] | None) -> np.ndarray | None:
@@ -294,17 +301,17 @@ def given_gauges(keys: manifest.GaugeKeys | None) -> GivenGauges | None:
 
 
 def _trials(
-    path: Path, keys: manifest.SessionKeys, problems: InputProblems, names: Collection[str] | None
+    path: Path, stated: StatedSession, problems: InputProblems, names: Collection[str] | None
 ) -> list[Trial]:
     """Return the trials of these names that can be read; None: of all."""
     found = []
     daq = None
     with problems.guard():
-        daq = daq_file(keys.signals, MANIFEST)
+        daq = daq_file(stated.keys.signals, MANIFEST)
     for entry in visible(path / "trials"):
         if entry.is_dir() and (names is None or entry.name in names):
             with problems.guard():
-                found.append(load_trial(entry, keys, problems, daq))
+                found.append(load_trial(entry, stated, problems, daq))
     return found
 
 

@@ -15,7 +15,13 @@ from bench.session.plausible import (
     MILLIVOLTS,
     PlausibleRange,
 )
-from bench.session.table import NumberTable, forward_in_time, read_table, require_columns
+from bench.session.table import (
+    NumberTable,
+    column_names,
+    forward_in_time,
+    read_table,
+    require_columns,
+)
 from bench.session.trial import Trial
 from vision.geometry import Reason
 
@@ -130,6 +136,14 @@ def read_signals(trial: Trial) -> Signals:
         warnings=_motor_warnings(table[TIME], motor_deg, trial, label),
         forces_N=_forces_N(table, forces, label) if forces else None,
     )
+
+
+def has_moments(trial: Trial) -> bool:
+    """Return whether a trial's signals are moments; only the head of its file is read."""
+    path = trial.signals_path
+    if trial.daq is not None:
+        return MOMENTS[0] in trial.daq.channels
+    return MOMENTS[0] in column_names(path, trial.label(path.name))
 
 
 def _kind_and_channels(table: NumberTable, label: str) -> tuple[str, tuple[str, str]]:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -37,6 +37,9 @@ class Keys:
     """
 
     one_of: ClassVar[tuple[tuple[str, ...], ...]] = ()
+
+
+KeysOf = TypeVar("KeysOf", bound=Keys)
 
 
 def read_toml(path: Path, label: str) -> dict[str, Any]:
@@ -65,11 +68,11 @@ def _bad_toml(problem: str, text: str, label: str) -> BadInput:
 
 def as_keys(
     tables: dict[str, Any],
-    kind: type[Keys],
+    kind: type[KeysOf],
     label: str,
     problems: InputProblems,
     needed: Sequence[str] = (),
-) -> Keys:
+) -> KeysOf:
     """Check a file's tables against `kind`: names, types, plausible values. Return them as `kind`.
 
     needed: tables that must be there. Raises BadInput with the key's path. A collecting `problems`
@@ -80,17 +83,27 @@ def as_keys(
         with problems.guard():
             raise BadInput(line, file=label)
     try:
-        keys = msgspec.convert(tables, kind, strict=True)
+        keys = convert(tables, kind)
     except msgspec.ValidationError as problem:
         raise BadInput(_in_plain_words(str(problem), kind), file=label) from None
     problems.each(_value_checks(tables, kind, label))
     return keys
 
 
+def convert(tables: dict[str, Any], kind: type[KeysOf]) -> KeysOf:
+    """Return tables that were checked as `kind`; keys that it does not have are left out."""
+    return msgspec.convert(tables, kind, strict=True)
+
+
 @lru_cache
 def key_names(kind: type[Keys]) -> tuple[str, ...]:
     """Return the names of a table's keys."""
     return tuple(field.name for field in fields(kind))
+
+
+def is_sigma(key: str) -> bool:
+    """Return whether a key is of a standard deviation: 'd_x_sigma_mm', or 'stretch_sigma' of a share."""
+    return "_sigma_" in key or key.endswith("_sigma")
 
 
 def values(keys: Keys, leave_out: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -175,7 +188,7 @@ def _value_checks(
         for key, value in table.items():
             if key not in key_names(kind):
                 continue
-            if "_sigma_" in key:
+            if is_sigma(key):
                 plausible_range = plausible.SIGMA
             else:
                 plausible_range = plausible_ranges(kind).get(key, plausible.NUMBER)

@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.session import manifest
 from bench.session.daq import DaqFile
 from bench.session.footage import camera_sources
-from bench.session.strict_toml import as_keys, read_toml, values
+from bench.session.givens import Given, with_sigmas
+from bench.session.stated import StatedSession
+from bench.session.strict_toml import as_keys, convert, read_toml, values
 
 MANIFEST = "trial.toml"
 SIGNALS = "signals.csv"
@@ -19,9 +22,10 @@ _UPRIGHT = (0.0, 0.0, 1.0)  # axis of an object that stands somewhere, where it 
 class Trial(manifest.TrialKeys):
     """One recording: what trial.toml and [trial] state, and where its files are.
 
-    Nominal values are None where not given, sigmas 0 where exact. bar_diameter_mm: the session's
-    where the trial has no own. camera_sources: camera to folder of pictures or video, empty where the
-    trial has none. whisker: of an array, whose channels `daq` names; '' where it is the only one.
+    Nominal values are None where not given, sigmas 0 where exact; first_frame_sigma_s is None where
+    the frames say it. bar_diameter_mm: the session's where the trial has no own. camera_sources: camera
+    to folder of pictures or video, empty where the trial has none. whisker: of an array, whose
+    channels `daq` names; '' where it is the only one. givens: what trial.toml and [trial] state.
     """
 
     name: str
@@ -30,6 +34,7 @@ class Trial(manifest.TrialKeys):
     signals_path: Path
     daq: DaqFile | None = None
     whisker: str = ""
+    givens: tuple[Given, ...] = ()
 
     @property
     def is_bar(self) -> bool:
@@ -60,7 +65,10 @@ class Trial(manifest.TrialKeys):
 
 
 def load_trial(
-    folder: Path, session: manifest.SessionKeys, problems: InputProblems, daq: DaqFile | None = None
+    folder: Path,
+    session: StatedSession,
+    problems: InputProblems,
+    daq: DaqFile | None = None,
 ) -> Trial:
     """Read trial.toml over the session's defaults and find the trial's files. Raises BadInput.
 
@@ -68,7 +76,9 @@ def load_trial(
     """
     place = f"trials/{folder.name}"
     label = f"{place}/{MANIFEST}"
-    keys = _trial_keys(folder, session.trial, label, problems)
+    table = _trial_table(folder, session.trial_table, label, problems)
+    table, givens = with_sigmas(table, manifest.TrialKeys, "[trial]", exact=session.keys.exact)
+    keys = convert(table, manifest.TrialKeys)
     if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
         raise BadInput('purpose = "weight" needs force_N and at_mm', file=label)
     if keys.object_gives_way and keys.object_velocity_mm_s is not None:
@@ -78,7 +88,7 @@ def load_trial(
     if not signals_path.is_file():
         found = "is not there; a trial needs its signals"
         raise BadInput(found, file=f"{place}/{signals_path.name}")
-    settings = values(keys) | _bar_diameter(keys, session.bar)
+    settings = values(keys) | _bar_diameter(keys, session.keys.bar)
     settings["object"] = _stated_object(keys.object, settings["bar_diameter_mm"], label)
     return Trial(
         name=folder.name,
@@ -86,25 +96,26 @@ def load_trial(
         camera_sources=camera_sources(folder, place),
         signals_path=signals_path,
         daq=daq,
+        givens=givens,
         **settings,
     )
 
 
-def _trial_keys(
-    folder: Path, defaults: manifest.TrialKeys, label: str, problems: InputProblems
-) -> manifest.TrialKeys:
-    """Return trial.toml, with absent keys from the session's [trial].
+def _trial_table(
+    folder: Path, defaults: dict[str, Any], label: str, problems: InputProblems
+) -> dict[str, Any]:
+    """Return the checked table of trial.toml, with absent keys from the session's [trial].
 
     A sigma comes from where its value comes from.
     """
     file = folder / MANIFEST
     if not file.is_file():
         return defaults
-    given = read_toml(file, label)
-    own = values(as_keys(given, manifest.TrialKeys, label, problems))
-    stated = set(given) | {manifest.sigma_key(key) for key in given}
-    kept = {name: value for name, value in own.items() if name in stated}
-    return manifest.TrialKeys(**values(defaults) | kept)
+    own = read_toml(file, label)
+    as_keys(own, manifest.TrialKeys, label, problems)
+    elsewhere = {manifest.sigma_key(key) for key in own}
+    kept = {key: value for key, value in defaults.items() if key not in elsewhere}
+    return kept | own
 
 
 def _stated_object(

@@ -10,7 +10,7 @@ from vision.geometry import Wire
 
 @dataclass(frozen=True, kw_only=True)
 class Whisker(WhiskerKeys):
-    """Shape, size and stiffness, each with one standard deviation (0: taken as exact).
+    """Shape, size and stiffness, each with one standard deviation (0: exact).
 
     diameter_mm is the base's; a "tapered" whisker, and no other, has a tip_diameter_mm below it. Exactly one of
     `youngs_modulus_GPa` and `flexural_rigidity_Nmm2` (at the base) is given. Raises ValueError for anything else.

@@ -126,7 +126,8 @@ def _next_steps(path: Path, answers: Mapping[str, float]) -> Iterator[str]:
 _TEMPLATE = """\
 # A session of whisker-bench: what was recorded in one sitting, with one whisker on one rig.
 # Lengths in mm, angles in degrees, gauges in volts. Any length or angle may have its standard deviation beside it:
-# length_sigma_mm, square_sigma_mm. What has none is taken as exact, and the report says so.
+# length_sigma_mm, square_sigma_mm. What has none is known as well as a careful lab knows it (docs/formats.md), and the
+# report marks it. Exact is what has a sigma of 0, or none in a table with exact = true.
 # Every key: docs/formats.md. `whisker-bench check` on this folder lists all that is wrong or doubtful.
 format = 1
 {named}

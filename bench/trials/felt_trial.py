@@ -249,13 +249,21 @@ def against_shape(unit: Unit, readout: Readout, pairs: Pairs) -> MomentAgreement
 def readout_of(unit: Unit, kind: str) -> tuple[Readout | None, Reason]:
     """Return the conversion of channels of this kind to moments, or None and why there is none."""
     if kind == "Nmm":
-        return Readout.bare(), NO_REASON
+        return _with_scale(Readout.bare(unit.trial.moment_gain_sigma), unit), NO_REASON
     if unit.gauges is None:
         return None, NO_GAUGES
     gauges = unit.gauges.for_trial(unit.trial.name)
     if gauges is None:
         return None, OWN_GAUGES
-    return Readout.of(unit.trial, gauges), NO_REASON
+    return _with_scale(Readout.of(unit.trial, gauges), unit), NO_REASON
+
+
+def _with_scale(readout: Readout, unit: Unit) -> Readout:
+    """Return the readout with the stiffness' relative sigma, where that enters distances.
+
+    Where gauges were fitted to the wire's bending, the stiffness cancels.
+    """
+    return replace(readout, scale_sigma=_stiffness_share(unit, readout, of_wire=False))
 
 
 def _with_drift(unit: Unit, stroke: FeltStroke, readout: Readout) -> WithDrift | None:

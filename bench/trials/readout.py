@@ -20,18 +20,20 @@ class Readout:
     """Conversion of a trial's channels to moments in the hub's axes: the gauges, and the follicle's
     turn with its sigma.
 
-    Moments that were recorded as such need neither (`Readout.bare`).
+    Moments that were recorded as such need neither (`Readout.bare`). scale_sigma: relative sigma of
+    the moments' newtons against those of the whisker's stiffness, where each are its own.
     """
 
     gauges: GaugeMatrix
     roll_rad: float = 0.0
     roll_sigma_rad: float = 0.0
     is_gauged: bool = False
+    scale_sigma: float = 0.0
 
     @classmethod
-    def bare(cls) -> "Readout":
-        """Return the readout of signals that are moments already."""
-        return cls(GaugeMatrix(np.eye(2)))
+    def bare(cls, gain_sigma: float = 0.0) -> "Readout":
+        """Return the readout of signals that are moments already; gain_sigma: of each channel."""
+        return cls(GaugeMatrix(np.eye(2), np.diag(gain_sigma**2 * np.eye(2).ravel())))
 
     @classmethod
     def of(cls, trial: Trial, gauges: GaugeMatrix) -> "Readout":
@@ -62,8 +64,8 @@ class Readout:
         return self.matrix @ channels_covariance @ self.matrix.T + changes.T @ changes
 
     def shared_Nmm(self, whisk: Whisk) -> np.ndarray:
-        """Return the change (5, 2) of a whisk's moments at one sigma of each cause that all whisks
-        of a session have in common: four of the gauges, and the follicle's turn.
+        """Return the change (6, 2) of a whisk's moments at one sigma of each cause that all whisks
+        of a session have in common: four of the gauges, the follicle's turn, and the stiffness.
         """
         moments = [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
         return self._shared_changes(np.linalg.solve(self.matrix, moments))
@@ -77,10 +79,11 @@ class Readout:
         return self.gauges.by_camera_error_at(channels) @ to_follicle(self.roll_rad)
 
     def _shared_changes(self, channels: np.ndarray) -> np.ndarray:
-        """Return the change (5, 2) of the moments of `channels` (2,) at one sigma of each cause."""
+        """Return the change (6, 2) of the moments of `channels` (2,) at one sigma of each cause."""
         by_gauges = self.gauges.changes_at(channels) @ to_follicle(self.roll_rad)
         per_rad = to_follicle(self.roll_rad + np.pi / 2).T @ self.gauges.matrix @ channels
-        return np.vstack([by_gauges, per_rad * self.roll_sigma_rad])
+        by_scale = self.scale_sigma * (self.matrix @ channels)
+        return np.vstack([by_gauges, per_rad * self.roll_sigma_rad, by_scale])
 
 
 def felt_whisk(

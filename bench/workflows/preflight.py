@@ -19,6 +19,7 @@ from bench.gauges.gauge_faults import check_alive
 from bench.gauges.gauges_file import given_gauges
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
+from bench.session.given_lines import assumed_line
 from bench.session.session import Session
 from bench.session.session_check import checked_views, find_damage
 from bench.session.signals import Signals, forward_strokes, read_signals
@@ -52,16 +53,20 @@ def check(path: Path, *, follow_links: bool = False) -> int:
     Return the exit code: 2 where there is a refusal, 1 where there is a warning, else 0.
     """
     problems = InputProblems(stop_at_first=False)
+    assumed = ""
     with problems.guard():
         views = checked_views(path, problems, follow_links=follow_links)
         session = views[0]
         find_damage(session, problems)
         for view in views:
             check_contents(view, problems)
+        assumed = assumed_line(views)
     for line in dict.fromkeys(problems.refusals):
         print(f"bad: {line}")
     for line in dict.fromkeys(problems.warnings):
         print(f"doubtful: {line}")
+    if assumed:
+        print(f"assumed: {assumed}")
     if problems.refusals:
         return 2
     if problems.warnings:

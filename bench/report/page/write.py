@@ -35,7 +35,7 @@ _WITH_OWN_PLACE = {
     "warnings",
     "cameras",
     "gauges",
-    "exact",
+    "givens",
     "ledger",
     "sensors",
 }

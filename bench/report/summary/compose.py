@@ -4,6 +4,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from bench.analyses.catalogue import ANALYSES
 from bench.report.evaluation import Evaluation
 from bench.report.run_facts import Section
@@ -22,9 +24,9 @@ from bench.report.summary.warning_lines import (
     estimator_limits,
     frame_lines,
     light_lines,
-    taken_as_exact,
     whisk_warnings,
 )
+from bench.session.given_lines import given_lines
 from bench.trials.estimate_errors import judge
 
 WARNINGS = "Doubtful"
@@ -104,11 +106,7 @@ def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[
         _section("warnings", WARNINGS, warnings),
         _section("limits", "Limits that estimators met", estimator_limits(results)),
         _section("score", SCORE, scores),
-        _section(
-            "exact",
-            "Taken as exact, for no sigma was given",
-            taken_as_exact(evaluation.session),
-        ),
+        _section("givens", "Givens (± one sigma)", _given_lines(evaluation)),
         _section("files", "Files", [_file_list(figures)]),
     )
     shown = tuple(section for section in sections if section.lines)
@@ -123,6 +121,14 @@ def _verdict_lines(evaluation: Evaluation, warnings: int) -> Iterator[str]:
     yield from verdict(session.name, has_pictures, evaluation.accuracy, settings, warnings)
     yield from gauge_source_lines(evaluation.gauges)
     yield from preset_lines(evaluation.results, settings)
+
+
+def _given_lines(evaluation: Evaluation) -> Iterator[str]:
+    """Return lines on how well what was stated is known."""
+    cameras = evaluation.calibration.cameras
+    are_brought = cameras is not None and evaluation.session.cameras_toml is not None
+    are_exact = are_brought and not np.any(cameras.covariance)
+    return given_lines(evaluation.session, cameras_are_exact=are_exact)
 
 
 def _sections_of_pictures(evaluation: Evaluation) -> Iterator[Section]:

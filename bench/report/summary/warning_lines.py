@@ -1,4 +1,4 @@
-"""Warnings of each whisk, what the light hides, and what was taken as exact."""
+"""Warnings of each whisk, and what the light hides."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -8,7 +8,6 @@ from bench.analyses.runs import RUNS
 from bench.base.input_problems import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import SeenWhisk, TrialResult, whisks
-from bench.session.session import Session
 from vision.geometry import Reason, as_reason, counted
 
 # Codes of statuses that are as they should be: of a session without pictures, of a gauge trial.
@@ -121,21 +120,3 @@ def frame_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     for result in results:
         for note in result.seen.notes:
             yield f"{result.trial.name}: {note}"
-
-
-def taken_as_exact(session: Session) -> Iterator[str]:
-    """Yield one line that names what was given without a sigma; none where all has one."""
-    whisker = session.whisker
-    given = {
-        "whisker length": whisker.length_sigma_mm,
-        "whisker diameter": whisker.diameter_sigma_mm,
-        "bar diameter": session.bar_diameter_sigma_mm,
-        "stiffness C": whisker.C_sigma_Nmm2,
-    }
-    if session.T_rig_board is not None:
-        given["T_rig_board"] = session.T_rig_board_sigma_mm + session.T_rig_board_sigma_rad
-    if session.board is not None:
-        given["board square"] = session.board.square_sigma_mm
-    exact = [name for name, sigma in given.items() if not sigma]
-    if exact:
-        yield ", ".join(exact)

@@ -39,11 +39,17 @@ def test_frames_csv(small_copy):
 
 
 def test_stated_rate(small_copy, folder):
-    replace_frames_csv(folder, "frame_rate_Hz = 20.0\nfirst_frame_s = 0.0005\n")
+    stated = "frame_rate_Hz = 20.0\nfirst_frame_s = 0.0005\n"
+    replace_frames_csv(folder, f"exact = false\n{stated}")
     found = times(small_copy)
     assert (found.source, found.warnings) == ("frame_rate_Hz", ())
     assert found.clock_sigma_s == 0.025  # half a frame: no edge was recorded
     np.testing.assert_allclose(found.time_s, 0.0005 + 0.05 * np.arange(11), atol=1e-12)
+
+
+def test_a_first_frame_that_is_exact_ties_the_clocks(small_copy, folder):
+    replace_frames_csv(folder, "frame_rate_Hz = 20.0\nfirst_frame_s = 0.0005\n")
+    assert times(small_copy).clock_sigma_s == 0.0
 
 
 def test_a_stated_sigma_of_the_first_frame_is_the_clocks(small_copy, folder):
@@ -84,7 +90,7 @@ def test_own_times_of_one_camera_only_are_refused(small_copy, folder):
 
 
 def test_container_times_are_a_warning(small_copy, folder, as_video):
-    replace_frames_csv(folder, "first_frame_s = 0.0005\n")
+    replace_frames_csv(folder, "exact = false\nfirst_frame_s = 0.0005\n")
     for camera in ("high", "low"):
         as_video(folder / camera, ".mkv", "FFV1")
     found = times(small_copy)

@@ -1,0 +1,169 @@
+"""Givens: every number that a person states has a sigma: the stated one, else that of a careful lab.
+
+Exact is what is said to be exact: by a sigma of 0, or by `exact = true` in its table or at the top
+of session.toml.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from bench.session.strict_toml import Keys, declared_parts, inner_tables
+
+_AS_READ = {"mm_s": "mm/s", "Nmm2": "N·mm²", "Nmm_per_V": "N·mm/V"}
+Sigma: TypeAlias = float | list[float] | list[list[float]]
+Source: TypeAlias = Literal["stated", "assumed", "exact"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class GivenKeys(Keys):
+    """A table that states numbers of a bench."""
+
+    # true: what has no sigma here is exact
+    exact: bool | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assumed:
+    """Says of a sigma's key what is assumed where nobody states it: what a careful lab would have.
+
+    absolute: in the sigma's own unit. share: of the value. The smaller of both counts; without both
+    the recording says it. origin: where it comes from. of: the key of the value, where the sigma's
+    name does not say it. unstated: the name of a value that stands in no key.
+    """
+
+    origin: str
+    absolute: float = math.inf
+    share: float = math.inf
+    of: str = ""
+    unstated: str = ""
+
+    def sigma(self, value: Any) -> Sigma | None:
+        """Return the sigma of a value, of the length of a vector; None where the recording says it."""
+        size = float(np.linalg.norm(value)) if math.isfinite(self.share) else 1.0
+        sigma = min(self.absolute, self.share * size)
+        return sigma if math.isfinite(sigma) else None
+
+    def exact(self, value: Any) -> Sigma:
+        """Return the sigma of a value that is exact."""
+        return 0.0
+
+    def text(self, unit: str) -> str:
+        """Return the assumption as documents have it: '± 0.02 mm, at most 2 % (a caliper)'."""
+        sizes = []
+        if math.isfinite(self.absolute):
+            sizes.append(f"{self.absolute:g} {unit}" if unit else f"{100.0 * self.absolute:g} %")
+        if math.isfinite(self.share):
+            sizes.append(f"{100.0 * self.share:.2g} %")
+        return f"± {', at most '.join(sizes)} ({self.origin})" if sizes else f"± {self.origin}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssumedOfRows(Assumed):
+    """Says so of a matrix: of each row, every entry has the share of the row's largest entry."""
+
+    def sigma(self, value: list[list[float]]) -> list[list[float]]:
+        """Return the sigmas of a matrix, entry by entry."""
+        rows = np.abs(np.array(value))
+        largest = rows.max(axis=1, keepdims=True)
+        return (self.share * np.broadcast_to(largest, rows.shape)).tolist()
+
+    def exact(self, value: list[list[float]]) -> list[list[float]]:
+        """Return the sigmas of a matrix that is exact."""
+        return np.zeros_like(value, dtype=float).tolist()
+
+
+@dataclass(frozen=True)
+class Given:
+    """A number that a person stated, and how well it is known.
+
+    key: of the value, with its table. sigma: in `unit`, the largest of a matrix; None where the
+    recording says it. origin: of an assumed sigma.
+    """
+
+    key: str
+    sigma: float | None
+    unit: str
+    source: Source
+    origin: str = ""
+
+    @property
+    def size(self) -> str:
+        """Return the sigma in words: '± 0.5 mm'; its origin where only the recording says it."""
+        if self.sigma is None:
+            return f"± {self.origin}"
+        if not self.unit:
+            return f"± {100.0 * self.sigma:.3g} %"
+        return f"± {self.sigma:.3g} {self.unit}"
+
+    @property
+    def text(self) -> str:
+        """Return the given with its sigma, and where that comes from."""
+        of = f"assumed: {self.origin}" if self.source == "assumed" else "stated"
+        return f"{self.key} {self.size}, {of}"
+
+
+def assumptions(kind: type[Keys]) -> dict[str, Assumed]:
+    """Return what a table assumes, by the key of the sigma."""
+    return declared_parts(kind, Assumed)
+
+
+def value_key(sigma_key: str, assumed: Assumed) -> str:
+    """Return the key of the value that a sigma belongs to."""
+    return assumed.of or sigma_key.replace("_sigma", "")
+
+
+def unit_of(sigma_key: str) -> str:
+    """Return the unit of a sigma by its name: 'length_sigma_mm' -> 'mm'; '' of a share."""
+    unit = sigma_key.partition("_sigma")[2].strip("_")
+    return _AS_READ.get(unit, unit)
+
+
+def with_sigmas(
+    table: dict[str, Any], kind: type[Keys], label: str = "", *, exact: bool = False
+) -> tuple[dict[str, Any], tuple[Given, ...]]:
+    """Return a checked table with a sigma for each number that needs one, and what is so given.
+
+    It holds for the tables within, too. label: how messages name the table. exact: whether unsaid
+    sigmas are 0 where the table does not say.
+    """
+    exact = table.get("exact", exact)
+    filled = dict(table)
+    givens: list[Given] = []
+    for key, assumed in assumptions(kind).items():
+        of = value_key(key, assumed)
+        if of in table or assumed.unstated:
+            filled[key], source = _sigma(table, key, assumed, exact)
+            largest = None if filled[key] is None else float(np.max(filled[key]))
+            if source != "assumed" or largest != 0.0:  # of a value of 0, a share says nothing
+                origin = assumed.origin if source == "assumed" else ""
+                givens.append(
+                    Given(
+                        f"{label} {assumed.unstated or of}", largest, unit_of(key), source, origin
+                    )
+                )
+    for key, inner in inner_tables(kind).items():
+        if isinstance(table.get(key), list):
+            found = []
+            for part in table[key]:
+                name = f"[[{key}]] {part.get('name', '')}".strip()
+                found.append(with_sigmas(part, inner, name, exact=exact))
+            filled[key] = [part for part, _ in found]
+            givens += [given for _, of_part in found for given in of_part]
+        elif key in table:
+            name = label if label.startswith("[[") else f"[{key}]"
+            filled[key], of_table = with_sigmas(table[key], inner, name, exact=exact)
+            givens += of_table
+    return filled, tuple(givens)
+
+
+def _sigma(
+    table: dict[str, Any], key: str, assumed: Assumed, exact: bool
+) -> tuple[Sigma | None, Source]:
+    """Return the sigma of a key, and where it comes from."""
+    value = table.get(value_key(key, assumed), 1.0)
+    if key in table:
+        return table[key], "stated" if np.any(table[key]) else "exact"
+    return (assumed.exact(value), "exact") if exact else (assumed.sigma(value), "assumed")
