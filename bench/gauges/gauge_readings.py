@@ -32,10 +32,8 @@ NOMINAL_SHARE = 0.01
 _NOMINAL_SLOPE_DEG = 5.0
 # [rad] A stroke's usual range, where no frame has the angles.
 _NOMINAL_THETA_RAD = np.radians(np.linspace(1.0, 4.0, 6))
-# [mm] Step of differences: far above rounding, far below what curves. Derived.
-_STEP_MM = 1e-3
-# [mm²] Where the places are exact, their common error is nothing by this. Derived.
-_LEAST_VARIANCE_MM2 = 1e-18
+# [1] Step of differences over the contact's distance: far above rounding, far below what curves. Derived.
+_STEP_SHARE = 1e-5
 # [rad] As the estimators average over (estimator.signal.HALF_WINDOW_RAD).
 _MOST_HALF_WINDOW_RAD = np.radians(0.5)
 # Where moments come from.
@@ -143,7 +141,8 @@ def pairs_of(
 
 
 def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMoments | None:
-    """Return the moments of the frames in which the whisker touches; None where there are none.
+    """Return the moments of the frames in which the whisker touches; None where there are none, or
+    where no rod of its rigidity is bent so.
 
     They are those of the exact rod through the contact that was seen, whose place and deflection
     are the wire's: neither the slope of the bar nor the slip is needed, and a whisk without a truth
@@ -157,9 +156,12 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
     across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
     along = d.along_mm[good]
     share = _share_along_rod(across, along, d.slip_mm[good], d.slip_sigma_mm[good])
-    moments, by_friction = _with_friction(along, across, share.value, whisker)
+    try:
+        moments, by_friction = _with_friction(along, across, share.value, whisker)
+        by_place = _by_place(along, across, share.value, whisker)
+    except ArithmeticError:
+        return None
     by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
-    by_place = _by_place(along, across, share.value, whisker)
     rows = np.repeat(good, 3)
     by_camera_error_mm = d.by_camera_error_mm[rows]
     of_places = d.covariance[np.ix_(rows, rows)] - by_camera_error_mm @ by_camera_error_mm.T
@@ -197,11 +199,12 @@ def _by_place(
     """
     n = len(along)
     frames = np.arange(n)
+    step_mm = _STEP_SHARE * float(along.max())
     here, _ = _with_friction(along, across, share, whisker)
     rows = np.zeros((n, 2, n, 3))
-    for k, step in enumerate(_STEP_MM * np.eye(3)):
+    for k, step in enumerate(step_mm * np.eye(3)):
         moved, _ = _with_friction(along + step[0], across + step[1:], share, whisker)
-        rows[frames, :, frames, k] = (moved - here) / _STEP_MM
+        rows[frames, :, frames, k] = (moved - here) / step_mm
     return rows.reshape(2 * n, 3 * n)
 
 
@@ -214,8 +217,8 @@ def _common_and_own(by_place: np.ndarray, of_places: np.ndarray) -> tuple[np.nda
     covariance = by_place @ of_places @ by_place.T
     mean_place = np.zeros(len(of_places))
     mean_place[::3] = 3.0 / len(of_places)
-    variance = mean_place @ of_places @ mean_place
-    common = by_place @ of_places @ mean_place / np.sqrt(max(variance, _LEAST_VARIANCE_MM2))
+    sigma = np.sqrt(mean_place @ of_places @ mean_place)
+    common = by_place @ (of_places @ mean_place) / (sigma or 1.0)  # exact places have no error
     return common.reshape(-1, 2), covariance - np.outer(common, common)
 
 
@@ -266,14 +269,17 @@ def reference_from_nominal(
     """Return the moments of a bar at right angles to the push, at the distance that a ruler gave.
 
     The bent whisker leans by half the pushing angle where it touches, and rolls that far over the
-    bar towards its base. None where there is no such distance.
+    bar towards its base. None where there is no such distance, or no rod is bent so there.
     """
     if trial.d_x_mm is None or abs(trial.beta_deg or 0.0) > _NOMINAL_SLOPE_DEG:
         return None
     theta = _NOMINAL_THETA_RAD
     radii_mm = 0.5 * trial.bar_diameter_mm + float(whisker.wire.radius_mm(trial.d_x_mm))
     along, across = _nominal_contacts(theta, trial.d_x_mm, radii_mm)
-    moments, by_friction = _with_friction(along, across, np.ones_like(theta), whisker)
+    try:
+        moments, by_friction = _with_friction(along, across, np.ones_like(theta), whisker)
+    except ArithmeticError:
+        return None
     by_touch = touch.sigma_rad * moments / theta[:, None]
     return ReferenceMoments(
         touch.motor_rad,

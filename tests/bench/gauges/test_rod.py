@@ -1,9 +1,14 @@
-"""The rod against closed forms of the elastica, small deflections, and the recorded-like session's exact mechanics."""
+"""The rod against closed forms of the elastica in 50 digits, small deflections, and the recorded-like session's exact
+mechanics; and the same answer in whatever unit it is asked."""
 
 import tomllib
 
+import mpmath as mp
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 from bench.gauges.clamped_rod import moment_at_clamp
 
@@ -14,28 +19,121 @@ def uniform(arc):
     return EI + 0.0 * arc
 
 
-def elastica(end_angle: float, friction_angle: float) -> tuple[float, float]:
+def elastica(end_angle: float, friction: float) -> tuple[float, float]:
     """(across/along, moment · along / EI) of a clamped elastica with tangent angle `end_angle` at its contact.
 
-    EI ψ'²/2 = F (sin(ψ_e − ψ + λ) − sin λ), by quadrature in u = √(ψ_e − ψ), where the integrand is smooth. No code and
-    no method is shared with the fixed point of `bench.gauges.clamped_rod`.
+    EI ψ'²/2 = F (sin(ψ_e − ψ + λ) − sin λ), by quadrature in u = √(ψ_e − ψ), where the integrand is smooth, in 50
+    digits. No code and no method is shared with `bench.gauges.clamped_rod`.
     """
-    u, w = np.polynomial.legendre.leggauss(60)
-    u, w = 0.5 * np.sqrt(end_angle) * (u + 1), 0.5 * np.sqrt(end_angle) * w
-    bend = np.sqrt(np.sin(u**2 + friction_angle) - np.sin(friction_angle))
-    along, across = (np.sum(w * f(end_angle - u**2) * 2 * u / bend) for f in (np.cos, np.sin))
-    return across / along, along * np.sqrt(
-        np.sin(end_angle + friction_angle) - np.sin(friction_angle)
-    )
+    with mp.workdps(50):
+        end, cone = mp.mpf(end_angle), mp.atan(mp.mpf(friction))
+
+        def along(f):
+            """∫ f(ψ) ds in units of √(EI/2F)."""
+            return mp.quad(
+                lambda u: (
+                    f(end - u**2) * 2 * u / mp.sqrt(2 * mp.cos(cone + u**2 / 2) * mp.sin(u**2 / 2))
+                ),
+                [0, mp.sqrt(end)],
+                method="gauss-legendre",
+            )
+
+        x, y = along(mp.cos), along(mp.sin)
+        return float(y / x), float(x * mp.sqrt(mp.sin(end + cone) - mp.sin(cone)))
 
 
-@pytest.mark.parametrize("end_angle", [1e-3, 0.05, 0.2, 0.5])
-@pytest.mark.parametrize("friction", [-0.4, 0.0, 0.2])
-def test_closed_form_of_the_elastica(end_angle, friction):
-    ratio, scaled = elastica(end_angle, np.arctan(friction))
-    assert moment_at_clamp(50.0, 50.0 * ratio, uniform, friction)[0] == pytest.approx(
-        EI / 50.0 * scaled, rel=1e-9
+@settings(max_examples=25)
+@given(
+    end_angle=st.floats(1e-4, 0.75),
+    friction=st.floats(-0.4, 0.3),
+    along_mm=st.floats(2.0, 480.0),
+    rigidity_Nmm2=st.floats(1e-3, 1e6),
+)
+def test_closed_form_of_the_elastica(end_angle, friction, along_mm, rigidity_Nmm2):
+    """Of any size and stiffness. An angle of 1e-4 is held to ε/1e-4 by the contact's own rounding."""
+    ratio, scaled = elastica(end_angle, friction)
+    found = moment_at_clamp(
+        along_mm, along_mm * ratio, lambda arc: rigidity_Nmm2 + 0 * arc, friction
     )
+    assert found[0] * along_mm / rigidity_Nmm2 == pytest.approx(scaled, rel=1e-10)
+
+
+def marched(loss: float, load: float, friction: float) -> tuple[float, float, float]:
+    """(along, across, moment) of a tapering rod of EI = 1 at its clamp that is loaded at an arc of 1.
+
+    From the contact, where all is known but its place, back to the clamp, and turned so that the clamp lies along x. loss:
+    share of the diameter that is lost up to there.
+    """
+
+    def change(s, state):
+        """ψ, x, y from the contact; the force's lever about (x, y)."""
+        angle, x, y = state
+        lever = -x * load - y * load * friction
+        return lever / (1 - loss * s) ** 4, np.cos(angle), np.sin(angle)
+
+    how = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14}
+    angle, x, y = solve_ivp(change, (1.0, 0.0), np.zeros(3), **how).y[:, -1]
+    c, s = np.cos(angle), np.sin(angle)
+    return -x * c - y * s, x * s - y * c, -x * load - y * load * friction
+
+
+@settings(max_examples=25)
+@given(
+    loss=st.floats(0.0, 0.85),
+    load=st.floats(0.001, 1.0),
+    friction=st.floats(-0.3, 0.3),
+    scale=st.floats(0.1, 500.0),
+)
+def test_a_tapering_rod_follows_its_equation_marched_from_the_contact(loss, load, friction, scale):
+    """The load's part of the rigidity there is that of the bend at the contact; up to 45°."""
+    load = load * (1 - loss) ** 2
+    along, across, moment = marched(loss, load, friction)
+
+    def rigidity(arc):
+        return (1 - loss * arc / scale) ** 4
+
+    found = moment_at_clamp(along * scale, across * scale, rigidity, friction)
+    assert found[0] * scale == pytest.approx(moment, rel=1e-8)
+
+
+@settings(max_examples=100)
+@given(
+    length_mm=st.floats(10.0, 500.0),
+    part=st.floats(0.05, 0.95),
+    theta_deg=st.floats(0.1, 30.0),
+    loss=st.floats(0.0, 1.0),
+    friction=st.floats(-0.4, 0.0),
+    rigidity_Nmm2=st.floats(1e-3, 1e6),
+    length_unit=st.floats(1e-3, 1e3),
+    force_unit=st.floats(1e-6, 1e6),
+)
+def test_the_answer_is_the_same_in_every_unit(
+    length_mm, part, theta_deg, loss, friction, rigidity_Nmm2, length_unit, force_unit
+):
+    """m goes with force · length; a rod that no force bends so is refused in every unit. Near 1 of small angles."""
+    theta = np.radians(theta_deg)
+
+    def asked(length, rigidity):
+        """Moment over the force's and the length's unit, or None where it is refused."""
+        x, w = part * length * np.cos(theta), part * length * np.sin(theta)
+        try:
+            moment = moment_at_clamp(
+                x, w, lambda arc: rigidity * (1 - loss * arc / length) ** 4, friction
+            )
+        except ArithmeticError:
+            return None
+        return moment[0] * length / rigidity
+
+    one = asked(length_mm, rigidity_Nmm2)
+    other = asked(length_mm * length_unit, rigidity_Nmm2 * force_unit * length_unit**2)
+    assert (one is None) == (other is None)
+    if one is not None:
+        assert other == pytest.approx(one, rel=1e-9)
+        bent = theta / (1 - loss * part)  # how far the rod's end turns, but for a factor near 1
+        small = 3 * theta * (1 / part - loss)
+        assert one / small == pytest.approx(1.0, abs=bent * (0.3 + bent))
+    else:
+        assert theta_deg / (1 - loss * part) > 30.0
 
 
 def test_small_deflections_go_over_into_the_beam_equation():
