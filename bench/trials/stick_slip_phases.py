@@ -46,6 +46,11 @@ _FEWEST = 4
 # of it.
 _MOST = 40
 _GUARD = 3  # samples at a jump that the gauges' own filter smears
+# [1] Of a stroke's angles, in its middle: there the motor goes at its speed, whatever its ramps. Stated.
+_PLATEAU_SHARE = 1 / 3
+# [1] How far the motor may be from the line of its speed, over the most that it is from it in the middle of the stroke.
+# A ramp of 20 ms leaves it within a few samples. Study: tests/studies/accuracy/felt_phases.py.
+_OFF_PLATEAU = 2.0
 
 
 def slips(seen: SeenWhisk) -> bool:
@@ -222,9 +227,17 @@ def find_rests(
     d_x_mm: float,
     beam: Beam,
 ) -> tuple[int, list[ContactRest]]:
-    """Return the number of jumps, and the rests between two of them; arguments as `felt_phases`."""
-    good = np.isfinite(moments_Nmm).all(axis=1)
+    """Return the number of jumps, and the rests between two of them; arguments as `felt_phases`.
+
+    They are looked for where the motor moves steadily. Where it starts, stops or turns round the slip
+    per angle changes with its speed, as the moments come late out of the gauges' filter.
+    """
+    steady = _steady(time_s, theta_rad)
+    good = np.zeros(len(theta_rad), dtype=bool)
+    good[steady] = np.isfinite(moments_Nmm[steady]).all(axis=1)
     theta = theta_rad[good]
+    if len(theta) < 2:
+        return 0, []
     moments = moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0]
     slip = _slip_mm(theta, moments, abs(beta_rad), d_x_mm, beam)
     jumps = _jumps(time_s[good], theta, slip)
@@ -235,6 +248,28 @@ def find_rests(
         if rest is not None:
             rests.append(rest)
     return len(jumps), rests
+
+
+def _steady(time_s: np.ndarray, motor_rad: np.ndarray) -> slice:
+    """Return the samples of a forward stroke at which the motor goes at the speed of its middle.
+
+    It ends where the motor leaves the line of that speed by more than its own noise: encoder steps
+    and uneven running, as the middle of the stroke has them.
+    """
+    low, high = motor_rad.min(), motor_rad.max()
+    edge = 0.5 * (1.0 - _PLATEAU_SHARE) * (high - low)
+    middle = np.flatnonzero((motor_rad >= low + edge) & (motor_rad <= high - edge))
+    if len(middle) < 2:
+        return slice(0, 0)
+    first, last = middle[0], middle[-1] + 1
+    line = np.polynomial.Polynomial.fit(time_s[first:last], motor_rad[first:last], 1)
+    off = np.abs(motor_rad - line(time_s))
+    is_off = off > _OFF_PLATEAU * off[first:last].max()
+    before = np.flatnonzero(is_off[:first])
+    after = np.flatnonzero(is_off[last:])
+    begin = before[-1] + 1 if len(before) else 0
+    end = last + after[0] if len(after) else len(motor_rad)
+    return slice(int(begin), int(end))
 
 
 def _slip_mm(

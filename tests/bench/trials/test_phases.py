@@ -12,11 +12,13 @@ from bench.gauges.felt import strokes_of
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Phases
 from bench.records.plain import from_plain, to_plain
 from bench.rig.simulation import simulate
+from bench.rig.stroke import Stroke as Plan
 from bench.session.session import load_session
 from bench.session.signals import read_signals
-from bench.trials.stick_slip_phases import felt_phases, seen_phases
+from bench.trials.stick_slip_phases import _steady, felt_phases, seen_phases
 from bench.workflows.session_evaluation import evaluate
 from estimator.beam import Beam
+from tests.studies.accuracy.felt_phases import ONE, TWO, felt_whisks
 from vision.truth.records import FrameTruth
 from vision.truth.value import Value
 
@@ -118,6 +120,38 @@ def test_a_whisker_that_slides_neither_rests_nor_jumps(seed):
     assert felt_phases(time, theta, felt, BETA, D_X, Beam(C, 100.0)) == NO_PHASES
     touching = theta > 0
     assert seen_phases(frames(theta[touching][::40], slip[touching][::40]), BETA, D_X) == NO_PHASES
+
+
+@pytest.mark.parametrize("coefficients", ONE)
+def test_a_motor_s_stop_is_no_slip(coefficients):
+    """At 90°/s with ramps of 20 ms; while they counted, stick–slip was felt in eight whisks of ten."""
+    assert not any(whisk.phases.jumps for whisk in felt_whisks(coefficients, 90.0, 3, seed=0))
+
+
+def test_slips_between_a_motor_s_ramps_are_felt():
+    found = list(felt_whisks(TWO[0], 10.0, 1, seed=0))
+    assert len(found) == 4
+    assert all(whisk.phases.jumps > 0 for whisk in found)
+
+
+@pytest.mark.parametrize("noise_deg", [0.0, 0.005, 0.05])
+@pytest.mark.parametrize("step_deg", [0.0, 0.01, 0.1])
+@pytest.mark.parametrize("ramp_s", [0.02, 0.05])
+def test_steady_motion_ends_where_the_motor_leaves_its_speed(noise_deg, step_deg, ramp_s):
+    """A ramp from 90°/s is off its line by ½ a t²: within √(2 · off/a) of either end, off being twice the noise's and
+    the encoder's most; and no whisk between the ramps is cut."""
+    stroke = Plan.plan(0.0, np.radians(10.0), np.radians(90.0), ramp_s=ramp_s, pause_s=0.05)
+    time = np.arange(0.0, stroke.end_s, 1 / 2000)
+    motor = np.degrees(stroke.angle_rad(time))
+    motor += noise_deg * np.random.default_rng(1).uniform(-1, 1, len(time))
+    if step_deg:
+        motor = np.round(motor / step_deg) * step_deg
+    steady = _steady(time, np.radians(motor))
+    begin, end = stroke.forward[0]
+    most_off = 2.0 * 2.0 * (noise_deg + step_deg) + 1e-6
+    late = np.sqrt(2 * most_off * ramp_s / 90.0) + 2 / 2000
+    assert time[steady][0] == pytest.approx(begin, abs=late)
+    assert time[steady][-1] == pytest.approx(end, abs=late)
 
 
 def test_frames_tell_static_from_kinetic_where_they_are_close():
