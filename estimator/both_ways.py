@@ -192,7 +192,7 @@ def _differs(felt: np.ndarray, covariance: np.ndarray) -> bool:
     size = hypot(*along)
     by_theta_there = there @ along / felt[0]
     by_theta_back = -back @ along / felt[3]
-    gradient = np.array([by_theta_there, *along, by_theta_back, *-along]) / max(size, 1e-12)
+    gradient = np.array([by_theta_there, *along, by_theta_back, *-along]) / (size or 1.0)
     return size > _SURE_SIGMAS * float(gradient @ covariance @ gradient) ** 0.5
 
 

@@ -42,8 +42,8 @@ _LEAST_OTHER = 0.1
 _HELD_SIGMAS = 2.0
 # Iterations of the share of friction along the object, by the direction of the motion over it.
 _ITERATIONS = 4
-# Steps of differences: θ, m_y, m_z, α in parts of 1, u in mm.
-_STEPS = np.array([1e-6, 1e-6, 1e-6, 1e-6, 1e-5, 1e-5, 1e-5])
+# [1] Step of differences, of the pushing angle, the moment, a radian of α and the distance.
+_STEP = 1e-6
 # [rad] Steepest friction angle at an end of its interval.
 _STEEPEST_RAD = 1.55
 
@@ -123,7 +123,8 @@ class _SlidingWhisker:
             if not x > 0:
                 return _NOWHERE, nan
             slip = self._slip(x, beta, cone)
-            share = abs(slip) / max(hypot(slip, self.u[0] * self.theta), 1e-12)
+            moved = hypot(slip, self.u[0] * self.theta)
+            share = abs(slip) / moved if moved > 0 else 1.0
         along_whisker = copysign(sqrt(1 - share**2), self.u[0])
         dragging = first_order.dragging(self.theta, self.alpha)
         x *= 1 - along_whisker * dragging / self.beam.left(x)
@@ -257,11 +258,14 @@ def _is_held(whisk: Whisk, contact: MovingContact) -> bool:
 
 def _gradient(solve: Callable, inputs: np.ndarray, beam: Beam) -> np.ndarray:
     """Compute the derivative (7,) of d_x by θ, m_y, m_z, α and u, by differences on both sides."""
-    gradient = np.zeros(len(_STEPS))
-    for place, change in enumerate(np.diag(_STEPS)):
+    moment = hypot(inputs[1], inputs[2])
+    length = solve(inputs, beam).d_x_mm
+    steps = _STEP * np.array([inputs[0], moment, moment, 1.0, length, length, length])
+    gradient = np.zeros(len(steps))
+    for place, change in enumerate(np.diag(steps)):
         after = solve(inputs + change, beam).d_x_mm
         before = solve(inputs - change, beam).d_x_mm
-        gradient[place] = (after - before) / (2 * _STEPS[place])
+        gradient[place] = (after - before) / (2 * steps[place])
     return np.nan_to_num(gradient)
 
 

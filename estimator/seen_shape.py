@@ -8,7 +8,8 @@ bends is the force. One camera does not see the bend towards it; the angle at wh
 whisking plane has a prior of 0 ± 45° and is fitted with the rest.
 
 Rig frame: base at the origin, z the rotation axis, x along the whisker at motor angle 0. Lengths in
-mm, angles in rad.
+mm, angles in rad. The fit itself takes lengths in those of the whisker and forces in EI/length², so
+that it converges alike whatever the whisker's size and stiffness.
 """
 
 from collections.abc import Callable
@@ -36,17 +37,24 @@ PLANE_UNKNOWN = NamedReason(
     "force and give are not told: the camera looks aside, "
     "and how the bend leaves the whisking plane is not known",
 )
+UNCONVERGED = NamedReason("shape_unconverged", "the fit of the seen shape does not converge")
 NO_END = NamedReason("bend_end_unseen", "the seen shape does not tell where the bend ends")
-# [mm] Prior sigma of the rest shape by powers of s/L: clamped off centre, clamp angle, set and sag,
-# change of curvature.
-_REST_MM = np.array([1.0, 8.0, 5.0, 2.0])
+# [lengths] Prior sigma of the rest shape by powers of s/L: clamped off centre, clamp angle, set and
+# sag, change of curvature.
+_REST = np.array([0.01, 0.08, 0.05, 0.02])
 # Prior sigma of tan φ of the bend: 45°.
 _TAN_PHI = 1.0
-# [mm/rad] Prior sigma of how fast the contact moves along the whisker: a bar's radius in rolling,
-# or 3 mm of slip in 3° along an object that leans by 20°.
-_ALONG_MM_RAD = 20.0
+# [lengths/rad] Prior sigma of how fast the contact moves along the whisker: of 100 mm, several radii
+# of a bar in rolling, or 3 mm of slip in 3° along an object that leans by 20°.
+_ALONG_PER_RAD = 0.2
+# [lengths] Nearest contact to the base.
+_NEAREST = 0.01
+# [lengths] Least way of the contact by which a force is divided: rounding.
+_LEAST_WAY = 1e-11
 # [rad] Frames that far past the pushing angle still count.
 _BEYOND_RAD = np.radians(1.0)
+# Evaluations of the residuals by which a fit has converged: simulated strokes take 5 to 35.
+_MOST_EVALUATIONS = 80
 # Fewest frames with points, and fewest points, from which a shape is fitted.
 _FEWEST_FRAMES = 4
 _FEWEST_POINTS = 30
@@ -66,8 +74,8 @@ _TOUCH = 8  # rad
 _BEND = 9  # tangent angle at the contact, by the angle past touch
 _BEND_2 = 10  # 1/rad, by its square
 _TAN = 11  # tan φ
-_ARC = 12  # mm, contact at the pushing angle
-_ALONG = 13  # mm/rad, its change
+_ARC = 12  # lengths, contact at the pushing angle
+_ALONG = 13  # lengths/rad, its change
 _OWN = 14
 
 
@@ -182,30 +190,38 @@ def contact_of_shape(
     """
     if not seen.suffices:
         return ShapeContact(status=FEW)
-    touch, begin = _initial_parameters(_ShapeFit(seen, theta_rad, beam))
+    length = beam.length_mm
+    seen = replace(seen, eye_mm=np.asarray(seen.eye_mm) / length)
+    touch, begin = _initial_parameters(_ShapeFit(seen, theta_rad, beam.taper))
     pushed_rad = touch + theta_rad
     near = seen.until(pushed_rad + _BEYOND_RAD)
     if not (near.has_frames and seen.reaches(pushed_rad)):
         return ShapeContact(status=NOT_PUSHED)
-    fit = _ShapeFit(near, theta_rad, beam)
-    vector, covariance = fit.solve(begin)
+    fit = _ShapeFit(near, theta_rad, beam.taper)
+    try:
+        vector, covariance = fit.solve(begin)
+    except ArithmeticError:
+        return ShapeContact(status=UNCONVERGED)
     values = fit.observables(vector)
     gradient = _derivatives(fit.observables, vector)  # (4, parameters)
     spread = gradient @ covariance @ gradient.T
-    model_share = fit.model_share(vector, values[1], reach_mm, tilt_sigma_rad)
+    model_share = fit.model_share(vector, values[1], reach_mm / length, tilt_sigma_rad)
     force_share = fit.force_share(rigidity_share)
-    contact = _with_sigmas(values, spread, beam.length_mm, model_share, force_share)
+    unit = np.array([1.0, length, beam.rigidity_Nmm2 / length**2, length])
+    spread_in_mm = spread * np.outer(unit, unit)
+    contact = _with_sigmas(unit * values, spread_in_mm, length, model_share, force_share)
     if contact.status or _is_plane_known(values[2], gradient[2], covariance):
         return contact
     return _without_force(contact)
 
 
 def _is_plane_known(force: float, gradient: np.ndarray, covariance: np.ndarray) -> bool:
-    """Check that tan φ changes the force by a small share; gradient: of the force, N, by the
-    parameters.
+    """Check that tan φ changes the force, which is above zero, by a small share.
+
+    gradient: of the force by the parameters.
     """
-    by_plane = gradient @ covariance[:, _TAN] / covariance[_TAN, _TAN] ** 0.5  # N, one sigma
-    return abs(by_plane) / max(force, 1e-9) < _MOST_BY_PLANE
+    by_plane = gradient @ covariance[:, _TAN] / covariance[_TAN, _TAN] ** 0.5  # one sigma
+    return abs(by_plane) < _MOST_BY_PLANE * force
 
 
 def _without_force(contact: ShapeContact) -> ShapeContact:
@@ -229,7 +245,7 @@ def _with_sigmas(values, covariance, length_mm, model_share, force_share) -> Sha
         return ShapeContact(status=NO_END)
     force_sigma = hypot(force_sigma, force_share * force)
     stiffness, stiffness_sigma, low = _stiffness(
-        force, force_sigma, moved, moved_sigma, covariance[2, 3]
+        force, force_sigma, moved, moved_sigma, covariance[2, 3], _LEAST_WAY * length_mm
     )
     return ShapeContact(
         touch_rad=touch,
@@ -246,11 +262,13 @@ def _with_sigmas(values, covariance, length_mm, model_share, force_share) -> Sha
     )
 
 
-def _stiffness(force, force_sigma, moved, moved_sigma, covariance) -> tuple[float, float, float]:
+def _stiffness(
+    force, force_sigma, moved, moved_sigma, covariance, least_way
+) -> tuple[float, float, float]:
     """Return (stiffness, its sigma, its low end), N/mm; the first two NaN where the way is within
     its noise.
     """
-    low = force / max(moved + Z_95 * moved_sigma, 1e-9)
+    low = force / max(moved + Z_95 * moved_sigma, least_way)
     if moved <= Z_95 * moved_sigma:
         return nan, nan, low
     stiffness = force / moved
@@ -259,21 +277,20 @@ def _stiffness(force, force_sigma, moved, moved_sigma, covariance) -> tuple[floa
     return stiffness, stiffness * max(variance, 0.0) ** 0.5, low
 
 
-def bend(arc_mm: np.ndarray, contact_mm: np.ndarray, taper_per_mm: float) -> np.ndarray:
-    """Compute ∫₀ˢ (c − t) / (1 − τt)⁴ dt, mm²: the tangent angle by a unit force at c over EI at
-    the base.
+def bend(arc: np.ndarray, contact: np.ndarray, taper: float) -> np.ndarray:
+    """Compute ∫₀ˢ (c − t) / (1 − τt)⁴ dt: the tangent angle by a unit force at c over EI at the
+    base.
 
-    It is constant beyond c. arc_mm: s, contact_mm: c, taper_per_mm: τ.
+    It is constant beyond c. arc: s, contact: c; taper: τ, share of the base's diameter that is lost
+    per length.
     """
-    s = np.minimum(arc_mm, contact_mm)
-    w = np.maximum(1.0 - taper_per_mm * s, _LEAST_LEFT)
-    return s * (contact_mm * (1.0 + w + w * w) / 3.0 - s * (w + 2.0) / 6.0) / w**3
+    s = np.minimum(arc, contact)
+    w = np.maximum(1.0 - taper * s, _LEAST_LEFT)
+    return s * (contact * (1.0 + w + w * w) / 3.0 - s * (w + 2.0) / 6.0) / w**3
 
 
 def _deflection(arc, contact, taper):
-    """Compute ∫₀ˢ of `bend`, mm³: the deflection (n,) at arcs (n,) by a unit force over EI at the
-    base.
-    """
+    """Compute ∫₀ˢ of `bend`: the deflection (n,) at arcs (n,) by a unit force over EI at the base."""
     half = 0.5 * np.minimum(arc, contact)[:, None]
     inner = (half * _WEIGHTS * bend(half * (1.0 + _NODES), contact[:, None], taper)).sum(axis=1)
     return inner + np.maximum(arc - contact, 0.0) * bend(contact, contact, taper)
@@ -281,8 +298,9 @@ def _deflection(arc, contact, taper):
 
 @dataclass(frozen=True, eq=False)
 class _ShapeFit:
-    """Least squares of a stroke's shape.
+    """Least squares of a stroke's shape, in lengths of the whisker and forces of EI/length².
 
+    seen: its eye in lengths. taper: share of the base's diameter that is lost up to the tip.
     Parameters: rest shape (2, 4), touch, bend in y by the angle past touch and by its square, tan
     φ, contact arc at the pushing angle and its change by angle, then the shared causes of the
     points.
@@ -290,18 +308,13 @@ class _ShapeFit:
 
     seen: SeenShape
     theta_rad: float
-    beam: Beam
-
-    @cached_property
-    def taper_per_mm(self) -> float:
-        """Return the share of the base's diameter that is lost per mm of arc."""
-        return self.beam.taper / self.beam.length_mm
+    taper: float
 
     @cached_property
     def prior(self) -> np.ndarray:
         """Return one prior sigma of each parameter; infinite where there is no prior."""
-        shape = [np.inf, np.inf, np.inf, _TAN_PHI, np.inf, _ALONG_MM_RAD]
-        return np.concatenate([_REST_MM, _REST_MM, shape, np.ones(self.seen.shared_rad.shape[1])])
+        shape = [np.inf, np.inf, np.inf, _TAN_PHI, np.inf, _ALONG_PER_RAD]
+        return np.concatenate([_REST, _REST, shape, np.ones(self.seen.shared_rad.shape[1])])
 
     @cached_property
     def motor(self) -> np.ndarray:
@@ -309,7 +322,7 @@ class _ShapeFit:
         return self.seen.motor_rad[self.seen.frame]
 
     @cached_property
-    def along_mm(self) -> np.ndarray:
+    def along(self) -> np.ndarray:
         """Compute how far out (n,) on the unbent whisker its nearest place to each sight is."""
         along = np.cross(self.seen.across, self.seen.sight)
         on_whisker = along[:, 0] * np.cos(self.motor) + along[:, 1] * np.sin(self.motor)
@@ -322,9 +335,9 @@ class _ShapeFit:
         (n,) past touch.
         """
         contact = vector[_ARC] + vector[_ALONG] * (pushed - self.theta_rad)
-        contact = np.clip(contact, 1.0, self.beam.length_mm)
+        contact = np.clip(contact, _NEAREST, 1.0)
         size = (vector[_BEND] + vector[_BEND_2] * pushed) * pushed
-        per_force = size / bend(contact, contact, self.taper_per_mm)
+        per_force = size / bend(contact, contact, self.taper)
         bent = np.minimum(arc, contact)
         # The third derivative jumps at the contact: each side is integrated by itself.
         points = self._integral(vector, 0.0 * arc, bent, contact, per_force)
@@ -333,7 +346,7 @@ class _ShapeFit:
         return points, self._tangents(vector, arc, contact, per_force)
 
     def _integral(self, vector, first, last, contact, per_force):
-        """Integrate the tangents from arc `first` to arc `last` (n,), which gives (n, 3) mm."""
+        """Integrate the tangents from arc `first` to arc `last` (n,), which gives (n, 3)."""
         half = 0.5 * (last - first)[:, None]
         arcs = first[:, None] + half * (1.0 + _NODES)  # (n, nodes)
         tangents = self._tangents(vector, arcs, contact[:, None], per_force[:, None])
@@ -341,11 +354,10 @@ class _ShapeFit:
 
     def _tangents(self, vector, arc, contact, per_force):
         """Compute unit tangents (…, 3): those of the rest shape, turned by the bend."""
-        u = arc / self.beam.length_mm
         secant = hypot(1.0, vector[_TAN])  # of φ
-        angle = per_force * bend(arc, contact, self.taper_per_mm) * secant
+        angle = per_force * bend(arc, contact, self.taper) * secant
         turn = np.sin(angle) / secant
-        powers = np.stack([0 * u, 1 + 0 * u, 2 * u, 3 * u * u], axis=-1) / self.beam.length_mm
+        powers = np.stack([0 * arc, 1 + 0 * arc, 2 * arc, 3 * arc * arc], axis=-1)
         y = powers @ vector[:4] + turn
         z = powers @ vector[4:8] + turn * vector[_TAN]
         x = np.sqrt(np.maximum(1.0 - y * y - z * z, 0.01))
@@ -359,36 +371,34 @@ class _ShapeFit:
         """
         seen = self.seen
         pushed = np.maximum(self.motor - vector[_TOUCH], 0.0)
-        points, tangents = self.points(vector, self.along_mm, pushed)
+        points, tangents = self.points(vector, self.along, pushed)
         eye = _turn_about_z(seen.eye_mm, -self.motor)
         along = _turn_about_z(np.cross(seen.across, seen.sight), -self.motor)
         across = _turn_about_z(seen.across, -self.motor)
         step = np.einsum("ni,ni->n", along, eye - points) / np.einsum("ni,ni->n", along, tangents)
-        # The whisker is straight over a step of a fraction of a mm.
+        # The whisker is straight over a step of a thousandth of its length.
         from_eye = points + step[:, None] * tangents - eye
         lateral = np.einsum("ni,ni->n", across, from_eye) / np.linalg.norm(from_eye, axis=1)
         lateral = lateral - seen.shared_rad @ vector[_OWN:]  # rad
         return np.concatenate([lateral / seen.sigma_rad, vector / self.prior])
 
     def observables(self, vector: np.ndarray) -> np.ndarray:
-        """Compute (4,): touch in rad, d_x in mm, force in N, and how far the contact has moved in
-        mm.
-        """
+        """Compute (4,): touch in rad, d_x, force, and how far the contact has moved."""
         theta = self.theta_rad
         arc = vector[[_ARC]]
         points, _ = self.points(vector, arc, np.array([theta]))
         x = points[0, 0]
-        y = points[0, 1] - polyval(vector[_ARC] / self.beam.length_mm, vector[:4])
+        y = points[0, 1] - polyval(vector[_ARC], vector[:4])
         size = (vector[_BEND] + vector[_BEND_2] * theta) * theta
-        force = -self.beam.rigidity_Nmm2 * size / bend(arc, arc, self.taper_per_mm)[0]
+        force = -size / bend(arc, arc, self.taper)[0]
         d_x = x * cos(theta) - y * sin(theta)
         moved = x * sin(theta) + y * cos(theta)
         return np.array([vector[_TOUCH], d_x, force, moved])
 
-    def model_share(self, vector, d_x, reach_mm, tilt_sigma_rad) -> float:
+    def model_share(self, vector, d_x, reach, tilt_sigma_rad) -> float:
         """Return the relative sigma of d_x by thickness and lean of the object."""
         phi = atan(abs(vector[_TAN]))
-        rolling = load_cell.rolling(self.theta_rad, reach_mm, 0.0, d_x, self.beam.left(d_x))
+        rolling = load_cell.rolling(self.theta_rad, reach, 0.0, d_x, 1.0 - self.taper * d_x)
         return hypot(rolling, load_cell.leaning(self.theta_rad, tilt_sigma_rad, phi, 0.0))
 
     def force_share(self, rigidity_share) -> float:
@@ -398,9 +408,14 @@ class _ShapeFit:
     def solve(self, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Fit the parameters, and return them with their covariance.
 
-        The points' sigmas are widened by their residuals' scatter and correlation.
+        The points' sigmas are widened by their residuals' scatter and correlation. Raises
+        ArithmeticError where the fit does not converge.
         """
-        found = least_squares(self.residuals, begin, x_scale="jac", method="trf", max_nfev=40)
+        found = least_squares(
+            self.residuals, begin, x_scale="jac", method="trf", max_nfev=_MOST_EVALUATIONS
+        )
+        if not found.success:
+            raise ArithmeticError("the fit of the seen shape does not converge")
         count = len(self.seen.frame)
         jacobian = found.jac.copy()
         jacobian[:count] /= self._sigma_factor(found.fun[:count])
@@ -432,15 +447,14 @@ def _initial_parameters(fit: _ShapeFit) -> tuple[float, np.ndarray]:
     Two finer grids follow, each about the best of the grid before.
     """
     plane = _PlanarShape(fit)
-    length = fit.beam.length_mm
     touches = np.linspace(fit.motor.min(), fit.motor.max(), 26)[2:-2]
-    contacts = np.linspace(0.1, 0.98, 19) * length
+    contacts = np.linspace(0.1, 0.98, 19)
     around = np.linspace(-1.0, 1.0, 7)
     for _ in range(3):
         values, touch, contact = plane.best_of_grid(touches, contacts)
         touches = touch + around * (touches[1] - touches[0])
         contacts = contact + around * (contacts[1] - contacts[0])
-        contacts = np.clip(contacts, 1.0, 0.999 * length)
+        contacts = np.clip(contacts, _NEAREST, 0.999)
     vector = np.zeros(len(fit.prior))
     vector[:4] = values[:4]
     vector[[_TOUCH, _BEND, _ARC]] = [touch, values[4], contact]
@@ -458,18 +472,18 @@ class _PlanarShape:
         """
         seen = fit.seen
         self.motor = fit.motor
-        self.arc = fit.along_mm
-        self.taper = fit.taper_per_mm
+        self.arc = fit.along
+        self.taper = fit.taper
         straight = np.zeros((len(self.arc), 3))
         straight[:, 0] = self.arc
         to_eye = _turn_about_z(seen.eye_mm, -self.motor) - straight
         across = _turn_about_z(seen.across, -self.motor)
-        weight = 1.0 / (seen.sigma_rad * np.linalg.norm(to_eye, axis=1))  # 1/mm
+        weight = 1.0 / (seen.sigma_rad * np.linalg.norm(to_eye, axis=1))  # 1/length
         aim = np.einsum("ni,ni->n", across, to_eye) * weight
-        powers = (self.arc[:, None] / fit.beam.length_mm) ** np.arange(4)
+        powers = self.arc[:, None] ** np.arange(4)
         self.side = across[:, 1] * weight
         self.aim = np.append(aim, np.zeros(4))
-        self.rest = np.vstack([powers * self.side[:, None], np.diag(1.0 / _REST_MM)])
+        self.rest = np.vstack([powers * self.side[:, None], np.diag(1.0 / _REST)])
 
     def best_of_grid(self, touches, contacts) -> tuple[np.ndarray, float, float]:
         """Find (rest shape and bend (5,), touch, contact) of least cost on a grid."""

@@ -471,6 +471,7 @@ _TABLE = (
     Status("whisker_points_few", REFUSAL, "one camera shows too few points of the whisker"),
     Status("pushing_angle_unseen", REFUSAL, "one camera does not see the pushing angle"),
     Status("bending_plane_unknown", WARNING, "the plane of bending is not known"),
+    Status("shape_unconverged", REFUSAL, "the fit of the seen shape does not converge"),
     Status("bend_end_unseen", REFUSAL, "the seen shape does not show where the bend ends"),
     Status(
         "angles_few",
