@@ -206,29 +206,39 @@ def _interval(whisk, settings, m_y, model_sigma):
         model_sigma=model_sigma,
         **_errors(whisk, settings),
     )
-    return _on_whisker(low, whisk.beam), _on_whisker(high, whisk.beam)
+    low = _on_this_whisker(low, whisk.beam)
+    high = _on_this_whisker(high, whisk.beam)
+    return low, min(high, whisk.beam.length_mm) if high > 0 else high
 
 
 def _up_to_tip(estimate, length_mm, clamp):
     """Return the estimate with its status: clamped at the tip, or flagged there and without an
     interval.
+
+    At the tip sigma and interval are the same shares of the length as they were of the distance.
     """
     d_x = estimate.d_x_mm
     clamped, at_tip = distance.clamp_to_length(d_x, length_mm)
     if at_tip and not clamp:
         return replace(estimate, status=BEYOND, low_mm=nan, high_mm=nan)
     if at_tip:
-        status = TIP.format(d_x, estimate.low_mm)
-        return replace(estimate, d_x_mm=clamped, status=status, gradient=None)
+        share = length_mm / d_x
+        low = estimate.low_mm * share
+        return replace(
+            estimate,
+            d_x_mm=clamped,
+            sigma_mm=estimate.sigma_mm * share,
+            status=TIP.format(d_x, low),
+            low_mm=low,
+            gradient=None,
+        )
     status = NEARER.format(estimate.high_mm) if estimate.low_mm == 0 else ""
     return replace(estimate, d_x_mm=clamped, status=status)
 
 
-def _on_whisker(end, beam):
-    """Convert an end of the cylinder's interval to this whisker, no longer than it; keep 0 and
-    NaN.
-    """
-    return min(beam.distance_mm(end), beam.length_mm) if end > 0 else end
+def _on_this_whisker(end, beam):
+    """Convert an end of the cylinder's interval to this whisker; keep 0 and NaN."""
+    return beam.distance_mm(end) if end > 0 else end
 
 
 def _model_share(whisk, settings, d_x, left):

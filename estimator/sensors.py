@@ -82,20 +82,20 @@ def force_and_moment(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
 
 def _on_whisker(d_x: float, share: float, gradient: np.ndarray, length: float) -> Estimate:
     """Assemble the estimate of a distance and its relative sigma; beyond the length it is the
-    tip's, and has no gradient.
+    tip's, of the same relative sigma, and has no gradient.
     """
-    low, high = _interval(d_x, Z_95 * share, length)
     clamped, at_tip = distance.clamp_to_length(d_x, length)
+    low, high = _interval(clamped, Z_95 * share, length)
     if at_tip:
-        return Estimate(clamped, d_x * share, TIP.format(d_x, low), low, high)
-    return Estimate(clamped, d_x * share, "", low, high, gradient=gradient)
+        return Estimate(clamped, clamped * share, TIP.format(d_x, low), low, high)
+    return Estimate(clamped, clamped * share, "", low, high, gradient=gradient)
 
 
 def _interval(d_x: float, half: float, length: float) -> tuple[float, float]:
     """Return the ends, mm, where 1/d_x lies within ± half of itself; the high one at most the
     whisker's length.
     """
-    low = min(d_x / (1 + half), length)
+    low = d_x / (1 + half)
     high = min(d_x / (1 - half), length) if half < 1 else length
     return low, high
 

@@ -235,10 +235,9 @@ def motor_channel(whisker: MountedWhisker, several_motors: bool) -> str:
     return f"motor_deg@{whisker.column.name}" if several_motors else "motor_deg"
 
 
-def base_keys(whisker: MountedWhisker, several_motors: bool) -> dict:
+def base_keys(whisker: MountedWhisker, several_motors: bool, *, states_gauges: bool) -> dict:
     """Return the keys of [[whiskers]] of session.toml for a whisker."""
     rod = whisker.rod
-    gauges = whisker.gauges
     keys = {
         "name": whisker.name,
         "base_mm": whisker.pose[:, 3].tolist(),
@@ -252,6 +251,8 @@ def base_keys(whisker: MountedWhisker, several_motors: bool) -> dict:
         keys["tip_diameter_mm"] = rod.tip_diameter_mm
     if several_motors:
         keys["channels"] = {"motor_deg": motor_channel(whisker, several_motors)}
-    matrix = np.round(gauges.matrix_Nmm_per_V, 9).tolist()
-    keys["gauges"] = {"offset_V": list(gauges.offset_V), "matrix_Nmm_per_V": matrix}
+    if states_gauges:
+        gauges = whisker.gauges
+        matrix = np.round(gauges.matrix_Nmm_per_V, 9).tolist()
+        keys["gauges"] = {"offset_V": list(gauges.offset_V), "matrix_Nmm_per_V": matrix}
     return keys

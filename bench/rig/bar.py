@@ -11,8 +11,8 @@ from bench.rig.elastic_rod import Rod
 from bench.rig.linear import across, rotate_about_z
 from bench.rig.touched_object import LocalBar, TouchedObject
 
-# [mm] Largest distance from contact that is a touch, and residual along the whisker. Stated.
-_TOUCHES_MM = 1e-9
+# [lengths] Largest distance from contact that is a touch, and residual along the whisker. Stated.
+_TOUCHES = 1e-11
 
 
 @dataclass(frozen=True)
@@ -105,11 +105,15 @@ def find_first_touch(
     Where the nearest point lies beyond the end, the tip touches and the arc is the length. Raises
     ArithmeticError where the whisker never touches.
     """
-    start = [motor_rad, min(arc_mm, rod.length_mm)]
-    found = optimize.root(lambda at: _touch_residual(rod, bar, *at), start, tol=1e-13)
-    motor_rad, arc_mm = found.x
-    if np.abs(found.fun).max() > _TOUCHES_MM:
+    length_mm = rod.length_mm
+    start = [motor_rad, min(arc_mm / length_mm, 1.0)]
+    found = optimize.root(
+        lambda at: _touch_residual(rod, bar, at[0], at[1] * length_mm) / length_mm, start, tol=1e-13
+    )
+    if np.abs(found.fun).max() > _TOUCHES:
         raise ArithmeticError("the whisker never touches the bar")
+    motor_rad = found.x[0]
+    arc_mm = found.x[1] * length_mm
     if arc_mm > rod.length_mm:
         arc_mm = rod.length_mm
         motor_rad = _find_tip_touch(rod, bar, motor_rad)

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-GIVE_MM = 1e-5  # a held contact gives way by about this before it slides along the whisker
+# [lengths] A held contact gives way by about this before it slides along the whisker: 10 nm of 100 mm. Stated.
+GIVE = 1e-7
 
 
 class ContactLoad(NamedTuple):
@@ -76,13 +77,14 @@ class Oiled:
 @dataclass(frozen=True)
 class Held:
     """No motion along the object; round it (along the whisker) a friction μN(1 − x²) against the
-    motion, x = force along the object / μN.
+    motion, x = force along the object / μN, softened within give_mm.
 
     That is inside the cone, the whole of μN where nothing acts along the object, and (unlike the
     cone's own circle) smooth at its end.
     """
 
     friction: float
+    give_mm: float
     status = "held"
 
     def equations(self, load: ContactLoad, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,7 +95,7 @@ class Held:
         residual = np.array([load.motion[0], load.shear[1]])
         residual_by = np.stack([load.motion_by[0], load.shear_by[1]])
         if abs(x) < 1:
-            direction, direction_by = _soft_sign(load.motion[1], load.motion_by[1])
+            direction, direction_by = _soft_sign(load.motion[1], load.motion_by[1], self.give_mm)
             left = limit * (1 - x**2)  # what the cone leaves for friction round the object
             left_by = (1 + x**2) * self.friction * load.press_by - 2 * x * load.shear_by[0]
             residual[1] += direction * left
@@ -101,7 +103,7 @@ class Held:
         return residual, residual_by
 
 
-def _soft_sign(motion, motion_by):
-    """Return the sign of a motion, softened within GIVE_MM of zero, and its derivatives (4,)."""
-    length = math.hypot(motion, GIVE_MM)
-    return motion / length, GIVE_MM**2 / length**3 * motion_by
+def _soft_sign(motion, motion_by, give_mm):
+    """Return the sign of a motion, softened within give_mm of zero, and its derivatives (4,)."""
+    length = math.hypot(motion, give_mm)
+    return motion / length, give_mm**2 / length**3 * motion_by

@@ -47,10 +47,18 @@ def session_toml(
     if whiskers:
         session.pop("whisker")
         several_motors = len({whisker.column.name for whisker in whiskers}) > 1
-        session["whiskers"] = [base_keys(whisker, several_motors) for whisker in whiskers]
+        states_gauges = protocol.gauges.known or not _has_gauge_trials(protocol)
+        session["whiskers"] = [
+            base_keys(whisker, several_motors, states_gauges=states_gauges) for whisker in whiskers
+        ]
     elif protocol.gauges.known:
         session["gauges"] = _fields(protocol.gauges, "offset_V matrix_Nmm_per_V")
     return tomli_w.dumps(session)
+
+
+def _has_gauge_trials(protocol: Protocol) -> bool:
+    """Return whether gauges are to be calibrated by trials of their own."""
+    return any(trial.purpose == "gauge" for trial in protocol.trials)
 
 
 def _fields(table, names: str) -> dict:
@@ -101,8 +109,7 @@ def trial_toml(recording: Recording) -> str:
         trial["object_velocity_sigma_mm_s"] = table.object_velocity_sigma_mm_s or 0.0
     if table.stiffness_N_mm:
         trial["object_gives_way"] = True
-    if table.purpose == "gauge":
-        trial["follicle_roll_deg"] = table.follicle_roll_deg
+    trial |= _follicle_keys(run)
     if not recording.bar.is_straight:
         trial["object"] = {"shape": recording.bar.shape} | recording.bar.size_keys()
     return tomli_w.dumps(trial)
@@ -120,7 +127,7 @@ def array_trial_toml(recording: ArrayRecording, *, says_where: bool = True) -> s
         "speed_deg_s": float(run.speed_deg_s),
         "purpose": run.table.purpose,
     }
-    trial |= _bar_keys(run)
+    trial |= _bar_keys(run) | _follicle_keys(run)
     if says_where:
         trial["object"] = object_keys(bar)
     elif not bar.is_straight:
@@ -132,6 +139,12 @@ def _bar_keys(run: ProtocolRun) -> dict:
     """Return the trial's own diameter of the object, where it has one."""
     diameter_mm = run.table.bar_diameter_mm
     return {"bar_diameter_mm": diameter_mm} if diameter_mm else {}
+
+
+def _follicle_keys(run: ProtocolRun) -> dict:
+    """Return by how much the follicle is turned in a gauge trial."""
+    table = run.table
+    return {"follicle_roll_deg": table.follicle_roll_deg} if table.purpose == "gauge" else {}
 
 
 def object_keys(bar: TouchedObject) -> dict:

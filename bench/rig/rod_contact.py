@@ -28,7 +28,8 @@ from bench.rig.touched_object import TouchedObject
 # [1] Steps of Newton's method before it is given up. Stated.
 _MOST_STEPS = 40
 _PARTS = 0.5 ** np.arange(8)  # of a Newton step, tried in turn until one helps
-_BACKWARDS_MM = -1e-9  # mm: less is rounding
+_BACKWARDS = -1e-11  # lengths of motion: less is rounding
+_MUCH = 0.01  # lengths by which a step's arc counts as much as all of the force
 _LAST = 1e-6  # of a Newton step, in parts
 
 
@@ -108,7 +109,8 @@ class RodContact:
         for _ in range(_MOST_STEPS):
             step = solve(here.jacobian, here.residual)
             if _has_converged(step, unknowns):
-                return here.state(motor_rad, unknowns, step, "tip" if tip else law.status)
+                status = "tip" if tip else law.status
+                return here.state(motor_rad, unknowns, step, status, self.rod.length_mm)
             unknowns, here = problem.step(unknowns, here, step)
         raise ArithmeticError(f"no contact found at motor angle {math.degrees(motor_rad):.4f} deg")
 
@@ -122,7 +124,7 @@ class _Equations:
     jacobian: np.ndarray
     load: ContactLoad
 
-    def state(self, motor_rad, unknowns, step, status) -> ContactState:
+    def state(self, motor_rad, unknowns, step, status, length_mm) -> ContactState:
         """Return the solution after Newton's last step.
 
         The loaded point follows to first order; what is left is of the order of the step squared.
@@ -133,7 +135,7 @@ class _Equations:
         slides = len(unknowns) > 4
         heading = float(unknowns[4]) if slides else math.atan2(*load.motion[::-1])
         onward_mm = load.motion @ [math.cos(heading), math.sin(heading)]
-        if load.press < 0 or (slides and onward_mm < _BACKWARDS_MM):
+        if load.press < 0 or (slides and onward_mm < _BACKWARDS * length_mm):
             raise ArithmeticError("a contact that pulls, or friction along the motion")
         return ContactState(
             motor_rad,
@@ -221,7 +223,8 @@ class _Problem:
         """Return the unknowns after as much of a step as brings them nearer, and the equations
         there."""
         force = np.abs(unknowns[:3]).max() + np.abs(step[:3]).max()
-        size = np.array([1 / force, 1 / force, 1 / force, 1.0, 1.0])[: len(step)]
+        per_mm = 1 / (_MUCH * self.contact.rod.length_mm)
+        size = np.array([1 / force, 1 / force, 1 / force, per_mm, 1.0])[: len(step)]
         length = np.linalg.norm(size * step)
         for part in _PARTS:
             tried = unknowns - part * step

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.rig.bar import UnloadedTouch
 from bench.rig.elastic_rod import Rod
-from bench.rig.laws import GIVE_MM, Held, Oiled, Sliding
+from bench.rig.laws import GIVE, Held, Oiled, Sliding
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import ContactState, RodContact
 from bench.rig.touched_object import TouchedObject
@@ -17,6 +17,7 @@ from bench.rig.touched_object import TouchedObject
 _ON_THE_CONE, _CLOSE_RAD = 1e-4, 1e-6
 _NO_PUSH_RAD = 1e-7  # below this (5 nm at 50 mm) there is no force to speak of
 _HALVINGS = 7  # of a step that comes to no equilibrium
+_SOFTEST = 0.01  # lengths by which the softest friction gives way
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,7 @@ class March:
         self.slid_off = False
         self._rest = 0  # number of the present rest
         self._jump_rad = -math.inf  # where the last jump was
+        self._give_mm = GIVE * rod.length_mm
 
     def along(self, path_rad: Iterable[float]) -> tuple[np.ndarray, list[ContactState | None]]:
         """Return motor angles and states met on the way through the angles of `path_rad`; a jump
@@ -173,7 +175,7 @@ class March:
             at = high - excess_high * (high - low) / (excess_high - excess_low)
             guess = _extrapolate(state, held, at)
             try:
-                edge = self.contact.solve(at, state, guess, Held(self._static), tip)
+                edge = self.contact.solve(at, state, guess, Held(self._static, self._give_mm), tip)
             except ArithmeticError:
                 break
             excess = edge.shear_ratio - self._static
@@ -191,7 +193,7 @@ class March:
 
     def _hold(self, motor_rad, tip):
         """Find the state that is held at a motor angle."""
-        law = Held(self._static)
+        law = Held(self._static, self._give_mm)
         return self.contact.solve(motor_rad, self.state, self._guess(motor_rad), law, tip)
 
     def _slide_on(self, motor_rad, tip):
@@ -221,14 +223,15 @@ class March:
         """Find the sliding state near a guess.
 
         Where the heading is another (the motor has just turned back), friction is first as soft as
-        oil, then ever stiffer, until it gives way by at most 10 nm.
+        oil, then ever stiffer, until it gives way by no more than a held contact.
         """
         kinetic = self.friction.kinetic
         unknowns = np.append(guess, heading_rad)
         try:
             return self.contact.solve(motor_rad, old, unknowns, Sliding(kinetic), tip)
         except ArithmeticError:
-            for give_mm in np.geomspace(1.0, GIVE_MM, 16):
+            softest_mm = _SOFTEST * self.contact.rod.length_mm
+            for give_mm in np.geomspace(softest_mm, self._give_mm, 16):
                 state = self.contact.solve(motor_rad, old, guess, Oiled(kinetic, give_mm), tip)
                 guess = state.unknowns
             return state

@@ -78,6 +78,14 @@ def test_beyond_the_tip_is_the_tip_with_its_sigma_and_a_word():
     assert estimate.sigma_mm > 0
 
 
+@pytest.mark.parametrize("beyond", [1.001, 1.02, 1.5])
+def test_an_interval_at_the_tip_is_as_wide_as_its_sigma(beyond):
+    """However far beyond the length the distance came out: 1.96 sigma below the length, and nothing above it."""
+    estimate = ESTIMATORS["with_friction"](whisk_at(beyond * 100.0, 0.0), SETTINGS)
+    assert (estimate.d_x_mm, estimate.high_mm) == (100.0, 100.0)
+    assert 100.0 - estimate.low_mm == pytest.approx(Z_95 * estimate.sigma_mm, rel=1e-6)
+
+
 def test_no_slip_beyond_the_length_is_left_and_flagged():
     """d_x cos α/(cos β cos φ), the slip that (2) ignores: nothing touched the tip."""
     beta = np.radians(75)
