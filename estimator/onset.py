@@ -32,6 +32,11 @@ WINDOW_S = 0.06
 GUARD_RAD = np.radians(0.1)
 # [sigma] Smallest rise over the scatter of one sample that counts as a touch.
 MIN_RISE_IN_SIGMAS = 8.0
+# [rad] To what readings of a motor are written: a hundred-thousandth of a degree. Steps of an encoder
+# are multiples of it.
+READING_RAD = np.radians(1e-5)
+# [1] Of that, the rounding of a reading in radians.
+READING_ROUNDING = 1e-3
 # Fewest samples of the free stroke, from which level and drift are measured.
 MIN_FREE_SAMPLES = 20
 # Fewest samples of the rise, to which the line is fitted.
@@ -266,9 +271,10 @@ def _extrapolate(motor, samples, used, touch, window, guard):
     if np.count_nonzero(rising) < MIN_RISE_SAMPLES:
         return FeltTouch.none(SHORT_RISE)
     level = free_level(motor, samples, free)
-    rise, sigma = _fit_rise(motor, samples, free, rising, touch, level)
-    if not sigma < window / 3:
+    rise, by_noise = _fit_rise(motor, samples, free, rising, touch, level)
+    if not by_noise < window / 3:
         return FeltTouch.none(VAGUE)
+    sigma = np.sqrt(by_noise**2 + hidden_step_variance(motor, free | rising))
     gap = noise.weighted_sum(rise.weights, samples, rising) - level.offset
     return FeltTouch(float(touch - gap @ rise.gain), float(sigma), level=level, rise=rise)
 
@@ -287,6 +293,22 @@ def _fit_rise(motor, samples, free, rising, touch, level):
     information = slope @ pull  # 1/rad²
     sigma = 1 / np.sqrt(max(information, noise.TINY))
     return Rise(slope, pull / information, weights, memory), sigma
+
+
+def hidden_step_variance(motor: np.ndarray, used: np.ndarray) -> float:
+    """Return the variance (rad²) of a motor's angles (n,) by its encoder's steps that no sample shows.
+
+    A reading is off by a uniform error of one step, q²/12. As far as this scatters about a steady
+    motion it is noise, and averages out; where the motor goes a whole number of steps from sample to
+    sample it is one and the same for all of them. used (n,): mask of the samples that count.
+    """
+    readings = motor[used] / READING_RAD
+    counts = np.rint(readings)
+    if np.abs(readings - counts).max() > READING_ROUNDING:
+        return 0.0
+    step = np.gcd.reduce(counts.astype(np.int64)) * READING_RAD
+    scatter = noise.line_residuals(np.arange(len(motor), dtype=float), motor[:, None], used)
+    return max(0.0, step**2 / 12 - float(np.mean(scatter**2)))
 
 
 def free_level(motor: np.ndarray, samples: np.ndarray, free: np.ndarray) -> Level:

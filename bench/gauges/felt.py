@@ -25,19 +25,23 @@ _LEAST_FREE = 50
 PAPERS_FILTER_HZ = 800.0
 # Mean of the impulse response of a fourth-order Butterworth filter, times its frequency.
 _DELAY_CYCLES = np.sqrt(2.0) * np.sqrt(2.0 + np.sqrt(2.0)) / (2.0 * np.pi)
+# [1] One sigma of a filter's delay over it: resistors and capacitors are known to some per cent. Stated.
+_DELAY_SHARE = 0.03
 
 
 def gauge_delay(filter_Hz: float | None) -> Value:
     """Return by how long a ramp comes late out of the gauges' filter, s.
 
     It is the mean of the filter's impulse response: fourth-order Butterworth, √2 √(2 + √2) / (2π
-    filter_Hz), 0 without one (0 Hz). Where no filter is named (None) it is the paper's, and its
-    sigma that of any delay from none to twice as much (uniform).
+    filter_Hz), 0 without one (0 Hz), and known as well as the filter's parts. Where no filter is
+    named (None) it is the paper's, and its sigma that of any delay from none to twice as much
+    (uniform).
     """
     if filter_Hz is None:
         delay_s = float(_DELAY_CYCLES / PAPERS_FILTER_HZ)
         return Value(delay_s, delay_s / float(np.sqrt(3.0)))
-    return Value(float(_DELAY_CYCLES / filter_Hz) if filter_Hz else 0.0, 0.0)
+    delay_s = float(_DELAY_CYCLES / filter_Hz) if filter_Hz else 0.0
+    return Value(delay_s, _DELAY_SHARE * delay_s)
 
 
 def late_by(delay_s: Value, speed_rad_s: float) -> Value:

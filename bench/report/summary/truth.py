@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from bench.gauges.felt import lateness
+from bench.gauges.felt import gauge_delay, lateness
 from bench.records.trial_result import TrialResult, whisks
 from bench.report.assembly import BEAM_UNITS, beam_rows, budget_rows
 from bench.trials.clocks import shared_touch
@@ -60,11 +60,12 @@ def _delay_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     for result in results:
         for felt in result.felt.whisks:
             delays[felt.delay_s.value, felt.delay_s.sigma] = None
+    assumed = gauge_delay(None)
     for delay_s, sigma_s in delays:
         if not np.isfinite(delay_s):
             continue
-        known = "by gauge_filter_Hz, taken as exact"
-        if sigma_s:
+        known = f"± {1e3 * sigma_s:.2f} ms, by gauge_filter_Hz"
+        if (delay_s, sigma_s) == (assumed.value, assumed.sigma):
             known = f"± {1e3 * sigma_s:.2f} ms, as in the paper: the trial has no gauge_filter_Hz"
         yield f"touch felt: {1e3 * delay_s:.2f} ms of delay by the gauges' filter are taken out ({known})"
 

@@ -1,7 +1,7 @@
 """How honest touch felt and (10) are over the pushing angle: signals only, the simulated friction given to (10).
 
     python tests/studies/accuracy/felt.py FOLDER [--count 3] [--seed 0] [--theta-deg 0.3 0.5 1 3] [--drift-V-per-s 0]
-        [--shape cylinder|cone|tapered]
+        [--shape cylinder|cone|tapered] [--noise-V 0.0064]
 
 FOLDER keeps the simulated session (β 0, 30, 60, at 10 and 90°/s, `--count` trials of each, gauges known, vibration on)
 and is taken up again. Printed for each speed: error of touch felt, and for each θ that of d_x by (10): bias and RMS,
@@ -39,6 +39,7 @@ shape = "{shape}"
 known = true
 vibration = true
 drift_V_per_s = {drift}
+noise_V = {noise}
 [[trials]]
 beta_deg = [0, 30, 60]
 speed_deg_s = [10, 90]
@@ -49,13 +50,19 @@ psi_scatter_deg = 2.0
 
 
 def session_in(
-    folder: Path, count: int, seed: int, drift: float = 0.0, shape: str = "cylinder"
+    folder: Path,
+    count: int,
+    seed: int,
+    drift: float = 0.0,
+    shape: str = "cylinder",
+    noise: float = 0.0064,
 ) -> Path:
     """The simulated session, made where it is not there."""
     folder.mkdir(parents=True, exist_ok=True)
     protocol, tip = folder / "protocol.toml", "tip_diameter_mm = 0.4" if shape == "tapered" else ""
     protocol.write_text(
-        PROTOCOL.format(count=count, drift=drift, shape=shape, tip=tip), encoding="utf-8"
+        PROTOCOL.format(count=count, drift=drift, shape=shape, tip=tip, noise=noise),
+        encoding="utf-8",
     )
     return simulate(folder / "session", protocol=str(protocol), signals_only=True, seed=seed)
 
@@ -115,9 +122,15 @@ def main() -> None:
     parser.add_argument("--theta-deg", type=float, nargs="+", default=[0.3, 0.5, 1.0, 3.0])
     parser.add_argument("--drift-V-per-s", type=float, default=0.0)
     parser.add_argument("--shape", choices=("cylinder", "cone", "tapered"), default="cylinder")
+    parser.add_argument("--noise-V", type=float, default=0.0064)
     options = parser.parse_args()
     session = session_in(
-        options.folder, options.count, options.seed, options.drift_V_per_s, options.shape
+        options.folder,
+        options.count,
+        options.seed,
+        options.drift_V_per_s,
+        options.shape,
+        options.noise_V,
     )
     rows = list(felt_rows(session, options.theta_deg))
     print(f"{'':<28}{'n':>5}  {'bias':>9}  {'RMS':>8}     in 95 %  most |z|")
