@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from fixtures.say_exact import exact_copy
+
 # The same examples on every machine, however busy it is.
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
-
-from fixtures.say_exact import exact_copy
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
