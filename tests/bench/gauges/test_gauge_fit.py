@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from bench.base.errors import BadInput
 from bench.gauges.felt import FeltStroke
@@ -67,6 +69,31 @@ def test_noiseless_readings_give_the_coefficients_back():
     gauges = fit_gauges([pairs("a", 0.0), pairs("b", 90.0)])
     assert gauges.all.matrix == pytest.approx(TRUE, rel=1e-9)
     assert gauges.at_angle.matrix == pytest.approx(TRUE, rel=1e-9)
+
+
+@settings(max_examples=40)
+@given(moment=st.floats(1e-9, 1e9), volt=st.floats(1e-4, 1e3), seed=st.integers(0, 50))
+def test_the_coefficients_are_the_same_in_every_unit(moment, volt, seed):
+    """Of moments and of volts, with their sigmas; how the residuals are judged does not depend on it."""
+    rng = np.random.default_rng(seed)
+    whisks = [pairs(f"t{number}", roll, rng) for number, roll in enumerate((0.0, 90.0))]
+    scaled = [
+        replace(
+            whisk,
+            moments=moment * whisk.moments,
+            moments_covariance=moment**2 * whisk.moments_covariance,
+            volts=volt * whisk.volts,
+            volts_covariance=volt**2 * whisk.volts_covariance,
+        )
+        for whisk in whisks
+    ]
+    one = fit_matrix(whisks)
+    other = fit_matrix(scaled)
+    largest = np.abs(one.matrix).max()
+    np.testing.assert_allclose(
+        other.matrix * volt / moment, one.matrix, rtol=1e-9, atol=1e-9 * largest
+    )
+    np.testing.assert_allclose(other.sigma * volt / moment, one.sigma, rtol=1e-7)
 
 
 def test_a_distance_that_is_hardly_known_draws_no_coefficient_towards_zero():
