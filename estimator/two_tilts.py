@@ -27,8 +27,11 @@ from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
 
-# Iterations of weights and e by the solution; after four nothing changes that matters.
-_ITERATIONS = 8
+# Iterations of weights and e by the solution: mostly four; where e is large they may circle.
+_MOST_ITERATIONS = 40
+# [sigma] Last step of an iteration that has converged, and [distances, rad] where sigmas are nothing.
+_LAST_STEP_SIGMAS = 1e-6
+_LAST_STEP = 1e-9
 # How far a cantilever's end is drawn along itself as it bends, in θ d: its arc's excess over its
 # chord.
 _DRAWN = 0.6
@@ -39,6 +42,10 @@ _LARGE_LEFT = 1 / 3
 _DRAGGING_LEFT = 1 / 3
 ALIKE = NamedReason(
     "whisks_slip_alike", "the whisks slip alike: no two of them tell friction from distance"
+)
+UNCONVERGED = NamedReason(
+    "whisks_unconverged",
+    "friction and distance do not converge: the whisks are pushed too far for what (10) leaves out",
 )
 NO_PUSH = NamedReason("whisk_not_pushing", "a whisk does not push: its m_z is not positive")
 BELOW_ZERO = NamedReason("friction_below_zero", "the friction angle came out below 0")
@@ -83,11 +90,14 @@ def shared_contact(
     apart = apart_sigma_mm * _by_place(places or range(len(whisks)))
     equations = _Equations(whisks, settings, apart, shared_Nmm)
     solution = equations.start()
-    for _ in range(_ITERATIONS):
+    for _ in range(_MOST_ITERATIONS):
+        before = solution
         solution, covariance = equations.refine(solution)
         if not np.isfinite(covariance).all() or not solution[0] > 0:
             return _without_contact(ALIKE)
-    return _contact(whisks[0], solution, covariance)
+        if _has_converged(solution - before, solution, covariance):
+            return _contact(whisks[0], solution, covariance)
+    return _without_contact(UNCONVERGED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +167,12 @@ class _Equations:
         common = np.array(common)
         # The moments' covariance holds their shared causes, too.
         return np.maximum(measured - (common**2).sum(axis=1), 0.0), common
+
+
+def _has_converged(step: np.ndarray, solution: np.ndarray, covariance: np.ndarray) -> bool:
+    """Return whether the last step (2,) of (d, μ) is nothing beside its sigmas."""
+    least = _LAST_STEP * np.array([solution[0], 1.0])
+    return bool((np.abs(step) <= _LAST_STEP_SIGMAS * np.sqrt(np.diag(covariance)) + least).all())
 
 
 def _felt(whisks: Sequence[Whisk]) -> np.ndarray:

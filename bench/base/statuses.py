@@ -464,6 +464,7 @@ _TABLE = (
     ),
     Status("tilts_one_sided", REFUSAL, "the slip angle does not leave zero on both sides"),
     Status("whisks_slip_alike", REFUSAL, "the whisks slip alike"),
+    Status("whisks_unconverged", REFUSAL, "friction and distance do not converge"),
     Status("whisk_not_pushing", REFUSAL, "a whisk does not push"),
     Status("ways_alike", REFUSAL, "there and back the moments are alike"),
     Status("no_push_one_way", REFUSAL, "no push on one of both ways"),

@@ -18,7 +18,7 @@ from estimator.onset import felt_touch
 from estimator.seen_shape import contact_of_shape
 from estimator.sensors import SENSORS
 from estimator.signal import moment_at, threshold_touch, touch_on_rate
-from estimator.two_tilts import shared_contact
+from estimator.two_tilts import _Equations, shared_contact
 from estimator.whisk import EstimatorSettings, ObjectMotion, OtherSensors, Whisk
 from tests.scenes.seen_shapes import shown
 
@@ -207,6 +207,23 @@ def test_two_tilts(scene, unit, turned, apart):
     same(values[0], in_units[0], SAME_SIGMA)
     np.testing.assert_allclose(in_units[1], values[1], atol=SAME_SIGMA)
     np.testing.assert_allclose(its_covariance, covariance, rtol=1e-5)
+
+
+@settings(max_examples=100)
+@given(scene=scenes, turned=st.floats(0.3, 0.8))
+def test_two_tilts_have_converged_or_say_that_they_have_not(scene, turned):
+    """Solved once more from its answer, it moves by less than a thousandth of its sigma."""
+    slopes = (0.6 * abs(scene.beta), 0.6 * abs(scene.beta) + turned)
+    whisks = [scene.whisk(MM_N, beta=beta) for beta in slopes]
+    contact = shared_contact(whisks, scene.told(MM_N))
+    if contact.status and contact.status.code != "friction_below_zero":
+        assert contact.status.code in ("whisks_unconverged", "whisks_slip_alike")
+        return
+    d = scene.beam(MM_N).as_cylinder_mm(contact.d_x_mm)
+    again = _Equations(whisks, scene.told(MM_N), 0.0 * np.eye(2), ())
+    if contact.alpha_rad > 0:
+        moved, covariance = again.refine(np.array([d, np.tan(contact.alpha_rad)]))
+        assert abs(moved[0] - d) < 1e-3 * np.sqrt(covariance[0, 0]) + 1e-6 * d
 
 
 @settings(max_examples=60)
