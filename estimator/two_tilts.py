@@ -27,10 +27,11 @@ from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
 
-# Iterations of weights and e by the solution: mostly four; where e is large they may circle.
+# [iterations] Of weights and e by the solution: four as a rule; where e is large they may circle. Stated.
 _MOST_ITERATIONS = 40
-# [sigma] Last step of an iteration that has converged, and [distances, rad] where sigmas are nothing.
+# [sigma] Last step of an iteration that has converged. Stated.
 _LAST_STEP_SIGMAS = 1e-6
+# [1] The same over distance and tan α, where sigmas are nothing: rounding, many times over. Derived.
 _LAST_STEP = 1e-9
 # How far a cantilever's end is drawn along itself as it bends, in θ d: its arc's excess over its
 # chord.
