@@ -325,6 +325,12 @@ _TABLE = (
         _MEASURE_BOARD,
     ),
     Status(
+        "boards_not_at_once",
+        WARNING,
+        "the cameras disagree about the board's pose in views of one index",
+        "record views of a board at rest, or trigger the cameras",
+    ),
+    Status(
         "boards_exchanged",
         REFUSAL,
         "the board views of cameras are exchanged",

@@ -10,7 +10,7 @@ zero only as far as the views demand it, and one they do not constrain keeps the
 instead of running away (a free k3 on 14 views came out at 6).
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,7 +36,7 @@ from vision.calibration.exchanged import check_own_lenses
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
 from vision.calibration.layout import Alone, Layout, gather
 from vision.calibration.place import by_board
-from vision.calibration.tied import JointInput, Timing, lens_priors, timing_note
+from vision.calibration.tied import JointAdjustment, JointInput, Timing, lens_priors, timing_note
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.board import PRINT_TERMS, Board
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras, camera_matrix
@@ -136,8 +136,15 @@ def calibrate_cameras(
         board=adjustment.solution.state.board,
         board_sigma=_print_sigma(adjustment),
         together=joint.layout.trajectory is not None,
-        warnings=warnings,
+        warnings=(*_disagreement(joint), *warnings),
     )
+
+
+def _disagreement(joint: JointAdjustment) -> Iterator[Reason]:
+    """Yield a warning where cameras disagree about the board and are tied by it all the same."""
+    if joint.disagreement:
+        cure = "record views of a board at rest, or trigger the cameras"
+        yield Reason("boards_not_at_once", f"{joint.disagreement}: {cure}")
 
 
 def _check_adjustment(names: Iterable[str], adjustment: Adjustment, triggered: bool) -> None:

@@ -24,6 +24,7 @@ from vision.calibration.bundle import (
     Priors,
 )
 from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
+from vision.calibration.instants_help import TURNS, Comparison, residuals_by_view
 from vision.calibration.layout import Alone, Layout, lay_out, place_cameras, saw_board_at_once
 from vision.calibration.views import MeasuredPose
 from vision.geometry.board import Board
@@ -44,6 +45,9 @@ _CLOCK_SIGMA = 0.6
 _FIRST_LATENESS = 0.2
 # [px] Where the fit of instants starts; learnt anew. Study: cameras.py.
 _FIRST_EXCESS_PX = 0.1
+# [rounds] Of learning the noise anew where models are compared, whose difference it does not turn:
+# four webcams gain 5 sigmas with 1 and with 5. Study: real_calibration.py.
+_HELD_OUT_ROUNDS = 1
 # [px] Of one camera by itself, so that nothing is divided by 0. Derived.
 _LEAST_ERROR_PX = 1e-3
 
@@ -53,24 +57,28 @@ class Timing:
     """The lateness of cameras that are not triggered together.
 
     offset_s, scatter_s (C,): mean and standard deviation of how late each camera's pictures are, in
-    s, or in frame intervals where the pictures' times were not given (in_frames).
+    s, or in frame intervals where the pictures' times were not given (in_frames). held_out: what
+    that makes of views held out, in words.
     """
 
     offset_s: np.ndarray
     scatter_s: np.ndarray
     in_frames: bool
+    held_out: str
 
 
 @dataclass(frozen=True, eq=False)
 class JointAdjustment:
     """The joint adjustment of all cameras, with notes for the report.
 
-    timing: None for pictures of one instant.
+    timing: None for pictures of one instant. disagreement: in what the cameras disagree about the
+    board, where no instants explain it; '' where they agree.
     """
 
     layout: Layout
     adjustment: Adjustment
     timing: Timing | None
+    disagreement: str = ""
     notes: tuple[str, ...] = ()
 
 
@@ -93,8 +101,9 @@ class JointInput:
         """Adjust all cameras jointly.
 
         Views of one index count as of one board where they agree with that and it explains them;
-        where each camera by itself explains its views far better, they are its own. Raises Refused
-        where nothing else determines how the cameras stand to each other.
+        where each camera by itself explains its views better, they are its own if the board on the
+        rig places the cameras. Raises Refused where they explain them far better, and nothing else
+        determines how the cameras stand to each other.
         """
         if not saw_board_at_once(self.alone):
             return self._adjust(self._layout(together=False))
@@ -104,11 +113,14 @@ class JointInput:
         except Refused as reason:
             complaint = str(reason)
         if not complaint:
-            return joint
+            if not joint.disagreement or self.standing is None:
+                return joint
+            complaint = joint.disagreement
         found = f"of one index look as if the cameras saw one board at once, but they did not: {complaint}"
         if self.standing is None:
             raise Refused(
-                f"views {found}; record views that all cameras see at once, or a picture of the board on the rig"
+                f"views {found}; record views that all cameras see at once, a board at rest or a "
+                "trigger, or a picture of the board on the rig"
             )
         note = f"Views {found}. Each camera's views count as its own."
         return replace(self._adjust(self._layout(together=False)), notes=(note,))
@@ -148,29 +160,101 @@ class JointInput:
         """Adjust all cameras.
 
         Pictures of one view count as of one instant, unless the cameras agree far worse with each
-        other than with themselves.
+        other than with themselves, and instants of their own help on views held out.
         """
-        corners_mm = self.board.corners_mm
-        first = layout.first
-        priors = _priors(first, self.board, self.on_rig)
-        if layout.trajectory is not None and not self.triggered and len(self.alone) > 1:
-            coarse = adjust_coarse(first, layout.seen, corners_mm, priors)
-            own_px = self._own_errors_px()
-            first = coarse.solution.state
-            if np.median(coarse.error_px / np.maximum(own_px, _LEAST_ERROR_PX)) >= _DISAGREE:
-                adjustment = adjust_with_noise(
-                    replace(first, trajectory=layout.trajectory),
-                    layout.seen,
-                    corners_mm,
-                    allow_lateness(priors, layout.trajectory),
-                    error_px=own_px + _FIRST_EXCESS_PX,
-                )
-                offset_s = adjustment.solution.state.clock
-                timing = Timing(offset_s, adjustment.priors.late_sigma_s, self.times_s is None)
-                return JointAdjustment(layout, adjustment, timing)
-        return JointAdjustment(
-            layout, adjust_with_noise(first, layout.seen, corners_mm, priors), None
+        if layout.trajectory is None or self.triggered or len(self.alone) == 1:
+            return JointAdjustment(layout, self._at_once(layout), None)
+        coarse = adjust_coarse(
+            layout.first, layout.seen, self.board.corners_mm, self._priors_of(layout)
         )
+        own_px = np.maximum(self._own_errors_px(), _LEAST_ERROR_PX)
+        if np.median(coarse.error_px / own_px) < _DISAGREE:
+            return JointAdjustment(layout, self._at_once(layout), None)
+        comparison = self._compare_on_held_out()
+        if not comparison.instants_help:
+            found = (
+                "the cameras disagree about the board's pose, and pictures late by an offset do not "
+                f"explain it ({comparison.in_words})"
+            )
+            return JointAdjustment(layout, self._at_once(layout), None, found)
+        adjustment = self._with_instants(layout, coarse.solution.state)
+        timing = Timing(
+            offset_s=adjustment.solution.state.clock,
+            scatter_s=adjustment.priors.late_sigma_s,
+            in_frames=self.times_s is None,
+            held_out=comparison.in_words,
+        )
+        return JointAdjustment(layout, adjustment, timing)
+
+    def _priors_of(self, layout: Layout) -> Priors:
+        """Return the priors of all views."""
+        return _priors(layout.first, self.board, self.on_rig)
+
+    def _at_once(self, layout: Layout, rounds: int | None = None) -> Adjustment:
+        """Adjust all cameras with the pictures of a view as of one instant.
+
+        rounds: of learning the noise anew.
+        """
+        priors = self._priors_of(layout)
+        corners_mm = self.board.corners_mm
+        return adjust_with_noise(layout.first, layout.seen, corners_mm, priors, rounds=rounds)
+
+    def _with_instants(
+        self, layout: Layout, first: BundleState, rounds: int | None = None
+    ) -> Adjustment:
+        """Adjust all cameras with instants of the pictures, from a first state.
+
+        rounds: of learning the noise anew.
+        """
+        return adjust_with_noise(
+            replace(first, trajectory=layout.trajectory),
+            layout.seen,
+            self.board.corners_mm,
+            allow_lateness(self._priors_of(layout), layout.trajectory),
+            error_px=self._own_errors_px() + _FIRST_EXCESS_PX,
+            rounds=rounds,
+        )
+
+    def _compare_on_held_out(self) -> Comparison:
+        """Compare instants of their own with one instant a view, on views of which neither knows."""
+        at_once_px: list[float] = []
+        instants_px: list[float] = []
+        indices = {k for camera in self.alone.values() for k in camera.views}
+        for turn in range(TURNS):
+            is_held = {k: k % TURNS == turn for k in indices}
+            try:
+                layout = self._without(is_held)._layout(together=True)
+                at_once = self._at_once(layout, _HELD_OUT_ROUNDS).solution.state
+                instants = self._with_instants(layout, at_once, _HELD_OUT_ROUNDS).solution.state
+            except Refused:
+                continue
+            everything = self._held_layout(at_once)
+            still = self._residuals_by_view(at_once, replace(everything, trajectory=None), is_held)
+            moving = self._residuals_by_view(instants, self._held_layout(instants), is_held)
+            at_once_px += still.values()
+            instants_px += [moving[index] for index in still]
+        return Comparison(np.array(at_once_px), np.array(instants_px))
+
+    def _without(self, is_held: Mapping[int, bool]) -> "JointInput":
+        """Return the input without the views of some indices."""
+        alone = {}
+        for name, camera in self.alone.items():
+            views = {k: view for k, view in camera.views.items() if not is_held[k]}
+            poses = {k: pose for k, pose in camera.poses.items() if not is_held[k]}
+            alone[name] = replace(camera, views=views, poses=poses)
+        return replace(self, alone=alone)
+
+    def _held_layout(self, cameras: BundleState) -> Layout:
+        """Return all held views before adjusted cameras, without the board on the rig."""
+        layout = lay_out(self.alone, cameras.T_camera_world, together=True, times_s=self.times_s)
+        return replace(layout, first=replace(layout.first, lens=cameras.lens))
+
+    def _residuals_by_view(
+        self, cameras: BundleState, layout: Layout, is_held: Mapping[int, bool]
+    ) -> dict[int, float]:
+        """Return the residual of each held-out view, by index; see `residuals_by_view`."""
+        priors = pose_priors(len(self.alone), len(layout.index))
+        return residuals_by_view(cameras, layout, is_held, self.board, priors)
 
 
 def timing_note(names: Sequence[str], timing: Timing) -> str:
@@ -183,7 +267,7 @@ def timing_note(names: Sequence[str], timing: Timing) -> str:
         late.append(f"{name} {scale * offset_s:+.3g} ± {scale * scatter_s:.2g} {unit}")
     return (
         "Pictures of one view were not taken at one instant: later than the view by "
-        f"{', '.join(late)} (below 0: earlier); taken into account."
+        f"{', '.join(late)} (below 0: earlier); taken into account, for {timing.held_out}."
     )
 
 

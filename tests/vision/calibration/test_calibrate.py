@@ -381,9 +381,35 @@ def test_series_of_their_own_do_not_place_cameras(same_order):
     boards, _ = same_order
     with pytest.raises(
         Refused,
-        match=r"by itself 0\.0. px; record views that all cameras see at once, or a picture",
+        match=r"by itself 0\.0. px; record views that all cameras see at once, a board at rest",
     ):
         calibrate_cameras(BoardViews(boards, dict.fromkeys(boards, SIZE_PX)), BOARD, None)
+
+
+@pytest.fixture
+def single_shots(recording, rng):
+    """A board in the hand, shot every seven seconds, which moves before the second camera's picture."""
+    boards = {camera.name: [] for camera in recording.cameras}
+    for k in range(24):
+        T = moving_board(7.3 * k)
+        for camera, moved_mm in zip(recording.cameras, (0.0, 0.12)):
+            shifted = T + np.column_stack([np.zeros((3, 3)), moved_mm * rng.standard_normal(3)])
+            boards[camera.name].append(noisy_view_at(camera, shifted, SIGMA_PX, rng))
+    return boards, recording.seen(SIGMA_PX, rng)[1]
+
+
+def test_single_shots_of_a_hand_held_board_get_no_instants_but_a_warning(single_shots):
+    boards, _ = single_shots
+    made = calibrate_cameras(BoardViews(boards, dict.fromkeys(boards, SIZE_PX)), BOARD, None)
+    assert made.timing is None and made.together
+    assert [warning.codes for warning in made.warnings] == [("boards_not_at_once",)]
+    assert "held-out views" in made.warnings[0]
+
+
+def test_single_shots_with_a_board_on_the_rig_are_each_camera_s_own(single_shots):
+    made = calibrated(*single_shots)
+    assert made.timing is None and not made.together and not made.warnings
+    assert any("pictures late by an offset do not explain it" in note for note in made.notes)
 
 
 def test_views_that_no_lens_explains_are_refused(recording, rng):
