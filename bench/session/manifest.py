@@ -106,6 +106,10 @@ class BoardKeys(GivenKeys):
     # side of a square; all lengths seen depend on it
     square_mm: Width
     square_sigma_mm: Annotated[float, Assumed(share=1e-3, origin="a print")] = 0.0
+    # share by which the print may be longer along y than along x
+    stretch_sigma: Annotated[
+        float, Assumed(absolute=1e-3, unstated="stretch", origin="a printer's feed")
+    ] = 0.0
     # side of a marker, used to find the board alone; its sigma enters nothing
     marker_mm: Width
     marker_sigma_mm: float = 0.0

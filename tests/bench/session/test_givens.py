@@ -36,6 +36,7 @@ def test_what_nobody_said_is_what_a_careful_lab_has(unsaid):
     assert session.bar_diameter_sigma_mm == 0.02
     assert session.trial("b30_3").bar_diameter_sigma_mm == 0.02
     assert session.board.square_sigma_mm == pytest.approx(1e-3 * session.board.square_mm)
+    assert session.board.stretch_sigma == 1e-3
     assert session.T_rig_board_sigma_mm == 0.2
     assert session.T_rig_board_sigma_rad == pytest.approx(np.radians(0.2))
     assert {given.source for given in givens_of(session)} == {"assumed"}
@@ -56,7 +57,8 @@ def test_a_turn_of_the_follicle_is_known_to_a_degree_in_ninety(unsaid):
 def test_a_session_may_be_exact(small_session):
     session = load_session(small_session)
     assert session.whisker.C_sigma_Nmm2 == session.T_rig_board_sigma_mm == 0.0
-    assert session.board.square_sigma_mm == session.bar_diameter_sigma_mm == 0.0
+    assert session.board.square_sigma_mm == session.board.stretch_sigma == 0.0
+    assert session.bar_diameter_sigma_mm == 0.0
     assert {given.source for given in givens_of(session)} == {"exact"}
     (line,) = given_lines(session)
     assert line.startswith("  exact, as said: [whisker] length_mm, ")
