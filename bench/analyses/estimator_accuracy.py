@@ -188,7 +188,8 @@ def _accuracy(name: str, mine: Sequence[Judged], holding: dict[Key, bool]) -> Ac
 class TruthUncertainty:
     """Median standard deviations of the truth over the measured whisks that have one.
 
-    known, measured: numbers of whisks with a truth and of all.
+    known, measured: numbers of whisks with a truth and of all. d_x_own_mm, d_x_shared_mm: the parts
+    of d_x's that are each whisk's own, and that all share; NaN where that is not known.
     """
 
     known: int
@@ -197,6 +198,16 @@ class TruthUncertainty:
     touch_deg: float
     beta_deg: float
     slip_mm: float
+    d_x_own_mm: float = math.nan
+    d_x_shared_mm: float = math.nan
+
+    @property
+    def d_x_text(self) -> str:
+        """Return how well d_x is known, in the parts that whisks have of their own and share."""
+        if math.isfinite(self.d_x_own_mm) and self.known > 1:
+            own = f"± {self.d_x_own_mm:.2g} mm each"
+            return f"{own}, and ± {self.d_x_shared_mm:.2g} mm that all whisks share"
+        return f"± {self.d_x_mm:.2g} mm"
 
 
 def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
@@ -211,6 +222,8 @@ def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
         touch_deg=math.degrees(_finite_median([seen.touch_rad.sigma for seen in known])),
         beta_deg=math.degrees(_finite_median([seen.beta_rad.sigma for seen in known])),
         slip_mm=_finite_median(slips),
+        d_x_own_mm=_finite_median([seen.d_x_own_sigma_mm for seen in known]),
+        d_x_shared_mm=_finite_median([seen.d_x_shared_sigma_mm for seen in known]),
     )
 
 

@@ -3,6 +3,7 @@
 A number that is missing is NaN, a record that is missing None; a status says why.
 """
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -143,6 +144,18 @@ class SeenWhisk:
     def d_x_mm(self) -> Value:
         """Return the radial distance; NaN exactly where there is no truth."""
         return self.truth.d_x_mm
+
+    @property
+    def d_x_own_sigma_mm(self) -> float:
+        """Return the part of d_x's sigma that is this whisk's own; NaN where it is not known."""
+        own_variance = self.d_x_mm.sigma**2 - self.d_x_shared_sigma_mm**2
+        return math.sqrt(max(own_variance, 0.0)) if math.isfinite(own_variance) else math.nan
+
+    @property
+    def d_x_shared_sigma_mm(self) -> float:
+        """Return the part of d_x's sigma that all whisks share; NaN where it is not known."""
+        shared = self.truth.shared
+        return math.nan if shared is None else float(shared.d_x_mm)
 
     @property
     def beta_rad(self) -> Value:

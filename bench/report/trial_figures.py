@@ -126,9 +126,13 @@ def _draw_shares(axes: Axes, known: Sequence[_WhiskOfTrial]) -> None:
 
 
 def _write_whisks(axes: Axes, known: Sequence[_WhiskOfTrial]) -> None:
-    """Write trial and whisk before each bar, and the sigma of d_x after it."""
+    """Write trial and whisk before each bar, and the sigma of d_x after it: its own, and shared."""
     for place, (_, seen) in enumerate(known):
-        axes.annotate(f"± {seen.d_x_mm.sigma:.3f} mm", (101.0, place), va="center", fontsize=7)
+        own_mm = seen.d_x_own_sigma_mm
+        text = f"± {own_mm:.3f} ± {seen.d_x_shared_sigma_mm:.3f} mm"
+        if math.isnan(own_mm):
+            text = f"± {seen.d_x_mm.sigma:.3f} mm"
+        axes.annotate(text, (101.0, place), va="center", fontsize=7)
     names = [trial + (f" {seen.whisk}" if seen.whisk else "") for trial, seen in known]
     axes.set_yticks(np.arange(len(known)), names, fontsize=7)
 

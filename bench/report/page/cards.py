@@ -8,10 +8,17 @@ from bench.analyses.alphas import seen_friction
 from bench.base.drawing import label_of
 from bench.base.statuses import cure_of
 from bench.gauges.felt import lateness
-from bench.records.trial_result import EstimateRow
+from bench.records.trial_result import EstimateRow, SeenWhisk
 from bench.report.assembly import status_of
 from bench.report.page.thumbnails import picture_source
-from bench.report.page.words import MISSING, WhiskRow, number, value_text, with_sigma
+from bench.report.page.words import (
+    MISSING,
+    WhiskRow,
+    distance_text,
+    number,
+    value_text,
+    with_sigma,
+)
 from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
 from vision import UNKNOWN, BeamCheck, TruthAtAngle, Value
@@ -190,7 +197,7 @@ def columns(estimators: list[str]) -> list[Cell]:
         Cell("surface", wide=True),
         _head("°/s", wide=True),
         _head("β [°]"),
-        _head("d_x [mm]"),
+        _head("d_x [mm], ± own ± shared"),
         _head("slip [mm]", wide=True),
         _head("felt − seen [°]", wide=True),
         _head("α seen [°]", wide=True),
@@ -214,7 +221,7 @@ def cells(row: WhiskRow, estimators: list[str]) -> list[Cell]:
         Cell(trial.surface, wide=True),
         Cell(f"{speed:g}" if math.isfinite(speed) else MISSING, speed, wide=True),
         _value_cell(seen.beta_rad, degrees=True),
-        _value_cell(seen.d_x_mm),
+        _distance_cell(seen),
         _value_cell(slip, wide=True),
         _value_cell(lateness(seen, row.felt), degrees=True, wide=True),
         _value_cell(alpha, degrees=True, wide=True),
@@ -238,6 +245,11 @@ def _error(row: WhiskRow, estimator: str) -> Cell:
             text = with_sigma(percent * error.value, percent * error.sigma, sign=True)
             return Cell(text, percent * error.value)
     return Cell(MISSING, math.nan)
+
+
+def _distance_cell(seen: SeenWhisk) -> Cell:
+    """Return the cell of d_x with both parts of its sigma, sorted by d_x."""
+    return Cell(distance_text(seen), float(seen.d_x_mm.value))
 
 
 def _value_cell(value: Value, *, degrees: bool = False, wide: bool = False) -> Cell:

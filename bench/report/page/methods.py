@@ -70,7 +70,8 @@ def _truth(record: RunRecord, run: Finished) -> Iterator[str]:
     yield _sentence_on_cameras(record.cameras)
     yield (
         f"The true radial distance d_x is known for {truth.known} of {truth.measured} whisks, with a median standard "
-        f"uncertainty of {number(truth.d_x_mm, 4)} mm (touch {number(truth.touch_deg, 4)}°, slope "
+        f"uncertainty of {number(truth.d_x_mm, 4)} mm, of which {number(truth.d_x_own_mm, 4)} mm are each whisk's own "
+        f"and {number(truth.d_x_shared_mm, 4)} mm are common to all (touch {number(truth.touch_deg, 4)}°, slope "
         f"{number(truth.beta_deg, 3)}°, slip {number(truth.slip_mm, 4)} mm)."
     )
 

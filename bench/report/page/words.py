@@ -8,7 +8,16 @@ from bench.base.numbers import MISSING, number, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from vision import Value
 
-__all__ = ["MISSING", "WhiskRow", "by_whisk", "number", "rows_of", "value_text", "with_sigma"]
+__all__ = [
+    "MISSING",
+    "WhiskRow",
+    "by_whisk",
+    "distance_text",
+    "number",
+    "rows_of",
+    "value_text",
+    "with_sigma",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +51,16 @@ def rows_of(results: Iterable[TrialResult]) -> list[WhiskRow]:
 def by_whisk(rows: Iterable[WhiskRow]) -> dict[tuple[str, int], WhiskRow]:
     """Return the rows by trial and number of the whisk."""
     return {(row.trial, row.seen.whisk): row for row in rows}
+
+
+def distance_text(seen: SeenWhisk) -> str:
+    """Return d_x with the part of its sigma that is the whisk's own, and that which all share."""
+    own_mm = seen.d_x_own_sigma_mm
+    if not own_mm > 0.0:
+        return value_text(seen.d_x_mm)
+    text = with_sigma(float(seen.d_x_mm.value), own_mm)
+    decimals = len(text.rpartition(".")[2])
+    return f"{text} ± {number(seen.d_x_shared_sigma_mm, decimals)}"
 
 
 def value_text(value: Value, *, degrees: bool = False) -> str:

@@ -44,9 +44,7 @@ def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warni
     if not has_pictures:
         known = f"no pictures, so the true distance is not known; {count} felt"
     elif truth.known:
-        known = (
-            f"the true distance is known for {truth.known} of {count}, to ± {truth.d_x_mm:.2g} mm"
-        )
+        known = f"the true distance is known for {truth.known} of {count}, to {truth.d_x_text}"
     else:
         known = f"the true distance is known for none of {count}"
     warned = f"{counted(warnings, 'doubt')}, see below" if warnings else "nothing doubtful"

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from bench.analyses.estimator_accuracy import truth_uncertainty
+from bench.report.page.words import distance_text
 from bench.report.summary.shared import scatter_warnings, shared_distance, shared_lines
 from tests.scenes.results import seen_whisk, trial_result
 from vision.truth.records import SharedSigmas
@@ -54,6 +56,22 @@ def test_scatter_within_recordings_tests_the_own_part():
     assert sum(map(len, sound)) <= 2  # one in a thousand
     (line,) = scatter_warnings(session(rng, 4, 10, own_mm=3 * OWN_MM))
     assert "mm is stated as each whisk's own" in line
+
+
+def test_a_distance_is_stated_with_both_parts():
+    (made,) = session(np.random.default_rng(6), 1, 1)
+    (seen,) = made.seen.whisks
+    assert seen.d_x_own_sigma_mm == pytest.approx(OWN_MM)
+    assert distance_text(seen) == f"{seen.d_x_mm.value:.4f} ± 0.0020 ± 0.0080"
+    alone = seen_whisk(0, d_x_mm=Value(60.0, 0.01))
+    assert distance_text(alone) == "60.000 ± 0.010"
+
+
+def test_the_truth_of_several_whisks_is_known_in_two_parts():
+    two = truth_uncertainty(session(np.random.default_rng(7), 1, 2))
+    assert two.d_x_text == "± 0.002 mm each, and ± 0.008 mm that all whisks share"
+    one = truth_uncertainty(session(np.random.default_rng(7), 1, 1))
+    assert one.d_x_text == "± 0.0082 mm"
 
 
 def test_single_whisks_say_nothing_of_their_scatter():
