@@ -2,7 +2,8 @@
 
     python tests/studies/accuracy/agreement.py SESSION OUT
 
-OUT is where `evaluate` left what is seen of SESSION. The gauges are fitted to the gauge trials as they are; then the
+SESSION: of a rendered one a copy that says so (fixtures/say_exact.py).
+OUT is where `evaluate` left what is seen of it. The gauges are fitted to the gauge trials as they are; then the
 channels of each measured whisk are exchanged, reversed, weakened or turned, and the cause is asked for.
 """
 

@@ -12,6 +12,7 @@ FOLDER holds sessions/steel-sample and real/calibration; by default ../shared be
 import argparse
 import json
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from bench.base.threads import in_threads
 from bench.cameras.board_views import read_board_views
 from bench.cameras.calibrate_session import calibrate_from
 from bench.session.session import load_session
+from fixtures.say_exact import exact_copy
 from vision.boards.corners import Corners, detect, find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.held_out import check_held_out
@@ -125,7 +127,9 @@ def main() -> None:
         print(
             f"single {name}, OpenCV's corners", real_video(real / "single", [name], opencv_corners)
         )
-    print("steel-sample", *steel(shared / "sessions" / "steel-sample"), sep="\n  ")
+    with tempfile.TemporaryDirectory() as folder:
+        sample = exact_copy(shared / "sessions" / "steel-sample", Path(folder) / "steel-sample")
+        print("steel-sample", *steel(sample), sep="\n  ")
 
 
 if __name__ == "__main__":
