@@ -2,10 +2,10 @@
 
     python tests/studies/accuracy/twin.py RECORDED OUT [seeds]
 
-RECORDED is a session with truth files (the steel sample's exact copy, by fixtures/say_exact.py), OUT keeps a file of errors a seed: run again, it goes on
-where it stopped. Cameras are calibrated from each session's own boards. Prints RMS errors of d_x, β and slip over all
-trials of both, and their ratio, wanted within a factor 1.5. The range is that of the RMS of one session of
-the twin alone (10 to 90 % of the seeds): how much RECORDED's own figure is worth.
+RECORDED is a session with truth files (the steel sample's exact copy, by fixtures/say_exact.py), OUT keeps a file of
+errors a seed: run again, it goes on where it stopped. Cameras are calibrated from each session's own boards. Prints RMS
+errors of d_x, β and slip over all trials of both, and their ratio, wanted within a factor 1.5. The range is that of the
+RMS of one session of the twin alone (10 to 90 % of the seeds): how much RECORDED's own figure is worth.
 """
 
 import csv
