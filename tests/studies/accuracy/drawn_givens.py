@@ -1,12 +1,12 @@
 """Do intervals hold where nobody measured the bench better than a careful lab, and nobody says so?
 
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/accuracy/drawn_givens.py FOLDER SEEDS
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/accuracy/drawn_givens.py FOLDER SEEDS [SESSION]
 
 Sessions of the synthetic rig are recorded with pictures into FOLDER, seeds 0 to SEEDS - 1. Of each, session.toml and
 trial.toml then state every given wrong by a draw of its assumed sigma (`Assumed` in bench/session/manifest.py), and none
 of these sigmas. A session is evaluated, reduced to a row of FOLDER/drawn.csv, and loses its pictures; one that has its
 row is not made again. Prints what sessions.py prints: 93 to 97 % of d_x's 95 % intervals should hold. A print's stretch
-is not drawn: the rig prints none.
+is not drawn: the rig prints none. Of a rendered SESSION with truth files, its own pictures are taken each time.
 """
 
 import shutil
@@ -59,7 +59,7 @@ def state_wrongly(session: Path, rng: np.random.Generator) -> None:
     """Let a session state each given wrong by a draw of the sigma that is assumed, and say nothing of it."""
     file = session / "session.toml"
     tables = tomllib.loads(file.read_text())
-    tables.pop("exact")
+    tables.pop("exact", None)
     file.write_text(tomli_w.dumps(drawn(tables, SessionKeys, rng)))
     for trial in sorted(session.glob("trials/*/trial.toml")):
         trial.write_text(tomli_w.dumps(drawn(tomllib.loads(trial.read_text()), TrialKeys, rng)))
@@ -90,12 +90,20 @@ def drawn_pose(pose: np.ndarray, kind: type[Keys], rng: np.random.Generator) -> 
     return np.column_stack([rotation, pose[:, 3] + shift_mm]).tolist()
 
 
-def row_of(folder: Path, seed: int) -> dict:
-    """A session recorded, stated wrongly, evaluated and reduced."""
-    protocol = folder / "drawn.toml"
+def record(path: Path, seed: int) -> None:
+    """Record a session of the synthetic rig."""
+    protocol = path.parent / "drawn.toml"
     protocol.write_text(PROTOCOL)
-    path = folder / f"s{seed}"
     simulate(path, protocol=protocol, seed=seed)
+
+
+def row_of(folder: Path, seed: int, rendered: Path | None) -> dict:
+    """A session recorded, or copied where it is rendered, stated wrongly, evaluated and reduced."""
+    path = folder / f"s{seed}"
+    if rendered is None:
+        record(path, seed)
+    else:
+        shutil.copytree(rendered, path, copy_function=shutil.copyfile)
     state_wrongly(path, np.random.default_rng([29, seed]))
     out = folder / f"out{seed}"
     run = api.evaluate(path, out, figures=False)
@@ -107,9 +115,10 @@ def row_of(folder: Path, seed: int) -> dict:
 def main() -> None:
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
-    rows = all_rows(
-        folder / "drawn.csv", COLUMNS, range(int(sys.argv[2])), lambda seed: row_of(folder, seed)
-    )
+    seeds = range(int(sys.argv[2]))
+    rendered = Path(sys.argv[3]) if len(sys.argv) > 3 else None
+    table = folder / "drawn.csv"
+    rows = all_rows(table, COLUMNS, seeds, lambda seed: row_of(folder, seed, rendered))
     print("\n".join(lines(rows)))
 
 
