@@ -95,6 +95,8 @@ def main() -> None:
         board, views = read_set(folder)
         for name in views.boards:
             z = half_differences(views, name, board, options.splits)
+            if not len(z):
+                continue
             every.append(z)
             terms = ", ".join(f"{term} {rms(of):.2f}" for term, of in zip(LENS_TERMS, z.T))
             print(f"{folder.name}, {name}: z RMS {rms(z):.2f} ({terms})")

@@ -36,6 +36,7 @@ from vision.calibration.exchanged import check_own_lenses
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
 from vision.calibration.layout import Alone, Layout, gather
 from vision.calibration.place import by_board
+from vision.calibration.shared_errors import with_shared_errors
 from vision.calibration.tied import JointAdjustment, JointInput, Timing, lens_priors, timing_note
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.board import PRINT_TERMS, Board
@@ -122,6 +123,7 @@ def calibrate_cameras(
     joint = JointInput(alone, standing, board, on_rig, views.times_s, triggered).adjust()
     adjustment, notes = _with_warp(joint.layout, joint.adjustment, board)
     _check_adjustment(alone, adjustment, triggered)
+    adjustment, shared_notes = with_shared_errors(adjustment, board.corners_mm, list(alone))
     if joint.timing is not None:
         notes.append(timing_note(alone, joint.timing))
     stretch_notes, warnings = _stretch_lines(adjustment, board)
@@ -131,7 +133,7 @@ def calibrate_cameras(
     return Calibration(
         cameras=cameras,
         report=reports,
-        notes=(*joint.notes, *lens_notes, *notes, *stretch_notes),
+        notes=(*joint.notes, *lens_notes, *notes, *stretch_notes, *shared_notes),
         timing=joint.timing,
         board=adjustment.solution.state.board,
         board_sigma=_print_sigma(adjustment),

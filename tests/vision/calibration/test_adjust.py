@@ -134,7 +134,8 @@ def test_a_moving_board_seen_late_is_followed():
     sizes = dict.fromkeys(boards, SIZE_PX)
     views = BoardViews(boards, sizes, rig, times_s=dict.fromkeys(boards, times))
     made = calibrate_cameras(views, BOARD, MeasuredPose(T_RIG_BOARD))
-    assert made.together and made.timing is not None and "held-out views" in made.notes[-1]
+    assert made.together and made.timing is not None
+    assert any("held-out views" in note for note in made.notes)
     # The mean of 24 latenesses that scatter by 20 ms is known to 4 ms; four of these.
     assert abs(made.timing.offset_s[1] - made.timing.offset_s[0] - 0.04) < 0.016
     for camera in made.cameras:

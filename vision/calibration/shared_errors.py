@@ -1,0 +1,132 @@
+"""By how much sigmas of lenses are too small where the corners of a view err together.
+
+A board that bends in the hand, blur along its motion and a focus that breathes move the corners of a
+view alike, so that fifty corners are fewer observations than fifty. How lenses scatter is then seen
+from view to view: the gradients of the cost by a camera's lens, a sum over each view, are as large
+as independent corners make them, or larger. Their covariance between the inverse normal matrices
+(the sandwich of White 1980, by clusters, with the small-sample correction CR2 of Bell and McCaffrey
+2002) is the one that halves of real sets of views agree with.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vision.calibration.adjust import adjust_bundle
+from vision.calibration.bundle import CLOCK, N_BOARD, N_CAMERA, Priors, predict
+from vision.calibration.corner_noise import Adjustment
+from vision.geometry.lens import LENS_TERMS
+
+# [1] Of a view's share of what is known of the lens, at most: a view that alone determines a
+# direction says nothing of its scatter. Stated.
+_MOST_LEVERAGE = 0.95
+# [1] Of the largest eigenvalue, below which a direction is not determined: rounding. Derived.
+_LEAST_EIGENVALUE = 1e-13
+# [1] Factor from which the report says it: six independent views scatter to 1.2. Study:
+# real_calibration.py.
+_NOTED = 1.3
+# [parameters] A layout, no threshold.
+_N_LENS = len(LENS_TERMS)
+
+
+def with_shared_errors(
+    adjustment: Adjustment, corners_mm: np.ndarray, names: Sequence[str]
+) -> tuple[Adjustment, list[str]]:
+    """Return the adjustment with each camera's corners weighted as its views scatter, and notes.
+
+    corners_mm (m, 3): of the board as stated. names: of the cameras.
+    """
+    factor = shared_error_factors(adjustment, corners_mm)
+    if np.all(factor == 1.0):
+        return adjustment, []
+    seen = replace(
+        adjustment.seen, sigma_px=adjustment.seen.sigma_px * factor[adjustment.seen.camera]
+    )
+    solution = adjust_bundle(
+        adjustment.solution.state, seen.select(adjustment.kept), corners_mm, adjustment.priors
+    )
+    residual_px = seen.px - predict(solution.state, seen, corners_mm)[0]
+    solution = replace(solution, residual_px=residual_px)
+    notes = [
+        f"Corners of a view of camera {name} err together: sigmas are {own:.1f} times those of corners by themselves."
+        for name, own in zip(names, factor)
+        if own > _NOTED
+    ]
+    return replace(adjustment, solution=solution, seen=seen, residual_px=residual_px), notes
+
+
+def shared_error_factors(adjustment: Adjustment, corners_mm: np.ndarray) -> np.ndarray:
+    """Return by how much the sigmas of each camera's lens are too small, (C,), 1 or more.
+
+    corners_mm (m, 3): of the board as stated.
+    """
+    state = adjustment.solution.state
+    seen = adjustment.seen.select(adjustment.kept)
+    px, J = predict(state, seen, corners_mm)
+    residual = (seen.px - px) / seen.sigma_px[:, None]
+    J = J / seen.sigma_px[:, None, None]
+    factors = []
+    for camera in range(len(state.lens)):
+        shots = []
+        for view in np.unique(seen.view[seen.camera == camera]):
+            rows = (seen.camera == camera) & (seen.view == view)
+            shots.append((J[rows].reshape(-1, J.shape[2]), residual[rows].ravel()))
+        factors.append(_factor(camera, shots, adjustment.priors))
+    return np.array(factors)
+
+
+def _factor(camera: int, shots: list[tuple[np.ndarray, np.ndarray]], priors: Priors) -> float:
+    """Return by how much the sigmas of one camera's lens are too small.
+
+    shots: whitened derivatives (2 n, p) and residuals (2 n,) of each picture.
+    """
+    of_prior, columns = _columns(camera, priors)
+    prior = np.diag(priors.sigma[of_prior] ** -2.0)
+    information = []
+    gradients = []
+    for J, residual in shots:
+        pose = np.column_stack([J[:, CLOCK], J[:, N_CAMERA + N_BOARD :]])
+        basis, size, _ = np.linalg.svd(pose, full_matrices=False)
+        basis = basis[:, size > _LEAST_EIGENVALUE * size[0]]
+        design = J[:, columns] - basis @ (basis.T @ J[:, columns])
+        information.append(design.T @ design)
+        gradients.append(design.T @ residual)
+    normal = prior + np.sum(information, axis=0)
+    scale = 1.0 / np.sqrt(np.diag(normal))
+    root, inverse_root = _roots(normal * np.outer(scale, scale))
+    scatter = prior * np.outer(scale, scale)
+    for shot, gradient in zip(information, gradients):
+        leverage = inverse_root @ (shot * np.outer(scale, scale)) @ inverse_root
+        whitened = _corrected(leverage) @ (inverse_root @ (scale * gradient))
+        scatter += np.outer(root @ whitened, root @ whitened)
+    stated = inverse_root @ inverse_root
+    found = stated @ scatter @ stated
+    lens = slice(0, _N_LENS)
+    ratio = np.trace(np.linalg.solve(stated[lens, lens], found[lens, lens])) / _N_LENS
+    return float(np.sqrt(max(ratio, 1.0)))
+
+
+def _columns(camera: int, priors: Priors) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a camera's lens and the free terms of the print stand among the globals, and
+    among the columns of `predict`.
+    """
+    print_terms = np.flatnonzero(priors.free[-N_BOARD:])
+    of_prior = np.append(
+        N_CAMERA * camera + np.arange(_N_LENS), len(priors.free) - N_BOARD + print_terms
+    )
+    return of_prior, np.append(np.arange(_N_LENS), N_CAMERA + print_terms)
+
+
+def _roots(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the symmetric root of a positive matrix and the root's inverse."""
+    values, vectors = np.linalg.eigh(matrix)
+    values = np.maximum(values, _LEAST_EIGENVALUE * values[-1])
+    return (vectors * np.sqrt(values)) @ vectors.T, (vectors / np.sqrt(values)) @ vectors.T
+
+
+def _corrected(leverage: np.ndarray) -> np.ndarray:
+    """Return (1 − leverage)^(−1/2): what a view took of its own residuals, given back."""
+    values, vectors = np.linalg.eigh(leverage)
+    left = 1.0 - np.minimum(values, _MOST_LEVERAGE)
+    return (vectors / np.sqrt(left)) @ vectors.T
