@@ -38,6 +38,9 @@ _LOOK_AT_BAR = (
 )
 _FRAMES_LOST = "record again with a slower frame rate or a faster disk, if it is near touch"
 _LOOK_AT_FILE = "look at the file that is named; where it is meant so, nothing is to be done"
+_MEASURE_RIG = (
+    "measure again by `whisker-bench calibrate rig`, then leave T_rig_board out of session.toml"
+)
 _MEASURE_BOARD = "measure a square of the board with a caliper, then T_rig_board"
 
 
@@ -341,6 +344,12 @@ _TABLE = (
         WARNING,
         "the board's print is longer along one direction than stretch_sigma lets it be",
         "measure many squares along x and along y; print without scaling, or state the difference",
+    ),
+    Status(
+        "rig_file_contradicts",
+        WARNING,
+        "rig.toml: {alarm}; {counts}",
+        _MEASURE_RIG,
     ),
     Status(
         "bar_width_unlike_board",

@@ -26,7 +26,9 @@ from bench.cameras.calibrate_session import board_in_world, calibrate_from, repo
 from bench.cameras.cameras_toml import write_cameras
 from bench.cameras.first_look import by_first_look, first_look
 from bench.cameras.known_scale import check_scale
+from bench.cameras.measured_place import measured_place
 from bench.session.footage import frame_count, read_frames, rig_picture
+from bench.session.rig_file import RIG_FILE
 from bench.session.session import Session
 from vision.boards import camera_moved, estimate_optics, refine_corners
 from vision.calibration import Placement, by_board, move_rig_frame, read_cameras
@@ -41,7 +43,6 @@ from vision.geometry import (
     compose,
     counted,
     invert_transform,
-    log_rotation,
     printed_corners,
     skew,
 )
@@ -164,7 +165,9 @@ def _cameras_at_base(cameras: Cameras, view: Session) -> Cameras:
         before = _board_covariance(view.whole)
         turn = np.kron(np.eye(2), T_rig_base[:, :3])
         after = turn @ _board_covariance(view) @ turn.T
-    return move_rig_frame(cameras, replace(_EXACT, covariance=before), _step(T_rig_base, after))
+    return move_rig_frame(
+        cameras, replace(_EXACT, covariance=before), Placement.of(T_rig_base, after)
+    )
 
 
 def _board_covariance(session: Session) -> np.ndarray:
@@ -172,11 +175,6 @@ def _board_covariance(session: Session) -> np.ndarray:
     return by_board(
         session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad
     ).covariance
-
-
-def _step(T_from_to: np.ndarray, covariance: np.ndarray) -> Placement:
-    """Return the placement that goes from one frame to another, of this covariance (6, 6)."""
-    return Placement(np.append(log_rotation(T_from_to[:, :3]), T_from_to[:, 3]), covariance)
 
 
 def _from_boards(session: Session, folder: Path) -> SessionCalibration:
@@ -230,12 +228,16 @@ def on_the_rig(
 ) -> tuple[Cameras, np.ndarray | None, str | None]:
     """Return cameras in the rig frame, T_rig_board (None where there is no such board) and a note.
 
-    Where session.toml does not state where the rig is, the free strokes give it.
+    Where session.toml does not state where the rig is, rig.toml does, or the free strokes give it.
     """
     if session.T_rig_board is not None:
         return cameras, session.T_rig_board, None
+    if session.measured_rig is not None:
+        note = f"{RIG_FILE} places the rig, by {session.measured_rig.source}."
+        placed = move_rig_frame(cameras, _EXACT, measured_place(session, np.eye(3, 4)))
+        return placed, session.measured_rig.T_rig_board, note
     first = first_look(session, cameras)
-    step = _step(invert_transform(first.T_rig_world), by_first_look().covariance)
+    step = Placement.of(invert_transform(first.T_rig_world), by_first_look().covariance)
     strokes = counted(first.strokes, "stroke")
     note = f"T_rig_board is missing: a first look at {strokes} says where whisker and motor are."
     T_rig_board = None if T_world_board is None else compose(first.T_rig_world, T_world_board)
@@ -250,13 +252,14 @@ def _key(session: Session, digests: Digests) -> str:
     paths = [session.path / "boards"]
     for trial in session.trials:
         # without T_rig_board motor angles count too
-        is_by_strokes = session.T_rig_board is None
+        is_by_strokes = session.T_rig_board is None and session.measured_rig is None
         paths += [trial.folder] if is_by_strokes else trial.camera_sources.values()
     given = [
         session.board,
         session.T_rig_board,
         session.T_rig_board_sigma_mm,
         session.T_rig_board_sigma_rad,
+        session.measured_rig,
     ]
     files = hash_of_files(paths, digests.of)
     return hash_of(hash_of_code(SEEING), given, session.whisker, files)

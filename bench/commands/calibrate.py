@@ -1,4 +1,4 @@
-"""The verb `calibrate`: of cameras (bench/cameras) and of gauges (bench/workflows)."""
+"""The verb `calibrate`: of cameras (bench/cameras), of gauges and of the rig (bench/workflows)."""
 
 import argparse
 from pathlib import Path
@@ -14,13 +14,15 @@ from bench.commands.options import (
 
 
 def add(verbs: Verbs) -> None:
-    """Add the verb with `cameras` and `gauges` below it."""
+    """Add the verb with `cameras`, `gauges` and `rig` below it."""
     calibrate = verbs.add_parser(
-        "calibrate", help="cameras from their board views, gauges from the deflection seen"
+        "calibrate",
+        help="cameras from their board views, gauges from the deflection seen, the rig from its turning",
     )
     what = calibrate.add_subparsers(title="what", metavar="WHAT", required=True)
     _add_cameras(what)
     _add_gauges(what)
+    _add_rig(what)
 
 
 def _add_cameras(what: Verbs) -> None:
@@ -59,6 +61,25 @@ def _add_gauges(what: Verbs) -> None:
     add_workers(verb)
 
 
+def _add_rig(what: Verbs) -> None:
+    """Add `calibrate rig`."""
+    verb = add_verb(
+        what,
+        "rig",
+        _run_rig,
+        "measure where the board on the rig stands, by free strokes and a marker on the hub",
+        "whisker-bench calibrate rig recorded/2026-05-04",
+    )
+    add_recorded(verb)
+    verb.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="file to write (default: rig.toml in SESSION, which evaluate then reads); a picture goes beside it as .png",
+    )
+    add_workers(verb)
+
+
 def _run_cameras(options: argparse.Namespace) -> int:
     """Calibrate the cameras; return the exit code."""
     begin_step(f"reading {options.session}, calibrating its cameras")
@@ -78,6 +99,19 @@ def _run_gauges(options: argparse.Namespace) -> int:
         options.session,
         options.out,
         every_trial=options.all,
+        workers=options.workers,
+        follow_links=options.follow_links,
+    )
+
+
+def _run_rig(options: argparse.Namespace) -> int:
+    """Measure the rig; return the exit code."""
+    begin_step(f"reading {options.session}")
+    from bench.workflows.rig_calibration import calibrate_rig_command
+
+    return calibrate_rig_command(
+        options.session,
+        options.out,
         workers=options.workers,
         follow_links=options.follow_links,
     )

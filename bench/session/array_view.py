@@ -18,6 +18,7 @@ from bench.base.input_problems import InputProblems
 from bench.session import manifest
 from bench.session.daq import DaqFile
 from bench.session.manifest import ChannelKeys
+from bench.session.rig_file import RIG_FILE
 from bench.session.session import (
     MANIFEST,
     Base,
@@ -99,6 +100,9 @@ def _check_tables(session: Session, keys: manifest.SessionKeys) -> None:
         raise BadInput(f"[gauges] are one whisker's; {_OWN_GAUGES}", file=MANIFEST)
     if session.gauges_toml is not None:
         raise BadInput(f"is one whisker's; {_OWN_GAUGES}", file="gauges.toml")
+    if session.measured_rig is not None:
+        cure = "state [rig] T_rig_board, and remove the file"
+        raise BadInput(f"was measured by one whisker; of several, {cure}", file=RIG_FILE)
 
 
 def _check_names(names: Sequence[str]) -> None:

@@ -18,7 +18,10 @@ _FOOTAGE = PICTURE_SUFFIXES | FILM_SUFFIXES
 # Depth of a camera's folder within the session: boards/<camera>, trials/<trial>/<camera>.
 _CAMERA_DEPTH = {"boards": 2, "trials": 3}
 # Names that a session gives to files, and to no folder.
-_FILES = {"session.toml", "trial.toml", "signals.csv", "frames.csv", "gauges.toml", "cameras.toml"}
+_FILES = {
+    *("session.toml", "trial.toml", "signals.csv", "frames.csv"),
+    *("gauges.toml", "cameras.toml", "rig.toml"),
+}
 _NOT_REGULAR = "is no regular file (a pipe, socket or device)"
 
 

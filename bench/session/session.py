@@ -1,7 +1,7 @@
 """A session folder, read strictly: what a lab recorded in one sitting (format 1)."""
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -15,23 +15,21 @@ from bench.session.footage import camera_sources, single_pictures, visible
 from bench.session.givens import Given
 from bench.session.inside import check_inside
 from bench.session.plausible import YOUNGS_MODULUS
+from bench.session.rig_file import RIG_FILE, MeasuredRig, exact_pose, read_rig
 from bench.session.stated import StatedSession
 from bench.session.strict_toml import as_keys, key_names, read_toml, values
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker
-from vision.geometry import Board, Reason, invert_transform, nearest_rotation
+from vision.geometry import Board, Reason, invert_transform
 from vision.pictures import natural_order
 
 FORMAT = 1  # of session.toml; another one is refused
 MANIFEST = "session.toml"
 # [N·mm² in a N·m²] For a guess at the unit.
 NMM2_PER_NM2 = 1e6
-# Three written digits are exact to 1e-3; a transposed, scaled or mirrored matrix is off by far more.
-_ROTATION_TOLERANCE = 2e-3
-# [mm] A board's origin this near to the whisker's base is a board placed in metres.
-_NEAREST_BOARD_MM = 0.5
-# [mm] No bench is larger; a board beyond is placed in another unit.
-_FARTHEST_BOARD_MM = 5000.0
+# [1], [mm] A T_rig_board of session.toml this near to rig.toml's was copied from there: no two measurements
+# agree in four digits of each of twelve numbers. Stated.
+_COPIED = 1e-4
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,8 @@ class Session:
     T_rig_board: (3, 4), mm. whisker and bar are given wherever there are trials; board wherever
     there is no cameras.toml but pictures. base: of the whisker whose view of an array this is
     (`bench.session.array_view`), whole: the array's session, in the rig frame; both None where the
-    session is one whisker's. givens: what session.toml states, without its trials'.
+    session is one whisker's. givens: what session.toml states, without its trials'. measured_rig: of
+    rig.toml, None without it.
     """
 
     path: Path
@@ -95,6 +94,7 @@ class Session:
     base: Base | None = None
     whole: "Session | None" = None
     givens: tuple[Given, ...] = ()
+    measured_rig: MeasuredRig | None = None
 
     @property
     def whole_name(self) -> str:
@@ -172,9 +172,29 @@ def session_of(
         gauges_toml=_existing(path / "gauges.toml"),
         givens=stated.givens_of(),
     )
+    with problems.guard():
+        session = _with_measured_rig(session)
     _warn_of_unused_cameras(session, keys.cameras, problems)
     _check_cameras(session, problems, lenses_known)
     return session
+
+
+def _with_measured_rig(session: Session) -> Session:
+    """Return the session with what rig.toml holds. Raise BadInput where that is no rig of this session.
+
+    A T_rig_board of session.toml that was copied from there is no second measurement, and left out.
+    """
+    path = session.path / RIG_FILE
+    if not path.is_file():
+        return session
+    if session.cameras_toml is not None:
+        found = "cameras.toml places the cameras already; keep one of both"
+        raise BadInput(found, file=RIG_FILE)
+    measured = read_rig(path, session.rig_pictures)
+    stated = session.T_rig_board
+    if stated is not None and np.abs(stated - measured.T_rig_board).max() < _COPIED:
+        session = replace(session, T_rig_board=None)
+    return replace(session, measured_rig=measured)
 
 
 def _stated_bench(
@@ -263,29 +283,8 @@ def _board(keys: manifest.BoardKeys | None) -> Board | None:
 
 
 def _board_pose(rows: list[list[float]] | None) -> np.ndarray | None:
-    """Return T_rig_board (3, 4) with its rotation made exact; None without rows.
-
-    Raises BadInput where it is no rotation, or not in mm.
-    """
-    if rows is None:
-        return None
-    pose = np.array(rows, dtype=float)
-    rotation = pose[:, :3]
-    error = np.abs(rotation.T @ rotation - np.eye(3)).max()
-    determinant = np.linalg.det(rotation)
-    if error > _ROTATION_TOLERANCE or determinant < 0:
-        raise BadInput(
-            "[rig] T_rig_board: the first three columns are not a right-handed rotation "
-            f"(RᵀR is off by {error:.2g}, determinant {determinant:.3g})",
-            file=MANIFEST,
-        )
-    shift_mm = np.linalg.norm(pose[:, 3])
-    in_metres = 0 < shift_mm < _NEAREST_BOARD_MM
-    if in_metres or shift_mm > _FARTHEST_BOARD_MM:
-        hint = " Is the last column in metres? It is mm." if in_metres else ""
-        found = f"[rig] T_rig_board puts the board {shift_mm:.3g} mm from the base.{hint}"
-        raise BadInput(found, file=MANIFEST)
-    return np.column_stack([nearest_rotation(rotation), pose[:, 3]])
+    """Return T_rig_board (3, 4) of [rig]; None without rows. Raise BadInput for an impossible one."""
+    return None if rows is None else exact_pose(rows, "[rig] T_rig_board", MANIFEST)
 
 
 def given_gauges(keys: manifest.GaugeKeys | None) -> GivenGauges | None:

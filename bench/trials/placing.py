@@ -9,7 +9,8 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.results import hash_of
 from bench.base.workers import Workers
-from bench.cameras.first_look import by_first_look, first_look, spread
+from bench.cameras.first_look import by_first_look, first_look, look_at_strokes, spread
+from bench.cameras.measured_place import both_places, contradiction, stated_place
 from bench.cameras.session_cameras import SessionCalibration
 from bench.session.session import Session
 from bench.trials.differences import Cause, Difference
@@ -18,6 +19,7 @@ from bench.trials.unit import Unit
 from vision.calibration import (
     Placement,
     by_board,
+    by_marker,
     by_strokes,
     check_swing_suffices,
     combine,
@@ -56,6 +58,8 @@ def place_rig(
     """
     if calibration.cameras is None:
         return calibration
+    if session.measured_rig is not None:
+        return _placed_by_file(session, calibration, problems)
     board = _placement_before(session)
     chosen = spread([unit for unit in units if unit.trial.camera_sources])
     strokes_only = session.T_rig_board is None and session.cameras_toml is None
@@ -78,6 +82,65 @@ def place_rig(
         problems.warn(Reason("board_misplaced", placement.alarm))
     notes = placement.notes[:1] if stays or strokes_only else placement.notes
     return placed_here.with_notes(*notes, *[_STAYS] * stays)
+
+
+def _placed_by_file(
+    session: Session, calibration: SessionCalibration, problems: InputProblems
+) -> SessionCalibration:
+    """Return the calibration with the cameras placed by rig.toml, and by T_rig_board where it is stated.
+
+    rig.toml was measured by the free strokes: they are not combined with it once more.
+    """
+    if session.T_rig_board is None:
+        return calibration
+    warning = contradiction(session)
+    if warning is not None:
+        problems.warn(warning)
+    board = stated_place(session)
+    both = both_places(session)
+    if not board.covariance.any():
+        return calibration.with_notes(*both.notes[:1], _STAYS)
+    return _moved(calibration, board, both).with_notes(*both.notes)
+
+
+def measure_rig(
+    session: Session,
+    units: Sequence[Unit],
+    pool: Workers,
+    problems: InputProblems,
+) -> tuple[SessionCalibration, tuple[Placement, ...]]:
+    """Return the calibration in the rig frame by what turns with the motor alone, and the placements
+    that it combines: by a marker on the hub, where there is one, and by the free strokes.
+
+    session: without T_rig_board. Raises BadInput where the free strokes cannot be read.
+    """
+    calibration = units[0].calibration
+    coarse = by_first_look()
+    exact = replace(coarse, covariance=np.zeros((6, 6)))
+    known = coarse
+    here = _moved(calibration, coarse, exact)
+    markers = look_at_strokes(session, here.cameras).markers
+    sources: tuple[Placement, ...] = ()
+    for _ in range(_MOST_ROUNDS):
+        try:
+            hub = by_marker(markers, here.cameras)
+        except Refused:
+            break
+        known = combine(coarse, hub)
+        here = _moved(here, exact, replace(known, covariance=exact.covariance))
+        sources = (hub,)
+        if np.all(np.abs(known.step) < _SMALL_STEP):
+            break
+    known = replace(known, step=exact.step)
+    chosen = spread([unit for unit in units if unit.trial.camera_sources])
+    try:
+        placed, both = _converge(_moved(here, exact, known), known, chosen, pool, problems)
+    except Refused as refusal:
+        cure = "record free strokes of some 20 degrees in view of two cameras"
+        raise BadInput(
+            f"the free strokes do not show the whisker, {refusal}: {cure}", file="trials"
+        ) from None
+    return placed, (*sources, both)
 
 
 def _placed_by_board_alone(

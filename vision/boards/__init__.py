@@ -12,6 +12,7 @@ NAMES = {
     "corners": ("Corners", "MIN_CORNERS", "find_corners", "refine_corners"),
     "diagnosis": ("why_not_found",),
     "marker_size": ("check_marker_size",),
+    "other_markers": ("find_other_markers",),
     "static_board": ("camera_moved",),
     "sufficiency": ("MIN_VIEWS", "fixes_pose"),
 }

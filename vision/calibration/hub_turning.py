@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.calibration.moving_line import MovingLines
+from vision.geometry.centreline import rotation_z
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import invert_transform, nearest_rotation
+from vision.geometry.rotation import compose, invert_transform, nearest_rotation
 
 # [share of the stroke] The first seventh is taken as free; from there on what goes on turning as it
 # did. Set by eye. Study: tests/bench/trials/test_placing_pictures.py.
@@ -36,6 +37,10 @@ _STRAY_MM = 1.0
 _STRAY_TIMES = 3.0
 # [lines] As `_MIN_FRAMES` of swing.py. Derived.
 _FEWEST_LINES = 4
+# [1] Rise of a line above the plane of rotation, sine; a steeper one is not the whisker. Stated.
+_MOST_RISE = 0.25
+# [mm] From the axis; a line that passes farther from it is not the whisker. Stated.
+_FARTHEST_MM = 5.0
 # [rounds] Of leaving strays out. Not measured. Study: tests/vision/calibration/test_turning.py.
 _REJECTIONS = 5
 
@@ -56,11 +61,7 @@ def first_rig(strokes: Sequence[MovingLines]) -> FirstRig:
     """Estimate the rig frame by all strokes together. Raises Refused where nothing turns with the
     motor.
     """
-    lines = MovingLines(
-        np.concatenate([stroke.motor_rad for stroke in strokes]),
-        np.concatenate([stroke.point_mm for stroke in strokes]),
-        np.concatenate([stroke.direction for stroke in strokes]),
-    )
+    lines = _of_all(strokes)
     shares = np.concatenate([_share_of_stroke(stroke.motor_rad) for stroke in strokes])
     kept, R, centre_mm = _free_lines(lines, shares)
     widths = []
@@ -70,6 +71,45 @@ def first_rig(strokes: Sequence[MovingLines]) -> FirstRig:
             widths.append(np.ptp(motor_rad[is_kept]))
     T_rig_world = invert_transform(np.column_stack([R, centre_mm]))
     return FirstRig(T_rig_world, float(max(widths)), len(widths))
+
+
+def first_rig_about(T_world_axis: np.ndarray, strokes: Sequence[MovingLines]) -> FirstRig:
+    """Estimate the rig frame where the axis is known: azimuth and height of the lines near it, as the
+    strokes begin.
+
+    T_world_axis (3, 4): its z is the axis. Short strokes serve, too. Raises Refused where no line
+    turns about it.
+    """
+    lines = _of_all(strokes)
+    T_axis_world = invert_transform(T_world_axis)
+    points = lines.point_mm @ T_axis_world[:, :3].T + T_axis_world[:, 3]
+    directions = lines.direction @ T_axis_world[:, :3].T
+    outward = np.sum(points[:, :2] * directions[:, :2], axis=1) >= 0
+    directions *= np.where(outward, 1.0, -1.0)[:, None]
+    beside_mm = np.abs(points[:, 0] * directions[:, 1] - points[:, 1] * directions[:, 0])
+    is_near = (beside_mm < _FARTHEST_MM) & (np.abs(directions[:, 2]) < _MOST_RISE)
+    shares = np.concatenate([_share_of_stroke(stroke.motor_rad) for stroke in strokes])
+    begins = is_near & (shares <= _MOST_FREE_SHARE)
+    if not begins.any():
+        raise Refused(_NOTHING_TURNS.format(0))
+    azimuths = np.arctan2(directions[:, 1], directions[:, 0]) - lines.motor_rad
+    first = azimuths[begins][0]
+    azimuth_rad = first + np.median(np.angle(np.exp(1j * (azimuths[begins] - first))))
+    along_mm = np.hypot(points[:, 0], points[:, 1])
+    heights = points[:, 2] - directions[:, 2] * along_mm
+    T_axis_rig = np.column_stack([rotation_z(azimuth_rad), [0.0, 0.0, np.median(heights[begins])]])
+    widths = [np.ptp(stroke.motor_rad) for stroke in strokes if len(stroke.motor_rad)]
+    width_rad = _MOST_FREE_SHARE * float(max(widths))
+    return FirstRig(invert_transform(compose(T_world_axis, T_axis_rig)), width_rad, len(widths))
+
+
+def _of_all(strokes: Sequence[MovingLines]) -> MovingLines:
+    """Return the lines of all strokes as one."""
+    return MovingLines(
+        np.concatenate([stroke.motor_rad for stroke in strokes]),
+        np.concatenate([stroke.point_mm for stroke in strokes]),
+        np.concatenate([stroke.direction for stroke in strokes]),
+    )
 
 
 def _free_lines(

@@ -15,7 +15,7 @@ from scipy.special import chdtri
 
 from vision.geometry.camera import Cameras
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import compose, exp_rotation, skew
+from vision.geometry.rotation import compose, exp_rotation, log_rotation, skew
 
 # [chance] By which swing and board, both right, would disagree as much as calls for an alarm.
 # Study: chosen.
@@ -49,8 +49,9 @@ class Placement:
     covariance (6, 6).
 
     rise_rad: elevation of the whisker's base above the plane of rotation (None without a swing).
-    width_rad: of the widest stroke. notes: sentences for the report. alarm: how swing and board
-    disagree, None where they do not.
+    width_rad: of the widest stroke. notes: sentences for the report. alarm: how the two that it
+    combines disagree, None where they do not. source: what it rests on, as sentences name it; basis:
+    how much of that.
     """
 
     step: np.ndarray
@@ -59,6 +60,13 @@ class Placement:
     width_rad: float = 0.0
     notes: tuple[str, ...] = ()
     alarm: str | None = None
+    source: str = "board"
+    basis: str = ""
+
+    @staticmethod
+    def of(T_board_rig: np.ndarray, covariance: np.ndarray) -> "Placement":
+        """Return the placement of a pose (3, 4) of the rig frame, with its covariance (6, 6)."""
+        return Placement(np.append(log_rotation(T_board_rig[:, :3]), T_board_rig[:, 3]), covariance)
 
     @property
     def T_board_rig(self) -> np.ndarray:
@@ -101,10 +109,11 @@ def by_board(T_rig_board: np.ndarray, sigma_mm: float, sigma_rad: float) -> Plac
 
 
 def combine(board: Placement, swing: Placement) -> Placement:
-    """Combine both placements by their covariances; with an alarm where they disagree by more than
+    """Combine two placements by their covariances; with an alarm where they disagree by more than
     chance allows.
 
-    A board taken as exact stays as it is, the alarm included.
+    A board taken as exact stays as it is, the alarm included. The result is as wide and rises as the
+    second.
     """
     difference = swing.step - board.step
     Sigma = board.covariance + swing.covariance  # covariance of the difference
@@ -116,9 +125,9 @@ def combine(board: Placement, swing: Placement) -> Placement:
         swing,
         step=board.step + gain @ difference,
         covariance=0.5 * (covariance + covariance.T),
-        alarm=_alarm(difference, np.sqrt(np.diag(Sigma))) if disagree else None,
+        alarm=_alarm(board, swing, Sigma) if disagree else None,
     )
-    return replace(combined, notes=(*swing.notes, f"With the board: {combined.spread}."))
+    return replace(combined, notes=(*swing.notes, f"With the {board.source}: {combined.spread}."))
 
 
 def check_swing_suffices(placement: Placement) -> str:
@@ -144,14 +153,19 @@ def check_swing_suffices(placement: Placement) -> str:
     )
 
 
-def _alarm(difference: np.ndarray, sigma: np.ndarray) -> str:
-    """Return the component that disagrees most, in words."""
+def _alarm(first: Placement, second: Placement, Sigma: np.ndarray) -> str:
+    """Return the component in which two placements disagree most, in words.
+
+    Sigma: covariance (6, 6) of their difference.
+    """
+    difference = second.step - first.step
+    sigma = np.sqrt(np.diag(Sigma))
     worst = int(np.argmax(np.abs(difference) / sigma))
     scale, unit = (np.degrees(1.0), "degrees") if worst < 3 else (1.0, "mm")
     return (
-        f"board and free stroke disagree: by the stroke {_COMPONENTS[worst]} by {scale * difference[worst]:+.3f} ± "
-        f"{scale * sigma[worst]:.3f} {unit} from where T_rig_board has it; check T_rig_board, the board's square_mm "
-        "and the encoder"
+        f"{first.source} and {second.source} disagree: by the {second.source} {_COMPONENTS[worst]} by "
+        f"{scale * difference[worst]:+.3f} ± {scale * sigma[worst]:.3f} {unit} from where the {first.source} has it; "
+        "check T_rig_board, the board's square_mm and the encoder"
     )
 
 

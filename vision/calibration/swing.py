@@ -19,6 +19,7 @@ from vision.geometry.rotation import exp_rotation
 
 # [frames] Six unknowns, four numbers a frame, and something left over. Derived.
 _MIN_FRAMES = 4
+_SOURCE = "free stroke"
 
 
 def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
@@ -36,8 +37,8 @@ def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
     step, covariance = _combine(usable, placements)
     widths = [lines.width_rad for lines in usable]
     rise_rad = float(np.mean([placement.rise_rad for placement in placements]))
-    combined = Placement(step, covariance, rise_rad, max(widths))
-    return replace(combined, notes=(_note(widths, combined),))
+    combined = Placement(step, covariance, rise_rad, max(widths), source=_SOURCE)
+    return _with_note(combined, widths)
 
 
 def _combine(
@@ -71,8 +72,9 @@ def by_swing(lines: BaseLines) -> Placement:
     first = np.append(np.zeros(6), elevation_rad)
     fitted = least_squares(_residuals, first, args=(lines,), x_scale="jac", method="lm")
     covariance = _excess(fitted) * _covariance(fitted.jac)[:6, :6] + lines.shared_covariance
-    placement = Placement(fitted.x[:6], covariance, float(fitted.x[6]), lines.width_rad)
-    return replace(placement, notes=(_note([lines.width_rad], placement),))
+    rise_rad = float(fitted.x[6])
+    placement = Placement(fitted.x[:6], covariance, rise_rad, lines.width_rad, source=_SOURCE)
+    return _with_note(placement, [lines.width_rad])
 
 
 def _too_few(lines: BaseLines | None) -> Refused:
@@ -136,11 +138,18 @@ def _covariance(J: np.ndarray) -> np.ndarray:
     return inverse @ inverse.T
 
 
-def _note(widths_rad: Sequence[float], placement: Placement) -> str:
-    """Return a sentence for the report on the strokes and the placement that they give."""
+def _basis(widths_rad: Sequence[float]) -> str:
+    """Return in words how many strokes there are, and how wide they are."""
     narrow, wide = np.degrees([min(widths_rad), max(widths_rad)])
-    strokes = f"A free stroke of {wide:.1f} degrees gives"
-    if len(widths_rad) > 1:
-        span = f"{narrow:.1f} to {wide:.1f}" if wide - narrow > 0.05 else f"{wide:.1f}"
-        strokes = f"{len(widths_rad)} free strokes of {span} degrees give"
-    return f"{strokes}: {placement.spread}."
+    if len(widths_rad) == 1:
+        return f"a free stroke of {wide:.1f} degrees"
+    span = f"{narrow:.1f} to {wide:.1f}" if wide - narrow > 0.05 else f"{wide:.1f}"
+    return f"{len(widths_rad)} free strokes of {span} degrees"
+
+
+def _with_note(placement: Placement, widths_rad: Sequence[float]) -> Placement:
+    """Return the placement with a sentence for the report on the strokes and what they give."""
+    basis = _basis(widths_rad)
+    verb = "gives" if len(widths_rad) == 1 else "give"
+    note = f"{basis[0].upper()}{basis[1:]} {verb}: {placement.spread}."
+    return replace(placement, basis=basis, notes=(note,))

@@ -1,0 +1,79 @@
+"""The place of the rig by rig.toml and by session.toml: each with its sigma, and whether they agree."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from bench.base.statuses import reason
+from bench.session.rig_file import RIG_FILE
+from bench.session.session import Session
+from vision.calibration import Placement, by_board, combine
+from vision.geometry import Reason, compose, invert_transform
+
+
+def measured_place(session: Session, T_board: np.ndarray) -> Placement:
+    """Return the placement by rig.toml, in the frame in which the board's pose is T_board (3, 4)."""
+    measured = session.measured_rig
+    T_board_rig = compose(T_board, invert_transform(measured.T_rig_board))
+    turn = np.kron(np.eye(2), T_board_rig[:, :3])
+    placement = Placement.of(T_board_rig, turn @ measured.covariance @ turn.T)
+    note = f"{RIG_FILE}, by {measured.source}: {_in_own_frame(session).spread}."
+    return replace(placement, source=RIG_FILE, notes=(note,))
+
+
+def stated_place(session: Session) -> Placement:
+    """Return the placement by session.toml's T_rig_board."""
+    stated = by_board(
+        session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad
+    )
+    return replace(stated, source="T_rig_board")
+
+
+def both_places(session: Session) -> Placement:
+    """Return the placement by session.toml and rig.toml together, in the frame of the first."""
+    return combine(stated_place(session), measured_place(session, session.T_rig_board))
+
+
+def contradiction(session: Session) -> Reason | None:
+    """Return the warning on a T_rig_board that contradicts rig.toml; None where there are not both,
+    or chance explains it.
+    """
+    if session.T_rig_board is None or session.measured_rig is None:
+        return None
+    alarm = both_places(session).alarm
+    if alarm is None:
+        return None
+    return reason("rig_file_contradicts", alarm=alarm, counts=_what_counts(session))
+
+
+def place_line(session: Session) -> str:
+    """Return a sentence on what places the rig, and how well."""
+    if session.cameras_toml is not None:
+        return "the cameras stand where cameras.toml has them"
+    measured = session.measured_rig
+    if session.T_rig_board is None and measured is None:
+        return (
+            "the free strokes place the rig when the session is evaluated; `whisker-bench calibrate rig` measures it, "
+            "by a marker on the hub, too, and says how well"
+        )
+    if session.T_rig_board is None:
+        return f"placed by {RIG_FILE} ({measured.source}): {_in_own_frame(session).spread}"
+    if measured is not None:
+        return f"placed by T_rig_board and {RIG_FILE}: {_what_counts(session)}"
+    if not stated_place(session).covariance.any():
+        return "placed by T_rig_board, taken as exact"
+    sigma_deg = np.degrees(session.T_rig_board_sigma_rad)
+    sigmas = f"± {session.T_rig_board_sigma_mm:g} mm and ± {sigma_deg:g} degrees"
+    return f"placed by T_rig_board, {sigmas}, with the free strokes when it is evaluated"
+
+
+def _what_counts(session: Session) -> str:
+    """Return in words which of T_rig_board and rig.toml counts."""
+    if not stated_place(session).covariance.any():
+        return f"T_rig_board is taken as exact and counts, {RIG_FILE} does not"
+    return f"both count, by their sigmas: {both_places(session).spread}"
+
+
+def _in_own_frame(session: Session) -> Placement:
+    """Return the placement by rig.toml in its own frame: no step, and its covariance."""
+    return Placement(np.zeros(6), session.measured_rig.covariance)

@@ -1,0 +1,248 @@
+"""The motor's axis by a marker on the hub, which turns with the motor in every frame of a stroke.
+
+Each of its corners describes a circle about the axis:
+
+    x = Exp(w) Rz(motor angle) q + v,    q: the corner in the hub
+
+Free and bent strokes serve alike. A marker fixes the axis and where it stands, across it; where the
+whisker leaves the hub (the encoder's zero, the height along the axis) only the whisker shows.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+
+from vision.calibration.place import Placement
+from vision.geometry.camera import Cameras
+from vision.geometry.centreline import rotation_z
+from vision.geometry.refusals import Refused
+from vision.geometry.rotation import exp_rotation, skew
+
+# [pictures] Of a marker in two cameras; fewer show no turn. Derived.
+_FEWEST_INSTANTS = 4
+# [rad] Of the motor, over all pictures of a marker. Half the smallest stroke that is evaluated.
+# Stated.
+_LEAST_TURN_RAD = np.radians(2.0)
+# [1] A marker on the hub turns as the motor does, to so much; one at rest turns by 0. Set by eye;
+# 0.996 on steel-sample.
+_TURNS_AS_MOTOR = 0.2
+# [px] What print, blur and light displace a marker's corner by in all pictures of a camera alike:
+# 0.4 px at most on steel-sample, 0.18 px RMS. Study: tests/vision/calibration/test_hub_marker.py.
+_BIAS_PX = 0.2
+# [px] Least scatter of a corner from picture to picture: the fit of a pattern has that where there
+# is no noise. Stated.
+_LEAST_SCATTER_PX = 0.02
+# [px] First scatter of a corner. The residuals give it then. Stated.
+_FIRST_SCATTER_PX = 0.05
+# [1] Standard deviation of normal residuals over the median of their magnitudes. Derived.
+_PER_MEDIAN = 1.4826
+# [rad], [mm] Prior sigma of what a marker does not constrain: none. Stated.
+_UNSEEN = (1.0, 1000.0)
+# [parameters] Of the axis: two turns, two shifts. A layout, no threshold.
+_AXIS = np.array([0, 1, 3, 4])
+_SOURCE = "marker on the hub"
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerSighting:
+    """A marker that is not the board's, in one picture: its corners px (4, 2).
+
+    instant: the same for all cameras' pictures of one frame.
+    """
+
+    number: int
+    camera: str
+    instant: tuple[str, int]
+    motor_rad: float
+    px: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _Turning:
+    """A marker that turns with the motor: its sightings, and its corners mm (n, 4, 3) at motor angles
+    (n,) rad, where two cameras see it.
+    """
+
+    sightings: list[MarkerSighting]
+    motor_rad: np.ndarray
+    corners_mm: np.ndarray
+
+
+def first_axis(sightings: Sequence[MarkerSighting], cameras: Cameras) -> np.ndarray | None:
+    """Return the axis that markers turn about, as T (3, 4) from a frame with that axis as its z, and
+    its origin beside the markers, to the cameras'; None where no marker turns with the motor.
+    """
+    turning = list(_turning(sightings, cameras))
+    if not turning:
+        return None
+    twist = np.mean([_twist(marker) for marker in turning], axis=0)
+    z = twist[:3] / np.linalg.norm(twist[:3])
+    on_axis = np.cross(twist[:3], twist[3:]) / (twist[:3] @ twist[:3])
+    middle = np.mean([marker.corners_mm.mean(axis=(0, 1)) for marker in turning], axis=0)
+    origin = on_axis + z * (z @ (middle - on_axis))
+    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z, origin])
+
+
+def by_marker(sightings: Sequence[MarkerSighting], cameras: Cameras) -> Placement:
+    """Return the placement by the markers that turn with the motor, about z of the cameras' frame or
+    nearly so; what they do not constrain has a sigma without end.
+
+    cameras: without the uncertainty of their place in the rig frame, which is what is sought. Raises
+    Refused where no marker turns.
+    """
+    fits = [_AxisFit(marker, cameras) for marker in _turning(sightings, cameras)]
+    if not fits:
+        raise Refused("no marker is seen to turn with the motor in two cameras")
+    precision = np.zeros((4, 4))
+    weighted = np.zeros(4)
+    shared = np.zeros((4, 4))
+    for fit in fits:
+        own = np.linalg.inv(fit.covariance)
+        precision += own
+        weighted += own @ fit.axis
+        shared += fit.by_cameras / len(fits)
+    covariance = np.diag(np.repeat(np.square(_UNSEEN), 3))
+    covariance[np.ix_(_AXIS, _AXIS)] = np.linalg.inv(precision) + shared
+    step = np.zeros(6)
+    step[_AXIS] = np.linalg.solve(precision, weighted)
+    numbers = ", ".join(str(fit.number) for fit in fits)
+    pictures = sum(fit.pictures for fit in fits)
+    sigma = np.sqrt(np.diag(covariance))
+    basis = f"marker {numbers} on the hub in {pictures} pictures"
+    note = (
+        f"{basis.capitalize()} gives: axis ± "
+        f"{np.degrees(max(sigma[0], sigma[1])):.3f} degrees, through a point ± {sigma[3]:.4f} mm along and ± "
+        f"{sigma[4]:.4f} mm across the whisker."
+    )
+    return Placement(step, covariance, source=_SOURCE, basis=basis, notes=(note,))
+
+
+class _AxisFit:
+    """The axis by one marker: w_x, w_y (rad), v_x, v_y (mm), with covariances of what each picture
+    has by itself and of what the cameras' own uncertainty adds.
+
+    A corner's bias in each camera is a nuisance, as nothing says how a print's edge is blurred.
+    """
+
+    def __init__(self, marker: _Turning, cameras: Cameras):
+        """Fit the axis by all pictures of a marker."""
+        self._cameras = cameras
+        self._px = np.array([one.px for one in marker.sightings])  # (pictures, 4, 2)
+        motor_rad = np.array([one.motor_rad for one in marker.sightings])
+        self._turn = rotation_z(motor_rad)
+        self._camera = np.array([cameras.index(one.camera) for one in marker.sightings])
+        self.number = marker.sightings[0].number
+        self.pictures = len(marker.sightings)
+        self._scatter_px = _FIRST_SCATTER_PX
+        fitted = self._solve(self._first(marker))
+        residual = fitted.fun[: self._px.size] * self._scatter_px
+        spread_px = _PER_MEDIAN * float(np.median(np.abs(residual)))
+        self._scatter_px = max(spread_px, _LEAST_SCATTER_PX)
+        fitted = self._solve(fitted.x)
+        covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
+        self.axis = fitted.x[:4]
+        self.covariance = covariance[:4, :4]
+        self.by_cameras = self._of_cameras(fitted, covariance)
+
+    def _first(self, marker: _Turning) -> np.ndarray:
+        """Return first parameters: axis at z, corners as triangulated, no bias."""
+        in_hub = np.mean(marker.corners_mm @ rotation_z(marker.motor_rad), axis=0)  # (4, 3)
+        return np.concatenate([np.zeros(4), in_hub.ravel(), np.zeros(8 * len(self._cameras))])
+
+    def _solve(self, first: np.ndarray) -> OptimizeResult:
+        """Fit from these parameters. Raises Refused where the fit does not converge."""
+        fitted = least_squares(self._residuals, first, x_scale="jac", loss="soft_l1")
+        if fitted.status <= 0:
+            raise Refused(f"the turn of marker {self.number} on the hub was not found")
+        return fitted
+
+    def _residuals(self, parameters: np.ndarray) -> np.ndarray:
+        """Return all residuals over their sigmas: of the corners in pictures, then of the biases."""
+        bias_px = parameters[16:].reshape(-1, 4, 2)
+        px = self._project(parameters, self._cameras) + bias_px[self._camera]
+        seen = (px - self._px) / self._scatter_px
+        return np.concatenate([seen.ravel(), parameters[16:] / _BIAS_PX])
+
+    def _project(self, parameters: np.ndarray, cameras: Cameras) -> np.ndarray:
+        """Return the corners (pictures, 4, 2), px, without bias."""
+        w_x, w_y, v_x, v_y = parameters[:4]
+        in_hub = parameters[4:16].reshape(4, 3)
+        turned = in_hub @ np.swapaxes(self._turn, 1, 2)  # (pictures, 4, 3)
+        points = turned @ exp_rotation(np.array([w_x, w_y, 0.0])).T + np.array([v_x, v_y, 0.0])
+        px = np.empty_like(self._px)
+        for k, camera in enumerate(cameras):
+            px[self._camera == k] = camera.project(points[self._camera == k])
+        return px
+
+    def _of_cameras(self, fitted: OptimizeResult, covariance: np.ndarray) -> np.ndarray:
+        """Return what the cameras' uncertainty adds to the axis' covariance, (4, 4)."""
+        cameras = self._cameras
+        sigma = np.sqrt(np.diag(cameras.covariance))
+        gain = -(covariance @ fitted.jac.T)[:4, : self._px.size]
+        here = self._project(fitted.x, cameras)
+        sensitivity = np.zeros((4, len(sigma)))
+        for k in np.flatnonzero(sigma):
+            step = np.zeros(len(sigma))
+            step[k] = sigma[k]
+            moved = self._project(fitted.x, cameras.moved(step)) - here
+            sensitivity[:, k] = gain @ (moved / self._scatter_px).ravel() / sigma[k]
+        return sensitivity @ cameras.covariance @ sensitivity.T
+
+
+def _turning(sightings: Sequence[MarkerSighting], cameras: Cameras) -> Iterator[_Turning]:
+    """Yield the markers that are seen to turn as the motor does."""
+    for number in sorted({one.number for one in sightings}):
+        own = [one for one in sightings if one.number == number]
+        motor_rad, corners_mm = _triangulated(own, cameras)
+        marker = _Turning(own, motor_rad, corners_mm)
+        if len(motor_rad) < _FEWEST_INSTANTS or np.ptp(motor_rad) < _LEAST_TURN_RAD:
+            continue
+        turn = np.linalg.norm(_twist(marker)[:3])
+        if abs(turn - 1.0) < _TURNS_AS_MOTOR:
+            yield marker
+
+
+def _triangulated(
+    sightings: Sequence[MarkerSighting], cameras: Cameras
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return motor angles (n,), rad, and corners (n, 4, 3), mm, of the instants that two cameras see."""
+    by_instant: dict[tuple[str, int], list[MarkerSighting]] = {}
+    for one in sightings:
+        by_instant.setdefault(one.instant, []).append(one)
+    angles = []
+    corners = []
+    for together in by_instant.values():
+        if len({one.camera for one in together}) > 1:
+            angles.append(together[0].motor_rad)
+            corners.append(_meet(together, cameras))
+    return np.array(angles), np.array(corners).reshape(-1, 4, 3)
+
+
+def _meet(together: Sequence[MarkerSighting], cameras: Cameras) -> np.ndarray:
+    """Return the points (4, 3), mm, nearest to the rays of several cameras to a marker's corners."""
+    across = np.zeros((4, 3, 3))
+    offset = np.zeros((4, 3))
+    for one in together:
+        camera = cameras[one.camera]
+        rays = camera.rays(one.px)
+        projector = np.eye(3) - rays[:, :, None] * rays[:, None, :]
+        across += projector
+        offset += projector @ camera.centre_mm
+    return np.linalg.solve(across, offset[:, :, None])[:, :, 0]
+
+
+def _twist(marker: _Turning) -> np.ndarray:
+    """Return the twist (6,), w and u of dx/d(motor angle) = w × x + u, that moves a marker's corners.
+
+    The length of w is the marker's turn over the motor's.
+    """
+    angle = marker.motor_rad - marker.motor_rad.mean()
+    middle = marker.corners_mm.mean(axis=0)  # (4, 3)
+    away = marker.corners_mm - middle
+    rate = np.tensordot(angle, away, axes=1) / (angle @ angle)
+    design = np.concatenate([-skew(middle), np.tile(np.eye(3), (4, 1, 1))], axis=2)  # (4, 3, 6)
+    return np.linalg.lstsq(design.reshape(12, 6), rate.ravel(), rcond=None)[0]
