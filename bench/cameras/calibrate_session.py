@@ -11,6 +11,7 @@ from bench.base.input_problems import refused_as_bad_input
 from bench.cameras.board_views import SessionViews, read_board_views, rig_view
 from bench.cameras.cameras_toml import write_cameras
 from bench.cameras.known_scale import check_scale
+from bench.cameras.measured_place import moved_by_file
 from bench.session.session import Session, load_session
 from vision.boards import Corners
 from vision.calibration import (
@@ -59,14 +60,15 @@ def calibrate_cameras_command(
         return _write(out, place_imported(loaded, lenses), [line], [])
     views = read_board_views(loaded)
     calibration = calibrate_from(loaded, views)
+    cameras = moved_by_file(loaded, calibration.cameras)
     lengths = [_NOT_PLACED]
     warnings: list[str] = []
-    if loaded.T_rig_board is not None:
-        lengths, warnings = check_scale(loaded, calibration.cameras)
+    if loaded.T_rig_board is not None or loaded.measured_rig is not None:
+        lengths, warnings = check_scale(loaded, cameras)
     measured = measure_held_out(loaded, views)
     lines = [*report_lines(calibration), *lengths, *held_out_lines(measured, calibration)]
     warnings = [*views.notes, *calibration.warnings, *warnings, *_corner_warnings(calibration)]
-    return _write(out, calibration.cameras, lines, warnings)
+    return _write(out, cameras, lines, warnings)
 
 
 def _write(out: Path, cameras: Cameras, lines: list[str], warnings: list[str]) -> int:

@@ -7,8 +7,8 @@ import numpy as np
 from bench.base.statuses import reason
 from bench.session.rig_file import RIG_FILE
 from bench.session.session import Session
-from vision.calibration import Placement, by_board, combine
-from vision.geometry import Reason, compose, invert_transform
+from vision.calibration import Placement, by_board, combine, move_rig_frame
+from vision.geometry import Cameras, Reason, compose, invert_transform
 
 
 def measured_place(session: Session, T_board: np.ndarray) -> Placement:
@@ -34,6 +34,23 @@ def both_places(session: Session) -> Placement:
     return combine(stated_place(session), measured_place(session, session.T_rig_board))
 
 
+def moved_by_file(session: Session, cameras: Cameras) -> Cameras:
+    """Return cameras in the frame that session.toml gives moved to that of rig.toml, or of both together.
+
+    Without T_rig_board their frame is the board's. They stay without rig.toml, and where T_rig_board is
+    taken as exact.
+    """
+    if session.measured_rig is None:
+        return cameras
+    if session.T_rig_board is None:
+        exact = Placement(np.zeros(6), np.zeros((6, 6)))
+        return move_rig_frame(cameras, exact, measured_place(session, np.eye(3, 4)))
+    stated = stated_place(session)
+    if not stated.covariance.any():
+        return cameras
+    return move_rig_frame(cameras, stated, both_places(session))
+
+
 def contradiction(session: Session) -> Reason | None:
     """Return the warning on a T_rig_board that contradicts rig.toml; None where there are not both,
     or chance explains it.
@@ -49,7 +66,8 @@ def contradiction(session: Session) -> Reason | None:
 def place_line(session: Session) -> str:
     """Return a sentence on what places the rig, and how well."""
     if session.cameras_toml is not None:
-        return "the cameras stand where cameras.toml has them"
+        unused = f"; {RIG_FILE} is not used" if (session.path / RIG_FILE).is_file() else ""
+        return f"the cameras stand where cameras.toml has them{unused}"
     measured = session.measured_rig
     if session.T_rig_board is None and measured is None:
         return (

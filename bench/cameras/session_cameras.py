@@ -26,7 +26,7 @@ from bench.cameras.calibrate_session import board_in_world, calibrate_from, repo
 from bench.cameras.cameras_toml import write_cameras
 from bench.cameras.first_look import by_first_look, first_look
 from bench.cameras.known_scale import check_scale
-from bench.cameras.measured_place import measured_place
+from bench.cameras.measured_place import moved_by_file
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.rig_file import RIG_FILE
 from bench.session.session import Session
@@ -234,8 +234,7 @@ def on_the_rig(
         return cameras, session.T_rig_board, None
     if session.measured_rig is not None:
         note = f"{RIG_FILE} places the rig, by {session.measured_rig.source}."
-        placed = move_rig_frame(cameras, _EXACT, measured_place(session, np.eye(3, 4)))
-        return placed, session.measured_rig.T_rig_board, note
+        return moved_by_file(session, cameras), session.measured_rig.T_rig_board, note
     first = first_look(session, cameras)
     step = Placement.of(invert_transform(first.T_rig_world), by_first_look().covariance)
     strokes = counted(first.strokes, "stroke")

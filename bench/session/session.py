@@ -182,14 +182,11 @@ def session_of(
 def _with_measured_rig(session: Session) -> Session:
     """Return the session with what rig.toml holds. Raise BadInput where that is no rig of this session.
 
-    A T_rig_board of session.toml that was copied from there is no second measurement, and left out.
+    Where cameras.toml places the cameras it is not read. A T_rig_board of session.toml that was copied from there is no second measurement, and left out.
     """
     path = session.path / RIG_FILE
-    if not path.is_file():
+    if session.cameras_toml is not None or not path.is_file():
         return session
-    if session.cameras_toml is not None:
-        found = "cameras.toml places the cameras already; keep one of both"
-        raise BadInput(found, file=RIG_FILE)
     measured = read_rig(path, session.rig_pictures)
     stated = session.T_rig_board
     if stated is not None and np.abs(stated - measured.T_rig_board).max() < _COPIED:

@@ -150,14 +150,12 @@ squares = [{x}, {y}]                # along x, along y
 dictionary = "{dictionary}"
 
 [rig]
-# Where the board stands on the rig, in the pictures boards/rig/<camera>.png:
-# rig = rows * [board x, board y, board z, 1].
-# The rig frame: origin at the whisker's base, z the motor's axis, x along the whisker at motor angle 0, mm.
-# The board frame: origin at its upper left corner, x right, y down, z into the board.
-# Without T_rig_board the free strokes of the whisker tell where the rig is (some 10 degrees of them are needed).
-# T_rig_board = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]
-# T_rig_board_sigma_mm = 0.2
-# T_rig_board_sigma_deg = 0.2
+# Where the board stands on the rig, in the pictures boards/rig/<camera>.png, is measured: record free strokes of some
+# 20 degrees, with a spare marker of the board's dictionary on the hub, then run `whisker-bench calibrate rig` on this
+# folder. It writes rig.toml, and there is nothing to fill in here.
+# Who has measured it otherwise writes T_rig_board, 3 rows of 4, mm: rig = rows * [board x, board y, board z, 1], with
+# T_rig_board_sigma_mm and T_rig_board_sigma_deg. Rig frame: origin at the whisker's base, z the motor's axis, x along
+# the whisker at motor angle 0. Board frame: origin at its upper left corner, x right, y down, z into the board.
 
 [trial]                         # for all trials; a key in trials/<trial>/trial.toml goes before it
 # surface = "steel"             # groups trials in fits and figures

@@ -13,6 +13,7 @@ from bench.base.input_problems import InputProblems
 from bench.base.progress import begin_step, count_parts
 from bench.base.settings import Settings
 from bench.base.threads import in_threads
+from bench.cameras.measured_place import contradiction, place_line
 from bench.gauges.felt import FeltStroke, strokes_of
 from bench.gauges.fit import RECORD, in_two_directions
 from bench.gauges.gauge_faults import check_alive
@@ -61,6 +62,8 @@ def check(path: Path, *, follow_links: bool = False) -> int:
         for view in views:
             check_contents(view, problems)
         assumed = assumed_line(views)
+        if session.has_pictures:
+            print(f"rig: {place_line(session)}")
     for line in dict.fromkeys(problems.refusals):
         print(f"bad: {line}")
     for line in dict.fromkeys(problems.warnings):
@@ -82,6 +85,9 @@ def check_contents(session: Session, problems: InputProblems) -> None:
 
     What is found is added to `problems`.
     """
+    disagreement = contradiction(session)
+    if disagreement is not None:
+        problems.warn(disagreement)
     if session.cameras_toml is None and session.board is not None:
         with problems.guard():  # one board for all cameras: its first fault is enough
             _check_boards(session, session.board, problems)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
 
 import numpy as np
 
@@ -71,23 +71,21 @@ def calibrate_rig_command(
 
     Return 0, or 1 with warnings. Raise BadInput; nothing is overwritten.
     """
-    target = session / RIG_FILE if out is None else out
-    _check_free(target)
     problems = InputProblems()
     loaded = checked_session(session, problems, follow_links=follow_links)
+    target = session / RIG_FILE if out is None else out
+    _check_target(target)
     found = calibrate_rig(loaded, problems, workers=workers)
     lines = list(report_lines(found))
-    keys = rig_file_keys(found)
     measured = MeasuredRig(found.calibration.T_rig_board, found.covariance, "these strokes")
     disagreement = contradiction(replace(loaded, measured_rig=measured))
     if disagreement is not None:
         problems.warn(disagreement)
     picture = target.with_suffix(".png")
     with whole_file(picture) as temporary:
-        draw_rig(found.calibration, found.covariance).savefig(
-            temporary, metadata={"Software": None}
-        )
-    write_rig(target, keys, lines)
+        figure = draw_rig(found.calibration, found.covariance)
+        figure.savefig(temporary, metadata={"Software": None})
+        write_rig(target, rig_file_keys(found), lines)
     advice = [f"to know it better: {line}" for line in what_would_help(found)]
     print(*lines, *advice, "", sep="\n")
     for warning in problems.warnings:
@@ -96,11 +94,19 @@ def calibrate_rig_command(
     return 1 if problems.warnings else 0
 
 
-def _check_free(target: Path) -> None:
-    """Raise BadInput where the file, or the picture beside it, exists: a measurement is never overwritten."""
+def _check_target(target: Path) -> None:
+    """Raise BadInput where the file cannot be written, before minutes of work, or where it, or the
+    picture beside it, exists: a measurement is never overwritten.
+    """
     for path in (target, target.with_suffix(".png")):
         if path.exists():
             raise BadInput("is there already; remove it, or give --out", file=str(path))
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=target.parent):
+            pass
+    except OSError as problem:
+        raise BadInput(f"cannot be written ({problem.strerror})", file=str(target)) from None
 
 
 def calibrate_rig(session: Session, problems: InputProblems, *, workers: int = 1) -> RigCalibration:

@@ -1,0 +1,42 @@
+"""Markers besides the board's: found, named, their corners where they were drawn."""
+
+import cv2
+import numpy as np
+
+from vision.boards.other_markers import find_other_markers
+from vision.geometry.board import Board
+
+BOARD = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
+CORNERS_PX = np.array([[60.3, 40.2], [121.7, 47.9], [118.4, 101.6], [57.1, 92.8]])
+
+
+def picture(number, rng, supersampled=8):
+    """A blurred, noisy picture of one marker with its corners at CORNERS_PX."""
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
+    marker = cv2.aruco.generateImageMarker(dictionary, number, 7)
+    large = np.kron(np.pad(marker, 1, constant_values=255), np.ones((40, 40), np.uint8))
+    near, far = 39.5, 319.5
+    ends = np.array([[near, near], [far, near], [far, far], [near, far]], dtype=np.float32)
+    fine_px = (CORNERS_PX + 0.5) * supersampled - 0.5
+    H = cv2.getPerspectiveTransform(ends, fine_px.astype(np.float32))
+    size = (180 * supersampled, 140 * supersampled)
+    fine = cv2.warpPerspective(large.astype(np.float32), H, size, borderValue=255)
+    small = cv2.resize(fine, (180, 140), interpolation=cv2.INTER_AREA)
+    grey = 40 + 0.5 * cv2.GaussianBlur(small, (0, 0), 0.9) + rng.normal(0, 2.0, small.shape)
+    return np.clip(grey, 0, 255).astype(np.uint8)
+
+
+def test_corners_are_where_they_were_drawn(rng):
+    (marker,) = find_other_markers(picture(40, rng), BOARD)
+    assert marker.number == 40
+    # An edge of 60 px, steps of 127 grey levels over a blur of 0.9 px: noise of 2 moves it by 2/(127/(0.9·√2π)·√60)
+    # = 0.005 px; what the pattern's own blur and the pixels' grid leave is a few hundredths.
+    np.testing.assert_allclose(marker.px, CORNERS_PX, atol=0.06)
+
+
+def test_markers_of_the_board_are_none(rng):
+    assert find_other_markers(picture(3, rng), BOARD) == []
+
+
+def test_a_picture_without_markers_has_none(rng):
+    assert find_other_markers(rng.integers(0, 255, (140, 180)).astype(np.uint8), BOARD) == []
