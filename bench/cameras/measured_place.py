@@ -81,7 +81,7 @@ def place_line(session: Session) -> str:
     if not stated_place(session).covariance.any():
         return "placed by T_rig_board, taken as exact"
     sigma_deg = np.degrees(session.T_rig_board_sigma_rad)
-    sigmas = f"± {session.T_rig_board_sigma_mm:g} mm and ± {sigma_deg:g} degrees"
+    sigmas = f"± {session.T_rig_board_sigma_mm:.3g} mm and ± {sigma_deg:.3g} degrees"
     return f"placed by T_rig_board, {sigmas}, with the free strokes when it is evaluated"
 
 

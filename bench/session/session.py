@@ -182,7 +182,8 @@ def session_of(
 def _with_measured_rig(session: Session) -> Session:
     """Return the session with what rig.toml holds. Raise BadInput where that is no rig of this session.
 
-    Where cameras.toml places the cameras it is not read. A T_rig_board of session.toml that was copied from there is no second measurement, and left out.
+    Where cameras.toml places the cameras it is not read. A T_rig_board of session.toml that was copied
+    from there is no second measurement, and left out.
     """
     path = session.path / RIG_FILE
     if session.cameras_toml is not None or not path.is_file():

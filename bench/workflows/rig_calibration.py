@@ -35,6 +35,10 @@ from vision.geometry import Reason, Refused, counted
 
 # [deg] Axis known worse: 60 mm along the whisker a bar then is 0.5 mm higher or lower than said. Stated.
 _HELPED_AXIS_SIGMA_DEG = 0.5
+# [component] Of a placement: the turn about the axis. A layout, no threshold.
+_ZERO = 2
+# [1] Of a sigma: beyond, most of its variance is what all free strokes share. Derived.
+_MOSTLY = np.sqrt(0.5)
 _NO_MARKER = (
     "fasten a marker of the board's dictionary to the hub, with a number that the board does not use and in view of "
     "two cameras: it shows axis and centre in all frames, bent ones included"
@@ -173,7 +177,7 @@ def report_lines(found: RigCalibration) -> Iterator[str]:
     names = ", ".join(trial.name for trial in found.trials)
     yield f"{found.session.name}: the board on the rig, by {counted(len(found.trials), 'trial')} ({names})"
     for source in found.sources:
-        yield from source.notes
+        yield source.notes[0]
     yield f"All together: {replace(found.placement, covariance=found.covariance).spread}."
     sigma = np.sqrt(np.diag(found.covariance))
     turns = ", ".join(f"{value:.4f}" for value in np.degrees(sigma[:3]))
@@ -188,6 +192,17 @@ def what_would_help(found: RigCalibration) -> Iterator[str]:
     sigma = np.sqrt(np.diag(found.covariance))
     if np.degrees(max(sigma[:2])) > _HELPED_AXIS_SIGMA_DEG:
         yield "wider strokes: the axis is known as well as the motor turns far in the pictures"
+    zero_deg, shared_deg = np.degrees([sigma[_ZERO], np.sqrt(found.placement.shared[_ZERO, _ZERO])])
+    if shared_deg > _MOSTLY * zero_deg:
+        yield (
+            f"softer light, or another camera: ± {shared_deg:.3f} of the encoder's zero's ± {zero_deg:.3f} degrees is "
+            "what all free strokes share (light on the wire, lenses), and more trials do not lower it"
+        )
+    else:
+        yield (
+            f"more trials: the encoder's zero, ± {zero_deg:.3f} degrees now, comes down to the ± {shared_deg:.3f} that "
+            "all free strokes share (light on the wire, lenses)"
+        )
 
 
 def rig_file_keys(found: RigCalibration) -> RigFileKeys:

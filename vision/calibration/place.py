@@ -51,7 +51,8 @@ class Placement:
     rise_rad: elevation of the whisker's base above the plane of rotation (None without a swing).
     width_rad: of the widest stroke. notes: sentences for the report. alarm: how the two that it
     combines disagree, None where they do not. source: what it rests on, as sentences name it; basis:
-    how much of that.
+    how much of that. shared (6, 6): the part of a swing's covariance that all free strokes share, None
+    without a swing.
     """
 
     step: np.ndarray
@@ -62,6 +63,7 @@ class Placement:
     alarm: str | None = None
     source: str = "board"
     basis: str = ""
+    shared: np.ndarray | None = None
 
     @staticmethod
     def of(T_board_rig: np.ndarray, covariance: np.ndarray) -> "Placement":

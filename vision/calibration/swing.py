@@ -34,26 +34,27 @@ def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
         widest = max(strokes, key=lambda lines: len(lines.motor_rad), default=None)
         raise _too_few(widest)
     placements = [by_swing(lines) for lines in usable]
-    step, covariance = _combine(usable, placements)
+    shared = np.mean([lines.shared_covariance for lines in usable], axis=0)
+    step, covariance = _combine(usable, placements, shared)
     widths = [lines.width_rad for lines in usable]
     rise_rad = float(np.mean([placement.rise_rad for placement in placements]))
-    combined = Placement(step, covariance, rise_rad, max(widths), source=_SOURCE)
+    combined = Placement(step, covariance, rise_rad, max(widths), source=_SOURCE, shared=shared)
     return _with_note(combined, widths)
 
 
 def _combine(
-    strokes: Sequence[BaseLines], placements: Sequence[Placement]
+    strokes: Sequence[BaseLines], placements: Sequence[Placement], shared: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean step (6,) of placements by a stroke each, weighted by precision, and its
     covariance.
 
-    What the lines of a stroke share (light, lenses) all strokes share: their mean has as much of it
-    as one.
+    shared (6, 6): what the lines of a stroke share (light, lenses) all strokes share: their mean has
+    as much of it as one.
     """
     precisions = [np.linalg.inv(placement.covariance) for placement in placements]
     total = np.linalg.inv(sum(precisions))
     step = np.zeros(6)
-    covariance = np.mean([lines.shared_covariance for lines in strokes], axis=0)
+    covariance = shared.copy()
     for lines, placement, precision in zip(strokes, placements, precisions):
         gain = total @ precision
         step += gain @ placement.step

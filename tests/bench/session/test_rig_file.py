@@ -73,11 +73,7 @@ def test_beside_cameras_toml_it_is_not_read(small_copy):
     assert load_session(small_copy).measured_rig is None
 
 
-def swapped(old, new):
-    """A function that changes the text of rig.toml."""
-    return lambda text: text.replace(old, new)
-
-
+FIRST_ROW = re.compile(r"T_rig_board = \[\n.*?\],\n", flags=re.DOTALL)
 FAULTS = {
     "cut": (lambda text: text[: len(text) // 2], "is not TOML"),
     "empty": (lambda text: "", "is missing"),
@@ -87,7 +83,7 @@ FAULTS = {
         "was measured by other pictures than those in boards/rig; remove it",
     ),
     "no rotation": (lambda text: re.sub(r"0\.99756\d*", "1.7", text, count=1), "no.* rotation"),
-    "rows missing": (lambda text: re.sub(r"T_rig_board = \[\n.*?\],\n", "T_rig_board = [\n", text, count=1, flags=re.DOTALL), "T_rig_board"),
+    "rows missing": (lambda text: FIRST_ROW.sub("T_rig_board = [\n", text, count=1), "T_rig_board"),
     "not a number": (lambda text: re.sub(r"\d+\.\d+e-?\d+|0\.0\d+", "nan", text, count=1), "rig.toml"),
 }  # fmt: skip
 
