@@ -19,7 +19,9 @@ from vision.geometry import nearest_rotation
 
 RIG_FILE = "rig.toml"
 _CURE = "remove it, and run `whisker-bench calibrate rig` on this session"
+# A layout, no threshold.
 _THREE = msgspec.Meta(min_length=3, max_length=3)
+# A layout, no threshold.
 _SIX = msgspec.Meta(min_length=6, max_length=6)
 Row6 = Annotated[list[float], _SIX]
 # Three written digits are exact to 1e-3; a transposed, scaled or mirrored matrix is off by far more.
@@ -40,12 +42,11 @@ class RigFileKeys(Keys):
 
     # 3 × 4, mm: as in `[rig]` of session.toml
     T_rig_board: Annotated[list[Row4], _THREE]
-    # 6 × 6: of turns of the rig frame about its own x, y and z, degrees, and of shifts of its
-    # origin along them, mm
+    # 6 × 6: turns of the rig frame about its own axes, degrees, and shifts along them, mm
     covariance_deg_mm: Annotated[list[Row6], _SIX]
-    # hash of the pictures in boards/rig; where they are others, the file is refused
+    # hash of boards/rig; of other pictures the file is refused
     rig_pictures: str
-    # what it was measured from, in words; the trials, and the hash of their files
+    # what it was measured from
     measured_from: list[str]
     trials: list[str]
     trial_files: str

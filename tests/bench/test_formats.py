@@ -16,6 +16,7 @@ from bench.report.run_facts import BoardFacts, CameraFacts
 from bench.rig.simulation import simulate
 from bench.session import manifest
 from bench.session.givens import GivenKeys
+from bench.session.rig_file import RigFileKeys
 from bench.session.strict_toml import key_names
 from bench.trials import seeing
 from bench.workflows.session_evaluation import evaluate
@@ -38,6 +39,7 @@ TOML = {
     "[signals]": manifest.SignalKeys,
     "[trial]": manifest.TrialKeys,
     "gauges.toml": FileKeys,
+    "rig.toml": RigFileKeys,
     "[seeing]": seeing.SeeingKeys,
 }
 

@@ -22,7 +22,6 @@ NAMES = {
         "apply",
         "compose",
         "invert_transform",
-        "log_rotation",
         "nearest_rotation",
         "skew",
     ),

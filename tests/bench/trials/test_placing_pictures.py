@@ -1,9 +1,11 @@
 """Where the rig is, from pictures: the free strokes against a T_rig_board that is right, wrong, or not there."""
 
 import csv
+import json
 import re
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.workers import Workers
+from bench.cameras.first_look import first_look
 from bench.cameras.session_cameras import SessionCalibration, on_the_rig
+from bench.commands.cli import main
 from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from bench.trials.placing import place_rig
@@ -20,9 +24,11 @@ from bench.trials.trial_evaluation import see_unit
 from bench.trials.unit import Unit
 from tests.scenes.recorded import exact_cameras
 from vision.geometry.camera import Cameras
-from vision.geometry.rotation import compose, invert_transform
+from vision.geometry.rotation import compose, invert_transform, log_rotation
 from vision.pictures.files import read_picture
 
+SMALL = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
+TRUE_T_RIG_BOARD = np.array(json.loads((SMALL / "truth.json").read_text())["T_rig_board"])[:3]
 PROTOCOL = """
 name = "wide"
 [[cameras]]
@@ -157,3 +163,36 @@ def test_squares_a_sixth_too_large_are_what_a_stroke_that_cannot_be_read_leads_t
     ]
     _, (warning,), _ = place(wide, Cameras(tuple(on_rig)), wide.T_rig_board, tmp_path)
     assert "square_mm" in warning
+
+
+def test_by_a_marker_on_the_hub_short_strokes_give_a_first_look():
+    """Of 1.5 degrees the moving lines alone give no axis; the marker turns with the motor in every frame."""
+    session = load_session(SMALL)
+    session = replace(session, T_rig_board=None, trials=session.trials[:1])
+    first = first_look(session, moved(session, invert_transform(TRUE_T_RIG_BOARD)))
+    off = compose(first.T_rig_world, invert_transform(TRUE_T_RIG_BOARD))
+    # What `place_rig` begins with may be off by 5 degrees and 5 mm (`_SIGMA_RAD`, `_SIGMA_MM` of first_look.py): half of that.
+    assert np.degrees(np.linalg.norm(log_rotation(off[:, :3]))) < 2.5
+    assert np.linalg.norm(off[:, 3]) < 2.5
+
+
+@pytest.mark.slow
+def test_calibrate_rig_on_short_strokes_by_the_marker_and_evaluate(small_copy, tmp_path, capsys):
+    """The board's place is found without one in session.toml, and d_x with it."""
+    text = (small_copy / "session.toml").read_text()
+    (small_copy / "session.toml").write_text(re.sub(r"T_rig_board = .*\n", "", text))
+    assert main(["calibrate", "rig", str(small_copy)]) in (0, 1)
+    assert "Marker 40 on the hub" in capsys.readouterr().out
+    found = load_session(small_copy).measured_rig
+    off = compose(found.T_rig_board, invert_transform(TRUE_T_RIG_BOARD))
+    error = np.append(log_rotation(off[:, :3]), off[:, 3])
+    # 22.5: chi-squared of six at one in a thousand.
+    assert error @ np.linalg.solve(found.covariance, error) < 22.5
+    assert np.sqrt(found.covariance[3, 3]) < 0.1
+    assert main(["evaluate", str(small_copy), "--out", str(tmp_path / "out"), "--no-figures"]) in (
+        0,
+        1,
+    )
+    for row in csv.DictReader((tmp_path / "out" / "whisks.csv").open()):
+        truth = tomllib.loads((small_copy / "trials" / row["trial"] / "truth.toml").read_text())
+        assert abs(float(row["d_x_mm"]) - truth["d_x_mm"]) < 3 * float(row["d_x_sigma_mm"])
