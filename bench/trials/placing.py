@@ -160,7 +160,7 @@ def _placed_by_board_alone(
 
 def _without_rig_frame(refusal: Refused) -> BadInput:
     """Return the error of a session without T_rig_board whose free strokes do not give the rig frame."""
-    cure = "record free strokes of some 10 degrees, or measure T_rig_board"
+    cure = "record free strokes of some 10 degrees, or put a marker on the hub and run `whisker-bench calibrate rig`"
     return BadInput(f"T_rig_board is missing, and {refusal}: {cure}", file="trials")
 
 

@@ -49,12 +49,13 @@ _LARGEST_SATURATED_SHARE = 0.1
 
 
 def check(path: Path, *, follow_links: bool = False) -> int:
-    """Print refusals and warnings of a session.
+    """Print refusals and warnings of a session, and what places its rig.
 
     Return the exit code: 2 where there is a refusal, 1 where there is a warning, else 0.
     """
     problems = InputProblems(stop_at_first=False)
     assumed = ""
+    placed = ""
     with problems.guard():
         views = checked_views(path, problems, follow_links=follow_links)
         session = views[0]
@@ -63,7 +64,7 @@ def check(path: Path, *, follow_links: bool = False) -> int:
             check_contents(view, problems)
         assumed = assumed_line(views)
         if session.has_pictures:
-            print(f"rig: {place_line(session)}")
+            placed = place_line(session)
     for line in dict.fromkeys(problems.refusals):
         print(f"bad: {line}")
     for line in dict.fromkeys(problems.warnings):
@@ -72,6 +73,8 @@ def check(path: Path, *, follow_links: bool = False) -> int:
         print(f"assumed: {assumed}")
     if problems.refusals:
         return 2
+    if placed:
+        print(f"rig: {placed}")
     if problems.warnings:
         return 1
     whiskers = f", {counted(len(views), 'whisker')}" if session.base else ""

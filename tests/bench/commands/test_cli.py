@@ -104,7 +104,9 @@ def test_wrong_usage_is_exit_code_2(arguments, capsys):
 
 def test_check_of_a_sound_session(small_session, capsys):
     assert cli.main(["check", str(small_session)]) == 0
-    assert "4 trials, nothing wrong or doubtful" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "4 trials, nothing wrong or doubtful" in said
+    assert "rig: placed by T_rig_board" in said
 
 
 def test_check_of_a_session_with_a_warning(small_copy, capsys):

@@ -99,6 +99,13 @@ def test_what_is_implausible_is_one_line(option, tmp_path, capsys):
     assert not (tmp_path / "s").exists()
 
 
+def test_the_board_s_place_is_measured_and_not_filled_in(tmp_path):
+    assert main(["new", str(tmp_path / "s"), *options(NUMBERS)]) == 0
+    text = (tmp_path / "s" / "session.toml").read_text()
+    assert "whisker-bench calibrate rig" in text
+    assert "[[1, 0, 0, 0]" not in text and read(tmp_path / "s").rig.T_rig_board is None
+
+
 def test_every_question_has_its_range():
     for question in QUESTIONS:
         with pytest.raises(BadInput):

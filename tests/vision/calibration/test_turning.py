@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import CAMERAS
-from vision.calibration.hub_turning import first_rig
+from vision.calibration.hub_turning import first_rig, first_rig_about
 from vision.calibration.moving_line import MovingLines, moving_lines
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import apply, compose, exp_rotation, invert_transform
@@ -55,6 +55,23 @@ def test_a_centre_is_found_as_well_as_the_fan_tells():
     ]
     # Along the whisker 0.1 mm / √21 over the fan's standard deviation of 0.106 rad: 0.21 mm, across a tenth of that.
     assert 0.14 < np.sqrt(np.mean(np.square(shifts))) < 0.28
+
+
+def test_about_a_known_axis_a_stroke_of_a_degree_does():
+    """The axis as a marker gives it: elsewhere along itself, its x anywhere."""
+    turned = np.column_stack([exp_rotation(np.array([0.0, 0.0, 1.1])), [0.0, 0.0, 7.0]])
+    lines = fan(np.linspace(0.5, 7.0, 14), bend_after_deg=2.3)
+    lines.direction[2] = [0.0, 0.0, 1.0]  # a stray
+    found = first_rig_about(compose(T_WORLD_RIG, turned), [lines])
+    shift_mm, turn_rad = off(found)
+    # Lines of the first quarter of the stroke, which are free, lie on the whisker.
+    assert shift_mm < 1e-6 and turn_rad < 1e-6
+
+
+def test_about_an_axis_that_no_line_passes_nothing_is_found():
+    beside = np.column_stack([np.eye(3), [0.0, 30.0, 0.0]])
+    with pytest.raises(Refused, match="nothing is seen to turn"):
+        first_rig_about(compose(T_WORLD_RIG, beside), [fan(np.linspace(0.5, 7.0, 14))])
 
 
 def test_nothing_that_turns_is_refused():
