@@ -191,7 +191,8 @@ def _with_measured_rig(session: Session) -> Session:
     measured = read_rig(path, session.rig_pictures)
     stated = session.T_rig_board
     if stated is not None and np.abs(stated - measured.T_rig_board).max() < _COPIED:
-        session = replace(session, T_rig_board=None)
+        others = tuple(given for given in session.givens if not given.key.startswith("[rig]"))
+        session = replace(session, T_rig_board=None, givens=others)
     return replace(session, measured_rig=measured)
 
 
