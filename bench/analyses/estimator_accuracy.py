@@ -4,6 +4,7 @@ The verdict, the page, methods.md and the comparison of runs all take their numb
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -12,8 +13,10 @@ from scipy.special import bdtr
 
 from bench.analyses.pooling import grouped, rms
 from bench.base.drawing import label_of
+from bench.base.statuses import TRUTH, reaching
 from bench.records.trial_result import TrialResult, whisks
 from bench.trials.estimate_errors import Judged, judge
+from vision.geometry import NO_REASON, Reason
 
 # [1] Intervals are stated for this share of all whisks.
 INTERVAL_SHARE = 0.95
@@ -189,7 +192,9 @@ class TruthUncertainty:
     """Median standard deviations of the truth over the measured whisks that have one.
 
     known, measured: numbers of whisks with a truth and of all. d_x_own_mm, d_x_shared_mm: the parts
-    of d_x's that are each whisk's own, and that all share; NaN where that is not known.
+    of d_x's that are each whisk's own, and that all share; NaN where that is not known. in_doubt:
+    of those with a truth, how many have a status that reaches it; contradiction: the commonest of
+    what they say.
     """
 
     known: int
@@ -200,6 +205,8 @@ class TruthUncertainty:
     slip_mm: float
     d_x_own_mm: float = math.nan
     d_x_shared_mm: float = math.nan
+    in_doubt: int = 0
+    contradiction: Reason = NO_REASON
 
     @property
     def d_x_text(self) -> str:
@@ -215,6 +222,8 @@ def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
     measured = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
     known = [seen for seen in measured if seen.has_truth]
     slips = [seen.at.slip_mm.sigma for seen in known if seen.at is not None]
+    doubts = [reaching((TRUTH,), seen.status) for seen in known]
+    commonest = Counter(part for doubt in doubts for part in doubt.parts).most_common(1)
     return TruthUncertainty(
         known=len(known),
         measured=len(measured),
@@ -224,6 +233,8 @@ def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
         slip_mm=_finite_median(slips),
         d_x_own_mm=_finite_median([seen.d_x_own_sigma_mm for seen in known]),
         d_x_shared_mm=_finite_median([seen.d_x_shared_sigma_mm for seen in known]),
+        in_doubt=sum(map(bool, doubts)),
+        contradiction=Reason.of_parts(part for part, _ in commonest),
     )
 
 

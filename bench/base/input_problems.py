@@ -25,11 +25,15 @@ def in_one_status(*said: str | None) -> Reason:
 
 @dataclass
 class InputProblems:
-    """Refusals (bad input) and warnings (usable, but to be checked), in the order in which they were found."""
+    """Refusals (bad input) and warnings (usable, but to be checked), in the order in which they were found.
+
+    trials_of: names of the trials that a warning is about, where it is not about the whole session.
+    """
 
     stop_at_first: bool = True
     refusals: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    trials_of: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     @contextmanager
     def guard(self) -> Iterator[None]:
@@ -55,6 +59,19 @@ class InputProblems:
             raise BadInput(self.refusals[before])
         return given
 
-    def warn(self, line: str) -> None:
-        """Keep a line that the user should read (with a code: a `Reason`); the run goes on."""
+    def warn(self, line: str, trials: Iterable[str] = ()) -> None:
+        """Keep a line that the user should read (with a code: a `Reason`); the run goes on.
+
+        trials: names of those that it is about; none: it is about the session.
+        """
         self.warnings.append(line)
+        if trials:
+            self.trials_of[line] = tuple(trials)
+
+    def about(self, trial: str) -> Reason:
+        """Return all warnings about the session and about a trial as one status."""
+        found = []
+        for line in self.warnings:
+            if trial in self.trials_of.get(line, (trial,)):
+                found.append(line)
+        return in_one_status(*found)

@@ -24,6 +24,7 @@ SEEING = (
     *("bench/trials/trial_frames.py", "bench/trials/other_wires.py", "bench/trials/whose_wire.py"),
     *(
         "bench/trials/consistency.py",
+        "bench/trials/contradictions.py",
         "bench/trials/differences.py",
         "bench/trials/placing.py",
         "bench/trials/still_scene.py",

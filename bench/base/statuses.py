@@ -5,7 +5,7 @@ programs (`vision.geometry.reasons.Reason`, `estimator.reasons.NamedReason`). Wh
 stands here: how severe it is, and what to do about it. Nothing else asks what a sentence says.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from vision.geometry import UNNAMED, Reason, as_reason
@@ -15,6 +15,10 @@ from vision.geometry import UNNAMED, Reason, as_reason
 NOTE = "note"
 WARNING = "warning"
 REFUSAL = "refusal"
+
+# Numbers of a whisk that a status of the whole session, or of its trial, puts in doubt.
+TRUTH = "truth"
+ESTIMATES = "estimates"
 
 _USUAL_CURE = "look at the whisk's card and overlays; docs/truth.md says what the truth needs"
 
@@ -50,13 +54,16 @@ class Status:
 
     code: its name in snake_case, which stays when words change. severity: NOTE, WARNING or REFUSAL.
     sentence: with places for numbers where bench makes it by `reason`; else what it says in general,
-    and the sentence itself is made where its numbers are known. cure: what to do.
+    and the sentence itself is made where its numbers are known. cure: what to do. reaches: TRUTH,
+    ESTIMATES or both: said of the session or of a trial, it stands in the status of every whisk that
+    has such numbers, and no verdict rests on these (`bench.trials.contradictions`).
     """
 
     code: str
     severity: str
     sentence: str
     cure: str = _USUAL_CURE
+    reaches: tuple[str, ...] = ()
 
 
 # Of several statuses in one line the cure of the first in this table is shown.
@@ -301,6 +308,7 @@ _TABLE = (
         WARNING,
         "trials {names} have one and the same {file}: all but one have another's",
         "find the recordings that belong to these trials, and copy them anew",
+        reaches=(TRUTH, ESTIMATES),
     ),
     Status("signals_mended", WARNING, "{label}: {count} {cause} mended", _LOOK_AT_FILE),
     Status(
@@ -326,6 +334,20 @@ _TABLE = (
         WARNING,
         "the board and the free strokes place the rig differently",
         _MEASURE_BOARD,
+        reaches=(TRUTH,),
+    ),
+    Status(
+        "scale_unconfirmed",
+        WARNING,
+        "the bars are hardly seen where square_mm and T_rig_board have the whisker",
+        _MEASURE_BOARD,
+        reaches=(TRUTH,),
+    ),
+    Status(
+        "swing_narrow",
+        WARNING,
+        "the free strokes that place the rig are narrow",
+        "record wider free strokes, or measure T_rig_board",
     ),
     Status(
         "boards_not_at_once",
@@ -356,6 +378,7 @@ _TABLE = (
         WARNING,
         "the bar looks thicker or thinner than said, or the board's squares are",
         _MEASURE_BOARD,
+        reaches=(TRUTH,),
     ),
     Status(
         "bends_from_start", REFUSAL, "the whisker is seen to bend from the start", _BEGIN_EARLIER
@@ -406,20 +429,46 @@ _TABLE = (
     ),
     Status("light_unexplained", WARNING, "the wire's light differs from that of any lit wire"),
     Status("no_touching_frame", NOTE, "the whisker does not touch"),
-    Status("bar_width_unlike_stated", WARNING, "the bar looks thicker or thinner than said"),
-    Status("wire_width_unlike_stated", WARNING, "the whisker looks thinner than said"),
     Status(
-        "length_unlike_stated", WARNING, "the whisker is seen to end elsewhere than length_mm says"
+        "bar_width_unlike_stated",
+        WARNING,
+        "the bar looks thicker or thinner than said",
+        reaches=(TRUTH,),
     ),
-    Status("slope_unlike_stated", WARNING, "the bar's slope is seen other than stated"),
-    Status("turns_unlike_motor", WARNING, "the whisker is not seen to turn as the motor does"),
-    Status("friction_too_large", WARNING, "no friction holds the whisker at this angle"),
+    Status(
+        "wire_width_unlike_stated", WARNING, "the whisker looks thinner than said", reaches=(TRUTH,)
+    ),
+    Status(
+        "length_unlike_stated",
+        WARNING,
+        "the whisker is seen to end elsewhere than length_mm says",
+        reaches=(TRUTH,),
+    ),
+    Status(
+        "slope_unlike_stated",
+        WARNING,
+        "the bar's slope is seen other than stated",
+        reaches=(TRUTH,),
+    ),
+    Status(
+        "turns_unlike_motor",
+        WARNING,
+        "the whisker is not seen to turn as the motor does",
+        reaches=(TRUTH,),
+    ),
+    Status(
+        "friction_too_large",
+        WARNING,
+        "no friction holds the whisker at this angle",
+        reaches=(TRUTH,),
+    ),
     Status(
         "wire_off_its_base",
         WARNING,
         "its wire starts {beside_mm:.1f} mm beside its base, check base_mm",
+        reaches=(TRUTH,),
     ),
-    Status("wire_of_another", WARNING, "its wire may be that of {names}"),
+    Status("wire_of_another", WARNING, "its wire may be that of {names}", reaches=(TRUTH,)),
     Status("no_free_force", REFUSAL, "no free stroke to read the force's zero from"),
     Status("angle_not_reached", REFUSAL, "the stroke does not reach the pushing angle"),
     Status(
@@ -559,6 +608,15 @@ def status_of_code(code: str) -> Status:
 def reason(code: str, **numbers: object) -> Reason:
     """Return the status of a code, its sentence from the table with numbers filled in."""
     return Reason(code, STATUSES[code].sentence.format(**numbers))
+
+
+def reaching(numbers: Collection[str], said: Reason) -> Reason:
+    """Return of what is said those sentences whose code puts one of these numbers in doubt."""
+    found = []
+    for code, sentence in said.parts:
+        if set(numbers).intersection(status_of_code(code).reaches):
+            found.append((code, sentence))
+    return Reason.of_parts(found)
 
 
 def has_only_notes(text: str) -> bool:

@@ -13,7 +13,7 @@ from bench.session.signals import read_signals
 from bench.session.trial import Trial
 from vision import SIGMA_SHARE, bar_diameter_mm
 from vision.calibration import check_known_lengths
-from vision.geometry import Bar, Cameras, Refused
+from vision.geometry import Bar, Cameras, Reason, Refused
 
 # [trials] A median is taken over them. Set by eye.
 _MOST_TRIALS = 3
@@ -25,7 +25,7 @@ _UNCONFIRMED = 0.05
 _MOST_SCATTER = 0.1
 
 
-def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[str]]:
+def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[Reason]]:
     """Return notes and warnings on the bars' apparent diameter; none where the session has no bar.
 
     cameras: in the rig frame. Raises BadInput at the wrong scale.
@@ -47,7 +47,7 @@ def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[str
     return [f"Second length: {looks}; square_mm can be right."], []
 
 
-def _scatter_warning(shares: np.ndarray, scatter: float) -> str:
+def _scatter_warning(shares: np.ndarray, scatter: float) -> Reason:
     """Return the warning on bars whose apparent diameters scatter. Raises BadInput where by much."""
     seen = (
         f"bars look {min(shares):.2f} to {max(shares):.2f} times as thick as given, so they are "
@@ -56,7 +56,7 @@ def _scatter_warning(shares: np.ndarray, scatter: float) -> str:
     if scatter > _MOST_SCATTER:
         cure = "measure a square of the board and enter it, then check T_rig_board"
         raise BadInput(f"{seen}: {cure}", file="session.toml")
-    return f"Second length: {seen}: check both"
+    return Reason("scale_unconfirmed", f"Second length: {seen}: check both")
 
 
 def _has_measurable_bar(trial: Trial, session: Session) -> bool:
@@ -76,7 +76,10 @@ def _check_bar_diameter(
         check_known_lengths({"bar diameter": diameter})
     except Refused as reason:
         square_mm = session.board.square_mm
-        found = f"square_mm is {square_mm:g}, some {square_mm / share:.3g} would fit the bar"
+        bar = f"a bar of {share * given_mm:.3g} mm would fit it"
+        found = (
+            f"square_mm is {square_mm:g}, some {square_mm / share:.3g} would fit the bar, or {bar}"
+        )
         raise BadInput(f"{reason}; {found}", file="session.toml") from None
 
 

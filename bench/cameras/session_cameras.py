@@ -65,7 +65,7 @@ class SessionCalibration:
     cameras: None where the session has no pictures. background: the scene by camera, None where
     there is no such picture. hash: of both. notes: lines on what they rest on. T_rig_board: where
     the board on the rig stands in the cameras' frame, (3, 4) mm, None where not known. board_print:
-    PRINT_TERMS of the board. warnings: where the board's views contradict what is stated.
+    PRINT_TERMS of the board. warnings: where the board's views or the bars' widths contradict what is stated.
     """
 
     cameras: Cameras | None
@@ -209,14 +209,14 @@ def _calibrate_into(session: Session, folder: Path, key: str) -> dict:
     lengths, warnings = check_scale(session, cameras)
     folder.mkdir(parents=True, exist_ok=True)
     write_cameras(folder / "cameras.toml", cameras)
-    notes = [*report_lines(made), *([note] if note else []), *lengths, *warnings]
+    notes = [*report_lines(made), *([note] if note else []), *lengths]
     kept = plain(
         {
             "hash": key,
             "notes": notes,
             "T_rig_board": T_rig_board,
             "board_print": made.board,
-            "warnings": [part for warning in made.warnings for part in warning.parts],
+            "warnings": [part for warning in (*made.warnings, *warnings) for part in warning.parts],
         }
     )
     write_result(folder / "cameras.json", kept)

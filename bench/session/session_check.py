@@ -71,12 +71,15 @@ def _check(views: Sequence[Session], problems: InputProblems) -> None:
         for trial in count_parts(trials, "recordings read", len(trials)):
             check_recording(trial, problems)
     check_sizes(views[0], problems)
-    for line in _copies(views[0]):
-        problems.warn(line)
+    for names, line in _copies(views[0]):
+        problems.warn(line, names)
 
 
-def _copies(session: Session) -> Iterator[Reason]:
-    """Yield a line on trials whose signals are those of another: noise is never the same twice."""
+def _copies(session: Session) -> Iterator[tuple[list[str], Reason]]:
+    """Yield the names of trials whose signals are those of another, and a line on them.
+
+    Noise is never the same twice.
+    """
     sizes = [trial.signals_path.stat().st_size for trial in session.trials]
     count = Counter(sizes)
     alike: dict[str, list[str]] = {}
@@ -86,7 +89,7 @@ def _copies(session: Session) -> Iterator[Reason]:
     for names in alike.values():
         if len(names) > 1:
             file = session.trial(names[0]).signals_path.name
-            yield reason("signals_copied", names=", ".join(names), file=file)
+            yield names, reason("signals_copied", names=", ".join(names), file=file)
 
 
 def check_recording(trial: Trial, problems: InputProblems) -> None:

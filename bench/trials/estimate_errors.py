@@ -15,6 +15,7 @@ import numpy as np
 
 from bench.base.statuses import has_only_notes
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
+from vision.geometry import NO_REASON, Reason, joined
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Judged:
 
     beta_deg: the slope as seen, else the nominal one. covariance_mm2: of estimate and truth, by the
     errors of the cameras. one_factor: made with one gauge factor a channel. status: the estimate's.
-    has_warning: the whisk itself has a warning.
+    whisk_status: of the whisk, seen and felt.
     """
 
     trial: str
@@ -40,7 +41,12 @@ class Judged:
     covariance_mm2: float = 0.0
     one_factor: bool = False
     status: str = ""
-    has_warning: bool = False
+    whisk_status: Reason = NO_REASON
+
+    @property
+    def has_warning(self) -> bool:
+        """Return whether the whisk itself has a warning."""
+        return not has_only_notes(self.whisk_status)
 
     @property
     def error_mm(self) -> float:
@@ -92,12 +98,12 @@ def judge(results: Iterable[TrialResult]) -> list[Judged]:
     """Return every estimate of every whisk with its truth."""
     found = []
     for result, seen, felt in whisks(results):
-        has_warning = not is_sound(seen, felt)
+        status = joined(seen.status, felt.status)
         for row in felt.estimates:
-            judged = _judged(result, seen, row, has_warning=has_warning)
+            judged = _judged(result, seen, row, whisk_status=status)
             found.append(replace(judged, covariance_mm2=_covariance_mm2(seen, felt, row)))
         for row in felt.one_factor:
-            judged = _judged(result, seen, row, has_warning=has_warning)
+            judged = _judged(result, seen, row, whisk_status=status)
             found.append(replace(judged, one_factor=True))
     return found
 
@@ -116,7 +122,9 @@ def _covariance_mm2(seen: SeenWhisk, felt: FeltWhisk, row: EstimateRow) -> float
     return float(-row.d_x_est_mm.value * by_share @ of_truth_mm)
 
 
-def _judged(result: TrialResult, seen: SeenWhisk, row: EstimateRow, *, has_warning: bool) -> Judged:
+def _judged(
+    result: TrialResult, seen: SeenWhisk, row: EstimateRow, *, whisk_status: Reason
+) -> Judged:
     """Return one estimate with its truth."""
     trial = result.trial
     return Judged(
@@ -132,5 +140,5 @@ def _judged(result: TrialResult, seen: SeenWhisk, row: EstimateRow, *, has_warni
         float(row.d_x_est_mm.value),
         float(row.d_x_est_mm.sigma),
         status=row.status,
-        has_warning=has_warning,
+        whisk_status=whisk_status,
     )

@@ -30,6 +30,7 @@ from bench.records.trial_result import (
 from bench.session.signals import Signals
 from bench.trials.agreement import MomentAgreement, agreement
 from bench.trials.consistency import check_friction_cone, nominal_slope
+from bench.trials.contradictions import against_estimates
 from bench.trials.estimates import answers, as_felt, estimators, felt_at
 from bench.trials.gate import kinetic_of
 from bench.trials.object_motion import MOTION_ESTIMATORS, with_motion
@@ -92,13 +93,14 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
     touch, whisk = _felt_whisk(unit, stroke, readout or Readout.bare())
     status = _missing(unit, stroke, touch, whisk, missing)
     usable = None if status else whisk
+    doubt = against_estimates(unit.contradictions, unit.gauges, seen)
     felt = as_felt(number, touch, usable, stroke.speed_rad_s, _delay_s(unit))
     felt = replace(felt, status=status, saturated=stroke.saturated)
     if usable is None:
         return felt
     felt = replace(
         felt,
-        status=_beyond_calibration(unit, readout, usable),
+        status=joined(doubt, _beyond_calibration(unit, readout, usable)),
         shared_Nmm=readout.shared_Nmm(usable),
         by_camera_error_Nmm=readout.by_camera_error_Nmm(usable),
         phases=phases_of(unit.trial, stroke, touch, readout, seen, usable.beam),

@@ -31,6 +31,7 @@ from bench.records.trial_result import SeenTrial
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
+from bench.trials.contradictions import contradictions_of
 from bench.trials.free_strokes import free_strokes
 from bench.trials.lost import see_units
 from bench.trials.placing import place_rig
@@ -119,11 +120,16 @@ def units_in_rig(
 ) -> tuple[SessionCalibration, list[Unit]]:
     """Return the cameras in the rig frame of board and free strokes, and the units with these.
 
-    What the board's views contradict is a warning in `problems`. Raises BadInput.
+    What the board's views contradict is a warning in `problems`. The units have the warnings so far
+    that put their truth or estimates in doubt. Raises BadInput.
     """
     problems.warnings += units[0].calibration.warnings
     calibration = place_rig(session, units[0].calibration, units, pool, problems)
-    return calibration, [replace(unit, calibration=calibration) for unit in units]
+    placed = []
+    for unit in units:
+        found = contradictions_of(problems, unit.trial.name)
+        placed.append(replace(unit, calibration=calibration, contradictions=found))
+    return calibration, placed
 
 
 def with_gauges(

@@ -219,7 +219,7 @@ def _require_swing(placement: Placement, problems: InputProblems) -> None:
     except Refused as refusal:
         raise BadInput(str(refusal), file="trials") from None
     if warning:
-        problems.warn(Reason("board_misplaced", warning))
+        problems.warn(Reason("swing_narrow", warning))
 
 
 def _converge(

@@ -8,6 +8,7 @@ from bench.base.results import read_result, write_result
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import SeenTrial, TrialFacts, TrialResult, WhiskerFacts
 from bench.session.signals import Signals, read_signals
+from bench.trials.contradictions import contradicted
 from bench.trials.felt_trial import feel_trial
 from bench.trials.object_motion import MOVING
 from bench.trials.other_wires import lines_in
@@ -27,9 +28,12 @@ def see_unit(unit: Unit) -> SeenTrial:
 
 
 def _see(unit: Unit, signals: Signals) -> SeenTrial:
-    """Evaluate the pictures of a trial; of an array, with a status where the wire is not its own."""
+    """Evaluate the pictures of a trial; with a status where the session contradicts itself, and, of
+    an array, where the wire is not its own.
+    """
     wires = lines_in(unit.wires)
     seen = see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings, wires)
+    seen = contradicted(seen, unit.contradictions)
     if not unit.wires:
         return seen
     return with_whose(seen, lines_in(unit.straight), wires, unit.session.base.name)

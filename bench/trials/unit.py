@@ -14,6 +14,7 @@ from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.matrix import GaugeCalibration
 from bench.session.session import Session
 from bench.session.trial import Trial
+from vision.geometry import NO_REASON, Reason
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,8 @@ class Unit:
     force_drift_rate (3,) of a load cell. gauges: None where volts cannot become moments. stage:
     folder of a seen half that is part of the session's calibration. wires: of an array, by the
     names of its whiskers, files with the places of their wires in the pictures, and wires_hash of
-    all of them. straight: the same were all wires straight.
+    all of them. straight: the same were all wires straight. contradictions: warnings about the
+    session or the trial that put its truth or its estimates in doubt.
     """
 
     session: Session
@@ -40,6 +42,7 @@ class Unit:
     wires: tuple[tuple[str, Path], ...] = ()
     wires_hash: str = ""
     straight: tuple[tuple[str, Path], ...] = ()
+    contradictions: Reason = NO_REASON
 
     @property
     def path(self) -> Path:
@@ -65,6 +68,7 @@ class Unit:
             self.calibration.hash,
             self.settings.seen(),
             self.wires_hash,
+            self.contradictions.parts,
         )
 
     @property

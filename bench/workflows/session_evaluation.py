@@ -16,6 +16,7 @@ from bench.session.inside import check_outside
 from bench.session.session import Session
 from bench.session.session_check import checked_views
 from bench.session.trial import Trial
+from bench.trials.contradictions import contradictions_alone
 from bench.trials.estimates import estimators
 from bench.trials.exchanged_signals import exchanged_signals
 from bench.trials.lost import evaluate_units
@@ -92,8 +93,9 @@ def _evaluate_array(
     folders = [folder_of(out, view.base.name) for view in views]
     units_of_views = array_units(views, recorded, out, folders, settings, pool)
     for view, folder, units in zip(views, folders, units_of_views):
+        carried = contradictions_alone(problems)
         with lock_output(folder):
-            _evaluate_whisker(view, units, folder, settings, pool, InputProblems(), figure_formats)
+            _evaluate_whisker(view, units, folder, settings, pool, carried, figure_formats)
     scores = score_all(list(zip(views, folders)))
     write_array_record(out, array_record(views, problems.warnings, scores))
     return write_array(out)

@@ -7,6 +7,7 @@ import csv
 import os
 import shutil
 import struct
+import tomllib
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -126,6 +127,59 @@ def _another_trials_signals(session: Path) -> None:
         / "signals.csv"
     )
     shutil.copyfile(other, _trial(session) / "signals.csv")
+
+
+def _moments(factor: float) -> Fault:
+    """Signals as moments in N·mm by the sound gauges beside the session, times a factor."""
+
+    def spoil(session: Path) -> None:
+        found = tomllib.loads((session / "gauges.toml").read_text())
+        matrix = np.array(found["matrix_Nmm_per_V"])
+        file = _trial(session) / "signals.csv"
+
+        def change(columns) -> None:
+            volts = np.stack([columns["y_V"], columns["z_V"]])
+            columns["y_V"], columns["z_V"] = factor * matrix @ volts
+
+        change_table(file, change, digits=8)
+        _renamed(file)
+
+    return spoil
+
+
+def _renamed(signals: Path) -> None:
+    """Name the two channels as if they were moments in N·mm."""
+    text = signals.read_text()
+    assert text.startswith("time_s,motor_deg,y_V,z_V\n")
+    signals.write_text(text.replace("y_V,z_V", "m_y_Nmm,m_z_Nmm", 1))
+
+
+def _volts_named_Nmm(session: Path) -> None:
+    _renamed(_trial(session) / "signals.csv")
+
+
+def _millivolts(columns) -> None:
+    for name in ("y_V", "z_V"):
+        columns[name] = 1e3 * columns[name]
+
+
+def _camera_late(session: Path) -> None:
+    """Every picture of a camera in the place of the next; the first is there twice."""
+    files = pictures(session, "low")
+    kept = [file.read_bytes() for file in files]
+    for file, content in zip(files[1:], kept):
+        file.unlink()
+        file.write_bytes(content)
+
+
+def _pictures_exchanged(session: Path) -> None:
+    """The two measured trials have each other's pictures and frame times."""
+    mine = _trial(session)
+    other = mine.with_name("b30_3")
+    for name in ("low", "high", "frames.csv"):
+        (mine / name).rename(mine / "aside")
+        (other / name).rename(mine / name)
+        (mine / "aside").rename(other / name)
 
 
 def pictures(session: Path, camera: str) -> list[Path]:
@@ -266,6 +320,16 @@ FAULTS: dict[str, Fault] = {
     "frame twice": _frame_twice,
     "frame lost silently": _lost_silently,
     "frame dropped": _dropped,
+    "frame times 1.01": _times(scaled("time_s", 1.01)),
+    "encoder scale 1.01": _signals(scaled("motor_deg", 1.01)),
+    "moments in N m": _moments(1e-3),
+    "moments in N um": _moments(1e3),
+    "volts named Nmm": _volts_named_Nmm,
+    "millivolts": _signals(_millivolts),
+    "a camera late by a frame": _camera_late,
+    "pictures of two trials exchanged": _pictures_exchanged,
+    "exposure 1.3 from frame 6": _camera(brighter(1.3), first=6),
+    "bar 6.6 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 6.6"),
     "bar 6.8 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 6.8"),
     "bar 5.2 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 5.2"),
     "bar 4 mm for 6": _manifest("diameter_mm = 6.0", "diameter_mm = 4.0"),
@@ -273,6 +337,10 @@ FAULTS: dict[str, Fault] = {
     "board 10 % too large": _manifest(
         "square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 16.5\nmarker_mm = 12.1"
     ),
+    "board 2 % too large": _manifest(
+        "square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 15.3\nmarker_mm = 11.22"
+    ),
+    "board 3 mm higher": _manifest("-44.3509729]", "-41.3509729]"),
     "wrong dictionary": _manifest("DICT_5X5_100", "DICT_4X4_100"),
     "wrong squares": _manifest("squares = [8, 6]", "squares = [7, 5]"),
     "whisker 90 mm for 100": _manifest("length_mm = 100.0", "length_mm = 90.0"),
@@ -295,4 +363,13 @@ FAULTS: dict[str, Fault] = {
     "covariance is a folder": _covariance_is_a_folder,
 }
 # These need the board views: they are made on the whole session, without cameras brought along.
-WHOLE = ("board 10 % too large", "rig board hidden", "wrong dictionary", "wrong squares")
+WHOLE = (
+    "board 10 % too large",
+    "board 2 % too large",
+    "bar 6.6 mm for 6",
+    "board 3 mm higher",
+    "pictures of two trials exchanged",
+    "rig board hidden",
+    "wrong dictionary",
+    "wrong squares",
+)

@@ -93,7 +93,7 @@ def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[
         *evaluation.warnings,
         *damage_warnings(results),
         *scatter_warnings(results),
-        *whisk_warnings(results),
+        *whisk_warnings(results, evaluation.warnings),
     )
     of_analyses = _sections_of_analyses(evaluation)
     last = [of_analyses.pop(code) for code in _ANALYSES_LAST if code in of_analyses]

@@ -11,6 +11,7 @@ from bench.analyses.accuracy_line import accuracy_line
 from bench.analyses.estimator_accuracy import Accuracy, RunAccuracy, TruthUncertainty
 from bench.analyses.runs import RUNS
 from bench.base.settings import Seeing, Settings
+from bench.base.statuses import cure_of
 from bench.gauges.matrix import FROM_ALL, GaugeCalibration
 from bench.records.trial_result import TrialResult, whisks
 from vision.geometry import counted
@@ -35,7 +36,17 @@ def verdict(
     if judged:
         yield _recommendation(judged, settings.theta_deg)
     else:
-        yield "No verdict on the estimators: no whisk has both a truth and an estimate."
+        yield _withheld(accuracy.truth, compared)
+
+
+def _withheld(truth: TruthUncertainty, compared: Sequence[Accuracy]) -> str:
+    """Return why there is no verdict on the estimators, and what would allow one."""
+    left_out = [judged for one in compared for judged in one.left_out]
+    if not left_out:
+        return "No verdict on the estimators: no whisk has both a truth and an estimate."
+    # What speaks against the truth of many comes before what a single whisk has.
+    why = truth.contradiction or left_out[0].whisk_status
+    return f"No verdict on the estimators: all whisks are doubtful ({why}). To have one: {cure_of(why.codes)}."
 
 
 def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warnings: int) -> str:
@@ -45,10 +56,19 @@ def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warni
         known = f"no pictures, so the true distance is not known; {count} felt"
     elif truth.known:
         known = f"the true distance is known for {truth.known} of {count}, to {truth.d_x_text}"
+        if truth.in_doubt:
+            known += _in_doubt(truth)
     else:
         known = f"the true distance is known for none of {count}"
     warned = f"{counted(warnings, 'doubt')}, see below" if warnings else "nothing doubtful"
     return f"{session}: {known}; {warned}."
+
+
+def _in_doubt(truth: TruthUncertainty) -> str:
+    """Return of how many whisks the truth is in doubt, and by what where the others have a verdict."""
+    if truth.in_doubt == truth.known:
+        return ", but in doubt"
+    return f", but in doubt for {truth.in_doubt} of these ({truth.contradiction})"
 
 
 def _recommendation(judged: Sequence[Accuracy], theta_deg: float) -> str:

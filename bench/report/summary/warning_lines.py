@@ -1,7 +1,7 @@
 """Warnings of each whisk, and what the light hides."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from bench.analyses.runs import RUNS
@@ -33,17 +33,20 @@ class _Warned:
     sigma_mm: float
 
 
-def whisk_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:
+def whisk_warnings(
+    results: Iterable[TrialResult], of_session: Iterable[str] = ()
+) -> Iterator[Reason]:
     """Yield a line for each cause of warnings of whisks, and of estimators that failed.
 
-    A gauge trial that cannot be judged is as it should be; limits of estimators are in
-    `estimator_limits`.
+    of_session: warnings that have a line of their own, whichever whisks they reach. A gauge trial
+    that cannot be judged is as it should be; limits of estimators are in `estimator_limits`.
     """
+    said = {part for line in of_session for part in as_reason(line).parts}
     results = list(results)
     by_cause: dict[tuple[str, ...], list[_Warned]] = {}
     for result, seen, felt in whisks(results):
         name = f"{result.trial.name}, whisk {seen.whisk}"
-        statuses = [as_reason(status) for status in (seen.status, felt.status)]
+        statuses = [_without(said, status) for status in (seen.status, felt.status)]
         status = in_one_status(*(one for one in statuses if not is_silent(one)))
         found = [status] if status else []
         if felt.saturated:
@@ -56,6 +59,11 @@ def whisk_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:
     for estimator, warned in _answers(results):
         if FAILURES.intersection(warned[0].status.codes):
             yield _cause_line(warned, f", {estimator}")
+
+
+def _without(said: Collection[tuple[str, str]], status: Reason) -> Reason:
+    """Return a status without those sentences that are said elsewhere."""
+    return Reason.of_parts(part for part in as_reason(status).parts if part not in said)
 
 
 def estimator_limits(results: Iterable[TrialResult]) -> Iterator[Reason]:

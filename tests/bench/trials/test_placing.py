@@ -124,7 +124,7 @@ def test_where_no_stroke_can_be_read_what_turns_elsewhere_is_a_warning(place, mo
 
 def test_a_board_by_ruler_wants_strokes_wide_enough(place):
     _, (warning,), _ = place(0 * OFF, sigma_mm=2.0, width_deg=1.5)
-    assert warning.codes == ("board_misplaced",)
+    assert warning.codes == ("swing_narrow",)
 
 
 def test_without_a_board_the_strokes_place_the_rig(place):
