@@ -216,6 +216,13 @@ _TABLE = (
         _CHECK_CHANNELS,
     ),
     Status(
+        "moments_implausible",
+        WARNING,
+        "moments are not of the size that this whisker can give",
+        "check the unit of m_y_Nmm and m_z_Nmm, and [whisker]",
+        reaches=(ESTIMATES,),
+    ),
+    Status(
         "force_reversed",
         WARNING,
         "no friction holds the whisker at this angle, unless a channel is reversed",
@@ -294,6 +301,12 @@ _TABLE = (
         "fasten bar and hub: whisks of one recording should give one d_x",
     ),
     Status("frames_damaged", WARNING, "pictures cannot be read", _FRAMES_LOST),
+    Status(
+        "exposure_changed",
+        WARNING,
+        "frames are far brighter or darker than most, and were left out",
+        "fix exposure, gain and light, and record the trial again",
+    ),
     Status(
         "rows_repeated", WARNING, "rows of frame times were repeated, and dropped", _FRAMES_LOST
     ),

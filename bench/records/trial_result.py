@@ -217,8 +217,8 @@ class BackStroke:
 class SeenTrial:
     """The seen half of a trial; bar, radii and clock are missing where there are no pictures.
 
-    notes: lines on frames that were dropped, corrected or left out. damaged: which frames
-    cannot be read. bar_looks: ratio of the
+    notes: lines on frames that were dropped or corrected. damaged: which frames cannot be read,
+    or were left out for their exposure. bar_looks: ratio of the
     bar's apparent to its stated diameter, by camera. one_sided_light: the width of the wire that is
     seen, by camera that sees light from one side. back: the first back stroke, where it was recorded
     and has a truth. ways_back: the way back of each whisk, run backwards, where the trial evaluates

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bench.session.plausible import PlausibleRange
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.differences import (
@@ -25,6 +26,13 @@ _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
 # A whisker leans on a bar within its friction angle of the bar's normal. μ = 1 is more than rubber or coarse sandpaper
 # does to metal or plastic; the paper's is 0.43 (Fig. 8, sandpaper).
 _STEEPEST_FRICTION_RAD = np.radians(45.0)
+
+# [1] Of the moment of a push at the tip without slip: a slope of 87° leaves that much of it, less
+# at a tip that tapers. Stated.
+_LEAST_MOMENT_SHARE = 0.01
+# [1] Of the same: a contact at a fiftieth of the length. Stated.
+_LARGEST_MOMENT_SHARE = 50.0
+_MOMENT_UNITS = (("N·m", 1e3), ("N·µm", 1e-3), ("nN·m", 1e-6))
 
 _LOST = "a frame before frame {} looks lost; pictures after it have the times of the one before"
 _ADDED = "a frame too many before frame {}; pictures after it have the times of the next"
@@ -226,6 +234,27 @@ def _from_normal(phi_rad: float, beta: Value) -> float:
     """Return the angle of φ with the bar's normal, 0 to π rad."""
     difference = phi_rad - beta.value
     return abs(float(np.arctan2(np.sin(difference), np.cos(difference))))
+
+
+def check_moment_size(moments_Nmm: np.ndarray, theta_rad: float, whisker: Whisker) -> Reason:
+    """Compare moments recorded as such with what this whisker can give: a unit is a factor of 1000.
+
+    moments_Nmm (2,): m_y, m_z at the pushing angle.
+    """
+    beam = whisker.beam
+    most_Nmm = beam.C_Nmm2 * theta_rad / beam.length_mm  # of a rod touched at its tip, without slip
+    plausible = PlausibleRange(
+        _LEAST_MOMENT_SHARE * most_Nmm, _LARGEST_MOMENT_SHARE * most_Nmm, _MOMENT_UNITS
+    )
+    size_Nmm = float(np.linalg.norm(moments_Nmm))
+    if not np.isfinite(size_Nmm) or plausible.holds(size_Nmm):
+        return NO_REASON
+    guess = plausible.guess(size_Nmm) or " Are these another unit, or volts?"
+    limits = (
+        f"a push by {np.degrees(theta_rad):g}° gives {plausible.low:.2g} to {plausible.high:.2g}"
+    )
+    sentence = f"the moment is {size_Nmm:.3g} N·mm, {limits} with this whisker.{guess}"
+    return Reason("moments_implausible", sentence)
 
 
 def nominal_slope(trial: Trial) -> Value:

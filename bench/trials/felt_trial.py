@@ -28,8 +28,8 @@ from bench.records.trial_result import (
     WithDrift,
 )
 from bench.session.signals import Signals
-from bench.trials.agreement import MomentAgreement, agreement
-from bench.trials.consistency import check_friction_cone, nominal_slope
+from bench.trials.agreement import MomentAgreement, OtherReading, agreement, other_units
+from bench.trials.consistency import check_friction_cone, check_moment_size, nominal_slope
 from bench.trials.contradictions import against_estimates
 from bench.trials.estimates import answers, as_felt, estimators, felt_at
 from bench.trials.gate import kinetic_of
@@ -226,6 +226,10 @@ def _against_pictures(
     """
     if seen.deflection is None:
         odd = check_friction_cone(felt.phi_felt_rad, nominal_slope(unit.trial), "felt")
+        if not readout.is_gauged:
+            moments = np.array([felt.m_y_Nmm.value, felt.m_z_Nmm.value])
+            size = check_moment_size(moments, unit.settings.theta_rad, unit.session.whisker)
+            odd = joined(odd, size)
         is_apart = seen.contradicted or bool(odd)
         return replace(felt, apart=is_apart, status=joined(felt.status, odd))
     if seen.contradicted:
@@ -245,7 +249,12 @@ def against_shape(unit: Unit, readout: Readout, pairs: Pairs) -> MomentAgreement
 
     Moments that have newtons of their own also depend on how well the rigidity is known.
     """
-    return agreement(pairs, readout.gauges, _stiffness_share(unit, readout, of_wire=False))
+    others = other_units(readout.gauges, readout.is_gauged)
+    if unit.gauges is not None and not readout.is_gauged:
+        sentence = "m_y_Nmm and m_z_Nmm look like the gauges' volts: name them y_V and z_V"
+        others.append(OtherReading(unit.gauges.all, sentence))
+    scale_sigma = _stiffness_share(unit, readout, of_wire=False)
+    return agreement(pairs, readout.gauges, scale_sigma, others)
 
 
 def readout_of(unit: Unit, kind: str) -> tuple[Readout | None, Reason]:

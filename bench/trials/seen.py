@@ -36,7 +36,7 @@ from bench.trials.one_camera import by_one_camera
 from bench.trials.seeing import presets_for
 from bench.trials.trial_frames import TrialFrames
 from vision import Smooth, TrialTruth, Value, WhiskTruth, observe_trial
-from vision.geometry import Reason, Refused
+from vision.geometry import Reason, Refused, joined
 from vision.pictures import Others
 
 NO_PICTURES = reason("no_pictures")
@@ -99,12 +99,16 @@ def _see(
     warnings = frames.scene.left_out.values()
     seen = []
     for name, whisk in whisks:
+        if whisk.status:  # what the missing frames may have cost comes with their cause
+            whisk = replace(whisk, status=joined(*frames.scene.unusable, whisk.status))
         record = _whisk_of_trial(session, trial, whisk, settings, warnings, of_trial)
         seen.append(replace(record, looked=name))
     return SeenTrial(
         tuple(seen),
         notes=_notes(frames),
-        damaged=in_one_status(*_damaged_frames(frames.by_camera, frames.times)),
+        damaged=in_one_status(
+            *_damaged_frames(frames.by_camera, frames.times), *frames.scene.unusable
+        ),
         bar=BarLine(truth.bar_point_mm, truth.bar_direction),
         bar_radius_mm=0.5 * trial.bar_diameter_mm,
         wire_radius_mm=0.5 * frames.rods.wire.diameter_mm,

@@ -2,7 +2,7 @@
 any amount, mirrored or exchanged, a lens cap, an exposure that changed.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -39,12 +39,14 @@ class StillScene:
     """Frames whose still scene is that of the rig picture.
 
     frames: by camera and index, as evenly exposed as they can be made. left_out: a line on each
-    camera that shows another scene. notes: lines on frames that were corrected.
+    camera that shows another scene. notes: lines on frames that were corrected. unusable: a line on
+    each camera with frames that were left out, for they are far brighter or darker than most.
     """
 
     frames: dict[str, Pictures]
     left_out: dict[str, Reason]
     notes: tuple[str, ...]
+    unusable: tuple[Reason, ...] = ()
 
 
 def still_scene(
@@ -54,7 +56,7 @@ def still_scene(
     # It imports all of the calibration, which `check` does without.
     from bench.cameras.session_cameras import moved_cameras
 
-    kept, left_out, notes = {}, {}, []
+    kept, left_out, notes, unusable = {}, {}, [], []
     for name, pictures in frames.items():
         fault = "none of its frames can be read"
         if pictures:
@@ -62,10 +64,11 @@ def still_scene(
         if fault:
             left_out[name] = Reason("camera_left_out", f"camera {name} was left out: {fault}")
         else:
-            kept[name], lines = evenly_exposed(name, pictures)
-            notes += lines
+            kept[name], corrected, lost = evenly_exposed(name, pictures)
+            notes += corrected
+            unusable += lost
     moved = moved_cameras(session, calibration, kept)
-    return StillScene(kept, left_out | moved, tuple(notes))
+    return StillScene(kept, left_out | moved, tuple(notes), tuple(unusable))
 
 
 def other_scene(name: str, pictures: Pictures, background: Mapping[str, np.ndarray | None]) -> str:
@@ -109,10 +112,11 @@ def _moved_sentence(found: Likeness) -> str:
     )
 
 
-def evenly_exposed(name: str, pictures: Pictures) -> tuple[Pictures, list[str]]:
-    """Return the pictures as bright as they are in the median, and lines on those that were not.
+def evenly_exposed(name: str, pictures: Pictures) -> tuple[Pictures, list[str], list[Reason]]:
+    """Return the pictures as bright as they are in the median, with lines on those that were not.
 
-    A picture whose brightness is too far from that is left out.
+    The first lines are on pictures that were corrected, the others on those that were left out, for
+    their brightness is too far from that.
     """
     indices = sorted(pictures)
     full_scale = float(np.iinfo(pictures[indices[0]].dtype).max)
@@ -123,24 +127,33 @@ def evenly_exposed(name: str, pictures: Pictures) -> tuple[Pictures, list[str]]:
             is_usable = 1.0 / _MOST_CORRECTED < gain < _MOST_CORRECTED
             (corrected if is_usable else lost)[k] = gain
     if not corrected and not lost:
-        return pictures, []
+        return pictures, [], []
     even = {}
     for k, grey in pictures.items():
         if k not in lost:
             even[k] = _divided(grey, corrected[k]) if k in corrected else grey
-    return even, list(_exposure_lines(name, corrected, lost, len(indices)))
+    return (
+        even,
+        list(_corrected_lines(name, corrected, indices)),
+        list(_lost_lines(name, lost, indices)),
+    )
 
 
-def _exposure_lines(
-    name: str, corrected: Mapping[int, float], lost: Mapping[int, float], count: int
+def _corrected_lines(
+    name: str, corrected: Mapping[int, float], indices: Sequence[int]
 ) -> Iterator[str]:
-    """Yield a line on the frames that were corrected, and one on those that were left out."""
+    """Yield a line on the frames that were corrected, of those with these indices."""
     if corrected:
-        found = _brightness(corrected, count, digits=3)
-        yield f"camera {name}: {found}, made good ({_first_frames(corrected)})"
+        found = _brightness(corrected, len(indices), digits=3)
+        yield f"camera {name}: {found}, made good ({_which_frames(corrected, indices)})"
+
+
+def _lost_lines(name: str, lost: Mapping[int, float], indices: Sequence[int]) -> Iterator[Reason]:
+    """Yield a line on the frames that were left out, of those with these indices."""
     if lost:
-        found = _brightness(lost, count, digits=2)
-        yield f"camera {name}: {found}, left out ({_first_frames(lost)}): fix exposure and gain"
+        found = _brightness(lost, len(indices), digits=2)
+        line = f"camera {name}: {found}, left out ({_which_frames(lost, indices)}): fix exposure and gain"
+        yield Reason("exposure_changed", line)
 
 
 def _brightness(gains: Mapping[int, float], count: int, *, digits: int) -> str:
@@ -151,11 +164,17 @@ def _brightness(gains: Mapping[int, float], count: int, *, digits: int) -> str:
     return f"{len(gains)} of {count} frames {are} {times} times as bright as most"
 
 
-def _first_frames(indices: Collection[int]) -> str:
-    """Return the first frames by number, with an ellipsis where there are more."""
-    label = ", ".join(map(str, list(indices)[:_MOST_NAMED]))
-    frames = "frame" if len(indices) == 1 else "frames"
-    return f"{frames} {label}" + (", …" if len(indices) > _MOST_NAMED else "")
+def _which_frames(changed: Collection[int], indices: Sequence[int]) -> str:
+    """Return the changed frames by number: those from one on, or up to one, or the first of them."""
+    frames = sorted(changed)
+    if len(frames) > 1:
+        if frames == list(indices[-len(frames) :]):
+            return f"from frame {frames[0]} on"
+        if frames == list(indices[: len(frames)]):
+            return f"up to frame {frames[-1]}"
+    label = ", ".join(map(str, frames[:_MOST_NAMED]))
+    more = ", …" if len(frames) > _MOST_NAMED else ""
+    return f"{'frame' if len(frames) == 1 else 'frames'} {label}{more}"
 
 
 def _divided(grey: np.ndarray, gain: float) -> np.ndarray:

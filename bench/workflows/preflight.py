@@ -25,6 +25,8 @@ from bench.session.session import Session
 from bench.session.session_check import checked_views, find_damage
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
+from bench.session.whisker import Whisker
+from bench.trials.consistency import check_moment_size
 from bench.trials.still_scene import evenly_exposed, other_scene
 from vision import FEWEST_FREE
 from vision.boards import (
@@ -135,9 +137,22 @@ def _check_trials(
             signals = read_signals(trial)
             strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
             if trial.purpose == "gauge" and signals.kind == "V":
-                pushes_V += _pushes_V(strokes)
+                pushes_V += _pushes(strokes)
+            if session.whisker is not None and signals.kind == "Nmm":
+                _check_moments(trial, strokes, session.whisker, problems)
             _check_trial(trial, signals, strokes, rig, problems)
     return pushes_V
+
+
+def _check_moments(
+    trial: Trial, strokes: Sequence[FeltStroke], whisker: Whisker, problems: InputProblems
+) -> None:
+    """Add a warning for each whisk with moments that this whisker cannot give."""
+    theta_rad = Settings().theta_rad
+    for number, moments_Nmm in enumerate(_pushes(strokes)):
+        odd = check_moment_size(moments_Nmm, theta_rad, whisker)
+        if odd:
+            problems.warn(odd.about(f"{trial.place}, whisk {number}"))
 
 
 def _check_trial(
@@ -159,8 +174,8 @@ def _check_trial(
         problems.warn(f"{trial.place}: {line}")
 
 
-def _pushes_V(strokes: Sequence[FeltStroke]) -> Iterator[np.ndarray]:
-    """Yield the volts (2,) of each stroke at the usual pushing angle, where it gets there."""
+def _pushes(strokes: Sequence[FeltStroke]) -> Iterator[np.ndarray]:
+    """Yield the channels (2,) of each stroke at the usual pushing angle, where it gets there."""
     for stroke in strokes:
         touch = stroke.touch()
         if touch.status:
@@ -262,5 +277,8 @@ def _scene_warnings(trial: Trial, times: FrameTimes, rig: dict[str, np.ndarray])
         if fault:
             yield f"camera {name}: {fault}"
         else:
-            _, warnings = evenly_exposed(name, pictures)
-            yield from warnings
+            _, _, lost = evenly_exposed(name, pictures)
+            if lost:  # some of the frames have shown it; all of them tell which
+                every = read_trial(trial, times)[name]
+                _, _, lost = evenly_exposed(name, every)
+            yield from lost

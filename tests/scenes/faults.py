@@ -323,6 +323,7 @@ FAULTS: dict[str, Fault] = {
     "frame times 1.01": _times(scaled("time_s", 1.01)),
     "encoder scale 1.01": _signals(scaled("motor_deg", 1.01)),
     "moments in N m": _moments(1e-3),
+    "moments in N mm": _moments(1.0),
     "moments in N um": _moments(1e3),
     "volts named Nmm": _volts_named_Nmm,
     "millivolts": _signals(_millivolts),

@@ -16,7 +16,7 @@ from bench.gauges.matrix import (
     to_follicle,
 )
 from bench.rig.simulation import simulate
-from bench.trials.agreement import agreement
+from bench.trials.agreement import agreement, other_units
 from bench.trials.differences import LEAST_CHANCE
 from bench.trials.felt_trial import against_shape
 from bench.trials.readout import Readout
@@ -81,6 +81,39 @@ def test_what_stands_out_is_named(rng, spoil, said, value, within):
         assert float(found.cause.removeprefix(said).split()[0].strip("°%")) == pytest.approx(
             value, abs=within
         )
+
+
+@pytest.mark.parametrize(
+    ("factor", "is_gauged", "said"),
+    [
+        (1e3, True, "y_V and z_V look like millivolts"),
+        (1e-3, True, "the gauges' factors look like N·m per volt"),
+        (1e-3, False, "m_y_Nmm and m_z_Nmm look like N·m: multiply them by 1000"),
+        (1e3, False, "m_y_Nmm and m_z_Nmm look like N·µm: multiply them by 0.001"),
+        (1e6, False, "m_y_Nmm and m_z_Nmm look like nN·m: multiply them by 1e-06"),
+    ],
+)
+def test_a_factor_of_a_thousand_is_a_unit(rng, factor, is_gauged, said):
+    """Beside it a gauge may have slipped by a tenth, which is said once the unit is right."""
+    spoilt = pairs(rng, factor * np.diag([0.9, 1.0]))
+    found = agreement(spoilt, GAUGES, others=other_units(GAUGES, is_gauged))
+    assert found.is_explained and found.cause.startswith(said)
+
+
+def test_a_fault_of_a_gauge_is_no_unit(rng):
+    for spoil in (np.diag([-1, 1]), np.diag([0.2, 1]), np.eye(2) / 3.0, np.eye(2)[::-1]):
+        found = agreement(pairs(rng, spoil), GAUGES, others=other_units(GAUGES, is_gauged=True))
+        assert "look like" not in found.cause
+
+
+def test_volts_named_moments_are_told_by_the_session_s_gauges(rng):
+    """Recorded as moments, they are read without gauges: a tenth of what the whisker gives."""
+    wire = SimpleNamespace(C_Nmm2=9000.0, C_sigma_Nmm2=0.0)
+    unit = SimpleNamespace(
+        session=SimpleNamespace(whisker=wire), gauges=GaugeCalibration(GAUGES, FROM_FILE)
+    )
+    found = against_shape(unit, Readout.bare(), pairs(rng))
+    assert found.cause == "m_y_Nmm and m_z_Nmm look like the gauges' volts: name them y_V and z_V"
 
 
 def test_what_no_gauge_does_may_be_another_trials_signals(rng):

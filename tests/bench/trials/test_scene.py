@@ -65,20 +65,35 @@ def series(gains, rng):
 
 def test_exposure_is_made_good(rng):
     pictures = series([1.0, 1.0, 1.0, 1.1, 0.85], rng)
-    even, lines = evenly_exposed("low", pictures)
+    even, lines, lost = evenly_exposed("low", pictures)
+    assert not lost
     assert lines == [
-        "camera low: 2 of 5 frames are 0.850 to 1.100 times as bright as most, made good (frames 3, 4)"
+        "camera low: 2 of 5 frames are 0.850 to 1.100 times as bright as most, made good (from frame 3 on)"
     ]
     for grey in even.values():
         np.testing.assert_allclose(grey, pictures[0].astype(float), atol=1.1)
 
 
 def test_exposure_far_off_is_left_out(rng):
-    even, lines = evenly_exposed("low", series([1.0, 1.0, 1.0, 1.5], rng))
-    assert sorted(even) == [0, 1, 2]
-    assert "1 of 4 frames is 1.50 times as bright as most, left out (frame 3)" in lines[0]
+    even, corrected, (line,) = evenly_exposed("low", series([1.0, 1.0, 1.0, 1.5], rng))
+    assert sorted(even) == [0, 1, 2] and not corrected
+    assert "1 of 4 frames is 1.50 times as bright as most, left out (frame 3)" in line
+    assert line.codes == ("exposure_changed",)
+
+
+@pytest.mark.parametrize(
+    ("gains", "which"),
+    [
+        ([1, 1, 1, 1.3, 1.3], "from frame 3 on"),
+        ([1.3, 1.3, 1, 1, 1], "up to frame 1"),
+        ([1, 1.3, 1, 1.3, 1], "frames 1, 3"),
+    ],
+)
+def test_light_that_changes_names_its_frames(rng, gains, which):
+    _, _, (line,) = evenly_exposed("low", series(gains, rng))
+    assert f"2 of 5 frames are 1.30 times as bright as most, left out ({which})" in line
 
 
 def test_even_exposure_is_left_alone(rng):
     pictures = series([1.0, 1.02, 0.99, 1.0], rng)
-    assert evenly_exposed("low", pictures) == (pictures, [])
+    assert evenly_exposed("low", pictures) == (pictures, [], [])

@@ -51,6 +51,17 @@ def test_a_fault_of_a_trial(small_copy, fault, expected):
     assert any(note.startswith(f"trials/{TRIAL}: ") and expected in note for note in notes), notes
 
 
+@pytest.mark.parametrize(("unit", "is_told"), [("N·mm", False), ("N·m", True)])
+def test_moments_in_another_unit(small_copy, unit, is_told):
+    """evaluate says the same by the shape that is seen."""
+    (small_copy / "gauges.toml").write_text(
+        "offset_V = [0.0, 0.0]\nmatrix_Nmm_per_V = [[11.3, 0.3], [-0.2, 10.5]]\n"
+    )
+    FAULTS["moments in N m" if is_told else "moments in N mm"](small_copy)
+    told = [note for note in found(small_copy).warnings if "Is it in N·m?" in note]
+    assert len(told) == is_told
+
+
 def test_gauges_brought_along_to_a_session_without_its_whisker(small_copy):
     """What gauges.toml rests on cannot be looked up; that the whisker is missing is said, and nothing else."""
     manifest = small_copy / "session.toml"
