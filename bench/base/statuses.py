@@ -146,6 +146,13 @@ _TABLE = (
         "slip is hardly known",
         "bring a camera nearer, or place one that does not look along the bar",
     ),
+    Status(
+        "camera_late",
+        WARNING,
+        "a camera shows each frame some frames later than the others",
+        "look at which of that camera's pictures is the first, and number them so that all cameras' agree",
+        reaches=(TRUTH,),
+    ),
     Status("camera_moved", WARNING, "a camera moved and was left out", _FASTEN_CAMERA),
     Status("cameras_contradict", WARNING, "the cameras see different whisks", _FASTEN_CAMERA),
     Status(

@@ -132,7 +132,8 @@ def _strokes(results: Iterable[TrialResult]) -> Iterator[np.ndarray]:
     for result in results:
         clock_s = result.seen.clock.sigma_s if result.seen.clock else 0.0
         for seen, felt in zip(result.seen.whisks, result.felt.whisks):
-            if np.isfinite(seen.touch_rad.value):
+            # A camera that is late is no clock's fault, and has a status of its own.
+            if np.isfinite(seen.touch_rad.value) and "camera_late" not in seen.status.codes:
                 speed = motor_speed(seen.frames)
                 shared = np.hypot(seen.touch_shared_rad, clock_s * speed)
                 touch = Value(felt.touch_felt_rad.value, felt.theta_sigma_rad)
@@ -219,6 +220,7 @@ def _probable_cause(shared: SharedTouch) -> str:
             "that nothing touches the whisker or its gauges earlier"
         )
     return (
-        "likeliest the clock of frames or signals, else diameters or the gauges' onset: strokes of one speed and "
-        "direction do not tell which; record back strokes with frames, or another speed"
+        "likeliest the clock of frames or signals, or one camera's pictures counted from another frame, else diameters "
+        "or the gauges' onset: strokes of one speed and direction do not tell which; record back strokes with frames, "
+        "or another speed, or a third camera"
     )

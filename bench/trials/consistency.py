@@ -19,7 +19,7 @@ from bench.trials.differences import (
     without_mean,
 )
 from vision import UNKNOWN, Turns, Value, combine_widths
-from vision.geometry import NO_REASON, Board, Reason
+from vision.geometry import NO_REASON, Board, Reason, counted
 
 # Of a nominal slope that states no sigma: a bar set by eye and a protractor, written in steps of 5°.
 _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
@@ -27,6 +27,9 @@ _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
 # does to metal or plastic; the paper's is 0.43 (Fig. 8, sandpaper).
 _STEEPEST_FRICTION_RAD = np.radians(45.0)
 
+# [frames] A camera that is late by one looks so by a third at least: the fit takes the rest for an
+# offset of its lines. Study: tests/vision/fit/test_camera_delays.py.
+_LEAST_DELAY_FRAMES = 0.25
 # [1] Of the moment of a push at the tip without slip: a slope of 87° leaves that much of it, less
 # at a tip that tapers. Stated.
 _LEAST_MOMENT_SHARE = 0.01
@@ -95,6 +98,29 @@ def _time_message(frame: int, speed_rad_s: float) -> Callable[[float], str]:
     return lambda size: (
         f"frame {frame} looks taken {1e3 * size / speed_rad_s:+.1f} ms from its time"
     )
+
+
+def check_camera_delays(delays: Mapping[str, Value]) -> Reason:
+    """Compare the cameras with each other: does one show each frame some frames later than the rest?
+
+    delays: of each camera if the others have none, frames.
+    """
+    if len(delays) < 2:
+        return NO_REASON
+    name = max(delays, key=lambda camera: abs(delays[camera].value) / delays[camera].sigma)
+    late = delays[name].value
+    is_chance = Difference.scalar(late, delays[name].sigma).is_chance
+    if abs(late) < _LEAST_DELAY_FRAMES or is_chance:
+        return NO_REASON
+    others = "the others"
+    if len(delays) == 2:
+        others = f"camera {next(other for other in delays if other != name)}"
+    frames = counted(max(1, round(abs(late))), "frame")
+    found = f"camera {name} looks {frames} {'later' if late > 0 else 'earlier'} than {others}"
+    cause = (
+        "one of them lost a frame, or its pictures are numbered from another one, or it was moved"
+    )
+    return Reason("camera_late", f"{found}: {cause}")
 
 
 def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board | None) -> Reason:

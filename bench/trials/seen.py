@@ -26,6 +26,7 @@ from bench.session.signals import Signals, forward_strokes
 from bench.session.trial import Trial
 from bench.trials.consistency import (
     check_bar_width,
+    check_camera_delays,
     check_friction_cone,
     check_length,
     check_slope,
@@ -263,10 +264,11 @@ def whisk_record(
     """
     at = truth.at(settings.theta_rad)
     contradictions = list(contradictions)
+    contradictions.append(check_camera_delays(truth.delays))
     if truth.frames:
         contradictions.append(check_turns(truth.turns, motor_speed(truth.frames)))
     return SeenWhisk(
-        truth=replace(truth, overlay={}, ends={}, widths={}, smooth=None, problem=None),
+        truth=replace(truth, overlay={}, ends={}, widths={}, delays={}, smooth=None, problem=None),
         status=in_one_status(truth.status, at.status, *contradictions, *warnings),
         at=at,
         deflection=_known_deflection(truth),

@@ -48,13 +48,18 @@ def frame_turns(problem: Problem, state: State, index: Sequence[int]) -> Turns:
     return Turns(np.asarray(index), problem.motor_rad, turn_rad, covariance[-count:, -count:])
 
 
-def _by_turns(problem: Problem, state: State, linear: Linear) -> np.ndarray:
-    """Return derivatives (n, f) of all residuals by the turn of each frame."""
+def by_turn(problem: Problem, state: State, linear: Linear) -> np.ndarray:
+    """Return derivatives (n,) of all residuals by the turn of the frame that each is of."""
     turned_problem = replace(problem, motor_rad=problem.motor_rad + _STEP_RAD)
     turned, _ = linearise(turned_problem, state, linear.jacobian)
-    by_turn = (turned.residual - linear.residual) / _STEP_RAD
-    is_of_frame = _frame_of_row(problem, len(by_turn))[:, None] == np.arange(len(problem.motor_rad))
-    return is_of_frame * by_turn[:, None]
+    return (turned.residual - linear.residual) / _STEP_RAD
+
+
+def _by_turns(problem: Problem, state: State, linear: Linear) -> np.ndarray:
+    """Return derivatives (n, f) of all residuals by the turn of each frame."""
+    own = by_turn(problem, state, linear)
+    is_of_frame = _frame_of_row(problem, len(own))[:, None] == np.arange(len(problem.motor_rad))
+    return is_of_frame * own[:, None]
 
 
 def _frame_of_row(problem: Problem, count: int) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
+from vision.fit.camera_delays import camera_delays
 from vision.fit.motion import Gives, StatedVelocity
 from vision.fit.one_camera_less import contradiction
 from vision.fit.refinements import Fit, LeftOut, left_out
@@ -316,11 +317,18 @@ def _truth(explained: Explanation) -> WhiskTruth:
         refinements=refinements,
         status=status,
         turns=frame_turns(fitted.problem, fitted.state, fitted.frames),
+        delays=_delays(fitted),
         base=base_lines(*free, fitted.uncertainty.lens),
         ends=wire_ends(whisk, fitted),
         widths=wire_widths(whisk, fitted) if checks_beam and whisk.number == 0 else {},
         beam=beam,
     )
+
+
+def _delays(fitted: FittedWhisk) -> dict[str, Value]:
+    """Return by how many frames each camera shows the whisker later than the others."""
+    delays = camera_delays(fitted.problem, fitted.state)
+    return {name: Value(*delay) for name, delay in delays.items()}
 
 
 def _warnings(

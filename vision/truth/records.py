@@ -106,7 +106,8 @@ class WhiskTruth:
     d_x_mm is NaN exactly where there is no truth; `status` says why, or holds warnings.
     overlay: lines to draw by frame and camera. budget: shares of d_x's variance by cause. base: the
     whisker's base in the frames before touch. beam: the comparison with a curve that is no beam.
-    turns: the whisker's rotation in each frame of the fit beyond the motor's. refinements: what the
+    turns: the whisker's rotation in each frame of the fit beyond the motor's. delays: by camera, by how
+    many frames it shows the whisker later than the others. refinements: what the
     truth would be without each part of the model, by name. lines: the precision of each camera's
     lines. ends: by camera how far from its base, mm, the whisker is seen to end; widths: its width
     in the pictures over the stated one, of a trial's first whisk. point_covariance_mm2 (3, 3): of
@@ -133,6 +134,7 @@ class WhiskTruth:
     base: BaseLines | None = None
     beam: BeamCheck | None = None
     turns: Turns | None = None
+    delays: dict[str, Value] = field(default_factory=dict, metadata=_OPTIONAL)
     refinements: dict[str, LeftOut] = field(default_factory=dict)
     lines: dict[str, LineNoise] = field(default_factory=dict)
     ends: dict[str, Value] = field(default_factory=dict, metadata=_OPTIONAL)

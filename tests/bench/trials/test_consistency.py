@@ -6,11 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bench.gauges.matrix import GaugeMatrix
 from bench.records.trial_result import FeltWhisk
 from bench.session.session import load_session
 from bench.session.whisker import Whisker
 from bench.trials.consistency import (
     check_bar_width,
+    check_camera_delays,
     check_friction_cone,
     check_length,
     check_slope,
@@ -20,6 +22,7 @@ from bench.trials.consistency import (
 )
 from bench.trials.felt_trial import _against_pictures
 from bench.trials.placing import _scale_cause
+from bench.trials.readout import Readout
 from tests.scenes.model_scenes import begun, scene, with_points
 from tests.scenes.results import seen_whisk
 from vision.calibration.place import Placement, by_board
@@ -262,6 +265,28 @@ def test_reversed_gauges_are_told_without_a_picture(trial):
     felt = FeltWhisk(phi_felt_rad=degrees(-50.0, 0.5))
     for beta_deg, apart in ((60.0, True), (-60.0, False), (None, False)):
         unit = SimpleNamespace(trial=replace(trial, beta_deg=beta_deg))
-        found = _against_pictures(felt, unit, None, None, seen_whisk())
+        gauged = Readout(GaugeMatrix(np.eye(2)), is_gauged=True)
+        found = _against_pictures(felt, unit, None, gauged, seen_whisk())
         assert found.apart == apart and ("force_reversed" in found.status.codes) == apart
     assert nominal_slope(trial).sigma == pytest.approx(np.radians(3.0))
+
+
+@pytest.mark.parametrize(
+    ("delays", "said"),
+    [
+        ({"a": Value(0.1, 0.05), "b": Value(-0.1, 0.05)}, ""),
+        ({"a": Value(0.6, 0.5), "b": Value(-0.6, 0.5)}, ""),
+        (
+            {"a": Value(-0.2, 0.03), "b": Value(0.5, 0.03), "c": Value(-0.3, 0.05)},
+            "camera b looks 1 frame later than the others",
+        ),
+        (
+            {"a": Value(-0.9, 0.1), "b": Value(0.7, 0.2)},
+            "camera a looks 1 frame earlier than camera b",
+        ),
+        ({"a": Value(0.0, 0.1)}, ""),
+    ],
+)
+def test_a_camera_late_by_a_frame_is_named(delays, said):
+    found = check_camera_delays(delays)
+    assert found.startswith(said) and bool(found) == bool(said)

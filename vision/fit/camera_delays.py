@@ -1,0 +1,55 @@
+"""By how many frames each camera shows the whisker later than the others do: cameras compared.
+
+A camera that lost a frame, or whose pictures are numbered from another one, has every picture in the
+place of the next. It shows the whisker where it was, which the other cameras contradict whatever
+clock or encoder say. One more step of the fit, with a column for the delay of one camera, gives it.
+"""
+
+import numpy as np
+
+from vision.fit.covariance import camera_rows, times_residual_covariance
+from vision.fit.problem import Problem, State, point_rows
+from vision.fit.solve import LAST_SCALE, linear_at, robust_weights
+from vision.fit.turns import by_turn
+
+# [frames⁻²] Information on the delay of a camera that shows no wire, which would run away. Stated.
+_PRIOR = 1e-4
+
+
+def camera_delays(problem: Problem, state: State) -> dict[str, tuple[float, float]]:
+    """Return the delay of each camera in frames, the others having none, and its sigma.
+
+    There is none of a single camera. The fit has converged.
+    """
+    names = problem.cameras.names
+    if len(names) < 2:
+        return {}
+    linear = linear_at(problem, state)
+    weight = robust_weights(linear, LAST_SCALE)
+    columns = _by_delay(problem, by_turn(problem, state, linear))
+    by_cameras = camera_rows(problem, state)
+    found = {}
+    for name, column in zip(names, columns.T):
+        jacobian = np.column_stack([linear.jacobian, column])
+        weighted = jacobian.T * weight
+        prior = np.append(np.zeros(problem.size), _PRIOR)
+        gain = -np.linalg.solve(weighted @ jacobian + np.diag(prior), weighted)[-1:]  # (1, n)
+        by_camera = gain[:, linear.is_point] @ by_cameras
+        variance = times_residual_covariance(problem, gain) @ gain.T
+        variance += by_camera @ problem.cameras.covariance @ by_camera.T
+        found[name] = (float(gain[0] @ linear.residual), float(np.sqrt(variance[0, 0])))
+    return found
+
+
+def _by_delay(problem: Problem, by_turn_rad: np.ndarray) -> np.ndarray:
+    """Return derivatives (n, cameras) of all residuals by the delay of each camera in frames.
+
+    by_turn_rad (n,): by the whisker's turn in the frame of each residual.
+    """
+    motor = problem.motor_rad
+    behind = -np.diff(motor, prepend=2.0 * motor[0] - motor[1])  # (f,) rad, of one frame
+    columns = np.zeros((len(by_turn_rad), len(problem.cameras)))
+    for seen, rows in point_rows(problem):
+        if seen.frame >= 0:
+            columns[rows, seen.camera] = by_turn_rad[rows] * behind[seen.frame]
+    return columns
