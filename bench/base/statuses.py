@@ -243,6 +243,13 @@ _TABLE = (
         _CHECK_CHANNELS,
     ),
     Status(
+        "pictures_exchanged",
+        WARNING,
+        "the pictures of trials {names} look exchanged, or their trial.toml: "
+        "each shows the slope that the other states",
+        "find the recordings that belong to these trials, and copy them anew",
+    ),
+    Status(
         "shape_not_felt",
         WARNING,
         "felt moments are not those of the seen shape, without a known cause",

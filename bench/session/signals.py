@@ -44,6 +44,8 @@ _TURN_DEG = 360.0
 _STILL_DEG = 0.02
 # [°] No whisk is so short, and any usual one is, in radians.
 _SMALL_RANGE_DEG = 0.5
+# [1] Steps of a stroke of whose speeds the median is taken. Stated.
+_SPEED_STEPS = 10
 # A motor's mean speed over a stroke may differ from the nominal one by this factor without a warning.
 _SPEED_FACTOR = 1.6
 
@@ -84,6 +86,19 @@ class Signals:
 def forward_strokes(signals: Signals) -> tuple[slice, ...]:
     """Return slices of samples, one a forward stroke: the whisks of the recording, from 0."""
     return strokes.forward_strokes(signals.motor_rad)
+
+
+def stroke_speed_rad_s(signals: Signals) -> float:
+    """Return the motor's speed in the middle of its longest forward stroke; NaN without one.
+
+    The median of the steps between tenths of its time leaves out how it starts and stops.
+    """
+    strokes_found = forward_strokes(signals)
+    if not strokes_found:
+        return float("nan")
+    longest = max(strokes_found, key=lambda stroke: np.ptp(signals.motor_rad[stroke]))
+    times_s = np.linspace(*signals.time_s[longest][[0, -1]], _SPEED_STEPS + 1)
+    return float(np.median(np.diff(signals.motor_at(times_s)) / np.diff(times_s)))
 
 
 def stroke_ends(signals: Signals) -> list[int]:

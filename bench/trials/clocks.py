@@ -30,6 +30,8 @@ _LEAST_SHARE = 0.5
 _PRIOR = np.array([np.radians(1.0), 0.05])
 # By so much (chi²) a clock must explain better than a zero, or the other way round, to be named alone: three sigma.
 _CLEAR_PREFERENCE = 9.0
+# Whisks with these codes have no part in the clock: what is off is told by cameras or encoder.
+_NO_CLOCK = {"camera_late", "turns_unlike_motor"}
 _ALIKE = 0.1  # speeds: a motor's own scatter
 
 
@@ -132,8 +134,9 @@ def _strokes(results: Iterable[TrialResult]) -> Iterator[np.ndarray]:
     for result in results:
         clock_s = result.seen.clock.sigma_s if result.seen.clock else 0.0
         for seen, felt in zip(result.seen.whisks, result.felt.whisks):
-            # A camera that is late is no clock's fault, and has a status of its own.
-            if np.isfinite(seen.touch_rad.value) and "camera_late" not in seen.status.codes:
+            # Frames or motor that are off by themselves have a status of their own.
+            is_timed = not _NO_CLOCK.intersection(seen.status.codes)
+            if is_timed and np.isfinite(seen.touch_rad.value):
                 speed = motor_speed(seen.frames)
                 shared = np.hypot(seen.touch_shared_rad, clock_s * speed)
                 touch = Value(felt.touch_felt_rad.value, felt.theta_sigma_rad)

@@ -5,6 +5,7 @@ Each check returns NO_REASON where both agree or one of them is unknown.
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -27,6 +28,8 @@ _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
 # does to metal or plastic; the paper's is 0.43 (Fig. 8, sandpaper).
 _STEEPEST_FRICTION_RAD = np.radians(45.0)
 
+# [1] Of the other's distance from the stated speed: a cause that is so much nearer to it is named. Stated.
+_CLEARLY_NEARER = 0.5
 # [frames] A camera that is late by one looks so by a third at least: the fit takes the rest for an
 # offset of its lines. Study: tests/vision/fit/test_camera_delays.py.
 _LEAST_DELAY_FRAMES = 0.25
@@ -42,10 +45,12 @@ _ADDED = "a frame too many before frame {}; pictures after it have the times of 
 _REPEATED = "frame {} looks the same as the one before it"
 
 
-def check_turns(turns: Turns | None, speed_rad_s: float) -> Reason:
+def check_turns(
+    turns: Turns | None, speed_rad_s: float, stated_speed_rad_s: float | None = None
+) -> Reason:
     """Compare the whisker's turn from frame to frame with the motor's (encoder).
 
-    speed_rad_s: of the motor.
+    speed_rad_s: of the motor by the signals; stated_speed_rad_s: the one that trial.toml states.
     """
     if turns is None or len(turns.index) < 3:
         return NO_REASON
@@ -54,20 +59,23 @@ def check_turns(turns: Turns | None, speed_rad_s: float) -> Reason:
     if difference.is_chance:
         return NO_REASON
     found = f"(χ² {difference.chi2:.0f}, {difference.freedom} degrees of freedom)"
-    cause = difference.explained_by(list(_turn_causes(turns, speed_rad_s)))
+    cause = difference.explained_by(list(_turn_causes(turns, speed_rad_s, stated_speed_rad_s)))
     cause = cause or "no single cause explains it"
     sentence = f"the whisker is not seen to turn as the motor does {found}: {cause}"
     return Reason("turns_unlike_motor", sentence)
 
 
-def _turn_causes(turns: Turns, speed_rad_s: float) -> Iterator[Cause]:
+def _turn_causes(
+    turns: Turns, speed_rad_s: float, stated_speed_rad_s: float | None
+) -> Iterator[Cause]:
     """Yield the faults of encoder and frame times that would turn the whisker unlike the motor."""
     motor = turns.motor_rad
     count = len(motor)
     nothing = np.zeros(count)
     ahead = np.diff(motor, append=2.0 * motor[-1] - motor[-2])
     behind = -np.diff(motor, prepend=2.0 * motor[0] - motor[1])
-    yield Cause(_scale_message, nothing, motor - motor.mean(), 1)
+    scale_message = partial(_scale_message, speed_rad_s, stated_speed_rad_s)
+    yield Cause(scale_message, nothing, motor - motor.mean(), 1)
     for k in range(1, count):
         later = (np.arange(count) >= k).astype(float)
         alone = (np.arange(count) == k).astype(float)
@@ -79,12 +87,30 @@ def _turn_causes(turns: Turns, speed_rad_s: float) -> Iterator[Cause]:
         yield Cause(_time_message(frame, speed_rad_s), nothing, alone, 2)
 
 
-def _scale_message(size: float) -> str:
+def _scale_message(speed_rad_s: float, stated_speed_rad_s: float | None, size: float) -> str:
     """Return the sentence on a whisker that turns farther than the motor by this share."""
-    return (
-        f"it turns {1.0 + size:.3f} times as far; check the encoder's scale and the rate of the frames' times, one "
-        "of them looks to need that factor"
-    )
+    share = 1.0 + size
+    return f"it turns {share:.3f} times as far; {rate_or_encoder(share, speed_rad_s, stated_speed_rad_s)}"
+
+
+def rate_or_encoder(share: float, speed_rad_s: float, stated_speed_rad_s: float | None) -> str:
+    """Return which of frame times and encoder needs a factor, by the speed of the motor.
+
+    share: how many times as far as the motor the whisker is seen to turn. speed_rad_s: of the motor
+    by the signals alone, which an encoder's scale changes and a frame rate does not.
+    """
+    both = "check the encoder's scale and the rate of the frames' times, one of them looks to need that factor"
+    if not stated_speed_rad_s:
+        return both
+    by_encoder = abs(np.log(share * speed_rad_s / stated_speed_rad_s))
+    by_rate = abs(np.log(speed_rad_s / stated_speed_rad_s))
+    speed = f"by the signals the motor goes at {np.degrees(speed_rad_s):.4g}°/s"
+    stated = f"speed_deg_s says {np.degrees(stated_speed_rad_s):.4g}"
+    if by_rate < _CLEARLY_NEARER * by_encoder:
+        return f"{speed} and {stated}, so the rate of the frames' times looks to need that factor"
+    if by_encoder < _CLEARLY_NEARER * by_rate:
+        return f"{speed}, {stated}, so motor_deg looks to need that factor"
+    return both
 
 
 def _jump_message(at_rad: float) -> Callable[[float], str]:

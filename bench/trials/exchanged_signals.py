@@ -1,5 +1,5 @@
-"""Signals that stand in another trial's folder: each trial's felt moments against the shape seen in
-the other.
+"""Signals, or pictures, that stand in another trial's folder: each trial's felt moments against the
+shape seen in the other, and the slope that it shows against the one that the other states.
 
 Compared over the session, of those whisks whose moments are not those of their own shape
 (`bench.trials.agreement`). With one motor program for all trials nothing else shows it: encoder and
@@ -16,6 +16,7 @@ from bench.gauges.felt import strokes_of
 from bench.gauges.gauge_readings import pairs_of
 from bench.records.trial_result import TrialResult
 from bench.session.signals import read_signals
+from bench.trials.consistency import check_slope
 from bench.trials.differences import LEAST_CHANCE
 from bench.trials.felt_trial import against_shape, readout_of
 from bench.trials.unit import Unit
@@ -35,6 +36,31 @@ def exchanged_signals(units: Sequence[Unit], results: Sequence[TrialResult]) -> 
         if _fits(unit, result, other) and _fits(other, other_result, unit):
             names = f"{unit.trial.name} and {other.trial.name}"
             yield reason("signals_exchanged", names=names)
+
+
+def exchanged_pictures(units: Sequence[Unit], results: Sequence[TrialResult]) -> Iterator[str]:
+    """Yield a line for each two trials whose pictures show the slope that the other states, and
+    neither its own.
+    """
+    apart = [(unit, result) for unit, result in zip(units, results) if _has_another_slope(result)]
+    if len(apart) > _MOST_APART:
+        return
+    for (unit, result), (other, other_result) in combinations(apart, 2):
+        if _shows_slope_of(result, other) and _shows_slope_of(other_result, unit):
+            names = f"{unit.trial.name} and {other.trial.name}"
+            yield reason("pictures_exchanged", names=names)
+
+
+def _has_another_slope(result: TrialResult) -> bool:
+    """Return whether all whisks with a truth show another slope than trial.toml states."""
+    known = [seen for seen in result.seen.whisks if seen.has_truth]
+    return bool(known) and all("slope_unlike_stated" in seen.status.codes for seen in known)
+
+
+def _shows_slope_of(result: TrialResult, other: Unit) -> bool:
+    """Return whether all whisks with a truth show the slope that another trial states."""
+    known = [seen for seen in result.seen.whisks if seen.has_truth]
+    return not any(check_slope(seen.beta_rad, other.trial) for seen in known)
 
 
 def _is_apart(result: TrialResult) -> bool:

@@ -134,7 +134,8 @@ def _whisk_of_trial(
     warnings: of the recording. of_trial: contradictions of the trial as a whole.
     """
     contradictions = [*of_trial, *_whisk_contradictions(whisk, session, trial, settings)]
-    record = whisk_record(whisk, settings, warnings, contradictions)
+    speed_rad_s = None if trial.speed_deg_s is None else float(np.radians(trial.speed_deg_s))
+    record = whisk_record(whisk, settings, warnings, contradictions, speed_rad_s)
     return replace(record, by_one_camera=by_one_camera(whisk, session.whisker, settings))
 
 
@@ -255,9 +256,11 @@ def whisk_record(
     settings: Settings,
     warnings: Iterable[Reason] = (),
     contradictions: Iterable[Reason] = (),
+    stated_speed_rad_s: float | None = None,
 ) -> SeenWhisk:
     """Return the record of a whisk, from the truth that vision found.
 
+    stated_speed_rad_s: the motor's by trial.toml.
     contradictions: in what ways the recording disagrees with itself or with what is stated; such
     a whisk is marked. The record leaves out the fit itself, what the checks alone need, and
     the lines of all frames but two.
@@ -266,7 +269,9 @@ def whisk_record(
     contradictions = list(contradictions)
     contradictions.append(check_camera_delays(truth.delays))
     if truth.frames:
-        contradictions.append(check_turns(truth.turns, motor_speed(truth.frames)))
+        contradictions.append(
+            check_turns(truth.turns, motor_speed(truth.frames), stated_speed_rad_s)
+        )
     return SeenWhisk(
         truth=replace(truth, overlay={}, ends={}, widths={}, delays={}, smooth=None, problem=None),
         status=in_one_status(truth.status, at.status, *contradictions, *warnings),

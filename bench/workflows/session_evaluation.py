@@ -18,7 +18,7 @@ from bench.session.session_check import checked_views
 from bench.session.trial import Trial
 from bench.trials.contradictions import contradictions_alone
 from bench.trials.estimates import estimators
-from bench.trials.exchanged_signals import exchanged_signals
+from bench.trials.exchanged_signals import exchanged_pictures, exchanged_signals
 from bench.trials.lost import evaluate_units
 from bench.trials.of_session import (
     first_units,
@@ -121,6 +121,7 @@ def _evaluate_whisker(
     if whole.touch_warning:
         problems.warnings.append(whole.touch_warning)
     problems.warnings += exchanged_signals(chosen, whole.results)
+    problems.warnings += exchanged_pictures(chosen, whole.results)
     evaluation = Evaluation(
         whisker=session.whisker,
         settings=settings,

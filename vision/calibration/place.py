@@ -41,6 +41,10 @@ _COMPONENTS = (
     "the centre lies across the whisker",
     "the centre lies along the axis",
 )
+# Of these the one by which the axis leans along the whisker.
+_LEAN_ALONG = 1
+# [sigma] From here on it is no chance. Stated.
+_CLEAR_LEAN = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +56,8 @@ class Placement:
     width_rad: of the widest stroke. notes: sentences for the report. alarm: how the two that it
     combines disagree, None where they do not. source: what it rests on, as sentences name it; basis:
     how much of that. shared (6, 6): the part of a swing's covariance that all free strokes share, None
-    without a swing.
+    without a swing. turn_share: how many times as far as the motor the
+    whisker turns if that is why they disagree; None where it would not look so.
     """
 
     step: np.ndarray
@@ -64,6 +69,7 @@ class Placement:
     source: str = "board"
     basis: str = ""
     shared: np.ndarray | None = None
+    turn_share: float | None = None
 
     @staticmethod
     def of(T_board_rig: np.ndarray, covariance: np.ndarray) -> "Placement":
@@ -128,6 +134,7 @@ def combine(board: Placement, swing: Placement) -> Placement:
         step=board.step + gain @ difference,
         covariance=0.5 * (covariance + covariance.T),
         alarm=_alarm(board, swing, Sigma) if disagree else None,
+        turn_share=_turn_share(difference, np.sqrt(np.diag(Sigma))) if disagree else None,
     )
     return replace(combined, notes=(*swing.notes, f"With the {board.source}: {combined.spread}."))
 
@@ -169,6 +176,17 @@ def _alarm(first: Placement, second: Placement, Sigma: np.ndarray) -> str:
         f"{scale * difference[worst]:+.3f} ± {scale * sigma[worst]:.3f} {unit} from where the {first.source} has it; "
         "check T_rig_board, the board's square_mm and the encoder"
     )
+
+
+def _turn_share(difference: np.ndarray, sigma: np.ndarray) -> float | None:
+    """Return how many times as far as the motor the whisker turns, where that may be the cause.
+
+    About an axis that leans along the whisker by an angle a it sweeps cos a of the motor's angle: a
+    share that is less than one passes for such a lean, in either sense.
+    """
+    if abs(difference[_LEAN_ALONG]) < _CLEAR_LEAN * sigma[_LEAN_ALONG]:
+        return None
+    return float(np.cos(difference[_LEAN_ALONG]))
 
 
 def move_rig_frame(cameras: Cameras, before: Placement, after: Placement) -> Cameras:

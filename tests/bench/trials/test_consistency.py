@@ -19,6 +19,7 @@ from bench.trials.consistency import (
     check_turns,
     check_wire_width,
     nominal_slope,
+    rate_or_encoder,
 )
 from bench.trials.felt_trial import _against_pictures
 from bench.trials.placing import _scale_cause
@@ -69,6 +70,23 @@ def test_encoder_scale_or_frame_rate(rng, factor):
     said = warning(rng, lambda motor: factor * motor)
     found = float(said.split("it turns ")[1].split(" times")[0])
     assert found == pytest.approx(1.0 / factor, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("share", "speed", "said"),
+    [
+        (0.99, 10.0, "so the rate of the frames' times looks to need that factor"),
+        (0.99, 10.1, "so motor_deg looks to need that factor"),
+        (1.02, 9.804, "so motor_deg looks to need that factor"),
+        (0.99, 10.05, "one of them looks to need that factor"),
+        (0.99, None, "one of them looks to need that factor"),
+    ],
+)
+def test_the_speed_of_the_motor_tells_frame_rate_and_encoder(share, speed, said):
+    """The signals' own speed is that of an encoder's scale, whatever the frames' times are."""
+    stated = None if speed is None else np.radians(10.0)
+    measured = np.radians(10.0 if speed is None else speed)
+    assert rate_or_encoder(share, measured, stated).endswith(said)
 
 
 @pytest.mark.parametrize("before", [1, 3, 6])

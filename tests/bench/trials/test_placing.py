@@ -91,6 +91,14 @@ def test_a_disagreement_is_an_alarm(place):
     ) == pytest.approx(0.8, abs=0.02)
 
 
+def test_an_axis_that_leans_along_the_whisker_may_be_a_frame_rate(place):
+    """The trials state the speed at which their signals have the motor go."""
+    lean = np.array([0.0, np.radians(9.0), 0.0, 0.0, 0.0, 0.0])
+    _, (warning,), _ = place(lean, width_deg=20.0)
+    assert "a whisker that turns 0.988 times as far as the motor" in warning
+    assert warning.endswith("so the rate of the frames' times looks to need that factor")
+
+
 def test_a_board_with_a_sigma_gives_way(place):
     made, warnings, stages = place(OFF, sigma_mm=0.5)
     assert not warnings and made.hash != "before" and stages == {"swing0", "swing1"}

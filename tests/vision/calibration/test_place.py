@@ -1,6 +1,7 @@
 """Centre, axis and encoder's zero by the swing: exact without noise, as sure as it says, alarmed where due."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,6 +68,15 @@ def test_alarm_names_the_encoder():
     # The zero is known to 0.003 degrees here; four of those.
     found = float(re.search(r"encoder's zero is off by ([+-][0-9.]+)", alarm)[1])
     assert abs(found - 0.5) < 0.012
+
+
+def test_a_whisker_that_turns_less_far_than_the_motor_looks_like_an_axis_that_leans():
+    lines = some_lines(12.0, across_mm=0.001, turn_rad=1e-5)
+    slow = replace(lines, motor_rad=lines.motor_rad / 0.98)
+    both = combine(by_board(np.eye(3, 4), 0.0, 0.0), by_swing(slow))
+    assert both.turn_share == pytest.approx(0.98, abs=0.005)
+    off = some_lines(8.0, np.array([0, 0, 0, 0.0, 0.5, 0.0]), across_mm=0.01, turn_rad=5e-4)
+    assert combine(by_board(np.eye(3, 4), 0.0, 0.0), by_swing(off)).turn_share is None
 
 
 def test_a_narrow_swing_with_a_board_by_ruler_is_doubted_with_the_width_that_would_do():
