@@ -41,7 +41,7 @@ _COMPONENTS = (
     "the centre lies across the whisker",
     "the centre lies along the axis",
 )
-# Of these the one by which the axis leans along the whisker.
+# [index] Of these the one by which the axis leans along the whisker. A layout, no threshold.
 _LEAN_ALONG = 1
 # [sigma] From here on it is no chance. Stated.
 _CLEAR_LEAN = 4.0
