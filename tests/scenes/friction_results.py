@@ -51,7 +51,7 @@ def deflection(d_x, beta):
     rows = {"theta_rad": theta, "slip_mm": slid, "across_y_mm": y, "across_z_mm": z}
     rows |= {"motor_rad": theta, "along_mm": np.full(4, d_x), "past_mm": np.zeros(4)}
     rows |= {"slip_sigma_mm": np.zeros(4), "touch_rad": 0.0, "touch_sigma_rad": 1e-4, "d_x_mm": d_x}
-    return rows | {"covariance": 1e-6 * np.eye(12)}
+    return rows | {"covariance": 1e-6 * np.eye(12), "by_camera_error_mm": np.zeros((12, 0))}
 
 
 def result(beta_deg, d_x=60.0, *, alpha=ALPHA, name=None, nominal_mm=60.0) -> TrialResult:
