@@ -35,7 +35,7 @@ _LAST_STEP_SIGMAS = 1e-6
 _LAST_STEP = 1e-9
 # How far a cantilever's end is drawn along itself as it bends, in θ d: its arc's excess over its
 # chord.
-_DRAWN = 0.6
+DRAWN = 0.6
 # Share left unknown of large bending's second order, and of the friction along a whisker that
 # slips, when they are taken out: as much as exact mechanics differ from them. Study:
 # tests/studies/accuracy/two_tilts.py.
@@ -304,7 +304,7 @@ def _bending_slipping(whisk: Whisk, alpha: float) -> _Bending:
     theta = whisk.theta_at_rad
     phi = abs(felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm))
     bent = theta * max(cos(phi + alpha), 0.0) / cos(alpha)
-    drawn = _DRAWN * bent
+    drawn = DRAWN * bent
     along = drawn / hypot(drawn, sin(phi) / cos(alpha))
     dragging = first_order.dragging(theta, alpha)
     return _Bending(phi, bent, along * dragging, _DRAGGING_LEFT * along * dragging)

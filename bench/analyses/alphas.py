@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.analyses.direction import slip_angle
-from bench.base.weighted import weighted_mean
+from bench.base.combined import Measurement, Measurements
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.trial_result import (
     Deflection,
@@ -33,7 +33,8 @@ class WhiskAlphas:
     """Friction angles of one whisk, each a pair (value, sigma) in rad; NaN where it shows none.
 
     shared_seen_rad, shared_felt_rad: sigma that all angles of this whisk share, of β, and felt also of
-    the moments. nominal: β is that of the manifest, because no picture shows it.
+    the moments. nominal: β is that of the manifest, because no picture shows it. common_seen,
+    common_felt: change of the angles at one sigma of each cause that all whisks of a session share.
     """
 
     trial: str
@@ -48,6 +49,8 @@ class WhiskAlphas:
     shared_seen_rad: float
     shared_felt_rad: float
     nominal: bool = False
+    common_seen: tuple[float, ...] = ()
+    common_felt: tuple[float, ...] = ()
 
     def phases(self, record: str) -> Phases:
         """Return rests and jumps as "seen" or "felt"."""
@@ -58,6 +61,21 @@ class WhiskAlphas:
         shared_rad = self.shared_seen_rad if record == "seen" else self.shared_felt_rad
         mean, sigma = self.phases(record).mean(kind)
         return mean, float(np.hypot(sigma, shared_rad))
+
+    def angle(self, name: str) -> tuple[float, float]:
+        """Return the angle "seen" or "felt", or of a kind and record, such as "static_felt"."""
+        kind, _, record = name.partition("_")
+        return self.apart(kind, record) if record else getattr(self, name)
+
+    def measurement(self, name: str) -> Measurement:
+        """Return an angle with its sigma in parts: of the whisk, of its trial's bar, of all whisks."""
+        value, sigma = self.angle(name)
+        common = self.common_seen if name.endswith("seen") else self.common_felt
+        of_setting = BETA_BY_HAND_RAD if self.nominal else 0.0
+        own = np.sqrt(max(sigma**2 - of_setting**2 - np.sum(np.square(common)), 0.0))
+        if not sigma > 0:
+            own = np.nan
+        return Measurement(value, float(own), of_setting, common)
 
     @property
     def panel(self) -> tuple[str, float | None]:
@@ -85,6 +103,8 @@ def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: floa
     if nominal:
         beta = Value(float(np.radians(trial.beta_nominal_deg)), BETA_BY_HAND_RAD)
     phases = NO_PHASES
+    seen_alpha = seen_friction(seen)
+    beta_common_rad = _common_slope(seen)
     if slips(seen):
         phases = seen_phases(seen.frames, beta.value, seen.d_x_mm.value)
     return WhiskAlphas(
@@ -92,14 +112,43 @@ def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: floa
         seen.whisk,
         *trial.panel,
         beta_rad=beta.value,
-        seen=seen_friction(seen),
+        seen=seen_alpha,
         felt=felt_friction(seen, felt, theta_rad),
         phases_seen=phases,
         phases_felt=felt.phases,
         shared_seen_rad=beta.sigma,
         shared_felt_rad=float(np.hypot(beta.sigma, felt.phi_felt_rad.sigma)),
         nominal=nominal,
+        common_seen=(beta_common_rad, _common_seen(seen, seen_alpha[1])),
+        common_felt=(beta_common_rad, *_common_felt(felt).tolist()),
     )
+
+
+def _common_slope(seen: SeenWhisk) -> float:
+    """Return the part of β's sigma that all whisks share, rad; of a slope set by hand there is none."""
+    if not np.isfinite(seen.beta_rad.value):
+        return 0.0
+    shared = seen.truth.shared
+    return seen.beta_rad.sigma if shared is None else shared.beta_rad
+
+
+def _common_seen(seen: SeenWhisk, sigma_rad: float) -> float:
+    """Return the part of the sigma of α seen that all whisks share but for β's, rad.
+
+    It is the share that the sigma of slip has; where that is not known, all of it.
+    """
+    by_slope_rad = np.sqrt(max(np.nan_to_num(sigma_rad) ** 2 - seen.beta_rad.sigma**2, 0.0))
+    if seen.at is None or not np.isfinite(seen.at.slip_shared_mm):
+        return float(by_slope_rad)
+    return float(by_slope_rad * min(seen.at.slip_shared_mm / seen.at.slip_mm.sigma, 1.0))
+
+
+def _common_felt(felt: FeltWhisk) -> np.ndarray:
+    """Return the change (k,) of −|φ| by each cause that the moments of all whisks share, rad."""
+    m_y = felt.m_y_Nmm.value
+    m_z = felt.m_z_Nmm.value
+    by_cause = felt.shared_Nmm @ [m_z, -m_y] / (m_y**2 + m_z**2)
+    return -np.copysign(1.0, felt.phi_felt_rad.value) * by_cause
 
 
 def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
@@ -186,12 +235,11 @@ def _heading(d: Deflection, theta_rad: float | np.ndarray) -> float | np.ndarray
     return np.arctan(past_per_rad / slip_per_rad)
 
 
-def mean_alpha(alphas: Iterable[tuple[float, float]]) -> tuple[float, float]:
-    """Return the weighted mean of pairs (value, sigma) and its sigma, rad; NaN where none is known.
+def mean_alpha(alphas: Iterable[WhiskAlphas], name: str) -> tuple[float, float]:
+    """Return the mean of an angle (`WhiskAlphas.angle`) over whisks and its sigma, rad.
 
-    Cameras and gauges are common to all whisks (`bench.base.weighted`).
+    NaN where no whisk has it. How the shared error of β goes with the sign of the slope is not known, so
+    that it counts as one for all.
     """
-    known = np.array([pair for pair in alphas if np.isfinite(pair).all() and pair[1] > 0])
-    if not len(known):
-        return UNKNOWN
-    return weighted_mean(*known.T)
+    mean = Measurements.of((whisk.trial, whisk.measurement(name)) for whisk in alphas).mean()
+    return mean.value, mean.sigma

@@ -7,7 +7,7 @@ Appendix B, by (23) to (25) as printed and by the exact form.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,10 +16,10 @@ from bench.analyses.gave import OBJECT
 from bench.analyses.pooling import (
     angle_cells,
     column,
-    known_rows,
     sound_measured_whisks,
     value_cells,
 )
+from bench.base.combined import Combined, Measurement, Measurements, holm
 from bench.base.settings import TILT_SIGMA_RAD
 from bench.base.statuses import reason
 from bench.base.tables import TRIAL, WHISK, Column, Table, status, with_sigma
@@ -30,6 +30,7 @@ from estimator.beam import Beam
 from estimator.domain import RIGHT_ANGLE
 from estimator.uncertainty import Z_95, gradient_with_friction, slip_angle_sigma
 from vision import UNKNOWN, Value
+from vision.geometry import counted
 
 CURVATURE = Table(
     "curvature",
@@ -51,6 +52,9 @@ CURVATURE = Table(
         status("what is missing"),
     ),
 )
+# By chance one session of straight bars in a hundred says of any bar that it is curved to the side. Stated.
+_FALSE_ALARM = 0.01
+_UNMEASURED = Measurement(np.nan, np.nan)
 # Nearer to touch the window of a moment is shorter, and (10) mostly noise.
 _FIRST_RAD = np.radians(0.95)
 _APART_RAD = np.radians(0.95)  # windows of half a degree to either side share no sample
@@ -65,16 +69,26 @@ _MOST_TURN = 0.6
 class Curved:
     """The curvature of an object by one whisk; NaN where it is not known, and status says why.
 
-    angles: how many pushing angles served. radius_mm: in the whisking plane. phi_0_rad: φ at touch.
-    lateral_per_mm: curvature in the sensing plane by the exact form; lateral_printed_per_mm: by (24).
+    angles: how many pushing angles served. radius: in the whisking plane, mm. phi_0_rad: φ at touch.
+    lateral: curvature in the sensing plane by the exact form, 1/mm; lateral_printed_per_mm: by (24).
     """
 
     angles: int
-    radius_mm: Value = UNKNOWN
+    radius: Measurement = _UNMEASURED
     phi_0_rad: Value = UNKNOWN
-    lateral_per_mm: Value = UNKNOWN
+    lateral: Measurement = _UNMEASURED
     lateral_printed_per_mm: float = np.nan
     status: str = ""
+
+    @property
+    def radius_mm(self) -> Value:
+        """Return the radius of curvature in the whisking plane."""
+        return Value(self.radius.value, self.radius.sigma)
+
+    @property
+    def lateral_per_mm(self) -> Value:
+        """Return the curvature in the sensing plane."""
+        return Value(self.lateral.value, self.lateral.sigma)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +117,8 @@ class Curvature(Analysis):
         found = []
         for result, _, felt in sound_measured_whisks(run.results):
             if felt.has_moments:
-                by_whisk = curved(felt.by_theta, run.whisker, alpha_est.value, alpha_est.sigma)
+                felt_at = without_shared(felt)
+                by_whisk = curved(felt_at, run.whisker, alpha_est.value, alpha_est.sigma)
                 found.append(CurvedWhisk(result, felt, by_whisk))
         return found
 
@@ -124,37 +139,77 @@ class Curvature(Analysis):
         }
 
     def lines(self, found: Sequence[CurvedWhisk]) -> Iterator[str]:
-        """Yield the mean radius less the bar's own, and whisks whose object is curved sideways."""
+        """Yield the mean radius less the bar's own, and trials whose object is curved sideways."""
         yield from _radius_lines(found)
-        for one in found:
-            lateral = one.curved.lateral_per_mm
-            if abs(lateral.value) > Z_95 * lateral.sigma:
-                yield (
-                    f"{one.result.trial.name}, whisk {one.felt.whisk}: curved to the side by "
-                    f"{lateral.value:.4f} ± {lateral.sigma:.4f} 1/mm (Appendix B; "
-                    f"{one.curved.lateral_printed_per_mm:.4f} by (24) as printed), or it leans along "
-                    "the whisker"
-                )
+        for trial, mean in sideways(found).items():
+            printed = [
+                one.curved.lateral_printed_per_mm
+                for one in found
+                if one.result.trial.name == trial and one.curved.lateral.is_known
+            ]
+            yield (
+                f"{trial}, {counted(len(printed), 'whisk')}: curved to the side by "
+                f"{mean.value:.4f} ± {mean.sigma:.4f} 1/mm (Appendix B; {np.mean(printed):.4f} by (24) "
+                "as printed), or it leans along the whisker"
+            )
+
+
+def sideways(found: Sequence[CurvedWhisk]) -> dict[str, Combined]:
+    """Return the mean lateral curvature, 1/mm, of each trial that has one for sure.
+
+    A trial's whisks are pushes against one bar: one test of it. What is said of all trials together is
+    wrong by chance as often as _FALSE_ALARM says (`holm`).
+    """
+    lateral = ((one.result.trial.name, one.curved.lateral) for one in found)
+    of_trials = Measurements.of(lateral).by_setting()
+    stands = holm([mean.chance for mean in of_trials.values()], _FALSE_ALARM)
+    return {trial: mean for (trial, mean), sure in zip(of_trials.items(), stands) if sure}
+
+
+def mean_radius_error(found: Sequence[CurvedWhisk]) -> Combined:
+    """Return the mean over bars of the radius less the bar's own, mm."""
+    errors = []
+    for one in found:
+        radius = one.curved.radius
+        error = replace(radius, value=radius.value - one.bar_radius_mm)
+        errors.append((one.result.trial.name, error))
+    return Measurements.of(errors).mean()
 
 
 def _radius_lines(found: Sequence[CurvedWhisk]) -> Iterator[str]:
-    """Yield a line on the weighted mean of radii less the bar's own, where any is known."""
-    errors = []
+    """Yield a line on the mean of radii less the bar's own, where any is known."""
+    inside = []
     for one in found:
         radius = one.curved.radius_mm
-        errors.append((radius.value - one.bar_radius_mm, radius.sigma))
-    known, _ = known_rows(errors, 2)
-    if not len(known):
+        error_mm = radius.value - one.bar_radius_mm
+        if np.isfinite(error_mm):
+            inside.append(abs(error_mm) < Z_95 * radius.sigma)
+    if not inside:
         return
-    error_mm, sigma_mm = known.T
-    precision = np.sum(sigma_mm**-2.0)
-    mean_mm = sigma_mm**-2.0 / precision @ error_mm
-    inside = 100.0 * np.mean(np.abs(error_mm) < Z_95 * sigma_mm)
+    mean = mean_radius_error(found)
     yield (
-        f"radius of the object in the whisking plane, by successive contacts of {len(known)} "
-        f"whisks, less the bar's own: {mean_mm:+.1f} ± {precision**-0.5:.1f} mm, 95 % "
-        f"intervals hold in {inside:.0f} % (curvature.csv)"
+        f"radius of the object in the whisking plane, by successive contacts of {len(inside)} whisks "
+        f"in {counted(mean.settings, 'trial')}, less the bar's own: {mean.value:+.1f} ± "
+        f"{mean.sigma:.1f} mm, 95 % intervals hold in {100.0 * np.mean(inside):.0f} % (curvature.csv)"
     )
+
+
+def without_shared(felt: FeltWhisk) -> list[FeltAt]:
+    """Return the moments at successive angles with the part of their covariance that is not shared.
+
+    Gauges' coefficients move all moments of a push by one share of them: no change with θ comes from that.
+    """
+    size_Nmm = np.hypot(felt.m_y_Nmm.value, felt.m_z_Nmm.value)
+    shared = felt.shared_Nmm.T @ felt.shared_Nmm / size_Nmm**2  # (2, 2), of |m|²
+    found = []
+    for at in felt.by_theta:
+        square = at.m_y_Nmm.value**2 + at.m_z_Nmm.value**2
+        variances, axes = np.linalg.eigh(at.covariance_at - square * shared)
+        own = axes * np.maximum(variances, 0.0) @ axes.T
+        m_y = Value(at.m_y_Nmm.value, float(np.sqrt(own[0, 0])))
+        m_z = Value(at.m_z_Nmm.value, float(np.sqrt(own[1, 1])))
+        found.append(replace(at, m_y_Nmm=m_y, m_z_Nmm=m_z, covariance_at=own))
+    return found
 
 
 @dataclass(frozen=True)
@@ -265,12 +320,13 @@ def weighted_fit(
 def _at_touch(theta: np.ndarray, values: np.ndarray, sigmas: np.ndarray) -> tuple[Value, Value]:
     """Return value and rate at θ = 0 of what is felt at θ (n,).
 
-    The fit is to second order, with a part that goes as 1/θ, as errors of touch and zero do. The
-    sigmas also hold what is common to all angles.
+    The fit is to second order, with a part that goes as 1/θ, as errors of touch and zero do. Where the
+    values scatter about it by more than their sigmas, the scatter counts.
     """
     columns = (np.ones_like(theta), theta, theta**2, 1 / theta)
-    coefficients, covariance, _ = weighted_fit(columns, values, sigmas)
-    spread = np.sqrt(np.diag(covariance))
+    coefficients, covariance, chi_square = weighted_fit(columns, values, sigmas)
+    scatter = np.sqrt(chi_square / (len(theta) - len(columns)))
+    spread = np.sqrt(np.diag(covariance)) * max(scatter, 1.0)
     value = Value(float(coefficients[0]), float(spread[0]))
     return value, Value(float(coefficients[1]), float(spread[1]))
 
@@ -306,11 +362,12 @@ def _turned(d_x_mm: float, phi: float, rate: Value, alpha_rad: float) -> float:
 
 def _radius(
     d_x_mm: float, creep: Value, phi: float, alpha: Value, turned: float, whisker: Whisker
-) -> Value:
+) -> Measurement:
     """Return the radius of the object by the change of (10) with θ, mm.
 
     creep: that change, mm/rad. phi: 0 where the contact is held. alpha: as assumed, rad. turned: what
-    a turn of φ may add, mm/rad.
+    a turn of φ may add, mm/rad. Lean and turn are of the bar, what friction along the whisker adds is of
+    all whisks.
     """
     left = whisker.beam.left(d_x_mm)
     per_mm = float(first_order.rolling(1.0, 1.0, phi, alpha.value, 1.0, left))
@@ -322,11 +379,15 @@ def _radius(
     leaning = d_x_mm * float(first_order.leaning(1.0, TILT_SIGMA_RAD, phi, alpha.value))
     reach_mm = (creep.value - first_order.HELD_SHARE * dragging) / per_mm
     spread = first_order.HELD_SPREAD * dragging
-    sigmas = np.array([creep.sigma, spread, by_alpha, leaning, turned]) / per_mm
-    return Value(reach_mm - 0.5 * whisker.diameter_mm * left, float(np.linalg.norm(sigmas)))
+    return Measurement(
+        reach_mm - 0.5 * whisker.diameter_mm * left,
+        own=abs(creep.sigma / per_mm),
+        of_setting=float(np.hypot(leaning, turned)) / abs(per_mm),
+        common=(spread / per_mm, by_alpha / per_mm),
+    )
 
 
-def _lateral(phi: float, rate: Value, d_x_mm: float, alpha_rad: float) -> tuple[Value, float]:
+def _lateral(phi: float, rate: Value, d_x_mm: float, alpha_rad: float) -> tuple[Measurement, float]:
     """Return the lateral curvature by the exact form, and by (24) as printed, 1/mm.
 
     An object that leans turns φ by ½ θ cos β tan ψ, which is in the sigma.
@@ -334,5 +395,5 @@ def _lateral(phi: float, rate: Value, d_x_mm: float, alpha_rad: float) -> tuple[
     exact = float(curvature.curvature_of_slip(1.0, phi, alpha_rad)) / d_x_mm
     printed = float(curvature.curvature_of_slip_printed(1.0, phi, alpha_rad)) / d_x_mm
     leaning = 0.5 * np.cos(abs(phi) + alpha_rad) * np.tan(TILT_SIGMA_RAD)
-    sigma = abs(exact) * float(np.hypot(rate.sigma, leaning))
-    return Value(exact * rate.value, sigma), printed * rate.value
+    lateral = Measurement(exact * rate.value, abs(exact * rate.sigma), float(abs(exact * leaning)))
+    return lateral, printed * rate.value

@@ -133,16 +133,13 @@ class SurfaceFriction:
 
     def alpha(self, name: str) -> tuple[float, float]:
         """Return (value, sigma) in rad by the name in the columns of SURFACES; NaN if not known."""
-        if name in RECORDS:
-            return mean_alpha(getattr(whisk, name) for whisk in self.whisks)
         if name == "least_squares":
             fit = self.surface.fit
             return (fit.alpha_rad, fit.sigma_rad) if fit else UNKNOWN
-        kind, _, record = name.partition("_")
-        if record:
-            return mean_alpha(whisk.apart(kind, record) for whisk in self.whisks)
-        way = next(way for way in self.ways if way.name == name)
-        return way.alpha_rad, way.sigma_rad
+        for way in self.ways:
+            if way.name == name:
+                return way.alpha_rad, way.sigma_rad
+        return mean_alpha(self.whisks, name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +217,11 @@ def friction_of(
     found = []
     for surface in surfaces(results, whisker.beam):
         felt = contacts(results, surface.panel)
-        ways = (by_tilting(felt), by_consistency(felt, whisker), by_smoothness(felt, whisker))
+        ways = (
+            by_tilting(felt, whisker),
+            by_consistency(felt, whisker),
+            by_smoothness(felt, whisker),
+        )
         errors = np.array([error_percent.get(one.key, np.nan) for one in surface.felt])
         phi_rad = np.radians(column(surface.felt, "phi_deg"))
         confidences = weights(phi_rad, alpha_est_rad)

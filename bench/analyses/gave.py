@@ -9,7 +9,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import column, grouped, mean, panel_title, rms
+from bench.analyses.pooling import grouped, panel_title
+from bench.base.combined import Measurement, Measurements
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.trials.estimate_errors import is_sound
@@ -132,18 +133,35 @@ def give_seen(result: TrialResult, seen: SeenWhisk, felt: FeltWhisk) -> Value:
     return Value(give, abs(give) * relative_sigma)
 
 
-def mean_give(results: Sequence[TrialResult]) -> tuple[Value, int]:
-    """Return the mean compliance of all sound whisks whose object gave way, mm/N, and their number.
+def _measurement(give: Value, result: TrialResult, seen: SeenWhisk, felt: FeltWhisk) -> Measurement:
+    """Return a compliance with its sigma in parts.
 
-    Gauges and cameras are those of all, so that the mean is known no better than one.
+    What whisks share of the way seen is not known: all of it counts as shared.
     """
+    way = gave_at(seen, float(np.radians(result.theta_deg)))
+    sin = np.sin(seen.beta_rad.value)
+    cos = np.cos(seen.beta_rad.value)
+    force_N = normal_force_N(seen, felt).value
+    by_gauges = felt.shared_Nmm @ [sin, cos] / (force_N * seen.d_x_mm.value)
+    shared = seen.truth.shared
+    d_x_sigma_mm = seen.d_x_mm.sigma if shared is None else shared.d_x_mm
+    by_distance = d_x_sigma_mm / seen.d_x_mm.value
+    relative = np.array([way.sigma / way.value, by_distance, *-by_gauges])
+    common = give.value * relative
+    own = np.sqrt(max(give.sigma**2 - common @ common, 0.0))
+    return Measurement(give.value, float(own), common=tuple(common.tolist()))
+
+
+def mean_give(results: Sequence[TrialResult]) -> tuple[Value, int]:
+    """Return the mean compliance of all sound whisks whose object gave way, mm/N, and their number."""
     gives = []
     for result, seen, felt in whisks(results):
         if not is_sound(seen, felt):
             continue
         give = give_seen(result, seen, felt)
         if np.isfinite(give.value):
-            gives.append(give)
+            gives.append((result.trial.name, _measurement(give, result, seen, felt)))
     if not gives:
         return UNKNOWN, 0
-    return Value(mean(column(gives, "value")), rms(column(gives, "sigma"))), len(gives)
+    mean = Measurements.of(gives).mean()
+    return Value(mean.value, mean.sigma), len(gives)

@@ -13,25 +13,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.special import stdtrit
 
 from bench.analyses.explained import by_10
 from bench.analyses.pooling import column, grouped, measured
+from bench.analyses.theory_left import as_theory_has_them
+from bench.base.combined import add_common, student_factor
 from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.base.statuses import reason
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.whisker import Whisker
 from estimator.distance import felt_slip_angle
 from estimator.friction import alpha_from_tilts, confidence
-from estimator.uncertainty import Z_95
 
 _ALPHA_EST_SIGMA_RAD = np.radians(ALPHA_EST_SIGMA_DEG)
 _FEWEST = 3  # whisks, or recordings: the least that scatter about a mean and a slope
 _STEP_RAD = 1e-4  # of a derivative by differences: its error goes with the square
 # rad: the best of these is then refined
 _GRID_RAD = np.radians(np.arange(0.0, 45.0, 0.5))
-# of the variance that is the fit's own: with less, Student's t is the normal distribution
-_LEAST_SHARE = 1e-3
 _LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under any α
 
 
@@ -55,6 +53,7 @@ class FeltContact:
     """What a robot has of one whisk: nominal slope and distance (NaN where not given), and what was felt.
 
     shared_Nmm (k, 2): what (m_y, m_z) change by at one sigma of each cause that all whisks have in common.
+    reach_mm: radii of bar and whisker together, NaN where nobody states the bar's.
     """
 
     beta_rad: float
@@ -64,6 +63,7 @@ class FeltContact:
     m_z_Nmm: float
     shared_Nmm: np.ndarray
     trial: str = ""
+    reach_mm: float = np.nan
 
     @property
     def phi_rad(self) -> float:
@@ -91,12 +91,20 @@ def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) ->
             felt.m_z_Nmm.value,
             felt.shared_Nmm,
             trial.name,
+            reach_mm=_reach_mm(result),
         )
         found.append(contact)
     return found
 
 
-def by_tilting(of_surface: Sequence[FeltContact]) -> Way:
+def _reach_mm(result: TrialResult) -> float:
+    """Return the radii of bar and whisker together where the bar was set up."""
+    trial = result.trial
+    whisker_mm = result.whisker.diameter_mm * result.whisker.left(trial.d_x_nominal_mm)
+    return 0.5 * (trial.bar_diameter_mm + whisker_mm)
+
+
+def by_tilting(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
     """Return α by way 1, from nominal slopes of both signs."""
     known = [contact for contact in of_surface if np.isfinite(contact.beta_rad)]
     slopes = [contact.beta_rad for contact in known]
@@ -109,7 +117,7 @@ def by_tilting(of_surface: Sequence[FeltContact]) -> Way:
         fitted = alpha_from_tilts(betas, [contact.phi_rad for contact in recordings])
         return _AlphaFit(fitted.alpha_rad, fitted.sigma_rad, fitted.freedom, fitted.status)
 
-    return _with_shared("tilting", fit, known)
+    return _with_shared("tilting", fit, known, whisker)
 
 
 def by_consistency(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
@@ -138,7 +146,12 @@ def _by_object(name: str, of_surface: Sequence[FeltContact], whisker: Whisker, d
         return _unknown(name, reason("no_push_on_object"))
     if np.ptp([abs(np.tan(contact.phi_rad)) for contact in of_surface]) < _LEAST_SPREAD:
         return _unknown(name, reason("slip_angles_alike"))
-    return _with_shared(name, lambda some: _least_scatter(some, whisker, degree), of_surface)
+
+    def fit(recordings: Sequence[FeltContact]) -> _AlphaFit:
+        """Fit the distances of contacts to the object."""
+        return _least_scatter(recordings, whisker, degree)
+
+    return _with_shared(name, fit, of_surface, whisker)
 
 
 @dataclass(frozen=True)
@@ -152,13 +165,16 @@ class _AlphaFit:
 
 
 def _with_shared(
-    name: str, fit_to: Callable[[Sequence[FeltContact]], _AlphaFit], known: Sequence[FeltContact]
+    name: str,
+    fit_to: Callable[[Sequence[FeltContact]], _AlphaFit],
+    known: Sequence[FeltContact],
+    whisker: Whisker,
 ) -> Way:
     """Return the way by a fit to recordings, with what all whisks share in its sigma.
 
     Whisks of one recording share a bar that was set up once, and are no independent repeats: their mean counts as one.
-    What all whisks share comes on top, one cause after another. The sum has the degrees of freedom of Welch and
-    Satterthwaite, cut to a whole number (GUM, G.4); sigma is half a 95 % interval by Student's t, over 1.96.
+    What all whisks share comes on top, one cause after another, and so does what theory leaves out of all of them
+    (`bench.analyses.theory_left`). Sigma is half a 95 % interval by Student's t, over 1.96.
     """
     of_trials = grouped(known, lambda contact: contact.trial)
     recordings = [_mean(some) for some in of_trials.values()]
@@ -169,15 +185,29 @@ def _with_shared(
     for cause in range(len(known[0].shared_Nmm)):
         moved = fit_to([contact.moved(cause) for contact in recordings])
         shared.append(moved.alpha_rad - fit.alpha_rad)
-    return Way(name, fit.alpha_rad, _sigma_with_shared(fit, np.array(shared)))
+    in_theory = fit_to(_as_theory_has_them(recordings, fit.alpha_rad, whisker))
+    shared.append(in_theory.alpha_rad - fit.alpha_rad)
+    total = add_common(fit.sigma_rad, fit.freedom, np.array(shared))
+    sigma_rad = float(np.sqrt(total.variance)) * student_factor(total.freedom)
+    return Way(name, fit.alpha_rad, sigma_rad)
 
 
-def _sigma_with_shared(fit: _AlphaFit, shared_rad: np.ndarray) -> float:
-    """Return half the 95 % interval of a fit over 1.96, by its residuals and shared causes (k,)."""
-    variance = fit.sigma_rad**2 + np.sum(np.nan_to_num(shared_rad) ** 2)
-    own = max(fit.sigma_rad**2 / variance, _LEAST_SHARE) if variance > 0 else 1.0
-    freedom = np.floor(fit.freedom / own**2)
-    return float(np.sqrt(variance) * stdtrit(freedom, 0.975) / Z_95)
+def _as_theory_has_them(
+    some: Sequence[FeltContact], alpha_rad: float, whisker: Whisker
+) -> list[FeltContact]:
+    """Return the contacts without what theory leaves out of their moments at an α."""
+    m_Nmm = as_theory_has_them(
+        np.stack([column(some, "m_y_Nmm"), column(some, "m_z_Nmm")], axis=1),
+        column(some, "theta_rad"),
+        alpha_rad,
+        column(some, "d_x_nominal_mm"),
+        column(some, "reach_mm"),
+        whisker.beam,
+    )
+    found = []
+    for contact, (m_y, m_z) in zip(some, m_Nmm):
+        found.append(replace(contact, m_y_Nmm=float(m_y), m_z_Nmm=float(m_z)))
+    return found
 
 
 def _mean(some: Sequence[FeltContact]) -> FeltContact:

@@ -22,6 +22,7 @@ from bench.analyses.pooling import (
     sound_measured_whisks,
     value_cells,
 )
+from bench.base.combined import Measurement, Measurements
 from bench.base.numbers import MISSING, number_range
 from bench.base.statuses import reason
 from bench.base.tables import SPEED, SURFACE, Column, Table, alike, status, with_sigma
@@ -230,23 +231,24 @@ def _places(session: Session, results: Sequence[TrialResult]) -> list[Place]:
         held = []
         for result, _, felt in sound_measured_whisks(there):
             if _is_held(felt):
-                held.append(_compliance(result, felt))
+                held.append((result.trial.name, _compliance(result, felt)))
         if held:
-            places.append(_place(d_x_mm, sigma_mm, *map(np.array, zip(*held))))
+            places.append(_place(d_x_mm, sigma_mm, held))
     return places
 
 
-def _place(
-    d_x_mm: float,
-    sigma_mm: float,
-    compliances: np.ndarray,
-    sigmas: np.ndarray,
-    shared: np.ndarray,
-) -> Place:
-    """Average n whisks: compliances and their own sigmas (n,), what all have in common (n, k)."""
-    n = len(compliances)
-    own = float(np.sqrt(np.sum(sigmas**2))) / n
-    return Place(d_x_mm, sigma_mm, float(compliances.mean()), own, n, shared.mean(axis=0))
+def _place(d_x_mm: float, sigma_mm: float, held: Sequence[tuple[str, Measurement]]) -> Place:
+    """Average the compliances of whisks, each with the name of its trial.
+
+    Trials weigh alike. What they differ by because each was set up anew is in sigma_mm already.
+    """
+    measurements = Measurements.of(held)
+    of_trials = list(measurements.by_setting().values())
+    compliances = np.array([one.value for one in of_trials])
+    sigmas = np.array([one.sigma for one in of_trials])
+    own = float(np.linalg.norm(sigmas)) / len(sigmas)
+    shared = measurements.common.mean(axis=0)
+    return Place(d_x_mm, sigma_mm, float(compliances.mean()), own, len(held), shared)
 
 
 def _is_held(felt: FeltWhisk) -> bool:
@@ -255,8 +257,8 @@ def _is_held(felt: FeltWhisk) -> bool:
     return felt.has_moments and abs(phi.value) <= _HELD_SIGMAS * phi.sigma
 
 
-def _compliance(result: TrialResult, felt: FeltWhisk) -> tuple[float, float, np.ndarray]:
-    """Return k_θ = θ/m_z, its own sigma, and its change with each shared cause (k,)."""
+def _compliance(result: TrialResult, felt: FeltWhisk) -> Measurement:
+    """Return k_θ = θ/m_z."""
     theta = float(np.radians(result.theta_deg))
     m_z = felt.m_z_Nmm
     k_theta = theta / m_z.value
@@ -264,7 +266,8 @@ def _compliance(result: TrialResult, felt: FeltWhisk) -> tuple[float, float, np.
     own_of_moment = (m_z.sigma / m_z.value) ** 2 - shared @ shared
     covariance = felt.theta_moment_covariance_at[1] / (theta * m_z.value)
     variance = (felt.theta_sigma_rad / theta) ** 2 + own_of_moment - 2 * covariance
-    return k_theta, k_theta * float(np.sqrt(max(variance, 0.0))), -k_theta * shared
+    own = k_theta * float(np.sqrt(max(variance, 0.0)))
+    return Measurement(k_theta, own, common=tuple((-k_theta * shared).tolist()))
 
 
 def softness(

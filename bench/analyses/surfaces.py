@@ -7,6 +7,8 @@ import numpy as np
 
 from bench.analyses.alphas import BETA_BY_HAND_RAD
 from bench.analyses.pooling import column, measured, panel_title
+from bench.analyses.theory_left import as_theory_has_them
+from bench.base.combined import add_common, student_factor
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.trials.estimate_errors import slope_deg
 from estimator.beam import Beam
@@ -25,6 +27,7 @@ class Felt:
     """The moments felt of one whisk, with slope and distance as seen, else nominal.
 
     recording: number of the trial, whose whisks count together. shared_Nmm: as of `FeltWhisk`.
+    reach_mm: radii of bar and whisker together, NaN where nobody states the bar's.
     """
 
     beta_deg: float
@@ -42,6 +45,7 @@ class Felt:
     whisk: int = 0
     shared_Nmm: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     beta_sigma_rad: float = 0.0
+    reach_mm: float = np.nan
 
     @property
     def key(self) -> tuple[str, int]:
@@ -176,11 +180,17 @@ def _felt(recording: int, result: TrialResult, seen: SeenWhisk, felt: FeltWhisk)
         whisk=seen.whisk,
         shared_Nmm=felt.shared_Nmm,
         beta_sigma_rad=BETA_BY_HAND_RAD if nominal else seen.beta_rad.sigma,
+        reach_mm=0.5
+        * (trial.bar_diameter_mm + result.whisker.diameter_mm * result.whisker.left(d_x_mm)),
     )
 
 
 def _fit(felt: Sequence[Felt], beam: Beam) -> FrictionFit | None:
-    """Fit α; its sigma is half of the 95 % interval over 1.96. None where the whisks do not hold it."""
+    """Fit α; its sigma is half of the 95 % interval over 1.96. None where the whisks do not hold it.
+
+    The interval holds what the scatter of the recordings shows, what all whisks have in common, and what
+    (13), (14) leave out.
+    """
     if len(felt) < 2:
         return None
     beta_rad = np.radians(column(felt, "beta_deg"))
@@ -199,22 +209,23 @@ def _fit(felt: Sequence[Felt], beam: Beam) -> FrictionFit | None:
         return None
     recording = column(felt, "recording")
     slipping = np.abs(beta_rad) > fit.alpha_rad
+    by_theory = _alpha_by_theory(pushes, felt, beam, fit.alpha_rad)
     if len(set(recording[slipping])) < _MANY:
-        return _widen(fit, _alphas_by_slopes(pushes, felt, recording))
+        return _widen(fit, np.append(_alphas_by_slopes(pushes, felt, recording), by_theory))
     by_residuals = fit_alpha(replace(pushes, recording=recording))
     if not np.isfinite(by_residuals.alpha_rad):
         return None
-    return _widen(by_residuals, _alphas_by_shared(pushes, felt))
+    return _widen(by_residuals, np.append(_alphas_by_shared(pushes, felt), by_theory))
 
 
 def _widen(fit: FrictionFit, others: np.ndarray) -> FrictionFit:
     """Return a fit whose interval is wider by other values of α (k,), each with one cause off by its sigma."""
-    differences = np.nan_to_num(others - fit.alpha_rad)
-    by_causes = Z_95 * np.linalg.norm(differences)
-    reach = float(np.hypot(fit.high_rad - fit.alpha_rad, by_causes))
+    total = add_common(fit.sigma_rad, fit.freedom, others - fit.alpha_rad)
+    sigma = float(np.sqrt(total.variance)) * student_factor(total.freedom)
+    reach = Z_95 * sigma
     return replace(
         fit,
-        sigma_rad=reach / Z_95,
+        sigma_rad=sigma,
         low_rad=max(fit.alpha_rad - reach, 0.0),
         high_rad=fit.alpha_rad + reach,
     )
@@ -238,6 +249,19 @@ def _alphas_by_shared(pushes: Pushes, felt: Sequence[Felt]) -> np.ndarray:
     m_y = pushes.m_y + shared[:, :, 0].T
     m_z = pushes.m_z + shared[:, :, 1].T
     return fit_alpha(replace(pushes, m_y=m_y, m_z=m_z)).alpha_rad
+
+
+def _alpha_by_theory(pushes: Pushes, felt: Sequence[Felt], beam: Beam, alpha_rad: float) -> float:
+    """Return α by the moments without what (13), (14) leave out of them at an α."""
+    m_Nmm = as_theory_has_them(
+        np.stack([pushes.m_y, pushes.m_z], axis=1),
+        pushes.theta,
+        alpha_rad,
+        column(felt, "d_x_mm"),
+        column(felt, "reach_mm"),
+        beam,
+    )
+    return float(fit_alpha(replace(pushes, m_y=m_Nmm[:, 0], m_z=m_Nmm[:, 1])).alpha_rad)
 
 
 def _point(group: Sequence[Felt], d_x_mm: float, beam: Beam) -> SlopePoint:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.base.combined import Measurements
 from bench.base.errors import BadInput
-from bench.base.weighted import weighted_mean
 from bench.gauges.matrix import GaugeMatrix, to_follicle
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
@@ -56,16 +56,22 @@ def scale_by_weights(
     for trial in loaded:
         zero = zeros.get(trial.follicle_roll_deg, (zero_V, zero_sigma_V))
         found.append(_factor(trial, gauges, *zero))
-    # Scales, balances and rulers may be common to all weights.
-    factor, sigma = weighted_mean(*np.array(found).T)
-    return NewtonScale(factor, sigma, tuple(trial.name for trial in loaded))
+    names = tuple(trial.name for trial in loaded)
+    factors, own, common = map(np.array, zip(*found))
+    mean = Measurements(factors, own, names, np.zeros(len(own)), common).mean()
+    return NewtonScale(mean.value, mean.sigma, names)
 
 
 def _factor(
     trial: Trial, gauges: GaugeMatrix, zero_V: np.ndarray, zero_sigma_V: np.ndarray
-) -> tuple[float, float]:
-    """Return factor and sigma of one weight: along the moment that it should give."""
-    felt_Nmm, felt_sigma_Nmm = _felt_moment(trial, gauges, zero_V, zero_sigma_V)
+) -> tuple[float, float, np.ndarray]:
+    """Return the factor of one weight, along the moment that it should give.
+
+    With its own sigma, of the volts, and its change (k,) by each cause that all weights have in common:
+    the gauges' coefficients, the balance, the ruler.
+    """
+    felt_Nmm, own_Nmm, by_gauges_Nmm = _felt_moment(trial, gauges, zero_V, zero_sigma_V)
+    felt_sigma_Nmm = float(np.hypot(own_Nmm, np.linalg.norm(by_gauges_Nmm)))
     moment_Nmm = trial.force_N * trial.at_mm
     if felt_Nmm < _LEAST_SIGMAS * felt_sigma_Nmm:
         hung = f"{trial.force_N:g} N at {trial.at_mm:g} mm"
@@ -76,21 +82,26 @@ def _factor(
         )
     by_force = trial.force_sigma_N / trial.force_N
     by_place = trial.at_sigma_mm / trial.at_mm
-    share = float(np.linalg.norm([by_force, by_place, felt_sigma_Nmm / felt_Nmm]))
-    return moment_Nmm / felt_Nmm, moment_Nmm / felt_Nmm * share
+    factor = moment_Nmm / felt_Nmm
+    common = factor * np.array([by_force, by_place, *(by_gauges_Nmm / felt_Nmm)])
+    return factor, factor * own_Nmm / felt_Nmm, common
 
 
 def _felt_moment(
     trial: Trial, gauges: GaugeMatrix, zero_V: np.ndarray, zero_sigma_V: np.ndarray
-) -> tuple[float, float]:
-    """Return the moment felt of a weight that hangs along rig −z, N·mm, and its sigma."""
+) -> tuple[float, float, np.ndarray]:
+    """Return the moment felt of a weight that hangs along rig −z, N·mm.
+
+    With its sigma by the volts, and its change (k,) by each cause of the gauges' covariance.
+    """
     mean_V, mean_sigma_V = _mean_volts(trial)
     volts = mean_V - zero_V
     variances = mean_sigma_V**2 + np.asarray(zero_sigma_V) ** 2
     direction = to_follicle(np.radians(trial.follicle_roll_deg)) @ [-1.0, 0.0]
     felt_Nmm = float(direction @ gauges.matrix @ volts)
-    covariance = gauges.matrix @ np.diag(variances) @ gauges.matrix.T + gauges.covariance_at(volts)
-    return felt_Nmm, float(np.sqrt(direction @ covariance @ direction))
+    covariance = gauges.matrix @ np.diag(variances) @ gauges.matrix.T
+    by_gauges_Nmm = gauges.changes_at(volts) @ direction
+    return felt_Nmm, float(np.sqrt(direction @ covariance @ direction)), by_gauges_Nmm
 
 
 def _mean_volts(trial: Trial) -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.base.weighted import independent_mean
+from bench.base.combined import independent
 from vision import NAN
 
 STATIC = "static"
@@ -41,7 +41,8 @@ class Phases:
             return NAN, NAN
         values = np.array([angle.alpha_rad for angle in chosen])
         sigmas = np.array([angle.sigma_rad for angle in chosen])
-        return independent_mean(values, sigmas)
+        mean = independent(values, sigmas).mean()
+        return mean.value, mean.sigma
 
 
 NO_PHASES = Phases(0, 0, ())

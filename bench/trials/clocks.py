@@ -1,7 +1,7 @@
 """Touch felt against touch seen, over all whisks of a session: an error that they share is the
 session's, not chance.
 
-    felt − seen = zero + clock · speed
+    felt − seen = zero + clock · speed + what a trial's whisks share
 
 The speed is negative on the way back. zero: what moves either touch by an angle (diameters, light
 on the bar, the gauges' onset). clock: delay of the frames' clock behind the signals', plus the part
@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
+from bench.base.combined import between_settings
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import SeenWhisk, TrialResult
 from vision import Value
@@ -93,44 +94,64 @@ class SharedTouch:
 
 def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
     """Fit what all whisks of a session have in common of felt − seen; None where none has both."""
-    strokes = np.array(list(_strokes(results)))
-    if not len(strokes):
+    strokes = list(_strokes(results))
+    if not strokes:
         return None
-    difference, seen, felt, speed, delay = strokes.T
+    difference = np.array([stroke.difference_rad for stroke in strokes])
+    speed = np.array([stroke.speed_rad_s for stroke in strokes])
+    sigmas = np.array([np.hypot(stroke.seen_rad, stroke.felt_rad) for stroke in strokes])
     design = np.vander(speed, 2, increasing=True)  # (n, 2): zero, clock
-    weighted = design.T @ np.linalg.inv(_covariance(seen, felt, delay * speed))
+    settings = [stroke.trial for stroke in strokes]
+    covariance = _covariance(strokes)
+    covariance += between_settings(difference, covariance, design, settings)
+    weighted = design.T @ np.linalg.inv(covariance)
     information = weighted @ design
     gradient = weighted @ difference
     prior = _PRIOR**-2.0
-    covariance = np.linalg.inv(information + np.diag(prior))
-    values = covariance @ gradient
+    of_values = np.linalg.inv(information + np.diag(prior))
+    values = of_values @ gradient
     largest_rad = float(np.max(np.abs(design @ values)))
     zero_alone, clock_alone = gradient**2 / (np.diag(information) + prior)
     return SharedTouch(
         values,
-        covariance,
+        of_values,
         chance=float(chdtrc(2, gradient @ values)),
-        share_of_sigma=largest_rad / float(np.median(np.hypot(seen, felt))),
+        share_of_sigma=largest_rad / float(np.median(sigmas)),
         clock_preference=float(clock_alone - zero_alone),
         speeds_rad_s=speed,
     )
 
 
-def _covariance(seen: np.ndarray, felt: np.ndarray, late: np.ndarray) -> np.ndarray:
-    """Return the covariance (n, n) of felt − seen by the sigmas (n,) of both and of clock and filter.
+@dataclass(frozen=True)
+class _Stroke:
+    """A stroke, forward or back, whose touch is both felt and seen.
 
-    What moves the seen touch of one whisk (light, lenses, diameters) may move all; clocks and
-    filter surely do.
+    difference_rad: felt − seen. seen_rad: sigma of seen without the clock's, of which seen_shared_rad is
+    the part that all strokes share. felt_rad: sigma of felt without that of the filter's delay. delay_s:
+    sigma of clock and filter together.
     """
-    return np.diag(felt**2 + seen**2) + np.outer(seen, seen) + np.outer(late, late)
+
+    trial: str
+    difference_rad: float
+    seen_rad: float
+    seen_own_rad: float
+    seen_shared_rad: float
+    felt_rad: float
+    speed_rad_s: float
+    delay_s: float
 
 
-def _strokes(results: Iterable[TrialResult]) -> Iterator[np.ndarray]:
-    """Yield five numbers of each stroke, forward or back, whose touch is both felt and seen.
+def _covariance(strokes: Sequence[_Stroke]) -> np.ndarray:
+    """Return the covariance (n, n) of felt − seen, by what strokes have of their own and share."""
+    felt = np.array([stroke.felt_rad for stroke in strokes])
+    own = np.array([stroke.seen_own_rad for stroke in strokes])
+    shared = np.array([stroke.seen_shared_rad for stroke in strokes])
+    late = np.array([stroke.delay_s * stroke.speed_rad_s for stroke in strokes])
+    return np.diag(felt**2 + own**2) + np.outer(shared, shared) + np.outer(late, late)
 
-    These are felt − seen touch, the sigma of seen without the clock's, the sigma of felt without
-    that of the filter's delay, rad, the speed, rad/s, and the sigma of clock and delay together, s.
-    """
+
+def _strokes(results: Iterable[TrialResult]) -> Iterator[_Stroke]:
+    """Yield each stroke whose touch is both felt and seen."""
     for result in results:
         clock_s = result.seen.clock.sigma_s if result.seen.clock else 0.0
         for seen, felt in zip(result.seen.whisks, result.felt.whisks):
@@ -138,29 +159,54 @@ def _strokes(results: Iterable[TrialResult]) -> Iterator[np.ndarray]:
             is_timed = not _NO_CLOCK.intersection(seen.status.codes)
             if is_timed and np.isfinite(seen.touch_rad.value):
                 speed = motor_speed(seen.frames)
-                shared = np.hypot(seen.touch_shared_rad, clock_s * speed)
+                left_out = np.hypot(seen.touch_shared_rad, clock_s * speed)
                 touch = Value(felt.touch_felt_rad.value, felt.theta_sigma_rad)
-                delay_s = np.hypot(clock_s, felt.delay_s.sigma)
-                yield from _known(seen.touch_rad, shared, touch, speed, delay_s)
+                delay_s = float(np.hypot(clock_s, felt.delay_s.sigma))
+                shared = None if seen.truth.shared is None else seen.truth.shared.touch_rad
+                name = result.trial.name
+                yield from _known(name, seen.touch_rad, shared, left_out, touch, speed, delay_s)
         back = result.seen.back
         if back:
-            shared = clock_s * back.speed_rad_s
+            speed = back.speed_rad_s
             filters_s = [felt.delay_s.sigma for felt in result.felt.whisks]
-            delay_s = np.hypot(clock_s, max(filters_s, default=np.nan))
+            delay_s = float(np.hypot(clock_s, max(filters_s, default=np.nan)))
             touch = result.felt.back_touch_rad
-            yield from _known(back.touch_rad, shared, touch, back.speed_rad_s, delay_s)
+            name = result.trial.name
+            yield from _known(name, back.touch_rad, None, clock_s * speed, touch, speed, delay_s)
 
 
 def _known(
-    seen: Value, shared_sigma: float, felt: Value, speed_rad_s: float, delay_s: float
-) -> Iterator[np.ndarray]:
-    """Yield the numbers of a stroke, unless a touch is unknown; shared_sigma: part of seen's sigma
-    to leave out.
+    trial: str,
+    seen: Value,
+    shared_rad: float | None,
+    left_out_rad: float,
+    felt: Value,
+    speed_rad_s: float,
+    delay_s: float,
+) -> Iterator[_Stroke]:
+    """Yield a stroke, unless a touch is unknown.
+
+    shared_rad: part of seen's sigma that all whisks share. Where it is not known (None), what moves the
+    seen touch of one whisk (light, lenses, diameters) may move all, and its sigma counts as both.
+    left_out_rad: part of both that is counted elsewhere.
     """
-    own = np.sqrt(max(seen.sigma**2 - shared_sigma**2, 0.0))
-    touch = [felt.value - seen.value, own, felt.sigma]
-    if np.isfinite(touch).all():
-        yield np.array([*touch, speed_rad_s, delay_s])
+    without = np.sqrt(max(seen.sigma**2 - left_out_rad**2, 0.0))
+    if not np.isfinite([felt.value - seen.value, without, felt.sigma]).all():
+        return
+    own = shared = without
+    if shared_rad is not None:
+        shared = min(np.sqrt(max(shared_rad**2 - left_out_rad**2, 0.0)), without)
+        own = np.sqrt(without**2 - shared**2)
+    yield _Stroke(
+        trial,
+        float(felt.value - seen.value),
+        float(without),
+        float(own),
+        float(shared),
+        float(felt.sigma),
+        float(speed_rad_s),
+        delay_s,
+    )
 
 
 def with_shared_touch(

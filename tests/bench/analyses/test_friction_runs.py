@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.analyses.alphas import felt_friction, mean_alpha, seen_friction
+from bench.analyses.alphas import alphas_of, felt_friction, mean_alpha, seen_friction
 from bench.analyses.direction import slip_angle
 from bench.analyses.friction_tables import FrictionAngles, friction_of
 from bench.analyses.runs import FITTED, SEEN, _rescaled, with_runs
@@ -124,7 +124,7 @@ def contact(beta_deg, d_x_nominal_mm=60.0) -> FeltContact:
 
 
 def test_ways_say_what_they_lack():
-    assert by_tilting([contact(30), contact(60)]).status.codes == ("slopes_one_sided",)
+    assert by_tilting([contact(30), contact(60)], WHISKER).status.codes == ("slopes_one_sided",)
     two_distances = [contact(30), contact(50, 61.0), contact(60)]
     assert by_consistency(two_distances, WHISKER).status.codes == ("whisks_few",)
     held = [contact(0), contact(5), contact(10)]
@@ -182,20 +182,35 @@ def test_a_fit_without_a_spare_recording_has_no_sigma():
 
 
 def test_bars_that_agree_exactly_leave_what_gauges_share():
-    """No residual: the sigma is that of the cause in common, by the normal distribution."""
+    """No residual: the sigma is that of the cause in common and of what theory leaves out, by the normal distribution."""
     shared = np.array([[0.0, 0.05]])
     bars = [replace(contact(b), shared_Nmm=shared) for b in (20, 40, 55, 65)]
     way = by_consistency(bars, WHISKER)
     moved = by_consistency([c.moved(0) for c in bars], WHISKER).alpha_rad
-    assert (
-        way.sigma_rad == pytest.approx(abs(moved - way.alpha_rad), rel=1e-3) and way.sigma_rad > 0
-    )
+    by_gauges = abs(moved - way.alpha_rad)
+    by_theory = by_consistency([replace(c, shared_Nmm=NOTHING_SHARED) for c in bars], WHISKER)
+    assert way.sigma_rad == pytest.approx(np.hypot(by_gauges, by_theory.sigma_rad), rel=1e-3)
+    assert by_gauges > 0 and 0 < by_theory.sigma_rad < np.radians(0.5)
 
 
-def test_mean_does_not_shrink_a_shared_sigma():
-    assert mean_alpha([(0.2, 0.01)] * 16) == pytest.approx((0.2, 0.01))
-    assert np.isnan(mean_alpha([(np.nan, np.nan)])).all()
-    assert mean_alpha([(0.1, 0.001), (0.3, 0.001)])[1] == pytest.approx(0.1 / np.sqrt(2))
+def test_no_mean_is_surer_than_what_all_whisks_share():
+    """Gauges move |φ| of every bar the same way, and β of every bar by what nobody says is not shared."""
+    results = []
+    for beta_deg in SLOPES:
+        whole = result(beta_deg)
+        (felt,) = whole.felt.whisks
+        by_gauges = 0.01 * np.array([[felt.m_z_Nmm.value, -felt.m_y_Nmm.value]])
+        phi = Value(felt.phi_felt_rad.value, float(np.hypot(0.01, 0.001)))
+        felt = replace(felt, shared_Nmm=by_gauges, phi_felt_rad=phi)
+        results.append(replace(whole, felt=replace(whole.felt, whisks=(felt,))))
+    whisks = alphas_of(results)
+    value, sigma = mean_alpha(whisks, "felt")
+    assert value == pytest.approx(ALPHA, abs=1e-6)
+    shared = np.hypot(np.radians(0.1), 0.01)
+    assert sigma == pytest.approx(np.hypot(shared, 0.001 / np.sqrt(len(SLOPES))), rel=1e-6)
+    many = mean_alpha(whisks * 10, "felt")[1]
+    assert shared < many < sigma
+    assert np.isnan(mean_alpha(whisks, "static_felt")).all()  # it only slides
 
 
 def test_repeats_of_one_recording_are_no_independent_ones():

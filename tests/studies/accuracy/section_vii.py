@@ -131,7 +131,7 @@ def study(count: int, seed: int) -> dict[str, tuple[Score, Counter]]:
         )
         upward = [c for c in felt if c.beta_rad >= 0]
         for way in (
-            by_tilting(felt),
+            by_tilting(felt, WHISKER),
             by_consistency(upward, WHISKER),
             by_smoothness(along, WHISKER),
         ):

@@ -1,0 +1,50 @@
+"""What (10), (13) and (14) leave out of the moments of a whisk, to leading order: one error in all whisks of a session.
+
+A fit of the friction angle to moments scatters by noise and by how bars were set up; what its model leaves out moves
+all its points the same way, and no scatter shows it. So the fit is made once more with the moments as the theory would
+have them, and the change is part of its sigma.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bench.analyses.direction import slip_angle
+from bench.base.settings import OBJECT_REACH_MM
+from estimator import first_order
+from estimator.beam import Beam
+from estimator.domain import RIGHT_ANGLE
+from estimator.two_tilts import DRAWN
+
+
+def as_theory_has_them(
+    m_Nmm: np.ndarray,
+    theta_rad: ArrayLike,
+    alpha_rad: float,
+    d_x_mm: ArrayLike,
+    reach_mm: ArrayLike,
+    beam: Beam,
+) -> np.ndarray:
+    """Return moments (n, 2) without what small-angle theory leaves out of them.
+
+    m_Nmm (n, 2): m_y, m_z as measured at pushing angles theta_rad (n,). reach_mm (n,): radii of object and
+    whisker together; NaN where nobody states it, which stands for the thickness that settings allow.
+    Out of |m| go rolling over the object, large angles, and friction along the whisker; out of φ the way
+    that the force turns (`bench.analyses.direction`) and the share of friction that acts along the
+    whisker. A distance that is not known leaves |m| as it is.
+    """
+    m_y, m_z = m_Nmm.T
+    phi = np.arctan2(m_y, m_z)
+    slope = np.minimum(np.abs(phi) + alpha_rad, 0.999 * RIGHT_ANGLE)
+    theta = np.broadcast_to(np.asarray(theta_rad, dtype=float), phi.shape)
+    reach = np.where(np.isfinite(reach_mm), reach_mm, OBJECT_REACH_MM)
+    left = beam.left(np.asarray(d_x_mm, dtype=float))
+    bent = theta * np.cos(slope) / np.cos(alpha_rad)
+    drawn = DRAWN * bent
+    along = drawn / np.hypot(drawn, np.sin(np.abs(phi)) / np.cos(alpha_rad))
+    share = first_order.rolling_at(theta, reach, slope, d_x_mm, left)
+    share = share + along * first_order.dragging(theta, alpha_rad) + bent**2 / (6 * left)
+    size = np.hypot(m_y, m_z) * (1.0 + np.nan_to_num(share * left))
+    across_rad = np.arctan(np.tan(alpha_rad) * np.sqrt(1.0 - along**2))
+    turned = slip_angle(theta, slope, across_rad) - (slope - alpha_rad)
+    phi = np.copysign(np.maximum(np.abs(phi) - turned, 0.0), phi)
+    return size[:, None] * np.stack([np.sin(phi), np.cos(phi)], axis=1)
