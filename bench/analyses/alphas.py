@@ -147,7 +147,7 @@ def _common_felt(felt: FeltWhisk) -> np.ndarray:
     """Return the change (k,) of −|φ| by each cause that the moments of all whisks share, rad."""
     m_y = felt.m_y_Nmm.value
     m_z = felt.m_z_Nmm.value
-    by_cause = felt.shared_Nmm @ [m_z, -m_y] / (m_y**2 + m_z**2)
+    by_cause = felt.shared_Nmm.reshape(-1, 2) @ [m_z, -m_y] / (m_y**2 + m_z**2)
     return -np.copysign(1.0, felt.phi_felt_rad.value) * by_cause
 
 

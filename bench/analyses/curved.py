@@ -200,7 +200,8 @@ def without_shared(felt: FeltWhisk) -> list[FeltAt]:
     Gauges' coefficients move all moments of a push by one share of them: no change with θ comes from that.
     """
     size_Nmm = np.hypot(felt.m_y_Nmm.value, felt.m_z_Nmm.value)
-    shared = felt.shared_Nmm.T @ felt.shared_Nmm / size_Nmm**2  # (2, 2), of |m|²
+    causes_Nmm = felt.shared_Nmm.reshape(-1, 2)
+    shared = causes_Nmm.T @ causes_Nmm / size_Nmm**2  # (2, 2), of |m|²
     found = []
     for at in felt.by_theta:
         square = at.m_y_Nmm.value**2 + at.m_z_Nmm.value**2

@@ -142,7 +142,7 @@ def _measurement(give: Value, result: TrialResult, seen: SeenWhisk, felt: FeltWh
     sin = np.sin(seen.beta_rad.value)
     cos = np.cos(seen.beta_rad.value)
     force_N = normal_force_N(seen, felt).value
-    by_gauges = felt.shared_Nmm @ [sin, cos] / (force_N * seen.d_x_mm.value)
+    by_gauges = felt.shared_Nmm.reshape(-1, 2) @ [sin, cos] / (force_N * seen.d_x_mm.value)
     shared = seen.truth.shared
     d_x_sigma_mm = seen.d_x_mm.sigma if shared is None else shared.d_x_mm
     by_distance = d_x_sigma_mm / seen.d_x_mm.value

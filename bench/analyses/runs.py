@@ -15,7 +15,7 @@ import numpy as np
 
 from bench.analyses.alphas import seen_friction
 from bench.analyses.surfaces import FittedSurface, surfaces
-from bench.analyses.turning_phi import turn, with_turn
+from bench.analyses.turning_phi import sure_turns, turn, with_turn
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
 from bench.records.trial_result import (
     EstimateRow,
@@ -127,6 +127,7 @@ def with_runs(
     sigma_rad = alpha_est_sigma(found, settings)
     first_rad = np.radians(settings.first_alpha_est_sigma_deg)
     alpha_est = AlphaUncertainty(sigma_rad, sigma_rad / first_rad if first_rad else 1.0)
+    turns = _turns(results, settings.alpha_est_rad)
     finished = []
     for result in results:
         again = AskedAgain(np.radians(result.theta_deg), whisker.beam, _radii_mm(result), alpha_est)
@@ -134,19 +135,45 @@ def with_runs(
         felt = []
         for _, seen, of_whisk in whisks([result]):
             fit = surface and surface.fit_without(result.trial.name, seen.whisk)
-            felt.append(_with_runs(seen, of_whisk, fit, again))
+            turning = turns[result.trial.name, seen.whisk]
+            felt.append(_with_runs(seen, of_whisk, fit, again, turning))
         finished.append(replace(result, felt=replace(result.felt, whisks=tuple(felt))))
     return finished
 
 
+@dataclass(frozen=True)
+class _Turning:
+    """How φ of a whisk turns over its push, and whether it does for sure."""
+
+    rate: Value
+    is_sure: bool
+
+
+def _turns(results: Iterable[TrialResult], alpha_est_rad: float) -> dict[tuple[str, int], _Turning]:
+    """Return how φ turns in each whisk, by trial and number; all whisks are tested together."""
+    keys = []
+    phi_rad = []
+    rates = []
+    for result, seen, felt in whisks(results):
+        keys.append((result.trial.name, seen.whisk))
+        phi_rad.append(felt.phi_felt_rad.value)
+        rates.append(turn(felt.by_theta))
+    sure = sure_turns(phi_rad, rates, alpha_est_rad)
+    return {key: _Turning(rate, bool(one)) for key, rate, one in zip(keys, rates, sure)}
+
+
 def _with_runs(
-    seen: SeenWhisk, felt: FeltWhisk, fit: FrictionFit | None, again: AskedAgain
+    seen: SeenWhisk,
+    felt: FeltWhisk,
+    fit: FrictionFit | None,
+    again: AskedAgain,
+    turning: _Turning,
 ) -> FeltWhisk:
     """Return the whisk with (10) run again. fit: of α to the other whisks of its surface."""
     ratio = again.alpha_est.ratio_to_first
     return replace(
         felt,
-        estimates=_estimates(seen, felt, fit, again),
+        estimates=_estimates(seen, felt, fit, again, turning),
         sensors=tuple(_rescaled_sensor(row, again.beam, ratio) for row in felt.sensors),
         by_theta=tuple(
             replace(at, estimates=again.given(at, at.theta_rad)) for at in felt.by_theta
@@ -155,18 +182,28 @@ def _with_runs(
 
 
 def _estimates(
-    seen: SeenWhisk, felt: FeltWhisk, fit: FrictionFit | None, again: AskedAgain
+    seen: SeenWhisk,
+    felt: FeltWhisk,
+    fit: FrictionFit | None,
+    again: AskedAgain,
+    turning: _Turning,
 ) -> tuple[EstimateRow, ...]:
     """Return the whisk's estimates with the new ones."""
     if not felt.estimates:
         return ()
     given = again.given(felt, again.theta_rad)
-    rate = turn(felt.by_theta)
     phi_rad = felt.phi_felt_rad.value
     rows = []
     for row in (*given, *_runs(seen, felt, fit, again)):
         if row.estimator in ASSUMING or row.estimator in RUNS:
-            row = with_turn(row, phi_rad, rate, again.theta_rad, again.beam.length_mm)
+            row = with_turn(
+                row,
+                phi_rad,
+                turning.rate,
+                again.theta_rad,
+                again.beam.length_mm,
+                is_sure=turning.is_sure,
+            )
         rows.append(row)
     return tuple(rows)
 

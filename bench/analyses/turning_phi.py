@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import chdtri, stdtrit
+from scipy.special import chdtri, ndtr, stdtrit
 
 from bench.analyses.curved import independent_angles, phi_sigma, slip_angles, weighted_fit
 from bench.analyses.pooling import column
+from bench.base.combined import holm
 from bench.base.settings import TILT_SIGMA_RAD
 from bench.records.trial_result import EstimateRow, FeltAt
 from estimator.domain import RIGHT_ANGLE
@@ -22,7 +23,9 @@ from vision import UNKNOWN, Value
 from vision.geometry import Reason, joined
 
 _FEWEST = 4  # angles, for three numbers and what is left
-_CHANCE = 1e-3  # of a turn as large where an object leans by no more than sigma holds, of a scatter as large by noise
+# Of a scatter as large by noise; and of a session in which any whisk is said to turn though no object leans by more
+# than sigma holds. Stated.
+_CHANCE = 1e-3
 _MATTERS = 0.5  # of an estimate's own sigma: less adds no more than an eighth to its error
 
 
@@ -51,28 +54,50 @@ def _quantile(freedom: float) -> float:
     return float(stdtrit(freedom, 1.0 - _CHANCE / 2))
 
 
+def sure_turns(phi_rad: Sequence[float], rates: Sequence[Value], alpha_rad: float) -> np.ndarray:
+    """Return of which (n,) whisks of a session φ turns for sure, all of them tested together.
+
+    phi_rad, rates: the slip angle felt of each, and its `turn`. alpha_rad: the assumed friction angle.
+    """
+    chances = []
+    for phi, rate in zip(phi_rad, rates):
+        spread = np.hypot(rate.sigma, _rate_by_hand(phi, alpha_rad))
+        chances.append(2 * ndtr(-abs(rate.value) / spread))
+    return holm(chances, _CHANCE)
+
+
+def _rate_by_hand(phi: float, alpha_rad: float) -> float:
+    """Return the change of φ with θ against an object that leans as one set up by hand, one sigma."""
+    beta = min(abs(phi) + alpha_rad, 0.999 * RIGHT_ANGLE)
+    return float(0.5 * np.cos(beta) * np.tan(TILT_SIGMA_RAD))
+
+
 def with_turn(
-    row: EstimateRow, phi: float, rate: Value, theta_rad: float, length_mm: float
+    row: EstimateRow,
+    phi: float,
+    rate: Value,
+    theta_rad: float,
+    length_mm: float,
+    *,
+    is_sure: bool,
 ) -> EstimateRow:
     """Return a row of (10), whatever α it assumed, with the turn of φ in its sigma.
 
     It gets a status where φ turns by more than against an object that leans as one set up by hand, and
-    that matters. phi, rate: the slip angle felt, and its `turn`; length_mm: the whisker's, at which
-    intervals end. Into the sigma goes what the turn's square is beyond its variance (the positive part of
+    that matters. phi, rate: the slip angle felt, and its `turn`; is_sure: of `sure_turns`; length_mm: the
+    whisker's, at which intervals end. Into the sigma goes what the turn's square is beyond its variance (the positive part of
     the moment estimate, as DerSimonian & Laird, Controlled Clinical Trials 7, 1986): of an object across
     the whisker nothing, in the mean.
     """
     alpha = row.alpha_est_rad
     beta = min(abs(phi) + alpha, 0.999 * RIGHT_ANGLE)
-    by_hand = 0.5 * np.cos(beta) * np.tan(TILT_SIGMA_RAD)
     share = theta_rad * np.sin(abs(phi)) / (np.cos(alpha) * np.cos(beta))  # of d_x, by a rate
-    spread = float(np.hypot(rate.sigma, by_hand))
+    spread = float(np.hypot(rate.sigma, _rate_by_hand(phi, alpha)))
     d_x_mm = row.d_x_est_mm
     size = abs(rate.value)
     if not (size > spread and np.isfinite(d_x_mm.value)):
         return row
     widened = _widened(row, share * float(np.sqrt(size**2 - spread**2)), length_mm)
-    is_sure = size > _quantile(np.inf) * spread
     if not (is_sure and size * share * d_x_mm.value > _MATTERS * d_x_mm.sigma):
         return widened
     status = _turning_status(rate.value * theta_rad, size * share)

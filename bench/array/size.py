@@ -4,7 +4,8 @@ At first touch each whisker is a straight line that just touches the surface: it
 is known by the angle of touch, to hundredths of a millimetre, and the place along it by the felt
 distance. Shape, direction of the axis and a ring's thickness are those of the manifest; place and
 size are fitted to both, weighted by their covariance, in which the error of the assumed friction
-angle is one for all. Where a distance has a warning the touch counts alone.
+angle is one for all. The whisks of one whisker share its base and its gauges, and count as one contact. Where a
+distance has a warning the touch counts alone.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,6 +16,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
+from bench.analyses.pooling import column, grouped
 from bench.array.cloud import ContactPoint
 from bench.array.shape_verdict import FELT
 from bench.array.surface import STATED, ObjectSurface
@@ -96,8 +98,10 @@ def fit_size(trial: str, contacts: Sequence[ContactPoint], surface: ObjectSurfac
     """Fit place and size of an object, by Gauss and Newton's method from what is stated of it."""
     distances = sum(not contact.status for contact in contacts)
     unknown = FeltSize(trial, surface, len(contacts), distances)
-    fit = _SizeFit(contacts, surface)
-    freedom = len(contacts) + distances - fit.count
+    of_whiskers = _one_a_whisker(contacts)
+    fit = _SizeFit(of_whiskers, surface)
+    known = sum(not contact.status for contact in of_whiskers)
+    freedom = len(of_whiskers) + known - fit.count
     if freedom < 1:
         sound = counted(distances, "sound distance")
         return replace(unknown, status=reason("contacts_few", distances=sound))
@@ -108,6 +112,21 @@ def fit_size(trial: str, contacts: Sequence[ContactPoint], surface: ObjectSurfac
     size = Value(unknown.stated + change, sigma)
     chance = float(chdtrc(freedom, cost))
     return replace(unknown, size=size, chance=chance, status=_status(size, chance))
+
+
+def _one_a_whisker(contacts: Sequence[ContactPoint]) -> list[ContactPoint]:
+    """Return the mean contact of each whisker, known as well as one of them; doubtful ones where it has no others."""
+    found = []
+    for of_whisker in grouped(contacts, lambda contact: contact.whisker).values():
+        sound = [contact for contact in of_whisker if not contact.status] or of_whisker
+        mean = replace(
+            sound[0],
+            point_mm=column(sound, "point_mm").mean(axis=0),
+            covariance_mm2=column(sound, "covariance_mm2").mean(axis=0),
+            by_alpha_mm=float(column(sound, "by_alpha_mm").mean()),
+        )
+        found.append(mean)
+    return found
 
 
 def _status(size: Value, chance: float) -> Reason:

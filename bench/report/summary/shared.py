@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from bench.records.trial_result import SeenWhisk, TrialResult, whisks
-from vision.geometry import Reason
+from vision.geometry import Reason, counted
 
 # Chance by which whisks of one recording would scatter so much with a sound part of their own.
 _FALSE_ALARM = 1e-3
@@ -38,20 +38,24 @@ class Parts:
 class SharedDistance:
     """The part of d_x's error that all n whisks share, and each whisk's own, RMS of sigmas in mm.
 
-    scatter_mm: of whisks of one recording about their mean, with so many degrees of freedom; NaN of
-    none.
+    settings: how many recordings they are of, each with a bar set up once. scatter_mm: of whisks of one
+    recording about their mean, with so many degrees of freedom; NaN of none.
     """
 
     shared_mm: float
     own_mm: float
     n: int
+    settings: int
     scatter_mm: float
     freedom: int
 
     @property
     def mean_sigma_mm(self) -> float:
-        """Return the standard deviation of the mean error of all whisks."""
-        return float(np.hypot(self.shared_mm, self.own_mm / np.sqrt(self.n)))
+        """Return the standard deviation of the mean error of all whisks.
+
+        What is a whisk's own may be its bar's, which the whisks of a recording share.
+        """
+        return float(np.hypot(self.shared_mm, self.own_mm / np.sqrt(self.settings)))
 
     @property
     def is_too_narrow(self) -> bool:
@@ -70,7 +74,9 @@ def shared_distance(results: Sequence[TrialResult]) -> SharedDistance | None:
     sigma = np.array([seen.d_x_mm.sigma for seen in known])
     shared = np.array([seen.truth.shared.d_x_mm for seen in known])
     parts = Parts.of(sigma, shared)
-    return SharedDistance(parts.shared, parts.own, len(known), *_scatter(results, "d_x_mm"))
+    settings = sum(any(seen in known for seen in result.seen.whisks) for result in results)
+    scatter = _scatter(results, "d_x_mm")
+    return SharedDistance(parts.shared, parts.own, len(known), settings, *scatter)
 
 
 def _known(results: Sequence[TrialResult]) -> list[SeenWhisk]:
@@ -123,7 +129,7 @@ def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
     yield (
         f"of d_x's sigma ± {shared.shared_mm:.4f} mm is one error that all {shared.n} whisks share "
         f"(diameters, light, cameras, placement, clock), ± {shared.own_mm:.4f} mm each whisk's own: "
-        f"their mean is known to ± {shared.mean_sigma_mm:.4f} mm"
+        f"the mean of {counted(shared.settings, 'recording')} is known to ± {shared.mean_sigma_mm:.4f} mm"
     )
     yield f"  shared by all and each whisk's own, one sigma: {_other_parts(_known(results))}"
     if shared.freedom:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.analyses.curved import curved
-from bench.analyses.turning_phi import turn, with_turn
+from bench.analyses.turning_phi import sure_turns, turn, with_turn
 from bench.base.settings import Settings
 from bench.base.statuses import reason
 from bench.records.trial_result import EstimateRow, FeltAt
@@ -156,7 +156,9 @@ def test_an_estimate_against_what_turns_the_slip_angle_says_so(r_n, told):
         at.theta_rad,
         D_X + 1.5,
     )
-    said = with_turn(row, *turns)
+    (is_sure,) = sure_turns([turns[0]], [turns[1]], ALPHA)
+    assert is_sure == told
+    said = with_turn(row, *turns, is_sure=is_sure)
     assert ("phi_turns" in said.status.codes) == told
     two_percent = np.hypot(0.5, 0.02 * D_X)
     assert said.d_x_est_mm.sigma == pytest.approx(
@@ -169,8 +171,8 @@ def test_an_estimate_against_what_turns_the_slip_angle_says_so(r_n, told):
     )
     assert said.d_x_est_high_mm == pytest.approx(D_X + (1.5 if told else 1.0), rel=0.001)
     unsure = EstimateRow("with_friction", Value(D_X, 10.0), alpha_est_rad=ALPHA)
-    assert with_turn(unsure, *turns).status == ""
+    assert with_turn(unsure, *turns, is_sure=is_sure).status == ""
     nearer = EstimateRow(
         "with_friction", Value(np.nan, np.nan), ALPHA, d_x_est_low_mm=0.0, d_x_est_high_mm=20.0
     )
-    assert with_turn(nearer, *turns) is nearer
+    assert with_turn(nearer, *turns, is_sure=is_sure) is nearer

@@ -23,6 +23,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.analyses.curved import Curvature, mean_radius_error
 from bench.analyses.friction_tables import friction_of
+from bench.analyses.runs import settings_without_alpha
+from bench.analyses.soft import Soft, _place, softness
+from bench.base.combined import Measurement
 from bench.base.settings import TILT_SIGMA_RAD
 from bench.records.trial_result import (
     Clock,
@@ -42,6 +45,8 @@ from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.whisk_mechanics import WhiskMechanics
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_touch
+from bench.trials.estimates import whisk_of
+from estimator.two_tilts import SharedContact, shared_contact
 from estimator.uncertainty import Z_95
 from tests.scenes.friction_results import run_of
 from tests.studies.accuracy.estimates_montecarlo import (
@@ -62,6 +67,8 @@ THETAS_RAD = np.radians(np.arange(1.0, 9.0))
 BAR_RADIUS_MM = 3.0
 # One sigma each: what a hand sets wrong, of a bar.
 SLOPE_RAD, DISTANCE_MM = np.radians(0.4), 0.4
+# Distances of a soft object, and how well each is known.
+SOFT_MM, SHIFT_MM = (40.0, 60.0), 0.07
 # What all whisks share: gauges' coefficients (share), slope and touch as seen, the clock.
 GAUGE_SHARE, SHARED_SLOPE_RAD, CLOCK_S = 0.004, np.radians(0.03), 5e-4
 SHARED_TOUCH_RAD = np.radians(0.005)
@@ -315,10 +322,59 @@ def judge(session: DrawnSession, table: Table, shape: str) -> None:
     said = sum("curved to the side" in line for line in Curvature().lines(curved))
     table.statuses["straight bars said to be curved"][f"{said} in a session"] += 1
     clock = shared_touch(session.results)
-    errors = clock.values - [-session.shared.touch_rad, session.shared.clock_s]
     sigmas = np.sqrt(np.diag(clock.covariance))
-    table.add("zero of touch [°]", *np.degrees([errors[0], sigmas[0]]))
-    table.add("clock [ms]", *(1e3 * np.array([errors[1], sigmas[1]])))
+    table.add("zero of touch beyond stated [°]", *np.degrees([clock.values[0], sigmas[0]]))
+    table.add("clock beyond stated [ms]", *(1e3 * np.array([clock.values[1], sigmas[1]])))
+    table.statuses["error of touch said"][f"{clock.is_error} of a sound session"] += 1
+    tilted = tilts(session)
+    table.add("d_x of tilts [mm]", tilted.d_x_mm - 60.0, tilted.covariance[0, 0] ** 0.5)
+    sigma_deg = np.degrees(tilted.covariance[1, 1] ** 0.5)
+    table.add("α of tilts [°]", np.degrees(tilted.alpha_rad) - true_deg, sigma_deg, tilted.status)
+    stiffness = np.inf if session.rng.random() < 0.25 else 10.0 ** session.rng.uniform(-1.0, 1.0)
+    give = soft_object(session, stiffness).give_mm_N
+    table.add("softness [mm/N]", give.value - 1.0 / stiffness, give.sigma)
+
+
+def tilts(session: DrawnSession) -> SharedContact:
+    """Solve the bars at one distance for that and α."""
+    pushes = []
+    names = []
+    shared = []
+    for result in session.results:
+        if result.trial.surface == "one distance":
+            for felt in result.felt.whisks:
+                pushes.append(whisk_of(felt, np.radians(THETA_DEG), session.beam))
+                names.append(result.trial.name)
+                shared.append(felt.shared_Nmm)
+    return shared_contact(
+        pushes,
+        settings_without_alpha(session.results[0]),
+        apart_sigma_mm=DISTANCE_MM,
+        places=names,
+        shared_Nmm=shared,
+    )
+
+
+def soft_object(session: DrawnSession, stiffness_N_mm: float) -> Soft:
+    """Push an object that gives way at two distances, two bars at each."""
+    rng = session.rng
+    theta = np.radians(THETA_DEG)
+    places = []
+    for nominal_mm in SOFT_MM:
+        held = []
+        for trial in range(2):
+            d_x_mm = nominal_mm + SHIFT_MM * rng.normal()
+            mechanics = push(session.rod, 0.0, 0.0, d_x_mm, session.alpha_rad, stiffness_N_mm)
+            exact = mechanics.forward.moments_at(np.array([mechanics.touch.motor_rad + theta]))[0]
+            for _ in range(WHISKS):
+                m_z = (session.shared.gauges @ exact)[1] + MOMENT_NMM * rng.normal()
+                k = theta / m_z
+                common = (-GAUGE_SHARE * k,)
+                held.append((str(trial), Measurement(k, k / m_z * MOMENT_NMM, common=common)))
+        places.append(_place(nominal_mm, SHIFT_MM / np.sqrt(2.0), held))
+    facts = TrialFacts("soft", "measure", "soft", None, bar_diameter_mm=2 * BAR_RADIUS_MM)
+    alpha_est = Value(*np.radians([12.0, 5.0]))
+    return softness(session.whisker, facts, *places, theta, alpha_est)
 
 
 def main() -> None:
