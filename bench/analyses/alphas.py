@@ -19,6 +19,10 @@ from bench.records.trial_result import (
 from bench.trials.stick_slip_phases import seen_phases, slips
 from vision import Value
 
+# [1] Share of what bends the line of d_z against d_y that is left when it is taken out. Study:
+# tests/studies/accuracy/combined_numbers.py. Of a whisker that tapers it is more: the tangent where it is pushed
+# turns by 1 + ½/w of its chord's angle (w: share of the diameter that is left there), where 1.5 is taken.
+_BEND_LEFT = 1 / 4
 _ROUNDS = 12  # each leaves less than half of the change up to a heading of 45°
 # Terms of θ² are enough up to here: pushed by 8, 16 and 25 degrees against a bar at 40, α seen is off by 0.03, 0.3 and
 # 0.7 degrees with them, but for the slope's error, and by 0.5, 1.5 and 3.8 without.
@@ -92,18 +96,25 @@ def alphas_of(results: Iterable[TrialResult]) -> list[WhiskAlphas]:
     """Return the friction angles of every whisk, in their order."""
     found = []
     for result, seen, felt in whisks(results):
-        found.append(_alphas(result.trial, seen, felt, np.radians(result.theta_deg)))
+        left = result.whisker.left(seen.d_x_mm.value)
+        found.append(_alphas(result.trial, seen, felt, np.radians(result.theta_deg), left))
     return found
 
 
-def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> WhiskAlphas:
-    """Return the friction angles of one whisk at a pushing angle."""
+def _alphas(
+    trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: float
+) -> WhiskAlphas:
+    """Return the friction angles of one whisk at a pushing angle.
+
+    left: share of the base's diameter that the whisker has at the contact.
+    """
     nominal = not np.isfinite(seen.beta_rad.value)
     beta = seen.beta_rad
     if nominal:
         beta = Value(float(np.radians(trial.beta_nominal_deg)), BETA_BY_HAND_RAD)
     phases = NO_PHASES
-    seen_alpha = seen_friction(seen)
+    alpha_rad, sigma_rad = seen_friction(seen)
+    by_theory_rad = _left_of_bend(seen, alpha_rad, left)
     beta_common_rad = _common_slope(seen)
     if slips(seen):
         phases = seen_phases(seen.frames, beta.value, seen.d_x_mm.value)
@@ -112,14 +123,14 @@ def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: floa
         seen.whisk,
         *trial.panel,
         beta_rad=beta.value,
-        seen=seen_alpha,
+        seen=(alpha_rad, float(np.hypot(sigma_rad, by_theory_rad))),
         felt=felt_friction(seen, felt, theta_rad),
         phases_seen=phases,
         phases_felt=felt.phases,
         shared_seen_rad=beta.sigma,
         shared_felt_rad=float(np.hypot(beta.sigma, felt.phi_felt_rad.sigma)),
         nominal=nominal,
-        common_seen=(beta_common_rad, _common_seen(seen, seen_alpha[1])),
+        common_seen=(beta_common_rad, _common_seen(seen, sigma_rad), by_theory_rad),
         common_felt=(beta_common_rad, *_common_felt(felt).tolist()),
     )
 
@@ -172,6 +183,22 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
     gradient = np.stack([np.zeros_like(weights), weights, -slope * weights], axis=1).ravel()
     slope_sigma = float(np.sqrt(gradient @ d.covariance @ gradient))
     return alpha, float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
+
+
+def _left_of_bend(seen: SeenWhisk, alpha_rad: float, left: float) -> float:
+    """Return what α seen may be off by because the line that it rests on is not straight, rad.
+
+    It is a share of what taking the bend out changes α by, the same in all whisks; 0 where no line is
+    fitted.
+    """
+    if not np.isfinite(alpha_rad) or _turns_with_slip(seen):
+        return 0.0
+    d = _near_touch(seen.deflection)
+    centred = d.across_y_mm - d.across_y_mm.mean()
+    slope = float(centred @ d.across_z_mm / np.sum(centred**2))
+    bent_rad = alpha_rad - (abs(seen.beta_rad.value) - np.arctan(abs(slope)))
+    of_taper = (1.0 + 0.5 / left) / 1.5 - 1.0
+    return float(max(_BEND_LEFT, of_taper) * bent_rad)
 
 
 def _straight_line(d: Deflection, beta: float, weights: np.ndarray) -> tuple[float, float]:
