@@ -148,7 +148,9 @@ class _Equations:
         """
         own, common = self._by_felt(models, solution)
         left = solution[0] * self.per_mm * [model.own for model in models]
-        by_place = self.per_mm[:, None] * self.apart_mm
+        # The equations are of the base's cylinder, 1/d = 1/d_x − τ: a change of d_x is one of d times (d/d_x)².
+        d_per_d_x = (solution[0] / self.whisks[0].beam.distance_mm(solution[0])) ** 2
+        by_place = self.per_mm[:, None] * self.apart_mm * d_per_d_x
         by_model = solution[0] * self.per_mm[:, None] * [model.shared for model in models]
         causes = np.concatenate([common, by_place, by_model], axis=1)
         return np.diag(own + left**2) + causes @ causes.T

@@ -226,6 +226,7 @@ class DrawnSession:
             z + noise[1],
             past,
             OWN_PLACE_MM**2 * np.eye(3 * count),
+            np.zeros((3 * count, 0)),
             Value(touch, OWN_TOUCH_RAD),
             mechanics.touch.d_x_mm,
         )
