@@ -1,5 +1,6 @@
-"""The sentence on one estimator: what it assumes, how far off it is, whether its sigma covers that."""
+"""The sentences on one estimator: what it assumes, how far off it is, what it states and why."""
 
+import math
 from collections.abc import Sequence
 
 from bench.analyses.estimator_accuracy import Accuracy
@@ -20,41 +21,52 @@ _ASSUMPTIONS = {
 
 
 def accuracy_line(accuracy: Accuracy, settings: Settings) -> str:
-    """Return what an estimator assumes, how far off it is, and whether its uncertainty covers that."""
+    """Return what an estimator assumes, how far off it is, and what it states of that itself."""
     name = f"Equation {accuracy.label}" if accuracy.label.startswith("(") else accuracy.label
     if accuracy.estimator in _ASSUMPTIONS:
         assumed = _ASSUMPTIONS[accuracy.estimator].format(alpha_est_deg=settings.alpha_est_deg)
         name = f"{name} assumes {assumed}"
     missing = _missing(accuracy)
     if accuracy.judged:
-        return f"{name}: {_errors(accuracy)} {_coverage(accuracy)}{missing}"
+        errors = _errors(accuracy, settings.theta_deg)
+        return f"{name}: {errors} {_stated(accuracy)}{missing}"
     if accuracy.left_out:
         errors = _error_range(accuracy.left_out)
         return f"{name}: no verdict, all {len(accuracy.left_out)} whisks are doubtful ({errors}).{missing}"
     return f"{name}: it gave no distance.{missing}"
 
 
-def _errors(accuracy: Accuracy) -> str:
+def _errors(accuracy: Accuracy, theta_deg: float) -> str:
     """Return RMS and worst error in per cent and mm, and where the worst is."""
     worst = accuracy.worst
-    text = f"off by {accuracy.rms_percent:.1f} % ({accuracy.rms_mm:.2f} mm) RMS"
-    if len(accuracy.judged) == 1:
-        text = "off by"
-    else:
-        text += f" over {len(accuracy.judged)} whisks, at worst"
+    text = f"at θ = {theta_deg:g}° off by"
+    if len(accuracy.judged) > 1:
+        text += (
+            f" {accuracy.rms_percent:.1f} % ({accuracy.rms_mm:.2f} mm) RMS over "
+            f"{len(accuracy.judged)} whisks, at worst"
+        )
     return (
         f"{text} {worst.error_percent:+.1f} ± {worst.error_sigma_percent:.1f} % "
         f"({worst.error_mm:+.2f} mm) on a slope of {worst.beta_deg:.1f}° ({worst.trial})."
     )
 
 
-def _coverage(accuracy: Accuracy) -> str:
-    """Return whether the stated 95 % intervals hold the truth as often as they should."""
+def _stated(accuracy: Accuracy) -> str:
+    """Return what the estimator states of its error, how much of that is the assumed friction, and
+    whether the stated 95 % intervals hold the truth as often as they should."""
+    if not math.isfinite(accuracy.stated_percent):
+        return "It states no uncertainty."
+    text = f"It states ± {accuracy.stated_percent:.1f} %"
+    if accuracy.stated_for_friction_percent:
+        text += (
+            f" (± {accuracy.stated_for_friction_percent:.1f} % for the friction angle, "
+            f"± {accuracy.stated_alpha_exact_percent:.1f} % for all else)"
+        )
     if not accuracy.intervals:
-        return "It states no interval."
-    covers = "covers" if accuracy.is_covered else "does not cover"
-    held = f"{accuracy.intervals_holding} of {accuracy.intervals}"
-    return f"Its stated uncertainty {covers} that: the 95 % interval holds the truth in {held}."
+        return f"{text}."
+    if not accuracy.is_covered:
+        text += ", which is too little"
+    return f"{text}: its 95 % interval holds the truth in {accuracy.intervals_holding} of {accuracy.intervals}."
 
 
 def _missing(accuracy: Accuracy) -> str:

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import bdtr
+from scipy.special import betainc, betaincinv, chdtri
 
-from bench.analyses.pooling import grouped, rms
+from bench.analyses.pooling import by_slope, grouped, rms
 from bench.base.drawing import label_of
 from bench.base.statuses import TRUTH, reaching
 from bench.records.trial_result import TrialResult, whisks
@@ -40,6 +40,8 @@ class Accuracy:
     warned: whisks with a distance that the estimator itself warns about.
     intervals: number of judged whisks with a finite 95 % interval.
     intervals_holding: how many of these hold the true distance.
+    settings: how many slopes of a surface and speed the judged whisks are at. What an estimator assumes
+    is wrong alike in all whisks of a setting, so that ten of them count as one.
     """
 
     estimator: str
@@ -50,6 +52,7 @@ class Accuracy:
     warned: tuple[Judged, ...]
     intervals: int
     intervals_holding: int
+    settings: int
 
     @property
     def label(self) -> str:
@@ -87,6 +90,57 @@ class Accuracy:
         return rms(self.errors_mm)
 
     @property
+    def stated_percent(self) -> float:
+        """Return the RMS of the stated sigmas of the estimates, per cent of the truth."""
+        return _rms_share([(one.d_x_est_sigma_mm, one.d_x_mm) for one in self.judged])
+
+    @property
+    def stated_alpha_exact_percent(self) -> float:
+        """Return the RMS of these sigmas as if the assumed friction angle were exact, per cent."""
+        return _rms_share([(one.d_x_est_sigma_alpha_exact_mm, one.d_x_mm) for one in self.judged])
+
+    @property
+    def stated_for_friction_percent(self) -> float:
+        """Return the part of `stated_percent` that is the assumed friction angle's; 0 where none is."""
+        squared = self.stated_percent**2 - self.stated_alpha_exact_percent**2
+        return math.sqrt(max(squared, 0.0))
+
+    @property
+    def rms_range_percent(self) -> tuple[float, float]:
+        """Return the 95 % interval of the RMS error over further settings like these, per cent.
+
+        The errors of settings are taken as normal: their sum of squares over the variance is χ² with as
+        many degrees of freedom. NaN where nothing is judged.
+        """
+        if not self.judged:
+            return math.nan, math.nan
+        tail = 0.5 * (1.0 - INTERVAL_SHARE)
+        low = math.sqrt(self.settings / chdtri(self.settings, tail))
+        high = math.sqrt(self.settings / chdtri(self.settings, 1.0 - tail))
+        return low * self.rms_percent, high * self.rms_percent
+
+    @property
+    def holding_range_percent(self) -> tuple[float, float]:
+        """Return the 95 % interval of the share of intervals that hold over further settings, per cent.
+
+        It is Clopper and Pearson's (Biometrika 26, 1934) of as many trials as there are settings. NaN
+        where no interval is judged.
+        """
+        if not self.intervals:
+            return math.nan, math.nan
+        tail = 0.5 * (1.0 - INTERVAL_SHARE)
+        holding, failing = self._settings_holding()
+        low = betaincinv(holding, failing + 1.0, tail) if holding else 0.0
+        high = betaincinv(holding + 1.0, failing, 1.0 - tail) if failing else 1.0
+        return 100.0 * float(low), 100.0 * float(high)
+
+    def _settings_holding(self) -> tuple[float, float]:
+        """Return how many settings the intervals that hold amount to, and those that do not."""
+        count = min(self.settings, self.intervals)
+        holding = count * self.intervals_holding / self.intervals
+        return holding, count - holding
+
+    @property
     def worst(self) -> Judged | None:
         """Return the whisk with the largest error in per cent; None where nothing is judged."""
         if not self.judged:
@@ -109,9 +163,14 @@ class Accuracy:
 
         Where none holds they cover nothing, however few there are.
         """
-        # The probability that no more than these hold.
-        chance = bdtr(self.intervals_holding, self.intervals, INTERVAL_SHARE)
-        return self.intervals_holding > 0 and bool(chance >= LEAST_CHANCE)
+        if not self.intervals_holding:
+            return False
+        holding, failing = self._settings_holding()
+        if not failing:
+            return True
+        # The probability that no more than these hold: the binomial distribution's, for parts, too.
+        chance = betainc(failing, holding + 1.0, 1.0 - INTERVAL_SHARE)
+        return bool(chance >= LEAST_CHANCE)
 
     def is_worse_than(self, other: "Accuracy") -> bool:
         """Return whether the sum of squared errors is larger by more than the sigmas explain.
@@ -184,7 +243,19 @@ def _accuracy(name: str, mine: Sequence[Judged], holding: dict[Key, bool]) -> Ac
         warned=tuple(warned),
         intervals=len(intervals),
         intervals_holding=sum(intervals),
+        settings=_settings(judged),
     )
+
+
+def _settings(judged: Iterable[Judged]) -> int:
+    """Return at how many slopes of a surface and speed the whisks are."""
+    panels = grouped(judged, lambda one: (one.surface, one.speed_deg_s))
+    return sum(len(by_slope(of_panel, _steepness)) for of_panel in panels.values())
+
+
+def _steepness(judged: Judged) -> float:
+    """Return how steep the slope is, to either side."""
+    return abs(judged.beta_deg)
 
 
 @dataclass(frozen=True)
@@ -250,6 +321,12 @@ class RunAccuracy:
         """Return the accuracy over the measured whisks of these results."""
         results = list(results)
         return cls(truth_uncertainty(results), tuple(accuracies(results)))
+
+
+def _rms_share(parts: Iterable[tuple[float, float]]) -> float:
+    """Return the RMS of the finite ratios of pairs (part, whole), per cent; NaN where there is none."""
+    shares = [100.0 * part / whole for part, whole in parts]
+    return rms(share for share in shares if math.isfinite(share))
 
 
 def _finite_median(values: Sequence[float]) -> float:

@@ -14,6 +14,8 @@ from vision.geometry import counted
 
 Item = TypeVar("Item")
 Key = TypeVar("Key", bound=Hashable)
+# [°] Half of the step of 5° that a protractor sets: slopes nearer than that are one. Stated.
+_SAME_SLOPE_DEG = 2.5
 
 
 def grouped(items: Iterable[Item], key: Callable[[Item], Key]) -> dict[Key, list[Item]]:
@@ -21,6 +23,17 @@ def grouped(items: Iterable[Item], key: Callable[[Item], Key]) -> dict[Key, list
     groups: dict[Key, list[Item]] = {}
     for item in items:
         groups.setdefault(key(item), []).append(item)
+    return groups
+
+
+def by_slope(items: Iterable[Item], slope_deg: Callable[[Item], float]) -> list[list[Item]]:
+    """Return the items in groups of alike slope, the flattest first."""
+    groups: list[list[Item]] = []
+    for item in sorted(items, key=slope_deg):
+        if groups and slope_deg(item) - slope_deg(groups[-1][0]) < _SAME_SLOPE_DEG:
+            groups[-1].append(item)
+        else:
+            groups.append([item])
     return groups
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bench.analyses.alphas import BETA_BY_HAND_RAD
-from bench.analyses.pooling import column, measured, panel_title
+from bench.analyses.pooling import by_slope, column, measured, panel_title
 from bench.analyses.theory_left import as_theory_has_them
 from bench.base.combined import add_common, student_factor
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
@@ -19,7 +19,6 @@ from vision.geometry import counted
 # From so many recordings that slip on, the fit's own sigma is that of its residuals, the whisks of a recording counting
 # together: what is wrong with its slope is wrong in all of them. With fewer it is that of moments and slopes as stated.
 _MANY = 3
-_SAME_SLOPE_DEG = 2.5  # °: half of the step of 5° that a protractor sets
 
 
 @dataclass(frozen=True)
@@ -122,12 +121,7 @@ class FittedSurface:
 
     def points(self) -> list[SlopePoint]:
         """Return the points of the figure: whisks of alike slope, |m| scaled to the common distance."""
-        groups: list[list[Felt]] = []
-        for felt in sorted(self.felt, key=lambda one: one.beta_deg):
-            if groups and felt.beta_deg - groups[-1][0].beta_deg < _SAME_SLOPE_DEG:
-                groups[-1].append(felt)
-            else:
-                groups.append([felt])
+        groups = by_slope(self.felt, lambda one: one.beta_deg)
         return [_point(group, self.common_d_x_mm, self.beam) for group in groups]
 
 

@@ -8,6 +8,7 @@ too long by one share make both too long by it. So truth and estimate err togeth
 their difference is not that of two independent errors.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -24,7 +25,8 @@ class Judged:
 
     beta_deg: the slope as seen, else the nominal one. covariance_mm2: of estimate and truth, by the
     errors of the cameras. one_factor: made with one gauge factor a channel. status: the estimate's.
-    whisk_status: of the whisk, seen and felt.
+    whisk_status: of the whisk, seen and felt. d_x_est_sigma_alpha_exact_mm: the estimate's sigma as
+    if the friction angle were exact.
     """
 
     trial: str
@@ -42,6 +44,7 @@ class Judged:
     one_factor: bool = False
     status: str = ""
     whisk_status: Reason = NO_REASON
+    d_x_est_sigma_alpha_exact_mm: float = math.nan
 
     @property
     def has_warning(self) -> bool:
@@ -141,4 +144,5 @@ def _judged(
         float(row.d_x_est_mm.sigma),
         status=row.status,
         whisk_status=whisk_status,
+        d_x_est_sigma_alpha_exact_mm=float(row.d_x_est_sigma_alpha_exact_mm),
     )

@@ -1,20 +1,29 @@
 """The verdict, for a reader who does not know the paper.
 
 First how well the truth is known; then, for each estimator, what it assumes, how far off it is and
-whether its stated uncertainty covers that; last, which one to use here.
+what it states of that; of the best one, on which surfaces and slopes, and what so many whisks allow
+to say of others; last, which one to use here.
 """
 
+from bisect import bisect
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 from bench.analyses.accuracy_line import accuracy_line
 from bench.analyses.estimator_accuracy import Accuracy, RunAccuracy, TruthUncertainty
-from bench.analyses.runs import RUNS
+from bench.analyses.pooling import grouped, panel_title, rms
+from bench.analyses.runs import FITTED, RUNS
 from bench.base.settings import Seeing, Settings
 from bench.base.statuses import cure_of
 from bench.gauges.matrix import FROM_ALL, GaugeCalibration
 from bench.records.trial_result import TrialResult, whisks
+from bench.trials.estimate_errors import Judged
 from vision.geometry import counted
+
+# [°] Where slopes are steeper by a group: between those that a protractor sets every 5°. Stated.
+_STEEPER_DEG = (27.5, 57.5)
+# [surfaces and speeds] At most, so that a verdict stays short: the paper's. Stated.
+_MOST_PANELS = 4
 
 
 def verdict(
@@ -30,11 +39,16 @@ def verdict(
     """
     yield _truth_line(session, has_pictures, accuracy.truth, warnings)
     compared = [one for one in accuracy.estimators if one.estimator not in RUNS]
-    for one in compared:
+    fitted = [one for one in accuracy.estimators if one.estimator == FITTED and one.judged]
+    for one in (*compared, *fitted):
         yield accuracy_line(one, settings)
     judged = [one for one in compared if one.judged]
     if judged:
-        yield _recommendation(judged, settings.theta_deg)
+        complete = _most_complete(judged)
+        best = min(complete, key=lambda one: one.rms_mm)
+        yield from _slope_lines(best)
+        yield _sample_line(best)
+        yield _recommendation(best, complete, fitted, settings.theta_deg)
     else:
         yield _withheld(accuracy.truth, compared)
 
@@ -71,20 +85,85 @@ def _in_doubt(truth: TruthUncertainty) -> str:
     return f", but in doubt for {truth.in_doubt} of these ({truth.contradiction})"
 
 
-def _recommendation(judged: Sequence[Accuracy], theta_deg: float) -> str:
-    """Return which estimator to use, and which others these whisks cannot distinguish from it.
-
-    Only estimators that give a distance for as many whisks as any other are compared.
-    """
+def _most_complete(judged: Sequence[Accuracy]) -> list[Accuracy]:
+    """Return the estimators that give a distance for as many whisks as any other."""
     most = max(len(one.judged) for one in judged)
-    complete = [one for one in judged if len(one.judged) == most]
-    best = min(complete, key=lambda one: one.rms_mm)
+    return [one for one in judged if len(one.judged) == most]
+
+
+def _slope_lines(accuracy: Accuracy) -> Iterator[str]:
+    """Yield RMS and worst error by surface and slope, a line a surface and speed.
+
+    There is none where all whisks are of one surface and of alike slopes. Of many surfaces those of
+    the largest error are shown.
+    """
+    panels = list(grouped(accuracy.judged, lambda one: (one.surface, one.speed_deg_s)).items())
+    if len(panels) == 1 and len(_by_steepness(panels[0][1])) == 1:
+        return
+    shown = panels
+    if len(panels) > _MOST_PANELS:
+        largest = sorted(panels, key=lambda panel: -rms(_errors_percent(panel[1])))
+        shown = [panel for panel in panels if panel in largest[:_MOST_PANELS]]
+        yield f"The {_MOST_PANELS} of {len(panels)} surfaces and speeds with the largest errors:"
+    for panel, judged in shown:
+        parts = [_slope_part(group) for group in _by_steepness(judged)]
+        yield f"{accuracy.label} on {panel_title(*panel)}, by slope: {'; '.join(parts)}."
+
+
+def _by_steepness(judged: Iterable[Judged]) -> list[list[Judged]]:
+    """Return the whisks in groups of flat, middle and steep slopes, those that there are."""
+    groups = grouped(judged, lambda one: bisect(_STEEPER_DEG, abs(one.beta_deg)))
+    return [groups[number] for number in sorted(groups)]
+
+
+def _slope_part(judged: Sequence[Judged]) -> str:
+    """Return RMS and worst error of whisks, and from what slope to what slope they are."""
+    slopes_deg = [abs(one.beta_deg) for one in judged]
+    ends = dict.fromkeys(f"{slope:.0f}" for slope in (min(slopes_deg), max(slopes_deg)))
+    errors = _errors_percent(judged)
+    worst = max(errors, key=abs)
+    slopes = f"{' to '.join(ends)}°"
+    if len(errors) == 1:
+        return f"{slopes} {worst:+.1f} %"
+    return f"{slopes} {rms(errors):.1f} % RMS (worst {worst:+.1f} %)"
+
+
+def _errors_percent(judged: Iterable[Judged]) -> list[float]:
+    """Return the errors of whisks, per cent of the truth."""
+    return [one.error_percent for one in judged]
+
+
+def _sample_line(accuracy: Accuracy) -> str:
+    """Return what so many whisks allow to say of further ones."""
+    low, high = accuracy.rms_range_percent
+    text = (
+        f"{counted(len(accuracy.judged), 'whisk')} at {counted(accuracy.settings, 'setting')} (a slope of a "
+        f"surface at a speed): over others like these, {accuracy.label} errs by {low:.2g} to {high:.2g} % RMS"
+    )
+    if accuracy.intervals:
+        least, most = accuracy.holding_range_percent
+        text += f" and its interval holds in {least:.0f} to {most:.0f} %"
+    return f"{text} (95 % confidence)."
+
+
+def _recommendation(
+    best: Accuracy, complete: Sequence[Accuracy], fitted: Sequence[Accuracy], theta_deg: float
+) -> str:
+    """Return which estimator to use, which others these whisks cannot distinguish from it, and whether
+    a fitted friction angle is better.
+
+    complete: all that are compared. fitted: (10) with the friction angle fitted, where that is known.
+    """
     alike = [one.label for one in complete if one is not best and not one.is_worse_than(best)]
     text = f"Use {best.label} here, at a pushing angle of {theta_deg:g}°"
     if alike:
-        text += f"; {counted(most, 'whisk')} cannot tell {' or '.join(alike)} from it"
+        whisks_text = counted(len(best.judged), "whisk")
+        text += f"; {whisks_text} cannot tell {' or '.join(alike)} from it"
     if not best.is_covered:
         text += "; but take its stated uncertainty as too small"
+    for one in fitted:
+        if len(one.judged) == len(best.judged) and best.is_worse_than(one):
+            text += f"; where α can be fitted to the surface first, {one.rms_percent:.1f} % RMS are left"
     return f"{text}."
 
 

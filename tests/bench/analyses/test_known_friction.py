@@ -19,7 +19,7 @@ def accuracy_of(estimator: str, *errors_mm: float) -> Accuracy:
             "t", 0, "measure", "steel", 1.0, estimator, 20.0, 60.0, 0.1, 60 + error_mm, 0.1
         )
         judged.append(one)
-    return Accuracy(estimator, 1, tuple(judged), (), (), (), len(judged), len(judged))
+    return Accuracy(estimator, 1, tuple(judged), (), (), (), len(judged), len(judged), 1)
 
 
 def test_only_estimators_that_know_the_friction_and_are_judged_have_a_line():
