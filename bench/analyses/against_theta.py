@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import column, grouped, known_rows, mean, rms, sound_measured_whisks
-from bench.base.drawing import blank, colour_of, label_of
+from bench.base.drawing import blank, colour_of, label_of, nested_size
 from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table
 from bench.records.trial_result import EstimateRow, TrialResult
 from vision import Value
@@ -149,8 +149,10 @@ def _draw(rows: Sequence[AtTheta]) -> "Figure":
     """Draw the lines of all estimators, and what kinds of lines mean."""
     drawing = blank(5.6, 4.8)
     axes = drawing.subplots()
-    for number, (name, mine) in enumerate(grouped(rows, lambda row: row.estimator).items()):
-        _draw_estimator(axes, mine, label_of(name), colour_of(name, number))
+    of_estimators = grouped(rows, lambda row: row.estimator)
+    for number, (name, mine) in enumerate(of_estimators.items()):
+        rim_points = nested_size(number, len(of_estimators), least=0.0, step=1.3)
+        _draw_estimator(axes, mine, label_of(name), colour_of(name, number), rim_points)
     axes.plot([], [], "--", lw=1.0, color="0.4", label="stated sigma")
     axes.plot([], [], ":", lw=1.0, color="0.4", label="sigma, α$_{est}$ exact")
     axes.plot([], [], "o", ms=9, mfc="none", mec="0.4", label="least error")
@@ -170,18 +172,27 @@ def _draw(rows: Sequence[AtTheta]) -> "Figure":
     return drawing
 
 
-def _draw_estimator(axes: "Axes", rows: Sequence[AtTheta], label: str, colour: str) -> None:
-    """Draw error and sigmas of one estimator over θ, with a ring where the error is least."""
+def _draw_estimator(
+    axes: "Axes", rows: Sequence[AtTheta], label: str, colour: str, rim_points: float
+) -> None:
+    """Draw error and sigmas of one estimator over θ, with a ring where the error is least.
+
+    rim_points: by how much its lines are wider than those that are drawn last.
+    """
     known = [row for row in rows if row.whisks]
     theta_deg = column(known, "theta_deg")
     errors = column(known, "error_rms_percent")
-    axes.plot(theta_deg, errors, "o-", ms=3.5, color=colour, label=label)
-    axes.plot(theta_deg, column(known, "error_sigma_percent"), "--", lw=1.0, color=colour)
-    exact_sigmas = column(known, "error_sigma_alpha_exact_percent")
-    axes.plot(theta_deg, exact_sigmas, ":", lw=1.0, color=colour)
+    width = 1.2 + rim_points
+    axes.plot(theta_deg, errors, "o-", lw=width, ms=3.5 + rim_points, color=colour, label=label)
+    for name, line in (
+        ("error_sigma_percent", "--"),
+        ("error_sigma_alpha_exact_percent", ":"),
+    ):
+        axes.plot(theta_deg, column(known, name), line, lw=1.0 + rim_points, color=colour)
     least = least_error(rows)
     if least is not None:
-        axes.plot(least.theta_deg, least.error_rms_percent, "o", ms=9, mfc="none", mec=colour)
+        size = 9 + 1.5 * rim_points
+        axes.plot(least.theta_deg, least.error_rms_percent, "o", ms=size, mfc="none", mec=colour)
 
 
 def _add_legend(drawing: "Figure", axes: "Axes", styles: int) -> None:

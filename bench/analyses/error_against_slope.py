@@ -1,14 +1,14 @@
 """Error of every estimator against the slope, and of (10) against the friction angle that is seen."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.analyses.alphas import seen_friction
 from bench.analyses.analysis import Analysis, EvaluatedRun
-from bench.analyses.pooling import grouped
+from bench.analyses.pooling import grouped, panel_title
 from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import (
     SLOPES_DEG,
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MARKERS = "osD^vP"
-_LINES = ("-", "--", ":", "-.")
 # [%] A layout: an error bar that is longer widens no axis.
 _LONGEST_BAR_PERCENT = 50.0
-# [deg] A layout: between the estimates of one whisk by two estimators.
-_APART_DEG = 0.6
+# [deg] A layout: between the estimates of one whisk by two estimators, and between the first and the last
+# of many, less than the 5° between slopes.
+_APART_DEG = 0.8
+_SPREAD_DEG = 4.0
 
 
 class ErrorAgainstSlope(Analysis):
@@ -42,8 +42,9 @@ class ErrorAgainstSlope(Analysis):
     figure_name = "error_against_slope"
     figure_title = "Error against slope"
     figure_caption = (
-        "Error of d_x, estimate less truth, in per cent of the truth, ± one sigma. Lines: as (13), (14) "
-        "predict with the α that fits each surface. A hollow point is in doubt and not in the verdict."
+        "Error of d_x, estimate less truth, in per cent of the truth, ± one sigma; a row a surface and speed. "
+        "Lines: as (13), (14) predict with the α that fits it. Estimators stand side by side, points and lines. "
+        "A hollow point is in doubt and not in the verdict."
     )
 
     def compute(self, run: EvaluatedRun) -> EvaluatedRun:
@@ -88,31 +89,70 @@ def error_against_slope(
 
     The error of (2), which assumes no slip, dwarfs the others'. Hollow points are flagged.
     """
-    figure = blank(9.6, 4.3)
-    whole, near = figure.subplots(1, 2)
     judged = [j for j in judged if not j.one_factor or j.estimator == "with_friction"]
-    without_2 = [j for j in judged if j.estimator != "no_slip"]
-    _draw_estimators(whole, judged, fitted, settings)
-    _draw_estimators(near, without_2, fitted, settings)
-    whole.set(ylabel="error of d$_x$  [%]", title="every estimator")
-    whole.set_ylim(*_limits([j for j in judged if not j.one_factor]))
-    near.set(title="without (2)")
-    near.set_ylim(*_limits(without_2))
+    panels = grouped(judged, lambda one: (one.surface, one.speed_deg_s))
+    surface_of = {surface.panel: surface for surface in fitted}
+    lanes = _lanes(judged)
+    figure = blank(9.6, 1.0 + 3.2 * len(panels))
+    rows = figure.subplots(len(panels), 2, squeeze=False)
+    for (whole, near), (panel, of_panel) in zip(rows, panels.items()):
+        surface = surface_of.get(panel)
+        title = panel_title(*panel)
+        without_2 = [j for j in of_panel if j.estimator != "no_slip"]
+        _draw_estimators(whole, of_panel, lanes, surface, settings)
+        _draw_estimators(near, without_2, lanes, surface, settings)
+        whole.set(ylabel="error of d$_x$  [%]", title=f"{title}: every estimator")
+        whole.set_ylim(*_limits([j for j in of_panel if not j.one_factor]))
+        near.set(title=f"{title}: without (2)")
+        near.set_ylim(*_limits(without_2))
+    for axes in rows[-1]:
+        axes.set_xlabel("slope β  [°]")
     add_legend(figure, 3)
     return figure
 
 
+Lane = tuple[str, bool]  # estimator, and whether it was given one gauge factor a channel
+
+
+def _lane(judged: Judged) -> Lane:
+    """Return what an estimate is drawn beside others of its whisk by."""
+    return judged.estimator, judged.one_factor
+
+
+def _lanes(judged: Sequence[Judged]) -> dict[Lane, float]:
+    """Return how far the estimates of each lane are drawn to the side of their slope, degrees."""
+    lanes = list(dict.fromkeys(_lane(one) for one in judged))
+    step_deg = min(_APART_DEG, _SPREAD_DEG / len(lanes))
+    middle = 0.5 * (len(lanes) - 1)
+    return {lane: step_deg * (number - middle) for number, lane in enumerate(lanes)}
+
+
 def _draw_estimators(
-    axes: "Axes", judged: Sequence[Judged], fitted: Sequence[FittedSurface], settings: Settings
+    axes: "Axes",
+    judged: Sequence[Judged],
+    lanes: Mapping[Lane, float],
+    surface: FittedSurface | None,
+    settings: Settings,
 ) -> None:
-    """Draw predicted and measured errors of all estimators against the slope."""
-    of_estimators = grouped(judged, lambda one: one.estimator)
-    for number, (name, mine) in enumerate(of_estimators.items()):
-        _draw_prediction(axes, name, number, fitted, settings)
-        apart_deg = _APART_DEG * (number - 0.5 * (len(of_estimators) - 1))
-        _draw_errors(axes, mine, number, fitted, apart_deg)
+    """Draw predicted and measured errors of the estimators against the slope, on one surface.
+
+    lanes: how far the estimates of one whisk stand to the side, so that none hides another; the
+    predicted line goes with them.
+    """
+    of_lanes = grouped(judged, _lane)
+    for number, (lane, apart_deg) in enumerate(lanes.items()):
+        mine = of_lanes.get(lane, [])
+        if not mine:
+            continue
+        name, one_factor = lane
+        label = label_of(name)
+        label += ", one gauge factor a channel" if one_factor else ""
+        if surface is not None and not one_factor:
+            _draw_prediction(axes, name, number, surface, settings, apart_deg)
+        slopes = [abs(one.beta_deg) + apart_deg for one in mine]
+        _draw_group(axes, slopes, mine, number, label)
     axes.axhline(0.0, color="0.6", lw=0.8, zorder=0)
-    axes.set(xlabel="slope β  [°]", xlim=(-2, 82))
+    axes.set(xlim=(-3, 82))
 
 
 def errors_with_friction(results: Sequence[TrialResult]) -> list[tuple[float, Judged]]:
@@ -134,7 +174,7 @@ def error_against_friction(found: Sequence[tuple[float, Judged]]) -> "Figure":
     chosen = [one for _, one in found]
     figure = blank(5.6, 4.3)
     axes = figure.subplots()
-    _draw_group(axes, [alpha for alpha, _ in found], chosen, "o", 0)
+    _draw_group(axes, [alpha for alpha, _ in found], chosen, 0)
     axes.axhline(0.0, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="friction angle α seen  [°]", ylabel="error of d$_x$  [%]")
     axes.set_title(label_of("with_friction"))
@@ -143,11 +183,11 @@ def error_against_friction(found: Sequence[tuple[float, Judged]]) -> "Figure":
 
 
 def _limits(judged: Sequence[Judged]) -> tuple[float, float]:
-    """Return limits, %, that hold all points with room for their sigmas, and at least ± 5 %."""
+    """Return limits, %, that hold all points with their sigmas, and at least ± 5 %."""
     low = -5.0
     high = 5.0
     for one in judged:
-        reach = 2.0 * min(one.error_sigma_percent, _LONGEST_BAR_PERCENT)
+        reach = min(one.error_sigma_percent, _LONGEST_BAR_PERCENT)
         low = min(low, one.error_percent - reach)
         high = max(high, one.error_percent + reach)
     margin = 0.06 * (high - low)
@@ -155,62 +195,38 @@ def _limits(judged: Sequence[Judged]) -> tuple[float, float]:
 
 
 def _draw_prediction(
-    axes: "Axes", name: str, number: int, fitted: Sequence[FittedSurface], settings: Settings
-) -> None:
-    """Draw the error that (13), (14) predict for an estimator where the surface has its fitted α."""
-    assumed_rad = {"frictionless": 0.0, "with_friction": settings.alpha_est_rad, "no_slip": 0.0}
-    if name not in assumed_rad:
-        return
-    equation = "no_slip" if name == "no_slip" else "with_friction"
-    for place, surface in enumerate(fitted):
-        if surface.fit is None:
-            continue
-        error = distance_error(
-            np.radians(SLOPES_DEG), surface.alpha_rad, assumed_rad[name], equation=equation
-        )
-        axes.plot(
-            SLOPES_DEG,
-            100.0 * surface.beam.error_share(surface.common_d_x_mm, error),
-            color=colour_of(name, number),
-            lw=1.2,
-            alpha=0.8,
-            ls=_LINES[place % len(_LINES)],
-            label=f"{label_of(name)}, predicted, α = {np.degrees(surface.alpha_rad):.1f}°",
-        )
-
-
-def _draw_errors(
     axes: "Axes",
-    judged: Sequence[Judged],
+    name: str,
     number: int,
-    fitted: Sequence[FittedSurface],
+    surface: FittedSurface,
+    settings: Settings,
     apart_deg: float,
 ) -> None:
-    """Draw the errors of one estimator against the slope, a marker a surface.
+    """Draw the error that (13), (14) predict for an estimator where the surface has its fitted α.
 
-    apart_deg: sideways, so that the estimates of one whisk do not hide each other.
+    apart_deg: how far to the side.
     """
-    for one_factor in (False, True):
-        for place, surface in enumerate(fitted):
-            chosen = []
-            for j in judged:
-                is_of_panel = (j.surface, j.speed_deg_s) == surface.panel
-                if is_of_panel and j.one_factor == one_factor:
-                    chosen.append(j)
-            if chosen:
-                label = label_of(chosen[0].estimator)
-                label += ", one gauge factor a channel" if one_factor else ""
-                label += f", {surface.title}" if len(fitted) > 1 else ""
-                slopes = [abs(j.beta_deg) + apart_deg for j in chosen]
-                marker = _MARKERS[place % len(_MARKERS)]
-                _draw_group(axes, slopes, chosen, marker, number, label)
+    assumed_rad = {"frictionless": 0.0, "with_friction": settings.alpha_est_rad, "no_slip": 0.0}
+    if name not in assumed_rad or surface.fit is None:
+        return
+    equation = "no_slip" if name == "no_slip" else "with_friction"
+    error = distance_error(
+        np.radians(SLOPES_DEG), surface.alpha_rad, assumed_rad[name], equation=equation
+    )
+    axes.plot(
+        SLOPES_DEG + apart_deg,
+        100.0 * surface.beam.error_share(surface.common_d_x_mm, error),
+        color=colour_of(name, number),
+        lw=1.2,
+        alpha=0.8,
+        label=f"{label_of(name)}, predicted",
+    )
 
 
 def _draw_group(
     axes: "Axes",
     x: Sequence[float],
     judged: Sequence[Judged],
-    marker: str,
     number: int,
     label: str | None = None,
 ) -> None:
@@ -229,9 +245,10 @@ def _draw_group(
                 [j.error_percent for _, j in drawn],
                 [j.error_sigma_percent for _, j in drawn],
                 [whisk_url(j.trial, j.whisk) for _, j in drawn],
-                marker=marker,
+                marker="o",
                 colour=colour,
                 is_filled=is_filled,
+                size_points=4.0,
                 label=label,
             )
             label = None

@@ -126,6 +126,14 @@ def label_of(estimator: str) -> str:
     return LABELS.get(estimator, estimator.partition(":")[2] or estimator)
 
 
+def nested_size(number: int, count: int, least: float, step: float) -> float:
+    """Return the width of a line, or the size of a marker, in points, of one of several that may coincide.
+
+    Those that are drawn first are larger, so that each shows beside what lies over it.
+    """
+    return least + step * (count - 1 - number)
+
+
 def whisk_url(trial: str, whisk: int) -> str:
     """Return the link that a drawn point of a whisk carries; the page leads it to the whisk's card."""
     return f"whisk:{quote(trial, safe='')}/{whisk}"

@@ -2,7 +2,8 @@
 
 From one recording: pushed further and further, at each speed that was recorded, through filters,
 slower and coarser converters, one changed at a time. Measured: bias and scatter over the whisks.
-Expected: (13), (14) and docs/maps.md at the slope and friction seen, and the noise as stated.
+Expected: (13), (14) and docs/maps.md at the slope and friction seen, and the noise as stated; by that
+choices are ranked and drawn, since of many that few whisks measure the best is the luckiest.
 """
 
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, ScalarFormatter
 
 from bench.base.atomic import lock_output
-from bench.base.drawing import colour_of, label_of, publish, style
+from bench.base.drawing import colour_of, label_of, nested_size, publish, style
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
@@ -95,7 +96,7 @@ def _tasks(units: Sequence[Unit], results: Sequence[TrialResult]) -> list[Task]:
 
 
 def draw(points: Sequence[Point], on_front: Sequence[bool]) -> Figure:
-    """Draw error against milliseconds with the front, and against cut-off, rate and bits.
+    """Draw expected error against milliseconds with the front, and against cut-off, rate and bits.
 
     The last three are at the push nearest to _USUAL_PUSH_DEG.
     """
@@ -111,7 +112,7 @@ def draw(points: Sequence[Point], on_front: Sequence[bool]) -> Figure:
         title = f"pushed by {push_deg:g}°"
         axes.set(xlabel=panel.label, ylabel="error of d$_x$, RMS, %", title=title)
     handles, labels = time.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(names) + 2)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure
 
 
@@ -141,38 +142,52 @@ def _panels(points: Sequence[Point]) -> tuple[_Panel, ...]:
 def _draw_against_time(
     axes: Axes, points: Sequence[Point], on_front: Sequence[bool], names: Sequence[str]
 ) -> None:
-    """Draw the error of every point against its milliseconds, and the front."""
+    """Draw the expected error of every point against its milliseconds, and the front.
+
+    On the front a bar is the range of 95 % of the RMS errors of so many whisks, and a cross the
+    measured one.
+    """
     for number, name in enumerate(names):
         own = [point for point in points if point.estimator == name and point.whisks]
         axes.plot(
             [point.time_ms for point in own],
-            [point.error_rms_percent for point in own],
+            [point.expected_rms_percent for point in own],
             "o",
-            ms=3,
+            ms=nested_size(number, len(names), least=3.0, step=1.0),
             alpha=0.5,
             color=colour_of(name, number),
             mew=0,
             label=label_of(name),
         )
-    joined = []
-    for point, is_on_front in zip(points, on_front):
-        if is_on_front:
-            joined.append((point.time_ms, point.error_rms_percent))
-    time_ms, error_percent = np.array(sorted(joined)).reshape(-1, 2).T
-    axes.plot(time_ms, error_percent, color="0.2", lw=1, label="Pareto front")
-    axes.plot([], [], "--", color="0.4", lw=1, label="expected")
+    best = [point for point, is_on_front in zip(points, on_front) if is_on_front]
+    best.sort(key=lambda point: point.time_ms)
+    time_ms = [point.time_ms for point in best]
+    axes.plot(
+        time_ms,
+        [point.expected_rms_percent for point in best],
+        color="0.2",
+        lw=1,
+        label="front, expected",
+    )
+    low = [point.expected_low_percent for point in best]
+    high = [point.expected_high_percent for point in best]
+    axes.vlines(time_ms, low, high, color="0.6", lw=2, zorder=1.5, label="95 % by chance")
+    measured = [point.error_rms_percent for point in best]
+    axes.plot(time_ms, measured, "x", ms=5, color="0.2", label="measured")
     axes.set(
         xscale="log",
         yscale="log",
         xlabel="from touch to answer, ms",
         ylabel="error of d$_x$, RMS, %",
+        title="at every push",
     )
     _label_logarithmic(axes.xaxis)
     _label_logarithmic(axes.yaxis)
 
 
 def _draw_against(axes: Axes, points: Sequence[Point], column: str, names: Sequence[str]) -> None:
-    """Draw measured (solid) and expected error (dashed) over a column of ROBOT_TRADE.
+    """Draw expected error (a line in the range of 95 %) and measured error (crosses) over a column of
+    ROBOT_TRADE.
 
     There is a line an estimator and speed.
     """
@@ -184,12 +199,17 @@ def _draw_against(axes: Axes, points: Sequence[Point], column: str, names: Seque
             for point in points:
                 is_own = point.estimator == name and point.speed_deg_s == speed_deg_s
                 if is_own and point.whisks:
-                    errors = (point.error_rms_percent, point.expected_rms_percent)
-                    own.append((getattr(point, column), *errors))
-            if own:
-                x, measured, expected = np.array(sorted(own)).T
-                axes.plot(x, measured, "o-", ms=3, lw=1, color=colour)
-                axes.plot(x, expected, "--", lw=1, color=colour)
+                    own.append(point)
+            own.sort(key=lambda point: getattr(point, column))
+            x = [getattr(point, column) for point in own]
+            low = [point.expected_low_percent for point in own]
+            high = [point.expected_high_percent for point in own]
+            axes.fill_between(x, low, high, color=colour, alpha=0.1, lw=0)
+            expected = [point.expected_rms_percent for point in own]
+            measured = [point.error_rms_percent for point in own]
+            rim_points = nested_size(number, len(names), least=0.0, step=1.3)
+            axes.plot(x, expected, lw=1.0 + rim_points, color=colour)
+            axes.plot(x, measured, "x", ms=4 + 1.5 * rim_points, color=colour)
     axes.set_yscale("log")
     _label_logarithmic(axes.yaxis)
     if column != "bits":

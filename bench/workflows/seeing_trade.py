@@ -3,7 +3,8 @@
 Tried are the presets, the standard with one setting changed at a time, and the standard with its
 figures drawn. Each setting sees the same trials. It is timed several times, and the least time
 counts: what a clock adds is never negative. Errors are against the known truth where the session is
-simulated, else against the preset `fine`.
+simulated, else against the preset `fine`. Settings are ranked by the error that their stated sigmas let
+one expect, and by the measured one where that is larger than chance explains.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,7 +22,7 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.progress import begin_step
 from bench.base.settings import Seeing, Settings
-from bench.base.tables import Column, Kind, Table
+from bench.base.tables import Column, Kind, Table, alike
 from bench.base.workers import Workers
 from bench.report.score import truth_of
 from bench.session.inside import check_outside
@@ -33,9 +34,11 @@ from bench.trials.of_session import placed_units, trials_with_whisks, with_gauge
 from bench.trials.seeing import PRESETS, STANDARD, as_toml, by_preset
 from bench.trials.trial_evaluation import trial_result
 from bench.trials.unit import Unit
+from bench.workflows.expected_error import ExpectedRms
 from bench.workflows.pareto import pareto_front
 from bench.workflows.seeing_times import draw_all, see_all, time_work
 from estimator.uncertainty import Z_95
+from vision.geometry import counted
 
 TRADEOFF = Table(
     "tradeoff",
@@ -44,7 +47,11 @@ TRADEOFF = Table(
     "drawn, too: `evaluate` without `--no-figures`.",
     (
         Column("setting", "its name", Kind.TEXT),
-        Column("on_front", "1 where no other setting is as good in truths, error and time, else 0"),
+        Column(
+            "on_front",
+            "1 where no other setting is as good in truths, expected error and time, else 0; measured RMS "
+            "above d_x_expected_high_mm counts for d_x_expected_rms_mm",
+        ),
         Column("whisks", "how many whisks were seen", Kind.WHOLE),
         Column("whisks_with_truth", "how many of them have a truth"),
         Column("cpu_s_per_whisk", "seconds of processor, decoding included"),
@@ -54,6 +61,11 @@ TRADEOFF = Table(
             "processor time over that of the preset `standard` in the same run",
         ),
         Column("d_x_error_rms_mm", "RMS of the errors"),
+        Column("d_x_expected_rms_mm", "RMS of the stated sigmas"),
+        *alike(
+            ("d_x_expected_low_mm", "d_x_expected_high_mm"),
+            "range of 95 % of the RMS errors of so many whisks",
+        ),
         Column("d_x_sigma_median_mm", "median of the stated sigmas"),
         Column("inside_95_percent", "how many 95 % intervals hold"),
     ),
@@ -73,8 +85,8 @@ _DIGITS = FormatStrFormatter("%.3g")  # a log axis of less than a decade
 _PRINTED = (
     ("cpu_s_per_whisk", "CPU s/whisk", "13.2f"),
     ("cpu_share_of_standard", "of standard", "13.2f"),
+    ("d_x_expected_rms_mm", "expected mm", "13.4f"),
     ("d_x_error_rms_mm", "d_x RMS mm", "13.4f"),
-    ("d_x_sigma_median_mm", "sigma mm", "13.4f"),
     ("inside_95_percent", "in 95 %", "13.0f"),
 )
 
@@ -101,6 +113,12 @@ class Trade:
         return float(np.sqrt(np.mean(finite**2))) if len(finite) else np.nan
 
     @property
+    def expected(self) -> ExpectedRms:
+        """Return the RMS error that the stated sigmas let one expect, mm."""
+        sigmas = self.sigma_mm[np.isfinite(self.errors_mm)]
+        return ExpectedRms.of_errors(np.zeros(len(sigmas)), sigmas)
+
+    @property
     def missing(self) -> int:
         """Return the number of whisks without a truth."""
         return int(np.sum(np.isnan(self.d_x_mm)))
@@ -123,6 +141,9 @@ class Trade:
             "wall_s_per_whisk": self.wall_s,
             "cpu_share_of_standard": self.cpu_s / standard_cpu_s,
             "d_x_error_rms_mm": self.rms_mm,
+            "d_x_expected_rms_mm": self.expected.rms,
+            "d_x_expected_low_mm": self.expected.low,
+            "d_x_expected_high_mm": self.expected.high,
             "d_x_sigma_median_mm": sigma_mm,
             "inside_95_percent": inside_percent,
         }
@@ -187,8 +208,11 @@ def settings_to_try(cameras: Sequence[str]) -> Iterator[Seeing]:
 
 
 def front(trades: Sequence[Trade]) -> np.ndarray:
-    """Return the mask (n,) of the settings that no other beats in truths, error and time."""
-    costs = np.array([[trade.missing, trade.rms_mm, trade.cpu_s] for trade in trades])
+    """Return the mask (n,) of the settings that no other beats in truths, expected error and time."""
+    rows = []
+    for trade in trades:
+        rows.append([trade.missing, trade.expected.to_rank(trade.rms_mm), trade.cpu_s])
+    costs = np.array(rows)
     costs[np.isnan(costs)] = np.inf
     return pareto_front(costs)
 
@@ -261,21 +285,30 @@ def tradeoff_lines(rows: Sequence[dict]) -> Iterator[str]:
         values = "".join(format(row[name], form) for name, _, form in _PRINTED)
         mark = "  on the front" if row["on_front"] else ""
         yield f"{row['setting']:<18}{truths:>13}{values}{mark}"
+    whisks = counted(max(row["whisks_with_truth"] for row in rows), "whisk")
+    yield (
+        f"The front is by the expected error. Measured on {whisks}: of {len(rows)} settings the one that "
+        "measures best is the luckiest."
+    )
 
 
 def draw(trades: Sequence[Trade], on_front: Sequence[bool]) -> Figure:
-    """Draw error against processor time, the front joined.
+    """Draw expected error against processor time, the front joined, and measured errors as crosses.
 
-    Presets and what lies on the front are named; the rest lie upon each other: tradeoff.csv has
-    them.
+    A bar is the range of 95 % of the RMS errors of so many whisks. Presets and what lies on the front
+    are named; the rest lie upon each other: tradeoff.csv has them.
     """
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     axes = figure.add_subplot()
-    points = [(trade.cpu_s, trade.rms_mm) for trade in trades]
+    points = [(trade.cpu_s, trade.expected.rms) for trade in trades]
     joined = sorted(point for point, is_on_front in zip(points, on_front) if is_on_front)
     axes.plot(*np.array(joined).T, color="0.6", lw=1, zorder=1, label="Pareto front")
     for trade, point, is_on_front in zip(trades, points, on_front):
-        axes.plot(*point, "o", color="#2166ac" if is_on_front else "0.6", ms=5)
+        colour = "#2166ac" if is_on_front else "0.6"
+        axes.plot(*point, "o", color=colour, ms=5)
+        ends = (trade.expected.low, trade.expected.high)
+        axes.plot([trade.cpu_s] * 2, ends, color=colour, lw=0.8, alpha=0.6)
+        axes.plot(trade.cpu_s, trade.rms_mm, "x", color=colour, ms=4)
         if is_on_front or trade.seeing.name in (*PRESETS, FIGURES):
             axes.annotate(
                 trade.seeing.name,
@@ -285,6 +318,8 @@ def draw(trades: Sequence[Trade], on_front: Sequence[bool]) -> Figure:
                 fontsize=7,
                 color="0.2" if is_on_front else "0.5",
             )
+    axes.plot([], [], "o-", color="0.6", lw=0.8, ms=5, label="expected, 95 % by chance")
+    axes.plot([], [], "x", color="0.6", ms=4, label="measured")
     axes.set(xlabel="processor time a whisk, s", ylabel="error of d$_x$, RMS, mm", yscale="log")
     axes.yaxis.set_major_formatter(_DIGITS)
     axes.yaxis.set_minor_formatter(_DIGITS)

@@ -90,7 +90,10 @@ def test_predicted_error_of_2_and_10_are_those_of_13_and_14():
     everything = [judged("no_slip", 60.0, 204.0), judged("with_friction", 60.0, 0.0)]
     figure = error_against_slope(everything, [surface()], Settings(alpha_est_deg=10.5))
     whole, near = figure.axes
-    predicted = [np.interp(60.0, *line.T) for line in lines_of(whole) if len(line) > 100]
+    drawn_deg = [float(points.get_offsets()[0, 0]) for points in whole.collections[1::2]]
+    assert sorted(drawn_deg) == pytest.approx([59.6, 60.4])  # side by side, with their lines
+    lines = [line for line in lines_of(whole) if len(line) > 100]
+    predicted = [np.interp(at_deg, *line.T) for at_deg, line in zip(drawn_deg, lines)]
     expected = 100 * np.tan(np.radians(60.0)) * np.tan(np.radians(49.5))
     assert predicted == pytest.approx([expected, 0.0], abs=0.01)
     assert len([line for line in lines_of(near) if len(line) > 100]) == 1

@@ -15,20 +15,27 @@ from bench.workflows.seeing_trade import Trade, front, settings_to_try
 RING = Path(__file__).resolve().parents[3] / "fixtures" / "scenes" / "ring"
 
 
-def trade(cpu_s, error_mm, missing=0):
+def trade(cpu_s, sigma_mm, error_mm=0.01, missing=0):
     errors = np.array([error_mm, -error_mm, *[np.nan] * missing])
-    return Trade(Seeing(), cpu_s, cpu_s, 50.0 + errors, np.ones(len(errors)), errors)
+    return Trade(Seeing(), cpu_s, cpu_s, 50.0 + errors, np.full(len(errors), sigma_mm), errors)
 
 
-def test_the_front_is_what_no_other_beats():
+def test_the_front_is_what_no_other_is_expected_to_beat():
+    """However near the two whisks came: 0.0001 mm is luck."""
     trades = [
         trade(1.0, 0.02),
         trade(2.0, 0.01),
-        trade(2.5, 0.015),
+        trade(2.5, 0.015, error_mm=0.0001),
         trade(0.5, 0.001, missing=1),
         trade(1.0, 0.03),
     ]
     assert front(trades).tolist() == [True, True, False, True, False]
+
+
+def test_an_error_beyond_chance_counts():
+    """Two errors of 0.1 mm at a stated 0.005 mm: the setting is as wrong as it was measured."""
+    trades = [trade(1.0, 0.02), trade(2.0, 0.005, error_mm=0.1)]
+    assert front(trades).tolist() == [True, False]
 
 
 def test_a_third_camera_is_left_out_in_turn():
