@@ -1,6 +1,7 @@
 """The cloud of contacts before the object's surface, in two views."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,11 @@ from bench.records.plain import to_plain
 
 _FELT = "with_friction"
 _VIEWS = ((0, 2, "x (mm)", "z (mm)"), (0, 1, "x (mm)", "y (mm)"))
-_MARGIN_MM = 15.0  # mm of the object that are drawn beyond the contacts
+_MARGIN_MM = 15.0  # mm of a bar that are drawn beyond the contacts
+_MOST_ENTRIES = 14  # of a column of the legend that is as high as the figure
+_MARKERS = "os^D"
+
+Colour = tuple[float, ...]  # red, green, blue, perhaps opacity
 
 
 def write_figures(
@@ -49,60 +54,89 @@ def draw(trial: str, cloud: Sequence[ContactPoint], surface: ObjectSurface | Non
 
     Felt contacts have their one-sigma ellipses, seen contacts are crosses.
     """
-    figure = blank(7.2, 3.6)
-    whiskers = dict.fromkeys(contact.whisker for contact in cloud)
-    colours = {name: colormaps["tab20"](k % 20) for k, name in enumerate(whiskers)}
+    looks = _looks(dict.fromkeys(contact.whisker for contact in cloud))
+    columns = -(-len(looks) // _MOST_ENTRIES)  # of the legend
+    figure = blank(6.4 + 0.9 * columns, 3.8)
     for axes, view in zip(figure.subplots(1, 2), _VIEWS):
-        _draw_view(axes, view, cloud, surface, colours)
-    for name, colour in colours.items():
-        axes.plot([], [], "o", color=colour, label=name)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside right center", title="whisker")
+        _draw_view(axes, view, cloud, surface, looks)
+    for name, look in looks.items():
+        axes.plot([], [], look.marker, color=look.colour, ms=4, label=name)
+    figure.legend(
+        *axes.get_legend_handles_labels(),
+        loc="outside right center",
+        title="whisker",
+        ncols=columns,
+    )
     title = f"{trial}: contacts felt (ellipses: one sigma), seen (crosses), and the object"
     figure.suptitle(title, fontsize=9)
     return figure
 
 
-def _draw_view(axes, view, cloud: Sequence[ContactPoint], surface, colours) -> None:
+@dataclass(frozen=True)
+class _Look:
+    """How the contacts of a whisker are drawn."""
+
+    colour: Colour
+    marker: str
+
+
+def _looks(whiskers: Collection[str]) -> dict[str, _Look]:
+    """Return a look for each whisker: neighbours in colour differ in their markers."""
+    palette = colormaps["tab10"].colors
+    if len(whiskers) > len(palette):
+        palette = colormaps["turbo"](np.linspace(0.04, 0.96, len(whiskers)))
+    looks = {}
+    for number, name in enumerate(whiskers):
+        looks[name] = _Look(tuple(palette[number]), _MARKERS[number % len(_MARKERS)])
+    return looks
+
+
+def _draw_view(axes, view, cloud: Sequence[ContactPoint], surface, looks) -> None:
     """Draw object and contacts in the view along two of the rig's axes.
 
-    view: numbers of these axes, then their names. colours: by whisker.
+    view: numbers of these axes, then their names. looks: by whisker.
     """
     x, y, x_name, y_name = view
     points = np.array([contact.point_mm for contact in cloud])
+    low = points[:, [x, y]].min(axis=0) - _MARGIN_MM
+    high = points[:, [x, y]].max(axis=0) + _MARGIN_MM
     if surface is not None:
-        _draw_object(axes, surface, points, x, y)
+        object_low, object_high = _draw_object(axes, surface, points, x, y)
+        low = np.minimum(low, object_low)
+        high = np.maximum(high, object_high)
     for contact in cloud:
-        _draw_contact(axes, contact, x, y, colours[contact.whisker])
+        _draw_contact(axes, contact, x, y, looks[contact.whisker])
     axes.set(xlabel=x_name, ylabel=y_name, aspect="equal")
-    axes.set(xlim=_span(points[:, x]), ylim=_span(points[:, y]))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
-def _span(values: np.ndarray) -> tuple[float, float]:
-    """Return the limits of an axis, mm."""
-    return float(values.min()) - _MARGIN_MM, float(values.max()) + _MARGIN_MM
-
-
-def _draw_contact(axes, contact: ContactPoint, x: int, y: int, colour) -> None:
+def _draw_contact(axes, contact: ContactPoint, x: int, y: int, look: _Look) -> None:
     """Draw a contact in the view along two of the rig's axes."""
     place = contact.point_mm[[x, y]]
     if contact.estimator == SEEN:
-        axes.plot(*place, "x", color=colour, markersize=5)
+        axes.plot(*place, "x", color=look.colour, ms=5)
         return
     variances, vectors = np.linalg.eigh(contact.covariance_mm2[np.ix_([x, y], [x, y])])
     width, height = 2.0 * np.sqrt(np.clip(variances, 0.0, None))
     angle = float(np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0])))
-    axes.add_patch(Ellipse(place, width, height, angle=angle, facecolor="none", edgecolor=colour))
-    axes.plot(*place, "o", color=colour, markersize=2, alpha=0.5 if contact.status else 1.0)
+    axes.add_patch(
+        Ellipse(place, width, height, angle=angle, facecolor="none", edgecolor=look.colour)
+    )
+    axes.plot(*place, look.marker, color=look.colour, ms=3, alpha=0.5 if contact.status else 1.0)
 
 
-def _draw_object(axes, surface: ObjectSurface, points: np.ndarray, x: int, y: int) -> None:
+def _draw_object(
+    axes, surface: ObjectSurface, points: np.ndarray, x: int, y: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Draw the object as discs of its radius about its centreline, of a cone as those of balls that
-    just fit in."""
+    just fit in; return the ends (2,), (2,) of what is drawn, mm."""
     heights = (points - surface.point_mm) @ surface.axis
-    low = heights.min() - 2 * _MARGIN_MM
-    high = heights.max() + 2 * _MARGIN_MM
+    low = heights.min() - _MARGIN_MM
+    high = heights.max() + _MARGIN_MM
     centreline = surface.form.centreline_mm(surface, low, high)
     below_tip = (surface.point_mm - centreline) @ surface.axis
     radii = surface.radius_mm + np.sin(surface.half_angle_rad) * below_tip
-    for centre, radius in zip(centreline[:, [x, y]], radii):
+    centres = centreline[:, [x, y]]
+    for centre, radius in zip(centres, radii):
         axes.add_patch(Ellipse(centre, 2 * radius, 2 * radius, facecolor="0.85", edgecolor="none"))
+    return (centres - radii[:, None]).min(axis=0), (centres + radii[:, None]).max(axis=0)
