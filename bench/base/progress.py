@@ -26,6 +26,29 @@ def begin_step(name: str) -> None:
     _log.info("%s ...", name)
 
 
+class PartCount:
+    """Counts the parts of a step that are done, where no iterable of them can be passed on."""
+
+    def __init__(self, name: str, total: int, least_gap_s: float = _LEAST_GAP_S) -> None:
+        """Log that a step of so many parts begins. least_gap_s: least time between two lines of it."""
+        begin_step(f"{name}: {total}")
+        self._name = name
+        self._total = total
+        self._least_gap_s = least_gap_s
+        self._done = 0
+        self._start_s = time.monotonic()
+        self._shown_s = self._start_s
+
+    def add(self) -> None:
+        """Count one part; log how many of the total are done, and in how many seconds."""
+        self._done += 1
+        now_s = time.monotonic()
+        if self._done == self._total or now_s - self._shown_s >= self._least_gap_s:
+            elapsed_s = now_s - self._start_s
+            _log.info("%s: %d of %d, %.0f s", self._name, self._done, self._total, elapsed_s)
+            self._shown_s = now_s
+
+
 def count_parts(parts: Iterable[_Part], name: str, total: int) -> Iterator[_Part]:
     """Yield the parts of a step; log how many of the total are done, and in how many seconds.
 
@@ -33,12 +56,7 @@ def count_parts(parts: Iterable[_Part], name: str, total: int) -> Iterator[_Part
     """
     if not total:
         return
-    begin_step(f"{name}: {total}")
-    start_s = time.monotonic()
-    shown_s = start_s
-    for done, part in enumerate(parts, start=1):
+    count = PartCount(name, total)
+    for part in parts:
         yield part
-        now_s = time.monotonic()
-        if done == total or now_s - shown_s >= _LEAST_GAP_S:
-            _log.info("%s: %d of %d, %.0f s", name, done, total, now_s - start_s)
-            shown_s = now_s
+        count.add()

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bench.base.progress import count_parts
 from bench.plan.planned_cameras import BoardWork, as_seen_camera, expected_cameras
 from bench.rig.pinhole import PinholeCamera
 from vision import KnownWhisk, LineNoise
@@ -92,7 +93,8 @@ def list_changes(
     target_mm (3,): where the contact is. light: whether to try more of it.
     """
     found = []
-    for change in _changes(cameras, target_mm):
+    to_try = list(_changes(cameras, target_mm))
+    for change in count_parts(to_try, "cameras calibrated with a change", len(to_try)):
         try:
             calibrated = _calibrate(cameras, change, work, target_mm)
         except Refused:

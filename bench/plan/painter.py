@@ -6,6 +6,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
+from bench.base.progress import count_parts
 from bench.plan.planned_cameras import as_board, as_seen_camera
 from bench.plan.staged import StagedWhisk
 from bench.rig import boards, build
@@ -127,7 +128,9 @@ class Painter:
         for number, camera in enumerate(self.cameras):
             setting = self.setting(number, staged)
             frames = {}
-            for f in staged.known.frames_to_fit:
+            numbers = staged.known.frames_to_fit
+            name = f"pictures painted of camera {camera.name}"
+            for f in count_parts(numbers, name, len(numbers)):
                 frames[f] = self.frame(number, staged, setting, f)
             with_bar = self.studios[number].sensor.expose(setting.empty, None)
             pictures.append(CameraPictures(camera, self.empty[number], with_bar, frames))

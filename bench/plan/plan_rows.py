@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import msgspec
 
+from bench.base.progress import begin_step, count_parts
 from bench.plan.changes import LIGHT, Change
 from bench.plan.outlook import Outlook, outlook, sigmas
 from bench.plan.painter import Clamp, Painter
@@ -150,10 +151,11 @@ def plan_run(task: RigTask) -> Row:
     except ArithmeticError as problem:
         status = f"the whisker slips off or buckles ({problem}); push less far or nearer the base"
         return Row(facts, Outlook(status=status))
+    begin_step(f"{task.run.name}: pictures, and the truth that they would give")
     noise = painter_of(protocol).line_noise(staged, task.cameras)
     predicted = predict_truth(staged.known, task.cameras, noise, Clamp.of(staged))
     changes = []
-    for change in task.changes:
+    for change in count_parts(task.changes, f"{task.run.name}, changes", len(task.changes)):
         if change.light:
             brighter = painter_of(_with_more_light(protocol))
             changed = brighter.line_noise(staged, task.cameras)

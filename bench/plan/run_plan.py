@@ -133,10 +133,12 @@ def _place_rig(protocol: Protocol, whisks: Sequence[StagedWhisk]) -> _PlacedRig:
     Raises BadInput, Refused, ValueError or cv2.error where that cannot be.
     """
     target_mm = _mean_contact_mm(whisks)
-    begin_step("places of cameras, pictures of the board")
+    begin_step("places of cameras")
     placed = place_cameras(protocol, whisks, target_mm)
+    begin_step("pictures of the board")
     painter = painter_of(placed)
     work = _board_work(painter)
+    begin_step("cameras as they would be calibrated")
     return _PlacedRig(placed, target_mm, painter, work, expected_cameras(painter.cameras, work))
 
 
@@ -144,7 +146,6 @@ def _rig_tasks(rig: _PlacedRig, options: Options) -> list[RigTask]:
     """Return a task for each trial of a rig."""
     changes: Sequence[Change] = ()
     if options.changes:
-        begin_step("changes to try")
         changes = list_changes(rig.cameras, rig.work, rig.target_mm, light=True)
     theta_rad = float(np.radians(options.theta_deg))
     runs = rig.protocol.runs()

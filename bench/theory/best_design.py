@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.base.progress import count_parts
+from bench.base.progress import PartCount, count_parts
 from bench.theory.sample_noise import StrokeNoise, stroke_noise
 from estimator import distance, first_order, slip, uncertainty
 from estimator.beam import flexural_rigidity
@@ -24,6 +24,7 @@ _ALONG = np.linspace(0.0, 0.99, 34)[:, None]  # shares of the way to the contact
 _NO_DESIGN = 1e6  # %: of a design that is none; more where it is further from being one
 _SLIP_ROOM = 1.02  # of the largest distance: a whisker slips along, too
 _GENERATIONS, _POPULATION, _TOLERANCE = 120, 12, 1e-4
+_GENERATION_GAP_S = 2.0  # s, between two lines of a search's progress. A choice.
 
 
 @dataclass(frozen=True)
@@ -251,6 +252,7 @@ def _least(function: Callable, limits: np.ndarray, seed: int) -> np.ndarray:
     from scipy.optimize import Bounds, differential_evolution, minimize
 
     bounds = Bounds(*limits.T)
+    count = PartCount("generations of the search, at most", _GENERATIONS, _GENERATION_GAP_S)
     found = differential_evolution(
         function,
         bounds,
@@ -259,6 +261,7 @@ def _least(function: Callable, limits: np.ndarray, seed: int) -> np.ndarray:
         popsize=_POPULATION,
         tol=_TOLERANCE,
         polish=False,
+        callback=lambda *_: count.add(),
     )
     refined = minimize(function, found.x, method="Nelder-Mead", bounds=bounds)
     return refined.x if refined.fun < found.fun else found.x
