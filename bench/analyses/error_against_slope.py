@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 # [%] A layout: an error bar that is longer widens no axis.
 _LONGEST_BAR_PERCENT = 50.0
-# [deg] A layout: between the estimates of one whisk by two estimators, and between the first and the last
-# of many, less than the 5° between slopes.
+# [deg] A layout: between the estimates of one whisk by two estimators.
 _APART_DEG = 0.8
+# [deg] A layout: between the first and the last of many, less than the 5° between slopes.
 _SPREAD_DEG = 4.0
 
 

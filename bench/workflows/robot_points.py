@@ -74,8 +74,8 @@ ROBOT_TRADE = Table(
     (
         Column(
             "on_front",
-            "1 where each faster row is expected to err by 5 % more, of those that answer about nearly "
-            "all whisks, else 0; measured RMS above expected_high_percent counts for expected_rms_percent",
+            "1 where each faster row errs by 5 % more, of those that answer about nearly all whisks, else "
+            "0; by expected_rms_percent, or a measured RMS above expected_high_percent",
         ),
         Column("estimator", "as in estimates.csv", Kind.TEXT),
         Column("speed_deg_s", "speed of the motor, to two digits"),

@@ -49,8 +49,8 @@ TRADEOFF = Table(
         Column("setting", "its name", Kind.TEXT),
         Column(
             "on_front",
-            "1 where no other setting is as good in truths, expected error and time, else 0; measured RMS "
-            "above d_x_expected_high_mm counts for d_x_expected_rms_mm",
+            "1 where no other setting is as good in truths, error and time, else 0; by d_x_expected_rms_mm, "
+            "or a measured RMS above d_x_expected_high_mm",
         ),
         Column("whisks", "how many whisks were seen", Kind.WHOLE),
         Column("whisks_with_truth", "how many of them have a truth"),
