@@ -239,7 +239,7 @@ def _view(
     return replace(
         session,
         name=f"{session.name}, whisker {base.name}",
-        whisker=stated_whisker(keys, f"{whisker_label(base.name)}:"),
+        whisker=stated_whisker(keys, f"{whisker_label(base.name)}:", session.path),
         gauges=given_gauges(keys.gauges),
         trials=tuple(trials),
         base=base,

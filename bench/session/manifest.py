@@ -28,6 +28,7 @@ Row4 = Annotated[list[float], _FOUR]
 Place = Annotated[list[float], _THREE, plausible.PLACE]
 Velocity = Annotated[list[float], _THREE, plausible.VELOCITY]
 Turns = Annotated[list[float], _THREE, plausible.ANGLE]
+Curvature = Annotated[list[float], _TWO, plausible.CURVATURE]
 Length = Annotated[float, plausible.LENGTH]
 Thickness = Annotated[float, plausible.THICKNESS]
 Width = Annotated[float, plausible.WIDTH]
@@ -86,6 +87,12 @@ class WhiskerKeys(GivenKeys):
     # rigidity E I at the base
     flexural_rigidity_Nmm2: Rigidity | None = None
     flexural_rigidity_sigma_Nmm2: StiffnessSigma = 0.0
+    # curvature [y, z] of the unloaded whisker in its base frame: at arc length s it lies κ s²/2
+    # aside. Its error enters nothing, since the free stroke's pictures correct the shape
+    rest_curvature_per_mm: Curvature | None = None
+    # or a table in the session, such as "rest.csv": points x_mm, y_mm, z_mm of the unloaded whisker
+    # in its base frame, from the base on
+    rest_shape: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

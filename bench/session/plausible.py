@@ -56,6 +56,7 @@ class PlausibleRange:
 
 LENGTH = PlausibleRange(1.0, 5000.0, (METRES, MICROMETRES))
 PLACE = PlausibleRange(-5000.0, 5000.0, (MICROMETRES,))
+CURVATURE = PlausibleRange(-0.5, 0.5, (("1/m", 1e-3),))
 THICKNESS = PlausibleRange(0.01, 30.0, (METRES, MICROMETRES))
 WIDTH = PlausibleRange(0.1, 500.0, (METRES, MICROMETRES))
 YOUNGS_MODULUS = PlausibleRange(1e-3, 1500.0, (PASCALS, MEGAPASCALS))

@@ -15,6 +15,7 @@ from bench.session.footage import camera_sources, single_pictures, visible
 from bench.session.givens import Given
 from bench.session.inside import check_inside
 from bench.session.plausible import YOUNGS_MODULUS
+from bench.session.rest_shape import read_rest_shape
 from bench.session.rig_file import RIG_FILE, MeasuredRig, exact_pose, read_rig
 from bench.session.stated import StatedSession
 from bench.session.strict_toml import as_keys, key_names, read_toml, values
@@ -148,7 +149,7 @@ def session_of(
 ) -> Session:
     """Return the session of a manifest; options and errors are those of `load_session`."""
     keys = stated.keys
-    whisker, board, T_rig_board = _stated_bench(keys, problems)
+    whisker, board, T_rig_board = _stated_bench(path, keys, problems)
     bar_mm, bar_sigma_mm = _bar_diameter(keys.bar)
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
@@ -197,12 +198,12 @@ def _with_measured_rig(session: Session) -> Session:
 
 
 def _stated_bench(
-    keys: manifest.SessionKeys, problems: InputProblems
+    path: Path, keys: manifest.SessionKeys, problems: InputProblems
 ) -> tuple[Whisker | None, Board | None, np.ndarray | None]:
     """Return whisker, board and T_rig_board (3, 4), each None where it is not stated."""
     return problems.each(
         [
-            partial(_whisker, keys.whisker),
+            partial(_whisker, keys.whisker, path),
             partial(_board, keys.board),
             partial(_board_pose, keys.rig.T_rig_board),
         ]
@@ -244,14 +245,19 @@ def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> St
     return StatedSession.of(tables)
 
 
-def _whisker(keys: manifest.WhiskerKeys | None) -> Whisker | None:
+def _whisker(keys: manifest.WhiskerKeys | None, path: Path) -> Whisker | None:
     """Return the whisker of [whisker]; None without that table."""
-    return None if keys is None else stated_whisker(keys, "[whisker]")
+    return None if keys is None else stated_whisker(keys, "[whisker]", path)
 
 
-def stated_whisker(keys: manifest.WhiskerKeys, table: str) -> Whisker:
-    """Return the whisker of a table, which messages name so. Raise BadInput for an impossible one."""
+def stated_whisker(keys: manifest.WhiskerKeys, table: str, path: Path) -> Whisker:
+    """Return the whisker of a table of the session at `path`, with the file that it names.
+
+    table: its name in messages. Raises BadInput for an impossible whisker, or file.
+    """
     sizes = {name: getattr(keys, name) for name in key_names(manifest.WhiskerKeys)}
+    if keys.rest_shape is not None:
+        sizes["rest_mm"] = read_rest_shape(path, keys.rest_shape, keys.length_mm)
     try:
         whisker = Whisker(**sizes)
     except ValueError as problem:

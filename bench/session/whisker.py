@@ -4,6 +4,14 @@ import math
 from dataclasses import dataclass
 
 from bench.session.manifest import WhiskerKeys
+from bench.session.rest_shape import (
+    MOST_SLOPE,
+    MOST_TURN_DEG,
+    STRAIGHT,
+    RestShape,
+    of_curvature,
+    steepest_slopes,
+)
 from estimator.beam import Beam, flexural_rigidity
 from vision.geometry import Wire
 
@@ -13,8 +21,11 @@ class Whisker(WhiskerKeys):
     """Shape, size and stiffness, each with one standard deviation (0: exact).
 
     diameter_mm is the base's; a "tapered" whisker, and no other, has a tip_diameter_mm below it. Exactly one of
-    `youngs_modulus_GPa` and `flexural_rigidity_Nmm2` (at the base) is given. Raises ValueError for anything else.
+    `youngs_modulus_GPa` and `flexural_rigidity_Nmm2` (at the base) is given. rest_mm: what the file `rest_shape`
+    holds, see `bench.session.rest_shape`. Raises ValueError for anything else.
     """
+
+    rest_mm: RestShape = STRAIGHT
 
     def __post_init__(self):
         """Raise ValueError where the keys contradict each other."""
@@ -25,6 +36,20 @@ class Whisker(WhiskerKeys):
         if self.tip_diameter_mm is not None and not 0 < self.tip_diameter_mm < self.diameter_mm:
             found = f"tip_diameter_mm = {self.tip_diameter_mm:g}"
             raise ValueError(f"{found}: must be below diameter_mm, and above 0")
+        if self.rest_curvature_per_mm is not None and self.rest_shape is not None:
+            raise ValueError("give either rest_curvature_per_mm or rest_shape, not both")
+        if max(steepest_slopes(self.unloaded_mm, self.length_mm)) > MOST_SLOPE:
+            raise ValueError(
+                "rest_curvature_per_mm: over length_mm the whisker would turn by more than "
+                f"{MOST_TURN_DEG:g}° from its base"
+            )
+
+    @property
+    def unloaded_mm(self) -> RestShape:
+        """Return the shape of the unloaded whisker, straight where nothing is stated of it."""
+        if self.rest_curvature_per_mm is None:
+            return self.rest_mm
+        return of_curvature(self.rest_curvature_per_mm, self.length_mm)
 
     @property
     def wire(self) -> Wire:
@@ -36,6 +61,7 @@ class Whisker(WhiskerKeys):
             self.length_sigma_mm,
             self.diameter_sigma_mm,
             self.tip_diameter_mm,
+            self.unloaded_mm,
         )
 
     @property

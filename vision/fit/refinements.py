@@ -197,9 +197,7 @@ def _taper(fit: Fit) -> LeftOut:
 
 def _cylinder(wire: Wire) -> Wire:
     """Return a cylinder of a wire's length and its base's diameter."""
-    return Wire(
-        "cylinder", wire.length_mm, wire.diameter_mm, wire.length_sigma_mm, wire.diameter_sigma_mm
-    )
+    return replace(wire, shape="cylinder", tip_diameter_mm=None)
 
 
 def _lens(fit: Fit, terms: Sequence[str]) -> LeftOut:

@@ -183,13 +183,15 @@ def centrelines(
 ) -> Curves:
     """Return the centrelines in the rig frame of batches of shapes.
 
-    rest_mm (…, 2, 4): polynomials in s/length, (y, z); bend_rad (…, 2): the tangent angle at the
+    rest_mm (…, 2, k): polynomials in s/length, (y, z), beyond the wire's own; bend_rad (…, 2): the tangent angle at the
     contact, (y, z) components, hub frame; contact_mm (…): arc length of the contact; motor_rad (…);
     pull (…): force along the whisker at the contact over that across it, towards the tip.
     """
     rest_mm = np.asarray(rest_mm)
     arc = np.linspace(0.0, wire.length_mm, _NODES)
-    lateral = _rest_slope(rest_mm, arc / wire.length_mm) / wire.length_mm
+    share = arc / wire.length_mm
+    own_slope = rest_slope(np.array(wire.rest_mm), share)
+    lateral = (rest_slope(rest_mm, share) + own_slope) / wire.length_mm
     lateral = lateral + _slope_by_bend(
         np.asarray(bend_rad), np.asarray(pull)[..., None], arc, np.asarray(contact_mm), wire
     )
@@ -235,10 +237,19 @@ def simpson() -> np.ndarray:
     return np.cumsum(steps, axis=0)
 
 
-def _rest_slope(rest_mm, u) -> np.ndarray:
-    """Return the slopes (…, m, 2) of the rest shape (…, 2, 4) by u = s/length (m,)."""
-    powers = np.stack([k * u ** max(k - 1, 0) for k in range(REST_POWERS)], axis=-1)
+def rest_slope(rest_mm: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return the slopes (…, m, 2) of a rest shape (…, 2, k) by u = s/length (m,)."""
+    powers = np.stack([k * u ** max(k - 1, 0) for k in range(rest_mm.shape[-1])], axis=-1)
     return powers @ np.swapaxes(rest_mm, -1, -2)
+
+
+def whole_rest_mm(rest_mm: np.ndarray, wire: Wire) -> np.ndarray:
+    """Return a fit's rest shape (2, k) together with what is stated of the wire, (2, l)."""
+    own = np.array(wire.rest_mm)
+    whole = np.zeros((2, max(own.shape[1], rest_mm.shape[1])))
+    whole[:, : rest_mm.shape[1]] += rest_mm
+    whole[:, : own.shape[1]] += own
+    return whole
 
 
 def rotation_z(angle_rad: float | np.ndarray) -> np.ndarray:

@@ -9,12 +9,15 @@ from vision.geometry.checks import require, require_length, require_sigma
 from vision.geometry.touched import OneDiameter, Touched
 
 SHAPES = ("cylinder", "cone", "tapered")
+# Polynomials in arc length over the wire's length, in y and z, mm: lowest power first.
+RestShape = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
 class Wire:
     """The whisker: a cylinder, a cone with its point at its length, or one cut off there (tapered).
 
+    rest_mm: as it is without load, as far as it is stated; a fit's own rest shape adds to that.
     Refused where a length is not > 0, and where a tapered wire has no tip thinner than its base or
     another one has.
     """
@@ -25,6 +28,7 @@ class Wire:
     length_sigma_mm: float = 0.0
     diameter_sigma_mm: float = 0.0
     tip_diameter_mm: float | None = None
+    rest_mm: RestShape = ((0.0,), (0.0,))
 
     def __post_init__(self):
         """Raise Refused where there is no such wire."""

@@ -41,7 +41,7 @@ class FrameTruth(WhileTouching):
 class WireShape:
     """The fitted wire, as `vision.geometry.centreline` describes it.
 
-    rest_mm (2, 4); of each frame of the fit its index (f,), bend_rad (f, 2), and arc_mm (f,) of the
+    rest_mm (2, k): with what is stated of it; of each frame of the fit its index (f,), bend_rad (f, 2), and arc_mm (f,) of the
     contact.
     """
 

@@ -10,6 +10,7 @@ from vision.fit.covariance import shared_covariance, variance_by_cause
 from vision.fit.line_noise import line_noise
 from vision.fit.problem import bar_axes, bar_axis, bends, curves_of, rest_shape, shifts_mm
 from vision.geometry.camera import Camera
+from vision.geometry.centreline import whole_rest_mm
 from vision.geometry.reasons import Reason, joined
 from vision.geometry.rounded import Rounded
 from vision.geometry.touched import Axis, Touched
@@ -213,7 +214,7 @@ def _shape(fitted: FittedWhisk) -> WireShape:
     problem = fitted.problem
     state = fitted.state
     return WireShape(
-        rest_shape(problem, state.vector),
+        whole_rest_mm(rest_shape(problem, state.vector), problem.wire),
         np.array(fitted.frames),
         bends(problem, state.vector),
         state.arcs_mm,

@@ -1,0 +1,157 @@
+"""The shape of the unloaded whisker, as a lab traced it: a table of points in the base frame.
+
+A shape is two polynomials in arc length over the whisker's length, in y and z, mm; what is left of
+each unit of arc goes forward, along x.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from scipy.integrate import cumulative_simpson
+
+from bench.base.errors import BadInput
+from bench.session.table import NumberTable, read_table, require_columns
+
+# Coefficients in y and z, mm, lowest power first.
+RestShape = tuple[tuple[float, ...], tuple[float, ...]]
+STRAIGHT: RestShape = ((0.0,), (0.0,))
+# [°] Largest turn from the base: beyond, a whisker coils, and y and z no longer say where it is.
+# Stated.
+MOST_TURN_DEG = 60.0
+# [1] The sine of it, which is the slope by arc length. Derived.
+MOST_SLOPE = float(np.sin(np.radians(MOST_TURN_DEG)))
+
+_COLUMNS = ("x_mm", "y_mm", "z_mm")
+# [powers] Of the smooth curve through the points: a spiral that turns by 57° is within 0.02 % of
+# its length. Study: tests/bench/session/test_rest_shape.py.
+_POWERS = 5
+# [rows] As many as there are powers, and one more, so that a misplaced point shows. Derived.
+_LEAST_ROWS = _POWERS + 1
+# [1] Of the length: how far the first point may lie from the base, and any from the smooth curve.
+# Tracing in a photograph is good to some 0.2 %. Stated.
+_MISPLACED = 0.01
+# [1] Of the length: how far a trace may end before the tip, where the curve goes on unseen, and how
+# far beyond. Stated.
+_SHORT = 0.1
+_LONG = 0.01
+# [rounds] Of fitting the curve to points and points to the curve: what is left falls by the square of
+# the noise's slope in each. Derived.
+_ROUNDS = 20
+# [points] Of the integral that gives arc lengths: its error is below 1e-6 of the length. Derived.
+_STEPS = 401
+
+
+def of_curvature(curvature_per_mm: list[float], length_mm: float) -> RestShape:
+    """Return the shape that lies κ s²/2 aside at arc length s, for κ in y and z, 1/mm."""
+    y, z = (0.5 * curvature * length_mm**2 for curvature in curvature_per_mm)
+    return (0.0, 0.0, y), (0.0, 0.0, z)
+
+
+def steepest_slopes(rest_mm: RestShape, length_mm: float) -> tuple[float, ...]:
+    """Return the sine of the turn from the base at places from base to tip."""
+    at = np.linspace(0.0, 1.0, _STEPS)
+    slopes = [Polynomial(own).deriv()(at) / length_mm for own in rest_mm]
+    return tuple(np.hypot(*slopes).tolist())
+
+
+def read_rest_shape(session: Path, name: str, length_mm: float) -> RestShape:
+    """Read the unloaded whisker's shape from a file of the session.
+
+    Raises BadInput, in a line with the file's name and row: no such file, a name that leads out of
+    the session, text in a number, too few points, a first point off the base, points that do not
+    go on along x, or beside the smooth curve through all, a whisker that coils, or is longer or
+    much shorter than length_mm.
+    """
+    path = session / name
+    if Path(name).name != name or not path.is_file():
+        found = f"rest_shape = {name!r}: there is no such file beside session.toml"
+        raise BadInput(f"[whisker] {found}", file="session.toml")
+    table = read_table(path, name, _COLUMNS)
+    require_columns(table, _COLUMNS, name)
+    _check_points(table, name, length_mm)
+    rest_mm, end_mm = _fit(table, name, length_mm)
+    _check_length(end_mm, name, length_mm)
+    return rest_mm
+
+
+def _check_points(table: NumberTable, name: str, length_mm: float) -> None:
+    """Raise BadInput for too few points, or points that do not go from the base on along x."""
+    if len(table) < _LEAST_ROWS:
+        raise BadInput(f"has {len(table)} points; {_LEAST_ROWS} or more are needed", file=name)
+    first_mm = float(np.linalg.norm([table[column][0] for column in _COLUMNS]))
+    if first_mm > _MISPLACED * length_mm:
+        found = f"the first point is {first_mm:.3g} mm from the base, which is [0, 0, 0]"
+        allowed = f"{_MISPLACED * length_mm:.2g} mm is allowed"
+        raise BadInput(f"{found}; {allowed}", file=name, row=int(table.row[0]))
+    back = np.flatnonzero(np.diff(table["x_mm"]) <= 0)
+    if len(back):
+        before, after = table["x_mm"][back[0] : back[0] + 2]
+        found = f"goes from {before:g} to {after:g}; points go from the base on, x rising"
+        raise BadInput(found, file=name, row=int(table.row[back[0] + 1]), column="x_mm")
+
+
+def _fit(table: NumberTable, name: str, length_mm: float) -> tuple[RestShape, float]:
+    """Return the smooth curve through the points, from the base on, and the arc length of the last.
+
+    Each point belongs to the curve's nearest, so that noise of tracing does not lengthen it.
+    Raises BadInput for a curve that turns too far, and for the point that is farthest off it, where
+    that is too far.
+    """
+    points_mm = np.column_stack([table[column] for column in _COLUMNS])
+    steps_mm = np.linalg.norm(np.diff(points_mm, axis=0, prepend=np.zeros((1, 3))), axis=1)
+    arc_mm = np.cumsum(steps_mm)
+    for _ in range(_ROUNDS):
+        lateral = [_through_base(arc_mm / length_mm, points_mm[:, k]) for k in (1, 2)]
+        curve_mm, tangents = _curve(lateral, arc_mm, length_mm)
+        off_mm = points_mm - curve_mm
+        arc_mm = arc_mm + np.sum(off_mm * tangents, axis=1)
+    y, z = (tuple(own.coef.tolist()) for own in lateral)
+    if max(steepest_slopes((y, z), length_mm)) > MOST_SLOPE:
+        found = f"the whisker turns by more than {MOST_TURN_DEG:g}° from its base"
+        raise BadInput(f"{found}; such a coil is not evaluated", file=name)
+    beside_mm = np.linalg.norm(off_mm, axis=1)
+    farthest = int(np.argmax(beside_mm))
+    if beside_mm[farthest] > _MISPLACED * length_mm:
+        found = f"lies {beside_mm[farthest]:.3g} mm beside the smooth curve through all points"
+        allowed = f"{_MISPLACED * length_mm:.2g} mm is allowed"
+        raise BadInput(f"{found}; {allowed}", file=name, row=int(table.row[farthest]))
+    return (y, z), float(arc_mm[-1])
+
+
+def _curve(
+    lateral: list[Polynomial], arc_mm: np.ndarray, length_mm: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return points and tangents, each (n, 3), of the curve at arc lengths (n,).
+
+    lateral: its y and z by arc length over length_mm.
+    """
+    grid_mm = np.linspace(0.0, max(float(arc_mm.max()), length_mm), _STEPS)
+    slopes = [own.deriv() for own in lateral]
+    steepness2 = sum((slope(grid_mm / length_mm) / length_mm) ** 2 for slope in slopes)
+    forward = np.sqrt(np.maximum(1.0 - steepness2, 1.0 - MOST_SLOPE**2))
+    x_mm = cumulative_simpson(forward, x=grid_mm, initial=0.0)
+    share = arc_mm / length_mm
+    points = [np.interp(arc_mm, grid_mm, x_mm), *(own(share) for own in lateral)]
+    tangents = [
+        np.interp(arc_mm, grid_mm, forward),
+        *(slope(share) / length_mm for slope in slopes),
+    ]
+    return np.column_stack(points), np.column_stack(tangents)
+
+
+def _through_base(at: np.ndarray, values: np.ndarray) -> Polynomial:
+    """Fit a polynomial without constant to values (n,) at places (n,)."""
+    powers = np.vander(at, _POWERS + 1, increasing=True)[:, 1:]
+    coefficients = np.linalg.lstsq(powers, values, rcond=None)[0]
+    return Polynomial([0.0, *coefficients])
+
+
+def _check_length(end_mm: float, name: str, length_mm: float) -> None:
+    """Raise BadInput where the points are of a longer whisker, or end much before the tip."""
+    found = f"the points go to an arc length of {end_mm:.4g} mm, length_mm is {length_mm:g}"
+    if end_mm > (1.0 + _LONG) * length_mm:
+        raise BadInput(f"{found}: a whisker is no longer than that", file=name)
+    if end_mm < (1.0 - _SHORT) * length_mm:
+        share = f"{100 * (1 - _SHORT):g} %"
+        raise BadInput(f"{found}; {share} of the whisker or more are needed", file=name)
