@@ -94,7 +94,7 @@ def as_staged(marched: WhiskMechanics, motor_rad: np.ndarray, time_s: np.ndarray
     wire = Wire(rod.shape, rod.length_mm, rod.diameter_mm, tip_diameter_mm=rod.tip_diameter_mm)
     bar = Bar(2.0 * marched.bar.radius_mm)
     share = np.linspace(0.0, 1.0, _REST_POINTS)
-    rest_offset_mm = rod.rest.offset_mm(share * rod.length_mm)[:, 1:]
+    rest_offset_mm = rod.rest.point_mm(share * rod.length_mm)[:, 1:]
     foot_mm = marched.bar.foot_mm(touch.point_mm)  # of the bar's axis, opposite the contact
     known = KnownWhisk(
         rods=Rods(wire, bar),
@@ -131,7 +131,7 @@ def _bends_and_arcs(
 def _bend_rad(rod: Rod, state) -> np.ndarray:
     """Return the tangent angle (2,) at the contact, across and along the rotation axis, hub frame."""
     tangent = rotate_about_z(state.tangent, -state.motor_rad)
-    deviation = tangent[1:] / np.linalg.norm(tangent) - rod.rest.slope(state.arc_mm)[1:]
+    deviation = tangent[1:] / np.linalg.norm(tangent) - rod.rest.tangent(state.arc_mm)[1:]
     sine = float(np.linalg.norm(deviation))
     if sine == 0.0:
         return deviation

@@ -13,6 +13,8 @@ from bench.rig.touched_object import LocalBar, TouchedObject
 
 # [lengths] Largest distance from contact that is a touch, and residual along the whisker. Stated.
 _TOUCHES = 1e-11
+# [rad] Before first touch, where the surfaces are apart: 0.1 µm at 10 mm. Stated.
+_BEFORE_RAD = 1e-5
 
 
 @dataclass(frozen=True)
@@ -89,11 +91,8 @@ def unloaded_curve(
     rod: Rod, motor_rad: float, arc_mm: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return points and tangents, each (..., 3), of the unloaded whisker in the rig frame."""
-    arc = np.asarray(arc_mm, float)[..., None]
-    straight = np.array([1.0, 0.0, 0.0])
-    points = arc * straight + rod.rest.offset_mm(arc_mm)
-    tangents = straight + rod.rest.slope(arc_mm)
-    return rotate_about_z(points, motor_rad), rotate_about_z(tangents, motor_rad)
+    points = rotate_about_z(rod.rest.point_mm(arc_mm), motor_rad)
+    return points, rotate_about_z(rod.rest.tangent(arc_mm), motor_rad)
 
 
 def find_first_touch(
@@ -103,14 +102,15 @@ def find_first_touch(
     radii.
 
     Where the nearest point lies beyond the end, the tip touches and the arc is the length. Raises
-    ArithmeticError where the whisker never touches.
+    ArithmeticError where the whisker never touches, or only as it leaves the object on its far side.
     """
     length_mm = rod.length_mm
     start = [motor_rad, min(arc_mm / length_mm, 1.0)]
     found = optimize.root(
         lambda at: _touch_residual(rod, bar, at[0], at[1] * length_mm) / length_mm, start, tol=1e-13
     )
-    if np.abs(found.fun).max() > _TOUCHES:
+    before_mm = _touch_residual(rod, bar, found.x[0] - _BEFORE_RAD, found.x[1] * length_mm)[0]
+    if np.abs(found.fun).max() > _TOUCHES or before_mm < -_TOUCHES * length_mm:
         raise ArithmeticError("the whisker never touches the bar")
     motor_rad = found.x[0]
     arc_mm = found.x[1] * length_mm

@@ -20,7 +20,7 @@ _MOST_STEPS = 40
 _LAST_STEP_RAD = 1e-9
 # [1] Least diameter over the base's: at a cone's very tip moment and rigidity vanish together and
 # the curvature is finite. Stated.
-_LEAST_WIDTH = 1e-3
+LEAST_WIDTH = 1e-3
 
 
 @dataclass(slots=True)
@@ -155,7 +155,7 @@ class Elastica:
         nodes = self.nodes
         loss_per_mm = self.rod.diameter_loss / self.rod.length_mm
         width = 1 - nodes.at * arc_mm * loss_per_mm
-        width[-1] = max(width[-1], _LEAST_WIDTH)
+        width[-1] = max(width[-1], LEAST_WIDTH)
         softness = width**-4.0
         softness_by_arc = 4 * softness / width * nodes.at * loss_per_mm
         by_arc = (nodes.from_base * softness_by_arc) @ nodes.to_load

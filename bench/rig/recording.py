@@ -129,7 +129,7 @@ class Recording:
 def place_object(
     protocol: Protocol, run: ProtocolRun, rod: Rod, rng: np.random.Generator
 ) -> tuple[TouchedObject, float, float]:
-    """Place the object as people set it, near what they wanted.
+    """Place the object as people set it, near what they wanted of the unloaded whisker.
 
     Returns it, and about the motor angle (rad) and arc (mm) of first touch.
     """
@@ -154,9 +154,12 @@ def place_object(
         whisker_radius_mm=float(rod.radius_mm(min(d_x_mm, rod.length_mm))),
         stiffness_N_mm=table.stiffness_N_mm or math.inf,
     )
-    touched_mm = rotate_about_z([d_x_mm, 0.0, 0.0], touch_rad)
+    arc_mm = rod.rest.arc_at_mm(d_x_mm)
+    beside_mm = rod.rest.point_mm(arc_mm) - [d_x_mm, 0.0, 0.0]
+    bar = bar.shift(rotate_about_z(beside_mm, touch_rad))
+    touched_mm = rotate_about_z(rod.rest.point_mm(arc_mm), touch_rad)
     placed = OBJECTS[table.object or TouchedBar.shape].from_trial(bar, touched_mm, table)
-    return placed, touch_rad, d_x_mm
+    return placed, touch_rad, arc_mm
 
 
 def plan_stroke(protocol: Protocol, run: ProtocolRun, low_rad: float, high_rad: float) -> Stroke:

@@ -19,10 +19,11 @@ import numpy as np
 
 from bench.rig.bar import UnloadedTouch
 from bench.rig.elastic_rod import Rod
-from bench.rig.elastica import Elastica
+from bench.rig.kirchhoff_rod import KirchhoffRod
 from bench.rig.laws import ContactLoad, Held, Oiled, Sliding
 from bench.rig.linear import across, cross, cross_matrix, rotation_about_z, solve
-from bench.rig.loaded_point import LoadedPoint
+from bench.rig.loaded_point import BentRod, LoadedPoint
+from bench.rig.planar_rod import PlanarRod
 from bench.rig.touched_object import TouchedObject
 
 # [1] Steps of Newton's method before it is given up. Stated.
@@ -39,7 +40,7 @@ class ContactState:
 
     shear_ratio: size of the force along the object over the normal force. status: held, sliding or
     tip. heading_rad: direction of the material's motion, 0 along the object. motion_round_mm: the
-    material's motion round the object in the last step. angle (n,): of the elastica, to start the
+    material's motion round the object in the last step. shape: of the whisker, to start the
     next solution from.
     """
 
@@ -52,7 +53,7 @@ class ContactState:
     status: str
     heading_rad: float = 0.0
     motion_round_mm: float = 0.0
-    angle: np.ndarray | None = None
+    shape: np.ndarray | None = None
 
     @property
     def unknowns(self) -> np.ndarray:
@@ -61,17 +62,22 @@ class ContactState:
         return np.append(self.force_hub_N, self.arc_mm)
 
 
+def bent_rod(rod: Rod) -> BentRod:
+    """Return what bends a whisker: in the plane where it is straight, else in space."""
+    return PlanarRod(rod) if rod.rest.is_straight else KirchhoffRod(rod)
+
+
 class RodContact:
     """The contact problem of one whisker and one object."""
 
     def __init__(self, rod: Rod, bar: TouchedObject):
         self.rod = rod
         self.bar = bar
-        self.elastica = Elastica(rod)
+        self.bent_rod = bent_rod(rod)
 
     def touch_state(self, touch: UnloadedTouch) -> ContactState:
         """Return the state at first touch, without force."""
-        tangent = np.array([1.0, 0, 0]) + self.rod.rest.slope(touch.arc_mm)
+        tangent = self.rod.rest.tangent(touch.arc_mm)
         return ContactState(
             touch.motor_rad,
             np.zeros(3),
@@ -105,7 +111,7 @@ class RodContact:
         bar = self.bar.at(motor_rad)
         bar_moved_mm = self.bar.moved_mm(motor_rad) - self.bar.moved_mm(old.motor_rad)
         problem = _Problem(self, bar, bar_moved_mm, rotation_about_z(motor_rad), old, law, tip)
-        here = problem.at(unknowns, old.angle)
+        here = problem.at(unknowns, old.shape)
         for _ in range(_MOST_STEPS):
             step = solve(here.jacobian, here.residual)
             if _has_converged(step, unknowns):
@@ -147,7 +153,7 @@ class _Equations:
             status,
             heading,
             float(load.motion[1]),
-            loaded.angle,
+            loaded.shape,
         )
 
 
@@ -167,9 +173,9 @@ class _Problem:
     law: Sliding | Oiled | Held
     tip: bool
 
-    def at(self, unknowns, angle) -> _Equations:
-        """Return the equations at unknowns (n,), the elastica starting from `angle`."""
-        loaded = LoadedPoint.solve(self.contact.elastica, self.rotation, unknowns, angle)
+    def at(self, unknowns, shape) -> _Equations:
+        """Return the equations at unknowns (n,), the whisker starting from `shape`."""
+        loaded = self.contact.bent_rod.solve(self.rotation, unknowns, shape)
         local = self.bar.local_bar(loaded.point)
         offset_by = local.offset_by @ loaded.point_by
         distance = math.sqrt(local.offset_mm @ local.offset_mm)
@@ -229,7 +235,7 @@ class _Problem:
         for part in _PARTS:
             tried = unknowns - part * step
             try:
-                there = self.at(tried, here.loaded.angle)
+                there = self.at(tried, here.loaded.shape)
                 left = np.linalg.norm(size * solve(here.jacobian, there.residual))
             except ArithmeticError:
                 continue

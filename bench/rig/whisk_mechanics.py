@@ -9,9 +9,8 @@ import numpy as np
 
 from bench.rig.bar import UnloadedTouch, unloaded_curve
 from bench.rig.elastic_rod import Rod
-from bench.rig.elastica import Elastica
 from bench.rig.linear import rotate_about_z
-from bench.rig.rod_contact import ContactState, moments_Nmm
+from bench.rig.rod_contact import ContactState, bent_rod, moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
 from bench.rig.touched_object import TouchedObject
 
@@ -181,13 +180,8 @@ class WhiskMechanics:
         force of `state` or free."""
         if state is None or not state.force_hub_N.any():
             return unloaded_curve(self.rod, motor_rad, arc_mm)[0]
-        force = state.force_hub_N
-        across = float(np.hypot(force[1], force[2]))
-        elastica = Elastica(self.rod)
-        bent = elastica.solve(force[0], across, state.arc_mm, state.angle)
-        plane = elastica.curve_mm(bent, arc_mm)  # (n, 2)
-        points = np.column_stack([plane[:, 0], plane[:, 1:] * force[1:] / across])
-        return rotate_about_z(points + self.rod.rest.offset_mm(arc_mm), motor_rad)
+        points = bent_rod(self.rod).curve_mm(state.unknowns, state.shape, arc_mm)
+        return rotate_about_z(points, motor_rad)
 
 
 def _stations(start, end, step, stops):

@@ -59,7 +59,7 @@ def bending_Nmm(state) -> float:
     """Half of M²/EI over the arc, M the moment of the force about each place."""
     elastica, force = Elastica(ROD), state.force_hub_N
     across = math.hypot(force[1], force[2])
-    bent, nodes = elastica.solve(force[0], across, state.arc_mm, state.angle), elastica.nodes
+    bent, nodes = elastica.solve(force[0], across, state.arc_mm, state.shape), elastica.nodes
     x, e = (
         bent.arc_mm * nodes.from_base @ part for part in (np.cos(bent.angle), np.sin(bent.angle))
     )
