@@ -23,7 +23,10 @@ def add(verbs: Verbs) -> None:
     )
     add_session(verb)
     verb.add_argument(
-        "--protocol", default="quick", metavar="NAME|FILE", help="quick, paper or a TOML file"
+        "--protocol",
+        default="quick",
+        metavar="NAME|FILE",
+        help="a built-in one (quick, paper, nitinol, thin-wire, polymer-cone, vibrissa) or a TOML file",
     )
     verb.add_argument(
         "--signals-only",

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bench.base.errors import BadInput
+from bench.rig.elastic_rod import RestShape
 
 if TYPE_CHECKING:
     from bench.rig.protocol import Protocol, ProtocolRun
@@ -22,6 +23,7 @@ def check_protocol(protocol: "Protocol", path: Path) -> None:
     """Raise BadInput, naming the file, for what no rig can do, or what its mechanics here do not
     cover."""
     try:
+        _check_rest(protocol.whisker)
         _check_cameras(protocol)
         _check_columns(protocol)
         for run in protocol.runs():
@@ -30,6 +32,11 @@ def check_protocol(protocol: "Protocol", path: Path) -> None:
             _check_moving(protocol, run)
     except ValueError as problem:
         raise BadInput(str(problem), file=path) from None
+
+
+def _check_rest(whisker):
+    """Raise ValueError for an unloaded whisker that turns back."""
+    RestShape(whisker.length_mm, whisker.sag_mm, whisker.set_y_mm, whisker.set_z_mm)
 
 
 def _check_cameras(protocol):

@@ -76,7 +76,13 @@ def _whisker_keys(protocol) -> dict:
     keys = _fields(
         protocol.whisker, "shape length_mm diameter_mm tip_diameter_mm youngs_modulus_GPa"
     )
-    return {name: value for name, value in keys.items() if value is not None}
+    stated = {name: value for name, value in keys.items() if value is not None}
+    whisker = protocol.whisker
+    if whisker.states_rest:
+        per_mm = 2 / whisker.length_mm**2
+        curvature = [per_mm * whisker.set_y_mm, per_mm * whisker.set_z_mm]
+        stated["rest_curvature_per_mm"] = _rounded(curvature, 9)
+    return stated
 
 
 def _rig_keys(protocol, stated_T_rig_board) -> dict:

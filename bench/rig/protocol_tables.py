@@ -26,8 +26,10 @@ class WhiskerTable(ProtocolTable):
     youngs_modulus_GPa: Positive = 60.0
     density_kg_m3: Positive = 6450.0
     sag_mm: float = 0.0  # the tip's drop under its own weight
-    set_y_mm: float = 0.0  # the tip's departure by the curvature that spool wire keeps
+    set_y_mm: float = 0.0  # the tip's departure by the curvature that spool wire keeps, or a hair
     set_z_mm: float = 0.0
+    # session.toml has the set as rest_curvature_per_mm. UNSET keeps it out of the fingerprint
+    states_rest: bool | msgspec.UnsetType = msgspec.UNSET
 
 
 class BoardTable(ProtocolTable):

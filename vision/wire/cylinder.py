@@ -51,6 +51,7 @@ def shading_basis(
     little).
     """
     weight = np.ones(offset_px.shape) if weight is None else weight
+    radius_px = np.maximum(radius_px, _LEAST_RADIUS_PX)
     ratio = _common_ratio(radius_px, blur_px)
     if ratio is None:
         values = np.empty((*offset_px.shape, terms + 2 + room))
@@ -104,6 +105,7 @@ def slopes_of(
     The first row is of the light that s cylinders add, the second of the share that they hide.
     offset_px (s, p), radius_px (s,); coefficients (s, terms): radiance in terms of `round_the_rod`.
     """
+    radius_px = np.maximum(radius_px, _LEAST_RADIUS_PX)
     ratio = _common_ratio(radius_px, blur_px)
     if ratio is not None:
         return _slopes_of_alike(offset_px, radius_px[:, None], ratio, coefficients)
@@ -158,9 +160,10 @@ def rim_bells(offset_px: np.ndarray, radius_px: np.ndarray | float, blur_px: flo
 
 def _common_ratio(radius_px: np.ndarray, blur_px: float) -> float | None:
     """Return radius over blur where it is nearly the same for all, else None."""
-    least = np.min(radius_px, initial=np.inf)
-    most = np.max(radius_px, initial=0.0)
-    is_same = most - least < _SAME_RADIUS * least or most <= _LEAST_RADIUS_PX
+    thick = np.maximum(radius_px, _LEAST_RADIUS_PX)
+    least = np.min(thick, initial=np.inf)
+    most = np.max(thick, initial=_LEAST_RADIUS_PX)
+    is_same = most - least < _SAME_RADIUS * least
     return 0.5 * (least + most) / blur_px if is_same else None
 
 

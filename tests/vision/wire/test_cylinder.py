@@ -80,3 +80,16 @@ def _integrated_bends(offset, radius, terms):
         _integrated(offset + d, radius[:, None], 0.8, terms) for d in (-0.05, 0.0, 0.05)
     )
     return (ahead - 2.0 * here + behind) / 0.05**2
+
+
+def test_a_cone_is_drawn_to_its_point():
+    """Radii to 0 with one just above the least that counts, 0.05 px, which are then all of that one."""
+    radius = np.array([0.3, 0.0505, 0.02, 0.0])
+    offset = np.broadcast_to(np.linspace(-2, 2, 9), (4, 9))
+    found = shading_basis(offset, radius[:, None], 0.9, 4)
+    thin = shading_basis(offset[:1], np.array([[0.05]]), 0.9, 4)
+    assert np.isfinite(found).all()
+    assert found[2] == pytest.approx(thin[0], abs=TABLED)
+    assert found[3] == pytest.approx(thin[0], abs=TABLED)
+    slopes, curvatures = slopes_of(offset, radius, 0.9, np.ones((4, 3)))
+    assert np.isfinite([slopes, curvatures]).all()
