@@ -26,7 +26,7 @@ def add(verbs: Verbs) -> None:
         "--protocol",
         default="quick",
         metavar="NAME|FILE",
-        help="a built-in one (quick, paper, nitinol, thin-wire, polymer-cone, vibrissa) or a TOML file",
+        help="quick, paper, nitinol, thin-wire, polymer-cone, vibrissa or a TOML file",
     )
     verb.add_argument(
         "--signals-only",
