@@ -7,10 +7,9 @@ import numpy as np
 
 # [rounds] For the arc length at a distance, each a tenth as far off as the one before. Derived.
 _ROUNDS = 12
-# Gauss–Legendre on 0…1: of the forward part along a rest shape. Its slopes are polynomials of third
+# Gauss–Legendre on −1…1: of the forward part along a rest shape. Its slopes are polynomials of third
 # degree, so that 24 points leave less than 1e-12 of the arc up to a turn of 60°. Derived.
-_AT, _WEIGHTS = (np.array(half) / 2 for half in np.polynomial.legendre.leggauss(24))
-_AT = _AT + 0.5
+_GAUSS = np.polynomial.legendre.leggauss(24)
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,8 @@ class RestShape:
         arc = np.asarray(arc_mm, float)
         u = arc / self.length_mm
         lateral = self._lateral(u**2, (u**4 - 4 * u**3 + 6 * u**2) / 3)
-        forward = arc * (self._forward(arc[..., None] * _AT) @ _WEIGHTS)
+        at, weights = _GAUSS
+        forward = 0.5 * arc * (self._forward(0.5 * arc[..., None] * (1 + at)) @ weights)
         return np.concatenate([forward[..., None], lateral], axis=-1)
 
     def arc_at_mm(self, distance_mm: float) -> float:

@@ -30,6 +30,7 @@ _LONGEST_STEP_RAD = 0.7
 TORSION_OVER_BENDING = 0.35
 # [points] Of Chebyshev along the loaded arc. Study: tests/bench/rig/test_kirchhoff_rod.py.
 _NODES_OF_CYLINDER = 16
+# [points] Of a rod that tapers. Study: tests/bench/rig/test_kirchhoff_rod.py.
 _NODES_OF_TAPER = 32
 # [1] Share of the largest Chebyshev coefficient of the curvature that the last two may have. Stated:
 # positions, its double integral, are then good to 1e-7 of the arc.

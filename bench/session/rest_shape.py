@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from scipy.integrate import cumulative_simpson
 
 from bench.base.errors import BadInput
 from bench.session.table import NumberTable, read_table, require_columns
@@ -31,9 +30,9 @@ _LEAST_ROWS = _POWERS + 1
 # [1] Of the length: how far the first point may lie from the base, and any from the smooth curve.
 # Tracing in a photograph is good to some 0.2 %. Stated.
 _MISPLACED = 0.01
-# [1] Of the length: how far a trace may end before the tip, where the curve goes on unseen, and how
-# far beyond. Stated.
+# [1] Of the length: how far a trace may end before the tip, where the curve goes on unseen. Stated.
 _SHORT = 0.1
+# [1] Of the length: how far a trace may go beyond the tip, by what a ruler leaves. Stated.
 _LONG = 0.01
 # [rounds] Of fitting the curve to points and points to the curve: what is left falls by the square of
 # the noise's slope in each. Derived.
@@ -130,7 +129,8 @@ def _curve(
     slopes = [own.deriv() for own in lateral]
     steepness2 = sum((slope(grid_mm / length_mm) / length_mm) ** 2 for slope in slopes)
     forward = np.sqrt(np.maximum(1.0 - steepness2, 1.0 - MOST_SLOPE**2))
-    x_mm = cumulative_simpson(forward, x=grid_mm, initial=0.0)
+    steps_mm = 0.5 * (forward[1:] + forward[:-1]) * np.diff(grid_mm)
+    x_mm = np.append(0.0, np.cumsum(steps_mm))
     share = arc_mm / length_mm
     points = [np.interp(arc_mm, grid_mm, x_mm), *(own(share) for own in lateral)]
     tangents = [

@@ -42,7 +42,7 @@ def test_a_bad_protocol_is_refused_in_one_line(tmp_path, change, message):
 
 
 def test_a_missing_protocol_names_the_built_in_ones(tmp_path):
-    with pytest.raises(BadInput, match=r"no\.toml.*paper, quick"):
+    with pytest.raises(BadInput, match=r"no\.toml.*nitinol, paper, .*vibrissa"):
         simulate(tmp_path / "session", protocol=tmp_path / "no.toml")
 
 
