@@ -88,10 +88,9 @@ class WhiskerKeys(GivenKeys):
     flexural_rigidity_Nmm2: Rigidity | None = None
     flexural_rigidity_sigma_Nmm2: StiffnessSigma = 0.0
     # curvature [y, z] of the unloaded whisker in its base frame: at arc length s it lies κ s²/2
-    # aside. Its error enters nothing, since the free stroke's pictures correct the shape
+    # aside. Pictures correct it; gauges and estimates take the whisker as straight
     rest_curvature_per_mm: Curvature | None = None
-    # or a table in the session, such as "rest.csv": points x_mm, y_mm, z_mm of the unloaded whisker
-    # in its base frame, from the base on
+    # or a table beside session.toml, such as "rest.csv", of its shape
     rest_shape: str | None = None
 
 
