@@ -9,7 +9,6 @@ from functools import partial
 
 import numpy as np
 
-from bench.session.plausible import PlausibleRange
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.differences import (
@@ -33,12 +32,6 @@ _CLEARLY_NEARER = 0.5
 # [frames] A camera that is late by one looks so by a third at least: the fit takes the rest for an
 # offset of its lines. Study: tests/vision/fit/test_camera_delays.py.
 _LEAST_DELAY_FRAMES = 0.25
-# [1] Of the moment of a push at the tip without slip: a slope of 87° leaves that much of it, less
-# at a tip that tapers. Stated.
-_LEAST_MOMENT_SHARE = 0.01
-# [1] Of the same: a contact at a fiftieth of the length. Stated.
-_LARGEST_MOMENT_SHARE = 50.0
-_MOMENT_UNITS = (("N·m", 1e3), ("N·µm", 1e-3), ("nN·m", 1e-6))
 
 _LOST = "a frame before frame {} looks lost; pictures after it have the times of the one before"
 _ADDED = "a frame too many before frame {}; pictures after it have the times of the next"
@@ -286,27 +279,6 @@ def _from_normal(phi_rad: float, beta: Value) -> float:
     """Return the angle of φ with the bar's normal, 0 to π rad."""
     difference = phi_rad - beta.value
     return abs(float(np.arctan2(np.sin(difference), np.cos(difference))))
-
-
-def check_moment_size(moments_Nmm: np.ndarray, theta_rad: float, whisker: Whisker) -> Reason:
-    """Compare moments recorded as such with what this whisker can give: a unit is a factor of 1000.
-
-    moments_Nmm (2,): m_y, m_z at the pushing angle.
-    """
-    beam = whisker.beam
-    most_Nmm = beam.C_Nmm2 * theta_rad / beam.length_mm  # of a rod touched at its tip, without slip
-    plausible = PlausibleRange(
-        _LEAST_MOMENT_SHARE * most_Nmm, _LARGEST_MOMENT_SHARE * most_Nmm, _MOMENT_UNITS
-    )
-    size_Nmm = float(np.linalg.norm(moments_Nmm))
-    if not np.isfinite(size_Nmm) or plausible.holds(size_Nmm):
-        return NO_REASON
-    guess = plausible.guess(size_Nmm) or " Are these another unit, or volts?"
-    limits = (
-        f"a push by {np.degrees(theta_rad):g}° gives {plausible.low:.2g} to {plausible.high:.2g}"
-    )
-    sentence = f"the moment is {size_Nmm:.3g} N·mm, {limits} with this whisker.{guess}"
-    return Reason("moments_implausible", sentence)
 
 
 def nominal_slope(trial: Trial) -> Value:

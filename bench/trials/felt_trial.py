@@ -29,10 +29,11 @@ from bench.records.trial_result import (
 )
 from bench.session.signals import Signals
 from bench.trials.agreement import MomentAgreement, OtherReading, agreement, other_units
-from bench.trials.consistency import check_friction_cone, check_moment_size, nominal_slope
+from bench.trials.consistency import check_friction_cone, nominal_slope
 from bench.trials.contradictions import against_estimates
 from bench.trials.estimates import answers, as_felt, estimators, felt_at
 from bench.trials.gate import kinetic_of
+from bench.trials.moment_size import check_moment_size
 from bench.trials.object_motion import MOTION_ESTIMATORS, with_motion
 from bench.trials.readout import Readout, felt_whisk, whisk_at
 from bench.trials.seen import NO_PICTURES, unseen

@@ -26,7 +26,7 @@ from bench.session.session_check import checked_views, find_damage
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
-from bench.trials.consistency import check_moment_size
+from bench.trials.moment_size import check_moment_size
 from bench.trials.still_scene import evenly_exposed, other_scene
 from vision import FEWEST_FREE
 from vision.boards import (

@@ -19,7 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.analyses.turning_phi import turn, with_turn
+from bench.analyses.turning_phi import sure_turns, turn, with_turn
 from bench.records.trial_result import EstimateRow, FeltAt
 from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
@@ -132,7 +132,10 @@ def answers(push: Push, draws: int, rng: np.random.Generator) -> list[EstimateRo
                 for a, pair in zip(true.stroke_rad, stroke)
             ]
         )
-        found.append(with_turn(row, felt_slip_angle(*felt), rate, theta, true.beam.length_mm))
+        phi = felt_slip_angle(*felt)
+        (is_sure,) = sure_turns([phi], [rate], float(alpha))
+        length_mm = true.beam.length_mm
+        found.append(with_turn(row, phi, rate, theta, length_mm, is_sure=is_sure))
     return found
 
 
