@@ -125,11 +125,7 @@ def _normal_equations(p: Pairs, matrix: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _solve(equations: Sequence[tuple[np.ndarray, np.ndarray]]) -> _Solution:
-    """Solve summed normal equations.
-
-    An error of the coefficients and the cameras' true errors are correlated as the posterior of
-    both is, with the other sign: what the pictures are off by, the coefficients make up for.
-    """
+    """Solve summed normal equations of the coefficients and the cameras' errors, of unit variance."""
     size = max(len(right) for _, right in equations)
     normal = np.diag(np.repeat([0.0, 1.0], [4, size - 4]))
     right = np.zeros(size)
@@ -137,10 +133,13 @@ def _solve(equations: Sequence[tuple[np.ndarray, np.ndarray]]) -> _Solution:
         own = len(own_right)  # 4 of moments that no camera saw
         normal[:own, :own] += own_normal
         right[:own] += own_right
-    covariance = np.linalg.inv(normal)
-    unknowns = covariance @ right
-    gauges = GaugeMatrix(unknowns[:4].reshape(2, 2), covariance[:4, :4], -covariance[:4, 4:])
-    return _Solution(gauges, unknowns[4:])
+    posterior = np.linalg.inv(normal)  # covariance of the unknowns: truth less estimate
+    estimate = posterior @ right
+    matrix = estimate[:4].reshape(2, 2)
+    # The coefficients change with a camera's error by their covariance with it, as its variance is 1.
+    # Their error is estimate less truth, where the posterior has truth less estimate: hence the sign.
+    by_camera_error = -posterior[:4, 4:]
+    return _Solution(GaugeMatrix(matrix, posterior[:4, :4], by_camera_error), estimate[4:])
 
 
 def _weight(p: Pairs, matrix: np.ndarray) -> np.ndarray:

@@ -27,7 +27,7 @@ class GivenKeys(Keys):
 
 @dataclass(frozen=True, kw_only=True)
 class Assumed:
-    """Says of a sigma's key what is assumed where nobody states it: what a careful lab would have.
+    """The sigma that is assumed of a value where nobody states one: that of a careful lab.
 
     absolute: in the sigma's own unit. share: of the value. The smaller of both counts; without both
     the recording says it. origin: where it comes from. of: the key of the value, where the sigma's
@@ -62,7 +62,7 @@ class Assumed:
 
 @dataclass(frozen=True, kw_only=True)
 class AssumedOfRows(Assumed):
-    """Says so of a matrix: of each row, every entry has the share of the row's largest entry."""
+    """The sigmas that are assumed of a matrix: every entry has the share of its row's largest entry."""
 
     def sigma(self, value: list[list[float]]) -> list[list[float]]:
         """Return the sigmas of a matrix, entry by entry."""
@@ -101,8 +101,8 @@ class Given:
     @property
     def text(self) -> str:
         """Return the given with its sigma, and where that comes from."""
-        of = f"assumed: {self.origin}" if self.source == "assumed" else "stated"
-        return f"{self.key} {self.size}, {of}"
+        source = f"assumed: {self.origin}" if self.source == "assumed" else "stated"
+        return f"{self.key} {self.size}, {source}"
 
 
 def assumptions(kind: type[Keys]) -> dict[str, Assumed]:
@@ -126,32 +126,24 @@ def with_sigmas(
 ) -> tuple[dict[str, Any], tuple[Given, ...]]:
     """Return a checked table with a sigma for each number that needs one, and what is so given.
 
-    It holds for the tables within, too. label: how messages name the table. exact: whether unsaid
+    The tables within it are filled, too. label: how messages name the table. exact: whether unsaid
     sigmas are 0 where the table does not say.
     """
     exact = table.get("exact", exact)
     filled = dict(table)
     givens: list[Given] = []
     for key, assumed in assumptions(kind).items():
-        of = value_key(key, assumed)
-        if of in table or assumed.unstated:
+        if value_key(key, assumed) in table or assumed.unstated:
             filled[key], source = _sigma(table, key, assumed, exact)
-            largest = None if filled[key] is None else float(np.max(filled[key]))
-            if source != "assumed" or largest != 0.0:  # of a value of 0, a share says nothing
-                origin = assumed.origin if source == "assumed" else ""
-                givens.append(
-                    Given(
-                        f"{label} {assumed.unstated or of}", largest, unit_of(key), source, origin
-                    )
-                )
+            givens += _given(key, filled[key], source, assumed, label)
     for key, inner in inner_tables(kind).items():
         if isinstance(table.get(key), list):
-            found = []
+            filled[key] = []
             for part in table[key]:
                 name = f"[[{key}]] {part.get('name', '')}".strip()
-                found.append(with_sigmas(part, inner, name, exact=exact))
-            filled[key] = [part for part, _ in found]
-            givens += [given for _, of_part in found for given in of_part]
+                filled_part, of_part = with_sigmas(part, inner, name, exact=exact)
+                filled[key].append(filled_part)
+                givens += of_part
         elif key in table:
             name = label if label.startswith("[[") else f"[{key}]"
             filled[key], of_table = with_sigmas(table[key], inner, name, exact=exact)
@@ -163,7 +155,21 @@ def _sigma(
     table: dict[str, Any], key: str, assumed: Assumed, exact: bool
 ) -> tuple[Sigma | None, Source]:
     """Return the sigma of a key, and where it comes from."""
-    value = table.get(value_key(key, assumed), 1.0)
     if key in table:
         return table[key], "stated" if np.any(table[key]) else "exact"
-    return (assumed.exact(value), "exact") if exact else (assumed.sigma(value), "assumed")
+    value = table.get(value_key(key, assumed), 1.0)
+    if exact:
+        return assumed.exact(value), "exact"
+    return assumed.sigma(value), "assumed"
+
+
+def _given(
+    key: str, sigma: Sigma | None, source: Source, assumed: Assumed, label: str
+) -> list[Given]:
+    """Return the given of a sigma's key; none where a share is assumed of a value of 0."""
+    largest = None if sigma is None else float(np.max(sigma))
+    if source == "assumed" and largest == 0.0:
+        return []
+    name = f"{label} {assumed.unstated or value_key(key, assumed)}"
+    origin = assumed.origin if source == "assumed" else ""
+    return [Given(name, largest, unit_of(key), source, origin)]

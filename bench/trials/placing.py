@@ -13,8 +13,7 @@ from bench.cameras.first_look import by_first_look, first_look, look_at_strokes,
 from bench.cameras.measured_place import both_places, contradiction, stated_place
 from bench.cameras.session_cameras import SessionCalibration
 from bench.session.session import Session
-from bench.session.signals import read_signals, stroke_speed_rad_s
-from bench.trials.consistency import rate_or_encoder
+from bench.trials.consistency import turn_cause
 from bench.trials.differences import Cause, Difference
 from bench.trials.lost import see_units
 from bench.trials.unit import Unit
@@ -81,8 +80,10 @@ def place_rig(
     if strokes_only or is_by_ruler:
         _require_swing(placement, problems)
     if placement.alarm and not strokes_only:
-        cause = _turn_cause(placement, chosen)
-        problems.warn(Reason("board_misplaced", f"{placement.alarm}{cause}"))
+        alarm = placement.alarm
+        if placement.turn_share is not None:
+            alarm += turn_cause(placement.turn_share, [unit.trial for unit in chosen])
+        problems.warn(Reason("board_misplaced", alarm))
     notes = placement.notes[:1] if stays or strokes_only else placement.notes
     return placed_here.with_notes(*notes, *[_STAYS] * stays)
 
@@ -144,30 +145,6 @@ def measure_rig(
             f"the free strokes do not show the whisker, {refusal}: {cure}", file="trials"
         ) from None
     return placed, (*sources, both)
-
-
-def _turn_cause(placement: Placement, units: Sequence[Unit]) -> str:
-    """Return the sentence on a whisker that turns less far than the motor, which looks as an axis
-    that leans; '' where it does not look so.
-    """
-    if placement.turn_share is None:
-        return ""
-    speeds = []
-    for unit in units:
-        if unit.trial.speed_deg_s is not None:
-            found = stroke_speed_rad_s(read_signals(unit.trial))
-            speeds.append(found / np.radians(unit.trial.speed_deg_s))
-    stated = (
-        float(
-            np.radians(next(u for u in units if u.trial.speed_deg_s is not None).trial.speed_deg_s)
-        )
-        if speeds
-        else None
-    )
-    speed = float(np.median(speeds)) * stated if speeds else np.nan
-    why = rate_or_encoder(placement.turn_share, speed, stated)
-    share = f"{placement.turn_share:.3f} times as far as the motor"
-    return f". So looks, too, a whisker that turns {share}: {why}"
 
 
 def _placed_by_board_alone(
