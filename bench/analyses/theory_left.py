@@ -39,12 +39,30 @@ def as_theory_has_them(
     reach = np.where(np.isfinite(reach_mm), reach_mm, OBJECT_REACH_MM)
     left = beam.left(np.asarray(d_x_mm, dtype=float))
     bent = theta * np.cos(slope) / np.cos(alpha_rad)
-    drawn = DRAWN * bent
-    along = drawn / np.hypot(drawn, np.sin(np.abs(phi)) / np.cos(alpha_rad))
+    along = _share_along(phi, bent, alpha_rad)
     share = first_order.rolling_at(theta, reach, slope, d_x_mm, left)
     share = share + along * first_order.dragging(theta, alpha_rad) + bent**2 / (6 * left)
     size = np.hypot(m_y, m_z) * (1.0 + np.nan_to_num(share * left))
-    across_rad = np.arctan(np.tan(alpha_rad) * np.sqrt(1.0 - along**2))
-    turned = slip_angle(theta, slope, across_rad) - (slope - alpha_rad)
+    turned = _turn_of_force(theta, slope, along, alpha_rad)
     phi = np.copysign(np.maximum(np.abs(phi) - turned, 0.0), phi)
     return size[:, None] * np.stack([np.sin(phi), np.cos(phi)], axis=1)
+
+
+def _share_along(phi: np.ndarray, bent: np.ndarray, alpha_rad: float) -> np.ndarray:
+    """Return the share (n,) of friction that acts along the whisker.
+
+    phi, bent (n,): direction of the force and angle of the bend, rad.
+    """
+    drawn = DRAWN * bent
+    return drawn / np.hypot(drawn, np.sin(np.abs(phi)) / np.cos(alpha_rad))
+
+
+def _turn_of_force(
+    theta: np.ndarray, slope: np.ndarray, along: np.ndarray, alpha_rad: float
+) -> np.ndarray:
+    """Return by how much (n,), rad, the force turns away from slope − α over a push by theta.
+
+    along (n,): share of friction that acts along the whisker, which is missing across it.
+    """
+    across_rad = np.arctan(np.tan(alpha_rad) * np.sqrt(1.0 - along**2))
+    return slip_angle(theta, slope, across_rad) - (slope - alpha_rad)

@@ -148,34 +148,49 @@ class _Rods:
     def _newton_step(self, unknowns: np.ndarray, nodes: _Nodes) -> np.ndarray:
         """Return Newton's step (n, nodes + 2) of angles, force and arc."""
         count = len(nodes.at)
-        angle = unknowns[:, :count]
-        force = unknowns[:, count, None]
-        arc = unknowns[:, count + 1, None]
-        c, s = np.cos(angle), np.sin(angle)
-        softness, softness_by_arc = self._softness(arc, nodes)
-        lever, lever_by = self._lever(c, s, nodes)
-        bend = (lever * softness) @ nodes.from_clamp.T
-        bend_by = nodes.from_clamp @ (softness[:, :, None] * lever_by)
-        bend_by_arc = 2.0 * arc * bend + arc**2 * ((lever * softness_by_arc) @ nodes.from_clamp.T)
-        weights = nodes.from_clamp[-1]
-        along = c @ weights
-        across = s @ weights
         residual = np.empty_like(unknowns)
-        residual[:, :count] = angle - force * arc**2 * bend
-        residual[:, count] = arc[:, 0] * along - self.contact[0]
-        residual[:, count + 1] = arc[:, 0] * across - self.contact[1]
         jacobian = np.zeros((*unknowns.shape, count + 2))
-        jacobian[:, :count, :count] = np.eye(count) - (force * arc**2)[:, :, None] * bend_by
-        jacobian[:, :count, count] = -(arc**2) * bend
-        jacobian[:, :count, count + 1] = -force * bend_by_arc
-        jacobian[:, count, :count] = -arc * weights * s
-        jacobian[:, count, count + 1] = along
-        jacobian[:, count + 1, :count] = arc * weights * c
-        jacobian[:, count + 1, count + 1] = across
+        residual[:, :count], jacobian[:, :count] = self._bending(unknowns, nodes)
+        residual[:, count:], jacobian[:, count:] = self._closure(unknowns, nodes)
         try:
             return -np.linalg.solve(jacobian, residual[:, :, None])[:, :, 0]
         except np.linalg.LinAlgError:
             raise ArithmeticError("no equilibrium found of a rod that is bent so far") from None
+
+    def _bending(self, unknowns: np.ndarray, nodes: _Nodes) -> tuple[np.ndarray, np.ndarray]:
+        """Return by how much the angles (n, nodes) are not those of the force's bend, and the
+        derivatives (n, nodes, nodes + 2) by the unknowns.
+        """
+        count = len(nodes.at)
+        angle = unknowns[:, :count]
+        force = unknowns[:, count, None]
+        arc = unknowns[:, count + 1, None]
+        softness, softness_by_arc = self._softness(arc, nodes)
+        lever, lever_by = self._lever(np.cos(angle), np.sin(angle), nodes)
+        bend = (lever * softness) @ nodes.from_clamp.T
+        bend_by = nodes.from_clamp @ (softness[:, :, None] * lever_by)
+        bend_by_arc = 2.0 * arc * bend + arc**2 * ((lever * softness_by_arc) @ nodes.from_clamp.T)
+        derivatives = np.empty((*angle.shape, count + 2))
+        derivatives[:, :, :count] = np.eye(count) - (force * arc**2)[:, :, None] * bend_by
+        derivatives[:, :, count] = -(arc**2) * bend
+        derivatives[:, :, count + 1] = -force * bend_by_arc
+        return angle - force * arc**2 * bend, derivatives
+
+    def _closure(self, unknowns: np.ndarray, nodes: _Nodes) -> tuple[np.ndarray, np.ndarray]:
+        """Return how far (n, 2) the rod's end is from the contact, along and across, and the
+        derivatives (n, 2, nodes + 2) by the unknowns.
+        """
+        count = len(nodes.at)
+        c = np.cos(unknowns[:, :count])
+        s = np.sin(unknowns[:, :count])
+        arc = unknowns[:, count + 1, None]
+        weights = nodes.from_clamp[-1]
+        end = np.stack([c @ weights, s @ weights], axis=1)  # of a rod of unit arc
+        derivatives = np.zeros((len(unknowns), 2, count + 2))
+        derivatives[:, 0, :count] = -arc * weights * s
+        derivatives[:, 1, :count] = arc * weights * c
+        derivatives[:, :, count + 1] = end
+        return arc * end - self.contact.T, derivatives
 
     def _softness(self, arc: np.ndarray, nodes: _Nodes) -> tuple[np.ndarray, np.ndarray]:
         """Return EI at the clamp over EI (n, nodes) at the points of arcs (n, 1), and its derivative by these."""

@@ -12,7 +12,7 @@ from bench.gauges.clamped_rod import moment_at_clamp
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import FeltStroke, gauge_delay, late_by
 from bench.gauges.matrix import to_follicle
-from bench.records.trial_result import SeenWhisk
+from bench.records.trial_result import Deflection, SeenWhisk
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from estimator.beam import rigidity_at
@@ -162,9 +162,7 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
     except ArithmeticError:
         return None
     by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
-    rows = np.repeat(good, 3)
-    by_camera_error_mm = d.by_camera_error_mm[rows]
-    of_places = d.covariance[np.ix_(rows, rows)] - by_camera_error_mm @ by_camera_error_mm.T
+    by_camera_error_mm, of_places = _errors_of_places(d, good)
     by_arc, covariance = _common_and_own(by_place, of_places)
     scale_sigma = float(np.sum(by_arc * moments) / np.sum(moments**2))
     return ReferenceMoments(
@@ -180,6 +178,17 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
         scale_sigma=abs(scale_sigma),
         by_camera_error=by_place @ by_camera_error_mm,
     )
+
+
+def _errors_of_places(d: Deflection, good: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the errors of the places of contacts in the frames `good` (f,), n of them.
+
+    These are by_camera_error_mm (3n, k), and the covariance (3n, 3n), mm², without the cameras' errors.
+    """
+    rows = np.repeat(good, 3)
+    by_camera_error_mm = d.by_camera_error_mm[rows]
+    covariance = d.covariance[np.ix_(rows, rows)] - by_camera_error_mm @ by_camera_error_mm.T
+    return by_camera_error_mm, covariance
 
 
 def source_of(seen: SeenWhisk) -> str:

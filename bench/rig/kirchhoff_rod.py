@@ -153,15 +153,24 @@ class KirchhoffRod(BentRod):
         compliance = load.softness[:, None, None] * (np.eye(3) + twisted)
         curvature = np.einsum("nij,nj->ni", compliance, moment)
         count = len(tangents)
-        # m changes by f × (∫ₛ t × w du), and a turned section by m × w besides
-        by_turns = force_matrix @ _cross_matrices(tangents)  # (n, 3, 3) at each node u
-        change = self.nodes.to_load[:, :, None, None] * by_turns  # (n, n, 3, 3)
-        own = np.arange(count)
-        change[own, own] += _cross_matrices(moment)
-        change = compliance[:, None] @ change
+        change = compliance[:, None] @ self._moment_by_turns(force_matrix, tangents, moment)
         per_node = change.transpose(0, 2, 1, 3).reshape(count, -1)
         jacobian = np.eye(3 * count) - (self.nodes.from_base @ per_node).reshape(3 * count, -1)
         return _Balance(tangents, lever, moment, curvature, compliance, jacobian)
+
+    def _moment_by_turns(
+        self, force_matrix: np.ndarray, tangents: np.ndarray, moment: np.ndarray
+    ) -> np.ndarray:
+        """Return the derivatives (n, n, 3, 3) of the moments (n, 3) by turns w of the sections.
+
+        m changes by f × (∫ₛ t × w du), and that of a turned section by m × w besides. tangents
+        (n, 3): t; force_matrix (3, 3): of f ×.
+        """
+        by_turns = force_matrix @ _cross_matrices(tangents)  # (n, 3, 3) at each node u
+        change = self.nodes.to_load[:, :, None, None] * by_turns
+        own = np.arange(len(tangents))
+        change[own, own] += _cross_matrices(moment)
+        return change
 
     def _curvature(self, turns: Rotation) -> np.ndarray:
         """Return the rate (n, 3) at which sections turn along the rod: 2 q' q* of quaternions."""
@@ -182,7 +191,6 @@ class KirchhoffRod(BentRod):
 
         tangents_by_arc (n, 3): of sections that do not turn.
         """
-        tangents = balance.tangents
         moment = balance.moment
         per_newton = arc**2 / self.rod.rigidity_Nmm2
         moment_by = np.empty((*moment.shape, 4))
@@ -193,9 +201,7 @@ class KirchhoffRod(BentRod):
         width = load.softness**-0.25
         softer_by = -4 * self.rod.width_by_arc * self.nodes.at / width  # (n,) by parts
         curvature_by[..., 3] += softer_by[:, None] * balance.curvature
-        twist = (tangents * moment).sum(1)[:, None]
-        twist_by = (tangents_by_arc * moment).sum(1)[:, None]
-        by_tangent = tangents_by_arc * twist + tangents * twist_by
+        by_tangent = _twist_by_arc(balance.tangents, tangents_by_arc, moment)
         curvature_by[..., 3] += TORSION_OVER_BENDING * load.softness[:, None] * by_tangent
         count = len(moment)
         missing = (self.nodes.from_base @ curvature_by.reshape(count, -1)).reshape(3 * count, 4)
@@ -208,6 +214,15 @@ class KirchhoffRod(BentRod):
             raise ArithmeticError(
                 f"the whisker is too thin at {arc:.4g} mm for its bend to be resolved"
             )
+
+
+def _twist_by_arc(
+    tangents: np.ndarray, tangents_by_arc: np.ndarray, moment: np.ndarray
+) -> np.ndarray:
+    """Return the derivative (n, 3) by the arc of t (t · m), the twisting part of moments m (n, 3)."""
+    twist = (tangents * moment).sum(1)[:, None]
+    twist_by = (tangents_by_arc * moment).sum(1)[:, None]
+    return tangents_by_arc * twist + tangents * twist_by
 
 
 def _cross_matrices(vectors: np.ndarray) -> np.ndarray:

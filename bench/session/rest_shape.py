@@ -109,13 +109,19 @@ def _fit(table: NumberTable, name: str, length_mm: float) -> tuple[RestShape, fl
     if max(steepest_slopes((y, z), length_mm)) > MOST_SLOPE:
         found = f"the whisker turns by more than {MOST_TURN_DEG:g}° from its base"
         raise BadInput(f"{found}; such a coil is not evaluated", file=name)
-    beside_mm = np.linalg.norm(off_mm, axis=1)
+    _check_residuals(np.linalg.norm(off_mm, axis=1), table, name, length_mm)
+    return (y, z), float(arc_mm[-1])
+
+
+def _check_residuals(
+    beside_mm: np.ndarray, table: NumberTable, name: str, length_mm: float
+) -> None:
+    """Raise BadInput for the point that lies farthest beside the curve (n,), mm, where that is too far."""
     farthest = int(np.argmax(beside_mm))
     if beside_mm[farthest] > _MISPLACED * length_mm:
         found = f"lies {beside_mm[farthest]:.3g} mm beside the smooth curve through all points"
         allowed = f"{_MISPLACED * length_mm:.2g} mm is allowed"
         raise BadInput(f"{found}; {allowed}", file=name, row=int(table.row[farthest]))
-    return (y, z), float(arc_mm[-1])
 
 
 def _curve(
