@@ -153,9 +153,7 @@ def _draw(rows: Sequence[AtTheta]) -> "Figure":
     for number, (name, mine) in enumerate(of_estimators.items()):
         rim_points = nested_size(number, len(of_estimators), least=0.0, step=1.3)
         _draw_estimator(axes, mine, label_of(name), colour_of(name, number), rim_points)
-    axes.plot([], [], "--", lw=1.0, color="0.4", label="stated sigma")
-    axes.plot([], [], ":", lw=1.0, color="0.4", label="sigma, α$_{est}$ exact")
-    axes.plot([], [], "o", ms=9, mfc="none", mec="0.4", label="least error")
+    _explain_lines(axes)
     axes.set(
         xscale="log",
         yscale="log",
@@ -170,6 +168,13 @@ def _draw(rows: Sequence[AtTheta]) -> "Figure":
     axes.grid(alpha=0.25, which="major")
     _add_legend(drawing, axes, 3)
     return drawing
+
+
+def _explain_lines(axes: "Axes") -> None:
+    """Add to the legend what kinds of lines and the ring mean."""
+    axes.plot([], [], "--", lw=1.0, color="0.4", label="stated sigma")
+    axes.plot([], [], ":", lw=1.0, color="0.4", label="sigma, α$_{est}$ exact")
+    axes.plot([], [], "o", ms=9, mfc="none", mec="0.4", label="least error")
 
 
 def _draw_estimator(

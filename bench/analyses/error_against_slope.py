@@ -98,11 +98,11 @@ def error_against_slope(
     for (whole, near), (panel, of_panel) in zip(rows, panels.items()):
         surface = surface_of.get(panel)
         title = panel_title(*panel)
-        without_2 = [j for j in of_panel if j.estimator != "no_slip"]
         _draw_estimators(whole, of_panel, lanes, surface, settings)
-        _draw_estimators(near, without_2, lanes, surface, settings)
         whole.set(ylabel="error of d$_x$  [%]", title=f"{title}: every estimator")
         whole.set_ylim(*_limits([j for j in of_panel if not j.one_factor]))
+        without_2 = [j for j in of_panel if j.estimator != "no_slip"]
+        _draw_estimators(near, without_2, lanes, surface, settings)
         near.set(title=f"{title}: without (2)")
         near.set_ylim(*_limits(without_2))
     for axes in rows[-1]:

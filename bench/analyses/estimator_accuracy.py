@@ -293,8 +293,7 @@ def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
     measured = [s for result, s, _ in whisks(results) if result.trial.purpose == "measure"]
     known = [seen for seen in measured if seen.has_truth]
     slips = [seen.at.slip_mm.sigma for seen in known if seen.at is not None]
-    doubts = [reaching((TRUTH,), seen.status) for seen in known]
-    commonest = Counter(part for doubt in doubts for part in doubt.parts).most_common(1)
+    contradictions = [reaching((TRUTH,), seen.status) for seen in known]
     return TruthUncertainty(
         known=len(known),
         measured=len(measured),
@@ -304,9 +303,15 @@ def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
         slip_mm=_finite_median(slips),
         d_x_own_mm=_finite_median([seen.d_x_own_sigma_mm for seen in known]),
         d_x_shared_mm=_finite_median([seen.d_x_shared_sigma_mm for seen in known]),
-        in_doubt=sum(map(bool, doubts)),
-        contradiction=Reason.of_parts(part for part, _ in commonest),
+        in_doubt=sum(map(bool, contradictions)),
+        contradiction=_commonest(contradictions),
     )
+
+
+def _commonest(reasons: Iterable[Reason]) -> Reason:
+    """Return the part of these reasons that stands in most of them; NO_REASON of none."""
+    counts = Counter(part for one in reasons for part in one.parts)
+    return Reason.of_parts(part for part, _ in counts.most_common(1))
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,13 @@ class AlphaUncertainty:
     sigma_rad: float
     ratio_to_first: float
 
+    @classmethod
+    def of_session(cls, found: Iterable[FittedSurface], settings: Settings) -> "AlphaUncertainty":
+        """Return the uncertainty by the surfaces of a session, as settings have it."""
+        sigma_rad = alpha_est_sigma(found, settings)
+        first_rad = np.radians(settings.first_alpha_est_sigma_deg)
+        return cls(sigma_rad, sigma_rad / first_rad if first_rad else 1.0)
+
 
 @dataclass(frozen=True)
 class AskedAgain:
@@ -124,9 +131,7 @@ def with_runs(
     results = list(results)
     found = surfaces(results, whisker.beam)
     surface_of = {surface.panel: surface for surface in found}
-    sigma_rad = alpha_est_sigma(found, settings)
-    first_rad = np.radians(settings.first_alpha_est_sigma_deg)
-    alpha_est = AlphaUncertainty(sigma_rad, sigma_rad / first_rad if first_rad else 1.0)
+    alpha_est = AlphaUncertainty.of_session(found, settings)
     turns = _turns(results, settings.alpha_est_rad)
     finished = []
     for result in results:

@@ -181,13 +181,13 @@ def _with_shared(
     fit = fit_to(recordings)
     if fit.status or fit.freedom < 1:
         return _unknown(name, fit.status or reason("recordings_few"))
-    shared = []
+    alphas_rad = []  # with each shared cause off by its sigma
     for cause in range(len(known[0].shared_Nmm)):
         moved = fit_to([contact.moved(cause) for contact in recordings])
-        shared.append(moved.alpha_rad - fit.alpha_rad)
+        alphas_rad.append(moved.alpha_rad)
     in_theory = fit_to(_as_theory_has_them(recordings, fit.alpha_rad, whisker))
-    shared.append(in_theory.alpha_rad - fit.alpha_rad)
-    total = add_common(fit.sigma_rad, fit.freedom, np.array(shared))
+    alphas_rad.append(in_theory.alpha_rad)
+    total = add_common(fit.sigma_rad, fit.freedom, np.array(alphas_rad) - fit.alpha_rad)
     sigma_rad = float(np.sqrt(total.variance)) * student_factor(total.freedom)
     return Way(name, fit.alpha_rad, sigma_rad)
 

@@ -187,22 +187,14 @@ def _fit(felt: Sequence[Felt], beam: Beam) -> FrictionFit | None:
     """
     if len(felt) < 2:
         return None
-    beta_rad = np.radians(column(felt, "beta_deg"))
-    pushes = Pushes(
-        beta_rad,
-        m_y=column(felt, "m_y_Nmm"),
-        m_z=column(felt, "m_z_Nmm"),
-        d_x=beam.as_cylinder_mm(column(felt, "d_x_mm")),
-        theta=column(felt, "theta_rad"),
-        C=beam.C_Nmm2,
-    )
+    pushes = _pushes(felt, beam)
     sigma_y = column(felt, "m_y_sigma_Nmm")
     sigma_z = column(felt, "m_z_sigma_Nmm")
     fit = fit_alpha(replace(pushes, sigma_y=sigma_y, sigma_z=sigma_z))
     if not np.isfinite(fit.alpha_rad):
         return None
     recording = column(felt, "recording")
-    slipping = np.abs(beta_rad) > fit.alpha_rad
+    slipping = np.abs(pushes.beta) > fit.alpha_rad
     by_theory = _alpha_by_theory(pushes, felt, beam, fit.alpha_rad)
     if len(set(recording[slipping])) < _MANY:
         return _widen(fit, np.append(_alphas_by_slopes(pushes, felt, recording), by_theory))
@@ -210,6 +202,18 @@ def _fit(felt: Sequence[Felt], beam: Beam) -> FrictionFit | None:
     if not np.isfinite(by_residuals.alpha_rad):
         return None
     return _widen(by_residuals, np.append(_alphas_by_shared(pushes, felt), by_theory))
+
+
+def _pushes(felt: Sequence[Felt], beam: Beam) -> Pushes:
+    """Return slopes, moments and distances of whisks as a fit of α takes them: of a cylinder."""
+    return Pushes(
+        np.radians(column(felt, "beta_deg")),
+        m_y=column(felt, "m_y_Nmm"),
+        m_z=column(felt, "m_z_Nmm"),
+        d_x=beam.as_cylinder_mm(column(felt, "d_x_mm")),
+        theta=column(felt, "theta_rad"),
+        C=beam.C_Nmm2,
+    )
 
 
 def _widen(fit: FrictionFit, others: np.ndarray) -> FrictionFit:

@@ -15,6 +15,9 @@ from estimator.beam import Beam
 from estimator.domain import RIGHT_ANGLE
 from estimator.two_tilts import DRAWN
 
+# [rad] Of a slope, at most: at a right angle no push is left. Stated.
+_STEEPEST_RAD = 0.999 * RIGHT_ANGLE
+
 
 def as_theory_has_them(
     m_Nmm: np.ndarray,
@@ -34,7 +37,7 @@ def as_theory_has_them(
     """
     m_y, m_z = m_Nmm.T
     phi = np.arctan2(m_y, m_z)
-    slope = np.minimum(np.abs(phi) + alpha_rad, 0.999 * RIGHT_ANGLE)
+    slope = np.minimum(np.abs(phi) + alpha_rad, _STEEPEST_RAD)
     theta = np.broadcast_to(np.asarray(theta_rad, dtype=float), phi.shape)
     reach = np.where(np.isfinite(reach_mm), reach_mm, OBJECT_REACH_MM)
     left = beam.left(np.asarray(d_x_mm, dtype=float))

@@ -325,7 +325,7 @@ def _paired(
     rigid_Nmm: float,
     theta_rad: float,
 ) -> Pairs | None:
-    """Read the volts at the moments' motor angles, but as late as the gauges' filter has them.
+    """Return the moments with the volts at their motor angles, as late as the gauges' filter has them.
 
     Each is from a short line through the samples around it. None where the wanted pushing angle, as
     seen, is reached before a touch is felt. rigid_Nmm: the paper's moment at that angle.
@@ -338,10 +338,7 @@ def _paired(
     if not readings or wanted <= 0.0:
         return None
     theta = felt_theta[kept]
-    rows = (2 * kept[:, None] + np.arange(2)).ravel()
-    covariance = reference.covariance[np.ix_(rows, rows)]
-    moments, covariance = _in_follicle(trial, reference.moments[kept], covariance)
-    turn = np.kron(np.eye(len(kept)), to_follicle(roll_rad))
+    moments, covariance, by_camera_error = _in_follicle(trial, reference, kept)
     volts = np.array([reading.values for reading in readings])
     by_delay = volts / theta[:, None] * late.sigma
     return Pairs(
@@ -356,7 +353,7 @@ def _paired(
         paper_moment=to_follicle(roll_rad) @ [0.0, rigid_Nmm],
         paper_volts=stroke.at(wanted, touch).values,
         scale_sigma=reference.scale_sigma,
-        by_camera_error=turn @ reference.by_camera_error[rows],
+        by_camera_error=by_camera_error,
     )
 
 
@@ -379,17 +376,25 @@ def _readings(
 
 
 def _in_follicle(
-    trial: Trial, moments: np.ndarray, covariance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return moments (n, 2) and covariance (2n, 2n) in the axes of the turned follicle.
+    trial: Trial, reference: ReferenceMoments, kept: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return moments (n, 2), their covariance (2n, 2n) and their change with the cameras' errors (2n, k).
 
-    The covariance has the turn's own sigma.
+    They are in the axes of the turned follicle, at the indices `kept` (n,); the covariance has the
+    turn's own sigma.
     """
+    moments = reference.moments[kept]
+    rows = (2 * kept[:, None] + np.arange(2)).ravel()
+    covariance = reference.covariance[np.ix_(rows, rows)]
     roll = np.radians(trial.follicle_roll_deg)
     turn = np.kron(np.eye(len(moments)), to_follicle(roll))
     per_radian = moments @ to_follicle(roll + np.pi / 2).T
     by_roll = per_radian * np.radians(trial.follicle_roll_sigma_deg)
-    return moments @ to_follicle(roll).T, turn @ covariance @ turn.T + _common_cause(by_roll)
+    return (
+        moments @ to_follicle(roll).T,
+        turn @ covariance @ turn.T + _common_cause(by_roll),
+        turn @ reference.by_camera_error[rows],
+    )
 
 
 def _volts_covariance(

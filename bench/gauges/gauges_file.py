@@ -83,7 +83,11 @@ def read_gauges(path: Path, C_Nmm2: float) -> GaugeCalibration:
         one_factor=None if factors is None else GaugeMatrix(np.diag(factors)),
         full_scale_Nmm=None if full_scale is None else np.array(full_scale),
     )
-    scale = 1.0 if keys.C_Nmm2 is None else C_Nmm2 / keys.C_Nmm2
+    return gauges if keys.C_Nmm2 is None else _in_unit(gauges, C_Nmm2 / keys.C_Nmm2)
+
+
+def _in_unit(gauges: GaugeCalibration, scale: float) -> GaugeCalibration:
+    """Return coefficients that were made with a C that is `scale` times smaller, with a note on it."""
     if abs(scale - 1.0) >= 1e-9:
         note = f"scaled by {scale:.6g} from the C that they were made with"
         gauges = replace(gauges, notes=(note,))

@@ -134,16 +134,7 @@ def place_object(
     Returns it, and about the motor angle (rad) and arc (mm) of first touch.
     """
     table = run.table
-    wanted = np.array([run.beta_deg, run.psi_deg, run.d_x_mm, table.touch_deg])
-    scatter = np.array(
-        [
-            table.beta_scatter_deg,
-            table.psi_scatter_deg,
-            table.d_x_scatter_mm,
-            table.touch_scatter_deg,
-        ]
-    )
-    beta_deg, psi_deg, d_x_mm, touch_deg = wanted + scatter * rng.standard_normal(4)
+    beta_deg, psi_deg, d_x_mm, touch_deg = _draw_place(run, rng)
     touch_rad = math.radians(touch_deg)
     bar = TouchedBar.at_contact(
         d_x_mm=d_x_mm,
@@ -160,6 +151,21 @@ def place_object(
     touched_mm = rotate_about_z(rod.rest.point_mm(arc_mm), touch_rad)
     placed = OBJECTS[table.object or TouchedBar.shape].from_trial(bar, touched_mm, table)
     return placed, touch_rad, arc_mm
+
+
+def _draw_place(run: ProtocolRun, rng: np.random.Generator) -> np.ndarray:
+    """Return β and ψ, deg, d_x, mm, and the angle of touch, deg, near those that are wanted."""
+    table = run.table
+    wanted = np.array([run.beta_deg, run.psi_deg, run.d_x_mm, table.touch_deg])
+    scatter = np.array(
+        [
+            table.beta_scatter_deg,
+            table.psi_scatter_deg,
+            table.d_x_scatter_mm,
+            table.touch_scatter_deg,
+        ]
+    )
+    return wanted + scatter * rng.standard_normal(4)
 
 
 def plan_stroke(protocol: Protocol, run: ProtocolRun, low_rad: float, high_rad: float) -> Stroke:

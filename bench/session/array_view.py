@@ -64,14 +64,19 @@ def load_views(
     _check_names([base.name for base in bases])
     _check_distances(bases, keys.whiskers)
     trials_of = _trials_of_all(session, keys.whiskers, bases, problems)
-    if session.has_pictures and session.T_rig_board is None and session.cameras_toml is None:
-        cure = "measure it, or bring cameras.toml: of several wires it says which is whose"
-        raise BadInput(f"[rig] T_rig_board is missing; {cure}", file=MANIFEST)
+    _check_placed(session)
     views = []
     for one, base in zip(keys.whiskers, bases):
         view = _view(session, one, base, trials_of[base.name])
         views.append(replace(view, givens=stated.givens_of(base.name)))
     return tuple(views)
+
+
+def _check_placed(session: Session) -> None:
+    """Raise BadInput for pictures of an array without T_rig_board or cameras.toml."""
+    if session.has_pictures and session.T_rig_board is None and session.cameras_toml is None:
+        cure = "measure it, or bring cameras.toml: of several wires it says which is whose"
+        raise BadInput(f"[rig] T_rig_board is missing; {cure}", file=MANIFEST)
 
 
 def _trials_of_all(

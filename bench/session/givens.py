@@ -130,25 +130,43 @@ def with_sigmas(
     sigmas are 0 where the table does not say.
     """
     exact = table.get("exact", exact)
+    filled, givens = _with_own_sigmas(table, kind, label, exact)
+    for key, inner in inner_tables(kind).items():
+        if isinstance(table.get(key), list):
+            filled[key], of_parts = _with_sigmas_in_all(table[key], inner, key, exact)
+            givens += of_parts
+        elif key in table:
+            name = label if label.startswith("[[") else f"[{key}]"
+            filled[key], of_table = with_sigmas(table[key], inner, name, exact=exact)
+            givens += of_table
+    return filled, tuple(givens)
+
+
+def _with_own_sigmas(
+    table: dict[str, Any], kind: type[Keys], label: str, exact: bool
+) -> tuple[dict[str, Any], list[Given]]:
+    """Return a table with sigmas of its own numbers, not of the tables within, and what is so given."""
     filled = dict(table)
     givens: list[Given] = []
     for key, assumed in assumptions(kind).items():
         if value_key(key, assumed) in table or assumed.unstated:
             filled[key], source = _sigma(table, key, assumed, exact)
             givens += _given(key, filled[key], source, assumed, label)
-    for key, inner in inner_tables(kind).items():
-        if isinstance(table.get(key), list):
-            filled[key] = []
-            for part in table[key]:
-                name = f"[[{key}]] {part.get('name', '')}".strip()
-                filled_part, of_part = with_sigmas(part, inner, name, exact=exact)
-                filled[key].append(filled_part)
-                givens += of_part
-        elif key in table:
-            name = label if label.startswith("[[") else f"[{key}]"
-            filled[key], of_table = with_sigmas(table[key], inner, name, exact=exact)
-            givens += of_table
-    return filled, tuple(givens)
+    return filled, givens
+
+
+def _with_sigmas_in_all(
+    tables: list[dict[str, Any]], kind: type[Keys], key: str, exact: bool
+) -> tuple[list[dict[str, Any]], list[Given]]:
+    """Return the tables of an array of tables [[key]] with sigmas, and what is given in all of them."""
+    filled = []
+    givens: list[Given] = []
+    for table in tables:
+        label = f"[[{key}]] {table.get('name', '')}".strip()
+        filled_table, of_table = with_sigmas(table, kind, label, exact=exact)
+        filled.append(filled_table)
+        givens += of_table
+    return filled, givens
 
 
 def _sigma(

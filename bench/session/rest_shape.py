@@ -98,8 +98,7 @@ def _fit(table: NumberTable, name: str, length_mm: float) -> tuple[RestShape, fl
     that is too far.
     """
     points_mm = np.column_stack([table[column] for column in _COLUMNS])
-    steps_mm = np.linalg.norm(np.diff(points_mm, axis=0, prepend=np.zeros((1, 3))), axis=1)
-    arc_mm = np.cumsum(steps_mm)
+    arc_mm = _arc_along_chords(points_mm)
     for _ in range(_ROUNDS):
         lateral = [_through_base(arc_mm / length_mm, points_mm[:, k]) for k in (1, 2)]
         curve_mm, tangents = _curve(lateral, arc_mm, length_mm)
@@ -124,6 +123,12 @@ def _check_residuals(
         raise BadInput(f"{found}; {allowed}", file=name, row=int(table.row[farthest]))
 
 
+def _arc_along_chords(points_mm: np.ndarray) -> np.ndarray:
+    """Return the arc lengths (n,) of points (n, 3) along straight lines from the base."""
+    steps_mm = np.linalg.norm(np.diff(points_mm, axis=0, prepend=np.zeros((1, 3))), axis=1)
+    return np.cumsum(steps_mm)
+
+
 def _curve(
     lateral: list[Polynomial], arc_mm: np.ndarray, length_mm: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -133,17 +138,21 @@ def _curve(
     """
     grid_mm = np.linspace(0.0, max(float(arc_mm.max()), length_mm), _STEPS)
     slopes = [own.deriv() for own in lateral]
-    steepness2 = sum((slope(grid_mm / length_mm) / length_mm) ** 2 for slope in slopes)
-    forward = np.sqrt(np.maximum(1.0 - steepness2, 1.0 - MOST_SLOPE**2))
+    forward = _forward(slopes, grid_mm, length_mm)
     steps_mm = 0.5 * (forward[1:] + forward[:-1]) * np.diff(grid_mm)
     x_mm = np.append(0.0, np.cumsum(steps_mm))
     share = arc_mm / length_mm
-    points = [np.interp(arc_mm, grid_mm, x_mm), *(own(share) for own in lateral)]
-    tangents = [
-        np.interp(arc_mm, grid_mm, forward),
-        *(slope(share) / length_mm for slope in slopes),
-    ]
+    y, z = lateral
+    points = [np.interp(arc_mm, grid_mm, x_mm), y(share), z(share)]
+    y_slope, z_slope = (slope(share) / length_mm for slope in slopes)
+    tangents = [np.interp(arc_mm, grid_mm, forward), y_slope, z_slope]
     return np.column_stack(points), np.column_stack(tangents)
+
+
+def _forward(slopes: list[Polynomial], arc_mm: np.ndarray, length_mm: float) -> np.ndarray:
+    """Return the x (n,) of unit tangents whose y and z are these slopes at arc lengths (n,)."""
+    steepness2 = sum((slope(arc_mm / length_mm) / length_mm) ** 2 for slope in slopes)
+    return np.sqrt(np.maximum(1.0 - steepness2, 1.0 - MOST_SLOPE**2))
 
 
 def _through_base(at: np.ndarray, values: np.ndarray) -> Polynomial:

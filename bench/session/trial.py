@@ -79,11 +79,7 @@ def load_trial(
     table = _trial_table(folder, session.trial_table, label, problems)
     table, givens = with_sigmas(table, manifest.TrialKeys, "[trial]", exact=session.keys.exact)
     keys = convert(table, manifest.TrialKeys)
-    if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
-        raise BadInput('purpose = "weight" needs force_N and at_mm', file=label)
-    if keys.object_gives_way and keys.object_velocity_mm_s is not None:
-        found = "an object that moves does not give way, too; leave out object_velocity_mm_s"
-        raise BadInput(f"object_gives_way: {found}", file=label)
+    _check_keys(keys, label)
     signals_path = folder / (daq.file if daq else SIGNALS)
     if not signals_path.is_file():
         found = "is not there; a trial needs its signals"
@@ -99,6 +95,15 @@ def load_trial(
         givens=givens,
         **settings,
     )
+
+
+def _check_keys(keys: manifest.TrialKeys, label: str) -> None:
+    """Raise BadInput for a weight without force or place, and an object that moves and gives way."""
+    if keys.purpose == "weight" and None in (keys.force_N, keys.at_mm):
+        raise BadInput('purpose = "weight" needs force_N and at_mm', file=label)
+    if keys.object_gives_way and keys.object_velocity_mm_s is not None:
+        found = "an object that moves does not give way, too; leave out object_velocity_mm_s"
+        raise BadInput(f"object_gives_way: {found}", file=label)
 
 
 def _trial_table(

@@ -100,15 +100,23 @@ def agreement(
     if chance >= LEAST_CHANCE:
         return MomentAgreement(chi2, chance)
     sentence = _other_reading(volts, seen, others)
-    if sentence:
-        return MomentAgreement(chi2, chance, sentence, is_explained=True)
-    causes = [
-        *_exchanges(volts, gauges.matrix),
-        *_turns(felt, seen),
-        *_possible_scales(difference, volts, gauges.matrix),
-    ]
-    sentence = difference.explained_by(causes, _EXPLAINED)
+    sentence = sentence or _explanation(difference, volts, gauges.matrix, seen)
     return MomentAgreement(chi2, chance, sentence or _UNEXPLAINED, is_explained=bool(sentence))
+
+
+def _explanation(
+    difference: Difference, volts: np.ndarray, matrix: np.ndarray, seen: np.ndarray
+) -> str:
+    """Return the sentence on the fault of channels or gauges that explains the difference; '' without one.
+
+    volts, seen (2,): slopes of volts and of the seen moments over the pushing angle.
+    """
+    causes = [
+        *_exchanges(volts, matrix),
+        *_turns(matrix @ volts, seen),
+        *_possible_scales(difference, volts, matrix),
+    ]
+    return difference.explained_by(causes, _EXPLAINED)
 
 
 def _other_reading(volts: np.ndarray, seen: np.ndarray, others: Sequence[OtherReading]) -> str:

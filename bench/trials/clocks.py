@@ -18,7 +18,7 @@ from scipy.special import chdtrc
 
 from bench.base.combined import between_settings
 from bench.gauges.felt import motor_speed
-from bench.records.trial_result import SeenWhisk, TrialResult
+from bench.records.trial_result import BackStroke, FeltTrial, FeltWhisk, SeenWhisk, TrialResult
 from vision import Value
 from vision.geometry import NO_REASON, Reason, counted
 
@@ -97,16 +97,10 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
     strokes = list(_strokes(results))
     if not strokes:
         return None
-    difference = np.array([stroke.difference_rad for stroke in strokes])
     speed = np.array([stroke.speed_rad_s for stroke in strokes])
     sigmas = np.array([np.hypot(stroke.seen_rad, stroke.felt_rad) for stroke in strokes])
     design = np.vander(speed, 2, increasing=True)  # (n, 2): zero, clock
-    settings = [stroke.trial for stroke in strokes]
-    covariance = _covariance(strokes)
-    covariance += between_settings(difference, covariance, design, settings)
-    weighted = design.T @ np.linalg.inv(covariance)
-    information = weighted @ design
-    gradient = weighted @ difference
+    information, gradient = _normal_equations(strokes, design)
     prior = _PRIOR**-2.0
     of_values = np.linalg.inv(information + np.diag(prior))
     values = of_values @ gradient
@@ -120,6 +114,18 @@ def shared_touch(results: Iterable[TrialResult]) -> SharedTouch | None:
         clock_preference=float(clock_alone - zero_alone),
         speeds_rad_s=speed,
     )
+
+
+def _normal_equations(
+    strokes: Sequence["_Stroke"], design: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normal matrix (2, 2) and right-hand side (2,) of zero and clock. design (n, 2)."""
+    difference = np.array([stroke.difference_rad for stroke in strokes])
+    settings = [stroke.trial for stroke in strokes]
+    covariance = _covariance(strokes)
+    covariance += between_settings(difference, covariance, design, settings)
+    weighted = design.T @ np.linalg.inv(covariance)
+    return weighted @ design, weighted @ difference
 
 
 @dataclass(frozen=True)
@@ -154,25 +160,33 @@ def _strokes(results: Iterable[TrialResult]) -> Iterator[_Stroke]:
     """Yield each stroke whose touch is both felt and seen."""
     for result in results:
         clock_s = result.seen.clock.sigma_s if result.seen.clock else 0.0
+        name = result.trial.name
         for seen, felt in zip(result.seen.whisks, result.felt.whisks):
             # Frames or motor that are off by themselves have a status of their own.
             is_timed = not _NO_CLOCK.intersection(seen.status.codes)
             if is_timed and np.isfinite(seen.touch_rad.value):
-                speed = motor_speed(seen.frames)
-                left_out = np.hypot(seen.touch_shared_rad, clock_s * speed)
-                touch = Value(felt.touch_felt_rad.value, felt.theta_sigma_rad)
-                delay_s = float(np.hypot(clock_s, felt.delay_s.sigma))
-                shared = None if seen.truth.shared is None else seen.truth.shared.touch_rad
-                name = result.trial.name
-                yield from _known(name, seen.touch_rad, shared, left_out, touch, speed, delay_s)
-        back = result.seen.back
-        if back:
-            speed = back.speed_rad_s
-            filters_s = [felt.delay_s.sigma for felt in result.felt.whisks]
-            delay_s = float(np.hypot(clock_s, max(filters_s, default=np.nan)))
-            touch = result.felt.back_touch_rad
-            name = result.trial.name
-            yield from _known(name, back.touch_rad, None, clock_s * speed, touch, speed, delay_s)
+                yield from _forward(name, seen, felt, clock_s)
+        if result.seen.back:
+            yield from _backward(name, result.seen.back, result.felt, clock_s)
+
+
+def _forward(trial: str, seen: SeenWhisk, felt: FeltWhisk, clock_s: float) -> Iterator[_Stroke]:
+    """Yield the forward stroke of a whisk, if all of it is known. clock_s: sigma of the frames' clock."""
+    speed = motor_speed(seen.frames)
+    left_out = np.hypot(seen.touch_shared_rad, clock_s * speed)
+    touch = Value(felt.touch_felt_rad.value, felt.theta_sigma_rad)
+    delay_s = float(np.hypot(clock_s, felt.delay_s.sigma))
+    shared = None if seen.truth.shared is None else seen.truth.shared.touch_rad
+    yield from _known(trial, seen.touch_rad, shared, left_out, touch, speed, delay_s)
+
+
+def _backward(trial: str, back: BackStroke, felt: FeltTrial, clock_s: float) -> Iterator[_Stroke]:
+    """Yield the back stroke of a trial, if all of it is known. clock_s: sigma of the frames' clock."""
+    speed = back.speed_rad_s
+    filters_s = [whisk.delay_s.sigma for whisk in felt.whisks]
+    delay_s = float(np.hypot(clock_s, max(filters_s, default=np.nan)))
+    touch = felt.back_touch_rad
+    yield from _known(trial, back.touch_rad, None, clock_s * speed, touch, speed, delay_s)
 
 
 def _known(

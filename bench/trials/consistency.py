@@ -64,21 +64,27 @@ def _turn_causes(
 ) -> Iterator[Cause]:
     """Yield the faults of encoder and frame times that would turn the whisker unlike the motor."""
     motor = turns.motor_rad
-    count = len(motor)
-    nothing = np.zeros(count)
+    scale_message = partial(_scale_message, speed_rad_s, stated_speed_rad_s)
+    yield Cause(scale_message, np.zeros(len(motor)), motor - motor.mean(), 1)
+    for k in range(1, len(motor)):
+        yield from _causes_at(k, turns, speed_rad_s)
+
+
+def _causes_at(k: int, turns: Turns, speed_rad_s: float) -> Iterator[Cause]:
+    """Yield the faults of encoder and frame times that begin at, or are of, the k-th frame seen."""
+    motor = turns.motor_rad
     ahead = np.diff(motor, append=2.0 * motor[-1] - motor[-2])
     behind = -np.diff(motor, prepend=2.0 * motor[0] - motor[1])
-    scale_message = partial(_scale_message, speed_rad_s, stated_speed_rad_s)
-    yield Cause(scale_message, nothing, motor - motor.mean(), 1)
-    for k in range(1, count):
-        later = (np.arange(count) >= k).astype(float)
-        alone = (np.arange(count) == k).astype(float)
-        frame = int(turns.index[k])
-        yield Cause(constant_message(_LOST.format(frame)), ahead * later, None, 1)
-        yield Cause(constant_message(_ADDED.format(frame)), behind * later, None, 1)
-        yield Cause(constant_message(_REPEATED.format(frame)), behind * alone, None, 1)
-        yield Cause(_jump_message(motor[k]), nothing, later, 2)
-        yield Cause(_time_message(frame, speed_rad_s), nothing, alone, 2)
+    number = np.arange(len(motor))
+    nothing = np.zeros(len(motor))
+    later = (number >= k).astype(float)
+    alone = (number == k).astype(float)
+    frame = int(turns.index[k])
+    yield Cause(constant_message(_LOST.format(frame)), ahead * later, None, 1)
+    yield Cause(constant_message(_ADDED.format(frame)), behind * later, None, 1)
+    yield Cause(constant_message(_REPEATED.format(frame)), behind * alone, None, 1)
+    yield Cause(_jump_message(motor[k]), nothing, later, 2)
+    yield Cause(_time_message(frame, speed_rad_s), nothing, alone, 2)
 
 
 def _scale_message(speed_rad_s: float, stated_speed_rad_s: float | None, size: float) -> str:

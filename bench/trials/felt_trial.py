@@ -226,11 +226,7 @@ def _against_pictures(
     Pictures that contradict encoder or lengths say nothing about the gauges.
     """
     if seen.deflection is None:
-        odd = check_friction_cone(felt.phi_felt_rad, nominal_slope(unit.trial), "felt")
-        if not readout.is_gauged:
-            moments = np.array([felt.m_y_Nmm.value, felt.m_z_Nmm.value])
-            size = check_moment_size(moments, unit.settings.theta_rad, unit.session.whisker)
-            odd = joined(odd, size)
+        odd = _against_expectation(felt, unit, readout)
         is_apart = seen.contradicted or bool(odd)
         return replace(felt, apart=is_apart, status=joined(felt.status, odd))
     if seen.contradicted:
@@ -243,6 +239,16 @@ def _against_pictures(
     found = against_shape(unit, readout, pairs)
     status = joined(felt.status, found.status)
     return replace(felt, agreement_chi2=found.chi2, apart=bool(found.status), status=status)
+
+
+def _against_expectation(felt: FeltWhisk, unit: Unit, readout: Readout) -> Reason:
+    """Return why moments that no picture shows cannot be; NO_REASON where they can."""
+    odd = check_friction_cone(felt.phi_felt_rad, nominal_slope(unit.trial), "felt")
+    if readout.is_gauged:
+        return odd
+    moments_Nmm = np.array([felt.m_y_Nmm.value, felt.m_z_Nmm.value])
+    size = check_moment_size(moments_Nmm, unit.settings.theta_rad, unit.session.whisker)
+    return joined(odd, size)
 
 
 def against_shape(unit: Unit, readout: Readout, pairs: Pairs) -> MomentAgreement:

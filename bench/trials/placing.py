@@ -78,14 +78,19 @@ def place_rig(
         return _placed_by_board_alone(session, calibration, refusal, problems)
     is_by_ruler = not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM
     if strokes_only or is_by_ruler:
-        _require_swing(placement, problems)
+        require_swing(placement, problems)
     if placement.alarm and not strokes_only:
-        alarm = placement.alarm
-        if placement.turn_share is not None:
-            alarm += turn_cause(placement.turn_share, [unit.trial for unit in chosen])
-        problems.warn(Reason("board_misplaced", alarm))
+        problems.warn(_misplaced(placement, chosen))
     notes = placement.notes[:1] if stays or strokes_only else placement.notes
     return placed_here.with_notes(*notes, *[_STAYS] * stays)
+
+
+def _misplaced(placement: Placement, units: Sequence[Unit]) -> Reason:
+    """Return the warning of a placement with an alarm, with a turn of the whisker that would explain it."""
+    cause = ""
+    if placement.turn_share is not None:
+        cause = turn_cause(placement.turn_share, [unit.trial for unit in units])
+    return Reason("board_misplaced", f"{placement.alarm}{cause}")
 
 
 def _placed_by_file(
@@ -136,15 +141,26 @@ def measure_rig(
         if np.all(np.abs(known.step) < _SMALL_STEP):
             break
     known = replace(known, step=exact.step)
+    placed, both = _converge_on_strokes(_moved(here, exact, known), known, units, pool, problems)
+    return placed, (*sources, both)
+
+
+def _converge_on_strokes(
+    calibration: SessionCalibration,
+    known: Placement,
+    units: Sequence[Unit],
+    pool: Workers,
+    problems: InputProblems,
+) -> tuple[SessionCalibration, Placement]:
+    """Return what `_converge` does of free strokes; raise BadInput where these cannot be read."""
     chosen = spread([unit for unit in units if unit.trial.camera_sources])
     try:
-        placed, both = _converge(_moved(here, exact, known), known, chosen, pool, problems)
+        return _converge(calibration, known, chosen, pool, problems)
     except Refused as refusal:
         cure = "record free strokes of some 20 degrees in view of two cameras"
         raise BadInput(
             f"the free strokes do not show the whisker, {refusal}: {cure}", file="trials"
         ) from None
-    return placed, (*sources, both)
 
 
 def _placed_by_board_alone(
@@ -216,7 +232,7 @@ def _turning_elsewhere(session: Session, calibration: SessionCalibration) -> lis
     return [Reason("board_misplaced", line)]
 
 
-def _require_swing(placement: Placement, problems: InputProblems) -> None:
+def require_swing(placement: Placement, problems: InputProblems) -> None:
     """Raise BadInput where the strokes are too short to place the rig; note where they nearly are."""
     try:
         warning = check_swing_suffices(placement)

@@ -302,8 +302,8 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
     smooth = truth.smooth
     if smooth is None or len(smooth.theta_rad) == 0:
         return None
-    count = len(smooth.theta_rad)
-    chosen = np.unique(np.linspace(0, count - 1, _MOST_DEFLECTIONS).round().astype(int))
+    last = len(smooth.theta_rad) - 1
+    chosen = np.unique(np.linspace(0, last, _MOST_DEFLECTIONS).round().astype(int))
     frames = truth.frames
     shown = np.flatnonzero(frames.touching)[chosen]
     motor = frames.motor_rad[shown]

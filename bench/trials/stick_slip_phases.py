@@ -241,13 +241,20 @@ def find_rests(
     moments = moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0]
     slip = _slip_mm(theta, moments, abs(beta_rad), d_x_mm, beam)
     jumps = _jumps(time_s[good], theta, slip)
+    return len(jumps), _rests_between(jumps, theta, moments, slip)
+
+
+def _rests_between(
+    jumps: list[int], theta: np.ndarray, moments: np.ndarray, slip: np.ndarray
+) -> list[ContactRest]:
+    """Return the rests after the samples `jumps`, those that can be fitted."""
     rests = []
     for first, last in pairwise([*jumps, len(theta)]):
         part = slice(first, last)
         rest = _rest(theta[part], moments[part], slip[part], ends_in_jump=last < len(theta))
         if rest is not None:
             rests.append(rest)
-    return len(jumps), rests
+    return rests
 
 
 def _steady(time_s: np.ndarray, motor_rad: np.ndarray) -> slice:
@@ -256,12 +263,11 @@ def _steady(time_s: np.ndarray, motor_rad: np.ndarray) -> slice:
     It ends where the motor leaves the line of that speed by more than its own noise: encoder steps
     and uneven running, as the middle of the stroke has them.
     """
-    low, high = motor_rad.min(), motor_rad.max()
-    edge = 0.5 * (1.0 - _PLATEAU_SHARE) * (high - low)
-    middle = np.flatnonzero((motor_rad >= low + edge) & (motor_rad <= high - edge))
+    middle = _middle(motor_rad)
     if len(middle) < 2:
         return slice(0, 0)
-    first, last = middle[0], middle[-1] + 1
+    first = middle[0]
+    last = middle[-1] + 1
     line = np.polynomial.Polynomial.fit(time_s[first:last], motor_rad[first:last], 1)
     off = np.abs(motor_rad - line(time_s))
     is_off = off > _OFF_PLATEAU * off[first:last].max()
@@ -270,6 +276,14 @@ def _steady(time_s: np.ndarray, motor_rad: np.ndarray) -> slice:
     begin = before[-1] + 1 if len(before) else 0
     end = last + after[0] if len(after) else len(motor_rad)
     return slice(int(begin), int(end))
+
+
+def _middle(motor_rad: np.ndarray) -> np.ndarray:
+    """Return the samples in the middle of a stroke, by its angle."""
+    low = motor_rad.min()
+    high = motor_rad.max()
+    edge = 0.5 * (1.0 - _PLATEAU_SHARE) * (high - low)
+    return np.flatnonzero((motor_rad >= low + edge) & (motor_rad <= high - edge))
 
 
 def _slip_mm(

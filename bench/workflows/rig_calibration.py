@@ -28,10 +28,10 @@ from bench.session.session import Session
 from bench.session.session_check import checked_session
 from bench.session.trial import Trial
 from bench.trials.of_session import first_units, trials_with_whisks
-from bench.trials.placing import measure_rig
+from bench.trials.placing import measure_rig, require_swing
 from bench.workflows.rig_picture import draw_rig
-from vision.calibration import Placement, check_swing_suffices
-from vision.geometry import Reason, Refused, counted
+from vision.calibration import Placement
+from vision.geometry import Reason, counted
 
 # [deg] Axis known worse: 60 mm along the whisker a bar then is 0.5 mm higher or lower than said. Stated.
 _HELPED_AXIS_SIGMA_DEG = 0.5
@@ -86,16 +86,21 @@ def calibrate_rig_command(
     if disagreement is not None:
         problems.warn(disagreement)
     picture = target.with_suffix(".png")
-    with whole_file(picture) as temporary:
-        figure = draw_rig(found.calibration, found.covariance)
-        figure.savefig(temporary, metadata={"Software": None})
-        write_rig(target, rig_file_keys(found), lines)
+    _write(target, picture, found, lines)
     advice = [f"to know it better: {line}" for line in what_would_help(found)]
     print(*lines, *advice, "", sep="\n")
     for warning in problems.warnings:
         print(f"doubtful: {warning}")
     print(f"written: {target}, {picture.name}")
     return 1 if problems.warnings else 0
+
+
+def _write(target: Path, picture: Path, found: RigCalibration, lines: list[str]) -> None:
+    """Write rig.toml with `lines` as comments, and its picture: both, or none."""
+    with whole_file(picture) as temporary:
+        figure = draw_rig(found.calibration, found.covariance)
+        figure.savefig(temporary, metadata={"Software": None})
+        write_rig(target, rig_file_keys(found), lines)
 
 
 def _check_target(target: Path) -> None:
@@ -164,12 +169,7 @@ def _warn(found: RigCalibration, problems: InputProblems) -> None:
     placement = replace(found.placement, covariance=found.covariance)
     if placement.alarm:
         problems.warn(Reason("board_misplaced", placement.alarm))
-    try:
-        warning = check_swing_suffices(placement)
-    except Refused as refusal:
-        raise BadInput(str(refusal), file="trials") from None
-    if warning:
-        problems.warn(Reason("board_misplaced", warning))
+    require_swing(placement, problems)
 
 
 def report_lines(found: RigCalibration) -> Iterator[str]:

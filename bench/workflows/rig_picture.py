@@ -48,6 +48,11 @@ def _draw_camera(
     axes.set_xlim(-0.5, camera.size_px[0] - 0.5)
     axes.set_ylim(camera.size_px[1] - 0.5, -0.5)
     axes.set_axis_off()
+    _draw_frame(axes, camera, draws)
+
+
+def _draw_frame(axes: "Axes", camera: Camera, draws: np.ndarray) -> None:
+    """Draw axes and centre of the rig frame, and the axes of its `draws` (n, 6)."""
     x_axis = np.array([[0.0, 0.0, 0.0], [_ALONG_X_MM, 0.0, 0.0]])
     z_axis = np.array([[0.0, 0.0, -_ALONG_Z_MM], [0.0, 0.0, _ALONG_Z_MM]])
     lines = ((x_axis, "tab:red", "x: whisker at motor angle 0"), (z_axis, "tab:cyan", "z: axis"))

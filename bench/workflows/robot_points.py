@@ -120,10 +120,7 @@ def pool_answers(answers: Sequence[Answer]) -> list[Point]:
 def _point(answers: Sequence[Answer], speed_deg_s: float) -> Point:
     """Return the point of answers of one estimator, converter and push."""
     first = answers[0]
-    rows = [(one.error_percent, one.expected_percent, one.noise_percent) for one in answers]
-    table = np.array(rows)  # (answers, 3) %
-    known = table[np.isfinite(table).all(axis=1)]
-    error, expected, noise = known.T
+    error, expected, noise = _known_percent(answers)
     expected_rms = ExpectedRms.of_errors(expected, noise)
     return Point(
         estimator=first.estimator,
@@ -133,8 +130,8 @@ def _point(answers: Sequence[Answer], speed_deg_s: float) -> Point:
         bits=first.converter.bits or np.nan,
         push_deg=first.push_deg,
         time_ms=1e3 * float(np.median([one.time_s for one in answers])),
-        whisks=len(known),
-        none=len(answers) - len(known),
+        whisks=len(error),
+        none=len(answers) - len(error),
         error_mean_percent=mean(error),
         error_sd_percent=rms(error - mean(error)),
         error_rms_percent=rms(error),
@@ -144,6 +141,13 @@ def _point(answers: Sequence[Answer], speed_deg_s: float) -> Point:
         expected_low_percent=expected_rms.low,
         expected_high_percent=expected_rms.high,
     )
+
+
+def _known_percent(answers: Sequence[Answer]) -> np.ndarray:
+    """Return error, expected error and noise (3, n), per cent, of the answers that have all of them."""
+    rows = [(one.error_percent, one.expected_percent, one.noise_percent) for one in answers]
+    table = np.array(rows)  # (answers, 3)
+    return table[np.isfinite(table).all(axis=1)].T
 
 
 def front(points: Sequence[Point]) -> np.ndarray:
@@ -170,23 +174,27 @@ def _haste(point: Point) -> tuple[float, bool, float]:
 
 
 def trade_lines(points: Sequence[Point]) -> Iterator[str]:
-    """Yield the front as text, the fastest first, and what the measured errors may be taken for."""
+    """Yield the front as text, the fastest first, and how the measured errors are to be read."""
     yield f"{'ms':>8}{'expected':>10}{'95 % by chance':>18}{'measured':>10}   estimator, push, converter"
     on_front = [point for point, is_on_front in zip(points, front(points)) if is_on_front]
     for point in sorted(on_front, key=lambda point: point.time_ms):
-        converter = [f"{point.rate_Hz:.0f} Hz"]
-        if np.isfinite(point.cutoff_Hz):
-            converter.append(f"low-pass {point.cutoff_Hz:g} Hz")
-        if np.isfinite(point.bits):
-            converter.append(f"{point.bits:.0f} bits")
         chance = f"{point.expected_low_percent:.2g} to {point.expected_high_percent:.2g} %"
         errors = f"{point.expected_rms_percent:8.2f} %{chance:>18}{point.error_rms_percent:8.2f} %"
-        push = f"{point.push_deg:g}° at {point.speed_deg_s:g}°/s"
-        whose = f"{label_of(point.estimator)}, {push}, {', '.join(converter)}"
-        yield f"{point.time_ms:8.0f}{errors}   {whose}"
+        yield f"{point.time_ms:8.0f}{errors}   {_choice(point)}"
     if on_front:
         most = counted(max(point.whisks for point in on_front), "whisk")
         yield (
             f"RMS errors of d_x, ranked by what is expected at the slopes and friction seen. Measured on {most}: "
             f"of {len(points)} choices the one that measures best is the luckiest."
         )
+
+
+def _choice(point: Point) -> str:
+    """Return the estimator, the push and the converter of a point, in words."""
+    converter = [f"{point.rate_Hz:.0f} Hz"]
+    if np.isfinite(point.cutoff_Hz):
+        converter.append(f"low-pass {point.cutoff_Hz:g} Hz")
+    if np.isfinite(point.bits):
+        converter.append(f"{point.bits:.0f} bits")
+    push = f"{point.push_deg:g}° at {point.speed_deg_s:g}°/s"
+    return f"{label_of(point.estimator)}, {push}, {', '.join(converter)}"

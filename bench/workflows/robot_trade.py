@@ -159,8 +159,21 @@ def _draw_against_time(
             mew=0,
             label=label_of(name),
         )
-    best = [point for point, is_on_front in zip(points, on_front) if is_on_front]
-    best.sort(key=lambda point: point.time_ms)
+    _draw_front(axes, [point for point, is_on_front in zip(points, on_front) if is_on_front])
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="from touch to answer, ms",
+        ylabel="error of d$_x$, RMS, %",
+        title="at every push",
+    )
+    _label_logarithmic(axes.xaxis)
+    _label_logarithmic(axes.yaxis)
+
+
+def _draw_front(axes: Axes, on_front: Sequence[Point]) -> None:
+    """Draw the front: a line through its expected errors, their ranges, and measured errors."""
+    best = sorted(on_front, key=lambda point: point.time_ms)
     time_ms = [point.time_ms for point in best]
     axes.plot(
         time_ms,
@@ -174,15 +187,6 @@ def _draw_against_time(
     axes.vlines(time_ms, low, high, color="0.6", lw=2, zorder=1.5, label="95 % by chance")
     measured = [point.error_rms_percent for point in best]
     axes.plot(time_ms, measured, "x", ms=5, color="0.2", label="measured")
-    axes.set(
-        xscale="log",
-        yscale="log",
-        xlabel="from touch to answer, ms",
-        ylabel="error of d$_x$, RMS, %",
-        title="at every push",
-    )
-    _label_logarithmic(axes.xaxis)
-    _label_logarithmic(axes.yaxis)
 
 
 def _draw_against(axes: Axes, points: Sequence[Point], column: str, names: Sequence[str]) -> None:
@@ -194,27 +198,37 @@ def _draw_against(axes: Axes, points: Sequence[Point], column: str, names: Seque
     speeds_deg_s = sorted({point.speed_deg_s for point in points})
     for number, name in enumerate(names):
         colour = colour_of(name, number)
+        rim_points = nested_size(number, len(names), least=0.0, step=1.3)
         for speed_deg_s in speeds_deg_s:
             own = []
             for point in points:
                 is_own = point.estimator == name and point.speed_deg_s == speed_deg_s
                 if is_own and point.whisks:
                     own.append(point)
-            own.sort(key=lambda point: getattr(point, column))
-            x = [getattr(point, column) for point in own]
-            low = [point.expected_low_percent for point in own]
-            high = [point.expected_high_percent for point in own]
-            axes.fill_between(x, low, high, color=colour, alpha=0.1, lw=0)
-            expected = [point.expected_rms_percent for point in own]
-            measured = [point.error_rms_percent for point in own]
-            rim_points = nested_size(number, len(names), least=0.0, step=1.3)
-            axes.plot(x, expected, lw=1.0 + rim_points, color=colour)
-            axes.plot(x, measured, "x", ms=4 + 1.5 * rim_points, color=colour)
+            _draw_line(axes, own, column, colour, rim_points)
     axes.set_yscale("log")
     _label_logarithmic(axes.yaxis)
     if column != "bits":
         axes.set_xscale("log")
         _label_logarithmic(axes.xaxis)
+
+
+def _draw_line(
+    axes: Axes, points: Sequence[Point], column: str, colour: str, rim_points: float
+) -> None:
+    """Draw expected and measured errors of one estimator at one speed over a column of ROBOT_TRADE.
+
+    rim_points: by how much the line is wider than those that are drawn last.
+    """
+    own = sorted(points, key=lambda point: getattr(point, column))
+    x = [getattr(point, column) for point in own]
+    low = [point.expected_low_percent for point in own]
+    high = [point.expected_high_percent for point in own]
+    axes.fill_between(x, low, high, color=colour, alpha=0.1, lw=0)
+    expected = [point.expected_rms_percent for point in own]
+    measured = [point.error_rms_percent for point in own]
+    axes.plot(x, expected, lw=1.0 + rim_points, color=colour)
+    axes.plot(x, measured, "x", ms=4 + 1.5 * rim_points, color=colour)
 
 
 def _label_logarithmic(axis: Axis) -> None:

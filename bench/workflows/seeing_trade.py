@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter
 
@@ -303,21 +304,8 @@ def draw(trades: Sequence[Trade], on_front: Sequence[bool]) -> Figure:
     points = [(trade.cpu_s, trade.expected.rms) for trade in trades]
     joined = sorted(point for point, is_on_front in zip(points, on_front) if is_on_front)
     axes.plot(*np.array(joined).T, color="0.6", lw=1, zorder=1, label="Pareto front")
-    for trade, point, is_on_front in zip(trades, points, on_front):
-        colour = "#2166ac" if is_on_front else "0.6"
-        axes.plot(*point, "o", color=colour, ms=5)
-        ends = (trade.expected.low, trade.expected.high)
-        axes.plot([trade.cpu_s] * 2, ends, color=colour, lw=0.8, alpha=0.6)
-        axes.plot(trade.cpu_s, trade.rms_mm, "x", color=colour, ms=4)
-        if is_on_front or trade.seeing.name in (*PRESETS, FIGURES):
-            axes.annotate(
-                trade.seeing.name,
-                point,
-                xytext=(4, 3),
-                textcoords="offset points",
-                fontsize=7,
-                color="0.2" if is_on_front else "0.5",
-            )
+    for trade, is_on_front in zip(trades, on_front):
+        _draw_setting(axes, trade, is_on_front)
     axes.plot([], [], "o-", color="0.6", lw=0.8, ms=5, label="expected, 95 % by chance")
     axes.plot([], [], "x", color="0.6", ms=4, label="measured")
     axes.set(xlabel="processor time a whisk, s", ylabel="error of d$_x$, RMS, mm", yscale="log")
@@ -326,3 +314,21 @@ def draw(trades: Sequence[Trade], on_front: Sequence[bool]) -> Figure:
     axes.margins(x=0.12)
     axes.legend()
     return figure
+
+
+def _draw_setting(axes: Axes, trade: Trade, is_on_front: bool) -> None:
+    """Draw expected error, its range and the measured error of one setting, perhaps with its name."""
+    colour = "#2166ac" if is_on_front else "0.6"
+    axes.plot(trade.cpu_s, trade.expected.rms, "o", color=colour, ms=5)
+    ends = (trade.expected.low, trade.expected.high)
+    axes.plot([trade.cpu_s] * 2, ends, color=colour, lw=0.8, alpha=0.6)
+    axes.plot(trade.cpu_s, trade.rms_mm, "x", color=colour, ms=4)
+    if is_on_front or trade.seeing.name in (*PRESETS, FIGURES):
+        axes.annotate(
+            trade.seeing.name,
+            (trade.cpu_s, trade.expected.rms),
+            xytext=(4, 3),
+            textcoords="offset points",
+            fontsize=7,
+            color="0.2" if is_on_front else "0.5",
+        )

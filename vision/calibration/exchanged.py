@@ -34,8 +34,7 @@ def check_own_lenses(
     *,
     same_in_trials: bool,
 ) -> list[str]:
-    """Return a note on each pair of cameras of which the rig's board does not tell whose lens is
-    whose.
+    """Return a note on each pair of cameras whose lenses are too much alike for the check.
 
     standing: the board on the rig in each camera. same_in_trials: whether the trials' frames show
     it as these pictures do. Raises Refused, naming the cameras, where other lenses explain the
@@ -55,15 +54,24 @@ def check_own_lenses(
                 f"camera {names[k]}'s picture of the board on the rig by the lens of boards/{names[best[k]]} "
                 f"to {best_px[k]:.3f} px, by that of boards/{names[k]} to {own_px[k]:.3f} px"
             )
-        raise Refused(
-            _exchanged([names[k] for k in moved], found, same_in_trials), "boards_exchanged"
-        )
-    return [
-        f"The board on the rig does not tell whether boards/{names[a]} and boards/{names[b]} are "
-        "exchanged: the two lenses are too much alike."
-        for a, b in combinations(range(len(names)), 2)
-        if _are_alike(residual_px[np.ix_([a, b], [a, b])])
-    ]
+        sentence = _exchanged([names[k] for k in moved], found, same_in_trials)
+        raise Refused(sentence, "boards_exchanged")
+    return _notes_on_alike(names, residual_px)
+
+
+def _notes_on_alike(names: list[str], residual_px: np.ndarray) -> list[str]:
+    """Return a note on each pair of cameras whose lenses explain each other's picture as well.
+
+    residual_px (C, C): of each camera's view by each lens.
+    """
+    notes = []
+    for a, b in combinations(range(len(names)), 2):
+        if _are_alike(residual_px[np.ix_([a, b], [a, b])]):
+            notes.append(
+                f"The board on the rig does not tell whether boards/{names[a]} and boards/{names[b]} are "
+                "exchanged: the two lenses are too much alike."
+            )
+    return notes
 
 
 def lens_residuals_px(

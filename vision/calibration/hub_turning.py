@@ -86,21 +86,31 @@ def first_rig_about(T_world_axis: np.ndarray, strokes: Sequence[MovingLines]) ->
     directions = lines.direction @ T_axis_world[:, :3].T
     outward = np.sum(points[:, :2] * directions[:, :2], axis=1) >= 0
     directions *= np.where(outward, 1.0, -1.0)[:, None]
-    beside_mm = np.abs(points[:, 0] * directions[:, 1] - points[:, 1] * directions[:, 0])
-    is_near = (beside_mm < _FARTHEST_MM) & (np.abs(directions[:, 2]) < _MOST_RISE)
     shares = np.concatenate([_share_of_stroke(stroke.motor_rad) for stroke in strokes])
-    begins = is_near & (shares <= _MOST_FREE_SHARE)
+    begins = _is_near_axis(points, directions) & (shares <= _MOST_FREE_SHARE)
     if not begins.any():
         raise Refused(_NOTHING_TURNS.format(0))
-    azimuths = np.arctan2(directions[:, 1], directions[:, 0]) - lines.motor_rad
-    first = azimuths[begins][0]
-    azimuth_rad = first + np.median(np.angle(np.exp(1j * (azimuths[begins] - first))))
+    azimuth_rad = _median_azimuth(directions[begins], lines.motor_rad[begins])
     along_mm = np.hypot(points[:, 0], points[:, 1])
     heights = points[:, 2] - directions[:, 2] * along_mm
     T_axis_rig = np.column_stack([rotation_z(azimuth_rad), [0.0, 0.0, np.median(heights[begins])]])
     widths = [np.ptp(stroke.motor_rad) for stroke in strokes if len(stroke.motor_rad)]
     width_rad = _MOST_FREE_SHARE * float(max(widths))
     return FirstRig(invert_transform(compose(T_world_axis, T_axis_rig)), width_rad, len(widths))
+
+
+def _is_near_axis(points_mm: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Return the mask (n,) of lines that pass near the z axis and rise little along it."""
+    x, y, _ = points_mm.T
+    lateral_mm = np.abs(x * directions[:, 1] - y * directions[:, 0])
+    return (lateral_mm < _FARTHEST_MM) & (np.abs(directions[:, 2]) < _MOST_RISE)
+
+
+def _median_azimuth(directions: np.ndarray, motor_rad: np.ndarray) -> float:
+    """Return the median azimuth, rad, of directions (n, 3) turned back to motor angle 0."""
+    azimuths = np.arctan2(directions[:, 1], directions[:, 0]) - motor_rad
+    from_first = np.angle(np.exp(1j * (azimuths - azimuths[0])))  # within ±π
+    return azimuths[0] + np.median(from_first)
 
 
 def _of_all(strokes: Sequence[MovingLines]) -> MovingLines:

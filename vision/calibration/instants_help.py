@@ -16,7 +16,7 @@ from vision.calibration.bundle import BundleState, Priors
 from vision.calibration.layout import Layout
 from vision.geometry.board import Board
 
-# [turns] In each, every so manieth view is held out, all once. Stated.
+# [turns] In which views are held out, each view in one of them. Stated.
 TURNS = 4
 # [views] The scatter of fewer is not known. Derived.
 _FEWEST_VIEWS = 4

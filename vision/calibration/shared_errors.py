@@ -86,25 +86,31 @@ def _factor(camera: int, shots: list[tuple[np.ndarray, np.ndarray]], priors: Pri
     information = []
     gradients = []
     for J, residual in shots:
-        pose = np.column_stack([J[:, CLOCK], J[:, N_CAMERA + N_BOARD :]])
-        basis, size, _ = np.linalg.svd(pose, full_matrices=False)
-        basis = basis[:, size > _LEAST_EIGENVALUE * size[0]]
-        design = J[:, columns] - basis @ (basis.T @ J[:, columns])
+        design = _without_pose(J, columns)
         information.append(design.T @ design)
         gradients.append(design.T @ residual)
     normal = prior + np.sum(information, axis=0)
     scale = 1.0 / np.sqrt(np.diag(normal))
-    root, inverse_root = _roots(normal * np.outer(scale, scale))
-    scatter = prior * np.outer(scale, scale)
+    units = np.outer(scale, scale)
+    root, inverse_root = _roots(normal * units)
+    scatter = prior * units
     for shot, gradient in zip(information, gradients):
-        leverage = inverse_root @ (shot * np.outer(scale, scale)) @ inverse_root
+        leverage = inverse_root @ (shot * units) @ inverse_root
         whitened = _corrected(leverage) @ (inverse_root @ (scale * gradient))
         scatter += np.outer(root @ whitened, root @ whitened)
     stated = inverse_root @ inverse_root
-    found = stated @ scatter @ stated
+    sandwich = stated @ scatter @ stated
     lens = slice(0, _N_LENS)
-    ratio = np.trace(np.linalg.solve(stated[lens, lens], found[lens, lens])) / _N_LENS
+    ratio = np.trace(np.linalg.solve(stated[lens, lens], sandwich[lens, lens])) / _N_LENS
     return float(np.sqrt(max(ratio, 1.0)))
+
+
+def _without_pose(J: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Return the derivatives (2 n, k) of a picture by `columns` (k,) that no pose or instant takes up."""
+    pose = np.column_stack([J[:, CLOCK], J[:, N_CAMERA + N_BOARD :]])
+    basis, size, _ = np.linalg.svd(pose, full_matrices=False)
+    basis = basis[:, size > _LEAST_EIGENVALUE * size[0]]
+    return J[:, columns] - basis @ (basis.T @ J[:, columns])
 
 
 def _columns(camera: int, priors: Priors) -> tuple[np.ndarray, np.ndarray]:

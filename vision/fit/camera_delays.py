@@ -30,15 +30,22 @@ def camera_delays(problem: Problem, state: State) -> dict[str, tuple[float, floa
     by_cameras = camera_rows(problem, state)
     found = {}
     for name, column in zip(names, columns.T):
-        jacobian = np.column_stack([linear.jacobian, column])
-        weighted = jacobian.T * weight
-        prior = np.append(np.zeros(problem.size), _PRIOR)
-        gain = -np.linalg.solve(weighted @ jacobian + np.diag(prior), weighted)[-1:]  # (1, n)
+        gain = _gain_of_last(np.column_stack([linear.jacobian, column]), weight)
         by_camera = gain[:, linear.is_point] @ by_cameras
         variance = times_residual_covariance(problem, gain) @ gain.T
         variance += by_camera @ problem.cameras.covariance @ by_camera.T
         found[name] = (float(gain[0] @ linear.residual), float(np.sqrt(variance[0, 0])))
     return found
+
+
+def _gain_of_last(jacobian: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return how the step of the last parameter depends on the residuals, (1, n).
+
+    jacobian (n, p), of which the last column is a camera's delay; weight (n,): of the residuals.
+    """
+    weighted = jacobian.T * weight
+    prior = np.append(np.zeros(jacobian.shape[1] - 1), _PRIOR)
+    return -np.linalg.solve(weighted @ jacobian + np.diag(prior), weighted)[-1:]
 
 
 def _by_delay(problem: Problem, by_turn_rad: np.ndarray) -> np.ndarray:

@@ -92,18 +92,24 @@ def _other_parts(known: Sequence[SeenWhisk]) -> str:
         sigma = np.array([getattr(seen, field).sigma for seen in known])
         shared = np.array([getattr(seen.truth.shared, field) for seen in known])
         texts.append(Parts.of(np.degrees(sigma), np.degrees(shared)).text(name, 4, "deg"))
-    slips = []
-    for seen in known:
-        if seen.at is not None and np.isfinite(seen.at.slip_mm.sigma):
-            slips.append((seen.at.slip_mm.sigma, seen.at.slip_shared_mm))
-    if slips:
-        sigma, shared = np.array(slips).T
-        texts.append(Parts.of(sigma, shared).text("slip at θ", 4, "mm"))
+    texts += _slip_part(known)
     sigmas = np.array([seen.point_mm.sigma for seen in known])
     shared = np.array([seen.truth.shared.point_mm for seen in known])
     for axis, own_sigma, own_shared in zip(_AXES, sigmas.T, shared.T):
         texts.append(Parts.of(own_sigma, own_shared).text(f"contact {axis}", 3, "mm"))
     return ", ".join(texts)
+
+
+def _slip_part(known: Sequence[SeenWhisk]) -> list[str]:
+    """Return in words what whisks share of the sigma of slip; nothing where none has a slip at θ."""
+    slips = []
+    for seen in known:
+        if seen.at is not None and np.isfinite(seen.at.slip_mm.sigma):
+            slips.append((seen.at.slip_mm.sigma, seen.at.slip_shared_mm))
+    if not slips:
+        return []
+    sigma, shared = np.array(slips).T
+    return [Parts.of(sigma, shared).text("slip at θ", 4, "mm")]
 
 
 def _scatter(results: Sequence[TrialResult], name: str) -> tuple[float, int]:

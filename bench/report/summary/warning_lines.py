@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from bench.analyses.runs import RUNS
 from bench.base.input_problems import in_one_status
 from bench.base.statuses import reason
-from bench.records.trial_result import SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from vision.geometry import Reason, as_reason, counted
 
 # Codes of statuses that are as they should be: of a session without pictures, of a gauge trial.
@@ -46,19 +46,26 @@ def whisk_warnings(
     by_cause: dict[tuple[str, ...], list[_Warned]] = {}
     for result, seen, felt in whisks(results):
         name = f"{result.trial.name}, whisk {seen.whisk}"
-        statuses = [_without(said, status) for status in (seen.status, felt.status)]
-        status = in_one_status(*(one for one in statuses if not is_silent(one)))
-        found = [status] if status else []
-        if felt.saturated:
-            samples = counted(felt.saturated, "saturated sample")
-            found.append(reason("samples_saturated", samples=samples))
-        for one in found:
+        for one in _warnings_of(seen, felt, said):
             warned = _Warned(name, one, _sigma_mm(seen))
             by_cause.setdefault(one.codes, []).append(warned)
     yield from map(_cause_line, by_cause.values())
     for estimator, warned in _answers(results):
         if FAILURES.intersection(warned[0].status.codes):
             yield _cause_line(warned, f", {estimator}")
+
+
+def _warnings_of(
+    seen: SeenWhisk, felt: FeltWhisk, said: Collection[tuple[str, str]]
+) -> Iterator[Reason]:
+    """Yield the status of a whisk, without what is said elsewhere, and its saturated samples."""
+    statuses = [_without(said, status) for status in (seen.status, felt.status)]
+    status = in_one_status(*(one for one in statuses if not is_silent(one)))
+    if status:
+        yield status
+    if felt.saturated:
+        samples = counted(felt.saturated, "saturated sample")
+        yield reason("samples_saturated", samples=samples)
 
 
 def _without(said: Collection[tuple[str, str]], status: Reason) -> Reason:
