@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from bench.rig.bar import TouchedBar, find_first_touch
+from bench.rig.bar import TouchedBar, UnloadedTouch, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
@@ -12,6 +12,30 @@ from bench.rig.stick_slip import FrictionCoefficients, March
 WIRE = Rod("cylinder", 100.0, 1.0, 60.0)
 C = 3 * WIRE.rigidity_Nmm2
 MU_10 = math.tan(math.radians(10))
+
+
+def touched_bar(
+    rod: Rod,
+    d_x_mm: float,
+    *,
+    beta_rad: float = 0.0,
+    psi_rad: float = 0.0,
+    touch_rad: float = 0.0,
+    radius_mm: float = 3.0,
+    stiffness_N_mm: float = math.inf,
+) -> tuple[TouchedBar, UnloadedTouch]:
+    """Return a bar that a straight rod would touch at d_x and this motor angle, and where the rod, as it is
+    unloaded, first touches it."""
+    bar = TouchedBar.at_contact(
+        d_x_mm=d_x_mm,
+        beta_rad=beta_rad,
+        psi_rad=psi_rad,
+        touch_rad=touch_rad,
+        radius_mm=radius_mm,
+        whisker_radius_mm=float(rod.radius_mm(d_x_mm)),
+        stiffness_N_mm=stiffness_N_mm,
+    )
+    return bar, find_first_touch(rod, bar, touch_rad, d_x_mm)
 
 
 def whisk(
@@ -28,16 +52,14 @@ def whisk(
     rests=(1.0,),
 ):
     """(march, touch, states) along pushing angles."""
-    touch_rad = math.radians(touch_deg)
-    bar = TouchedBar.at_contact(
-        d_x_mm=d_x,
+    bar, touch = touched_bar(
+        rod,
+        d_x,
         beta_rad=math.radians(beta),
         psi_rad=math.radians(psi),
-        touch_rad=touch_rad,
+        touch_rad=math.radians(touch_deg),
         radius_mm=radius,
-        whisker_radius_mm=float(rod.radius_mm(d_x)),
     )
-    touch = find_first_touch(rod, bar, touch_rad, d_x)
     march = March(
         rod, bar, FrictionCoefficients(mu if static is None else static, mu, rests=rests), touch
     )

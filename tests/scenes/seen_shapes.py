@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import RestShape, Rod
 from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.whisk_mechanics import WhiskMechanics
 from estimator.beam import Beam
 from estimator.seen_shape import SeenShape
+from tests.scenes.marches import touched_bar
 
 E_GPA, LENGTH_MM = 60.0, 100.0
 ABOVE_MM, ASIDE_MM = np.array([50.0, 0.0, 400.0]), np.array([150.0, 150.0, 300.0])
@@ -58,16 +58,15 @@ def shown(
         *np.radians([beta_deg, psi_deg, theta_deg]),
         np.tan(np.radians(alpha_deg)),
     )
-    bar = TouchedBar.at_contact(
-        d_x_mm=d_x_mm,
+    bar, touch = touched_bar(
+        rod,
+        d_x_mm,
         beta_rad=beta,
         psi_rad=psi,
         touch_rad=0.05,
         radius_mm=0.5 * bar_mm,
-        whisker_radius_mm=float(rod.radius_mm(d_x_mm)),
         stiffness_N_mm=stiffness_N_mm,
     )
-    touch = find_first_touch(rod, bar, 0.05, d_x_mm)
     wanted = touch.motor_rad + theta
     motor = np.append(np.linspace(touch.motor_rad - 0.05, wanted + 0.01, 23), wanted)
     motor.sort()

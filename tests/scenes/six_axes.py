@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
 from estimator.beam import Beam
+from tests.scenes.marches import touched_bar
 
 E_GPA, LENGTH_MM = 60.0, 100.0
 
@@ -48,15 +48,7 @@ def pushed(
         *np.radians([beta_deg, psi_deg, theta_deg]),
         np.tan(np.radians(alpha_deg)),
     )
-    bar = TouchedBar.at_contact(
-        d_x_mm=d_x_mm,
-        beta_rad=beta,
-        psi_rad=psi,
-        touch_rad=0.0,
-        radius_mm=radius_mm,
-        whisker_radius_mm=float(rod.radius_mm(d_x_mm)),
-    )
-    touch = find_first_touch(rod, bar, 0.0, d_x_mm)
+    bar, touch = touched_bar(rod, d_x_mm, beta_rad=beta, psi_rad=psi, radius_mm=radius_mm)
     march = March(rod, bar, FrictionCoefficients(mu, mu), touch)
     *_, state = march.along(touch.motor_rad + theta * np.arange(1, 7) / 6)[1]
     if state is None:

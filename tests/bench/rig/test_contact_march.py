@@ -8,12 +8,11 @@ import tomllib
 import numpy as np
 import pytest
 
-from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import RestShape, Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients
-from tests.scenes.marches import MU_10, polar, slip_mm, small_angle, whisk
+from tests.scenes.marches import MU_10, polar, slip_mm, small_angle, touched_bar, whisk
 
 
 def test_the_numbers_that_three_solvers_agree_on():
@@ -238,15 +237,7 @@ def test_rest_shape_moves_touch_but_hardly_the_moments():
 
 def test_first_touch_is_where_the_distance_is_both_radii():
     rod = Rod("cone", 100.0, 1.0, 60.0, rest=RestShape(100.0, sag_mm=0.2, set_y_mm=-0.4))
-    bar = TouchedBar.at_contact(
-        d_x_mm=70.0,
-        beta_rad=0.6,
-        psi_rad=0.2,
-        touch_rad=0.05,
-        radius_mm=3.0,
-        whisker_radius_mm=0.15,
-    )
-    touch = find_first_touch(rod, bar, 0.05, 70.0)
+    bar, touch = touched_bar(rod, 70.0, beta_rad=0.6, psi_rad=0.2, touch_rad=0.05)
     assert np.linalg.norm(touch.point_mm - bar.foot_mm(touch.point_mm)) == pytest.approx(
         3 + 0.5 * (1 - touch.arc_mm / 100)
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
-from bench.rig.bar import TouchedBar, find_first_touch
+from bench.rig.bar import find_first_touch
 from bench.rig.elastic_rod import RestShape, Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.protocol import load
@@ -16,7 +16,7 @@ from bench.rig.recording import Recording
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.simulation import simulate
 from bench.session.session import load_session
-from tests.scenes.marches import whisk
+from tests.scenes.marches import touched_bar, whisk
 
 STRAIGHT = Rod("cylinder", 100.0, 1.0, 60.0)
 
@@ -79,14 +79,7 @@ def test_an_unloaded_whisker_that_turns_back_is_refused_in_one_line(tmp_path):
 
 def test_a_touch_on_the_far_side_of_the_bar_is_refused():
     """From a guess behind the bar, the root of the gap is where the whisker leaves it."""
-    bar = TouchedBar.at_contact(
-        d_x_mm=60.0,
-        beta_rad=0.0,
-        psi_rad=0.0,
-        touch_rad=0.0,
-        radius_mm=1.0,
-        whisker_radius_mm=0.5,
-    )
+    bar, _ = touched_bar(STRAIGHT, 60.0, radius_mm=1.0)
     behind = bar.shift(rotate_about_z([0.0, -6.0, 0.0], 0.0))
     with pytest.raises(ArithmeticError, match="never touches"):
         find_first_touch(STRAIGHT, behind, 0.0, 60.0)

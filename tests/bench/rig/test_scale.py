@@ -5,11 +5,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import RestShape, Rod
 from bench.rig.elastica import Elastica
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
+from tests.scenes.marches import touched_bar
 
 # Newton's last step is a millionth, after which the solution is exact to its square; a march adds up some twenty of them.
 SAME = 1e-9
@@ -115,15 +115,10 @@ def test_a_contact_marched_from_touch(
 
 def _marched(rod, d_x, theta_deg, beta, psi, friction, excess):
     """Status and values of each state on the way to θ, in lengths of the rod and EI."""
-    bar = TouchedBar.at_contact(
-        d_x_mm=d_x,
-        beta_rad=beta,
-        psi_rad=psi,
-        touch_rad=0.04,
-        radius_mm=0.03 * rod.length_mm,
-        whisker_radius_mm=float(rod.radius_mm(d_x)),
+    radius_mm = 0.03 * rod.length_mm
+    bar, touch = touched_bar(
+        rod, d_x, beta_rad=beta, psi_rad=psi, touch_rad=0.04, radius_mm=radius_mm
     )
-    touch = find_first_touch(rod, bar, 0.04, d_x)
     march = March(rod, bar, FrictionCoefficients(friction + excess, friction), touch)
     path = touch.motor_rad + np.radians(theta_deg) * np.linspace(0.0, 1.0, 7)[1:]
     angles, states = march.along(path)

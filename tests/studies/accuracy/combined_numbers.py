@@ -39,7 +39,6 @@ from bench.records.trial_result import (
     TrialResult,
     WhiskerFacts,
 )
-from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.whisk_mechanics import WhiskMechanics
@@ -49,6 +48,7 @@ from bench.trials.estimates import whisk_of
 from estimator.two_tilts import SharedContact, shared_contact
 from estimator.uncertainty import Z_95
 from tests.scenes.friction_results import run_of
+from tests.scenes.marches import touched_bar
 from tests.studies.accuracy.estimates_montecarlo import (
     DIAMETER_MM,
     E_GPA,
@@ -236,16 +236,8 @@ def push(
     rod: Rod, beta: float, psi: float, d_x_mm: float, alpha_rad: float, stiffness=np.inf
 ) -> WhiskMechanics:
     """Push a bar to beyond the last pushing angle."""
-    bar = TouchedBar.at_contact(
-        d_x_mm=d_x_mm,
-        beta_rad=beta,
-        psi_rad=psi,
-        touch_rad=0.0,
-        radius_mm=BAR_RADIUS_MM,
-        whisker_radius_mm=float(rod.radius_mm(d_x_mm)),
-        stiffness_N_mm=stiffness,
-    )
-    touch = find_first_touch(rod, bar, 0.0, d_x_mm)
+    place = {"beta_rad": beta, "psi_rad": psi, "radius_mm": BAR_RADIUS_MM}
+    bar, touch = touched_bar(rod, d_x_mm, **place, stiffness_N_mm=stiffness)
     friction = FrictionCoefficients(np.tan(alpha_rad), np.tan(alpha_rad))
     end_rad = touch.motor_rad + THETAS_RAD[-1] + np.radians(0.2)
     return WhiskMechanics.run(rod, bar, friction, touch, end_rad, step_rad=np.radians(0.5))

@@ -21,7 +21,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD
 from bench.records.trial_result import EstimateRow
-from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
@@ -29,6 +28,7 @@ from bench.trials.estimates import answer
 from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import Whisk
+from tests.scenes.marches import touched_bar
 
 DRAWN_ALPHA_DEG = truncnorm(-12.0 / 5.0, 13.0 / 5.0, loc=12.0, scale=5.0)
 ALPHA_EST_DEG, ALPHA_SIGMA_DEG = float(DRAWN_ALPHA_DEG.mean()), float(DRAWN_ALPHA_DEG.std())
@@ -95,16 +95,8 @@ def push(
 ):
     """First touch, and the exact moments at θ; stiffness: of the bar, N/mm; per_rad_mm (3,): how it moves. Raises
     ArithmeticError without contact."""
-    bar = TouchedBar.at_contact(
-        d_x_mm=d_x,
-        beta_rad=beta,
-        psi_rad=psi,
-        touch_rad=0.0,
-        radius_mm=radius,
-        whisker_radius_mm=float(rod.radius_mm(d_x)),
-        stiffness_N_mm=stiffness,
-    )
-    touch = find_first_touch(rod, bar, 0.0, d_x)
+    place = {"beta_rad": beta, "psi_rad": psi, "radius_mm": radius}
+    bar, touch = touched_bar(rod, d_x, **place, stiffness_N_mm=stiffness)
     if per_rad_mm is not None:
         bar = replace(bar, velocity_mm_rad=per_rad_mm, touch_rad=touch.motor_rad)
     march = March(rod, bar, FrictionCoefficients(np.tan(alpha), np.tan(alpha)), touch)
