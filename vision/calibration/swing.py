@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
+from scipy.optimize import least_squares
 from scipy.special import chdtri
 
 from vision.calibration.place import FALSE_ALARM, Placement
@@ -19,6 +19,11 @@ from vision.geometry.rotation import exp_rotation
 
 # [frames] Six unknowns, four numbers a frame, and something left over. Derived.
 _MIN_FRAMES = 4
+# [rad] How far an axis leans from where the board has it, to linearise there; a swing that
+# determines it better decides. Stated. Study: drawn_lines.py.
+_LEAN_RAD = 0.02
+# [parameters] By which an axis leans: the first of a step. A layout, no threshold.
+_LEANS = 2
 _SOURCE = "free stroke"
 
 
@@ -66,15 +71,24 @@ def _combine(
 def by_swing(lines: BaseLines) -> Placement:
     """Return the placement by one swing. Raises Refused with fewer than four frames or a motor at
     rest.
+
+    A narrow swing does not tell an axis that leans along the whisker from a whisker that rises, and
+    the wrong one of both looks far better known. So it is linearised at the most probable place of
+    an axis that hardly leans (`_LEAN_RAD`), and that prior is taken out again.
     """
     if len(lines.motor_rad) < _MIN_FRAMES or lines.width_rad == 0:
         raise _too_few(lines)
     elevation_rad = np.arcsin(np.clip(np.mean(lines.direction[:, 2]), -1, 1))
     first = np.append(np.zeros(6), elevation_rad)
-    fitted = least_squares(_residuals, first, args=(lines,), x_scale="jac", method="lm")
-    covariance = _excess(fitted) * _covariance(fitted.jac)[:6, :6] + lines.shared_covariance
-    rise_rad = float(fitted.x[6])
-    placement = Placement(fitted.x[:6], covariance, rise_rad, lines.width_rad, source=_SOURCE)
+    probable = least_squares(_residuals_and_prior, first, args=(lines,), x_scale="jac", method="lm")
+    jacobian = probable.jac[:-_LEANS]
+    residual = probable.fun[:-_LEANS]
+    own = _covariance(jacobian)
+    change = -own @ (jacobian.T @ residual)
+    excess = _excess(residual + jacobian @ change, len(change))
+    step = probable.x + change
+    covariance = excess * own[:6, :6] + lines.shared_covariance
+    placement = Placement(step[:6], covariance, float(step[6]), lines.width_rad, source=_SOURCE)
     return _with_note(placement, [lines.width_rad])
 
 
@@ -88,12 +102,12 @@ def _too_few(lines: BaseLines | None) -> Refused:
     )
 
 
-def _excess(fitted: OptimizeResult) -> float:
-    """Return the variance of the residuals over the stated one (a motor angle's own noise); 1 where
-    chance explains the difference.
+def _excess(residual: np.ndarray, unknowns: int) -> float:
+    """Return the variance of the residuals (n,) over the stated one (a motor angle's own noise); 1
+    where chance explains the difference.
     """
-    chi2 = 2 * fitted.cost
-    freedom = len(fitted.fun) - len(fitted.x)
+    chi2 = float(residual @ residual)
+    freedom = len(residual) - unknowns
     return chi2 / freedom if chi2 > chdtri(freedom, FALSE_ALARM) else 1.0
 
 
@@ -103,6 +117,11 @@ def _predict(p: np.ndarray, motor_rad: np.ndarray) -> np.ndarray:
     upward = np.full(len(motor_rad), np.sin(p[6]))
     fan = np.column_stack([forward * np.cos(motor_rad), forward * np.sin(motor_rad), upward])
     return fan @ exp_rotation(p[:3]).T
+
+
+def _residuals_and_prior(p: np.ndarray, lines: BaseLines) -> np.ndarray:
+    """Return the residuals of the lines, and of an axis that hardly leans."""
+    return np.append(_residuals(p, lines), p[:_LEANS] / _LEAN_RAD)
 
 
 def _residuals(p: np.ndarray, lines: BaseLines) -> np.ndarray:

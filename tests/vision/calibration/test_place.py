@@ -15,7 +15,7 @@ from vision.calibration.place import (
     combine,
     move_rig_frame,
 )
-from vision.calibration.swing import by_swing
+from vision.calibration.swing import by_strokes, by_swing
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import exp_rotation
@@ -35,6 +35,23 @@ def test_stated_sigmas_are_the_sampled_ones_and_intervals_hold():
     np.testing.assert_allclose(error.std(axis=0) / sigma.mean(axis=0), 1.0, atol=0.15)
     # 1800 intervals, not independent; as if 600 were: ± 0.9 %, three of them.
     assert abs(np.mean(np.abs(error) < 1.96 * sigma) - 0.95) < 0.027
+
+
+def test_narrow_swings_and_a_board_placed_by_hand_are_combined_as_sure_as_they_are():
+    """Axes that noise leans by 10 degrees must not look surer than those that stand upright."""
+    rng = np.random.default_rng(6)
+    turn_rad = np.radians(0.2)
+    board = by_board(np.eye(3, 4), 0.2, turn_rad)
+    chi2 = []
+    for _ in range(60):
+        true = rng.standard_normal(6) * np.repeat([turn_rad, 0.2], 3)
+        noise = {"across_mm": 0.003, "turn_rad": 1e-4, "frames": 4}
+        strokes = [some_lines(1.6, true, rng=rng, **noise) for _ in range(3)]
+        both = combine(board, by_strokes(strokes))
+        error = both.step - true
+        chi2.append(error @ np.linalg.solve(both.covariance, error))
+    # 360 squares: their mean scatters by √(2/360) = 7.5 %, three of these. Linearised where noise leans: 4.
+    assert abs(np.mean(chi2) / 6.0 - 1.0) < 0.23
 
 
 def test_a_narrow_swing_fixes_the_centre_across_but_not_along():
