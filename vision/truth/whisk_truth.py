@@ -22,7 +22,7 @@ from vision.wire.points import Observed
 # [1] Least that a variance grows by, of the free stroke that places the rig: what changes slowly
 # over a wide stroke passes for the whisker's turn, which takes up what would show it as scatter.
 # Study: tests/bench/trials/test_placing_pictures.py.
-_FREE_SHARED = 4.0
+FREE_SHARED = 4.0
 # [px] A camera whose points scatter by more sees another thing: where a wire is seen at all its
 # points lie on one line to a tenth of a pixel. Study: thresholds.py
 # truth.whisk_truth _MOST_SCATTER_PX ….
@@ -229,7 +229,7 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     middle_mm = np.full(len(place.curves), 0.5 * whisk.rods.wire.length_mm)
     state = State(vector[: problem.first_bend], middle_mm)
     state, _ = solve(alone, state, scales=[LAST_SCALE] * 3)
-    return inflated_by_residuals(alone, state, _FREE_SHARED), state
+    return inflated_by_residuals(alone, state, FREE_SHARED), state
 
 
 def _wire_points(whisk: WhiskPictures, place: WhiskPlace) -> list[Observed]:

@@ -162,10 +162,11 @@ def replace_tables(protocol: Protocol, **tables) -> Protocol:
 def make_scene(protocol: Protocol, sigmas: Sigmas, seed: int) -> Scene:
     """The scene of a protocol's first trial. Raises ArithmeticError where its whisker slips off the bar."""
     recording = Recording.make(protocol, protocol.runs()[0], np.random.default_rng([seed, 21]))
-    return Scene(seed, protocol, recording, _exact(protocol), sigmas)
+    return Scene(seed, protocol, recording, exact_cameras(protocol), sigmas)
 
 
-def _exact(protocol: Protocol) -> Cameras:
+def exact_cameras(protocol: Protocol) -> Cameras:
+    """The cameras of a protocol as they are."""
     return Cameras(
         tuple(
             Camera(
@@ -309,8 +310,14 @@ def given(scene: Scene, rng: np.random.Generator) -> tuple[Wire, Bar]:
     )
 
 
-def line_points(scene: Scene, rng: np.random.Generator | None = None) -> list[Observed]:
+def line_points(
+    scene: Scene,
+    rng: np.random.Generator | None = None,
+    light: np.random.Generator | None = None,
+) -> list[Observed]:
     """Line points of wire and bar in all frames and cameras; exact without a generator.
+
+    light: draws by what each camera's lines are off as a whole; rng where there is none.
 
     With one, each point has its noise, the wire's correlated; each camera's lines are off as a whole; wire and bar are
     out of round at each frame's contact, by as much as the fit's priors say.
@@ -323,15 +330,17 @@ def line_points(scene: Scene, rng: np.random.Generator | None = None) -> list[Ob
         seen
         for number, camera in enumerate(scene.cameras)
         for seen in [
-            *_wire_points(scene, number, camera, not_round, rng),
-            *_bar_points(scene, number, camera, rng),
+            *_wire_points(scene, number, camera, not_round, rng, light or rng),
+            *_bar_points(scene, number, camera, rng, light or rng),
         ]
     ]
 
 
-def _wire_points(scene: Scene, number: int, camera: Camera, not_round, rng) -> list[Observed]:
+def _wire_points(
+    scene: Scene, number: int, camera: Camera, not_round, rng, light
+) -> list[Observed]:
     length, sigma, seen = scene.wire.length_mm, scene.sigmas.wire_px, []
-    off_by = _whole(rng, model.WIRE_MODES_PX)
+    off_by = _whole(light, model.WIRE_MODES_PX)
     bar = scene.axis.covering_discs(camera, scene.bar.radius_mm)
     place = np.arange(FIRST_POINT_MM, length - 1.0, POINT_STEP_MM)
     for frame, more_mm in enumerate(not_round):
@@ -359,11 +368,11 @@ def _centreline_mm(scene: Scene, frame: int, arc_mm, more_mm: float) -> np.ndarr
     return points + more_mm * pushed[:, None] * away / np.linalg.norm(away)
 
 
-def _bar_points(scene: Scene, number: int, camera: Camera, rng) -> list[Observed]:
+def _bar_points(scene: Scene, number: int, camera: Camera, rng, light) -> list[Observed]:
     """Two points of the bar's middle, as vision hands it on; of its two edges where there is one camera."""
     if len(scene.cameras) == 1:
         return _edge_points(scene, number, camera, rng)
-    offset, tilt = _whole(rng, model.BAR_MODES_PX)
+    offset, tilt = _whole(light, model.BAR_MODES_PX)
     axis, sigma = scene.axis, scene.sigmas.bar_px
     points = axis.point_mm + BAR_PLACES_MM[:, None] * axis.direction
     px = outline(

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from bench.rig.protocol_tables import PicturesTable, WhiskerTable
-from tests.studies.accuracy import estimates_montecarlo, path_traced, rounded, rounding
+from tests.studies.accuracy import drawn_lines, estimates_montecarlo, path_traced, rounded, rounding
 from tests.studies.accuracy.coverage import (
     COLUMNS,
     QUANTITIES,
@@ -190,3 +190,12 @@ def test_cameras_that_differ_by_rounding_see_the_same():
     look = look_at(*rounding.trials([])["gauge_roll0"])
     move, wider = rounding.largest_move(look, 2, np.random.default_rng(7))
     assert move < rounding.MOST_SIGMAS and wider < rounding.MOST_SIGMAS
+
+
+def test_a_session_of_lines_whose_givens_are_wrong_is_as_far_off_as_it_says():
+    row = drawn_lines.session_row(1, 1.6, drawn_lines.GIVENS)
+    assert not row["is_alarmed"]
+    for name in drawn_lines.QUANTITIES:
+        for beta in ("0", "30", "60"):
+            # Twelve numbers of one session: beyond four sigma once in 1300.
+            assert abs(row[f"{name}_{beta}_error"]) < 4.0 * row[f"{name}_{beta}_sigma"]
