@@ -375,8 +375,8 @@ def summary(rows: Sequence[dict]) -> Iterator[str]:
 def causes(seeds: Sequence[int], before_deg: float) -> Iterator[str]:
     """What each given by itself makes of d_x, a line each: its error over its draw, and what is stated of it.
 
-    The errors of the same corners and lines with all givens exact are taken off. Of the six numbers of a placement
-    there is no one draw: what is stated alone.
+    The errors of the same corners and lines with all givens exact are taken off. A placement has six draws, and a
+    stretch is measured by the views, so that no error goes as its draw: of these, what is stated alone.
     """
     beta = f"{BETAS_DEG[0]:.0f}"
     exact = [session_row(seed, before_deg, ()) for seed in seeds]
