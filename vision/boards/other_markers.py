@@ -1,31 +1,50 @@
 """Markers of the board's dictionary that are not the board's: on the hub, on a clamp.
 
 OpenCV finds a marker to about a pixel; where its corners are follows from the printed pattern as a
-whole, laid over the picture by a homography (Evangelidis & Psarakis 2008, `cv2.findTransformECC`).
+whole. With u, v the place of a pixel on the print, in modules, by a homography:
+
+    grey = light + contrast · sum over modules p_ij b_i(u) b_j(v)
+
+p is 1 in white modules and 0 in black ones, b a module's box blurred by a Gaussian whose width in px
+is fitted along both sides. Light and contrast are linear over the picture. What surrounds the white
+rim is unknown, so pixels that it blurs into are left out.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
+from scipy.optimize import least_squares
+from scipy.special import ndtr
 
 from vision.boards.corners import to_8_bit
 from vision.geometry.board import Board
 
-# [px] Side of a module of the pattern that is laid over the picture. Stated.
-_MODULE_PX = 10
-# [px] Blur of that pattern, sigma: a fifth of a module, as of a marker in focus. Stated.
-_PATTERN_BLUR_PX = 2.0
-# [px] Pixels about a marker that are cut out with it: its white rim, and what OpenCV's corners are
-# off by. Stated.
+# [px] Pixels about a marker that are cut out with it: what OpenCV's corners are off by. Stated.
 _MARGIN_PX = 15
+# [px] Blur that the fit starts from, sigma: of a marker in focus. Stated.
+_FIRST_BLUR_PX = 1.0
+# [px] Sharper is a pixel's edge, softer no edge: as of saddles (vision/boards/saddle.py). Stated.
+_BLUR_LIMITS_PX = (0.2, 8.0)
+# [sigma of blur] Of a pixel from the rim's outer edge: 1.2 % of what is beyond shows there. Derived.
+_CLEAR_OF_SURROUND = 2.25
+# [modules] The white rim that every marker has. A layout, no threshold.
+_RIM = 1.0
 # [1] Correlation of pattern and picture: less is glare, a hidden corner, or no marker. Set by eye;
 # 0.93 to 0.97 on steel-sample.
 _LEAST_CORRELATION = 0.85
-# [1] Rounds of the fit at most, and the gain of correlation at which it ends. Stated.
-_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-7)
-# [px] Width of the filter that takes the picture's noise off before its gradient. Stated.
-_FILTER_PX = 5
+# [passes] Over which pixels are used, as the blur is known better. Stated.
+_PASSES = 2
+# [1] Of the sum of squares, and of the parameters: a thousandth of a corner's sigma. Derived.
+_CONVERGED = 1e-6
+# [pixels] Of a module; with fewer it is no pattern. Stated.
+_LEAST_PIXELS_A_MODULE = 4
+# [parameters] Homography to the print, logarithms of the blur along both sides, light, contrast. A
+# layout, no threshold.
+_TO_PRINT, _BLUR, _LIGHT, _CONTRAST = slice(0, 8), slice(8, 10), slice(10, 13), slice(13, 16)
+# [1] Over sqrt(2 pi): a normal density. Derived.
+_DENSITY = 1.0 / np.sqrt(2.0 * np.pi)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,36 +78,190 @@ def _refine(
     picture: np.ndarray, dictionary: cv2.aruco.Dictionary, number: int, outline_px: np.ndarray
 ) -> np.ndarray | None:
     """Return a marker's corners (4, 2), px, by its whole pattern; None where that does not fit."""
-    pattern, corners = _pattern(dictionary, number)
+    modules = dictionary.markerSize + 2
+    is_white = cv2.aruco.generateImageMarker(dictionary, number, modules) > 0
     low = np.maximum(np.floor(outline_px.min(axis=0) - _MARGIN_PX).astype(int), 0)
     high = np.ceil(outline_px.max(axis=0)).astype(int) + _MARGIN_PX
-    window = picture[low[1] : high[1], low[0] : high[0]].astype(np.float32)
-    first = cv2.getPerspectiveTransform(corners, (outline_px - low).astype(np.float32))
-    try:
-        correlation, H = cv2.findTransformECC(
-            pattern,
-            window,
-            first.astype(np.float32),
-            cv2.MOTION_HOMOGRAPHY,
-            _CRITERIA,
-            None,
-            _FILTER_PX,
+    window = picture[low[1] : high[1], low[0] : high[0]].astype(float)
+    fitted = _fit_pattern(window, np.pad(is_white.astype(float), 1, constant_values=1.0), outline_px - low)
+    return None if fitted is None else fitted + low
+
+
+def _fit_pattern(
+    window: np.ndarray, pattern: np.ndarray, corners_px: np.ndarray
+) -> np.ndarray | None:
+    """Return the corners (4, 2), px, of a pattern of modules in a window of a picture, near these;
+    None where it does not fit.
+
+    pattern (m, m): 1 where a module is white, with the white rim.
+    """
+    middle = corners_px.mean(axis=0)
+    scale_px = np.linalg.norm(corners_px - middle, axis=1).mean()
+    first = ((corners_px - middle) / scale_px).astype(np.float32)
+    on_print = _corners_on_print(len(pattern)).astype(np.float32)
+    to_print = cv2.getPerspectiveTransform(first, on_print).ravel()[:8]
+    parameters = np.append(to_print, np.log(np.repeat(_FIRST_BLUR_PX / scale_px, 2)))
+    rows, columns = np.indices(window.shape).reshape(2, -1)
+    places = (np.column_stack([columns, rows]) - middle) / scale_px
+    for _ in range(_PASSES):
+        is_used = _shows_pattern(places, parameters, len(pattern))
+        model = _Pattern(places[is_used], window.ravel()[is_used], pattern)
+        if is_used.sum() < _LEAST_PIXELS_A_MODULE * pattern.size:
+            return None
+        start = np.append(parameters, model.light_and_contrast(parameters))
+        fitted = least_squares(
+            model.residuals, start, model.jacobian, method="lm", ftol=_CONVERGED, xtol=_CONVERGED
         )
-    except cv2.error:  # it does not converge
+        parameters = fitted.x[:10]
+        if fitted.status <= 0 or not np.all(np.isfinite(parameters)):
+            return None
+    blur_px = scale_px * np.exp(parameters[_BLUR])
+    is_blur = np.all((blur_px > _BLUR_LIMITS_PX[0]) & (blur_px < _BLUR_LIMITS_PX[1]))
+    if not is_blur or np.corrcoef(model.predict(fitted.x), model.grey)[0, 1] < _LEAST_CORRELATION:
         return None
-    if correlation < _LEAST_CORRELATION:
-        return None
-    return cv2.perspectiveTransform(corners[:, None], H.astype(float))[:, 0] + low
+    from_print = np.linalg.inv(_homography(parameters))
+    return middle + scale_px * cv2.perspectiveTransform(on_print[:, None], from_print)[:, 0]
 
 
-def _pattern(dictionary: cv2.aruco.Dictionary, number: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the picture of a marker in a white rim, and its corners (4, 2) px in that picture."""
-    modules = dictionary.markerSize + 2
-    marker = cv2.aruco.generateImageMarker(dictionary, number, modules)
-    framed = np.pad(marker, 1, constant_values=255)
-    large = np.kron(framed, np.ones((_MODULE_PX, _MODULE_PX), dtype=np.uint8))
-    pattern = cv2.GaussianBlur(large.astype(np.float32), (0, 0), _PATTERN_BLUR_PX)
-    near = _MODULE_PX - 0.5
-    far = (modules + 1) * _MODULE_PX - 0.5
-    corners = [[near, near], [far, near], [far, far], [near, far]]
-    return pattern, np.array(corners, dtype=np.float32)
+def _corners_on_print(modules: int) -> np.ndarray:
+    """Return the corners (4, 2) of a marker in a rim, in modules from the rim's own corner."""
+    far = modules - _RIM
+    return np.array([[_RIM, _RIM], [far, _RIM], [far, far], [_RIM, far]])
+
+
+def _homography(parameters: np.ndarray) -> np.ndarray:
+    """Return the homography (3, 3) from the picture to the print."""
+    return np.append(parameters[_TO_PRINT], 1.0).reshape(3, 3)
+
+
+def _on_print(places: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return where places (n, 2) are on the print, (n, 2), and the denominators (n,) of that."""
+    H = _homography(parameters)
+    mapped = np.column_stack([places, np.ones(len(places))]) @ H.T
+    return mapped[:, :2] / mapped[:, 2:], mapped[:, 2]
+
+
+def _slopes(uv: np.ndarray, depth: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    """Return the derivatives (n, 2, 2) of u and v by the place in the picture."""
+    H = _homography(parameters)
+    return (H[:2, :2] - uv[:, :, None] * H[2, :2]) / depth[:, None, None]
+
+
+def _blur_on_print(uv: np.ndarray, depth: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    """Return the blur (n, 2) along u and v, in modules."""
+    rate = np.linalg.norm(_slopes(uv, depth, parameters), axis=2)
+    return rate * np.exp(parameters[_BLUR])
+
+
+def _shows_pattern(places: np.ndarray, parameters: np.ndarray, modules: int) -> np.ndarray:
+    """Return which places (n, 2) show the marker and its rim, and not what is beyond, (n,) bool."""
+    uv, depth = _on_print(places, parameters)
+    clear = np.minimum(_CLEAR_OF_SURROUND * _blur_on_print(uv, depth, parameters), _RIM)
+    return np.all((uv > clear) & (uv < modules - clear), axis=1) & (depth > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Pattern:
+    """The picture of a pattern (m, m) at places (n, 2), with its grey levels (n,)."""
+
+    places: np.ndarray
+    grey: np.ndarray
+    pattern: np.ndarray
+
+    @cached_property
+    def _light(self) -> np.ndarray:
+        """Return the columns (n, 3) of light that is linear over the picture."""
+        return np.column_stack([np.ones(len(self.places)), self.places])
+
+    def light_and_contrast(self, parameters: np.ndarray) -> np.ndarray:
+        """Return the light and the contrast (6,) that fit best."""
+        share = self._share(parameters)[0]
+        design = np.column_stack([self._light, share[:, None] * self._light])
+        return np.linalg.lstsq(design, self.grey, rcond=None)[0]
+
+    def predict(self, parameters: np.ndarray) -> np.ndarray:
+        """Return the grey levels (n,)."""
+        light = self._light @ parameters[_LIGHT]
+        return light + self._share(parameters)[0] * (self._light @ parameters[_CONTRAST])
+
+    def residuals(self, parameters: np.ndarray) -> np.ndarray:
+        """Return the grey levels (n,) less those of the picture."""
+        return self.predict(parameters) - self.grey
+
+    def jacobian(self, parameters: np.ndarray) -> np.ndarray:
+        """Return the derivatives (n, 16) of the residuals.
+
+        How the blur's width in modules changes with the homography is left out: it moves no edge.
+        """
+        share, by_uv, by_blur = self._share(parameters)
+        uv, depth = _on_print(self.places, parameters)
+        contrast = self._light @ parameters[_CONTRAST]
+        by_uv = contrast[:, None] * by_uv / depth[:, None]  # (n, 2)
+        along = np.einsum("ni,ni->n", by_uv, uv)
+        J = np.empty((len(self.places), 16))
+        J[:, 0:3] = by_uv[:, :1] * self._light[:, [1, 2, 0]]
+        J[:, 3:6] = by_uv[:, 1:] * self._light[:, [1, 2, 0]]
+        J[:, 6:8] = -along[:, None] * self.places
+        J[:, _BLUR] = contrast[:, None] * by_blur
+        J[:, _LIGHT] = self._light
+        J[:, _CONTRAST] = share[:, None] * self._light
+        return J
+
+    def _share(self, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the white share (n,) of each place, and its derivatives (n, 2) by u, v and by the
+        logarithm of the blur along both.
+
+        Where the print is seen aslant its blur along u and v is correlated: exp(c ∂²/∂u∂v) of the
+        share without that, with the covariance c, is taken to its second order.
+        """
+        uv, depth = _on_print(self.places, parameters)
+        slopes = _slopes(uv, depth, parameters)
+        blur = _blur_on_print(uv, depth, parameters)
+        cosine = np.sum(slopes[:, 0] * slopes[:, 1], axis=1) / np.prod(
+            np.linalg.norm(slopes, axis=2), axis=1
+        )
+        c = cosine * np.prod(blur, axis=1)
+        across = _BlurredModules.at(uv[:, 0], blur[:, 0], len(self.pattern))
+        down = _BlurredModules.at(uv[:, 1], blur[:, 1], len(self.pattern))
+
+        def both(of_v: np.ndarray, of_u: np.ndarray) -> np.ndarray:
+            """Return the sum (n,) over modules."""
+            return np.sum((of_v @ self.pattern) * of_u, axis=1)
+
+        share = both(down.share, across.share)
+        share += c * both(down.slope, across.slope)
+        share += 0.5 * c**2 * both(down.bend, across.bend)
+        by_u = both(down.share, across.slope) + c * both(down.slope, across.bend)
+        by_v = both(down.slope, across.share) + c * both(down.bend, across.slope)
+        # A Gaussian's width s changes a blurred edge by s² times its second derivative.
+        by_u_blur = blur[:, 0] ** 2 * both(down.share, across.bend)
+        by_v_blur = blur[:, 1] ** 2 * both(down.bend, across.share)
+        return share, np.column_stack([by_u, by_v]), np.column_stack([by_u_blur, by_v_blur])
+
+
+@dataclass(frozen=True, eq=False)
+class _BlurredModules:
+    """The share of each module in a row at places, (n, m), with its first and second derivative by
+    the place. The outer modules go on without end.
+    """
+
+    share: np.ndarray
+    slope: np.ndarray
+    bend: np.ndarray
+
+    @staticmethod
+    def at(place: np.ndarray, blur: np.ndarray, modules: int) -> "_BlurredModules":
+        """Return the shares at places (n,), blurred by sigmas (n,), in modules."""
+        blur = blur[:, None]
+        t = (place[:, None] - np.arange(1, modules)) / blur  # (n, m - 1), of the inner edges
+        density = _DENSITY * np.exp(-0.5 * t**2) / blur
+        return _BlurredModules(
+            _between(ndtr(t), 1.0), _between(density, 0.0), _between(-t / blur * density, 0.0)
+        )
+
+
+def _between(past_edge: np.ndarray, past_first: float) -> np.ndarray:
+    """Return values (n, m) of modules from those past their edges (n, m - 1), and past the first's."""
+    first = np.full((len(past_edge), 1), past_first)
+    last = np.zeros((len(past_edge), 1))
+    return -np.diff(np.hstack([first, past_edge, last]), axis=1)

@@ -28,12 +28,18 @@ _LEAST_TURN_RAD = np.radians(2.0)
 # [1] A marker on the hub turns as the motor does, to so much; one at rest turns by 0. Set by eye;
 # 0.996 on steel-sample.
 _TURNS_AS_MOTOR = 0.2
-# [px] What print, blur and light displace a marker's corner by in all pictures of a camera alike:
-# 0.4 px at most on steel-sample, 0.18 px RMS. Study: tests/vision/calibration/test_hub_marker.py.
-_BIAS_PX = 0.2
+# [px] What print, blur and light displace a marker's corner by in all pictures of a camera alike.
+# Painted hubs' are 0.01 to 0.02 px RMS, and the fit raises this where its residuals show more.
+# Study: rig_place.py.
+_BIAS_PX = 0.02
+# [1/rad] How fast that changes with the motor's angle, in parts of itself: a print that is foreshortened
+# to a third turns three times as fast in the picture as the motor does. Derived.
+_DRIFT_PER_RAD = 3.0
+# [passes] Of the fit before the last: each gives scatter and size of the biases to the next. Stated.
+_PASSES = 3
 # [px] Least scatter of a corner from picture to picture: the fit of a pattern has that where there
 # is no noise. Stated.
-_LEAST_SCATTER_PX = 0.02
+_LEAST_SCATTER_PX = 0.01
 # [px] First scatter of a corner. The residuals give it then. Stated.
 _FIRST_SCATTER_PX = 0.05
 # [1] Standard deviation of normal residuals over the median of their magnitudes. Derived.
@@ -125,7 +131,8 @@ class _AxisFit:
     """The axis by one marker: w_x, w_y (rad), v_x, v_y (mm), with covariances of what each picture
     has by itself and of what the cameras' own uncertainty adds.
 
-    A corner's bias in each camera is a nuisance, as nothing says how a print's edge is blurred.
+    A corner's bias in each camera and its change with the motor's angle are nuisances, as nothing
+    says how a print's edge is blurred. Their size is that of the prior, or what residuals show.
     """
 
     def __init__(self, marker: _Turning, cameras: Cameras):
@@ -133,16 +140,24 @@ class _AxisFit:
         self._cameras = cameras
         self._px = np.array([one.px for one in marker.sightings])  # (pictures, 4, 2)
         motor_rad = np.array([one.motor_rad for one in marker.sightings])
+        self._from_middle = motor_rad - 0.5 * (motor_rad.min() + motor_rad.max())
         self._turn = rotation_z(motor_rad)
         self._camera = np.array([cameras.index(one.camera) for one in marker.sightings])
         self.number = marker.sightings[0].number
         self.pictures = len(marker.sightings)
-        self._scatter_px = _FIRST_SCATTER_PX
-        fitted = self._solve(self._first(marker))
-        residual = fitted.fun[: self._px.size] * self._scatter_px
-        spread_px = _PER_MEDIAN * float(np.median(np.abs(residual)))
-        self._scatter_px = max(spread_px, _LEAST_SCATTER_PX)
-        fitted = self._solve(fitted.x)
+        biases = np.repeat(_BIAS_PX, 8 * len(cameras))
+        stated = np.concatenate([biases, _DRIFT_PER_RAD * biases])  # px, px/rad
+        self._prior = stated
+        self._scatter_px = np.full((len(cameras), 2), _FIRST_SCATTER_PX)
+        parameters = self._first(marker)
+        scale = 1.0
+        for _ in range(_PASSES):
+            fitted = self._solve(parameters)
+            parameters = fitted.x
+            self._scatter_px = self._scatter(fitted)
+            scale = max(scale * self._bias_excess(fitted), 1.0)
+            self._prior = scale * stated
+        fitted = self._solve(parameters)
         covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
         self.axis = fitted.x[:4]
         self.covariance = covariance[:4, :4]
@@ -151,7 +166,7 @@ class _AxisFit:
     def _first(self, marker: _Turning) -> np.ndarray:
         """Return first parameters: axis at z, corners as triangulated, no bias."""
         in_hub = np.mean(marker.corners_mm @ rotation_z(marker.motor_rad), axis=0)  # (4, 3)
-        return np.concatenate([np.zeros(4), in_hub.ravel(), np.zeros(8 * len(self._cameras))])
+        return np.concatenate([np.zeros(4), in_hub.ravel(), np.zeros(len(self._prior))])
 
     def _solve(self, first: np.ndarray) -> OptimizeResult:
         """Fit from these parameters. Raises Refused where the fit does not converge."""
@@ -160,12 +175,30 @@ class _AxisFit:
             raise Refused(f"the turn of marker {self.number} on the hub was not found")
         return fitted
 
+    def _scatter(self, fitted: OptimizeResult) -> np.ndarray:
+        """Return the scatter (cameras, 2) of corners along x and y, px, by the residuals."""
+        residual = fitted.fun[: self._px.size].reshape(self._px.shape)
+        scatter_px = self._scatter_px.copy()
+        for k in np.unique(self._camera):
+            typical = np.median(np.abs(residual[self._camera == k]), axis=(0, 1))
+            scatter_px[k] = _PER_MEDIAN * typical * self._scatter_px[k]
+        return np.maximum(scatter_px, _LEAST_SCATTER_PX)
+
+    def _bias_excess(self, fitted: OptimizeResult) -> float:
+        """Return how many times as large as their prior sigma the biases are, as far as pictures
+        constrain them.
+        """
+        covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
+        constrained = 1.0 - np.diag(covariance)[16:] / np.square(self._prior)
+        return float(np.linalg.norm(fitted.x[16:] / self._prior) / np.sqrt(constrained.sum()))
+
     def _residuals(self, parameters: np.ndarray) -> np.ndarray:
         """Return all residuals over their sigmas: of the corners in pictures, then of the biases."""
-        bias_px = parameters[16:].reshape(-1, 4, 2)
+        bias_px, drift_px_rad = parameters[16:].reshape(2, -1, 4, 2)
         px = self._project(parameters, self._cameras) + bias_px[self._camera]
-        seen = (px - self._px) / self._scatter_px
-        return np.concatenate([seen.ravel(), parameters[16:] / _BIAS_PX])
+        px += drift_px_rad[self._camera] * self._from_middle[:, None, None]
+        seen = (px - self._px) / self._scatter_px[self._camera][:, None]
+        return np.concatenate([seen.ravel(), parameters[16:] / self._prior])
 
     def _project(self, parameters: np.ndarray, cameras: Cameras) -> np.ndarray:
         """Return the corners (pictures, 4, 2), px, without bias."""
@@ -189,7 +222,7 @@ class _AxisFit:
             step = np.zeros(len(sigma))
             step[k] = sigma[k]
             moved = self._project(fitted.x, cameras.moved(step)) - here
-            sensitivity[:, k] = gain @ (moved / self._scatter_px).ravel() / sigma[k]
+            sensitivity[:, k] = gain @ (moved / self._scatter_px[self._camera][:, None]).ravel() / sigma[k]
         return sensitivity @ cameras.covariance @ sensitivity.T
 
 
