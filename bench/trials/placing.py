@@ -232,10 +232,10 @@ def _turning_elsewhere(session: Session, calibration: SessionCalibration) -> lis
     return [Reason("board_misplaced", line)]
 
 
-def require_swing(placement: Placement, problems: InputProblems) -> None:
+def require_swing(placement: Placement, problems: InputProblems, marker: str = "") -> None:
     """Raise BadInput where the strokes are too short to place the rig; note where they nearly are."""
     try:
-        warning = check_swing_suffices(placement)
+        warning = check_swing_suffices(placement, marker)
     except Refused as refusal:
         raise BadInput(str(refusal), file="trials") from None
     if warning:

@@ -169,7 +169,8 @@ def _warn(found: RigCalibration, problems: InputProblems) -> None:
     placement = replace(found.placement, covariance=found.covariance)
     if placement.alarm:
         problems.warn(Reason("board_misplaced", placement.alarm))
-    require_swing(placement, problems)
+    marker = ", ".join(source.basis for source in found.sources[:-1])
+    require_swing(placement, problems, marker)
 
 
 def report_lines(found: RigCalibration) -> Iterator[str]:

@@ -83,7 +83,9 @@ def _refine(
     low = np.maximum(np.floor(outline_px.min(axis=0) - _MARGIN_PX).astype(int), 0)
     high = np.ceil(outline_px.max(axis=0)).astype(int) + _MARGIN_PX
     window = picture[low[1] : high[1], low[0] : high[0]].astype(float)
-    fitted = _fit_pattern(window, np.pad(is_white.astype(float), 1, constant_values=1.0), outline_px - low)
+    fitted = _fit_pattern(
+        window, np.pad(is_white.astype(float), 1, constant_values=1.0), outline_px - low
+    )
     return None if fitted is None else fitted + low
 
 

@@ -170,7 +170,7 @@ class _AxisFit:
 
     def _solve(self, first: np.ndarray) -> OptimizeResult:
         """Fit from these parameters. Raises Refused where the fit does not converge."""
-        fitted = least_squares(self._residuals, first, x_scale="jac", loss="soft_l1")
+        fitted = least_squares(self._residuals, first, x_scale="jac", loss=self._loss)
         if fitted.status <= 0:
             raise Refused(f"the turn of marker {self.number} on the hub was not found")
         return fitted
@@ -189,8 +189,19 @@ class _AxisFit:
         constrain them.
         """
         covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
-        constrained = 1.0 - np.diag(covariance)[16:] / np.square(self._prior)
-        return float(np.linalg.norm(fitted.x[16:] / self._prior) / np.sqrt(constrained.sum()))
+        constrained = np.sum(1.0 - np.diag(covariance)[16:] / np.square(self._prior))
+        found = np.sum(np.square(fitted.x[16:] / self._prior))
+        # The prior counts as one bias of its size more.
+        return float(np.sqrt((1.0 + found) / (1.0 + constrained)))
+
+    def _loss(self, squares: np.ndarray) -> np.ndarray:
+        """Return the loss (3, n) of squared residuals, its slope and its bend: robust for corners in
+        pictures, plain for the biases.
+        """
+        loss = np.stack([squares, np.ones_like(squares), np.zeros_like(squares)])
+        seen = 1.0 + squares[: self._px.size]
+        loss[:, : self._px.size] = 2.0 * (np.sqrt(seen) - 1.0), seen**-0.5, -0.5 * seen**-1.5
+        return loss
 
     def _residuals(self, parameters: np.ndarray) -> np.ndarray:
         """Return all residuals over their sigmas: of the corners in pictures, then of the biases."""
@@ -222,7 +233,9 @@ class _AxisFit:
             step = np.zeros(len(sigma))
             step[k] = sigma[k]
             moved = self._project(fitted.x, cameras.moved(step)) - here
-            sensitivity[:, k] = gain @ (moved / self._scatter_px[self._camera][:, None]).ravel() / sigma[k]
+            sensitivity[:, k] = (
+                gain @ (moved / self._scatter_px[self._camera][:, None]).ravel() / sigma[k]
+            )
         return sensitivity @ cameras.covariance @ sensitivity.T
 
 

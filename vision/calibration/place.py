@@ -51,6 +51,7 @@ _CLEAR_LEAN = 4.0
 class Placement:
     """The rig frame relative to the one that the board gives.
 
+<<<<<<< HEAD
     step (6,): rotation w, rad, and shift v, mm; covariance (6, 6). rise_rad: elevation of the
     whisker's base above the plane of rotation; None without a swing. width_rad: of the widest
     stroke. notes: sentences for the report. alarm: how the two placements that it combines
@@ -58,6 +59,14 @@ class Placement:
     much of that. shared (6, 6): the part of a swing's covariance that all free strokes share; None
     without a swing. turn_share: how many times as far as the motor the whisker would turn, were
     that why the two disagree; None where it is not the cause.
+=======
+    rise_rad: elevation of the whisker's base above the plane of rotation (None without a swing).
+    width_rad: of the widest stroke. notes: sentences for the report. alarm: how the two that it
+    combines disagree, None where they do not. source: what it rests on, as sentences name it; basis:
+    how much of that. shared (6, 6): the part of the covariance that is what all free strokes share, None
+    without a swing. turn_share: how many times as far as the motor the
+    whisker turns if that is why they disagree; None where it would not look so.
+>>>>>>> 8d5ec554 (Biases of a marker's corners are as large as residuals show; advice of calibrate rig counts the marker, and shares of the combined sigma)
     """
 
     step: np.ndarray
@@ -129,21 +138,24 @@ def combine(board: Placement, swing: Placement) -> Placement:
     covariance = board.covariance - gain @ board.covariance
     chi2 = float(difference @ np.linalg.solve(Sigma, difference))
     disagree = chi2 > chdtri(6, FALSE_ALARM)
+    shared = None if swing.shared is None else gain @ swing.shared @ gain.T
     combined = replace(
         swing,
         step=board.step + gain @ difference,
         covariance=0.5 * (covariance + covariance.T),
+        shared=shared,
         alarm=_alarm(board, swing, Sigma) if disagree else None,
         turn_share=_turn_share(difference, np.sqrt(np.diag(Sigma))) if disagree else None,
     )
     return replace(combined, notes=(*swing.notes, f"With the {board.source}: {combined.spread}."))
 
 
-def check_swing_suffices(placement: Placement) -> str:
-    """Return '' where the swing alone fixes the centre well along the whisker, which is what
-    distances count from; else a warning that says how wide a stroke would.
+def check_swing_suffices(placement: Placement, marker: str = "") -> str:
+    """Return '' where the swing fixes the centre well along the whisker, which is what distances
+    count from; else a warning that says how wide a stroke would.
 
-    Raises Refused where a ruler would do better.
+    marker: what a marker on the hub gave besides, in words; how much wider strokes help it depends
+    on its print, so no width is named then. Raises Refused where a ruler would do better.
     """
     along_mm = float(np.sqrt(placement.covariance[3, 3]))
     if along_mm <= _HELPED_ALONG_SIGMA_MM:
@@ -151,8 +163,12 @@ def check_swing_suffices(placement: Placement) -> str:
     width_deg = np.degrees(placement.width_rad)
     # An apex is fixed as the fan is wide, and as the root of its frames, of which a wider one has more.
     needed_deg = np.ceil(_OVER * width_deg * (along_mm / _HELPED_ALONG_SIGMA_MM) ** (2 / 3))
-    advice = f"record free strokes of about {needed_deg:.0f} degrees, or measure T_rig_board better"
+    cure = f"record free strokes of about {needed_deg:.0f} degrees"
     found = f"the free strokes are what places the rig, and {width_deg:.1f} degrees fix the centre of rotation"
+    if marker:
+        cure = "let the motor turn further in the pictures, before touch above all"
+        found = f"free strokes of {width_deg:.1f} degrees and {marker} fix the centre of rotation"
+    advice = f"{cure}, or measure T_rig_board better"
     if along_mm > _MOST_ALONG_SIGMA_MM:
         raise Refused(
             f"{found} to {along_mm:.2f} mm along the whisker; {_MOST_ALONG_SIGMA_MM:g} mm is needed: {advice}"

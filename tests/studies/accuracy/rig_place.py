@@ -102,9 +102,15 @@ def study(sessions: int) -> None:
             total += zs
             row = [*rms[0], *rms[1], _rms(np.array(zs)), np.mean(chi2), _rms(np.array(biases))]
             row.append(_rms(np.array(drifts)))
-            print(f"{width_deg:8.1f} {blur_px:8.1f} {len(zs):8d}", *[f"{x:8.3f}" for x in row], flush=True)
+            print(
+                f"{width_deg:8.1f} {blur_px:8.1f} {len(zs):8d}",
+                *[f"{x:8.3f}" for x in row],
+                flush=True,
+            )
     every = np.abs(np.array(total))
-    print(f"all: z {_rms(every):.2f} RMS, {np.mean(every < 1.96):.3f} within 1.96, largest {every.max():.1f}")
+    print(
+        f"all: z {_rms(every):.2f} RMS, {np.mean(every < 1.96):.3f} within 1.96, largest {every.max():.1f}"
+    )
 
 
 def _rms(values: np.ndarray, axis: int | None = None) -> np.ndarray:
