@@ -51,22 +51,13 @@ _CLEAR_LEAN = 4.0
 class Placement:
     """The rig frame relative to the one that the board gives.
 
-    <<<<<<< HEAD
-        step (6,): rotation w, rad, and shift v, mm; covariance (6, 6). rise_rad: elevation of the
-        whisker's base above the plane of rotation; None without a swing. width_rad: of the widest
-        stroke. notes: sentences for the report. alarm: how the two placements that it combines
-        disagree; None where they agree. source: what it rests on, as sentences name it; basis: how
-        much of that. shared (6, 6): the part of a swing's covariance that all free strokes share; None
-        without a swing. turn_share: how many times as far as the motor the whisker would turn, were
-        that why the two disagree; None where it is not the cause.
-    =======
-        rise_rad: elevation of the whisker's base above the plane of rotation (None without a swing).
-        width_rad: of the widest stroke. notes: sentences for the report. alarm: how the two that it
-        combines disagree, None where they do not. source: what it rests on, as sentences name it; basis:
-        how much of that. shared (6, 6): the part of the covariance that is what all free strokes share, None
-        without a swing. turn_share: how many times as far as the motor the
-        whisker turns if that is why they disagree; None where it would not look so.
-    >>>>>>> 8d5ec554 (Biases of a marker's corners are as large as residuals show; advice of calibrate rig counts the marker, and shares of the combined sigma)
+    step (6,): rotation w, rad, and shift v, mm; covariance (6, 6). rise_rad: elevation of the
+    whisker's base above the plane of rotation; None without a swing. width_rad: of the widest
+    stroke. notes: sentences for the report. alarm: how the two placements that it combines
+    disagree; None where they agree. source: what it rests on, as sentences name it; basis: how
+    much of that. shared (6, 6): the part of the covariance that all free strokes share; None
+    without a swing. turn_share: how many times as far as the motor the whisker would turn, were
+    that why the two disagree; None where it is not the cause.
     """
 
     step: np.ndarray
