@@ -10,12 +10,14 @@ import numpy as np
 import tomli_w
 
 from bench.base.atomic import write_whole
+from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.gauges.matrix import FROM_FILE, FROM_MANIFEST, GaugeCalibration, GaugeMatrix
-from bench.session import manifest
+from bench.session import manifest, plausible
 from bench.session.givens import with_sigmas
 from bench.session.session import Session
 from bench.session.strict_toml import as_keys, convert, read_toml
+from bench.session.written_covariance import is_covariance
 
 Rows4 = Annotated[
     list[manifest.Row4],
@@ -37,7 +39,7 @@ class FileKeys(manifest.GaugeKeys):
     # 4 × 4, of the matrix row by row
     covariance: Rows4 | None = None
     # 3 E I that the coefficients rest on: with another, they are scaled, so that C cancels in d_x
-    C_Nmm2: float | None = None
+    C_Nmm2: Annotated[float, plausible.THREE_RIGIDITIES] | None = None
     C_sigma_Nmm2: float | None = None
     # largest moments that were calibrated
     full_scale_Nmm: manifest.Pair | None = None
@@ -73,11 +75,12 @@ def read_gauges(path: Path, C_Nmm2: float) -> GaugeCalibration:
         covariance = np.diag(np.ravel(keys.matrix_sigma_Nmm_per_V) ** 2)
     without = {}
     for name, rest in (keys.without or {}).items():
-        without[name] = _matrix(rest.matrix_Nmm_per_V, rest.covariance)
+        place = f"[without.{name}] "
+        without[name] = _matrix(rest.matrix_Nmm_per_V, rest.covariance, path.name, place)
     factors = keys.one_factor_Nmm_per_V
     full_scale = keys.full_scale_Nmm
     gauges = GaugeCalibration(
-        _matrix(keys.matrix_Nmm_per_V, covariance),
+        _matrix(keys.matrix_Nmm_per_V, covariance, path.name),
         FROM_FILE,
         without,
         one_factor=None if factors is None else GaugeMatrix(np.diag(factors)),
@@ -136,9 +139,21 @@ def _as_lists(arrays: Mapping[str, np.ndarray | float]) -> dict[str, list | floa
     return {name: np.asarray(value, dtype=float).tolist() for name, value in arrays.items()}
 
 
-def _matrix(coefficients: list | None, covariance: list | np.ndarray | None) -> GaugeMatrix | None:
-    """Return coefficients with their covariance, exact where it is not given; None without them."""
+def _matrix(
+    coefficients: list | None, covariance: list | np.ndarray | None, file: str, place: str = ""
+) -> GaugeMatrix | None:
+    """Return coefficients with their covariance, exact where it is not given; None without them.
+
+    Raises BadInput, naming file and place, for what is no matrix of numbers, or no covariance.
+    """
     if coefficients is None:
         return None
+    matrix = np.array(coefficients, dtype=float)
     known = np.zeros((4, 4)) if covariance is None else np.array(covariance, dtype=float)
-    return GaugeMatrix(np.array(coefficients, dtype=float), known)
+    if not np.all(np.abs(matrix) <= plausible.NUMBER.high):
+        found = f"{place}matrix_Nmm_per_V is not of numbers {plausible.NUMBER.allowed}"
+        raise BadInput(found, file=file)
+    if not is_covariance(known):
+        found = f"{place}covariance is none: symmetric, with variances of 0 or more, is allowed"
+        raise BadInput(found, file=file)
+    return GaugeMatrix(matrix, known)

@@ -34,6 +34,8 @@ _MISPLACED = 0.01
 _SHORT = 0.1
 # [1] Of the length: how far a trace may go beyond the tip, by what a ruler leaves. Stated.
 _LONG = 0.01
+# [1] Of the length: a coordinate beyond is in another unit, µm for mm. Stated.
+_FARTHEST = 10.0
 # [rounds] Of fitting the curve to points and points to the curve: what is left falls by the square of
 # the noise's slope in each. Derived.
 _ROUNDS = 20
@@ -58,15 +60,14 @@ def read_rest_shape(session: Path, name: str, length_mm: float) -> RestShape:
     """Read the unloaded whisker's shape from a file of the session.
 
     Raises BadInput, in a line with the file's name and row: no such file, a name that leads out of
-    the session, text in a number, too few points, a first point off the base, points that do not
+    the session, text in a number, too few points, a point far beyond the tip, a first point off the base, points that do not
     go on along x, or beside the smooth curve through all, a whisker that coils, or is longer or
     much shorter than length_mm.
     """
-    path = session / name
-    if Path(name).name != name or not path.is_file():
+    if name not in {file.name for file in session.iterdir() if file.is_file()}:
         found = f"rest_shape = {name!r}: there is no such file beside session.toml"
         raise BadInput(f"[whisker] {found}", file="session.toml")
-    table = read_table(path, name, _COLUMNS)
+    table = read_table(session / name, name, _COLUMNS)
     require_columns(table, _COLUMNS, name)
     _check_points(table, name, length_mm)
     rest_mm, end_mm = _fit(table, name, length_mm)
@@ -75,9 +76,15 @@ def read_rest_shape(session: Path, name: str, length_mm: float) -> RestShape:
 
 
 def _check_points(table: NumberTable, name: str, length_mm: float) -> None:
-    """Raise BadInput for too few points, or points that do not go from the base on along x."""
+    """Raise BadInput for too few points, points far beyond the tip, or not from the base on along x."""
     if len(table) < _LEAST_ROWS:
         raise BadInput(f"has {len(table)} points; {_LEAST_ROWS} or more are needed", file=name)
+    for column in _COLUMNS:
+        beyond = np.flatnonzero(np.abs(table[column]) > _FARTHEST * length_mm)
+        if len(beyond):
+            found = f"{table[column][beyond[0]]:g} mm is far beyond the whisker's {length_mm:g} mm"
+            row = int(table.row[beyond[0]])
+            raise BadInput(f"{found}. Are the points in mm?", file=name, row=row, column=column)
     first_mm = float(np.linalg.norm([table[column][0] for column in _COLUMNS]))
     if first_mm > _MISPLACED * length_mm:
         found = f"the first point is {first_mm:.3g} mm from the base, which is [0, 0, 0]"

@@ -15,6 +15,7 @@ from bench.base.input_problems import InputProblems
 from bench.base.results import hash_of_files
 from bench.session.manifest import Row4
 from bench.session.strict_toml import Keys, as_keys, read_toml
+from bench.session.written_covariance import is_covariance
 from vision.geometry import nearest_rotation
 
 RIG_FILE = "rig.toml"
@@ -30,8 +31,6 @@ _ROTATION_TOLERANCE = 2e-3
 _NEAREST_BOARD_MM = 0.5
 # [mm] No bench is larger; a board beyond is placed in another unit.
 _FARTHEST_BOARD_MM = 5000.0
-# [1] Of a covariance's entries, over the product of their sigmas: what rounding leaves. Stated.
-_ROUNDING = 1e-6
 # Units of the file's covariance: degrees of the turns, mm of the shifts.
 _FILE_UNITS = np.repeat([np.degrees(1.0), 1.0], 3)
 
@@ -99,11 +98,7 @@ def covariance_as_written(covariance: np.ndarray) -> list[list[float]]:
 def _covariance(written: list[list[float]]) -> np.ndarray:
     """Return a written covariance in rad and mm. Raise BadInput where it cannot be one."""
     covariance = np.array(written)
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    slack = _ROUNDING * np.outer(sigma, sigma) + np.finfo(float).tiny
-    is_symmetric = np.all(np.abs(covariance - covariance.T) <= slack)
-    scaled = covariance / np.where(slack > 0, slack / _ROUNDING, 1.0)
-    if not is_symmetric or np.any(sigma == 0) or np.linalg.eigvalsh(scaled)[0] < -_ROUNDING:
+    if not is_covariance(covariance) or np.any(np.diag(covariance) == 0):
         found = "covariance_deg_mm is no covariance: symmetric, with variances above 0, is allowed"
         raise BadInput(f"{found}; {_CURE}", file=RIG_FILE)
     return covariance / np.outer(_FILE_UNITS, _FILE_UNITS)

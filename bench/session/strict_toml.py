@@ -52,6 +52,8 @@ def read_toml(path: Path, label: str) -> dict[str, Any]:
         raise _bad_toml(str(problem), text, label) from None
     except RecursionError:
         raise BadInput("is not TOML: brackets within brackets without end", file=label) from None
+    except ValueError:  # Python converts no whole number of more than 4300 digits
+        raise BadInput("holds a number of thousands of digits", file=label) from None
 
 
 def _bad_toml(problem: str, text: str, label: str) -> BadInput:

@@ -82,6 +82,8 @@ def check(path: Path, *, follow_links: bool = False) -> int:
     whiskers = f", {counted(len(views), 'whisker')}" if session.base else ""
     trials = counted(len(session.trials), "trial")
     print(f"{session.whole_name}{whiskers}: {trials}, nothing wrong or doubtful")
+    if session.trials:
+        print(f"then run: whisker-bench evaluate {path} --out OUT")
     return 0
 
 

@@ -9,6 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests" / "faults" / "fuzz.py"
+STATED = ROOT / "tests" / "faults" / "fuzz_stated.py"
 pytestmark = pytest.mark.skipif(
     not hasattr(os, "fork"), reason="each mutation runs in a forked process"
 )
@@ -16,10 +17,20 @@ pytestmark = pytest.mark.skipif(
 
 def fuzzed(first: int, count: int, verb: str = "check") -> subprocess.CompletedProcess:
     """In a process of its own: forks of one with many threads may hang."""
+    return run(SCRIPT, str(first), str(count), verb)
+
+
+def stated(first: int, count: int) -> subprocess.CompletedProcess:
+    """In a process of its own, which has its own alarm and raises every warning."""
+    return run(STATED, str(first), str(count))
+
+
+def run(*arguments) -> subprocess.CompletedProcess:
+    """Run a script by one thread, with this checkout's packages."""
     one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1") | {
         "PYTHONPATH": str(ROOT)
     }
-    command = [sys.executable, str(SCRIPT), str(first), str(count), verb]
+    command = [sys.executable, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, env=os.environ | one)
 
 
@@ -27,6 +38,18 @@ def test_a_few_mutations():
     done = fuzzed(0, 20)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "'exit 2'" in done.stdout and "'exit 1'" in done.stdout
+
+
+def test_a_few_mutations_of_what_is_stated():
+    done = stated(0, 60)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "'refused'" in done.stdout and "'accepted'" in done.stdout
+
+
+@pytest.mark.slow
+def test_many_mutations_of_what_is_stated():
+    done = stated(100000, 20000)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.slow

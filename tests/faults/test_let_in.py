@@ -232,6 +232,13 @@ def test_tables_and_manifests_of_absurd_size(session, monkeypatch):
     assert "session.toml: has more than" in refusal(session)
 
 
+def test_a_number_of_thousands_of_digits(session):
+    manifest = session / "session.toml"
+    manifest.write_text(manifest.read_text().replace("100.0", "9" * 5000, 1))
+    with pytest.raises(BadInput, match=r"session.toml: holds a number of thousands of digits"):
+        checked_session(session)
+
+
 def test_brackets_without_end(session):
     file = session / "session.toml"
     file.write_text(file.read_text() + "\nx = " + "[" * 100000 + "\n")

@@ -4,18 +4,25 @@ A fault is a function of the session's folder; those of a recording spoil its tr
 """
 
 import csv
+import json
 import os
 import shutil
 import struct
 import tomllib
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from vision.boards import find_corners
+from vision.geometry import Board
+
 TRIAL = "b60_4"
+# The board of the small session.
+BOARD = Board((8, 6), square_mm=15.0, marker_mm=11.0, dictionary="DICT_5X5_100")
 Fault = Callable[[Path], None]
 
 
@@ -24,16 +31,16 @@ def copy_of(session: Path, target: Path) -> Path:
     return Path(shutil.copytree(session, target, copy_function=shutil.copyfile))
 
 
-def alone(session: Path, target: Path, made: Path, gauges: Path) -> Path:
+def alone(session: Path, target: Path, brought: Iterable[Path]) -> Path:
     """A copy with TRIAL alone, cameras and gauges brought along: a fifth of the whole session's time.
 
-    made: folder with cameras.toml and cameras.npz; gauges: a gauges.toml.
+    brought: cameras.toml and cameras.npz, left out where cameras are calibrated, and gauges.toml.
     """
     copy_of(session, target)
     for trial in (target / "trials").iterdir():
         if trial.name != TRIAL:
             shutil.rmtree(trial)
-    for file in (made / "cameras.toml", made / "cameras.npz", gauges):
+    for file in brought:
         shutil.copyfile(file, target / file.name)
     return target
 
@@ -255,6 +262,74 @@ def _damaged(session: Path) -> None:
         path.write_bytes(path.read_bytes()[:100])
 
 
+def _unsaid(fault: Fault) -> Fault:
+    """Make a fault in a session that says of no given that it is exact, as a lab's does."""
+
+    def spoil(session: Path) -> None:
+        _manifest("exact = true\n", "")(session)
+        fault(session)
+
+    return spoil
+
+
+def _board_views_exchanged(session: Path) -> None:
+    """Two cameras have each other's pictures of the board for their lenses."""
+    low, high = (session / "boards" / camera for camera in ("low", "high"))
+    low.rename(low.with_name("aside"))
+    high.rename(low)
+    low.with_name("aside").rename(high)
+
+
+def print_stretched(share: float) -> Fault:
+    """A fault: the board is longer along its x by a share, in every picture of it."""
+
+    def spoil(session: Path) -> None:
+        cameras = json.loads((session / "truth.json").read_text())["cameras"]
+        for name, camera in cameras.items():
+            K = np.array(camera["K"])
+            distortion = np.array(camera["dist"])
+            views = sorted((session / "boards" / name).iterdir())
+            for path in [*views, session / "boards" / "rig" / f"{name}.png"]:
+                change_picture(
+                    path, partial(stretched_board, share=share, K=K, distortion=distortion)
+                )
+
+    return spoil
+
+
+def stretched_board(
+    grey: np.ndarray, share: float, K: np.ndarray, distortion: np.ndarray
+) -> np.ndarray:
+    """Return a picture as it would be of a board longer along x, about its middle, by a share.
+
+    K (3, 3), distortion (5,): the camera's true lens.
+    """
+    corners = find_corners(grey, BOARD)
+    if not len(corners.ids):
+        return grey
+    flat = cv2.undistortPoints(corners.px.reshape(-1, 1, 2), K, distortion)
+    on_board_mm = BOARD.corners_mm[corners.ids, :2]
+    to_picture, _ = cv2.findHomography(on_board_mm, flat.reshape(-1, 2))
+    rows, columns = np.indices(grey.shape, dtype=float)
+    px = np.stack([columns.ravel(), rows.ravel()], axis=1)  # (pixels, 2)
+    seen = cv2.undistortPoints(px.reshape(-1, 1, 2), K, distortion)
+    place_mm = cv2.perspectiveTransform(seen, np.linalg.inv(to_picture))[:, 0]
+    middle_mm = on_board_mm.mean(axis=0)
+    place_mm[:, 0] = middle_mm[0] + (place_mm[:, 0] - middle_mm[0]) / (1.0 + share)
+    source = cv2.perspectiveTransform(place_mm.reshape(-1, 1, 2), to_picture)
+    rays = cv2.convertPointsToHomogeneous(source)
+    from_px, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), K, distortion)
+    from_px = from_px.reshape(*grey.shape, 2).astype(np.float32)
+    return cv2.remap(grey, from_px[..., 0], from_px[..., 1], cv2.INTER_LANCZOS4)
+
+
+def _some_damaged(session: Path) -> None:
+    """Two pictures of a camera, after the touch, cut short."""
+    for path in pictures(session, "low")[7:9]:
+        data = path.read_bytes()
+        path.write_bytes(data[: len(data) // 3])
+
+
 def _rig_board_hidden(session: Path) -> None:
     change_picture(session / "boards" / "rig" / "low.png", lambda grey: np.full_like(grey, 90))
 
@@ -342,6 +417,20 @@ FAULTS: dict[str, Fault] = {
         "square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 15.3\nmarker_mm = 11.22"
     ),
     "board 3 mm higher": _manifest("-44.3509729]", "-41.3509729]"),
+    "board 0.3 mm aside, unsaid": _unsaid(_manifest("4.24180287]", "4.54180287]")),
+    "square 0.3 % too large, unsaid": _unsaid(
+        _manifest("square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 15.045\nmarker_mm = 11.033")
+    ),
+    "square 0.5 % too large, unsaid": _unsaid(
+        _manifest("square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 15.075\nmarker_mm = 11.055")
+    ),
+    "board 2 % too large, unsaid": _unsaid(
+        _manifest("square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 15.3\nmarker_mm = 11.22")
+    ),
+    "board 3 mm higher, unsaid": _unsaid(_manifest("-44.3509729]", "-41.3509729]")),
+    "bar 6.6 mm for 6, unsaid": _unsaid(_manifest("diameter_mm = 6.0", "diameter_mm = 6.6")),
+    "print stretched 0.3 %, unsaid": _unsaid(print_stretched(3e-3)),
+    "lens boards exchanged, unsaid": _unsaid(_board_views_exchanged),
     "wrong dictionary": _manifest("DICT_5X5_100", "DICT_4X4_100"),
     "wrong squares": _manifest("squares = [8, 6]", "squares = [7, 5]"),
     "whisker 90 mm for 100": _manifest("length_mm = 100.0", "length_mm = 90.0"),
@@ -356,6 +445,7 @@ FAULTS: dict[str, Fault] = {
     "camera black": _camera(np.zeros_like),
     "camera white": _camera(lambda grey: np.full_like(grey, 255)),
     "camera damaged": _damaged,
+    "two frames damaged": _some_damaged,
     "rig board hidden": _rig_board_hidden,
     "PNG of 60000 x 60000": _huge_png,
     "FIFO for a picture": _fifo,
@@ -365,6 +455,8 @@ FAULTS: dict[str, Fault] = {
 }
 # These need the board views: they are made on the whole session, without cameras brought along.
 WHOLE = (
+    "board 3 mm higher, unsaid",
+    "board 2 % too large, unsaid",
     "board 10 % too large",
     "board 2 % too large",
     "bar 6.6 mm for 6",
@@ -373,4 +465,13 @@ WHOLE = (
     "rig board hidden",
     "wrong dictionary",
     "wrong squares",
+)
+# These need the board views, and no other trial: cameras are calibrated, gauges brought along.
+WITH_BOARDS = (
+    "board 0.3 mm aside, unsaid",
+    "square 0.3 % too large, unsaid",
+    "square 0.5 % too large, unsaid",
+    "bar 6.6 mm for 6, unsaid",
+    "print stretched 0.3 %, unsaid",
+    "lens boards exchanged, unsaid",
 )

@@ -107,6 +107,7 @@ def test_check_of_a_sound_session(small_session, capsys):
     said = capsys.readouterr().out
     assert "4 trials, nothing wrong or doubtful" in said
     assert "rig: placed by T_rig_board" in said
+    assert said.endswith(f"then run: whisker-bench evaluate {small_session} --out OUT\n")
 
 
 def test_check_of_a_session_with_a_warning(small_copy, capsys):

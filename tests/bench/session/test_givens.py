@@ -101,6 +101,30 @@ def test_a_matrix_is_known_to_a_share_of_each_row(unsaid):
     np.testing.assert_allclose(sigma, [[0.1, 0.1], [0.2, 0.2]])
 
 
+EYE = [[0.01 * (row == column) for column in range(4)] for row in range(4)]
+NEGATIVE = [[-value for value in row] for row in EYE]
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("C_Nmm2 = 0", r"gauges.toml: C_Nmm2 is 0; from 0.0003 to 3e\+08 is allowed"),
+        ("C_Nmm2 = 1e-320", r"gauges.toml: C_Nmm2 is .*is allowed"),
+        (f"covariance = {NEGATIVE}", r"gauges.toml: covariance is none: symmetric"),
+        (f"covariance = {[[0.01, 0.005, 0, 0], *EYE[1:]]}", r"gauges.toml: covariance is none"),
+        (
+            "[without.b60_4]\nmatrix_Nmm_per_V = [[nan, 0], [0, 1]]",
+            r"gauges.toml: \[without.b60_4\] matrix_Nmm_per_V is not of numbers from -1e\+07",
+        ),
+    ],
+)
+def test_gauges_that_cannot_be_are_refused(tmp_path, line, expected):
+    file = tmp_path / "gauges.toml"
+    file.write_text(f"offset_V = [0, 0]\nmatrix_Nmm_per_V = [[10.0, 1.0], [0.0, -20.0]]\n{line}\n")
+    with pytest.raises(BadInput, match=expected):
+        read_gauges(file, 8835.7)
+
+
 def test_a_gauges_file_without_sigmas_is_known_no_better(tmp_path):
     file = tmp_path / "gauges.toml"
     table = "offset_V = [0, 0]\nmatrix_Nmm_per_V = [[10.0, 1.0], [0.0, -20.0]]\n"

@@ -102,6 +102,10 @@ STRAIGHT = np.linspace([0.0, 0.0, 0.0], [100.0, 0.0, 0.0], 11)
             lambda p: 1.1 * p,
             r"rest.csv: the points go to an arc length of 110 mm, length_mm is 100",
         ),
+        (
+            lambda p: 1000 * p,
+            r"rest.csv, row 3, column x_mm: 10000 mm is far beyond .*Are the points in mm\?",
+        ),
         (lambda p: p[:9], r"arc length of 80 mm, length_mm is 100; 90 % of the whisker or more"),
         (lambda p: p[:4], r"rest.csv: has 4 points; 6 or more are needed"),
         (
@@ -130,6 +134,7 @@ def test_text_in_a_number_is_named_by_its_cell(session):
     ("line", "expected"),
     [
         ('rest_shape = "rest.csv"', "there is no such file beside session.toml"),
+        (f'rest_shape = "{"x" * 5000}"', "there is no such file beside session.toml"),
         ('rest_shape = "../rest.csv"', "there is no such file beside session.toml"),
         ("rest_curvature_per_mm = [0.02, 0.0]", "turn by more than 60° from its base"),
         ("rest_curvature_per_mm = [6.0, 0.0]", "Is it in 1/m? Then write 0.006."),

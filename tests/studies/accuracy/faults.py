@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.commands import cli
-from tests.scenes.faults import FAULTS, TRIAL, WHOLE, alone, copy_of
+from tests.scenes.faults import FAULTS, TRIAL, WHOLE, WITH_BOARDS, alone, copy_of
 
 SESSION = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
 SILENT_SIGMAS = 3.0
@@ -94,7 +94,8 @@ def study(folder: Path, name: str) -> None:
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     session, out = place / "session", place / "out"
-    copy_of(SESSION, session) if name in WHOLE else alone(SESSION, session, made, gauges)
+    cameras = [] if name in WITH_BOARDS else [made / "cameras.toml", made / "cameras.npz"]
+    copy_of(SESSION, session) if name in WHOLE else alone(SESSION, session, [*cameras, gauges])
     FAULTS[name](session)
     code, said, check_s = run("check", session)
     told = " | ".join(line.strip() for line in said.splitlines())
