@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -20,8 +21,7 @@ from bench.trials.stick_slip_phases import seen_phases, slips
 from vision import Value
 
 # [1] Share of what bends the line of d_z against d_y that is left when it is taken out. Study:
-# tests/studies/accuracy/combined_numbers.py. Of a whisker that tapers it is more: the tangent where it is pushed
-# turns by 1 + ½/w of its chord's angle (w: share of the diameter that is left there), where 1.5 is taken.
+# tests/studies/accuracy/combined_numbers.py.
 _BEND_LEFT = 1 / 4
 _ROUNDS = 12  # each leaves less than half of the change up to a heading of 45°
 # Terms of θ² are enough up to here: pushed by 8, 16 and 25 degrees against a bar at 40, α seen is off by 0.03, 0.3 and
@@ -30,6 +30,13 @@ _FARTHEST_RAD = np.radians(10.0)
 _FEWEST_NEAR = 5  # frames
 UNKNOWN = (np.nan, np.nan)
 BETA_BY_HAND_RAD = np.radians(1.0)  # one sigma of a slope set by hand, where no picture shows it
+
+
+class Tapering(Protocol):
+    """A whisker that says how much of its base's diameter is left at a distance from the base."""
+
+    def left(self, x_mm: float) -> float:
+        """Return that share."""
 
 
 @dataclass(frozen=True)
@@ -96,25 +103,23 @@ def alphas_of(results: Iterable[TrialResult]) -> list[WhiskAlphas]:
     """Return the friction angles of every whisk, in their order."""
     found = []
     for result, seen, felt in whisks(results):
-        left = result.whisker.left(seen.d_x_mm.value)
-        found.append(_alphas(result.trial, seen, felt, np.radians(result.theta_deg), left))
+        found.append(
+            _alphas(result.trial, seen, felt, np.radians(result.theta_deg), result.whisker)
+        )
     return found
 
 
 def _alphas(
-    trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: float
+    trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, whisker: Tapering
 ) -> WhiskAlphas:
-    """Return the friction angles of one whisk at a pushing angle.
-
-    left: share of the base's diameter that the whisker has at the contact.
-    """
+    """Return the friction angles of one whisk at a pushing angle."""
     nominal = not np.isfinite(seen.beta_rad.value)
     beta = seen.beta_rad
     if nominal:
         beta = Value(float(np.radians(trial.beta_nominal_deg)), BETA_BY_HAND_RAD)
     phases = NO_PHASES
-    alpha_rad, sigma_rad = seen_friction(seen)
-    by_theory_rad = _left_of_bend(seen, alpha_rad, left)
+    alpha_rad, sigma_rad = seen_friction(seen, whisker)
+    by_theory_rad = _left_of_bend(seen, alpha_rad)
     beta_common_rad = _common_slope(seen)
     if slips(seen):
         phases = seen_phases(seen.frames, beta.value, seen.d_x_mm.value)
@@ -162,7 +167,7 @@ def _common_felt(felt: FeltWhisk) -> np.ndarray:
     return -np.copysign(1.0, felt.phi_felt_rad.value) * by_cause
 
 
-def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
+def seen_friction(seen: SeenWhisk, whisker: Tapering) -> tuple[float, float]:
     """Return α and its sigma by the slope of d_z against d_y over the frames of a slipping whisk, and β.
 
     NaN where it hardly slips. A line's slope is free of what offsets all deflections alike. What friction
@@ -178,14 +183,14 @@ def seen_friction(seen: SeenWhisk) -> tuple[float, float]:
     beta = abs(seen.beta_rad.value)
     centred = d.across_y_mm - d.across_y_mm.mean()
     weights = centred / np.sum(centred**2)  # (frames,) of the slope of a line
-    alpha, slope = _straight_line(d, beta, weights)
+    alpha, slope = _straight_line(d, beta, weights, whisker.left(d.d_x_mm))
     # To first order an error of d_y acts as one of d_z times the slope; rows of along, z and y take turns.
     gradient = np.stack([np.zeros_like(weights), weights, -slope * weights], axis=1).ravel()
     slope_sigma = float(np.sqrt(gradient @ d.covariance @ gradient))
     return alpha, float(np.hypot(slope_sigma / (1.0 + slope**2), seen.beta_rad.sigma))
 
 
-def _left_of_bend(seen: SeenWhisk, alpha_rad: float, left: float) -> float:
+def _left_of_bend(seen: SeenWhisk, alpha_rad: float) -> float:
     """Return what α seen may be off by because the line that it rests on is not straight, rad.
 
     It is a share of what taking the bend out changes α by, the same in all whisks; 0 where no line is
@@ -197,14 +202,16 @@ def _left_of_bend(seen: SeenWhisk, alpha_rad: float, left: float) -> float:
     centred = d.across_y_mm - d.across_y_mm.mean()
     slope = float(centred @ d.across_z_mm / np.sum(centred**2))
     bent_rad = alpha_rad - (abs(seen.beta_rad.value) - np.arctan(abs(slope)))
-    of_taper = (1.0 + 0.5 / left) / 1.5 - 1.0
-    return float(max(_BEND_LEFT, of_taper) * bent_rad)
+    return float(_BEND_LEFT * bent_rad)
 
 
-def _straight_line(d: Deflection, beta: float, weights: np.ndarray) -> tuple[float, float]:
+def _straight_line(
+    d: Deflection, beta: float, weights: np.ndarray, left: float
+) -> tuple[float, float]:
     """Return α, rad, and the slope of d_z against d_y, without what bends that line.
 
-    weights (frames,): of the slope of a line. α is needed for that bend, and found in a few rounds.
+    weights (frames,): of the slope of a line. left: share of the base's diameter that the whisker has at
+    the contact. α is needed for that bend, and found in a few rounds.
     """
     slope = float(weights @ d.across_z_mm)
     side = np.copysign(1.0, slope)
@@ -213,7 +220,7 @@ def _straight_line(d: Deflection, beta: float, weights: np.ndarray) -> tuple[flo
     for _ in range(_ROUNDS):
         alpha = beta - np.arctan(side * slope)
         across_rad = np.arctan(np.tan(alpha) * np.cos(heading_rad))
-        phi = slip_angle(d.theta_rad, beta, across_rad)
+        phi = slip_angle(d.theta_rad, beta, across_rad, left)
         bent_mm = d.across_y_mm * (np.tan(phi) - np.tan(beta - alpha))
         slope = float(weights @ (d.across_z_mm - side * bent_mm))
     return float(alpha), slope

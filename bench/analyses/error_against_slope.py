@@ -160,7 +160,9 @@ def errors_with_friction(results: Sequence[TrialResult]) -> list[tuple[float, Ju
     alpha_deg = {}
     for result, seen, _ in whisks(results):
         if seen.deflection is not None:
-            alpha_deg[result.trial.name, seen.whisk] = math.degrees(seen_friction(seen)[0])
+            alpha_deg[result.trial.name, seen.whisk] = math.degrees(
+                seen_friction(seen, result.whisker)[0]
+            )
     found = []
     for one in measured(results):
         alpha = alpha_deg.get((one.trial, one.whisk), math.nan)

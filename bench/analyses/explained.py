@@ -122,7 +122,7 @@ def explained_rows(results: Iterable[TrialResult], whisker: Whisker) -> Iterator
         answers = [row for row in felt.estimates if row.estimator == "with_friction"]
         if not answers or not seen.has_truth:
             continue
-        alpha_rad, sigma_rad = seen_friction(seen)
+        alpha_rad, sigma_rad = seen_friction(seen, result.whisker)
         yield {
             "trial": result.trial.name,
             "whisk": seen.whisk,

@@ -78,7 +78,7 @@ class WhiskModel:
     @property
     def alpha_rad(self) -> float:
         """Return its friction angle, as well as it is known: as seen, as felt, as assumed."""
-        seen, _ = seen_friction(self.seen)
+        seen, _ = seen_friction(self.seen, self.whisker.beam)
         felt, _ = felt_friction(self.seen, self.felt, self.theta_rad)
         assumed = self.given.alpha_est_rad if self.given else NAN
         for alpha in (seen, felt):

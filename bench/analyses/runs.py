@@ -219,7 +219,8 @@ def _runs(
     """Yield (10) with α fitted and seen, where known, and at the kinetic ends, where there are any."""
     whisk = whisk_of(felt, again.theta_rad, again.beam)
     fitted = (fit.alpha_rad, fit.sigma_rad) if fit else (np.nan, np.nan)
-    for name, (alpha_rad, sigma_rad) in ((FITTED, fitted), (SEEN, seen_friction(seen))):
+    by_pictures = seen_friction(seen, again.beam)
+    for name, (alpha_rad, sigma_rad) in ((FITTED, fitted), (SEEN, by_pictures)):
         if np.isfinite(alpha_rad):
             alpha = (max(alpha_rad, 0.0), sigma_rad)
             yield again.evaluate(name, with_friction, whisk, alpha)

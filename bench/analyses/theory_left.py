@@ -46,7 +46,8 @@ def as_theory_has_them(
     share = first_order.rolling_at(theta, reach, slope, d_x_mm, left)
     share = share + along * first_order.dragging(theta, alpha_rad) + bent**2 / (6 * left)
     size = np.hypot(m_y, m_z) * (1.0 + np.nan_to_num(share * left))
-    turned = _turn_of_force(theta, slope, along, alpha_rad)
+    known_left = np.where(np.isfinite(left), left, 1.0)
+    turned = _turn_of_force(theta, slope, along, alpha_rad, known_left)
     phi = np.copysign(np.maximum(np.abs(phi) - turned, 0.0), phi)
     return size[:, None] * np.stack([np.sin(phi), np.cos(phi)], axis=1)
 
@@ -61,11 +62,16 @@ def _share_along(phi: np.ndarray, bent: np.ndarray, alpha_rad: float) -> np.ndar
 
 
 def _turn_of_force(
-    theta: np.ndarray, slope: np.ndarray, along: np.ndarray, alpha_rad: float
+    theta: np.ndarray,
+    slope: np.ndarray,
+    along: np.ndarray,
+    alpha_rad: float,
+    left: np.ndarray,
 ) -> np.ndarray:
     """Return by how much (n,), rad, the force turns away from slope − α over a push by theta.
 
     along (n,): share of friction that acts along the whisker, which is missing across it.
+    left (n,): share of the diameter at the base that the whisker has at the contact.
     """
     across_rad = np.arctan(np.tan(alpha_rad) * np.sqrt(1.0 - along**2))
-    return slip_angle(theta, slope, across_rad) - (slope - alpha_rad)
+    return slip_angle(theta, slope, across_rad, left) - (slope - alpha_rad)

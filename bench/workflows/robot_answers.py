@@ -274,7 +274,7 @@ def _expected_whisk(whisk: _ConvertedWhisk, theta_rad: float) -> Whisk:
 
 def _friction_angle_rad(whisk: _ConvertedWhisk) -> float:
     """Return the friction angle as it was seen, not below 0; α_est where it was not."""
-    alpha_rad, _ = seen_friction(whisk.seen)
+    alpha_rad, _ = seen_friction(whisk.seen, whisk.task.unit.session.whisker.beam)
     if np.isfinite(alpha_rad):
         return max(alpha_rad, 0.0)
     return whisk.task.unit.settings.alpha_est_rad

@@ -216,7 +216,7 @@ def cells(row: WhiskRow, estimators: list[str]) -> list[Cell]:
     trial = row.result.trial
     speed = math.nan if trial.speed_deg_s is None else trial.speed_deg_s
     slip = seen.at.slip_mm if seen.at is not None else UNKNOWN
-    alpha = Value(*seen_friction(seen))
+    alpha = Value(*seen_friction(seen, row.result.whisker))
     fixed = [
         Cell(trial.surface, wide=True),
         Cell(f"{speed:g}" if math.isfinite(speed) else MISSING, speed, wide=True),

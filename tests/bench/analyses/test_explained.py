@@ -21,20 +21,23 @@ from vision.truth.records import SeenObject
 from vision.truth.value import Value
 
 
+WIRE = Beam(8836.0, 100.0)
+
+
 @pytest.mark.parametrize("trial", ["b30_3", "b60_4"])
 def test_friction_as_seen_is_the_true_one(exact_record, steel_signals, trial):
     """10.5°, within 0.3°: near |β| − α = 20° slip along the whisker takes some of the friction (equations.md)."""
     record = exact_record(load_session(steel_signals).trial(trial))
-    alpha, sigma = np.degrees(seen_friction(record))
+    alpha, sigma = np.degrees(seen_friction(record, WIRE))
     assert alpha == pytest.approx(10.5, abs=0.3)
     assert 0.0 < sigma < 0.5
 
 
 def test_an_offset_common_to_all_deflections_drops_out(exact_record, steel_signals):
     record = exact_record(load_session(steel_signals).trial("b60_4"))
-    before = seen_friction(record)[0]
+    before = seen_friction(record, WIRE)[0]
     raised = replace(record.deflection, across_z_mm=record.deflection.across_z_mm + 0.2)
-    assert seen_friction(replace(record, deflection=raised))[0] == pytest.approx(before, abs=1e-9)
+    assert seen_friction(replace(record, deflection=raised), WIRE)[0] == pytest.approx(before, abs=1e-9)
 
 
 def solid(shape: str) -> SeenObject:
@@ -52,8 +55,8 @@ def test_along_a_sphere_alpha_is_that_at_theta_and_along_a_cone_the_deflections_
         shape: replace(record, at=at, truth=replace(record.truth, rounded=solid(shape)))
         for shape in ("sphere", "ring", "cone")
     }
-    assert seen_friction(of["sphere"]) == seen_friction(of["ring"]) == (0.2, 0.01)
-    assert seen_friction(of["cone"]) == seen_friction(record)
+    assert seen_friction(of["sphere"], WIRE) == seen_friction(of["ring"], WIRE) == (0.2, 0.01)
+    assert seen_friction(of["cone"], WIRE) == seen_friction(record, WIRE)
     felt = FeltWhisk(0, phi_felt_rad=Value(0.85, 0.01))
     assert np.isnan(felt_friction(of["sphere"], felt, 0.05)).all()
     assert felt_friction(of["cone"], felt, 0.05) == felt_friction(record, felt, 0.05)
@@ -62,7 +65,7 @@ def test_along_a_sphere_alpha_is_that_at_theta_and_along_a_cone_the_deflections_
 
 def test_no_slip_no_friction_angle(exact_record, steel_signals):
     record = exact_record(load_session(steel_signals).trial("b00_2"))
-    assert np.isnan(seen_friction(record)).all()
+    assert np.isnan(seen_friction(record, WIRE)).all()
 
 
 def test_shares_add_up_and_what_remains_is_small(steel_signals, exact_vision, tmp_path):

@@ -150,10 +150,9 @@ def test_friction_along_the_whisker_counts():
     bent = d.across_y_mm * np.tan(
         slip_angle(d.theta_rad, np.radians(60.0), np.arctan(np.tan(ALPHA) * cos))
     )
-    assert seen_friction(replace(seen, deflection=replace(wandering, across_z_mm=bent)))[
-        0
-    ] == pytest.approx(ALPHA, abs=1e-4)
-    assert seen_friction(seen)[0] == pytest.approx(ALPHA, abs=1e-6)
+    bent_whisk = replace(seen, deflection=replace(wandering, across_z_mm=bent))
+    assert seen_friction(bent_whisk, WHISKER.beam)[0] == pytest.approx(ALPHA, abs=1e-4)
+    assert seen_friction(seen, WHISKER.beam)[0] == pytest.approx(ALPHA, abs=1e-6)
 
 
 @pytest.mark.parametrize(
