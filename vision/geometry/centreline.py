@@ -6,10 +6,12 @@ motor. A round rod that is pushed at one point bends in the plane of its tangent
 tangent angle grows as the integral of (contact - s)/EI(s) up to the contact and stays constant
 beyond. For a uniform rod that is 2u - u², u = s/contact. The force stands across the whisker at the
 contact, so that a bent rod has shorter levers towards its base: the bend's square adds what
-`bend_growth` says, and so does friction along it.
+`bend_growth` says, and so does friction along it. A whisker that is curved without load leaves that
+plane and twists: its sections turn as a straight one's do, and by the difference of the curvatures
+that the force makes of the two, bent alike (one step of Picard's from the straight rod).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -30,6 +32,14 @@ _LEAST_FORWARD2 = 0.01
 # [1] Radius of a tapering rod over that at its base: a fit's wild step past the tip stays finite.
 # Stated.
 _LEAST_RADIUS = 1e-3
+# [rad] Least bend whose direction is asked for. Derived.
+_LEAST_BEND_RAD = 1e-12
+# [1] EI over the torsional rigidity of a round rod, less one, is Poisson's ratio: of metals and of
+# polymers 0.3 to 0.4. Stated.
+TORSION_OVER_BENDING = 0.35
+
+# Components x, y, z, each (…, m) or a number.
+_Vectors = tuple[np.ndarray | float, np.ndarray | float, np.ndarray | float]
 
 
 def tangent_growth(
@@ -191,11 +201,9 @@ def centrelines(
     arc = np.linspace(0.0, wire.length_mm, _NODES)
     share = arc / wire.length_mm
     own_slope = rest_slope(np.array(wire.rest_mm), share)
-    lateral = (rest_slope(rest_mm, share) + own_slope) / wire.length_mm
-    lateral = lateral + _slope_by_bend(
-        np.asarray(bend_rad), np.asarray(pull)[..., None], arc, np.asarray(contact_mm), wire
-    )
-    tangents = _tangents(lateral)
+    rest_tangents = _tangents((rest_slope(rest_mm, share) + own_slope) / wire.length_mm)
+    bend = _Bend.of(np.asarray(bend_rad), np.asarray(pull), arc, np.asarray(contact_mm), wire)
+    tangents = np.stack(np.broadcast_arrays(*bend.turned(rest_tangents)), axis=-1)
     points = simpson() @ tangents * arc[1]
     points[..., 1:] += rest_mm[..., None, :, 0]
     rotation = np.swapaxes(rotation_z(motor_rad), -1, -2)
@@ -208,14 +216,131 @@ def _tangents(lateral: np.ndarray) -> np.ndarray:
     return np.concatenate([np.sqrt(forward2), lateral], axis=-1)
 
 
-def _slope_by_bend(
-    bend_rad: np.ndarray, pull: np.ndarray, arc_mm: np.ndarray, contact_mm: np.ndarray, wire: Wire
-) -> np.ndarray:
-    """Return y and z (…, m, 2) of the tangents by bends (…, 2): sines of the tangent angle."""
-    turn = np.linalg.norm(bend_rad, axis=-1)[..., None]
-    growth = bend_growth(turn, pull, arc_mm, contact_mm[..., None], wire)
-    sine = np.where(turn > 1e-12, np.sin(turn * growth) / np.maximum(turn, 1e-12), growth)
-    return sine[..., None] * bend_rad[..., None, :]
+@dataclass(frozen=True, eq=False)
+class _Bend:
+    """The bend of one point force, at the nodes of a curve.
+
+    axis: y and z of the unit vector about which a straight whisker turns, each (…, 1), and
+    straight_rad (…, m), by how much. strength (…, 1): the force in base stiffnesses. pull (…, 1):
+    as of `centrelines`. softness (m,): base stiffness over that at a node. before (…, m): 1 before
+    the contact, 0 past it. at_contact (…, m): weights of the nodes that give a value there.
+    """
+
+    axis: tuple[np.ndarray, np.ndarray]
+    straight_rad: np.ndarray
+    strength: np.ndarray
+    pull: np.ndarray
+    softness: np.ndarray
+    before: np.ndarray
+    at_contact: np.ndarray
+    step_mm: float
+
+    @classmethod
+    def of(
+        cls,
+        bend_rad: np.ndarray,
+        pull: np.ndarray,
+        arc_mm: np.ndarray,
+        contact_mm: np.ndarray,
+        wire: Wire,
+    ) -> "_Bend":
+        """Return the bend with arguments as of `centrelines`; arc_mm (m,): of the nodes."""
+        turn = np.linalg.norm(bend_rad, axis=-1)[..., None]
+        direction = bend_rad / np.maximum(turn, _LEAST_BEND_RAD)
+        contact_mm = contact_mm[..., None]
+        pull = pull[..., None]
+        step_mm = arc_mm[1]
+        steps_to_contact = (contact_mm - arc_mm) / step_mm
+        radius = np.maximum(1.0 - wire.taper_per_mm * arc_mm, _LEAST_RADIUS)
+        return cls(
+            axis=(-direction[..., 1:], direction[..., :1]),
+            straight_rad=turn * bend_growth(turn, pull, arc_mm, contact_mm, wire),
+            strength=turn / _turn(contact_mm, contact_mm, wire.taper_per_mm),
+            pull=pull,
+            softness=radius**-4.0,
+            before=np.clip(steps_to_contact + 0.5, 0.0, 1.0),
+            at_contact=np.maximum(1.0 - np.abs(steps_to_contact), 0.0),
+            step_mm=step_mm,
+        )
+
+    def turned(self, rest_tangents: np.ndarray) -> _Vectors:
+        """Return the tangents of a whisker whose tangents without load are rest_tangents (…, m, 3)."""
+        rest = (rest_tangents[..., 0], rest_tangents[..., 1], rest_tangents[..., 2])
+        about_y, about_z = self.axis
+        straight = self._planar_curvature()
+        turn = (0.0, self.straight_rad * about_y, self.straight_rad * about_z)
+        x, y, z = self._curvature(_rotated(turn, rest))
+        added = (x, y - straight * about_y, z - straight * about_z)
+        added_rad = self._integrals(added)
+        whole = _sum(turn, added_rad)
+        # Turns about different axes do not add up: the second term of Magnus' series.
+        half_rad = self._integrals(_cross((x, y, z), whole))
+        return _rotated(_sum(whole, tuple(0.5 * one for one in half_rad)), rest)
+
+    def _planar_curvature(self) -> np.ndarray:
+        """Return the curvature (…, m), 1/mm, that the force makes of a straight whisker so bent."""
+        forward = np.cos(self.straight_rad)
+        aside = np.sin(self.straight_rad)
+        lever = self._levers((forward, aside))
+        along = self._at_contact((forward, aside))
+        force = (self.pull * along[0] - along[1], self.pull * along[1] + along[0])
+        moment = lever[0] * force[1] - lever[1] * force[0]
+        return self.strength * self.softness * self.before * moment
+
+    def _curvature(self, tangents: _Vectors) -> _Vectors:
+        """Return the curvature, 1/mm, and the twist that the force makes of a whisker so bent."""
+        lever = self._levers(tangents)
+        along = self._at_contact(tangents)
+        across = _cross((0.0, *self.axis), along)
+        norm = np.sqrt(_dot(across, across))
+        norm = np.maximum(norm, _LEAST_BEND_RAD)
+        force = tuple(a / norm + self.pull * t for a, t in zip(across, along))
+        moment = _cross(lever, force)
+        twist = TORSION_OVER_BENDING * _dot(moment, tangents)
+        scale = self.strength * self.softness * self.before
+        return tuple(scale * (m + twist * t) for m, t in zip(moment, tangents))
+
+    def _integrals(self, vectors: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+        """Return the integrals of components (…, m) from the base to each node."""
+        return tuple(one @ simpson().T * self.step_mm for one in vectors)
+
+    def _levers(self, tangents: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+        """Return components (…, m) of the way from each node to the contact, mm."""
+        points = self._integrals(tangents)
+        return tuple(at - one for at, one in zip(self._at_contact(points), points))
+
+    def _at_contact(self, vectors: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+        """Return components (…, 1) at the contact."""
+        return tuple(np.sum(self.at_contact * one, axis=-1, keepdims=True) for one in vectors)
+
+
+def _rotated(turn_rad: _Vectors, vectors: _Vectors) -> _Vectors:
+    """Return vectors rotated by rotation vectors."""
+    angle = np.sqrt(_dot(turn_rad, turn_rad))
+    sine = np.sinc(angle / np.pi)
+    versine = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
+    first = _cross(turn_rad, vectors)
+    second = _cross(turn_rad, first)
+    return tuple(v + sine * a + versine * b for v, a, b in zip(vectors, first, second))
+
+
+def _cross(a: _Vectors, b: _Vectors) -> _Vectors:
+    """Return the vector products."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def _dot(a: _Vectors, b: _Vectors) -> np.ndarray:
+    """Return the scalar products."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _sum(a: _Vectors, b: _Vectors) -> _Vectors:
+    """Return the sums."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @lru_cache
