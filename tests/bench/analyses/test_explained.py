@@ -20,7 +20,6 @@ from vision.truth.at_angle import TruthAtAngle
 from vision.truth.records import SeenObject
 from vision.truth.value import Value
 
-
 WIRE = Beam(8836.0, 100.0)
 
 
@@ -37,7 +36,9 @@ def test_an_offset_common_to_all_deflections_drops_out(exact_record, steel_signa
     record = exact_record(load_session(steel_signals).trial("b60_4"))
     before = seen_friction(record, WIRE)[0]
     raised = replace(record.deflection, across_z_mm=record.deflection.across_z_mm + 0.2)
-    assert seen_friction(replace(record, deflection=raised), WIRE)[0] == pytest.approx(before, abs=1e-9)
+    assert seen_friction(replace(record, deflection=raised), WIRE)[0] == pytest.approx(
+        before, abs=1e-9
+    )
 
 
 def solid(shape: str) -> SeenObject:
