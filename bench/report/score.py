@@ -76,7 +76,7 @@ def score_all(
     found: list[Score] = []
     try:
         for session, out in runs:
-            found += _scores(session, out)
+            found += scores_of(session, out)
         gauge_lines = list(_gauge_lines(runs[0][0], gauges))
     except (OSError, ValueError, KeyError, IndexError) as problem:
         return [f"the truth files cannot be read: {type(problem).__name__} {problem}"]
@@ -94,7 +94,7 @@ def _joined(scores: Sequence[Score]) -> Score:
     return Score(scores[0].name, scores[0].unit, errors, sigmas)
 
 
-def _scores(session: Session, out: Path) -> Iterator[Score]:
+def scores_of(session: Session, out: Path) -> Iterator[Score]:
     """Yield the score of every quantity of a run of which a true value is known."""
     truths = []
     for row in _read_rows(out / "whisks.csv"):
