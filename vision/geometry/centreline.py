@@ -35,7 +35,7 @@ _LEAST_RADIUS = 1e-3
 # [rad] Least bend whose direction is asked for. Derived.
 _LEAST_BEND_RAD = 1e-12
 # [1] EI over the torsional rigidity of a round rod, less one, is Poisson's ratio: of metals and of
-# polymers 0.3 to 0.4. Stated.
+# polymers. Stated.
 TORSION_OVER_BENDING = 0.35
 
 # Components x, y, z, each (…, m) or a number.

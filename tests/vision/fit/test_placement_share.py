@@ -65,7 +65,10 @@ def test_files_and_subsets_keep_it(loose, tmp_path):
 def test_the_budget_tells_rig_board_from_lenses(loose):
     scene, rng = scene_of(0.1), np.random.default_rng(2)
     problem = as_problem(scene, loose, *given(scene, rng), line_points(scene, rng))
-    state, answer = solve(problem, begin(problem), scales=SCALES)
+    near, _ = solve(problem, begin(problem), scales=SCALES)
+    state, answer = solve(
+        problem, near, scales=SCALES
+    )  # derivatives that nearly cancel are those at the end
     _, by = jacobians(problem, state)
     gradient = by.whisk["d_x"]
 
