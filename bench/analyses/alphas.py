@@ -24,8 +24,8 @@ from vision import Value
 # [1] Share of what bends the line of d_z against d_y that is left when it is taken out. Study:
 # tests/studies/accuracy/combined_numbers.py.
 _BEND_LEFT = 1 / 4
-# [1] Sigma of α seen over the square of the unloaded whisker's slope at the contact: nine whisks of vibrissae with
-# s² = 0.01 to 0.016 are off by up to 0.6 s². Study: tests/studies/accuracy/species.py.
+# [1] Sigma of α seen over the square of the unloaded whisker's slope at the contact: six whisks of a vibrissa with
+# s² = 0.01 to 0.016 are off by up to 0.7 s². Study: tests/studies/accuracy/species.py.
 _SET_LEFT = 1 / 2
 _ROUNDS = 12  # each leaves less than half of the change up to a heading of 45°
 # Terms of θ² are enough up to here: pushed by 8, 16 and 25 degrees against a bar at 40, α seen is off by 0.03, 0.3 and
