@@ -339,6 +339,14 @@ _TABLE = (
     ),
     Status("signals_mended", WARNING, "{label}: {count} {cause} mended", _LOOK_AT_FILE),
     Status(
+        "whisker_curved",
+        WARNING,
+        "the whisker turns by {turn_deg:.0f}° up to its tip, and gauges and estimates take it as straight: "
+        "touched there, d_x is off by up to {d_x_percent:.1f} % and a gauge trial's moment by up to "
+        "{moment_percent:.1f} %; nearer to the base by the square of the part of the length less",
+        "touch it near its base",
+    ),
+    Status(
         "speed_unlike_stated",
         WARNING,
         "the motor goes at another speed than is stated",

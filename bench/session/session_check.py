@@ -17,6 +17,7 @@ from bench.session.frame_times import frame_times
 from bench.session.session import Session, load_session
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
+from bench.session.whisker import Whisker
 from vision.calibration import read_cameras
 from vision.geometry import Reason, Refused, counted
 from vision.pictures import (
@@ -30,6 +31,13 @@ from vision.pictures import (
 
 Size: TypeAlias = tuple[int, int]  # width, height, px
 _MOST_NAMED = 5  # frames in one line
+# [1/rad²] Of d_x by (10), at most: its error where the whisker turns by so much up to its contact, and is
+# taken as straight. Study: curved_whiskers.py.
+_D_X_BY_TURN2 = 0.36
+# [1/rad²] Likewise of the moment that calibrates gauges. Study: curved_whiskers.py.
+_MOMENT_BY_TURN2 = 1.8
+# [1] Of d_x: below, straight will do; noise and touch are off by more. Stated.
+_STRAIGHT_ENOUGH = 0.002
 
 
 def checked_session(
@@ -70,9 +78,25 @@ def _check(views: Sequence[Session], problems: InputProblems) -> None:
         trials = view.trials
         for trial in count_parts(trials, "recordings read", len(trials)):
             check_recording(trial, problems)
+        _warn_of_curvature(view.whisker, problems)
     check_sizes(views[0], problems)
     for names, line in _copies(views[0]):
         problems.warn(line, names)
+
+
+def _warn_of_curvature(whisker: Whisker, problems: InputProblems) -> None:
+    """Warn where gauges and estimates, which take the whisker as straight, are off by that."""
+    turn2 = whisker.turn_rad**2
+    if _D_X_BY_TURN2 * turn2 < _STRAIGHT_ENOUGH:
+        return
+    problems.warn(
+        reason(
+            "whisker_curved",
+            turn_deg=np.degrees(whisker.turn_rad),
+            d_x_percent=100 * _D_X_BY_TURN2 * turn2,
+            moment_percent=100 * _MOMENT_BY_TURN2 * turn2,
+        )
+    )
 
 
 def _copies(session: Session) -> Iterator[tuple[list[str], Reason]]:

@@ -52,6 +52,11 @@ class Whisker(WhiskerKeys):
         return of_curvature(self.rest_curvature_per_mm, self.length_mm)
 
     @property
+    def turn_rad(self) -> float:
+        """Return by how much the unloaded whisker turns from its base, at most."""
+        return math.asin(max(steepest_slopes(self.unloaded_mm, self.length_mm)))
+
+    @property
     def wire(self) -> Wire:
         """Return the rod that the cameras see."""
         return Wire(

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from bench.base.input_problems import InputProblems
 from bench.session.session import load_session
+from bench.session.session_check import checked_session
 from tests.scenes.refusals import refusal
+from vision.geometry import as_reason
 from vision.geometry.centreline import centrelines
 
 LENGTH_MM = 100.0  # of the sample's whisker
@@ -150,3 +153,14 @@ def test_a_shape_is_stated_once(session):
     trace(session, STRAIGHT)
     state(session, "rest_curvature_per_mm = [0.001, 0.0]")
     assert "give either rest_curvature_per_mm or rest_shape" in refusal(session)
+
+
+@pytest.mark.parametrize(("curvature", "said"), [([0.002, -0.001], True), ([0.0005, 0.0], False)])
+def test_a_curved_whisker_is_said_to_be_taken_as_straight(session, curvature, said):
+    """0.36 · 0.224² = 1.8 % of d_x at the tip, and 0.36 · 0.05² = 0.09 %, which is nothing beside noise."""
+    state(session, f"rest_curvature_per_mm = {curvature}")
+    problems = InputProblems()
+    checked_session(session, problems)
+    found = [line for line in problems.warnings if as_reason(line).codes == ("whisker_curved",)]
+    assert len(found) == said
+    assert all("turns by 13° up to its tip" in line and "1.8 %" in line for line in found)
