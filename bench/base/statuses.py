@@ -341,9 +341,9 @@ _TABLE = (
     Status(
         "whisker_curved",
         WARNING,
-        "the whisker turns by {turn_deg:.0f}° up to its tip, and gauges and estimates take it as straight: "
-        "touched there, d_x is off by up to {d_x_percent:.1f} % and a gauge trial's moment by up to "
-        "{moment_percent:.1f} %; nearer to the base by the square of the part of the length less",
+        "the whisker turns by {turn_deg:.0f}° up to its tip, and estimates take it as straight: touched "
+        "there, d_x is off by up to {d_x_percent:.1f} %; nearer to the base by the square of the part of "
+        "the length less",
         "touch it near its base",
     ),
     Status(

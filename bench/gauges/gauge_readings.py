@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.gauges.clamped_rod import moment_at_clamp
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import FeltStroke, gauge_delay, late_by
 from bench.gauges.matrix import to_follicle
+from bench.gauges.whisker_rods import SeenContacts, WhiskerRod, rod_of
 from bench.records.trial_result import Deflection, SeenWhisk
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
-from estimator.beam import rigidity_at
 from estimator.signal import FeltTouch, MomentAt
 from vision import Value
 
@@ -155,10 +154,12 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
         return None
     across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
     along = d.along_mm[good]
+    contacts = SeenContacts(along, across, d.theta_rad[good], d.d_x_mm)
     share = _share_along_rod(across, along, d.slip_mm[good], d.slip_sigma_mm[good])
+    rod = rod_of(whisker)
     try:
-        moments, by_friction = _with_friction(along, across, share.value, whisker)
-        by_place = _by_place(along, across, share.value, whisker)
+        moments, by_friction = _with_friction(contacts, share.value, rod)
+        by_place = _by_place(contacts, share.value, rod)
     except ArithmeticError:
         return None
     by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
@@ -198,21 +199,19 @@ def source_of(seen: SeenWhisk) -> str:
     return SEEN if seen.has_truth else WIRE_ALONE
 
 
-def _by_place(
-    along: np.ndarray, across: np.ndarray, share: np.ndarray, whisker: Whisker
-) -> np.ndarray:
+def _by_place(contacts: SeenContacts, share: np.ndarray, rod: WhiskerRod) -> np.ndarray:
     """Return the derivatives (2n, 3n) of moments by where contacts are along, across z and across y.
 
     Further along the wire the deflection grows too; what is left of both is in the covariance of
     the places.
     """
-    n = len(along)
+    n = len(contacts.along_mm)
     frames = np.arange(n)
-    step_mm = _STEP_SHARE * float(along.max())
-    here, _ = _with_friction(along, across, share, whisker)
+    step_mm = _STEP_SHARE * float(contacts.along_mm.max())
+    here, _ = _with_friction(contacts, share, rod)
     rows = np.zeros((n, 2, n, 3))
     for k, step in enumerate(step_mm * np.eye(3)):
-        moved, _ = _with_friction(along + step[0], across + step[1:], share, whisker)
+        moved, _ = _with_friction(contacts.moved(step), share, rod)
         rows[frames, :, frames, k] = (moved - here) / step_mm
     return rows.reshape(2 * n, 3 * n)
 
@@ -249,22 +248,12 @@ def _share_along_rod(
 
 
 def _with_friction(
-    along: np.ndarray, across: np.ndarray, share: np.ndarray, whisker: Whisker
+    contacts: SeenContacts, share: np.ndarray, rod: WhiskerRod
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return moments (n, 2) in the hub's axes, and their change per unit of the friction coefficient."""
-    size = np.linalg.norm(across, axis=1)
-
-    def rigidity(arc: np.ndarray) -> np.ndarray:
-        """Return EI (n,) at arc lengths (n,), N·mm²."""
-        return rigidity_at(arc, whisker.EI_Nmm2, whisker.length_mm, whisker.beam.taper)
-
-    def direction_times(moment: np.ndarray) -> np.ndarray:
-        """Return moments (n, 2) of these sizes (n,)."""
-        return (moment / size)[:, None] * across
-
-    rough = moment_at_clamp(along, size, rigidity, -_FRICTION * share)
-    smooth = moment_at_clamp(along, size, rigidity)
-    return direction_times(rough), direction_times((rough - smooth) / _FRICTION)
+    rough = rod.moments_Nmm(contacts, -_FRICTION * share)
+    smooth = rod.moments_Nmm(contacts, 0.0)
+    return rough, (rough - smooth) / _FRICTION
 
 
 def _common_cause(effect: np.ndarray) -> np.ndarray:
@@ -285,8 +274,9 @@ def reference_from_nominal(
     theta = _NOMINAL_THETA_RAD
     radii_mm = 0.5 * trial.bar_diameter_mm + float(whisker.wire.radius_mm(trial.d_x_mm))
     along, across = _nominal_contacts(theta, trial.d_x_mm, radii_mm)
+    contacts = SeenContacts(along, across, theta, trial.d_x_mm)
     try:
-        moments, by_friction = _with_friction(along, across, np.ones_like(theta), whisker)
+        moments, by_friction = _with_friction(contacts, np.ones_like(theta), rod_of(whisker))
     except ArithmeticError:
         return None
     by_touch = touch.sigma_rad * moments / theta[:, None]

@@ -34,8 +34,6 @@ _MOST_NAMED = 5  # frames in one line
 # [1/rad²] Of d_x by (10), at most: its error where the whisker turns by so much up to its contact, and is
 # taken as straight. Study: curved_whiskers.py.
 _D_X_BY_TURN2 = 0.36
-# [1/rad²] Likewise of the moment that calibrates gauges. Study: curved_whiskers.py.
-_MOMENT_BY_TURN2 = 1.8
 # [1] Of d_x: below, straight will do; noise and touch are off by more. Stated.
 _STRAIGHT_ENOUGH = 0.002
 
@@ -85,7 +83,7 @@ def _check(views: Sequence[Session], problems: InputProblems) -> None:
 
 
 def _warn_of_curvature(whisker: Whisker, problems: InputProblems) -> None:
-    """Warn where gauges and estimates, which take the whisker as straight, are off by that."""
+    """Warn where estimates, which take the whisker as straight, are off by that."""
     turn2 = whisker.turn_rad**2
     if _D_X_BY_TURN2 * turn2 < _STRAIGHT_ENOUGH:
         return
@@ -94,7 +92,6 @@ def _warn_of_curvature(whisker: Whisker, problems: InputProblems) -> None:
             "whisker_curved",
             turn_deg=np.degrees(whisker.turn_rad),
             d_x_percent=100 * _D_X_BY_TURN2 * turn2,
-            moment_percent=100 * _MOMENT_BY_TURN2 * turn2,
         )
     )
 

@@ -1,7 +1,7 @@
 """Felt against seen, whisk by whisk: the moments at the base that follow from the seen shape, and
 those that were felt.
 
-The former are the exact rod's through the contact (`bench.gauges.clamped_rod`), frame by frame; the
+The former are the exact rod's through the contact (`bench.gauges.whisker_rods`), frame by frame; the
 latter are the channels at the same motor angles. Both rise from nothing at touch on a line, so
 their slopes are compared, two numbers with one covariance: of pictures, distance, friction along
 the rod, noise, zero, gauges and the follicle's turn.

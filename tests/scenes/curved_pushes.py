@@ -11,6 +11,7 @@ from bench.rig.elastic_rod import RestShape, Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
+from bench.session.whisker import Whisker
 
 # A rat's vibrissa, as `simulate --protocol vibrissa` has it.
 VIBRISSA = Rod("cone", 45.0, 0.2, 3.0, rest=RestShape(45.0, 0.0, -3.0, -4.0))
@@ -78,3 +79,15 @@ def deflection(rod: Rod, touch, state) -> tuple[float, np.ndarray]:
     beyond = point[0] - d_x
     along = d_x / np.cos(theta) - d_y * np.sin(theta) + beyond * np.cos(theta)
     return along, np.array([d_z, d_y * np.cos(theta) + beyond * np.sin(theta)])
+
+
+def whisker_of(rod: Rod) -> Whisker:
+    """Return the whisker whose session states a rod of even curvature."""
+    curvature = 2.0 / rod.length_mm**2 * np.array([rod.rest.set_y_mm, rod.rest.set_z_mm])
+    return Whisker(
+        shape=rod.shape,
+        length_mm=rod.length_mm,
+        diameter_mm=rod.diameter_mm,
+        youngs_modulus_GPa=rod.youngs_modulus_GPa,
+        rest_curvature_per_mm=curvature.tolist(),
+    )

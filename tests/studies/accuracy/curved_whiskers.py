@@ -16,12 +16,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.gauges.clamped_rod import moment_at_clamp
+from bench.gauges.whisker_rods import CurvedRod, SeenContacts, StraightRod
 from bench.rig.elastic_rod import RestShape, Rod
 from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings, Whisk
-from tests.scenes.curved_pushes import VIBRISSA, CurvedPush, Felt, feel
+from tests.scenes.curved_pushes import VIBRISSA, CurvedPush, Felt, feel, whisker_of
 
 BETAS_DEG = (-60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0)
 PARTS = (0.4, 0.6, 0.8)  # of the length, where the contact is
@@ -42,14 +42,12 @@ def error_of_10(push: CurvedPush, felt: Felt) -> float:
     return 100 * (found.d_x_mm / felt.d_x_mm - 1)
 
 
-def error_of_straight_gauge(push: CurvedPush, felt: Felt) -> float:
-    """Without the friction along the rod that no gauge knows, which is some 0.2 % at 3 degrees."""
-    rod = push.rod
-    size = np.linalg.norm(felt.across_mm)
-    moment = moment_at_clamp(
-        felt.along_mm, size, lambda arc: rod.rigidity_Nmm2 * rod.width(arc) ** 4
-    )
-    off = moment[0] * felt.across_mm / size - felt.moments_Nmm
+def error_of_gauge(push: CurvedPush, felt: Felt, kind: type) -> float:
+    """Without the friction along the rod, of which gauges know the half: with it some 0.5 % at 0 degrees."""
+    theta = np.radians([push.theta_deg])
+    along = np.array([felt.along_mm])
+    contacts = SeenContacts(along, felt.across_mm[None], theta, felt.d_x_mm)
+    off = kind(whisker_of(push.rod)).moments_Nmm(contacts, 0.0)[0] - felt.moments_Nmm
     return 100 * float(np.linalg.norm(off) / np.linalg.norm(felt.moments_Nmm))
 
 
@@ -62,11 +60,13 @@ def curved(rod: Rod, turn_deg: float, side: tuple[int, int]) -> Rod:
 
 def lines() -> Iterator[str]:
     yield "vibrissa of the protocol, d_x 20 mm, theta 3 deg, friction 0.3: slope, (10), gauges' moment"
+    yield "of a straight and of the curved rod"
     for beta in BETAS_DEG:
         push = CurvedPush(beta_deg=beta)
         felt = feel(push)
         ten = error_of_10(push, felt)
-        yield f"{beta:+4.0f} deg {ten:+6.2f} % {error_of_straight_gauge(push, felt):5.2f} %"
+        gauges = [error_of_gauge(push, felt, kind) for kind in (StraightRod, CurvedRod)]
+        yield f"{beta:+4.0f} deg {ten:+6.2f} % {gauges[0]:5.2f} % {gauges[1]:5.2f} %"
     yield "largest of four sides and of 0, 40, -40 deg less that of the straight whisker, over the square of the"
     yield "turn at the contact [rad]: shape, part of the length, turn to the tip, (10), gauges' moment"
     for shape, rod in STRAIGHT.items():
@@ -87,7 +87,7 @@ def _worst(rod: Rod, part: float, turn_deg: float) -> np.ndarray:
         for beta in (0.0, 40.0, -40.0):
             push = CurvedPush(rod=bent, beta_deg=beta, d_x_mm=part * rod.length_mm)
             felt = feel(push)
-            errors.append([error_of_10(push, felt), error_of_straight_gauge(push, felt)])
+            errors.append([error_of_10(push, felt), error_of_gauge(push, felt, StraightRod)])
     return np.max(errors, axis=0)
 
 

@@ -1,0 +1,212 @@
+"""The moments at the clamp of a curved, tapering rod from where a contact holds it: exact, the bench's own.
+
+Kirchhoff's inextensible rod of round section. A section has turned by Q from the unloaded shape, whose
+tangents are t₀: the tangent is t = Q t₀, and Q' = [κ]× Q with κ = (m + ν t (t·m))/EI and m = p × F, p
+being the way from the section to the contact. At the contact p and m are nothing, so all is known there
+but the force, and the rod is marched from the contact to its clamp. Newton's method finds the force
+and the arc that lead to the contact that is seen. Antman, Nonlinear Problems of Elasticity, chapter 8.
+
+All is solved in the rod's own units: lengths in the chord c from the clamp to the contact, forces in
+EI/c², with EI at the clamp.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import polynomial
+from scipy.integrate import solve_ivp
+
+from bench.session.rest_shape import RestShape
+
+# [1] EI over the torsional rigidity, less one, is Poisson's ratio: of metals and of polymers. Stated.
+_POISSON = 0.35
+# [steps] Of Newton's method: from the unloaded rod, in steps of `_LONGEST_STEP`. Stated.
+_MOST_STEPS = 40
+# [1] The most that one step moves the contact, in chords; within it the linear rod foretells the
+# bent one. Stated.
+_LONGEST_STEP = 0.2
+# [1] Last step in the rod's units: the next is smaller by the error of the derivatives, 1e-5. Derived.
+_LAST_STEP = 1e-9
+# [1] Step of differences in the rod's units: the root of the march's error. Derived.
+_DIFFERENCE = 1e-5
+# [1] Error of the march over the size of what is marched, a millionth of what pictures know. Stated.
+_MARCH_ERROR = 1e-10
+# [1] Width of a rod over that at its clamp: a contact nearer to a point than this bends nothing. Stated.
+_LEAST_WIDTH = 0.01
+# [rounds] Of Newton's method for an arc on the unloaded rod, from a turn of 60° to rounding. Derived.
+_ROUNDS = 12
+# Gauss–Legendre on −1…1: of the forward part of an unloaded shape of sixth degree. Derived.
+_GAUSS = np.polynomial.legendre.leggauss(24)
+
+
+@dataclass(frozen=True)
+class UnloadedRod:
+    """The rod without load. rest_mm: as `bench.session.rest_shape` has it, over length_mm."""
+
+    rest_mm: RestShape
+    length_mm: float
+
+    def tangent(self, arc_mm: np.ndarray) -> np.ndarray:
+        """Return unit tangents (..., 3) at arc lengths (...)."""
+        share = np.asarray(arc_mm) / self.length_mm
+        tangent = np.empty((*share.shape, 3))
+        for k, slope in enumerate(self._slopes):
+            tangent[..., k + 1] = polynomial.polyval(share, slope, tensor=False)
+        tangent[..., 0] = np.sqrt(1.0 - tangent[..., 1] ** 2 - tangent[..., 2] ** 2)
+        return tangent
+
+    @cached_property
+    def _slopes(self) -> list[np.ndarray]:
+        """Return the coefficients of y and z of the tangents, by the share of the length."""
+        return [polynomial.polyder(own) / self.length_mm for own in self.rest_mm]
+
+    def point_mm(self, arc_mm: np.ndarray) -> np.ndarray:
+        """Return points (..., 3) at arc lengths (...)."""
+        arc = np.asarray(arc_mm)
+        at, weights = _GAUSS
+        within = 0.5 * arc[..., None] * (1.0 + at)
+        x = 0.5 * arc * (self.tangent(within)[..., 0] @ weights)
+        y, z = (polynomial.polyval(arc / self.length_mm, own) - own[0] for own in self.rest_mm)
+        return np.stack([x, y, z], axis=-1)
+
+    def arc_along_mm(self, direction: np.ndarray, distance_mm: np.ndarray) -> np.ndarray:
+        """Return the arcs (n,) whose points are so far (n,) along directions (n, 3)."""
+        arc = np.array(distance_mm, dtype=float)
+        for _ in range(_ROUNDS):
+            missing = distance_mm - np.sum(self.point_mm(arc) * direction, axis=-1)
+            arc = arc + missing / np.sum(self.tangent(arc) * direction, axis=-1)
+        return arc
+
+    def point_at_distance_mm(self, distance_mm: float) -> np.ndarray:
+        """Return the point (3,) that is so far from the clamp."""
+        arc = distance_mm
+        for _ in range(_ROUNDS):
+            point = self.point_mm(arc)
+            reached = float(np.linalg.norm(point))
+            arc = arc + (distance_mm - reached) * reached / float(point @ self.tangent(arc))
+        return self.point_mm(arc)
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedRods:
+    """Rods of one whisker, held at contacts (n, 3), mm, in the hub's axes.
+
+    rest: of the whisker. taper: share of the diameter that is lost up to its length.
+    clamp_rigidity_Nmm2: EI at the clamp.
+    """
+
+    rest: UnloadedRod
+    taper: float
+    clamp_rigidity_Nmm2: float
+    contacts_mm: np.ndarray
+
+    def moments_Nmm(self, friction: np.ndarray, deflection_mm: np.ndarray) -> np.ndarray:
+        """Return m_y and m_z (n, 2) of the clamp on the rods, N·mm.
+
+        friction (n,): friction over the force across the rod at the contact, positive where it pulls
+        towards the clamp. deflection_mm (n, 3): about how far the contact is from the unloaded rod.
+        Raises ArithmeticError where no equilibrium is found.
+        """
+        chord = np.linalg.norm(self.contacts_mm, axis=1)
+        wanted = self.contacts_mm / chord[:, None]
+        unknowns = self._start(deflection_mm, chord)
+        for _ in range(_MOST_STEPS):
+            tried = self._with_differences(unknowns)  # (4, n, 3)
+            points, forces = self._march(tried, friction, chord)
+            missing = wanted - points[0]
+            by_unknowns = np.moveaxis(points[1:] - points[0], 0, -1) / _DIFFERENCE
+            step = np.linalg.solve(by_unknowns, missing[..., None])[..., 0]
+            if not np.isfinite(step).all():
+                break
+            if np.abs(step).max() < _LAST_STEP:
+                moments = -np.cross(points[0], forces[0])
+                return moments[:, 1:] * (self.clamp_rigidity_Nmm2 / chord)[:, None]
+            size = np.linalg.norm(missing, axis=1, keepdims=True)
+            unknowns = unknowns + step * np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
+        raise ArithmeticError("no equilibrium found of a curved rod that is bent so far")
+
+    def _start(self, deflection_mm: np.ndarray, chord: np.ndarray) -> np.ndarray:
+        """Return a guess (n, 3) of the force's two components across the rod's end, and of the arc."""
+        direction = self.contacts_mm / chord[:, None]
+        arc = self.rest.arc_along_mm(direction, chord)
+        _, first, second = self._end_axes(arc)
+        deflection = 3.0 * deflection_mm / chord[:, None]
+        across = [np.sum(deflection * axis, axis=1) for axis in (first, second)]
+        return np.column_stack([*across, arc / chord])
+
+    def _end_axes(self, arc_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the unloaded tangents (..., 3) at arcs (...), and two directions across each."""
+        tangent = self.rest.tangent(arc_mm)
+        first = np.array([0.0, 1.0, 0.0]) - tangent[..., 1:2] * tangent
+        first = first / np.linalg.norm(first, axis=-1, keepdims=True)
+        return tangent, first, np.cross(tangent, first)
+
+    @staticmethod
+    def _with_differences(unknowns: np.ndarray) -> np.ndarray:
+        """Return unknowns (4, n, 3): as they are, and each moved by a small step."""
+        tried = np.repeat(unknowns[None], 4, axis=0)
+        for k in range(3):
+            tried[k + 1, :, k] += _DIFFERENCE
+        return tried
+
+    def _march(
+        self, unknowns: np.ndarray, friction: np.ndarray, chord: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """March rods from contact to clamp; return contacts and forces (..., n, 3) in the hub's axes.
+
+        unknowns (..., n, 3): two components of the force across the rod's end, and the arc; friction,
+        chord (n,). While marching, the axes are those in which the rod's end has not turned.
+        """
+        arc = unknowns[..., 2]
+        if np.any(1.0 - self.taper * arc * chord / self.rest.length_mm < _LEAST_WIDTH):
+            raise ArithmeticError("the contact is too near the end of a rod that ends in a point")
+        tangent, first, second = self._end_axes(arc * chord)
+        pull = -friction * np.hypot(unknowns[..., 0], unknowns[..., 1])
+        force = pull[..., None] * tangent
+        force = force + unknowns[..., :1] * first + unknowns[..., 1:2] * second
+        lead = arc.shape
+
+        def change(left, state):
+            """Return the change of turns and ways by the share of the arc that lies behind, 0 to 1."""
+            turn, way = _unpacked(state, lead)
+            at_mm = (1.0 - left) * arc * chord
+            tangent = (turn @ self.rest.tangent(at_mm)[..., None])[..., 0]
+            moment = (_cross_matrices(way) @ force[..., None])[..., 0]
+            twist = np.sum(tangent * moment, axis=-1, keepdims=True)
+            width2 = (1.0 - self.taper * at_mm / self.rest.length_mm) ** 2
+            curvature = (arc / width2**2)[..., None] * (moment + _POISSON * twist * tangent)
+            turned = _cross_matrices(curvature) @ turn
+            return np.concatenate([-turned.ravel(), (arc[..., None] * tangent).ravel()])
+
+        begin = np.concatenate(
+            [np.broadcast_to(np.eye(3), (*lead, 3, 3)).ravel(), np.zeros(force.size)]
+        )
+        how = {"method": "DOP853", "rtol": _MARCH_ERROR, "atol": _MARCH_ERROR}
+        marched = solve_ivp(change, (0.0, 1.0), begin, t_eval=[1.0], **how)
+        if not marched.success:
+            raise ArithmeticError("no equilibrium found of a curved rod that is bent so far")
+        turn, way = _unpacked(marched.y[:, -1], lead)
+        to_hub = np.swapaxes(turn, -1, -2)
+        return (
+            np.einsum("...ij,...j->...i", to_hub, way),
+            np.einsum("...ij,...j->...i", to_hub, force),
+        )
+
+
+def _cross_matrices(vectors: np.ndarray) -> np.ndarray:
+    """Return the matrices (..., 3, 3) that map b to a × b, for vectors a (..., 3)."""
+    matrices = np.zeros((*vectors.shape, 3))
+    matrices[..., 0, 1] = -vectors[..., 2]
+    matrices[..., 0, 2] = vectors[..., 1]
+    matrices[..., 1, 0] = vectors[..., 2]
+    matrices[..., 1, 2] = -vectors[..., 0]
+    matrices[..., 2, 0] = -vectors[..., 1]
+    matrices[..., 2, 1] = vectors[..., 0]
+    return matrices
+
+
+def _unpacked(state: np.ndarray, lead: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return turns (*lead, 3, 3) and ways to the contact (*lead, 3) of a state."""
+    count = 9 * int(np.prod(lead))
+    return state[:count].reshape(*lead, 3, 3), state[count:].reshape(*lead, 3)

@@ -1,0 +1,101 @@
+"""The rod that a whisker is to its gauges: straight, or curved; chosen once, by what is stated of it."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.gauges.clamped_rod import moment_at_clamp
+from bench.gauges.curved_rod import CurvedRods, UnloadedRod
+from bench.session.whisker import Whisker
+from estimator.beam import rigidity_at
+
+
+@dataclass(frozen=True, eq=False)
+class SeenContacts:
+    """Where contacts of one whisk are, as `bench.records.trial_result.Deflection` has them.
+
+    along_mm (n,), across_mm (n, 2), along z and y: relative to the unbent whisker. theta_rad (n,):
+    pushing angles. d_x_mm: radial distance of first touch.
+    """
+
+    along_mm: np.ndarray
+    across_mm: np.ndarray
+    theta_rad: np.ndarray
+    d_x_mm: float
+
+    def moved(self, step_mm: np.ndarray) -> "SeenContacts":
+        """Return the contacts moved by a step (3,): along, across z and across y."""
+        return replace(
+            self, along_mm=self.along_mm + step_mm[0], across_mm=self.across_mm + step_mm[1:]
+        )
+
+
+class WhiskerRod(ABC):
+    """A clamped rod of which it is seen where a contact holds it."""
+
+    @abstractmethod
+    def moments_Nmm(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
+        """Return m_y and m_z (n, 2) at the clamp, N·mm, in the hub's axes.
+
+        friction: friction over normal force along the rod at the contact, one or (n,), positive
+        where it pulls towards the clamp. Raises ArithmeticError where no equilibrium is found.
+        """
+
+
+@dataclass(frozen=True)
+class StraightRod(WhiskerRod):
+    """A whisker that is straight without load: it bends in the plane of clamp and force."""
+
+    whisker: Whisker
+
+    def moments_Nmm(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
+        """Return m_y and m_z (n, 2) at the clamp, N·mm, in the hub's axes."""
+        size = np.linalg.norm(contacts.across_mm, axis=1)
+        moment = moment_at_clamp(contacts.along_mm, size, self._rigidity_Nmm2, friction)
+        return (moment / size)[:, None] * contacts.across_mm
+
+    def _rigidity_Nmm2(self, arc_mm: np.ndarray) -> np.ndarray:
+        """Return EI at arc lengths."""
+        whisker = self.whisker
+        return rigidity_at(arc_mm, whisker.EI_Nmm2, whisker.length_mm, whisker.beam.taper)
+
+
+@dataclass(frozen=True)
+class CurvedRod(WhiskerRod):
+    """A whisker that is stated to be curved without load: it bends and twists in space."""
+
+    whisker: Whisker
+
+    def moments_Nmm(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
+        """Return m_y and m_z (n, 2) at the clamp, N·mm, in the hub's axes."""
+        whisker = self.whisker
+        rest = UnloadedRod(whisker.unloaded_mm, whisker.length_mm)
+        unbent, deflection = _in_hub(rest, contacts)
+        rods = CurvedRods(rest, whisker.beam.taper, whisker.EI_Nmm2, unbent + deflection)
+        friction = np.broadcast_to(np.asarray(friction, float), contacts.along_mm.shape)
+        return rods.moments_Nmm(friction, deflection)
+
+
+def _in_hub(rest: UnloadedRod, contacts: SeenContacts) -> tuple[np.ndarray, np.ndarray]:
+    """Return the virtual points of the unbent whisker and the contacts less these (n, 3), hub's axes.
+
+    The virtual point is as far along the contact frame's x axis as the contact at touch, that is as
+    the whisker at d_x. What the seen unbent whisker differs from the stated one by has cancelled.
+    """
+    c = np.cos(contacts.theta_rad)
+    s = np.sin(contacts.theta_rad)
+    back_mm = contacts.along_mm - contacts.d_x_mm / c
+    across_z_mm, across_y_mm = contacts.across_mm.T
+    d_y_mm = c * across_y_mm - s * back_mm
+    first_mm = rest.point_at_distance_mm(contacts.d_x_mm)[0]
+    beyond_mm = s * across_y_mm + c * back_mm + contacts.d_x_mm - first_mm
+    forward = np.stack([c, -s, 0.0 * c], axis=1)  # the contact frame's x axis
+    virtual = rest.point_mm(rest.arc_along_mm(forward, np.full_like(c, first_mm)))
+    deflection = [c * beyond_mm - s * d_y_mm, -s * beyond_mm - c * d_y_mm, across_z_mm]
+    return virtual, np.stack(deflection, axis=1)
+
+
+def rod_of(whisker: Whisker) -> WhiskerRod:
+    """Return the rod of a whisker as it is stated to be."""
+    return CurvedRod(whisker) if whisker.turn_rad > 0 else StraightRod(whisker)
