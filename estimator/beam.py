@@ -83,11 +83,12 @@ def taper_of(shape: str, tip_share: float | None = None) -> float:
 
 @dataclass(frozen=True)
 class Beam:
-    """A straight whisker, clamped at its base: cylinder, cone, or a cone cut off ("tapered").
+    """A whisker, clamped at its base: cylinder, cone, or a cone cut off ("tapered").
 
     C_Nmm2 is 3EI at the base (the C of equation (1)); tip_share, of "tapered" alone, is the tip's
-    diameter over the base's. Raises ValueError for anything but a positive C and length, and as
-    `taper_of` does.
+    diameter over the base's. rest_mm: the unloaded whisker, polynomials in the share of the length of
+    y and z, lowest power first; all equations but the exact rod's take it as straight. Raises ValueError
+    for anything but a positive C and length, and as `taper_of` does.
 
     All of them have one compliance: θ/m = d/C with 1/d = 1/d_x − τ/L, τ being the share of the
     diameter that is lost up to the tip, since ∫(d_x − s)²/(1 − τs/L)⁴ ds = d_x²·d/3. So every
@@ -99,12 +100,14 @@ class Beam:
     length_mm: float
     shape: str = "cylinder"
     tip_share: float | None = None
+    rest_mm: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,), (0.0,))
 
     def __post_init__(self):
         """Raise ValueError unless C and length are positive and the shape is a known one."""
         require_positive("C_Nmm2", self.C_Nmm2, "N·mm²")
         require_positive("length_mm", self.length_mm, "mm")
         taper_of(self.shape, self.tip_share)
+        object.__setattr__(self, "rest_mm", tuple(tuple(own) for own in self.rest_mm))
 
     @classmethod
     def from_modulus(

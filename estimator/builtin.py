@@ -11,6 +11,7 @@ from dataclasses import replace
 from math import hypot, isnan, nan, sqrt
 
 from estimator import distance, first_order, uncertainty
+from estimator.exact_rod import UNCONVERGED, Reach, contact_by_exact_rod
 from estimator.reasons import NamedReason
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
@@ -21,6 +22,10 @@ TIP = NamedReason(
     "farther than {:.1f} mm (95 %)",
 )
 NEARER = NamedReason("only_nearer_known", "known only to be nearer than {:.1f} mm (95 %)")
+
+# [1] Of (10): the exact rod's equations have other roots, which are no push; curvature and large angles
+# move the distance by some 0.1. Stated.
+_MOST_FROM_10 = 0.4
 
 
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
@@ -62,6 +67,38 @@ def corrected(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     )
 
 
+def exact_rod(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
+    """Estimate by the exact rod of the stated unloaded shape, with the assumed friction cone angle.
+
+    The object's radius is as in `corrected`. The interval has the shape of that of (10). Where (10)
+    has no distance, this has none; where no bent rod is found and (10) is at the tip, so is this.
+    """
+    ten = _with_friction(whisk, settings, _share_of_rod)
+    if isnan(ten.d_x_mm):
+        return ten
+    felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad)
+    contact = contact_by_exact_rod(felt, whisk.beam, _reach(settings), is_held(whisk))
+    if contact is None or abs(contact.d_x_mm / ten.d_x_mm - 1) > _MOST_FROM_10:
+        at_tip = ten.d_x_mm == whisk.beam.length_mm
+        return ten if at_tip else Estimate(nan, nan, UNCONVERGED)
+    d_x = contact.d_x_mm
+    factor = d_x / ten.d_x_mm
+    low = ten.low_mm * factor
+    high = min(ten.high_mm * factor, whisk.beam.length_mm)
+    model = _share_of_rod(whisk, settings, d_x, whisk.beam.left(d_x))
+    sigma = hypot(uncertainty.sigma(contact.gradient, **_errors(whisk, settings)), model * d_x)
+    return replace(
+        ten,
+        d_x_mm=d_x,
+        sigma_mm=max(sigma, _sigma_by_friction(whisk, settings, d_x, low, high)),
+        status=NEARER.format(high) if low == 0 else "",
+        low_mm=low,
+        high_mm=high,
+        beta_rad=ten.beta_rad if is_held(whisk) else contact.beta_rad,
+        gradient=contact.gradient,
+    )
+
+
 def frictionless(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Estimate by equation (12): slip accounted for, as if there were no friction."""
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, whisk.beam.C_Nmm2)
@@ -100,6 +137,7 @@ ESTIMATORS = {
     "with_friction": with_friction,
     "frictionless": frictionless,
     "corrected": corrected,
+    "exact_rod": exact_rod,
 }
 # Estimators whose distance does not depend on the assumed friction angle.
 WITHOUT_ALPHA = (no_slip, frictionless)
@@ -177,10 +215,23 @@ def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
         return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
     of_inputs = uncertainty.sigma(gradient, **_errors(whisk, settings))
     sigma = hypot(of_inputs * left**2, model * tapered)
-    if beam.taper and settings.alpha_est_sigma_rad > 0 and low > 0:
-        sigma = max(sigma, hypot(tapered - low, high - tapered) / (sqrt(2) * uncertainty.Z_95))
+    sigma = max(sigma, _sigma_by_friction(whisk, settings, tapered, low, high))
     estimate = Estimate(tapered, sigma, "", low, high, gradient=gradient * left**2)
     return _up_to_tip(estimate, beam.length_mm, clamp)
+
+
+def _sigma_by_friction(whisk, settings, d_x, low, high):
+    """Return the least sigma of a tapering whisker's distance, by the sides of its interval; 0 elsewhere."""
+    if whisk.beam.taper and settings.alpha_est_sigma_rad > 0 and low > 0:
+        return hypot(d_x - low, high - d_x) / (sqrt(2) * uncertainty.Z_95)
+    return 0.0
+
+
+def _reach(settings):
+    """Return what lies between centreline and the object's axis."""
+    if isnan(settings.object_radius_mm):
+        return Reach(settings.object_reach_mm, 0.0)
+    return Reach(settings.object_radius_mm, settings.whisker_radius_mm)
 
 
 def _errors(whisk, settings):
@@ -272,6 +323,19 @@ def _share_left(whisk, settings, d_x, left):
         left=left,
         held_spread=first_order.HELD_SPREAD if is_held(whisk) else 1.0,
     )
+
+
+def _share_of_rod(whisk, settings, d_x, left):
+    """Return the relative sigma of the exact rod: the object's lean and radius, and friction along the rod."""
+    if isnan(d_x) or settings.object_reach_mm == 0:
+        return 0.0
+    theta = whisk.theta_at_rad
+    alpha = settings.alpha_est_rad
+    unknown_reach = settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0
+    leaning = first_order.leaning(theta, settings.tilt_sigma_rad, _phi(whisk), alpha)
+    rolling = first_order.rolling(theta, unknown_reach, _phi(whisk), alpha, d_x, left)
+    dragging = first_order.HELD_SPREAD * first_order.dragging(theta, alpha)
+    return hypot(leaning, rolling, dragging)
 
 
 def _reason(whisk, alpha_est, high):

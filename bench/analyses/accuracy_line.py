@@ -14,6 +14,7 @@ _ASSUMPTIONS = {
     "with_friction": "a friction angle of {alpha_est_deg:g}°",
     "frictionless": "a surface without friction",
     "corrected": "a friction angle of {alpha_est_deg:g}°, and corrects for the object's thickness",
+    "exact_rod": "a friction angle of {alpha_est_deg:g}°, and the stated unloaded shape",
     FITTED: "the friction angle fitted to the other whisks of the surface",
     SEEN: "the friction angle that the cameras saw, which no robot has",
     KINETIC: "a friction angle of {alpha_est_deg:g}° where the moments show that the contact slides",

@@ -28,7 +28,7 @@ from bench.records.trial_result import (
 from bench.session.whisker import Whisker
 from bench.trials.estimates import Estimator, answer, whisk_of
 from estimator.beam import Beam
-from estimator.builtin import corrected, with_friction
+from estimator.builtin import corrected, exact_rod, with_friction
 from estimator.friction import FrictionFit
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
@@ -39,7 +39,11 @@ FITTED = "with_friction_fitted"
 SEEN = "with_friction_seen"
 KINETIC = "with_friction_kinetic"
 RUNS = (FITTED, SEEN, KINETIC)
-ASSUMING = {GIVEN: with_friction, "corrected": corrected}  # take α_est as given
+ASSUMING = {
+    GIVEN: with_friction,
+    "corrected": corrected,
+    "exact_rod": exact_rod,
+}  # take α_est as given
 
 
 def alpha_est_sigma(found: Iterable[FittedSurface], settings: Settings) -> float:

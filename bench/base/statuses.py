@@ -341,10 +341,10 @@ _TABLE = (
     Status(
         "whisker_curved",
         WARNING,
-        "the whisker turns by {turn_deg:.0f}° up to its tip, and estimates take it as straight: touched "
-        "there, d_x is off by up to {d_x_percent:.1f} %; nearer to the base by the square of the part of "
-        "the length less",
-        "touch it near its base",
+        "the whisker turns by {turn_deg:.0f}° up to its tip, and all estimates but the exact rod's take "
+        "it as straight: touched there, (10) is off by up to {d_x_percent:.1f} %; nearer to the base by "
+        "the square of the part of the length less",
+        "take the exact rod's estimate, or touch it near its base",
     ),
     Status(
         "speed_unlike_stated",
@@ -546,6 +546,12 @@ _TABLE = (
     Status("not_pushing", REFUSAL, "m_z is not positive"),
     Status("moments_up_slope", REFUSAL, "m_y points up the slope, too strongly for a contact"),
     Status("beyond_friction", REFUSAL, "phi + alpha_est is 90 degrees or more", _GENTLER),
+    Status(
+        "rod_unconverged",
+        REFUSAL,
+        "no bent rod has these moments at this friction angle",
+        "take (10) there, and look at the friction angle and at [whisker]",
+    ),
     Status("distance_not_positive", REFUSAL, "the distance d_x is not positive"),
     Status("distance_out_of_range", REFUSAL, "the distance is beyond the range of a float"),
     Status("radius_not_positive", REFUSAL, "the radius of curvature is not positive"),

@@ -79,7 +79,7 @@ ESTIMATES = Table(
         Column(
             "estimator",
             "no_slip (2), with_friction (10), frictionless (12), corrected ((10) less the first "
-            "order of its error), with_friction_fitted and with_friction_seen (α fitted to the "
+            "order of its error), exact_rod, with_friction_fitted and with_friction_seen (α fitted to the "
             "other whisks, or as seen), with_friction_kinetic (at the kinetic ends of teeth); with "
             "a load cell touch_alone, moment_rate, force_and_moment; or one's own",
             Kind.TEXT,

@@ -88,7 +88,7 @@ class WhiskerKeys(GivenKeys):
     flexural_rigidity_Nmm2: Rigidity | None = None
     flexural_rigidity_sigma_Nmm2: StiffnessSigma = 0.0
     # curvature [y, z] of the unloaded whisker in its base frame: at arc length s it lies κ s²/2
-    # aside. Pictures correct it; estimates take the whisker as straight
+    # aside. Pictures correct it; estimates but the exact rod's take it as straight
     rest_curvature_per_mm: Curvature | None = None
     # or a table beside session.toml, such as "rest.csv", of its shape
     rest_shape: str | None = None

@@ -83,7 +83,7 @@ def _check(views: Sequence[Session], problems: InputProblems) -> None:
 
 
 def _warn_of_curvature(whisker: Whisker, problems: InputProblems) -> None:
-    """Warn where estimates, which take the whisker as straight, are off by that."""
+    """Warn where estimates by equations, which take the whisker as straight, are off by that."""
     turn2 = whisker.turn_rad**2
     if _D_X_BY_TURN2 * turn2 < _STRAIGHT_ENOUGH:
         return

@@ -92,7 +92,7 @@ class Whisker(WhiskerKeys):
         tip_share = None
         if self.tip_diameter_mm is not None:
             tip_share = self.tip_diameter_mm / self.diameter_mm
-        return Beam(self.C_Nmm2, self.length_mm, self.shape, tip_share)
+        return Beam(self.C_Nmm2, self.length_mm, self.shape, tip_share, self.unloaded_mm)
 
     @property
     def C_sigma_Nmm2(self) -> float:

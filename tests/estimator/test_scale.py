@@ -60,14 +60,16 @@ class Scene:
     beta: float
     alpha: float
     noise: float
+    turn: float = 0.0
 
     def beam(self, unit: Units) -> Beam:
         shape = ("cylinder",) if self.loss == 0 else ("cone",)
         if 0 < self.loss < 1:
             shape = ("tapered", 1 - self.loss)
-        return Beam.from_rigidity(
-            self.rigidity_Nmm2 * unit.rigidity, self.length_mm * unit.length, *shape
-        )
+        length = self.length_mm * unit.length
+        tip = 0.5 * self.turn * length
+        beam = Beam.from_rigidity(self.rigidity_Nmm2 * unit.rigidity, length, *shape)
+        return replace(beam, rest_mm=((0.0, 0.0, tip), (0.0, 0.0, -0.5 * tip)))
 
     def felt(self, unit: Units, *, alpha=None, beta=None, theta=None) -> np.ndarray:
         """Return θ, m_y, m_z."""
@@ -130,6 +132,7 @@ scenes = st.builds(
     beta=st.floats(-1.2, 1.2),
     alpha=st.floats(0.0, 0.5),
     noise=st.floats(1e-5, 0.03),
+    turn=st.floats(-0.4, 0.4),
 )
 
 

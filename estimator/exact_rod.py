@@ -1,0 +1,333 @@
+"""The exact model inverted: distance, slope and force of a contact from the moments at the base.
+
+A rod of any unloaded shape and taper, bent by as much as it takes, against a straight bar that stands at
+right angles to the base's direction at first touch. Sections turn by Q from the unloaded shape, of
+tangents t₀: t = Q t₀, Q' = [κ]× Q, κ = (m + ν t (t·m))/EI, m = p × F, with p the way to the contact. From
+the contact, where p = 0, the rod is marched to its base. Five unknowns, the force there, the arc and the
+heading of the motion over the bar, satisfy five equations: both moments; friction is against the motion,
+along the rod too; the bar, whose slope follows from the force and α_est as in (9), is the one that the
+unloaded rod first touched; and the heading is that of the path since then.
+
+All is solved in the rod's own units: lengths in the whisker's, forces in EI/L², moments in EI/L.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import nan
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from estimator import first_order
+from estimator.beam import Beam
+from estimator.distance import with_friction
+from estimator.reasons import NamedReason
+
+UNCONVERGED = NamedReason(
+    "rod_unconverged",
+    "no bent rod has these moments, at this friction angle, up to 97 % of the whisker",
+)
+# [1] EI over the torsional rigidity, less one, is Poisson's ratio: of metals and of polymers. Stated.
+_POISSON = 0.35
+# [steps] Of Runge and Kutta's fourth order from contact to base. Study: exact_rod.py.
+_STEPS = 12
+# [1] Unknowns: the force, the arc, and the heading of the motion from sideways. Derived.
+_COUNT = 5
+# [1] The rod is drawn along itself by the square of the push, and so at the end twice as fast as in the
+# mean. Derived.
+_LATE = 2.0
+# [steps] Of Newton's method before it is given up. Stated.
+_MOST_ROUNDS = 25
+# [1] Last step over the unknowns: the next is smaller by the error of the derivatives. Derived.
+_LAST_STEP = 1e-8
+# [1] The most that one step changes force or arc, in parts. Stated.
+_LONGEST_STEP = 0.3
+# [1] Step of central differences in parts: they are off by its square, and by rounding over it and
+# over θ. Derived.
+_DIFFERENCE = 1e-4
+# [1] Part of the whisker up to which a contact is sought: a cone's point bends as if it were nothing.
+# Stated.
+_FARTHEST = 0.97
+# [1] Part of the whisker from which on. Stated.
+_NEAREST = 0.01
+# Gauss–Legendre on −1…1, of the forward part of an unloaded shape. Derived.
+_GAUSS = np.polynomial.legendre.leggauss(12)
+# [rounds] Of Newton's method for the arc of first touch, each some tenth as far off. Derived.
+_TOUCH_ROUNDS = 10
+
+
+@dataclass(frozen=True)
+class RodContact:
+    """The contact of the exact model: distance, mm, and slope, rad; gradients (4,) by θ, m_y, m_z, α_est."""
+
+    d_x_mm: float
+    beta_rad: float
+    gradient: np.ndarray
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What lies between centreline and the bar's axis, mm: radius_mm, and a rod's radius that tapers to the
+    contact, of rod_radius_mm at the base.
+    """
+
+    radius_mm: float
+    rod_radius_mm: float
+
+
+@lru_cache(maxsize=64)
+def contact_by_exact_rod(
+    felt: tuple[float, float, float, float], beam: Beam, reach: Reach, held: bool
+) -> RodContact | None:
+    """Return the contact of θ, m_y, m_z and α_est; None where no bent rod has these.
+
+    held: whether friction holds the contact sideways, and so acts along the rod; the slope is then known
+    to α_est only, and returned as that without friction.
+    """
+    moment_unit = beam.rigidity_Nmm2 / beam.length_mm
+    unit = np.array([1.0, moment_unit, moment_unit, 1.0])
+    with np.errstate(all="ignore"):
+        solved = _Rod(beam, reach, held).solve(np.array(felt) / unit)
+    if solved is None:
+        return None
+    d_x, beta, gradient = solved
+    return RodContact(d_x * beam.length_mm, beta, gradient * beam.length_mm / unit)
+
+
+class _Rod:
+    """The equations of one whisker in its own units."""
+
+    def __init__(self, beam: Beam, reach: Reach, held: bool):
+        """Take the whisker and what lies between it and the bar's axis."""
+        self.taper = beam.taper
+        self.held = held
+        self.radius = reach.radius_mm / beam.length_mm
+        self.rod_radius = reach.rod_radius_mm / beam.length_mm
+        self.rest = [np.array(own) / beam.length_mm for own in beam.rest_mm]
+        self.slopes = [polynomial.polyder(own) for own in self.rest]
+
+    def tangent(self, arc: np.ndarray) -> np.ndarray:
+        """Return unloaded tangents (..., 3) at arcs (...)."""
+        y, z = (polynomial.polyval(arc, slope, tensor=False) for slope in self.slopes)
+        return np.stack(np.broadcast_arrays(np.sqrt(1.0 - y**2 - z**2), y, z), axis=-1)
+
+    def point(self, arc: np.ndarray) -> np.ndarray:
+        """Return unloaded points (..., 3) at arcs (...)."""
+        at, weights = _GAUSS
+        x = 0.5 * arc * (self.tangent(0.5 * arc[..., None] * (1.0 + at))[..., 0] @ weights)
+        y, z = (polynomial.polyval(arc, own, tensor=False) - own[0] for own in self.rest)
+        return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+
+    def solve(self, inputs: np.ndarray) -> tuple[float, float, np.ndarray] | None:
+        """Return distance, slope and the distance's gradient (4,) by the inputs θ, m_y, m_z, α_est (4,).
+
+        None where Newton's method ends nowhere.
+        """
+        unknowns = self._start(inputs)
+        for _ in range(_MOST_ROUNDS):
+            sizes = _sizes(unknowns)
+            values, by_unknowns = self._by_unknowns(unknowns, inputs)
+            step = _solved(by_unknowns[:_COUNT], -values[:_COUNT])
+            part = np.abs(step / sizes).max()
+            if not np.isfinite(part):
+                return None
+            unknowns = unknowns + step * min(1.0, _LONGEST_STEP / max(part, _LONGEST_STEP))
+            unknowns[3] = np.clip(unknowns[3], _NEAREST, _FARTHEST)
+            if part < _LAST_STEP:
+                return self._solution(unknowns, inputs)
+        return None
+
+    def _solution(
+        self, unknowns: np.ndarray, inputs: np.ndarray
+    ) -> tuple[float, float, np.ndarray]:
+        """Return distance, slope and the distance's gradient where the equations hold."""
+        values, by_unknowns = self._by_unknowns(unknowns, inputs)
+        moment = np.hypot(inputs[1], inputs[2])
+        steps = _steps(np.array([inputs[0], moment, moment, 1.0]))
+        tried = np.broadcast_to(unknowns, (len(steps), _COUNT))
+        by_inputs = _differences(self._values(tried, inputs + steps), steps)
+        change = _solved(by_unknowns[:_COUNT], -by_inputs[:_COUNT])
+        gradient = by_inputs[_COUNT] + by_unknowns[_COUNT] @ change
+        return float(values[_COUNT]), float(values[_COUNT + 1]), gradient
+
+    def _by_unknowns(
+        self, unknowns: np.ndarray, inputs: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return residuals, distance and slope (7,), and their derivatives by the unknowns (7, 5)."""
+        steps = _steps(_sizes(unknowns))
+        values = self._values(unknowns + steps, np.broadcast_to(inputs, (len(steps), 4)))
+        return values[:, 0], _differences(values, steps)
+
+    def _start(self, inputs: np.ndarray) -> np.ndarray:
+        """Return a guess (5,) of force, arc and heading by (10), or by its tip or middle where it has none."""
+        theta, m_y, m_z, alpha = inputs.tolist()
+        as_cylinder = with_friction(theta, m_y, m_z, alpha, 3.0)
+        arc = 1.0 / (1.0 / as_cylinder + self.taper) if as_cylinder > 0 else 0.5
+        arc = min(arc, 0.9)
+        turn = 1.5 * np.hypot(m_y, m_z) * arc / 3.0  # of the rod's end
+        return np.array([-turn * np.hypot(m_y, m_z) / arc, -m_z / arc, m_y / arc, arc, 0.0])
+
+    def _values(self, unknowns: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Return the five residuals, the distance and the slope (7, n) of n sets of unknowns and inputs."""
+        theta, m_y, m_z, alpha = inputs.T
+        arc = unknowns[:, 3]
+        heading = unknowns[:, 4]
+        point, force, tangent = self._march(unknowns[:, :3], arc)
+        felt = -np.cross(point, force)
+        size = np.hypot(m_y, m_z)
+        point, force, tangent = (_turned(each, theta) for each in (point, force, tangent))
+        sideways, lengthways = self._friction(alpha, heading)
+        beta = _slope(force, sideways)
+        bar = np.stack([0.0 * beta, np.sin(beta), np.cos(beta)], axis=1)
+        lean = _dot(tangent, bar)
+        along = (_dot(force, tangent) - lean * _dot(force, bar)) / np.linalg.norm(force, axis=1)
+        axis = point - _normal(tangent, bar) * self._reach(arc)
+        first, first_axis, first_arc = self._first_touch(axis[:, 0], bar, arc)
+        across = np.stack([0.0 * beta, -np.cos(beta), np.sin(beta)], axis=1)
+        moved = _dot(point - first, bar)
+        drawn = arc - first_arc - (_dot(point - first, tangent) - lean * moved)
+        residuals = [
+            (felt[:, 1] - m_y) / size,
+            (felt[:, 2] - m_z) / size,
+            along - lengthways,
+            _dot(axis - first_axis, across) / theta,
+            heading if self.held else heading - np.arctan2(_LATE * drawn, np.abs(moved)),
+        ]
+        return np.stack([*residuals, np.linalg.norm(first, axis=1), beta])
+
+    def _friction(self, alpha: np.ndarray, heading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return friction sideways and along the rod, away from the base, over the force (n,).
+
+        A contact that slides has it against its motion, of so large a heading from sideways; one that
+        is held sideways has along the rod what holding it leaves, in the mean of slopes.
+        """
+        if self.held:
+            return 0.0 * alpha, first_order.HELD_SHARE * np.sin(alpha)
+        return np.sin(alpha) * np.cos(heading), np.sin(alpha) * np.sin(heading)
+
+    def _first_touch(
+        self, x: np.ndarray, bar: np.ndarray, arc: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return points (n, 3) of the unloaded rod that touch bars (n, 3) whose axes are at x (n,), points
+        of these axes, and arcs (n,).
+        """
+        for _ in range(_TOUCH_ROUNDS):
+            point = self.point(arc)
+            tangent = self.tangent(arc)
+            axis = point - _normal(tangent, bar) * self._reach(arc)
+            arc = arc + (x - axis[:, 0]) / tangent[:, 0]
+        return point, axis, arc
+
+    def _reach(self, arc: np.ndarray) -> np.ndarray:
+        """Return the distance (n, 1) between centreline and the bar's axis."""
+        return (self.radius + self.rod_radius * (1.0 - self.taper * arc))[:, None]
+
+    def _march(
+        self, force: np.ndarray, arc: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """March rods from their contacts at arcs (n,) to the base; return contacts, forces, and tangents
+        there (n, 3), in the hub's axes. force (n, 3): in the axes in which the rod's end has not turned.
+
+        Steps are even in the logarithm of the width, so that a cone's thin end has its share of them.
+        """
+        parts = np.linspace(1.0, 0.0, 2 * _STEPS + 1)[:, None]
+        if self.taper > 0:
+            log_width = np.log1p(-self.taper * arc)
+            at = -np.expm1(log_width * parts) / self.taper  # (2 steps + 1, n)
+            rate = -log_width / self.taper * (1.0 - self.taper * at)
+        else:
+            at = arc * parts
+            rate = np.broadcast_to(arc, at.shape)
+        rest = self.tangent(at)[..., None]
+        rate = rate[..., None] / _STEPS
+        softness = rate / (1.0 - self.taper * at[..., None]) ** 4
+        force = force[..., None]
+
+        def change(k, turn, way):
+            """Return what turns and ways gain in a step towards the base, by the slopes at node k."""
+            tangent = turn @ rest[k]
+            moment = (_cross_matrices(way) @ force)[..., 0]
+            twist = _POISSON * _dot(tangent[..., 0], moment)[:, None]
+            curvature = softness[k] * (moment + twist * tangent[..., 0])
+            return -_cross_matrices(curvature) @ turn, rate[k] * tangent[..., 0]
+
+        turn = np.broadcast_to(np.eye(3), (len(arc), 3, 3))
+        way = np.zeros((len(arc), 3))
+        for k in range(0, 2 * _STEPS, 2):
+            turn_1, way_1 = change(k, turn, way)
+            turn_2, way_2 = change(k + 1, turn + 0.5 * turn_1, way + 0.5 * way_1)
+            turn_3, way_3 = change(k + 1, turn + 0.5 * turn_2, way + 0.5 * way_2)
+            turn_4, way_4 = change(k + 2, turn + turn_3, way + way_3)
+            turn = turn + (turn_1 + 2 * turn_2 + 2 * turn_3 + turn_4) / 6
+            way = way + (way_1 + 2 * way_2 + 2 * way_3 + way_4) / 6
+        to_hub = np.swapaxes(turn, 1, 2)
+        found = to_hub @ np.stack([way, force[..., 0], rest[0, :, :, 0]], axis=2)
+        return found[..., 0], found[..., 1], found[..., 2]
+
+
+def _sizes(unknowns: np.ndarray) -> np.ndarray:
+    """Return the sizes (5,) of the unknowns: of the force, of the arc, and a radian."""
+    strength = np.linalg.norm(unknowns[:3])
+    return np.array([strength, strength, strength, unknowns[3], 1.0])
+
+
+def _steps(sizes: np.ndarray) -> np.ndarray:
+    """Return small steps (2k + 1, k) of quantities of these sizes (k,): none, each up, and each down."""
+    steps = np.diag(_DIFFERENCE * sizes)
+    return np.concatenate([np.zeros((1, len(sizes))), steps, -steps])
+
+
+def _differences(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return central differences (m, k) of values (m, 2k + 1) after `_steps`."""
+    count = steps.shape[1]
+    up = values[:, 1 : count + 1]
+    down = values[:, count + 1 :]
+    return (up - down) / (2 * steps[1 : count + 1].diagonal())
+
+
+def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the solution of linear equations; NaN where there is none."""
+    try:
+        return np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        return np.full_like(right, nan)
+
+
+def _slope(force: np.ndarray, sideways: np.ndarray) -> np.ndarray:
+    """Return the slope (n,) of bars along which friction has this part (n,) of forces (n, 3): (9)."""
+    phi = np.arctan2(force[:, 2], -force[:, 1])
+    share = np.linalg.norm(force, axis=1) / np.hypot(force[:, 1], force[:, 2])
+    cone = np.arcsin(np.minimum(sideways * share, 1.0))
+    return phi + np.copysign(cone, phi)
+
+
+def _normal(tangent: np.ndarray, bar: np.ndarray) -> np.ndarray:
+    """Return the unit normals (n, 3) across rods and bars, towards the base's side of the push."""
+    normal = (_cross_matrices(tangent) @ bar[..., None])[..., 0]
+    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+
+def _turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Return vectors (n, 3) turned about z by angles (n,): from the hub's axes to the contact frame's."""
+    x, y, z = vectors.T
+    c = np.cos(angle)
+    s = np.sin(angle)
+    return np.stack([c * x - s * y, s * x + c * y, z], axis=1)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the products (n,) of vectors (n, 3)."""
+    return np.sum(a * b, axis=1)
+
+
+def _cross_matrices(vectors: np.ndarray) -> np.ndarray:
+    """Return the matrices (n, 3, 3) that map b to a × b, for vectors a (n, 3)."""
+    matrices = np.zeros((len(vectors), 3, 3))
+    x, y, z = vectors.T
+    matrices[:, 0, 1] = -z
+    matrices[:, 0, 2] = y
+    matrices[:, 1, 0] = z
+    matrices[:, 1, 2] = -x
+    matrices[:, 2, 0] = -y
+    matrices[:, 2, 1] = x
+    return matrices
