@@ -109,6 +109,11 @@ class Beam:
         taper_of(self.shape, self.tip_share)
         object.__setattr__(self, "rest_mm", tuple(tuple(own) for own in self.rest_mm))
 
+    @property
+    def is_curved(self) -> bool:
+        """Return whether the unloaded whisker is curved, or stands off its axis."""
+        return any(any(own) for own in self.rest_mm)
+
     @classmethod
     def from_modulus(
         cls, youngs_modulus_GPa: float, diameter_mm: float, length_mm: float, *shape: str | float

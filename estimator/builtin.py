@@ -7,10 +7,12 @@ and reported as a tip contact (section VII). (2) overestimates because it ignore
 distance beyond the length means slip, not the tip: it is flagged and left.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import hypot, isnan, nan, sqrt
 
 from estimator import distance, first_order, uncertainty
+from estimator.beam import Beam
 from estimator.exact_rod import UNCONVERGED, Reach, contact_by_exact_rod
 from estimator.reasons import NamedReason
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
@@ -137,10 +139,16 @@ ESTIMATORS = {
     "with_friction": with_friction,
     "frictionless": frictionless,
     "corrected": corrected,
-    "exact_rod": exact_rod,
 }
+# Of whiskers that are curved without load, besides: it takes some thousand times as long as (10).
+OF_CURVED = {"exact_rod": exact_rod}
 # Estimators whose distance does not depend on the assumed friction angle.
 WITHOUT_ALPHA = (no_slip, frictionless)
+
+
+def estimators_of(beam: Beam) -> dict[str, Callable[[Whisk, EstimatorSettings], Estimate]]:
+    """Return by name the estimators that a whisker of this shape asks for."""
+    return ESTIMATORS | OF_CURVED if beam.is_curved else ESTIMATORS
 
 
 def _first_order(whisk, settings, d_x):

@@ -104,25 +104,31 @@ def judge(results: Iterable[TrialResult]) -> list[Judged]:
         status = joined(seen.status, felt.status)
         for row in felt.estimates:
             judged = _judged(result, seen, row, whisk_status=status)
-            found.append(replace(judged, covariance_mm2=_covariance_mm2(seen, felt, row)))
+            found.append(replace(judged, covariance_mm2=_covariance_mm2(result, seen, felt, row)))
         for row in felt.one_factor:
             judged = _judged(result, seen, row, whisk_status=status)
             found.append(replace(judged, one_factor=True))
     return found
 
 
-def _covariance_mm2(seen: SeenWhisk, felt: FeltWhisk, row: EstimateRow) -> float:
+def _covariance_mm2(
+    result: TrialResult, seen: SeenWhisk, felt: FeltWhisk, row: EstimateRow
+) -> float:
     """Return the covariance of estimate and truth, mm², by the errors of the cameras.
 
-    An estimate goes as 1 / moment. How the moment turns is left out: a placement that is off along
-    the whisker, or a scale, changes its size alone.
+    An estimate goes as 1 / moment, and the less where the whisker has tapered. How the moment turns
+    is left out: a placement that is off along the whisker, or a scale, changes its size alone. An
+    estimate that was set to the whisker's length goes with nothing: both sigmas bound what is left.
     """
     if seen.truth.shared is None or not len(felt.by_camera_error_Nmm):
         return 0.0
     moment_Nmm = np.array([felt.m_y_Nmm.value, felt.m_z_Nmm.value])
     by_share = felt.by_camera_error_Nmm @ moment_Nmm / (moment_Nmm @ moment_Nmm)
     of_truth_mm = seen.truth.shared.d_x_by_camera_error_mm
-    return float(-row.d_x_est_mm.value * by_share @ of_truth_mm)
+    d_x_mm = row.d_x_est_mm.value
+    covariance_mm2 = -d_x_mm * result.whisker.left(d_x_mm) * float(by_share @ of_truth_mm)
+    most_mm2 = row.d_x_est_mm.sigma * seen.d_x_mm.sigma
+    return float(np.clip(covariance_mm2, -most_mm2, most_mm2))
 
 
 def _judged(

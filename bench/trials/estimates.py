@@ -14,7 +14,7 @@ from bench.base.statuses import reason
 from bench.gauges.felt import late_by
 from bench.records.trial_result import EstimateRow, FeltAt, FeltWhisk
 from estimator.beam import Beam
-from estimator.builtin import ESTIMATORS, WITHOUT_ALPHA
+from estimator.builtin import WITHOUT_ALPHA, estimators_of
 from estimator.contact_state import Contact, contact_of
 from estimator.distance import felt_slip_angle
 from estimator.signal import FeltTouch
@@ -28,12 +28,17 @@ UNKNOWN_RADII_MM = (math.nan, 0.0)  # of bar and whisker
 Estimator = Callable[[Whisk, EstimatorSettings], Estimate]
 
 
-def estimators(names: tuple[str, ...]) -> dict[str, Estimator]:
-    """Return the built-in estimators and those named "module:function".
+def estimators(names: tuple[str, ...], beam: Beam) -> dict[str, Estimator]:
+    """Return the built-in estimators of a whisker and those named "module:function".
 
     Raises BadInput where one of the latter cannot be imported.
     """
-    return {**ESTIMATORS, **{name: _imported(name) for name in names}}
+    return {**estimators_of(beam), **own_estimators(names)}
+
+
+def own_estimators(names: tuple[str, ...]) -> dict[str, Estimator]:
+    """Return the estimators named "module:function". Raises BadInput where one cannot be imported."""
+    return {name: _imported(name) for name in names}
 
 
 def _imported(name: str) -> Estimator:

@@ -170,7 +170,7 @@ class _FeltStroke:
         own = self.unit.settings.estimators
         if own:
             whisk = self._with_sensors(whisk)
-        return answers(whisk, estimators(own), self.unit.settings, _radii_mm(self.unit))
+        return answers(whisk, estimators(own, whisk.beam), self.unit.settings, _radii_mm(self.unit))
 
     def _by_theta(self) -> tuple[FeltAt, ...]:
         """Return moments and estimates at THETAS_DEG, as far as the stroke goes."""

@@ -18,7 +18,7 @@ from bench.base.settings import Settings
 from bench.session.footage import visible
 from bench.session.inside import check_outside
 from bench.session.session_check import checked_views
-from bench.trials.estimates import estimators
+from bench.trials.estimates import own_estimators
 from bench.workflows.session_evaluation import DONE, evaluate
 from vision.geometry import Refused
 
@@ -148,7 +148,7 @@ def watch(
     raised, for that one is not whole. announce: is given the verdict each time, and why a trial is
     not complete. Raise BadInput where there is no session.
     """
-    estimators(settings.estimators)
+    own_estimators(settings.estimators)
     check_outside(out, session_path)
     if not session_path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(session_path))

@@ -249,7 +249,7 @@ def _measured_rows(
 def _estimate(whisk: _ConvertedWhisk, felt: Whisk) -> tuple[EstimateRow, ...]:
     """Return each estimator's row."""
     settings = whisk.task.unit.settings
-    return answers(felt, estimators(settings.estimators), settings, whisk.radii_mm)
+    return answers(felt, estimators(settings.estimators, felt.beam), settings, whisk.radii_mm)
 
 
 def _error_percent(row: EstimateRow, d_x_mm: float) -> float:

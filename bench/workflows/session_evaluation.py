@@ -17,7 +17,7 @@ from bench.session.session import Session
 from bench.session.session_check import checked_views
 from bench.session.trial import Trial
 from bench.trials.contradictions import contradictions_alone
-from bench.trials.estimates import estimators
+from bench.trials.estimates import own_estimators
 from bench.trials.exchanged_signals import exchanged_pictures, exchanged_signals
 from bench.trials.lost import evaluate_units
 from bench.trials.of_session import (
@@ -53,7 +53,7 @@ def evaluate(
     paper, drawn besides the others. announce: is given what is to be seen at a glance, or of that the
     verdict alone. trials: names of those that the session is taken to have; None: all. Raise BadInput.
     """
-    estimators(settings.estimators)
+    own_estimators(settings.estimators)
     if dask is not None:  # its workers stand elsewhere
         session_path = session_path.absolute()
         out = out.absolute()

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.filterwarnings("error")
 BEAM = Beam.from_modulus(60.0, 1.0, 100.0)
 THETA, ALPHA = np.radians(3.0), np.radians(10.5)
 SETTINGS = EstimatorSettings(ALPHA)
-BEYOND_PAPER = ("corrected", "exact_rod")
+BEYOND_PAPER = ("corrected",)
 PAPER = {name: function for name, function in ESTIMATORS.items() if name not in BEYOND_PAPER}
 
 

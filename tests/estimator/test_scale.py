@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from estimator import compliance, friction, load_cell, slip
 from estimator.beam import Beam
 from estimator.both_ways import there_and_back
-from estimator.builtin import ESTIMATORS, printed_17
+from estimator.builtin import ESTIMATORS, OF_CURVED, printed_17
 from estimator.contact_state import contact_of
 from estimator.moving import known_motion
 from estimator.onset import felt_touch
@@ -142,11 +142,13 @@ def same(one, other, rel=SAME):
     np.testing.assert_allclose(other, one, rtol=rel, atol=rel * largest)
 
 
-@pytest.mark.parametrize("name", [*ESTIMATORS, *SENSORS, "printed_17", "known_motion"])
+@pytest.mark.parametrize("name", [*ESTIMATORS, *OF_CURVED, *SENSORS, "printed_17", "known_motion"])
 @settings(max_examples=40)
 @given(scene=scenes, unit=units)
 def test_estimates(name, scene, unit):
-    named = ESTIMATORS | SENSORS | {"printed_17": printed_17, "known_motion": known_motion}
+    named = (
+        ESTIMATORS | OF_CURVED | SENSORS | {"printed_17": printed_17, "known_motion": known_motion}
+    )
     one = named[name](scene.whisk(MM_N), scene.told(MM_N))
     other = named[name](scene.whisk(unit), scene.told(unit))
     assert getattr(one.status, "code", "") == getattr(other.status, "code", "")

@@ -10,11 +10,11 @@ from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import FeltStroke, gauge_delay
 from bench.gauges.matrix import GaugeMatrix
-from bench.trials.estimates import answer, answers, as_felt, estimators
+from bench.trials.estimates import answer, answers, as_felt, own_estimators
 from bench.trials.readout import Readout, felt_whisk
 from estimator import slip
 from estimator.beam import Beam
-from estimator.builtin import with_friction
+from estimator.builtin import ESTIMATORS, with_friction
 from estimator.whisk import Estimate, Whisk
 from vision.geometry.reasons import as_reason
 
@@ -46,9 +46,7 @@ def test_a_turned_follicle_feels_the_same_whisk(rng, roll_deg):
 
 def test_answers_carry_what_they_assumed(rng):
     touch, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
-    rows = {
-        row.estimator: row for row in answers(whisk, estimators(()), Settings(alpha_est_deg=10.0))
-    }
+    rows = {row.estimator: row for row in answers(whisk, ESTIMATORS, Settings(alpha_est_deg=10.0))}
     assert np.isnan([rows["no_slip"].alpha_est_rad, rows["no_slip"].beta_est_rad]).all()
     assert rows["frictionless"].alpha_est_rad == 0.0
     assert rows["with_friction"].d_x_est_mm.value == pytest.approx(60.0, rel=5e-3)
@@ -64,7 +62,7 @@ def test_sigma_of_10_is_its_scatter(rng):
         _, whisk = felt_whisk(
             stroke(rng, noise=0.01), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA
         )
-        row = answers(whisk, {"with_friction": estimators(())["with_friction"]}, Settings())[0]
+        row = answers(whisk, {"with_friction": ESTIMATORS["with_friction"]}, Settings())[0]
         stated.append(row.d_x_est_sigma_alpha_exact_mm)
         found.append(row.d_x_est_mm.value)
     assert np.mean(stated) == pytest.approx(np.std(found), rel=0.25)
@@ -132,7 +130,7 @@ def test_no_touch_is_a_reason(rng):
 @pytest.mark.parametrize("name", ["nowhere:f", "math:no_such", "math:pi", "math"])
 def test_estimators_that_cannot_be_had(name):
     with pytest.raises(BadInput, match=name):
-        estimators((name,))
+        own_estimators((name,))
 
 
 def test_an_answer_must_be_an_estimate(rng):
