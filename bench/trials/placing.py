@@ -14,7 +14,6 @@ from bench.cameras.measured_place import both_places, contradiction, stated_plac
 from bench.cameras.session_cameras import SessionCalibration
 from bench.session.session import Session
 from bench.trials.consistency import turn_cause
-from bench.trials.differences import Cause, Difference
 from bench.trials.lost import see_units
 from bench.trials.unit import Unit
 from vision.calibration import (
@@ -67,8 +66,7 @@ def place_rig(
     stays = session.cameras_toml is not None or not board.covariance.any()
     try:
         if stays:
-            strokes = _placement_by_strokes(chosen, pool, problems)
-            placement = _with_scale_alarm(combine(board, strokes), session, board, strokes)
+            placement = combine(board, _placement_by_strokes(chosen, pool, problems))
             placed_here = calibration
         else:
             placed_here, placement = _converge(calibration, board, chosen, pool, problems)
@@ -80,15 +78,21 @@ def place_rig(
     if strokes_only or is_by_ruler:
         require_swing(placement, problems)
     if placement.alarm and not strokes_only:
-        problems.warn(_misplaced(placement, chosen))
+        problems.warn(_misplaced(placement, session, chosen))
     notes = placement.notes[:1] if stays or strokes_only else placement.notes
     return placed_here.with_notes(*notes, *[_STAYS] * stays)
 
 
-def _misplaced(placement: Placement, units: Sequence[Unit]) -> Reason:
-    """Return the warning of a placement with an alarm, with a turn of the whisker that would explain it."""
+def _misplaced(placement: Placement, session: Session, units: Sequence[Unit]) -> Reason:
+    """Return the warning of a placement with an alarm, with a size of the board's squares or a turn
+    of the whisker that would explain it.
+    """
     cause = ""
-    if placement.turn_share is not None:
+    if placement.scale_share is not None and session.board is not None:
+        square_mm = session.board.square_mm
+        looks_mm = square_mm / (1.0 + placement.scale_share)
+        cause = f"; a square_mm of {looks_mm:.4g} for {square_mm:g} explains it"
+    elif placement.turn_share is not None:
         cause = turn_cause(placement.turn_share, [unit.trial for unit in units])
     return Reason("board_misplaced", f"{placement.alarm}{cause}")
 
@@ -182,35 +186,6 @@ def _without_rig_frame(refusal: Refused) -> BadInput:
     """Return the error of a session without T_rig_board whose free strokes do not give the rig frame."""
     cure = "record free strokes of some 10 degrees, or put a marker on the hub and run `whisker-bench calibrate rig`"
     return BadInput(f"T_rig_board is missing, and {refusal}: {cure}", file="trials")
-
-
-def _with_scale_alarm(
-    both: Placement, session: Session, board: Placement, strokes: Placement
-) -> Placement:
-    """Return the placement with a square_mm in its alarm that would explain it."""
-    if not both.alarm:
-        return both
-    return replace(both, alarm=both.alarm + _scale_cause(session, board, strokes))
-
-
-def _scale_cause(session: Session, board: Placement, strokes: Placement) -> str:
-    """Return the square_mm that would explain that board and strokes disagree; '' where none does.
-
-    Where all lengths are taken f times too long, the centre of rotation is seen f times as far from
-    the board as it stands: it is displaced by (1 − f) of T_rig_board's shift.
-    """
-    if session.board is None or session.T_rig_board is None:
-        return ""
-    square_mm = session.board.square_mm
-    information = np.linalg.inv(strokes.covariance + board.covariance)
-    difference = Difference(strokes.step - board.step, information, len(strokes.step))
-    trace = np.append(np.zeros(3), -session.T_rig_board[:, 3])
-
-    def message(size: float) -> str:
-        """Return the sentence for a relative error of all lengths."""
-        return f"; a square_mm of {square_mm / (1.0 + size):.4g} for {square_mm:g} explains it"
-
-    return difference.explained_by([Cause(message, np.zeros(6), trace, 1)])
 
 
 def _turning_elsewhere(session: Session, calibration: SessionCalibration) -> list[Reason]:

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.special import chdtri
 
 from bench.gauges.matrix import GaugeMatrix
 from bench.records.trial_result import FeltWhisk
@@ -22,11 +23,11 @@ from bench.trials.consistency import (
     rate_or_encoder,
 )
 from bench.trials.felt_trial import _against_pictures
-from bench.trials.placing import _scale_cause
+from bench.trials.placing import _misplaced
 from bench.trials.readout import Readout
 from tests.scenes.model_scenes import begun, scene, with_points
 from tests.scenes.results import seen_whisk
-from vision.calibration.place import Placement, by_board
+from vision.calibration.place import FALSE_ALARM, Placement, by_board, combine
 from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
 from vision.fit.turns import frame_turns
@@ -216,6 +217,8 @@ def test_a_contradicted_whisk_is_apart_and_names_no_gauge(exact_record, trial):
 
 
 SIGMA = np.array([0.005, 0.1, 0.005, 0.8, 0.14, 0.12])  # rad and mm, of two strokes of 1.5°
+# The covariance of free strokes of 1.5° of one trial.
+ONE_TRIAL = np.diag(np.array([0.02, 0.1, 0.0043, 0.13, 0.18, 0.18]) ** 2)
 
 
 def strokes(session, factor, rng, turned=0.0) -> Placement:
@@ -228,15 +231,43 @@ def strokes(session, factor, rng, turned=0.0) -> Placement:
 def test_a_board_at_another_scale_is_told_by_where_the_whisker_turns(small_session, rng, factor):
     session = load_session(small_session)
     exact = by_board(session.T_rig_board, 0.0, 0.0)
-    said = _scale_cause(session, exact, strokes(session, factor, rng))
-    found = float(said.removeprefix("; a square_mm of ").split(" for 15 ")[0])
+    placed = combine(exact, strokes(session, factor, rng))
+    said = _misplaced(placed, session, [])
+    found = float(str(said).split("; a square_mm of ")[1].split(" for 15 ")[0])
     assert found == pytest.approx(15.0 / factor, abs=0.1)  # 59 mm to the board, known to 0.15
+
+
+def test_a_board_two_percent_too_large_is_told_though_it_was_placed_by_hand(small_session):
+    """The default sigmas of T_rig_board leave χ² of six numbers where chance does; one number tells it.
+
+    What the strokes are off by is left out: 1.02 is 4.4 sigma from 1 here, and 3.3 are asked for.
+    """
+    session = load_session(small_session)
+    by_hand = by_board(session.T_rig_board, 0.2, np.radians(0.2))
+    moved = Placement(-0.02 * np.append(np.zeros(3), session.T_rig_board[:, 3]), ONE_TRIAL)
+    placed = combine(by_hand, moved)
+    difference = moved.step
+    chi2 = difference @ np.linalg.solve(ONE_TRIAL + by_hand.covariance, difference)
+    assert chi2 < chdtri(6, FALSE_ALARM)
+    assert placed.alarm and placed.scale_share == pytest.approx(0.02)
+
+
+def test_sound_boards_are_rarely_taken_for_another_scale(small_session, rng):
+    """One in a thousand: of 1000 draws more than five are by chance with a probability of 6e-4."""
+    session = load_session(small_session)
+    by_hand = by_board(session.T_rig_board, 0.2, np.radians(0.2))
+    root = np.linalg.cholesky(ONE_TRIAL + by_hand.covariance)
+    alarms = 0
+    for draw in rng.standard_normal((1000, 6)):
+        placed = combine(by_hand, Placement(root @ draw, ONE_TRIAL))
+        alarms += placed.scale_share is not None
+    assert alarms <= 5
 
 
 def test_a_leaning_axis_is_no_scale(small_session, rng):
     session = load_session(small_session)
     exact = by_board(session.T_rig_board, 0.0, 0.0)
-    assert _scale_cause(session, exact, strokes(session, 1.1, rng, turned=0.1)) == ""
+    assert combine(exact, strokes(session, 1.1, rng, turned=0.1)).scale_share is None
 
 
 @pytest.mark.parametrize(
