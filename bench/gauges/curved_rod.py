@@ -15,7 +15,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import polynomial
-from scipy.integrate import solve_ivp
 
 from bench.session.rest_shape import RestShape
 
@@ -158,6 +157,8 @@ class CurvedRods:
         unknowns (..., n, 3): two components of the force across the rod's end, and the arc; friction,
         chord (n,). While marching, the axes are those in which the rod's end has not turned.
         """
+        from scipy.integrate import solve_ivp  # it takes longer than reading a session
+
         arc = unknowns[..., 2]
         if np.any(1.0 - self.taper * arc * chord / self.rest.length_mm < _LEAST_WIDTH):
             raise ArithmeticError("the contact is too near the end of a rod that ends in a point")

@@ -76,7 +76,8 @@ def _check(views: Sequence[Session], problems: InputProblems) -> None:
         trials = view.trials
         for trial in count_parts(trials, "recordings read", len(trials)):
             check_recording(trial, problems)
-        _warn_of_curvature(view.whisker, problems)
+        if view.whisker is not None:
+            _warn_of_curvature(view.whisker, problems)
     check_sizes(views[0], problems)
     for names, line in _copies(views[0]):
         problems.warn(line, names)
