@@ -30,8 +30,8 @@ AGAINST_THETA = Table(
         Column("theta_deg", "pushing angle, from 0.2° as far as strokes go"),
         WHISKS_KNOWN,
         WHISKS_WITHOUT,
-        Column("error_mean_percent", "mean of estimate less truth, % of the truth"),
-        Column("error_rms_percent", "RMS of estimate less truth, % of the truth"),
+        Column("error_mean_percent", "mean error, % of the truth"),
+        Column("error_rms_percent", "RMS error, % of the truth"),
         Column("error_sigma_percent", "RMS of the stated sigmas, with what α_est may be off by"),
         Column(
             "error_sigma_alpha_exact_percent", "RMS of the stated sigmas, as if α_est were right"

@@ -29,8 +29,7 @@ GIVES_WAY = Table(
         Column("theta_deg", "pushing angle"),
         *with_sigma(
             "gave_mm",
-            "how far the object is from where it stood, away from the contact; seen, without any "
-            "gauge",
+            "how far the object is from where it stood, away from the contact; seen",
         ),
         *with_sigma("gave_aside_mm", "how far it is across that and the bar"),
     ),

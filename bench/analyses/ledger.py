@@ -63,8 +63,8 @@ LEDGER = Table(
         Column("largest_over_sigma", "the largest of the effects, each over its sigma"),
         Column(
             "verdict",
-            '"needed": largest_over_sigma is above 0.1; "may be left out, kept": it is not, and '
-            'every preset has the refinement even so; "not known": one of the effects is not',
+            '"needed": largest_over_sigma is above 0.1; "may be left out, kept": it is not, though '
+            'every preset has it; "not known": an effect is not',
             Kind.TEXT,
         ),
         status("why an effect is 0 or not known"),

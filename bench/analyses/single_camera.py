@@ -38,8 +38,7 @@ ONE_CAMERA = Table(
         Column("inside", "1 where 1.96 sigma of both hold that error, else 0"),
         *with_sigma(
             "moved_mm",
-            "motion of the contact the way it is pushed, by slip or as the object gives way: the "
-            "truth",
+            "motion of the contact the way it is pushed: the truth",
         ),
         *with_sigma("moved_est_mm", "the same by the one camera"),
         *with_sigma("force_N", "across the whisker in the whisking plane"),

@@ -63,8 +63,8 @@ COMPLIANCE_SEEN = Table(
         *COMPLIANCE.columns,
         Column(
             "whisks_seen",
-            "whisks of that surface and speed in which the object was seen to give way; these three "
-            "columns are there only where there is such a whisk",
+            "whisks in which the object was seen to give way; without one these three columns are "
+            "left out",
         ),
         *with_sigma(
             "give_seen_mm_N",

@@ -41,7 +41,7 @@ PLAN = Table(
         *alike(STATED, "of a recorded session: as `evaluate` states them"),
         *alike(
             LIMITS,
-            "the cause of the largest part of the variance, and how large that part is",
+            "the cause of the largest part of the variance, and that part",
             Kind.TEXT,
         ),
         Column("best_change", "the change that leaves least of d_x's sigma", Kind.TEXT),

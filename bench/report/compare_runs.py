@@ -33,8 +33,8 @@ COMPARISON = Table(
         Column("difference", "this less the first"),
         Column(
             "sigma",
-            "of the difference: of one recording the larger of the two stated sigmas, for both err "
-            "alike; of two recordings both",
+            "of the difference: of one recording the larger stated sigma, for both err alike; of two "
+            "recordings both",
         ),
         Column("sigmas", "the difference in sigmas"),
         Column("same_recording", "1 where the trial's files are the same, else 0"),

@@ -133,9 +133,7 @@ TRACK = Table(
         ),
         *alike(("d_y_mm", "d_z_mm"), "deflection as in whisks.csv, in this frame"),
         Column("phi_seen_deg", "its direction, in this frame"),
-        status(
-            "why there is none, or that the whisker slipped during the exposure, and by how much"
-        ),
+        status("why there is none, or by how much the whisker slipped during the exposure"),
     ),
 )
 

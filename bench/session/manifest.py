@@ -87,10 +87,10 @@ class WhiskerKeys(GivenKeys):
     # rigidity E I at the base
     flexural_rigidity_Nmm2: Rigidity | None = None
     flexural_rigidity_sigma_Nmm2: StiffnessSigma = 0.0
-    # curvature [y, z] of the unloaded whisker in its base frame: at arc length s it lies κ s²/2
-    # aside. Pictures correct it; estimates but the exact rod's take it as straight
+    # unloaded curvature [y, z] in the base frame: at arc length s it lies κ s²/2 aside. Pictures
+    # correct it; of the estimators exact_rod alone uses it
     rest_curvature_per_mm: Curvature | None = None
-    # or a table beside session.toml, such as "rest.csv", of its shape
+    # or its shape as a table beside session.toml, such as "rest.csv"
     rest_shape: str | None = None
 
 
@@ -131,8 +131,8 @@ class BoardKeys(GivenKeys):
 class RigKeys(GivenKeys):
     """[rig] of session.toml."""
 
-    # 3 × 4, mm: rig = rows · [board x, y, z, 1] for the board in boards/rig; absent: it is
-    # estimated from the free strokes
+    # 3 × 4, mm: rig = rows · [board x, y, z, 1] for the board in boards/rig; absent: by rig.toml
+    # (`calibrate rig`), else by the free strokes
     T_rig_board: Annotated[list[Row4], _THREE] | None = None
     # standard deviation of each shift
     T_rig_board_sigma_mm: Annotated[
@@ -150,8 +150,7 @@ class CameraKeys(Keys):
 
     # name of the folder or film
     name: str
-    # exposure, for the record: checked, and otherwise not used; how far the whisker slips meanwhile
-    # is seen in its frames
+    # exposure, for the record: checked, and otherwise not used
     exposure_s: Exposure | None = None
     exposure_sigma_s: float = 0.0
 
@@ -221,7 +220,7 @@ class ObjectKeys(GivenKeys):
     # diameter of the circle that the ring's axis is
     ring_diameter_mm: RingDiameter | None = None
     # angle of the cone between its axis and its surface. `bar_diameter_mm` then is twice its radius
-    # across, along its normal, where it is touched; nothing of the cloud asks for it
+    # along its normal where it is touched
     half_angle_deg: HalfAngle | None = None
 
     @property
@@ -243,15 +242,14 @@ class TrialKeys(GivenKeys):
 
     # groups trials in fits and plots
     surface: str = ""
-    # nominal speed of the motor; a warning is given where signals say another; its sigma enters
-    # nothing
+    # nominal speed of the motor; signals that say another give a warning; its sigma enters nothing
     speed_deg_s: Speed | None = None
     speed_sigma_deg_s: float = 0.0
-    # nominal slope; where the slope is seen that one counts, and a warning is given where the two
-    # differ by more than their sigmas allow
+    # nominal slope; one that is seen counts before it, with a warning where their sigmas do not
+    # allow the difference
     beta_deg: Slope | None = None
     beta_sigma_deg: float = 0.0
-    # nominal distance; where it is seen that one counts
+    # nominal distance; one that is seen counts before it
     d_x_mm: Length | None = None
     d_x_sigma_mm: float = 0.0
     # diameter of the bar where it differs from the session's (paper wrapped round it)
@@ -275,25 +273,24 @@ class TrialKeys(GivenKeys):
     moment_gain_sigma: Annotated[
         float, Assumed(absolute=0.01, unstated="moments in N·mm", origin="a calibrated cell")
     ] = 0.0
-    # −3 dB of the low-pass before the converter, a Butterworth of fourth order; 0: none. Its delay
-    # is taken out of touch felt. Left out: the paper's 800 Hz, with a sigma
+    # −3 dB of the fourth-order Butterworth before the converter; 0: none. Its delay is taken out of
+    # touch felt. Left out: the paper's 800 Hz, with a sigma
     gauge_filter_Hz: Filter | None = None
     # true: each way back is evaluated, too, and with the way there ([moving.md](moving.md))
     both_ways: bool = False
-    # [x, y, z] in the rig frame of an object that moves at constant speed, and one sigma each way;
-    # left out: it stands ([moving.md](moving.md))
+    # [x, y, z] in the rig frame of an object that moves steadily, and one sigma each way
+    # ([moving.md](moving.md))
     object_velocity_mm_s: Velocity | None = None
     object_velocity_sigma_mm_s: Annotated[float, Assumed(share=0.01, origin="a stage's speed")] = (
         0.0
     )
-    # true: the object stands until it is touched, gives way as it is pushed, and comes back; how
-    # far is fitted to the pictures ([soft.md](soft.md))
+    # true: the object gives way as it is pushed, and comes back; how far is fitted to the pictures
+    # ([soft.md](soft.md))
     object_gives_way: bool = False
     # how far the follicle is turned about the whisker (+x)
     follicle_roll_deg: Angle = 0.0
     follicle_roll_sigma_deg: Annotated[float, Assumed(share=1 / 90, origin="1° in 90°")] = 0.0
-    # the table `[object]` (`[trial.object]` in session.toml): what the object is, and where it
-    # stands, which arrays are judged by
+    # the table `[object]` (`[trial.object]` in session.toml); arrays are judged by it
     object: ObjectKeys | None = None
 
 
@@ -310,9 +307,8 @@ class ChannelKeys(Keys):
 class SignalKeys(Keys):
     """[signals] of session.toml: the DAQ's file in each trial's folder, and its channels."""
 
-    # its name in each trial's folder: .csv, .mat, .h5, .hdf5 or .tdms. HDF5 (and .mat of version
-    # 7.3) and TDMS need the extras `hdf5` and `tdms`. A variable within a MATLAB structure is a/b,
-    # a TDMS channel is group/channel
+    # its name in each trial's folder: .csv, .mat, .h5, .hdf5 or .tdms. HDF5 (and .mat 7.3) and TDMS
+    # need the extras `hdf5` and `tdms`. Within a MATLAB structure: a/b; in TDMS: group/channel
     file: str
     # where no channel holds the times; the first sample is at 0 s
     rate_Hz: Rate | None = None
@@ -330,8 +326,7 @@ class SignalKeys(Keys):
     f_x_N: ChannelKeys | None = None
     f_y_N: ChannelKeys | None = None
     f_z_N: ChannelKeys | None = None
-    # each rising edge through the middle of its range is a frame of every camera, where there is no
-    # frames.csv
+    # each rising edge through its middle is a frame of every camera, where there is no frames.csv
     frame_V: ChannelKeys | None = None
 
 
@@ -345,8 +340,8 @@ class SessionKeys(Keys):
     name: str = ""
     # true: what has no sigma is exact, in tables that do not say otherwise
     exact: bool = False
-    # the order of surfaces in tables and figures, such as ["steel", "sandpaper"]; others follow by
-    # the names of their trials
+    # order of surfaces in tables and figures, such as ["steel", "sandpaper"]; others follow by name
+    # of trial
     surfaces: tuple[str, ...] = ()
     # the tables below; `whisker` or `whiskers`
     whisker: WhiskerKeys | None = None
