@@ -407,6 +407,7 @@ _TABLE = (
         WARNING,
         "rig.toml: {alarm}; {counts}",
         _MEASURE_RIG,
+        reaches=(TRUTH,),
     ),
     Status(
         "bar_width_unlike_board",

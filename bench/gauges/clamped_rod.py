@@ -47,14 +47,14 @@ def moment_at_clamp(
 
     along_mm, across_mm (n,): where the contacts lie. rigidity_Nmm2: EI as a function of arc lengths
     (n, nodes) in mm. friction: friction over normal force along the rod at the contact, one or
-    (n,), positive where it pulls towards the clamp. Raises ValueError where the contact is not in
-    front of the clamp or the rod would have to bend by more than about 45°, ArithmeticError where
-    no equilibrium is found.
+    (n,), positive where it pulls towards the clamp. Raises ArithmeticError where the contact is not
+    in front of the clamp, the rod would have to bend by more than about 45°, or no equilibrium is
+    found.
     """
     x = np.atleast_1d(np.asarray(along_mm, dtype=float))
     w = np.atleast_1d(np.asarray(across_mm, dtype=float))
     if not (np.all(x > 0) and np.all(np.abs(w) < _MOST_ASIDE * x)):
-        raise ValueError(
+        raise ArithmeticError(
             "the contact must lie in front of the clamp, less than 0.6 of its distance aside"
         )
     rods = _Rods.at(x, w, rigidity_Nmm2, friction)

@@ -47,12 +47,18 @@ class UnloadedRod:
     length_mm: float
 
     def tangent(self, arc_mm: np.ndarray) -> np.ndarray:
-        """Return unit tangents (..., 3) at arc lengths (...)."""
+        """Return unit tangents (..., 3) at arc lengths (...).
+
+        Raises ArithmeticError where the shape, beyond its end, goes on as no rod can.
+        """
         share = np.asarray(arc_mm) / self.length_mm
         tangent = np.empty((*share.shape, 3))
         for k, slope in enumerate(self._slopes):
             tangent[..., k + 1] = polynomial.polyval(share, slope, tensor=False)
-        tangent[..., 0] = np.sqrt(1.0 - tangent[..., 1] ** 2 - tangent[..., 2] ** 2)
+        forward2 = 1.0 - tangent[..., 1] ** 2 - tangent[..., 2] ** 2
+        if not np.all(forward2 > 0):
+            raise ArithmeticError("the contact is far beyond the end of a curved rod")
+        tangent[..., 0] = np.sqrt(forward2)
         return tangent
 
     @cached_property
@@ -115,7 +121,10 @@ class CurvedRods:
             points, forces = self._march(tried, friction, chord)
             missing = wanted - points[0]
             by_unknowns = np.moveaxis(points[1:] - points[0], 0, -1) / _DIFFERENCE
-            step = np.linalg.solve(by_unknowns, missing[..., None])[..., 0]
+            try:
+                step = np.linalg.solve(by_unknowns, missing[..., None])[..., 0]
+            except np.linalg.LinAlgError:
+                break
             if not np.isfinite(step).all():
                 break
             if np.abs(step).max() < _LAST_STEP:

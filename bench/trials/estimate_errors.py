@@ -65,7 +65,8 @@ class Judged:
     def error_sigma_mm(self) -> float:
         """Return the error's stated standard deviation, that of estimate and truth together."""
         apart = self.d_x_est_sigma_mm**2 + self.d_x_sigma_mm**2
-        return float(np.sqrt(apart - 2.0 * self.covariance_mm2))
+        variance = apart - 2.0 * self.covariance_mm2
+        return float(np.sqrt(np.maximum(variance, 0.0)))  # below 0 by rounding only
 
     @property
     def error_sigma_percent(self) -> float:

@@ -83,3 +83,11 @@ def test_a_contact_at_the_point_of_a_cone_has_no_moment():
     contact = rest.point_mm(np.array([44.9])) - [0.0, 2.0, 0.0]
     with pytest.raises(ArithmeticError, match="too near the end"):
         CurvedRods(rest, 1.0, 0.24, contact).moments_Nmm(np.zeros(1), np.array([[0.0, -2.0, 0.0]]))
+
+
+def test_a_contact_far_beyond_the_end_is_refused_and_not_marched_for_ever():
+    """Beyond its end the shape's slope exceeds 1, whose tangent is no number: no step of a march ends."""
+    rest = UnloadedRod(((0.0, 0.0, 40.0), (0.0,)), 100.0)
+    rods = CurvedRods(rest, 0.0, 100.0, np.array([[130.0, 10.0, 5.0]]))
+    with pytest.raises(ArithmeticError, match="beyond the end"):
+        rods.moments_Nmm(np.zeros(1), np.array([[0.0, 10.0, 5.0]]))

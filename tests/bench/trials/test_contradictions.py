@@ -110,6 +110,11 @@ def test_what_is_harmless_reaches_no_number(code):
     assert not STATUSES[code].reaches
 
 
+@pytest.mark.parametrize("code", ["board_misplaced", "rig_file_contradicts"])
+def test_a_rig_in_two_places_reaches_the_truth(code):
+    assert "truth" in STATUSES[code].reaches
+
+
 @pytest.mark.parametrize(
     ("said", "doubtful"), [(MISPLACED, True), (HARMLESS, False)], ids=["misplaced", "harmless"]
 )
