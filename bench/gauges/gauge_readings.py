@@ -84,9 +84,9 @@ class Pairs:
     @property
     def moments_sigma(self) -> np.ndarray:
         """Return one standard deviation (n, 2) of the known moments, N·mm."""
-        by_cameras = np.sum(self.by_camera_error**2, axis=1)
-        apart = np.sqrt(np.diag(self.moments_covariance) + by_cameras).reshape(-1, 2)
-        return np.hypot(apart, self.scale_sigma * self.moments)
+        return _sigmas(
+            self.moments, self.moments_covariance, self.by_camera_error, self.scale_sigma
+        )
 
 
 ON_TIME = Value(0.0, 0.0)  # rad
@@ -110,6 +110,23 @@ class ReferenceMoments:
     scale_sigma: float
     by_camera_error: np.ndarray
     late_rad: Value = ON_TIME
+
+    @property
+    def moments_sigma(self) -> np.ndarray:
+        """Return one standard deviation (n, 2) of the moments, N·mm."""
+        return _sigmas(self.moments, self.covariance, self.by_camera_error, self.scale_sigma)
+
+
+def _sigmas(
+    moments: np.ndarray, covariance: np.ndarray, by_camera_error: np.ndarray, scale_sigma: float
+) -> np.ndarray:
+    """Return one standard deviation (n, 2) of moments (n, 2) by all three parts of their error.
+
+    covariance (2n, 2n); by_camera_error (2n, k); scale_sigma: share of all moments together.
+    """
+    variances = np.diag(covariance) + np.sum(by_camera_error**2, axis=1)
+    apart = np.sqrt(np.maximum(variances, 0.0)).reshape(-1, 2)  # below 0 by rounding only
+    return np.hypot(apart, scale_sigma * moments)
 
 
 def pairs_of(
@@ -225,7 +242,8 @@ def _common_and_own(by_place: np.ndarray, of_places: np.ndarray) -> tuple[np.nda
     covariance = by_place @ of_places @ by_place.T
     mean_place = np.zeros(len(of_places))
     mean_place[::3] = 3.0 / len(of_places)
-    sigma = np.sqrt(mean_place @ of_places @ mean_place)
+    # Below 0 by rounding only, where cameras' errors were nearly all of the places'.
+    sigma = np.sqrt(max(mean_place @ of_places @ mean_place, 0.0))
     common = by_place @ (of_places @ mean_place) / (sigma or 1.0)  # exact places have no error
     return common.reshape(-1, 2), covariance - np.outer(common, common)
 

@@ -104,7 +104,7 @@ def moments_over_stroke(
     if reference is None:
         return []
     theta_deg = np.degrees(reference.theta_rad)
-    sigmas = np.sqrt(np.diag(reference.covariance)).reshape(-1, 2)
+    sigmas = reference.moments_sigma
     curves = []
     for channel, (name, value) in enumerate((("m$_y$", felt.m_y_Nmm), ("m$_z$", felt.m_z_Nmm))):
         at = (result.theta_deg, float(value.value), float(value.sigma))

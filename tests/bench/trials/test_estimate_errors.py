@@ -10,7 +10,7 @@ from bench.gauges.gauge_readings import Pairs, reference_from_pictures
 from bench.gauges.matrix import to_follicle
 from bench.records.trial_result import Deflection, EstimateRow, FeltWhisk
 from bench.session.whisker import Whisker
-from bench.trials.estimate_errors import judge
+from bench.trials.estimate_errors import Judged, judge
 from tests.scenes.results import seen_whisk, trial_result
 from vision.truth.records import SharedSigmas
 from vision.truth.value import Value
@@ -99,3 +99,26 @@ def test_an_estimate_by_given_gauges_errs_apart_from_the_truth():
     felt = FeltWhisk(m_y_Nmm=Value(0.0, 0.0), m_z_Nmm=Value(5.0, 0.0), estimates=(row,))
     (judged,) = judge([trial_result([seen], [felt])])
     assert judged.error_sigma_mm == pytest.approx(0.5)
+
+
+def test_the_moments_seen_have_the_cameras_errors_in_their_sigma():
+    """ε along the whisker makes a moment, as 1 / d_x², 2 ε / d_x smaller; the friction adds 0.1 %."""
+    seen = replace(seen_whisk(d_x_mm=Value(D_X_MM, EPSILON_MM)), deflection=deflection())
+    reference = reference_from_pictures(seen, WHISKER)
+    share = reference.moments_sigma[:, 1] / reference.moments[:, 1]
+    assert share == pytest.approx(2.0 * EPSILON_MM / D_X_MM, rel=0.2)
+
+
+def test_places_whose_only_error_is_the_cameras_have_moments_with_a_sigma():
+    """Of the places' covariance nothing is left without the cameras' errors, but rounding, of either sign."""
+    for rounding in (-1e-18, 0.0, 1e-18):
+        known = deflection()
+        of_cameras = known.by_camera_error_mm @ known.by_camera_error_mm.T
+        exact = replace(known, covariance=of_cameras + rounding)
+        seen = replace(seen_whisk(d_x_mm=Value(D_X_MM, EPSILON_MM)), deflection=exact)
+        assert np.isfinite(reference_from_pictures(seen, WHISKER).moments_sigma).all()
+
+
+def test_an_error_whose_parts_cancel_is_no_less_than_nothing():
+    judged = Judged("t", 0, "", "", None, "e", 0.0, 70.0, 0.1, 70.0, 0.3, 0.03 + 0.02 + 1e-12)
+    assert judged.error_sigma_mm == 0.0
