@@ -102,9 +102,12 @@ def turn_cause(share: float, trials: Iterable[Trial]) -> str:
     ratios = []  # of the motor's speed by the signals to the stated one
     stated_rad_s = []
     for trial in trials:
-        if trial.speed_deg_s is not None:
+        if trial.speed_deg_s is None:
+            continue
+        speed_rad_s = stroke_speed_rad_s(read_signals(trial))
+        if np.isfinite(speed_rad_s):  # NaN without a forward stroke
             stated_rad_s.append(float(np.radians(trial.speed_deg_s)))
-            ratios.append(stroke_speed_rad_s(read_signals(trial)) / stated_rad_s[-1])
+            ratios.append(speed_rad_s / stated_rad_s[-1])
     if ratios:
         speed_rad_s = float(np.median(ratios)) * stated_rad_s[0]
         cause = rate_or_encoder(share, speed_rad_s, stated_rad_s[0])

@@ -20,6 +20,8 @@ from vision.geometry.rotation import compose, exp_rotation, log_rotation, skew
 # [chance] By which swing and board, both right, would disagree as much as calls for an alarm.
 # Study: chosen.
 FALSE_ALARM = 1e-3
+# [chance] Of each of the two tests that may call for it: of six numbers, and of the scale. Derived.
+_CHANCE_EACH = FALSE_ALARM / 2
 # [mm] Where the swing alone places the rig it must fix the centre along the whisker as well as a
 # ruler would, for d_x has it whole (`_BY_RULER_MM` of `bench/trials/placing.py`). Study: chosen.
 _MOST_ALONG_SIGMA_MM = 1.0
@@ -135,7 +137,7 @@ def combine(board: Placement, swing: Placement) -> Placement:
     covariance = board.covariance - gain @ board.covariance
     chi2 = float(difference @ np.linalg.solve(Sigma, difference))
     scale_share = _scale_share(difference, Sigma, board.by_scale)
-    disagree = chi2 > chdtri(6, FALSE_ALARM) or scale_share is not None
+    disagree = chi2 > chdtri(6, _CHANCE_EACH) or scale_share is not None
     shared = None if swing.shared is None else gain @ swing.shared @ gain.T
     combined = replace(
         swing,
@@ -219,7 +221,7 @@ def _scale_share(
     share = float(weights @ difference / (weights @ by_scale))
     explained = float(share * (weights @ difference))
     left = float(difference @ np.linalg.solve(Sigma, difference)) - explained
-    is_scale = explained > chdtri(1, FALSE_ALARM) and left < chdtri(5, FALSE_ALARM)
+    is_scale = explained > chdtri(1, _CHANCE_EACH) and left < chdtri(5, FALSE_ALARM)
     return share if is_scale else None
 
 
