@@ -11,7 +11,7 @@ from bench.base.input_problems import refused_as_bad_input
 from bench.cameras.board_views import SessionViews, read_board_views, rig_view
 from bench.cameras.cameras_toml import write_cameras
 from bench.cameras.known_scale import check_scale
-from bench.cameras.measured_place import moved_by_file
+from bench.cameras.measured_place import moved_by_file, stated_place
 from bench.session.session import Session, load_session
 from vision.boards import Corners
 from vision.calibration import (
@@ -20,7 +20,6 @@ from vision.calibration import (
     CameraReport,
     HeldOut,
     MeasuredPose,
-    by_board,
     calibrate_cameras,
     check_held_out,
     import_cameras,
@@ -96,9 +95,7 @@ def place_imported(session: Session, lenses: Path) -> Cameras:
             if name in session.rig_pictures:
                 views[name] = rig_view(session, name, cameras[name].size_px)
         exact = place_on_rig(cameras, views, session.board, session.T_rig_board)
-    board = by_board(
-        session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad
-    )
+    board = stated_place(session)
     return move_rig_frame(exact, replace(board, covariance=np.zeros((6, 6))), board)
 
 

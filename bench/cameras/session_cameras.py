@@ -26,12 +26,12 @@ from bench.cameras.calibrate_session import board_in_world, calibrate_from, repo
 from bench.cameras.cameras_toml import write_cameras
 from bench.cameras.first_look import by_first_look, first_look
 from bench.cameras.known_scale import check_scale
-from bench.cameras.measured_place import moved_by_file
+from bench.cameras.measured_place import moved_by_file, stated_place
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.rig_file import RIG_FILE
 from bench.session.session import Session
 from vision.boards import camera_moved, estimate_optics, refine_corners
-from vision.calibration import Placement, by_board, move_rig_frame, read_cameras
+from vision.calibration import Placement, move_rig_frame, read_cameras
 from vision.geometry import (
     NO_REASON,
     PRINT_TERMS,
@@ -172,9 +172,7 @@ def _cameras_at_base(cameras: Cameras, view: Session) -> Cameras:
 
 def _board_covariance(session: Session) -> np.ndarray:
     """Return the covariance (6, 6) of the rig frame as the board on the rig gives it."""
-    return by_board(
-        session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad
-    ).covariance
+    return stated_place(session).covariance
 
 
 def _from_boards(session: Session, folder: Path) -> SessionCalibration:

@@ -92,7 +92,7 @@ def agreement(
     volts = weights @ pairs.volts
     seen = weights @ pairs.moments
     scale = pairs.scale_sigma**2 + scale_sigma**2
-    covariance = _covariance(pairs, gauges, weights) + scale * np.outer(seen, seen)
+    covariance = _covariance(pairs, gauges, weights, volts) + scale * np.outer(seen, seen)
     felt = gauges.matrix @ volts
     difference = Difference(felt - seen, np.linalg.inv(covariance), 2)
     chi2 = difference.chi2
@@ -132,15 +132,16 @@ def _other_reading(volts: np.ndarray, seen: np.ndarray, others: Sequence[OtherRe
     return sentence
 
 
-def _covariance(pairs: Pairs, gauges: GaugeMatrix, weights: np.ndarray) -> np.ndarray:
+def _covariance(
+    pairs: Pairs, gauges: GaugeMatrix, weights: np.ndarray, volts: np.ndarray
+) -> np.ndarray:
     """Return the covariance (2, 2) of the slopes, felt less seen, from the pairs and the gauges.
 
-    The cameras' errors are in both, and partly cancel.
+    weights (n,), volts (2,): of the slopes. The cameras' errors are in both, and partly cancel.
     """
     to_moments = np.kron(np.eye(len(pairs)), gauges.matrix)  # (2n, 2n)
     of_slopes = np.kron(weights, np.eye(2))  # (2, 2n)
     felt = to_moments @ pairs.volts_covariance @ to_moments.T
-    volts = weights @ pairs.volts
     felt_by_cameras = gauges.by_camera_error_at(volts).T
     seen_by_cameras = of_slopes @ pairs.by_camera_error
     apart = seen_by_cameras.copy()

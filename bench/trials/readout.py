@@ -67,16 +67,18 @@ class Readout:
         """Return the change (6, 2) of a whisk's moments at one sigma of each cause that all whisks
         of a session have in common: four of the gauges, the follicle's turn, and the stiffness.
         """
-        moments = [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
-        return self._shared_changes(np.linalg.solve(self.matrix, moments))
+        return self._shared_changes(self._channels(whisk))
 
     def by_camera_error_Nmm(self, whisk: Whisk) -> np.ndarray:
         """Return how a whisk's moments change with each unit error of the cameras that the gauges
         were calibrated with, (k, 2); it is part of `shared_Nmm`.
         """
-        moments = [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
-        channels = np.linalg.solve(self.matrix, moments)
-        return self.gauges.by_camera_error_at(channels) @ to_follicle(self.roll_rad)
+        by_follicle = self.gauges.by_camera_error_at(self._channels(whisk))
+        return by_follicle @ to_follicle(self.roll_rad)
+
+    def _channels(self, whisk: Whisk) -> np.ndarray:
+        """Return the channels (2,) that a whisk's moments were read from."""
+        return np.linalg.solve(self.matrix, [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm])
 
     def _shared_changes(self, channels: np.ndarray) -> np.ndarray:
         """Return the change (6, 2) of the moments of `channels` (2,) at one sigma of each cause."""
