@@ -13,6 +13,7 @@ from bench.analyses.gave import GivesWay
 from bench.analyses.known_friction import KnownFriction
 from bench.analyses.ledger import Ledger
 from bench.analyses.moving_objects import MovingObjects
+from bench.analyses.reorientation import Reorientation
 from bench.analyses.single_camera import OneCamera
 from bench.analyses.soft import Softness
 from bench.analyses.table_i_sensors import Sensors
@@ -31,6 +32,7 @@ ANALYSES: tuple[Analysis, ...] = (
     GivesWay(),
     Curvature(),
     Tilts(),
+    Reorientation(),
     Sensors(),
     MovingObjects(),
     BothWays(),

@@ -30,6 +30,7 @@ def check_protocol(protocol: "Protocol", path: Path) -> None:
             _check_run(protocol, run)
             _check_object(run)
             _check_moving(protocol, run)
+            _check_rotations(protocol, run)
     except ValueError as problem:
         raise BadInput(str(problem), file=path) from None
 
@@ -124,3 +125,16 @@ def _check_moving(protocol, run: "ProtocolRun"):
     if not speed <= fastest:
         allowed = f"{fastest:.3g} is allowed: half the whisker's own where it touches"
         raise ValueError(f"{key}{speed:.3g} mm/s, {allowed}")
+
+
+def _check_rotations(protocol, run: "ProtocolRun"):
+    """Raise ValueError where rotations in turned planes would not meet one and the same contact."""
+    table = run.table
+    if not table.rotations:
+        return
+    if table.beta_scatter_deg or table.psi_scatter_deg or table.d_x_scatter_mm:
+        raise ValueError(
+            "rotations are against one object: beta_scatter_deg, psi_scatter_deg and d_x_scatter_mm are 0"
+        )
+    if table.purpose == "gauge" or protocol.columns or protocol.goes_back(run):
+        raise ValueError("rotations are single forward strokes that measure, of one whisker")

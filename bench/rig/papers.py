@@ -107,6 +107,9 @@ def trial_toml(recording: Recording) -> str:
         "d_x_mm": float(run.d_x_mm),
         "purpose": table.purpose,
     }
+    if table.rotations:
+        trial["contact"] = run.contact
+        trial["plane_turn_deg"] = round(run.plane_turn_deg, 6)
     trial |= _bar_keys(run)
     if table.both_ways:
         trial["both_ways"] = True

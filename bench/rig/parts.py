@@ -14,6 +14,7 @@ from bench.rig.array_rig import ArrayRecording, MountedWhisker, mount_whiskers
 from bench.rig.moments import array_exposure_moments, exposure_moments
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
+from bench.rig.reorienting import turned_plane
 from bench.rig.studio import Studio
 
 _BOARDS, _RIG, _TRIAL, _POSE, _ARRAY = range(5)  # first words of the random streams
@@ -119,6 +120,8 @@ def _write_board_views(job, number, folder):
 def _write_trial(job, number, folder):
     """Write the files of a trial of one whisker."""
     run = job.protocol.runs()[number]
+    first = number - run.rotation
+    run = turned_plane(job.protocol, run, lambda rotation: job.stream(_TRIAL, first + rotation))
     recording = Recording.make(job.protocol, run, job.stream(_TRIAL, number))
     clock_offset_s = job.protocol.pictures.clock_offset_s
     texts = {

@@ -56,13 +56,16 @@ class Protocol(ProtocolTable, kw_only=True):
         runs = []
         for table in self.trials:
             runs += _table_runs(table, self.motor)
-        totals = Counter(run.name for run in runs)
+        totals = Counter((run.name, run.rotation) for run in runs)
         counts = Counter()
         named = []
         for run in runs:
-            counts[run.name] += 1
-            number = f"_{counts[run.name]}" if totals[run.name] > 1 else ""
-            named.append(msgspec.structs.replace(run, name=run.name + number))
+            alike = (run.name, run.rotation)
+            counts[alike] += 1
+            number = f"_{counts[alike]}" if totals[alike] > 1 else ""
+            contact = run.name + number
+            rotation = f"_r{run.rotation}" if run.table.rotations else ""
+            named.append(msgspec.structs.replace(run, contact=contact, name=contact + rotation))
         return named
 
     def goes_back(self, run: "ProtocolRun") -> bool:
@@ -80,7 +83,12 @@ class Protocol(ProtocolTable, kw_only=True):
 
 
 class ProtocolRun(msgspec.Struct, frozen=True):
-    """One trial. The motor goes from `before_deg` before touch to `after_deg` after it."""
+    """One trial. The motor goes from `before_deg` before touch to `after_deg` after it.
+
+    rotation: its number among the rotations against one object. contact: the name that these share.
+    plane_turn_deg: how far the plane of rotation is turned about the whisker, against which beta_deg is
+    the object's slope.
+    """
 
     name: str
     beta_deg: float
@@ -90,6 +98,14 @@ class ProtocolRun(msgspec.Struct, frozen=True):
     before_deg: float
     after_deg: float
     table: TrialTable
+    rotation: int = 1
+    contact: str = ""
+    plane_turn_deg: float = 0.0
+
+    def turned(self, plane_turn_deg: float) -> "ProtocolRun":
+        """Return the run with its plane of rotation turned about the whisker."""
+        beta_deg = self.beta_deg - plane_turn_deg
+        return msgspec.structs.replace(self, beta_deg=beta_deg, plane_turn_deg=plane_turn_deg)
 
 
 def _table_runs(table, motor) -> list[ProtocolRun]:
@@ -106,7 +122,9 @@ def _table_runs(table, motor) -> list[ProtocolRun]:
         else:
             tilt = f"_psi{psi:g}" if psi else ""
             name += f"_b{beta:02g}{tilt}_v{speed:g}"
-        runs.append(ProtocolRun(name, beta, psi, d_x, speed, before_deg, after_deg, table))
+        run = ProtocolRun(name, beta, psi, d_x, speed, before_deg, after_deg, table)
+        rotations = range(1, (table.rotations or 1) + 1)
+        runs += [msgspec.structs.replace(run, rotation=rotation) for rotation in rotations]
     return runs
 
 

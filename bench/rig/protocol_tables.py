@@ -212,6 +212,9 @@ class TrialTable(ProtocolTable):
     after_deg: Positive | None = None
     whisks: Annotated[int, msgspec.Meta(ge=1)] = 1
     repeats: Annotated[int, msgspec.Meta(ge=1)] = 1
+    # How often the whisker is rotated against each object, its plane of rotation turned between so
+    # that it slips less; a trial each. By default once, and no plane is turned
+    rotations: Annotated[int, msgspec.Meta(ge=1, le=20)] | msgspec.UnsetType = msgspec.UNSET
     # Of the bar's surface, which gives way; by default it is rigid
     stiffness_N_mm: Positive | None = None
     # Where these are not given, UNSET keeps them out of the fingerprint.

@@ -287,6 +287,12 @@ class TrialKeys(GivenKeys):
     # true: the object gives way as it is pushed, and comes back; how far is fitted to the pictures
     # ([soft.md](soft.md))
     object_gives_way: bool = False
+    # name of a contact that several trials approach, the plane of rotation turned between them
+    contact: str = ""
+    # how far that plane is turned about the whisker (+x); the rig frame turns with it, so `beta_deg` is
+    # the slope against the turned plane. Its sigma enters nothing
+    plane_turn_deg: Angle = 0.0
+    plane_turn_sigma_deg: float = 0.0
     # how far the follicle is turned about the whisker (+x)
     follicle_roll_deg: Angle = 0.0
     follicle_roll_sigma_deg: Annotated[float, Assumed(share=1 / 90, origin="1° in 90°")] = 0.0
