@@ -64,6 +64,8 @@ class Whisk:
     theta_moment_covariance_at (2,): covariance of the pushing angle with (m_y, m_z), rad·N·mm.
     others: readings of other sensors; None where there are none.
     object_motion: None where the object stands still.
+    unfiltered_Nmm (n, 2): m_y and m_z of the samples as they were recorded, where m_y_Nmm and m_z_Nmm
+    are low-passed; None where they are not kept.
 
     Raises ValueError where shapes disagree or a sigma is negative. The arrays are read-only copies:
     no estimator can change what another one receives.
@@ -82,6 +84,7 @@ class Whisk:
     theta_moment_covariance_at: np.ndarray = field(default_factory=lambda: np.zeros(2))
     others: OtherSensors | None = None
     object_motion: ObjectMotion | None = None
+    unfiltered_Nmm: np.ndarray | None = None
 
     def __post_init__(self):
         """Raise ValueError for a wrong shape or sigma, and keep read-only copies."""

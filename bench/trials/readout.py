@@ -109,6 +109,7 @@ def whisk_at(
     if at.status:
         return as_reason(at.status)
     moments = (stroke.filtered - touch.offset) @ readout.matrix.T  # (n, 2) N·mm
+    unfiltered = (stroke.channels - touch.offset) @ readout.matrix.T
     m_y, m_z = readout.matrix @ at.values
     return Whisk(
         time_s=stroke.time_s,
@@ -122,4 +123,5 @@ def whisk_at(
         theta_sigma_rad=touch.sigma_rad,
         beam=beam,
         theta_moment_covariance_at=readout.matrix @ at.theta_covariance,
+        unfiltered_Nmm=unfiltered,
     )

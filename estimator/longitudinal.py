@@ -1,0 +1,32 @@
+"""Rotational compliance with longitudinal slip: (2), less what a contact that rolls along the whisker does to it.
+
+Kaneko et al. [19] take the distance from the compliance and correct it for a contact that moves along the
+whisker as it rolls over a round object. Their equation is not at hand: this is the first order of the
+exact mechanics (`estimator.first_order.rolling`), for an object of known radius met head-on.
+"""
+
+from dataclasses import replace
+from math import isnan
+
+from estimator import first_order
+from estimator.builtin import no_slip
+from estimator.whisk import Estimate, EstimatorSettings, Whisk
+
+
+def compliance_with_rolling(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
+    """Estimate by (2) less rolling; where the object's radius is not known, this is (2).
+
+    Slip sideways is ignored, as (2) ignores it.
+    """
+    estimate = no_slip(whisk, settings)
+    if isnan(estimate.d_x_mm) or isnan(settings.object_radius_mm):
+        return estimate
+    left = whisk.beam.left(estimate.d_x_mm)
+    reach = settings.object_radius_mm + settings.whisker_radius_mm * left
+    rolled = first_order.rolling(whisk.theta_at_rad, reach, 0.0, 0.0, estimate.d_x_mm, left)
+    return replace(
+        estimate,
+        d_x_mm=estimate.d_x_mm * (1 - rolled),
+        low_mm=estimate.low_mm * (1 - rolled),
+        high_mm=estimate.high_mm * (1 - rolled),
+    )
