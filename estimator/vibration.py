@@ -44,6 +44,8 @@ _FEWEST_PERIODS = 1.5
 _DAMPING = (1e-3, 0.1)
 # [1] Damping from which a ring is looked for: that of a steel or Nitinol wire in air, clamped. Stated.
 _TYPICAL_DAMPING = 0.02
+# [1] Over the span: frequencies farther apart are another ring's, nearer they share a peak. Derived.
+_APART = 1.5
 # [1] Share of the slowest frequency down to which a fit may go: noise moves it by less. Stated.
 _SLOWER = 0.9
 # [1] Of each channel: a cubic, a hum and a ring. Derived.
@@ -51,6 +53,8 @@ _LINEAR_UNKNOWNS = 8
 # [sigma] Amplitude below which a ring is noise: in 100 independent frequencies one of 1000, by χ² of the
 # six unknowns of a ring in two channels. Derived.
 _LEAST_AMPLITUDE_SIGMAS = 5.8
+# [sigma] Margin below which another frequency may be the ring's: one in 400. Derived.
+_LEAST_MARGIN_SIGMAS = 3.0
 NO_RING = NamedReason("whisker_does_not_ring", "no ringing stands out of the noise {}")
 NOT_PROPPED = NamedReason(
     "ring_not_of_a_prop", "the frequencies' ratio is {:.2f}: a contact gives 1 to 6.27"
@@ -68,18 +72,21 @@ TWO_PLACES = NamedReason(
 class Ring:
     """A damped oscillation: frequency with its standard deviation, Hz, and amplitude in its sigmas.
 
-    mains_Hz: frequency of the hum beside it.
+    margin_sigmas: by how much it explains more than a ring of any other frequency. mains_Hz: frequency
+    of the hum beside it.
     """
 
     frequency_Hz: float
     sigma_Hz: float
     amplitude_sigmas: float
+    margin_sigmas: float
     mains_Hz: float
 
     @property
     def is_heard(self) -> bool:
-        """Return whether it stands out of the noise."""
-        return self.amplitude_sigmas > _LEAST_AMPLITUDE_SIGMAS
+        """Return whether it stands out of the noise, and no other frequency explains as much."""
+        stands_out = self.amplitude_sigmas > _LEAST_AMPLITUDE_SIGMAS
+        return stands_out and self.margin_sigmas > _LEAST_MARGIN_SIGMAS
 
 
 def frequency_ratio(share: float) -> float:
@@ -133,7 +140,9 @@ def vibration(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     if propped is None or not propped.is_heard:
         return Estimate(nan, nan, NO_RING.format("after touch"))
     ratio = propped.frequency_Hz / free.frequency_Hz
-    sigma = ratio * hypot(free.sigma_Hz / free.frequency_Hz, propped.sigma_Hz / propped.frequency_Hz)
+    sigma = ratio * hypot(
+        free.sigma_Hz / free.frequency_Hz, propped.sigma_Hz / propped.frequency_Hz
+    )
     return _by_ratio(ratio, sigma, whisk.beam.length_mm)
 
 
@@ -187,6 +196,8 @@ def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None)
     frequencies = _frequencies(time_s, slowest_Hz)
     sums = [_left(time_s, moments, f, _TYPICAL_DAMPING, mains_Hz)[0] for f in frequencies]
     best_Hz = frequencies[int(np.argmin(sums))]
+    others = np.abs(frequencies - best_Hz) > _APART / time_s[-1]
+    runner_up = min(np.array(sums)[others], default=np.inf)
     start = [best_Hz, _TYPICAL_DAMPING]
     low = [_SLOWER * slowest_Hz, _DAMPING[0]]
     high = [0.5 / _step_s(time_s), _DAMPING[1]]
@@ -210,7 +221,9 @@ def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * variance
     without = _left(time_s, moments, None, None, mains_Hz)[0]
     amplitude_sigmas = sqrt(max(without - left, 0.0) / variance)
-    return Ring(frequency, frequency * sqrt(covariance[0, 0]), amplitude_sigmas, mains_Hz)
+    margin_sigmas = sqrt(max(runner_up - left, 0.0) / variance)
+    sigma_Hz = frequency * sqrt(covariance[0, 0])
+    return Ring(frequency, sigma_Hz, amplitude_sigmas, margin_sigmas, mains_Hz)
 
 
 def _step_s(time_s: np.ndarray) -> float:

@@ -1,0 +1,304 @@
+"""What the methods that the paper argues against or beside are worth, on the same simulated contacts with equal noise.
+
+    python tests/studies/accuracy/rivals.py [--count 6] [--seed 0] [--figure PICTURE.png]
+
+Each contact is pushed at 90°/s by the exact mechanics of the rig, with ringing, noise, hum and a load cell;
+drawn anew are its distance (30 to 80 mm) and the lean of the bar (N(0, 5°)); the bar is 6 mm thick, θ is 3°,
+α_est = 10 ± 4°. By friction angle and slope: RMS error and stated sigma (RMS) of d_x in % of the truth, and over
+all contacts how often the 95 % interval holds. Reorientation turns the plane of rotation until the slip that
+is left does not matter, at most four times; its pushes are counted, and its seconds with them.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+
+from bench.base.drawing import nested_size, save, style
+from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
+from bench.gauges.drift import allow_drift, drift_rate
+from bench.gauges.felt import strokes_of
+from bench.gauges.matrix import GaugeMatrix
+from bench.rig.protocol import Protocol
+from bench.rig.protocol_tables import (
+    GaugesTable,
+    LoadCellTable,
+    MotorTable,
+    PicturesTable,
+    TrialTable,
+)
+from bench.rig.recording import Recording
+from bench.session.signals import Signals
+from bench.trials.readout import Readout, whisk_at
+from bench.trials.sensor_readings import with_others
+from estimator.beam import Beam
+from estimator.builtin import no_slip, with_friction
+from estimator.longitudinal import compliance_with_rolling
+from estimator.reorientation import next_turn_rad, reoriented
+from estimator.sensors import SENSORS
+from estimator.uncertainty import Z_95
+from estimator.vibration import vibration
+from estimator.whisk import Estimate, EstimatorSettings, Whisk
+
+ALPHAS_DEG = (3.0, 10.0, 20.0)
+SLOPES_DEG = (0.0, 20.0, 40.0, 60.0, 75.0)
+THETA_RAD = np.radians(3.0)
+BEAM = Beam.from_modulus(60.0, 1.0, 100.0)
+READOUT = Readout(GaugeMatrix(10.0 * np.eye(2)))
+MOST_PUSHES = 4
+SPEED_DEG_S = 90.0
+BEFORE_DEG = 20.0
+AFTER_DEG = 6.0
+PUSH_S = (BEFORE_DEG + AFTER_DEG) / SPEED_DEG_S
+BAR_MM = 6.0
+SETTINGS = EstimatorSettings(
+    np.radians(10.0), np.radians(4.0), OBJECT_REACH_MM, TILT_SIGMA_RAD, np.nan, 0.5
+)
+KNOWN_BAR = replace(SETTINGS, object_radius_mm=BAR_MM / 2)
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact to be pushed against: slope, friction angle, distance, and lean along the whisker."""
+
+    beta_deg: float
+    alpha_deg: float
+    d_x_mm: float
+    psi_deg: float
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one method says of a contact, and how many pushes it took; the truth is that of its last push."""
+
+    estimate: Estimate
+    truth_mm: float
+    pushes: int
+
+    @property
+    def error(self) -> float:
+        """Return the relative error."""
+        return self.estimate.d_x_mm / self.truth_mm - 1
+
+    @property
+    def is_inside(self) -> bool:
+        """Return whether the 95 % interval holds the truth."""
+        low = self.estimate.low_mm
+        high = self.estimate.high_mm
+        if np.isnan(low):
+            low = self.estimate.d_x_mm - Z_95 * self.estimate.sigma_mm
+            high = self.estimate.d_x_mm + Z_95 * self.estimate.sigma_mm
+        return bool(low <= self.truth_mm <= high)
+
+
+Push = Callable[[float], tuple[Whisk, float] | None]
+
+
+@dataclass(frozen=True)
+class Method:
+    """One of the table's columns: what it needs, and how it answers by pushes in planes that it may turn."""
+
+    title: str
+    axes: int
+    sensors: str
+    answer: Callable[[Push], Answer | None]
+
+
+def by_one_push(estimator: Callable, settings: EstimatorSettings = SETTINGS) -> Callable:
+    """Return the answer of an estimator to one push."""
+
+    def answer(push: Push) -> Answer | None:
+        pushed = push(0.0)
+        return pushed and Answer(estimator(pushed[0], settings), pushed[1], 1)
+
+    return answer
+
+
+def by_reorientation(push: Push) -> Answer | None:
+    """Push, turn the plane by the slip that is felt, and push again until it does not matter."""
+    turn_rad = 0.0
+    pushes = 0
+    while pushes < MOST_PUSHES:
+        pushed = push(np.degrees(turn_rad))
+        if pushed is None:
+            return None
+        pushes += 1
+        whisk, truth_mm = pushed
+        further_rad = next_turn_rad(whisk, SETTINGS)
+        if further_rad == 0.0:
+            break
+        turn_rad += further_rad
+    return Answer(reoriented(whisk, SETTINGS), truth_mm, pushes)
+
+
+METHODS = (
+    Method("touch alone [24]–[26], [33]", 1, "a switch", by_one_push(SENSORS["touch_alone"])),
+    Method("compliance (2) [19]", 1, "m_z", by_one_push(no_slip)),
+    Method(
+        "(2) less rolling [19]", 1, "m_z, radius", by_one_push(compliance_with_rolling, KNOWN_BAR)
+    ),
+    Method("reorientation [19], [37]", 2, "m_y, m_z", by_reorientation),
+    Method("vibration [35]", 1, "m_z, fast", by_one_push(vibration)),
+    Method("force and moment [21], [37]", 1, "six axes", by_one_push(SENSORS["force_and_moment"])),
+    Method("(10), this paper", 1, "m_y, m_z", by_one_push(with_friction)),
+)
+
+
+def pushes_of(contact: Contact, rng: np.random.Generator) -> Push:
+    """Return the function that pushes against a contact, the plane of rotation turned by some degrees."""
+
+    def push(turn_deg: float) -> tuple[Whisk, float] | None:
+        table = TrialTable(
+            beta_deg=contact.beta_deg - turn_deg,
+            psi_deg=contact.psi_deg,
+            d_x_mm=contact.d_x_mm,
+            bar_diameter_mm=BAR_MM,
+            speed_deg_s=SPEED_DEG_S,
+            before_deg=BEFORE_DEG,
+            after_deg=AFTER_DEG,
+            friction=float(np.tan(np.radians(contact.alpha_deg))),
+            beta_scatter_deg=0.0,
+            d_x_scatter_mm=0.0,
+        )
+        protocol = Protocol(
+            trials=[table],
+            gauges=GaugesTable(
+                matrix_Nmm_per_V=((10.0, 0.0), (0.0, 10.0)), known=True, vibration=True
+            ),
+            load_cell=LoadCellTable(),
+            motor=MotorTable(ramp_s=0.01),
+            pictures=PicturesTable(step_deg=3.0),
+        )
+        return felt(protocol, rng)
+
+    return push
+
+
+def felt(protocol: Protocol, rng: np.random.Generator) -> tuple[Whisk, float] | None:
+    """Return a push as it is felt, and its true distance; None where it finds no hold or is not felt."""
+    (run,) = protocol.runs()
+    try:
+        recording = Recording.make(protocol, run, rng)
+    except ArithmeticError:
+        return None
+    time, motor_deg, y, z, *forces = recording.signals.T
+    signals = Signals(time, np.radians(motor_deg), y, z, "V", forces_N=np.stack(forces, axis=1))
+    (stroke,) = strokes_of(signals, run, Settings())
+    touch = allow_drift(stroke.touch(), drift_rate([]), stroke.speed_rad_s)
+    whisk = touch.status or whisk_at(stroke, READOUT, touch, BEAM, THETA_RAD)
+    if isinstance(whisk, str):
+        return None
+    whisk = with_others(
+        whisk, stroke, READOUT, touch, force_drift_rate=np.zeros(3), scale_sigma=0.0
+    )
+    return whisk, recording.touch.d_x_mm
+
+
+def contacts(count: int, rng: np.random.Generator) -> Iterator[Contact]:
+    """Yield the contacts of the table, `count` a cell."""
+    for alpha_deg in ALPHAS_DEG:
+        for beta_deg in SLOPES_DEG:
+            for _ in range(count):
+                yield Contact(beta_deg, alpha_deg, rng.uniform(30.0, 80.0), 5.0 * rng.normal())
+
+
+def answers(count: int, rng: np.random.Generator) -> dict[tuple[str, float, float], list[Answer]]:
+    """Return what each method says, by its title, friction angle and slope."""
+    found = {}
+    for contact in contacts(count, rng):
+        for method in METHODS:
+            answer = method.answer(pushes_of(contact, rng))
+            if answer is not None:
+                key = (method.title, contact.alpha_deg, contact.beta_deg)
+                found.setdefault(key, []).append(answer)
+    return found
+
+
+def rms_percent(values: list[float]) -> float:
+    """Return the root mean square of what is known, %; NaN of nothing."""
+    known = [value for value in values if np.isfinite(value)]
+    return 100.0 * float(np.sqrt(np.mean(np.square(known)))) if known else float("nan")
+
+
+def cell(said: list[Answer]) -> str:
+    """Return RMS error, stated sigma, and how many have none, as the table has them."""
+    error = rms_percent([one.error for one in said])
+    sigma = rms_percent([one.estimate.sigma_mm / one.truth_mm for one in said])
+    none = sum(np.isnan(one.error) for one in said)
+    without = f", {none} none" if none else ""
+    return f"{error:.1f} (± {sigma:.1f}{without})"
+
+
+def table_lines(found: dict) -> Iterator[str]:
+    """Yield the table by friction angle and slope, a column a method."""
+    yield "| α | β | " + " | ".join(method.title for method in METHODS) + " |"
+    yield "|---" * (2 + len(METHODS)) + "|"
+    for alpha_deg in ALPHAS_DEG:
+        for beta_deg in SLOPES_DEG:
+            cells = [cell(found.get((m.title, alpha_deg, beta_deg), [])) for m in METHODS]
+            yield f"| {alpha_deg:g}° | {beta_deg:g}° | " + " | ".join(cells) + " |"
+
+
+def needs_lines(found: dict) -> Iterator[str]:
+    """Yield what each method needs, and how often its intervals hold over all contacts."""
+    yield "| method | pushes | seconds | axes | sensors | 95 % hold |"
+    yield "|---|---|---|---|---|---|"
+    for method in METHODS:
+        said = [one for key, cell in found.items() if key[0] == method.title for one in cell]
+        pushes = np.mean([one.pushes for one in said])
+        known = [one.is_inside for one in said if np.isfinite(one.error)]
+        held = f"{100 * np.mean(known):.0f} % of {len(known)}"
+        needs = f"{pushes:.1f} | {pushes * PUSH_S:.2g} | {method.axes} | {method.sensors}"
+        yield f"| {method.title} | {needs} | {held} |"
+
+
+def draw(found: dict, path: Path) -> None:
+    """Draw the RMS error over the slope, a panel a friction angle."""
+    from matplotlib.figure import Figure
+
+    with style():
+        figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+        panels = figure.subplots(1, len(ALPHAS_DEG), sharey=True)
+        for panel, alpha_deg in zip(panels, ALPHAS_DEG):
+            for number, method in enumerate(METHODS):
+                mine = []
+                for beta_deg in SLOPES_DEG:
+                    said = found.get((method.title, alpha_deg, beta_deg), [])
+                    mine.append(rms_percent([one.error for one in said]))
+                # Those that coincide show beside each other: what is drawn first is wider.
+                panel.plot(
+                    SLOPES_DEG,
+                    mine,
+                    "o-",
+                    lw=nested_size(number, len(METHODS), 1.0, 0.5),
+                    ms=nested_size(number, len(METHODS), 2.0, 0.8),
+                    color=f"C{number}",
+                    label=method.title,
+                )
+            panel.set(yscale="log", xlabel="slope β, °", title=f"α = {alpha_deg:g}°")
+        panels[0].set_ylabel("error of d$_x$, RMS, %")
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        save(figure, path, "tests/studies/accuracy/rivals.py")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--count", type=int, default=6)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--figure", type=Path)
+    options = parser.parse_args()
+    found = answers(options.count, np.random.default_rng(options.seed))
+    print(*table_lines(found), "", *needs_lines(found), sep="\n")
+    if options.figure:
+        draw(found, options.figure)
+
+
+if __name__ == "__main__":
+    main()
