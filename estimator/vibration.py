@@ -175,6 +175,7 @@ def moves_steadily(motor_rad: np.ndarray) -> np.ndarray:
 
 def _ring(whisk: Whisk, part: np.ndarray, beside: Ring | None = None) -> Ring | None:
     """Return the ring in a part of the samples; None where the part is too short for one."""
+    part = part & np.isfinite(whisk.unfiltered_Nmm).all(axis=1)
     time_s = whisk.time_s[part]
     if len(time_s) < _FEWEST_SAMPLES:
         return None
