@@ -197,6 +197,14 @@ class Pieces(Rows):
         """
         return np.maximum((self.weight > 0).sum(axis=1) - 3, 1)
 
+    @property
+    def relative_radius(self) -> np.ndarray:
+        """Return the half-width (s,) over the mean of all segments.
+
+        By it a common shift is multiplied: light that hides an edge hides a share of the width.
+        """
+        return self.radius_px / np.mean(self.radius_px)
+
     def columns(self, keep: np.ndarray | slice) -> "Pieces":
         """Return the segments with those of their pixels where keep (p,) holds, or of a slice."""
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")

@@ -148,12 +148,14 @@ class Point:
         log_blur: float,
         robust: np.ndarray | None = None,
     ) -> "Point":
-        """Return the point where all segments have one shift, px, under this blur.
+        """Return the point where all segments have one shift, px at their mean half-width, under
+        this blur.
 
         robust (s,): weight of each segment; None: all count alike.
         """
-        every = np.ones(len(task.pieces))
-        return cls.at(task, shift_px * every, log_blur, every if robust is None else robust)
+        if robust is None:
+            robust = np.ones(len(task.pieces))
+        return cls.at(task, shift_px * task.pieces.relative_radius, log_blur, robust)
 
     @property
     def evidence(self) -> float:

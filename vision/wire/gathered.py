@@ -41,8 +41,10 @@ class GatheredEquations:
         each_pixel: sum nothing beforehand. It is slower, and the matrices are positive semidefinite
         whatever the pixels show.
         """
+        relative_radius = pieces.relative_radius
         gathers = _shows_enough_background(pieces) & (not each_pixel)
         self._groups: list[SummedSegments | _PixelSegments] = []
+        self._relative_radii: list[np.ndarray | float] = []
         summed = np.flatnonzero(gathers)
         if len(summed):
             for group in alike(pieces.radius_px[summed]):
@@ -50,16 +52,19 @@ class GatheredEquations:
                 self._groups.append(
                     SummedSegments(pieces.select(some), knot_weights[some], robust[some])
                 )
+                self._relative_radii.append(float(np.mean(relative_radius[some])))
         others = np.flatnonzero(~gathers)
         if len(others):
             self._groups.append(
                 _PixelSegments(pieces.select(others), knot_weights[others], robust[others])
             )
+            self._relative_radii.append(relative_radius[others])
 
     def normal(
         self, shifts_px: Sequence[float], models: Sequence[tuple[float, float]], terms: int
     ) -> Normal:
-        """Return the normal equations (shifts, models, …) of segments moved by each common shift.
+        """Return the normal equations (shifts, models, …) of segments moved by each common shift,
+        px at their mean half-width.
 
         models: of each how many times as thick the rod is, and the blur, px.
         terms: number of shading functions; size = knots × terms.
@@ -68,7 +73,9 @@ class GatheredEquations:
         rights = []
         powers = []
         for shift_px in shifts_px:
-            groups = [group.normal_at(shift_px, models, terms) for group in self._groups]
+            groups = []
+            for group, relative_radius in zip(self._groups, self._relative_radii):
+                groups.append(group.normal_at(shift_px * relative_radius, models, terms))
             lefts.append(sum(group.left for group in groups))
             rights.append(sum(group.right for group in groups))
             powers.append(sum(group.power for group in groups))
@@ -103,10 +110,10 @@ class _PixelSegments:
         self._robust = robust
 
     def normal_at(
-        self, shift_px: float, models: Sequence[tuple[float, float]], terms: int
+        self, shift_px: np.ndarray, models: Sequence[tuple[float, float]], terms: int
     ) -> Normal:
-        """Return the normal equations (models, …) of the segments moved by one shift."""
-        moved = self._pieces.moved(np.full(len(self._pieces), shift_px))
+        """Return the normal equations (models, …) of the segments, each moved by its shift (s,)."""
+        moved = self._pieces.moved(shift_px)
         lefts = []
         rights = []
         powers = []

@@ -75,9 +75,16 @@ def _with_all_shifts(task: ShadedSegments, shared: Shared) -> Shared:
             shared = other
             here = there
             shift = about_other
-    bent = shared.shared_px - np.average(shared.shared_px, axis=0, weights=here.robust)
-    common = np.full((len(bent), 1), shift.rms_px)
-    return replace(shared, shared_px=np.concatenate([bent, common], axis=1))
+    own_px = _without_common(task, shared.shared_px, here.robust)
+    common_px = shift.rms_px * task.pieces.relative_radius[:, None]
+    return replace(shared, shared_px=np.concatenate([own_px, common_px], axis=1))
+
+
+def _without_common(task: ShadedSegments, shifts_px: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return shifts (s, k) less the common shift that fits them best by weights (s,)."""
+    common = task.pieces.relative_radius
+    weighted = weight * common
+    return shifts_px - np.outer(common, (weighted @ shifts_px) / (weighted @ common))
 
 
 def _weighted_point(task: ShadedSegments, shared: Shared) -> Point:
@@ -88,7 +95,7 @@ def _weighted_point(task: ShadedSegments, shared: Shared) -> Point:
 
 def _descend_from(task: ShadedSegments, shared: Shared, shift: CommonShift) -> Shared:
     """Return where the descent ends from a solution moved by the mean of a common shift."""
-    moved_px = shared.shift_px + shift.mean_px
+    moved_px = shared.shift_px + shift.mean_px * task.pieces.relative_radius
     log_blur = np.log(shared.blur_px) + shift.log_blur
     return descend(Point.at(task, moved_px, log_blur, np.ones(len(moved_px))).weighted())
 
@@ -103,15 +110,16 @@ def _common_shift(task: ShadedSegments, here: Point) -> CommonShift:
 def settle(task: ShadedSegments, shared: Shared) -> Solved:
     """Find each segment's own position by all of its pixels, what all share known.
 
-    The segments' weighted mean position stays as it is.
+    Their common shift stays as it is.
     """
     here = Equations(task.pieces.moved(shared.shift_px), shared.blur_px, task.terms)
     linear = here.linearised(shared.coefficients)
     chi2 = here.chi2(shared.coefficients) / task.pieces.freedom
     misfit = chi2 / max(float(np.median(chi2)), 1e-9)
     share = linear.power / np.maximum(misfit, 1.0) ** 2
+    step_px = _without_common(task, linear.step_px[:, None], share)[:, 0]
     return Solved(
-        shift_px=shared.shift_px + linear.step_px - np.average(linear.step_px, weights=share),
+        shift_px=shared.shift_px + step_px,
         shared_px=shared.shared_px,
         coefficients=shared.coefficients,
         blur_px=shared.blur_px,

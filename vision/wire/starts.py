@@ -44,7 +44,8 @@ def find_start(task: ShadedSegments) -> tuple[float, float]:
         start = Point.at_common_shift(task, shift_px, log_blur, robust)
         ends.append(descend(start, _COARSE))
     best = min(ends, key=lambda end: end.evidence)
-    return float(np.median(best.shift_px)), float(np.log(best.blur_px))
+    shift_px = np.median(best.shift_px / task.pieces.relative_radius)
+    return float(shift_px), float(np.log(best.blur_px))
 
 
 def _rank_starts(task: ShadedSegments) -> list[tuple[float, float]]:
@@ -76,7 +77,8 @@ def _evidences(task: ShadedSegments, log_blurs: np.ndarray, each_pixel: bool) ->
     normal = gathered.normal(_START_SHIFTS_PX, models, task.terms)
     evidences = normal.power + task.blur_deviation(log_blurs) ** 2
     for k, shift in enumerate(_START_SHIFTS_PX):
-        prior = wave_prior(task.pieces.moved(shift * every), task.terms)
+        moved = task.pieces.moved(shift * task.pieces.relative_radius)
+        prior = wave_prior(moved, task.terms)
         stiff = stiffness(prior, task.knots)
         for b in range(len(log_blurs)):
             evidences[k, b] += _evidence_of_shading(normal.left[k, b], normal.right[k, b], stiff)

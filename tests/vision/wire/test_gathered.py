@@ -39,10 +39,9 @@ def both(pieces, **how):
             [SHIFT_PX], [(WIDER, BLUR_PX)], 11
         )
     ]
-    moved = replace(
-        pieces.moved(np.full(len(pieces), SHIFT_PX)), radius_px=WIDER * pieces.radius_px
-    )
-    one_by_one = Equations(moved, BLUR_PX, WIRE_WAVES)
+    moved = pieces.moved(SHIFT_PX * pieces.relative_radius)
+    thicker = replace(moved, radius_px=WIDER * pieces.radius_px)
+    one_by_one = Equations(thicker, BLUR_PX, WIRE_WAVES)
     return told, (*one_by_one.shared(hats, robust), robust @ one_by_one.power)
 
 

@@ -4,18 +4,20 @@ import numpy as np
 import pytest
 
 from vision.wire.bands import Pieces
-from vision.wire.cylinder import shading_basis
+from vision.wire.cylinder import round_the_rod, shading_basis
 from vision.wire.joint import solve_jointly
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import Knots, stiffness, wave_prior
+from vision.wire.trace import WIRE_WAVES
 
 FRAMES, PLACES, TERMS, BLUR_PX, NOISE = 6, np.arange(5.0, 100.0, 10.0), 5, 0.9, 2.0
 KNOTS = Knots(np.array([0.0, 50.0, 100.0]))
 
 
-def drawn(rng, jump_px=0.0) -> Pieces:
-    """Pieces of a rod on the line where they are looked for, its shading drawn from the prior, before an even floor; in
-    the last frame it is seen for half of the time to either side, jump_px apart."""
+def drawn(rng, jump_px=0.0, tip_px=2.8, waves=None) -> Pieces:
+    """Pieces of a rod on the line where they are looked for, before an even floor; in the last frame it is seen for half
+    of the time to either side, jump_px apart. tip_px: half-width at its end. waves (knots, terms): its shading, drawn
+    from the prior where None."""
     place = np.tile(PLACES, FRAMES)
     count, rows = len(place), np.arange(-9.0, 10.0)
     offset = (
@@ -23,11 +25,11 @@ def drawn(rng, jump_px=0.0) -> Pieces:
         + rng.uniform(-0.5, 0.5, (count, 1))
         + np.repeat(np.arange(6) / 6.0, len(rows))
     )
-    flat, radius = np.full(offset.shape, 60.0), np.full(count, 2.8)
+    flat, radius = np.full(offset.shape, 60.0), np.interp(place, [0.0, 100.0], [2.8, tip_px])
     none = np.zeros(offset.shape)
     pieces = Pieces(
         offset,
-        flat + 60.0 * (np.abs(offset) < 2.8),
+        flat + 60.0 * (np.abs(offset) < radius[:, None]),
         flat,
         none,
         none,
@@ -38,28 +40,30 @@ def drawn(rng, jump_px=0.0) -> Pieces:
         np.tile([0.0, 1.0], (count, 1)),
         np.repeat(range(FRAMES), len(PLACES)),
     )
-    covariance = np.linalg.inv(stiffness(wave_prior(pieces, TERMS), KNOTS))
-    waves = rng.multivariate_normal(np.zeros(len(covariance)), covariance).reshape(
-        len(KNOTS), TERMS
-    )
-    waves[:, 0] += (
-        160.0  # bright enough that its contrast, by which the prior is scaled, is what was drawn with
-    )
+    if waves is None:
+        covariance = np.linalg.inv(stiffness(wave_prior(pieces, TERMS), KNOTS))
+        waves = rng.multivariate_normal(np.zeros(len(covariance)), covariance).reshape(
+            len(KNOTS), TERMS
+        )
+        # bright enough that its contrast, by which the prior is scaled, is what was drawn with
+        waves[:, 0] += 160.0
     aside = 0.5 * jump_px * (pieces.source == FRAMES - 1)[:, None]
+    terms = waves.shape[1]
     basis = 0.5 * sum(
-        shading_basis(offset + move, radius[:, None], BLUR_PX, TERMS) for move in (-aside, aside)
+        shading_basis(offset + move, radius[:, None], BLUR_PX, terms) for move in (-aside, aside)
     )
-    light = np.einsum("spt,st->sp", basis[..., :TERMS], KNOTS.weights(pieces) @ waves)
+    light = np.einsum("spt,st->sp", basis[..., :terms], KNOTS.weights(pieces) @ waves)
     grey = light + (1.0 - basis[..., 0]) * flat + NOISE * rng.standard_normal(offset.shape)
     return Pieces(**{**vars(pieces), "grey": grey})
 
 
-def test_what_all_pieces_share_is_off_by_as_much_as_it_is_said_to(rng):
+@pytest.mark.parametrize("tip_px", [2.8, 0.7])
+def test_what_all_pieces_share_is_off_by_as_much_as_it_is_said_to(rng, tip_px):
     """40 draws: their RMS over the stated sigma is 1 to 11 %; three of that, and as much for a prior that is scaled by
     the contrast seen, which is that of the draw to a third."""
     z = []
     for _ in range(40):
-        found = solve_jointly(ShadedSegments(drawn(rng), TERMS, KNOTS, 0.8))
+        found = solve_jointly(ShadedSegments(drawn(rng, tip_px=tip_px), TERMS, KNOTS, 0.8))
         sigma = np.hypot(
             np.linalg.norm(found.shared_px.mean(axis=0)),
             np.linalg.norm(found.own_sigma_px) / len(found.shift_px),
@@ -67,6 +71,22 @@ def test_what_all_pieces_share_is_off_by_as_much_as_it_is_said_to(rng):
         z.append(found.shift_px.mean() / sigma)
         assert abs(found.blur_px / BLUR_PX - 1.0) < 0.15
     assert 0.67 / 1.33 < np.sqrt(np.mean(np.square(z))) < 1.33 * 1.33
+
+
+def test_light_from_one_side_moves_a_tapered_rod_by_no_more_than_is_said(rng):
+    """One side as dark as the floor: what is seen may lie a share of the half-width aside, all along the rod, so that
+    the uncertainty is as thick as the rod is, to a fifth for what each place has of its own."""
+    t = np.linspace(-np.pi / 2, np.pi / 2, 301)
+    lit = 60.0 + 100.0 * np.maximum(np.sin(t), 0.0)
+    waves = np.linalg.lstsq(round_the_rod(t, WIRE_WAVES), lit, rcond=None)[0]
+    pieces = drawn(rng, tip_px=0.7, waves=np.tile(waves, (len(KNOTS), 1)))
+    found = solve_jointly(ShadedSegments(pieces, WIRE_WAVES, KNOTS, 0.8))
+    sigma = np.linalg.norm(found.shared_px, axis=1)
+    ends = [0, len(PLACES) - 1]
+    assert sigma[ends[0]] / sigma[ends[1]] == pytest.approx(
+        pieces.radius_px[ends[0]] / pieces.radius_px[ends[1]], rel=0.2
+    )
+    assert np.all(np.abs(found.shift_px[pieces.place < 50.0]) < 2.0 * sigma[pieces.place < 50.0])
 
 
 def test_a_frame_that_shows_two_places_is_said_to_be_wider_by_their_variance(rng):
