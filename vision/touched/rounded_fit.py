@@ -27,7 +27,7 @@ REACHES_PX = (9.0, 7.0, 5.0, *[4.0] * 8)
 _PRIOR = np.array([8.0, 8.0, 0.5, 0.5, 8.0])
 # [mm, rad] Steps of differences; a smaller Gauss–Newton step is the last. Stated.
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
-# [steps] Gauss–Newton within an iteration; it ends earlier. Stated.
+# [steps] Gauss–Newton within an iteration: one in four takes more and goes on in the next. Stated.
 _GAUSS_NEWTON = 6
 # [sigmas] Scale of the Cauchy distribution that weighs residuals. Stated.
 _CAUCHY_SIGMAS = 5.0
@@ -73,9 +73,9 @@ def fit_to_edges(
         if not any(len(points) for points in edges.values()):
             return RoundedFit(place, 0.0)
         before = place
-        place = fit_silhouette(place, scene.cameras, edges, scene.radius_mm, prior)
+        place, has_converged = fit_silhouette(place, scene.cameras, edges, scene.radius_mm, prior)
         moved_mm = np.linalg.norm(place.point_mm - before.point_mm)
-        if reach_px == REACHES_PX[-1] and moved_mm < _CONVERGED_MM:
+        if has_converged and reach_px == REACHES_PX[-1] and moved_mm < _CONVERGED_MM:
             break
     total = 0.0
     for name, points in edges.items():
@@ -104,16 +104,17 @@ def fit_silhouette(
     edges: Mapping[str, LinePoints],
     radius_mm: float,
     prior: np.ndarray = _PRIOR,
-) -> RoundedAxis:
+) -> tuple[RoundedAxis, bool]:
     """Fit the object whose silhouette passes through the edge points in each camera.
 
     edges: by camera. prior (5,): sigmas of two shifts across, two tilts and a shift along, mm and
-    rad; what the edges do not determine stays as it was.
+    rad; what the edges do not determine stays as it was. The second value returned is whether the
+    fit has converged.
     """
     across = axis_frame(place.direction)
     used = {name: points for name, points in edges.items() if len(points)}
     if not used:
-        return place
+        return place, True
 
     def residuals_of(vectors: np.ndarray) -> np.ndarray:
         """Compute the residuals (m, n) of all cameras' edge points for vectors (m, 5).
@@ -125,8 +126,8 @@ def fit_silhouette(
         residuals = [_residuals(places, cameras[name], used[name], radius_mm) for name in used]
         return np.concatenate(residuals, axis=1)
 
-    vector = gauss_newton(residuals_of, prior, _STEPS, _GAUSS_NEWTON, _CAUCHY_SIGMAS)
-    return place.shifted_along(across, vector)
+    vector, has_converged = gauss_newton(residuals_of, prior, _STEPS, _GAUSS_NEWTON, _CAUCHY_SIGMAS)
+    return place.shifted_along(across, vector), has_converged
 
 
 def _residuals(

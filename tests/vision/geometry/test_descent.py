@@ -1,9 +1,10 @@
-"""The least value of a smooth function of a few parameters."""
+"""The least value of a smooth function of a few parameters, and fits that do not converge."""
 
 import numpy as np
 import pytest
 
-from vision.geometry.newton import descend
+from vision.geometry.newton import descend, gauss_newton
+from vision.geometry.refusals import Refused
 
 STEPS, LONGEST = np.array([0.1, 0.1]), np.array([0.5, 0.5])
 
@@ -30,3 +31,20 @@ def test_from_a_saddle_it_goes_downhill():
 def test_where_nothing_is_lower_it_stays():
     found, value, _ = descend(lambda q: float(q @ q), np.zeros(2), STEPS, LONGEST, 1e-3)
     assert np.array_equal(found, np.zeros(2)) and value == 0.0
+
+
+def test_a_descent_without_end_is_refused():
+    falling = lambda q: float(np.exp(-q).sum())  # noqa: E731
+    with pytest.raises(Refused) as refused:
+        descend(falling, np.zeros(2), STEPS, LONGEST, 1e-3)
+    assert refused.value.code == "fit_not_converged"
+
+
+def test_a_fit_says_whether_it_has_converged():
+    """A line takes two rounds: one to get there and one that hardly moves."""
+    residuals_of = lambda vectors: vectors - 0.5  # noqa: E731
+    wide, steps = np.full(2, 1e6), np.full(2, 1e-6)
+    for rounds, has_converged in ((1, False), (2, True)):
+        found, said = gauss_newton(residuals_of, wide, steps, rounds, 1e6)
+        assert said is has_converged
+        assert found == pytest.approx(0.5, abs=1e-6)
