@@ -4,6 +4,9 @@ Only the rod's rims show such a shift, and shading can stand in for it: the prio
 decides, and nobody knows beforehand how strong each of its Fourier coefficients is. Here each has
 the strength that makes the pixels most probable (empirical Bayes, MacKay 1992). The probability of
 shifts is then computed on a grid, for it often is not Gaussian.
+
+Light that hides an edge hides a share of the width: a common shift is in proportion to each
+segment's half-width (`Pieces.relative_radius`), and its px are those at the mean half-width.
 """
 
 from collections.abc import Sequence
