@@ -6,7 +6,7 @@ import numpy as np
 
 from vision.geometry.refusals import Refused
 
-# [steps] A descent that takes more does not converge: those to a bar's edges take 7 at most. Stated.
+# [steps] A descent that takes more does not converge: six to a bar's edges took 7 at most. Stated.
 _MOST_STEPS = 50
 # [px⁻²] A prior of half a pixel on what the pictures do not constrain. Stated.
 _LEAST_CURVATURE = 4.0

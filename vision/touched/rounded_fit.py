@@ -27,7 +27,7 @@ REACHES_PX = (9.0, 7.0, 5.0, *[4.0] * 8)
 _PRIOR = np.array([8.0, 8.0, 0.5, 0.5, 8.0])
 # [mm, rad] Steps of differences; a smaller Gauss–Newton step is the last. Stated.
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
-# [steps] Gauss–Newton within an iteration: one in four takes more and goes on in the next. Stated.
+# [steps] Gauss–Newton within an iteration: three in ten take more and go on in the next. Stated.
 _GAUSS_NEWTON = 6
 # [sigmas] Scale of the Cauchy distribution that weighs residuals. Stated.
 _CAUCHY_SIGMAS = 5.0
