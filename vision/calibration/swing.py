@@ -39,33 +39,36 @@ def by_strokes(strokes: Sequence[BaseLines]) -> Placement:
         widest = max(strokes, key=lambda lines: len(lines.motor_rad), default=None)
         raise _too_few(widest)
     placements = [by_swing(lines) for lines in usable]
-    shared = np.mean([lines.shared_covariance for lines in usable], axis=0)
-    step, covariance = _combine(usable, placements, shared)
     widths = [lines.width_rad for lines in usable]
-    rise_rad = float(np.mean([placement.rise_rad for placement in placements]))
-    combined = Placement(step, covariance, rise_rad, max(widths), source=_SOURCE, shared=shared)
-    return _with_note(combined, widths)
+    return _with_note(_combine(placements), widths)
 
 
-def _combine(
-    strokes: Sequence[BaseLines], placements: Sequence[Placement], shared: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean step (6,) of placements by a stroke each, weighted by precision, and its
-    covariance.
+def _combine(placements: Sequence[Placement]) -> Placement:
+    """Return the mean of placements by a stroke each, weighted by precision.
 
-    shared (6, 6): what the lines of a stroke share (light, lenses) all strokes share: their mean has
+    What the lines of a stroke share (light, lenses) all strokes share: of alike strokes the mean has
     as much of it as one.
     """
     precisions = [np.linalg.inv(placement.covariance) for placement in placements]
     total = np.linalg.inv(sum(precisions))
     step = np.zeros(6)
-    covariance = shared.copy()
-    for lines, placement, precision in zip(strokes, placements, precisions):
+    own = np.zeros((6, 6))
+    by_shared = np.zeros((6, 6))
+    for placement, precision in zip(placements, precisions):
         gain = total @ precision
         step += gain @ placement.step
-        own = placement.covariance - lines.shared_covariance
-        covariance += gain @ own @ gain.T
-    return step, 0.5 * (covariance + covariance.T)
+        own += gain @ (placement.covariance - placement.shared) @ gain.T
+        by_shared += gain @ _symmetric_root(placement.shared)
+    shared = by_shared @ by_shared.T
+    covariance = own + shared
+    return Placement(
+        step,
+        0.5 * (covariance + covariance.T),
+        rise_rad=float(np.mean([placement.rise_rad for placement in placements])),
+        width_rad=max(placement.width_rad for placement in placements),
+        source=_SOURCE,
+        shared=shared,
+    )
 
 
 def by_swing(lines: BaseLines) -> Placement:
@@ -87,8 +90,16 @@ def by_swing(lines: BaseLines) -> Placement:
     change = -own @ (jacobian.T @ residual)
     excess = _excess(residual + jacobian @ change, len(change))
     step = probable.x + change
-    covariance = excess * own[:6, :6] + lines.shared_covariance
-    placement = Placement(step[:6], covariance, float(step[6]), lines.width_rad, source=_SOURCE)
+    by_drift = (-own @ (jacobian.T @ _residuals_by_drift(probable.x, lines)))[:6]
+    shared = lines.shared_covariance + by_drift @ by_drift.T
+    placement = Placement(
+        step[:6],
+        excess * own[:6, :6] + shared,
+        rise_rad=float(step[6]),
+        width_rad=lines.width_rad,
+        source=_SOURCE,
+        shared=shared,
+    )
     return _with_note(placement, [lines.width_rad])
 
 
@@ -129,8 +140,17 @@ def _residuals(p: np.ndarray, lines: BaseLines) -> np.ndarray:
     in their sigmas.
     """
     across = _across(_predict(p, lines.motor_rad))
-    place = _whiten(across, lines.point_mm - p[3:6], lines.point_covariance)
-    direction = _whiten(across, lines.direction, lines.direction_covariance)
+    off_mm = (lines.point_mm - p[3:6])[:, :, None]
+    place = _whiten(across, off_mm, lines.point_covariance)
+    direction = _whiten(across, lines.direction[:, :, None], lines.direction_covariance)
+    return np.concatenate([place, direction])[:, 0]
+
+
+def _residuals_by_drift(p: np.ndarray, lines: BaseLines) -> np.ndarray:
+    """Return how the residuals change with each error that drifts, (4 n, k)."""
+    across = _across(_predict(p, lines.motor_rad))
+    place = _whiten(across, lines.point_by_drift, lines.point_covariance)
+    direction = _whiten(across, lines.direction_by_drift, lines.direction_covariance)
     return np.concatenate([place, direction])
 
 
@@ -144,18 +164,23 @@ def _across(along: np.ndarray) -> np.ndarray:
 
 
 def _whiten(across: np.ndarray, vectors: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Return the components (2 n,) of vectors (n, 3) along `across` (n, 2, 3), whitened by their
-    covariance.
+    """Return the components (2 n, k) of vectors (n, 3, k) along `across` (n, 2, 3), whitened by
+    their covariance.
     """
-    components = across @ vectors[:, :, None]
     root = np.linalg.cholesky(across @ covariance @ np.swapaxes(across, 1, 2))
-    return np.linalg.solve(root, components).ravel()
+    return np.concatenate(np.linalg.solve(root, across @ vectors))
 
 
 def _covariance(J: np.ndarray) -> np.ndarray:
     """Return (JᵀJ)⁻¹, by the triangular factor of J."""
     inverse = np.linalg.inv(np.linalg.qr(J, mode="r"))
     return inverse @ inverse.T
+
+
+def _symmetric_root(covariance: np.ndarray) -> np.ndarray:
+    """Return the symmetric root of a covariance (6, 6)."""
+    values, vectors = np.linalg.eigh(covariance)
+    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
 
 
 def _basis(widths_rad: Sequence[float]) -> str:

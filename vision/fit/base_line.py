@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.blocks import REST_PRIOR_MM
+from vision.fit.blocks import REST_PRIOR_MM, WIRE_MODES_PX
 from vision.fit.problem import (
     WANDER_PX,
     Problem,
@@ -43,6 +43,9 @@ _DRIFT_PER_RAD = 0.5
 _FEWEST_POINTS = 8
 
 
+# [columns] Of a camera's offsets, those that change with the motor angle (`wire_modes`). A layout, no
+# threshold.
+_DRIFTS = slice(2, len(WIRE_MODES_PX))
 # [parameters] Of the rest shape. A layout, no threshold.
 _REST = 2 * REST_POWERS
 
@@ -51,14 +54,15 @@ _REST = 2 * REST_POWERS
 class _Rows:
     """Line points of one camera in one frame, over their sigma.
 
-    residual (n,) about a straight whisker; by_rest (n, 8), by_nuisance (n, m): its derivatives by
-    rest shape and nuisances.
+    residual (n,) about a straight whisker; by_rest (n, 8), by_nuisance (n, m), by_drift (n, k): its
+    derivatives by rest shape, nuisances, and the errors of unit variance that drift with the motor.
     """
 
     frame: int
     residual: np.ndarray
     by_rest: np.ndarray
     by_nuisance: np.ndarray
+    by_drift: np.ndarray
 
 
 def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | None:
@@ -78,11 +82,22 @@ def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | 
     length_mm = problem.wire.length_mm
     lines = []
     for frame, angle in zip(frames, motor_rad):
-        step, spread = _own_line([r for r in rows if r.frame == frame], shape)
-        lines.append(_in_space(shape[_LINE] + step, spread, angle, length_mm))
-    point, point_spread, direction, direction_spread = map(np.array, zip(*lines))
-    shared = _shared(covariance, float(motor_rad.mean()), length_mm)
-    return BaseLines(motor_rad, point, point_spread, direction, direction_spread, shared)
+        own_line = _own_line([r for r in rows if r.frame == frame], shape)
+        lines.append(_in_space(own_line, angle, length_mm))
+    point, point_spread, point_by_drift = map(np.array, zip(*[line[:3] for line in lines]))
+    direction, direction_spread, direction_by_drift = map(
+        np.array, zip(*[line[3:] for line in lines])
+    )
+    return BaseLines(
+        motor_rad,
+        point,
+        point_spread,
+        direction,
+        direction_spread,
+        _shared(covariance, float(motor_rad.mean()), length_mm),
+        point_by_drift,
+        direction_by_drift,
+    )
 
 
 def _well_seen_frames(rows: list[_Rows]) -> np.ndarray:
@@ -113,10 +128,11 @@ def _rows_of(
     offsets = problem.blocks.wire_offsets[seen.camera].slice
     rest = problem.blocks.rest_shape.slice
     by_rest = jacobian[:, rest]
-    by_offsets = jacobian[:, offsets] @ state.vector[offsets]
-    straight = residual - by_offsets - by_rest @ state.vector[rest]
+    by_offsets = jacobian[:, offsets]
+    straight = residual - by_offsets @ state.vector[offsets] - by_rest @ state.vector[rest]
     nuisance = _nuisances(problem, seen) / seen.points.sigma_px[:, None]
-    return _Rows(seen.frame, straight[clear], by_rest[clear], nuisance[clear])
+    drift = _drifts(problem, seen.camera, by_offsets)
+    return _Rows(seen.frame, straight[clear], by_rest[clear], nuisance[clear], drift[clear])
 
 
 def _nuisances(problem: Problem, seen: Observed) -> np.ndarray:
@@ -124,6 +140,16 @@ def _nuisances(problem: Problem, seen: Observed) -> np.ndarray:
     (n, cameras · (1 + knots))."""
     own = np.column_stack([np.ones(len(seen.points)), wandering(problem, seen)])
     return np.kron(np.arange(len(problem.cameras)) == seen.camera, own)
+
+
+def _drifts(problem: Problem, camera: int, by_offsets: np.ndarray) -> np.ndarray:
+    """Return of each camera what its lines drift by as the whisker turns, in sigmas of its points:
+    (n, cameras · modes).
+
+    by_offsets (n, offsets): derivatives of residuals by the camera's own offsets.
+    """
+    own = by_offsets[:, _DRIFTS] * problem.blocks.wire_offsets[camera].sigma[_DRIFTS]
+    return np.kron(np.arange(len(problem.cameras)) == camera, own)
 
 
 def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
@@ -138,32 +164,43 @@ def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
     return solution[:_REST], covariance[:_REST, :_REST]
 
 
-def _own_line(rows: list[_Rows], shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit what one frame adds to the shape's offsets and slopes (4,), with its
-    covariance (4, 4).
+def _own_line(
+    rows: list[_Rows], shape: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fit the offsets and slopes (4,) of one frame, with their covariance (4, 4) and how they change
+    with each error that drifts, (4, k).
     """
     J = np.concatenate([r.by_rest[:, _LINE] for r in rows])
     residual = np.concatenate([r.residual + r.by_rest @ shape for r in rows])
+    by_drift = np.concatenate([r.by_drift for r in rows])
     covariance = np.linalg.inv(J.T @ J)
-    return -covariance @ (J.T @ residual), covariance
+    gain = -covariance @ J.T
+    return shape[_LINE] + gain @ residual, covariance, gain @ by_drift
 
 
 def _in_space(
-    line: np.ndarray, covariance: np.ndarray, motor_rad: float, length_mm: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return point, its covariance, direction and its covariance of offsets and slopes (4,).
+    own_line: tuple[np.ndarray, np.ndarray, np.ndarray], motor_rad: float, length_mm: float
+) -> tuple[np.ndarray, ...]:
+    """Return a point and a direction of a frame's line (see `_own_line`), each with its covariance
+    and its change (3, k) with what drifts.
 
     The point is taken where offset and slope err independently of each other.
     """
+    line, covariance, by_drift = own_line
     place = -np.trace(covariance[:2, 2:]) / np.trace(covariance[2:, 2:])  # in lengths
     R = rotation_z(motor_rad)
     along = R[:, 0]
     across = R[:, 1:]  # (3, 2): y and z of the hub
-    by_line = across @ np.hstack([np.eye(2), place * np.eye(2)])  # (3, 4)
-    point = place * length_mm * along + by_line @ line
-    direction = unit(along + across @ line[2:] / length_mm)
-    direction_spread = across @ covariance[2:, 2:] @ across.T / length_mm**2
-    return point, by_line @ covariance @ by_line.T, direction, direction_spread
+    point_by_line = across @ np.hstack([np.eye(2), place * np.eye(2)])  # (3, 4)
+    turn_by_line = across @ np.hstack([np.zeros((2, 2)), np.eye(2) / length_mm])  # (3, 4)
+    return (
+        place * length_mm * along + point_by_line @ line,
+        point_by_line @ covariance @ point_by_line.T,
+        point_by_line @ by_drift,
+        unit(along + turn_by_line @ line),
+        turn_by_line @ covariance @ turn_by_line.T,
+        turn_by_line @ by_drift,
+    )
 
 
 def _shared(covariance: np.ndarray, motor_rad: float, length_mm: float) -> np.ndarray:
