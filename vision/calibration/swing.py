@@ -90,8 +90,8 @@ def by_swing(lines: BaseLines) -> Placement:
     change = -own @ (jacobian.T @ residual)
     excess = _excess(residual + jacobian @ change, len(change))
     step = probable.x + change
-    by_drift = (-own @ (jacobian.T @ _residuals_by_drift(probable.x, lines)))[:6]
-    shared = lines.shared_covariance + by_drift @ by_drift.T
+    by_error = (-own @ (jacobian.T @ _residuals_by_shared(probable.x, lines)))[:6]
+    shared = lines.shared_covariance + by_error @ by_error.T
     placement = Placement(
         step[:6],
         excess * own[:6, :6] + shared,
@@ -146,11 +146,11 @@ def _residuals(p: np.ndarray, lines: BaseLines) -> np.ndarray:
     return np.concatenate([place, direction])[:, 0]
 
 
-def _residuals_by_drift(p: np.ndarray, lines: BaseLines) -> np.ndarray:
-    """Return how the residuals change with each error that drifts, (4 n, k)."""
+def _residuals_by_shared(p: np.ndarray, lines: BaseLines) -> np.ndarray:
+    """Return how the residuals change with each error that frames share, (4 n, k)."""
     across = _across(_predict(p, lines.motor_rad))
-    place = _whiten(across, lines.point_by_drift, lines.point_covariance)
-    direction = _whiten(across, lines.direction_by_drift, lines.direction_covariance)
+    place = _whiten(across, lines.point_by_shared, lines.point_covariance)
+    direction = _whiten(across, lines.direction_by_shared, lines.direction_covariance)
     return np.concatenate([place, direction])
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.fit.blocks import REST_PRIOR_MM, WIRE_MODES_PX
+from vision.fit.covariance import camera_rows
 from vision.fit.problem import (
     WANDER_PX,
     Problem,
@@ -35,10 +36,6 @@ _CLEAR_OF_HUB_MM = 15.0
 # [mm] Prior sigmas of a whisker's sag and set: what is more is seen, what is less cannot be told
 # from a wandering line. Study: tests/vision/fit/test_base_line.py.
 _STRAIGHT_MM = np.array([1.0, 0.4])
-# [rad⁻¹] Part of what a whole line is off by that changes as the whisker turns by a radian before
-# its lamp: it passes for a centre elsewhere along the whisker. Strokes of 24° erred by 0.04 mm
-# so. Study: tests/vision/fit/test_base_line.py.
-_DRIFT_PER_RAD = 0.5
 # [points] In a frame: twice the numbers that they give. Derived.
 _FEWEST_POINTS = 8
 
@@ -54,21 +51,21 @@ _REST = 2 * REST_POWERS
 class _Rows:
     """Line points of one camera in one frame, over their sigma.
 
-    residual (n,) about a straight whisker; by_rest (n, 8), by_nuisance (n, m), by_drift (n, k): its
-    derivatives by rest shape, nuisances, and the errors of unit variance that drift with the motor.
+    residual (n,) about a straight whisker; by_rest (n, 8), by_nuisance (n, m), by_shared (n, k): its
+    derivatives by rest shape, nuisances, and errors of unit variance that frames share (light that
+    changes as the whisker turns, cameras).
     """
 
     frame: int
     residual: np.ndarray
     by_rest: np.ndarray
     by_nuisance: np.ndarray
-    by_drift: np.ndarray
+    by_shared: np.ndarray
 
 
-def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | None:
+def base_lines(problem: Problem, state: State) -> BaseLines | None:
     """Return the whisker's base as a line in each frame before touch.
 
-    lens (size, size): what the cameras' uncertainty adds to the covariance of the fit's parameters.
     None where fewer than two frames are free and well seen.
     """
     rows = _free_rows(problem, state)
@@ -76,16 +73,14 @@ def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | 
     if len(frames) < 2:
         return None
     shape, covariance = _shape_at_rest(rows)
-    own = problem.blocks.rest_shape.slice
-    covariance = covariance + lens[own, own]
     motor_rad = problem.motor_rad[frames]
     length_mm = problem.wire.length_mm
     lines = []
     for frame, angle in zip(frames, motor_rad):
         own_line = _own_line([r for r in rows if r.frame == frame], shape)
         lines.append(_in_space(own_line, angle, length_mm))
-    point, point_spread, point_by_drift = map(np.array, zip(*[line[:3] for line in lines]))
-    direction, direction_spread, direction_by_drift = map(
+    point, point_spread, point_by_shared = map(np.array, zip(*[line[:3] for line in lines]))
+    direction, direction_spread, direction_by_shared = map(
         np.array, zip(*[line[3:] for line in lines])
     )
     return BaseLines(
@@ -95,8 +90,8 @@ def base_lines(problem: Problem, state: State, lens: np.ndarray) -> BaseLines | 
         direction,
         direction_spread,
         _shared(covariance, float(motor_rad.mean()), length_mm),
-        point_by_drift,
-        direction_by_drift,
+        point_by_shared,
+        direction_by_shared,
     )
 
 
@@ -110,20 +105,36 @@ def _well_seen_frames(rows: list[_Rows]) -> np.ndarray:
 def _free_rows(problem: Problem, state: State) -> list[_Rows]:
     """Return the rows of the wire in all frames that do not bend."""
     linear = linear_at(problem, state)
+    by_camera_error = camera_rows(problem, state) @ problem.cameras.by_error
     found = []
     for seen, rows in point_rows(problem):
         if seen.frame >= 0 and not problem.bent[seen.frame]:
             found.append(
-                _rows_of(problem, seen, state, linear.residual[rows], linear.jacobian[rows])
+                _rows_of(
+                    problem,
+                    seen,
+                    state,
+                    linear.residual[rows],
+                    linear.jacobian[rows],
+                    by_camera_error[rows],
+                )
             )
     return found
 
 
 def _rows_of(
-    problem: Problem, seen: Observed, state: State, residual: np.ndarray, jacobian: np.ndarray
+    problem: Problem,
+    seen: Observed,
+    state: State,
+    residual: np.ndarray,
+    jacobian: np.ndarray,
+    by_camera_error: np.ndarray,
 ) -> _Rows:
     """Return the rows of one observation, without the offsets that the whole fit gave the line, and
-    counted from a straight whisker in its place."""
+    counted from a straight whisker in its place.
+
+    residual (n,), jacobian (n, size), by_camera_error (n, k): of the fit, at its points.
+    """
     clear = seen.points.place > _CLEAR_OF_HUB_MM
     offsets = problem.blocks.wire_offsets[seen.camera].slice
     rest = problem.blocks.rest_shape.slice
@@ -131,8 +142,8 @@ def _rows_of(
     by_offsets = jacobian[:, offsets]
     straight = residual - by_offsets @ state.vector[offsets] - by_rest @ state.vector[rest]
     nuisance = _nuisances(problem, seen) / seen.points.sigma_px[:, None]
-    drift = _drifts(problem, seen.camera, by_offsets)
-    return _Rows(seen.frame, straight[clear], by_rest[clear], nuisance[clear], drift[clear])
+    shared = np.hstack([_drifts(problem, seen.camera, by_offsets), by_camera_error])
+    return _Rows(seen.frame, straight[clear], by_rest[clear], nuisance[clear], shared[clear])
 
 
 def _nuisances(problem: Problem, seen: Observed) -> np.ndarray:
@@ -164,29 +175,27 @@ def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
     return solution[:_REST], covariance[:_REST, :_REST]
 
 
-def _own_line(
-    rows: list[_Rows], shape: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _own_line(rows: list[_Rows], shape: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fit the offsets and slopes (4,) of one frame, with their covariance (4, 4) and how they change
-    with each error that drifts, (4, k).
+    with each error that frames share, (4, k).
     """
     J = np.concatenate([r.by_rest[:, _LINE] for r in rows])
     residual = np.concatenate([r.residual + r.by_rest @ shape for r in rows])
-    by_drift = np.concatenate([r.by_drift for r in rows])
+    by_shared = np.concatenate([r.by_shared for r in rows])
     covariance = np.linalg.inv(J.T @ J)
     gain = -covariance @ J.T
-    return shape[_LINE] + gain @ residual, covariance, gain @ by_drift
+    return shape[_LINE] + gain @ residual, covariance, gain @ by_shared
 
 
 def _in_space(
     own_line: tuple[np.ndarray, np.ndarray, np.ndarray], motor_rad: float, length_mm: float
 ) -> tuple[np.ndarray, ...]:
     """Return a point and a direction of a frame's line (see `_own_line`), each with its covariance
-    and its change (3, k) with what drifts.
+    and its change (3, k) with each error that frames share.
 
     The point is taken where offset and slope err independently of each other.
     """
-    line, covariance, by_drift = own_line
+    line, covariance, by_shared = own_line
     place = -np.trace(covariance[:2, 2:]) / np.trace(covariance[2:, 2:])  # in lengths
     R = rotation_z(motor_rad)
     along = R[:, 0]
@@ -196,10 +205,10 @@ def _in_space(
     return (
         place * length_mm * along + point_by_line @ line,
         point_by_line @ covariance @ point_by_line.T,
-        point_by_line @ by_drift,
+        point_by_line @ by_shared,
         unit(along + turn_by_line @ line),
         turn_by_line @ covariance @ turn_by_line.T,
-        turn_by_line @ by_drift,
+        turn_by_line @ by_shared,
     )
 
 
@@ -208,17 +217,11 @@ def _shared(covariance: np.ndarray, motor_rad: float, length_mm: float) -> np.nd
     the base.
 
     covariance (8, 8): of the rest shape. An offset shifts the base; a slope in y turns it about z,
-    one in z about −y. An offset in y that changes as the whisker turns shifts the base along it;
-    one in z passes for an axis that leans about the whisker.
+    one in z about −y.
     """
-    x, y, z = rotation_z(motor_rad).T  # of the hub, in the rig frame
+    _, y, z = rotation_z(motor_rad).T  # of the hub, in the rig frame
     none = np.zeros(3)
     turns = np.column_stack([none, none, z, -y]) / length_mm
     shifts = np.column_stack([y, z, none, none])
     by_line = np.vstack([turns, shifts])  # (6, 4)
-    shift_along = np.append(none, x)
-    lean = np.append(x / (0.5 * length_mm), none)
-    by_drift = _DRIFT_PER_RAD * np.column_stack([shift_along, lean])  # (6, 2)
-    of_line = covariance[np.ix_(_LINE, _LINE)]
-    offset_variances = np.diag(np.diag(of_line)[:2])
-    return by_line @ of_line @ by_line.T + by_drift @ offset_variances @ by_drift.T
+    return by_line @ covariance[np.ix_(_LINE, _LINE)] @ by_line.T

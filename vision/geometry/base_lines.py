@@ -19,9 +19,10 @@ class BaseLines:
     direction (n, 3): unit, from the base outward; direction_covariance (n, 3, 3). Both covariances
     are of the errors that each frame has by itself.
     shared_covariance (6, 6): of a rotation w about the base and a shift v, rad and mm, that all
-    lines have in common (light on the wire, lenses).
-    point_by_drift, direction_by_drift (n, 3, k): how the lines change with each of k independent
-    errors of unit variance that drift as the whisker turns; k = 0 of None.
+    lines have in common (light on the wire).
+    point_by_shared, direction_by_shared (n, 3, k): how each line changes with each of k independent
+    errors of unit variance (of cameras, and of light that changes as the whisker turns); k = 0 of
+    None.
     Raises Refused where shapes do not match.
     """
 
@@ -31,24 +32,24 @@ class BaseLines:
     direction: np.ndarray
     direction_covariance: np.ndarray
     shared_covariance: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
-    point_by_drift: np.ndarray | None = None
-    direction_by_drift: np.ndarray | None = None
+    point_by_shared: np.ndarray | None = None
+    direction_by_shared: np.ndarray | None = None
 
     def __post_init__(self):
         """Raise Refused where shapes do not match."""
         n = len(self.motor_rad)
-        for name in ("point_by_drift", "direction_by_drift"):
+        for name in ("point_by_shared", "direction_by_shared"):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, np.zeros((n, 3, 0)))
-        drifts = self.point_by_drift.shape[-1]
+        errors = self.point_by_shared.shape[-1]
         shapes = {
             "point_mm": (n, 3),
             "direction": (n, 3),
             "point_covariance": (n, 3, 3),
             "direction_covariance": (n, 3, 3),
             "shared_covariance": (6, 6),
-            "point_by_drift": (n, 3, drifts),
-            "direction_by_drift": (n, 3, drifts),
+            "point_by_shared": (n, 3, errors),
+            "direction_by_shared": (n, 3, errors),
         }
         for name, shape in shapes.items():
             found = np.shape(getattr(self, name))

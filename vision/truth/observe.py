@@ -318,7 +318,7 @@ def _truth(explained: Explanation) -> WhiskTruth:
         status=status,
         turns=frame_turns(fitted.problem, fitted.state, fitted.frames),
         delays=_delays(fitted),
-        base=base_lines(*free, fitted.uncertainty.lens),
+        base=base_lines(*free),
         ends=wire_ends(whisk, fitted),
         widths=wire_widths(whisk, fitted) if checks_beam and whisk.number == 0 else {},
         beam=beam,

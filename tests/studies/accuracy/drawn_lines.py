@@ -258,7 +258,7 @@ def fit_whisk(bench: Bench, scene: Scene, seen: Sequence, cameras: Cameras) -> F
     free = (problem, state)
     if not np.all(near):
         free = _free_stroke(whole, problem, state)
-    return Fitted(problem, state, found, base_lines(*free, found.lens))
+    return Fitted(problem, state, found, base_lines(*free))
 
 
 def _during(problem: Problem, chosen: np.ndarray) -> Problem:
