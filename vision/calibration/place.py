@@ -229,8 +229,9 @@ def move_rig_frame(cameras: Cameras, before: Placement, after: Placement) -> Cam
     (see `by_board`).
 
     Their covariance loses the placement error that `before` gave to all of them in common and gains
-    that of `after`. The swing is seen by the same cameras; that link is left out, which errs to the
-    wide side.
+    that of `after`. The swing is seen by the same cameras; that link is left out. Where the board's
+    origin lies between centre and bar, a wrong square's part of d_x is too small by √2 at most;
+    elsewhere it is too large.
     """
     moved = []
     for camera in cameras:

@@ -14,6 +14,7 @@ from scipy.special import chdtri
 
 from vision.calibration.place import FALSE_ALARM, Placement
 from vision.geometry.base_lines import BaseLines
+from vision.geometry.camera import symmetric_root
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import exp_rotation
 
@@ -58,7 +59,7 @@ def _combine(placements: Sequence[Placement]) -> Placement:
         gain = total @ precision
         step += gain @ placement.step
         own += gain @ (placement.covariance - placement.shared) @ gain.T
-        by_shared += gain @ _symmetric_root(placement.shared)
+        by_shared += gain @ symmetric_root(placement.shared)
     shared = by_shared @ by_shared.T
     covariance = own + shared
     return Placement(
@@ -175,12 +176,6 @@ def _covariance(J: np.ndarray) -> np.ndarray:
     """Return (JᵀJ)⁻¹, by the triangular factor of J."""
     inverse = np.linalg.inv(np.linalg.qr(J, mode="r"))
     return inverse @ inverse.T
-
-
-def _symmetric_root(covariance: np.ndarray) -> np.ndarray:
-    """Return the symmetric root of a covariance (6, 6)."""
-    values, vectors = np.linalg.eigh(covariance)
-    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
 
 
 def _basis(widths_rad: Sequence[float]) -> str:

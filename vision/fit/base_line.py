@@ -4,8 +4,9 @@ the rig from it.
 Two fits to the line points of the frames before touch, away from the hub. One gives the shape at
 rest, of which only what is straight counts here; how far a whole traced line may be off, and wander
 along the wire, enters as nuisances, because it is the same in all frames and no average makes it
-smaller. The other gives how far each frame by itself lies from that: offset and slope, y and z. In
-the hub's frame, lengths in mm, slopes in mm at the tip.
+smaller. The other gives how far each frame by itself lies from that: offset and slope, y and z, and
+how light that changes as the whisker turns, and cameras, move them. In the hub's frame, lengths in
+mm, slopes in mm at the tip.
 """
 
 from dataclasses import dataclass

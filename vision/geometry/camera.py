@@ -133,7 +133,7 @@ def camera_matrix(lens: np.ndarray) -> np.ndarray:
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
 
 
-def _symmetric_root(covariance: np.ndarray) -> np.ndarray:
+def symmetric_root(covariance: np.ndarray) -> np.ndarray:
     """Return a root R (n, n), with R Rᵀ equal to a covariance (n, n).
 
     Parameters are in px, rad and mm: each is counted in its own sigma meanwhile.
@@ -199,7 +199,7 @@ class Cameras:
         object.__setattr__(self, "covariance", covariance)
         object.__setattr__(self, "placement", self._known_placement())
         if self.by_error is None:
-            object.__setattr__(self, "by_error", _symmetric_root(covariance))
+            object.__setattr__(self, "by_error", symmetric_root(covariance))
 
     def _known_placement(self) -> np.ndarray | None:
         """Return the placement's covariance (6, 6), 0 for exact cameras; raise Refused where it
