@@ -109,6 +109,10 @@ class Beam:
         taper_of(self.shape, self.tip_share)
         object.__setattr__(self, "rest_mm", tuple(tuple(own) for own in self.rest_mm))
 
+    def width(self, share: ArrayLike) -> Numbers:
+        """Return the diameter over the base's at a share of the length."""
+        return 1.0 - self.taper * share
+
     @property
     def is_curved(self) -> bool:
         """Return whether the unloaded whisker is curved, or stands off its axis."""

@@ -215,16 +215,18 @@ def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
     """
     beam = whisk.beam
     tapered = beam.distance_mm(d_x)
-    # Share of the base's diameter at the contact, and of a relative error on the base's cylinder.
-    left = tapered / d_x
+    # Share that is left here of a relative error on the base's cylinder, and the change of d_x with
+    # the distance there.
+    left = beam.left(tapered)
+    by_cylinder = left * tapered / d_x
     model = model_share(whisk, settings, tapered, left)
     low, high = _interval(whisk, settings, m_y, model / left if model else 0.0)
     if isnan(d_x):
         return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
     of_inputs = uncertainty.sigma(gradient, **_errors(whisk, settings))
-    sigma = hypot(of_inputs * left**2, model * tapered)
+    sigma = hypot(of_inputs * by_cylinder, model * tapered)
     sigma = max(sigma, _sigma_by_friction(whisk, settings, tapered, low, high))
-    estimate = Estimate(tapered, sigma, "", low, high, gradient=gradient * left**2)
+    estimate = Estimate(tapered, sigma, "", low, high, gradient=gradient * by_cylinder)
     return _up_to_tip(estimate, beam.length_mm, clamp)
 
 

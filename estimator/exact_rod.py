@@ -100,6 +100,7 @@ class _Rod:
     def __init__(self, beam: Beam, reach: Reach, held: bool):
         """Take the whisker and what lies between it and the bar's axis."""
         self.taper = beam.taper
+        self.width = beam.width
         self.held = held
         self.radius = reach.radius_mm / beam.length_mm
         self.rod_radius = reach.rod_radius_mm / beam.length_mm
@@ -220,7 +221,7 @@ class _Rod:
 
     def _reach(self, arc: np.ndarray) -> np.ndarray:
         """Return the distance (n, 1) between centreline and the bar's axis."""
-        return (self.radius + self.rod_radius * (1.0 - self.taper * arc))[:, None]
+        return (self.radius + self.rod_radius * self.width(arc))[:, None]
 
     def _march(
         self, force: np.ndarray, arc: np.ndarray
@@ -228,7 +229,7 @@ class _Rod:
         """March rods from their contacts at arcs (n,) to the base; return contacts, forces, and tangents
         there (n, 3), in the hub's axes. force (n, 3): in the axes in which the rod's end has not turned.
 
-        Steps are even in the logarithm of the width, so that a cone's thin end has its share of them.
+        Steps are even in the logarithm of the closest cone's width, so that a cone's thin end has its share of them.
         """
         parts = np.linspace(1.0, 0.0, 2 * _STEPS + 1)[:, None]
         if self.taper > 0:
@@ -240,7 +241,7 @@ class _Rod:
             rate = np.broadcast_to(arc, at.shape)
         rest = self.tangent(at)[..., None]
         rate = rate[..., None] / _STEPS
-        softness = rate / (1.0 - self.taper * at[..., None]) ** 4
+        softness = rate / self.width(at[..., None]) ** 4
         force = force[..., None]
 
         def change(k, turn, way):

@@ -3,6 +3,7 @@
 from bench.analyses.against_theta import AgainstTheta
 from bench.analyses.analysis import Analysis
 from bench.analyses.back_strokes import BothWays
+from bench.analyses.base_moments import BaseMoments
 from bench.analyses.curved import Curvature
 from bench.analyses.error_against_slope import ErrorAgainstFriction, ErrorAgainstSlope
 from bench.analyses.error_map import ErrorMap
@@ -30,6 +31,7 @@ ANALYSES: tuple[Analysis, ...] = (
     AgainstTheta(),
     Softness(),
     GivesWay(),
+    BaseMoments(),
     Curvature(),
     Tilts(),
     Reorientation(),

@@ -43,7 +43,18 @@ def moment_at_clamp(
     rigidity_Nmm2: Callable,
     friction: float | np.ndarray = 0.0,
 ) -> np.ndarray:
-    """Return the size (n,) of the moment at the clamp of rods, N·mm.
+    """Return the size (n,) of the moment at the clamp of rods, N·mm; arguments and errors as of `load_at_clamp`."""
+    return load_at_clamp(along_mm, across_mm, rigidity_Nmm2, friction)[0]
+
+
+def load_at_clamp(
+    along_mm: float | np.ndarray,
+    across_mm: float | np.ndarray,
+    rigidity_Nmm2: Callable,
+    friction: float | np.ndarray = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the size (n,) of the moment at the clamp of rods, N·mm, and the forces (2, n) on their contacts,
+    N, along the clamp's axis and across it.
 
     along_mm, across_mm (n,): where the contacts lie. rigidity_Nmm2: EI as a function of arc lengths
     (n, nodes) in mm. friction: friction over normal force along the rod at the contact, one or
@@ -67,8 +78,10 @@ def moment_at_clamp(
         raise ArithmeticError(
             "no equilibrium found: the contact is too near the end of a rod that ends in a point"
         )
-    lever = _cross(rods.contact, _force_direction(angle[:, -1], rods.friction))
-    return np.abs(force * lever) * rods.clamp_rigidity_Nmm2 / rods.chord_mm
+    direction = _force_direction(angle[:, -1], rods.friction)
+    moment = np.abs(force * _cross(rods.contact, direction))
+    per_chord_N_mm = rods.clamp_rigidity_Nmm2 / rods.chord_mm
+    return moment * per_chord_N_mm, force * direction * per_chord_N_mm / rods.chord_mm
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ All is solved in the rod's own units: lengths in the chord c from the clamp to t
 EI/c², with EI at the clamp.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -97,17 +98,21 @@ class UnloadedRod:
 class CurvedRods:
     """Rods of one whisker, held at contacts (n, 3), mm, in the hub's axes.
 
-    rest: of the whisker. taper: share of the diameter that is lost up to its length.
+    rest: of the whisker. width: the diameter over the clamp's as a function of shares of the length.
     clamp_rigidity_Nmm2: EI at the clamp.
     """
 
     rest: UnloadedRod
-    taper: float
+    width: Callable
     clamp_rigidity_Nmm2: float
     contacts_mm: np.ndarray
 
     def moments_Nmm(self, friction: np.ndarray, deflection_mm: np.ndarray) -> np.ndarray:
-        """Return m_y and m_z (n, 2) of the clamp on the rods, N·mm.
+        """Return m_y and m_z (n, 2) of the clamp on the rods, N·mm; arguments and errors as of `loads`."""
+        return self.loads(friction, deflection_mm)[:, :2]
+
+    def loads(self, friction: np.ndarray, deflection_mm: np.ndarray) -> np.ndarray:
+        """Return m_y and m_z of the clamp on the rods, N·mm, and the force on their contacts, N: (n, 5).
 
         friction (n,): friction over the force across the rod at the contact, positive where it pulls
         towards the clamp. deflection_mm (n, 3): about how far the contact is from the unloaded rod.
@@ -129,7 +134,9 @@ class CurvedRods:
                 break
             if np.abs(step).max() < _LAST_STEP:
                 moments = -np.cross(points[0], forces[0])
-                return moments[:, 1:] * (self.clamp_rigidity_Nmm2 / chord)[:, None]
+                per_chord = (self.clamp_rigidity_Nmm2 / chord)[:, None]
+                forces_N = forces[0] * per_chord / chord[:, None]
+                return np.column_stack([moments[:, 1:] * per_chord, forces_N])
             size = np.linalg.norm(missing, axis=1, keepdims=True)
             unknowns = unknowns + step * np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
         raise ArithmeticError("no equilibrium found of a curved rod that is bent so far")
@@ -169,7 +176,7 @@ class CurvedRods:
         from scipy.integrate import solve_ivp  # it takes longer than reading a session
 
         arc = unknowns[..., 2]
-        if np.any(1.0 - self.taper * arc * chord / self.rest.length_mm < _LEAST_WIDTH):
+        if np.any(self.width(arc * chord / self.rest.length_mm) < _LEAST_WIDTH):
             raise ArithmeticError("the contact is too near the end of a rod that ends in a point")
         tangent, first, second = self._end_axes(arc * chord)
         pull = -friction * np.hypot(unknowns[..., 0], unknowns[..., 1])
@@ -184,7 +191,7 @@ class CurvedRods:
             tangent = (turn @ self.rest.tangent(at_mm)[..., None])[..., 0]
             moment = (_cross_matrices(way) @ force[..., None])[..., 0]
             twist = np.sum(tangent * moment, axis=-1, keepdims=True)
-            width2 = (1.0 - self.taper * at_mm / self.rest.length_mm) ** 2
+            width2 = self.width(at_mm / self.rest.length_mm) ** 2
             curvature = (arc / width2**2)[..., None] * (moment + _POISSON * twist * tangent)
             turned = _cross_matrices(curvature) @ turn
             return np.concatenate([-turned.ravel(), (arc[..., None] * tangent).ravel()])

@@ -3,7 +3,7 @@
 Where a session has no pictures the deflection is that of a nominal bar held still, from the angle of felt touch.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import FeltStroke, gauge_delay, late_by
 from bench.gauges.matrix import to_follicle
-from bench.gauges.whisker_rods import SeenContacts, WhiskerRod, rod_of
+from bench.gauges.whisker_rods import SeenContacts, rod_of
 from bench.records.trial_result import Deflection, SeenWhisk
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
@@ -39,6 +39,8 @@ _MOST_HALF_WINDOW_RAD = np.radians(0.5)
 SEEN = "seen in pictures"
 WIRE_ALONE = "seen in pictures, by the wire alone"
 NOMINAL = "set: nominal distance"
+# Of contacts and the friction along the rod: moments (n, 2), or moments and forces (n, 5).
+Loads = Callable[[SeenContacts, float | np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -166,35 +168,74 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
     set of the wire is no moment. The force lies in the plane in which the wire is bent.
     """
     d = seen.deflection
-    good = d.theta_rad > _LEAST_THETA_RAD
+    good = frames_with_moments(d)
     if not good.any():
         return None
-    across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
-    along = d.along_mm[good]
-    contacts = SeenContacts(along, across, d.theta_rad[good], d.d_x_mm)
-    share = _share_along_rod(across, along, d.slip_mm[good], d.slip_sigma_mm[good])
-    rod = rod_of(whisker)
     try:
-        moments, by_friction = _with_friction(contacts, share.value, rod)
-        by_place = _by_place(contacts, share.value, rod)
+        moments = _seen_loads(d, good, rod_of(whisker).moments_Nmm)
     except ArithmeticError:
         return None
-    by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
-    by_camera_error_mm, of_places = _errors_of_places(d, good)
-    by_arc, covariance = _common_and_own(by_place, of_places)
-    scale_sigma = float(np.sum(by_arc * moments) / np.sum(moments**2))
+    by_arc = moments.by_arc
+    scale_sigma = float(np.sum(by_arc * moments.values) / np.sum(moments.values**2))
     return ReferenceMoments(
         d.touch_rad.value,
         d.d_x_mm,
         d.motor_rad[good],
         d.theta_rad[good],
-        moments,
-        covariance
-        + _common_cause(by_arc - scale_sigma * moments)
-        + _common_cause(_FRICTION_SIGMA * by_friction)
-        + _common_cause(by_share),
+        moments.values,
+        moments.own_covariance + _common_cause(by_arc - scale_sigma * moments.values),
         scale_sigma=abs(scale_sigma),
-        by_camera_error=by_place @ by_camera_error_mm,
+        by_camera_error=moments.by_camera_error,
+    )
+
+
+def loads_from_pictures(deflection: Deflection, whisker: Whisker) -> tuple[np.ndarray, np.ndarray]:
+    """Return the loads (n, 5) of `WhiskerRod.loads` in the n frames of `frames_with_moments`, and
+    their covariance (5n, 5n), without that of the whisker's stiffness.
+
+    Raises ArithmeticError where no rod of its rigidity is bent so.
+    """
+    good = frames_with_moments(deflection)
+    loads = _seen_loads(deflection, good, rod_of(whisker).loads)
+    covariance = loads.own_covariance + _common_cause(loads.by_arc)
+    return loads.values, covariance + loads.by_camera_error @ loads.by_camera_error.T
+
+
+def frames_with_moments(deflection: Deflection) -> np.ndarray:
+    """Return which frames (f,) of a deflection are far enough from touch to show a moment."""
+    return deflection.theta_rad > _LEAST_THETA_RAD
+
+
+@dataclass(frozen=True, eq=False)
+class _SeenLoads:
+    """Moments, or moments and forces, values (n, k), of the contacts seen, with the parts of their error.
+
+    by_arc (n, k): by one sigma of the contact's mean place along the wire. own_covariance (nk, nk):
+    of all else but the cameras. by_camera_error (nk, c).
+    """
+
+    values: np.ndarray
+    by_arc: np.ndarray
+    own_covariance: np.ndarray
+    by_camera_error: np.ndarray
+
+
+def _seen_loads(d: Deflection, good: np.ndarray, loads: Loads) -> _SeenLoads:
+    """Return the loads in the frames `good` (f,), of which there is one. Raises ArithmeticError as `loads` does."""
+    across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
+    along = d.along_mm[good]
+    contacts = SeenContacts(along, across, d.theta_rad[good], d.d_x_mm)
+    share = _share_along_rod(across, along, d.slip_mm[good], d.slip_sigma_mm[good])
+    values, by_friction = _with_friction(contacts, share.value, loads)
+    by_place = _by_place(contacts, share.value, loads)
+    by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
+    by_camera_error_mm, of_places = _errors_of_places(d, good)
+    by_arc, covariance = _common_and_own(by_place, of_places)
+    return _SeenLoads(
+        values,
+        by_arc,
+        covariance + _common_cause(_FRICTION_SIGMA * by_friction) + _common_cause(by_share),
+        by_place @ by_camera_error_mm,
     )
 
 
@@ -216,8 +257,8 @@ def source_of(seen: SeenWhisk) -> str:
     return SEEN if seen.has_truth else WIRE_ALONE
 
 
-def _by_place(contacts: SeenContacts, share: np.ndarray, rod: WhiskerRod) -> np.ndarray:
-    """Return the derivatives (2n, 3n) of moments by where contacts are along, across z and across y.
+def _by_place(contacts: SeenContacts, share: np.ndarray, loads: Loads) -> np.ndarray:
+    """Return the derivatives (kn, 3n) of k loads by where contacts are along, across z and across y.
 
     Further along the wire the deflection grows too; what is left of both is in the covariance of
     the places.
@@ -225,19 +266,19 @@ def _by_place(contacts: SeenContacts, share: np.ndarray, rod: WhiskerRod) -> np.
     n = len(contacts.along_mm)
     frames = np.arange(n)
     step_mm = _STEP_SHARE * float(contacts.along_mm.max())
-    here, _ = _with_friction(contacts, share, rod)
-    rows = np.zeros((n, 2, n, 3))
+    here, _ = _with_friction(contacts, share, loads)
+    rows = np.zeros((*here.shape, n, 3))
     for k, step in enumerate(step_mm * np.eye(3)):
-        moved, _ = _with_friction(contacts.moved(step), share, rod)
+        moved, _ = _with_friction(contacts.moved(step), share, loads)
         rows[frames, :, frames, k] = (moved - here) / step_mm
-    return rows.reshape(2 * n, 3 * n)
+    return rows.reshape(-1, 3 * n)
 
 
 def _common_and_own(by_place: np.ndarray, of_places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return by how much (n, 2) one sigma of the contact's mean place moves all moments, and the
-    covariance (2n, 2n) of what else they are off by.
+    """Return by how much (n, k) one sigma of the contact's mean place moves all k loads, and the
+    covariance (kn, kn) of what else they are off by.
 
-    of_places (3n, 3n): covariance of the places by which the moments have derivatives (2n, 3n).
+    of_places (3n, 3n): covariance of the places by which the loads have derivatives (kn, 3n).
     """
     covariance = by_place @ of_places @ by_place.T
     mean_place = np.zeros(len(of_places))
@@ -245,7 +286,8 @@ def _common_and_own(by_place: np.ndarray, of_places: np.ndarray) -> tuple[np.nda
     # Below 0 by rounding only, where cameras' errors were nearly all of the places'.
     sigma = np.sqrt(max(mean_place @ of_places @ mean_place, 0.0))
     common = by_place @ (of_places @ mean_place) / (sigma or 1.0)  # exact places have no error
-    return common.reshape(-1, 2), covariance - np.outer(common, common)
+    frames = len(of_places) // 3
+    return common.reshape(frames, -1), covariance - np.outer(common, common)
 
 
 def _share_along_rod(
@@ -266,16 +308,16 @@ def _share_along_rod(
 
 
 def _with_friction(
-    contacts: SeenContacts, share: np.ndarray, rod: WhiskerRod
+    contacts: SeenContacts, share: np.ndarray, loads: Loads
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return moments (n, 2) in the hub's axes, and their change per unit of the friction coefficient."""
-    rough = rod.moments_Nmm(contacts, -_FRICTION * share)
-    smooth = rod.moments_Nmm(contacts, 0.0)
+    """Return loads (n, k) in the hub's axes, and their change per unit of the friction coefficient."""
+    rough = loads(contacts, -_FRICTION * share)
+    smooth = loads(contacts, 0.0)
     return rough, (rough - smooth) / _FRICTION
 
 
 def _common_cause(effect: np.ndarray) -> np.ndarray:
-    """Return the covariance (2n, 2n) of one cause that moves all moments (n, 2) by `effect`."""
+    """Return the covariance (kn, kn) of one cause that moves all loads (n, k) by `effect`."""
     return np.outer(effect.ravel(), effect.ravel())
 
 
@@ -294,7 +336,9 @@ def reference_from_nominal(
     along, across = _nominal_contacts(theta, trial.d_x_mm, radii_mm)
     contacts = SeenContacts(along, across, theta, trial.d_x_mm)
     try:
-        moments, by_friction = _with_friction(contacts, np.ones_like(theta), rod_of(whisker))
+        moments, by_friction = _with_friction(
+            contacts, np.ones_like(theta), rod_of(whisker).moments_Nmm
+        )
     except ArithmeticError:
         return None
     by_touch = touch.sigma_rad * moments / theta[:, None]

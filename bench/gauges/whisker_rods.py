@@ -5,10 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.gauges.clamped_rod import moment_at_clamp
+from bench.gauges.clamped_rod import load_at_clamp
 from bench.gauges.curved_rod import CurvedRods, UnloadedRod
 from bench.session.whisker import Whisker
-from estimator.beam import rigidity_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +33,13 @@ class SeenContacts:
 class WhiskerRod(ABC):
     """A clamped rod of which it is seen where a contact holds it."""
 
-    @abstractmethod
     def moments_Nmm(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
-        """Return m_y and m_z (n, 2) at the clamp, N·mm, in the hub's axes.
+        """Return m_y and m_z (n, 2) at the clamp, N·mm, in the hub's axes; see `loads`."""
+        return self.loads(contacts, friction)[:, :2]
+
+    @abstractmethod
+    def loads(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
+        """Return m_y and m_z at the clamp, N·mm, and the object's force on the whisker, N: (n, 5), in the hub's axes.
 
         friction: friction over normal force along the rod at the contact, one or (n,), positive
         where it pulls towards the clamp. Raises ArithmeticError where no equilibrium is found.
@@ -49,16 +52,19 @@ class StraightRod(WhiskerRod):
 
     whisker: Whisker
 
-    def moments_Nmm(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
-        """Return m_y and m_z (n, 2) at the clamp, N·mm, in the hub's axes."""
+    def loads(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
+        """Return moments at the clamp, N·mm, and the force on the whisker, N: (n, 5), in the hub's axes."""
         size = np.linalg.norm(contacts.across_mm, axis=1)
-        moment = moment_at_clamp(contacts.along_mm, size, self._rigidity_Nmm2, friction)
-        return (moment / size)[:, None] * contacts.across_mm
+        moment, force_N = load_at_clamp(contacts.along_mm, size, self._rigidity_Nmm2, friction)
+        along_N, aside_N = force_N
+        across = contacts.across_mm / size[:, None]
+        z, y = across.T
+        return np.column_stack([moment[:, None] * across, along_N, -aside_N * y, aside_N * z])
 
     def _rigidity_Nmm2(self, arc_mm: np.ndarray) -> np.ndarray:
         """Return EI at arc lengths."""
         whisker = self.whisker
-        return rigidity_at(arc_mm, whisker.EI_Nmm2, whisker.length_mm, whisker.beam.taper)
+        return whisker.EI_Nmm2 * self.whisker.beam.width(arc_mm / whisker.length_mm) ** 4
 
 
 @dataclass(frozen=True)
@@ -67,14 +73,14 @@ class CurvedRod(WhiskerRod):
 
     whisker: Whisker
 
-    def moments_Nmm(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
-        """Return m_y and m_z (n, 2) at the clamp, N·mm, in the hub's axes."""
+    def loads(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
+        """Return moments at the clamp, N·mm, and the force on the whisker, N: (n, 5), in the hub's axes."""
         whisker = self.whisker
         rest = UnloadedRod(whisker.unloaded_mm, whisker.length_mm)
         unbent, deflection = _in_hub(rest, contacts)
-        rods = CurvedRods(rest, whisker.beam.taper, whisker.EI_Nmm2, unbent + deflection)
+        rods = CurvedRods(rest, whisker.beam.width, whisker.EI_Nmm2, unbent + deflection)
         friction = np.broadcast_to(np.asarray(friction, float), contacts.along_mm.shape)
-        return rods.moments_Nmm(friction, deflection)
+        return rods.loads(friction, deflection)
 
 
 def _in_hub(rest: UnloadedRod, contacts: SeenContacts) -> tuple[np.ndarray, np.ndarray]:

@@ -8,14 +8,14 @@ import msgspec
 import numpy as np
 
 from bench.rig.bar import TouchedBar, UnloadedTouch
-from bench.rig.elastic_rod import Rod
+from bench.rig.elastic_rod import ProfiledRod, Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.protocol import Protocol, ProtocolRun
 from bench.rig.recording import Recording
 from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.whisk_mechanics import WhiskMechanics
 from vision import KnownWhisk
-from vision.geometry import Bar, BarAxis, Rods, Wire
+from vision.geometry import Bar, BarAxis, ProfiledWire, Rods, Wire
 
 # [rad] Step of the mechanics between frames. Stated.
 _STEP_RAD = math.radians(0.1)
@@ -91,7 +91,7 @@ def as_staged(marched: WhiskMechanics, motor_rad: np.ndarray, time_s: np.ndarray
     rod = marched.rod
     touch = marched.touch
     bend_rad, arc_mm = _bends_and_arcs(marched, motor_rad)
-    wire = Wire(rod.shape, rod.length_mm, rod.diameter_mm, tip_diameter_mm=rod.tip_diameter_mm)
+    wire = _wire(rod)
     bar = Bar(2.0 * marched.bar.radius_mm)
     share = np.linspace(0.0, 1.0, _REST_POINTS)
     rest_offset_mm = rod.rest.point_mm(share * rod.length_mm)[:, 1:]
@@ -108,6 +108,14 @@ def as_staged(marched: WhiskMechanics, motor_rad: np.ndarray, time_s: np.ndarray
         contact_mm=touch.point_mm,
     )
     return StagedWhisk(marched, known)
+
+
+def _wire(rod: Rod) -> Wire:
+    """Return a rod of the rig as cameras see it; its rest shape stands elsewhere."""
+    tip = {"tip_diameter_mm": rod.tip_diameter_mm}
+    if isinstance(rod, ProfiledRod):
+        return ProfiledWire(rod.shape, rod.length_mm, rod.diameter_mm, **tip, widths=rod.widths)
+    return Wire(rod.shape, rod.length_mm, rod.diameter_mm, **tip)
 
 
 def _bends_and_arcs(

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 # [rounds] For the arc length at a distance, each a tenth as far off as the one before. Derived.
 _ROUNDS = 12
@@ -150,16 +151,34 @@ class Rod:
         share = np.asarray(arc_mm, float) / self.length_mm
         return np.maximum(1 - self.diameter_loss * share, 0.0)
 
-    @property
-    def width_by_arc(self) -> float:
-        """Return the derivative of the width by arc length, 1/mm."""
+    def width_by_arc(self, arc_mm: float | np.ndarray) -> float | np.ndarray:
+        """Return the derivative of the width by arc length at arc lengths, 1/mm."""
         return -self.diameter_loss / self.length_mm
 
     def radius_mm(self, arc_mm: float | np.ndarray) -> np.ndarray:
         """Return the radius at arc length."""
         return 0.5 * self.diameter_mm * self.width(arc_mm)
 
-    @property
-    def taper(self) -> float:
-        """Return the change of the radius per arc length, not positive."""
-        return -0.5 * self.diameter_loss * self.diameter_mm / self.length_mm
+    def taper_at(self, arc_mm: float) -> float:
+        """Return the change of the radius per arc length at an arc length."""
+        return 0.5 * self.diameter_mm * float(self.width_by_arc(arc_mm))
+
+
+@dataclass(frozen=True)
+class ProfiledRod(Rod):
+    """A "tapered" whisker that is no cone.
+
+    widths: polynomial in the share of the length of the diameter over the base's, lowest power first.
+    """
+
+    widths: tuple[float, ...] = (1.0,)
+
+    def width(self, arc_mm: float | np.ndarray) -> np.ndarray:
+        """Return the diameter at arc length over the base's."""
+        share = np.asarray(arc_mm, float) / self.length_mm
+        return np.maximum(polynomial.polyval(share, self.widths), 0.0)
+
+    def width_by_arc(self, arc_mm: float | np.ndarray) -> float | np.ndarray:
+        """Return the derivative of the width by arc length at arc lengths, 1/mm."""
+        share = np.asarray(arc_mm, float) / self.length_mm
+        return polynomial.polyval(share, polynomial.polyder(self.widths)) / self.length_mm

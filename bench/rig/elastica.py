@@ -153,11 +153,10 @@ class Elastica:
         if self.rod.shape == "cylinder":
             return self._uniform, 0.0
         nodes = self.nodes
-        loss_per_mm = self.rod.diameter_loss / self.rod.length_mm
-        width = 1 - nodes.at * arc_mm * loss_per_mm
-        width[-1] = max(width[-1], LEAST_WIDTH)
+        at_mm = nodes.at * arc_mm
+        width = np.maximum(self.rod.width(at_mm), LEAST_WIDTH)
         softness = width**-4.0
-        softness_by_arc = 4 * softness / width * nodes.at * loss_per_mm
+        softness_by_arc = -4 * softness / width * nodes.at * self.rod.width_by_arc(at_mm)
         by_arc = (nodes.from_base * softness_by_arc) @ nodes.to_load
         return (nodes.from_base * softness) @ nodes.to_load, by_arc
 

@@ -199,7 +199,8 @@ class KirchhoffRod(BentRod):
         moment_by[..., 3] = 2 / arc * moment + np.cross(lever_by_arc, load.force)
         curvature_by = balance.compliance @ moment_by
         width = load.softness**-0.25
-        softer_by = -4 * self.rod.width_by_arc * self.nodes.at / width  # (n,) by parts
+        thinner_by = self.rod.width_by_arc(self.nodes.at * arc) * self.nodes.at
+        softer_by = -4 * thinner_by / width  # (n,) by parts
         curvature_by[..., 3] += softer_by[:, None] * balance.curvature
         by_tangent = _twist_by_arc(balance.tangents, tangents_by_arc, moment)
         curvature_by[..., 3] += TORSION_OVER_BENDING * load.softness[:, None] * by_tangent

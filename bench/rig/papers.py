@@ -7,10 +7,13 @@ import numpy as np
 import tomli_w
 
 from bench.rig.array_rig import ArrayRecording, MountedWhisker, base_keys
+from bench.rig.elastic_rod import Rod
 from bench.rig.protocol import Protocol, ProtocolRun
 from bench.rig.recording import Recording
 from bench.rig.touched_object import TouchedObject
 
+# [points] Of a whisker's measured diameters. Stated.
+_PROFILE_POINTS = 16
 _GAUGES = ("time_s", "motor_deg", "y_V", "z_V")
 _FORCES = ("f_x_N", "f_y_N", "f_z_N")
 
@@ -73,11 +76,14 @@ def _rounded(values, digits: int) -> list[float]:
 
 def _whisker_keys(protocol) -> dict:
     """Return the keys of [whisker]."""
-    keys = _fields(
-        protocol.whisker, "shape length_mm diameter_mm tip_diameter_mm youngs_modulus_GPa"
-    )
-    stated = {name: value for name, value in keys.items() if value is not None}
     whisker = protocol.whisker
+    names = "shape length_mm diameter_mm tip_diameter_mm youngs_modulus_GPa"
+    if whisker.widths:
+        names = "length_mm diameter_mm youngs_modulus_GPa"
+    keys = _fields(whisker, names)
+    stated = {name: value for name, value in keys.items() if value is not None}
+    if whisker.widths:
+        stated["profile"] = "profile.csv"
     if whisker.states_rest:
         per_mm = 2 / whisker.length_mm**2
         curvature = [per_mm * whisker.set_y_mm, per_mm * whisker.set_z_mm]
@@ -94,6 +100,14 @@ def _rig_keys(protocol, stated_T_rig_board) -> dict:
         if sigma:
             keys[f"T_rig_board_sigma_{unit}"] = sigma
     return keys
+
+
+def profile_csv(rod: Rod) -> str:
+    """Return profile.csv: diameters of the whisker from base to tip, as under a microscope."""
+    arc_mm = np.linspace(0.0, rod.length_mm, _PROFILE_POINTS)
+    diameters_mm = 2.0 * rod.radius_mm(arc_mm)
+    rows = [f"{arc:.4f},{across:.6f}" for arc, across in zip(arc_mm, diameters_mm)]
+    return "\n".join(["arc_mm,diameter_mm", *rows, ""])
 
 
 def trial_toml(recording: Recording) -> str:

@@ -51,7 +51,10 @@ class Job:
     def papers(self) -> dict[str, str]:
         """Return the session's own text files by name."""
         stated = build.stated_T_rig_board(self.protocol, self.stream(_POSE))
-        return {
+        measured = {}
+        if self.protocol.whisker.widths:
+            measured["profile.csv"] = papers.profile_csv(build.rod(self.protocol))
+        return measured | {
             "session.toml": papers.session_toml(self.protocol, stated, self.whiskers),
             "truth.json": truth_files.truth_json(self.protocol, self.seed, self.whiskers),
         }

@@ -30,6 +30,9 @@ class WhiskerTable(ProtocolTable):
     set_z_mm: float = 0.0
     # session.toml has the set as rest_curvature_per_mm. UNSET keeps it out of the fingerprint
     states_rest: bool | msgspec.UnsetType = msgspec.UNSET
+    # diameter over the base's, a polynomial in the share of the length, from 1 on; session.toml has it
+    # measured at points, as profile.csv
+    widths: tuple[float, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 class BoardTable(ProtocolTable):

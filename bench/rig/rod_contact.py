@@ -205,7 +205,7 @@ class _Problem:
         stiffness = self.bar.stiffness_N_mm
         reach = self.bar.radius_mm + float(rod.radius_mm(unknowns[3]))
         gap_by = normal @ loaded.point_by + load.press_by / stiffness
-        gap_by[3] -= rod.taper
+        gap_by[3] -= rod.taper_at(unknowns[3])
         return distance + load.press / stiffness - reach, gap_by
 
     def _load(self, unknowns, loaded, frame, frame_by) -> ContactLoad:

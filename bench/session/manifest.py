@@ -81,6 +81,9 @@ class WhiskerKeys(GivenKeys):
     diameter_sigma_mm: DiameterSigma = 0.0
     # diameter at `length_mm`; of "tapered", and of no other shape
     tip_diameter_mm: Thickness | None = None
+    # diameters from base to tip as a table beside session.toml, such as "profile.csv"; they replace
+    # shape, and decide where diameter_mm or tip_diameter_mm differ by less than 5 % or 3 sigma
+    profile: str | None = None
     # Young's modulus; this, or the rigidity
     youngs_modulus_GPa: Modulus | None = None
     youngs_modulus_sigma_GPa: StiffnessSigma = 0.0

@@ -64,15 +64,20 @@ def read_rest_shape(session: Path, name: str, length_mm: float) -> RestShape:
     go on along x, or beside the smooth curve through all, a whisker that coils, or is longer or
     much shorter than length_mm.
     """
-    if name not in {file.name for file in session.iterdir() if file.is_file()}:
-        found = f"rest_shape = {name!r}: there is no such file beside session.toml"
-        raise BadInput(f"[whisker] {found}", file="session.toml")
+    check_is_beside(session, name, "rest_shape")
     table = read_table(session / name, name, _COLUMNS)
     require_columns(table, _COLUMNS, name)
     _check_points(table, name, length_mm)
     rest_mm, end_mm = _fit(table, name, length_mm)
     _check_length(end_mm, name, length_mm)
     return rest_mm
+
+
+def check_is_beside(session: Path, name: str, key: str) -> None:
+    """Raise BadInput where the file that a key of [whisker] names is not in the session's folder."""
+    if name not in {file.name for file in session.iterdir() if file.is_file()}:
+        found = f"{key} = {name!r}: there is no such file beside session.toml"
+        raise BadInput(f"[whisker] {found}", file="session.toml")
 
 
 def _check_points(table: NumberTable, name: str, length_mm: float) -> None:

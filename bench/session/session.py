@@ -15,12 +15,13 @@ from bench.session.footage import camera_sources, single_pictures, visible
 from bench.session.givens import Given
 from bench.session.inside import check_inside
 from bench.session.plausible import YOUNGS_MODULUS
+from bench.session.profile import read_profile
 from bench.session.rest_shape import read_rest_shape
 from bench.session.rig_file import RIG_FILE, MeasuredRig, exact_pose, read_rig
 from bench.session.stated import StatedSession
 from bench.session.strict_toml import as_keys, key_names, read_toml, values
 from bench.session.trial import Trial, load_trial
-from bench.session.whisker import Whisker
+from bench.session.whisker import Whisker, profiled_sizes
 from vision.geometry import Board, Reason, invert_transform
 from vision.pictures import natural_order
 
@@ -259,6 +260,8 @@ def stated_whisker(keys: manifest.WhiskerKeys, table: str, path: Path) -> Whiske
     if keys.rest_shape is not None:
         sizes["rest_mm"] = read_rest_shape(path, keys.rest_shape, keys.length_mm)
     try:
+        if keys.profile is not None:
+            sizes |= profiled_sizes(keys, read_profile(path, keys.profile, keys.length_mm))
         whisker = Whisker(**sizes)
     except ValueError as problem:
         raise BadInput(f"{table} {problem}", file=MANIFEST) from None

@@ -2,8 +2,10 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from bench.session.manifest import WhiskerKeys
+from bench.session.profile import Profile, contradiction
 from bench.session.rest_shape import (
     MOST_SLOPE,
     MOST_TURN_DEG,
@@ -13,7 +15,8 @@ from bench.session.rest_shape import (
     steepest_slopes,
 )
 from estimator.beam import Beam, flexural_rigidity
-from vision.geometry import Wire
+from estimator.profiled_beam import ProfiledBeam
+from vision.geometry import ProfiledWire, Wire
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,10 +25,12 @@ class Whisker(WhiskerKeys):
 
     diameter_mm is the base's; a "tapered" whisker, and no other, has a tip_diameter_mm below it. Exactly one of
     `youngs_modulus_GPa` and `flexural_rigidity_Nmm2` (at the base) is given. rest_mm: what the file `rest_shape`
-    holds, see `bench.session.rest_shape`. Raises ValueError for anything else.
+    holds, see `bench.session.rest_shape`. widths: of the file `profile` (`bench.session.profile`); shape and
+    tip_diameter_mm are then those from end to end, diameter_mm that measured at the base. Raises ValueError for anything else.
     """
 
     rest_mm: RestShape = STRAIGHT
+    widths: tuple[float, ...] = ()
 
     def __post_init__(self):
         """Raise ValueError where the keys contradict each other."""
@@ -59,7 +64,7 @@ class Whisker(WhiskerKeys):
     @property
     def wire(self) -> Wire:
         """Return the rod that the cameras see."""
-        return Wire(
+        stated = (
             self.shape,
             self.length_mm,
             self.diameter_mm,
@@ -68,6 +73,7 @@ class Whisker(WhiskerKeys):
             self.tip_diameter_mm,
             self.unloaded_mm,
         )
+        return ProfiledWire(*stated, self.widths) if self.widths else Wire(*stated)
 
     @property
     def EI_Nmm2(self) -> float:
@@ -89,6 +95,10 @@ class Whisker(WhiskerKeys):
     @property
     def beam(self) -> Beam:
         """Return the beam that an estimator may know of."""
+        if self.widths:
+            return ProfiledBeam.of_widths(
+                self.C_Nmm2, self.length_mm, self.widths, self.unloaded_mm
+            )
         tip_share = None
         if self.tip_diameter_mm is not None:
             tip_share = self.tip_diameter_mm / self.diameter_mm
@@ -105,3 +115,29 @@ class Whisker(WhiskerKeys):
         by_modulus = self.youngs_modulus_sigma_GPa / self.youngs_modulus_GPa
         by_diameter = 4.0 * self.diameter_sigma_mm / self.diameter_mm
         return self.C_Nmm2 * math.hypot(by_modulus, by_diameter)
+
+
+def profiled_sizes(keys: WhiskerKeys, profile: Profile) -> dict[str, Any]:
+    """Return the sizes of a whisker whose diameters are measured, by their names in `Whisker`.
+
+    Raises ValueError where keys that are stated besides contradict them.
+    """
+    sigma_mm = keys.diameter_sigma_mm
+    for key, measured_mm in (
+        ("diameter_mm", profile.base_mm),
+        ("tip_diameter_mm", profile.tip_mm),
+    ):
+        stated_mm = getattr(keys, key)
+        found = stated_mm and contradiction(key, stated_mm, sigma_mm, measured_mm)
+        if found:
+            raise ValueError(found)
+    if keys.shape == "cone":
+        raise ValueError('shape = "cone" has no profile: leave shape out')
+    is_tapered = profile.tip_mm < profile.base_mm
+    return {
+        "shape": "tapered" if is_tapered else "cylinder",
+        "diameter_mm": profile.base_mm,
+        "diameter_sigma_mm": sigma_mm if profile.sigma_mm is None else profile.sigma_mm,
+        "tip_diameter_mm": profile.tip_mm if is_tapered else None,
+        "widths": profile.widths,
+    }

@@ -179,7 +179,7 @@ def _taper(fit: Fit) -> LeftOut:
     """Return the effect of the whisker as a cylinder of its base's diameter."""
     problem = fit.problem
     state = fit.state
-    if problem.wire.taper_per_mm == 0.0:
+    if problem.wire.is_uniform:
         return LeftOut(why="the whisker does not taper")
     cylinder = replace(problem, rods=replace(problem.rods, wire=_cylinder(problem.wire)))
     with_taper = linear_at(problem, state)
@@ -197,7 +197,14 @@ def _taper(fit: Fit) -> LeftOut:
 
 def _cylinder(wire: Wire) -> Wire:
     """Return a cylinder of a wire's length and its base's diameter."""
-    return replace(wire, shape="cylinder", tip_diameter_mm=None)
+    return Wire(
+        "cylinder",
+        wire.length_mm,
+        wire.diameter_mm,
+        wire.length_sigma_mm,
+        wire.diameter_sigma_mm,
+        rest_mm=wire.rest_mm,
+    )
 
 
 def _lens(fit: Fit, terms: Sequence[str]) -> LeftOut:

@@ -17,7 +17,7 @@ NAMES = {
     "number_words": ("counted",),
     "reasons": ("NO_REASON", "Reason", "UNNAMED", "as_reason", "joined"),
     "refusals": ("Refused",),
-    "rods": ("Bar", "Rods", "Wire"),
+    "rods": ("Bar", "ProfiledWire", "Rods", "Wire"),
     "rotation": (
         "apply",
         "compose",

@@ -29,9 +29,6 @@ _NODES = 41
 # [1] Square of the tangent's part along the base: where it would turn back it goes on at 84°
 # instead, so that a fit's wild step stays finite. Stated.
 _LEAST_FORWARD2 = 0.01
-# [1] Radius of a tapering rod over that at its base: a fit's wild step past the tip stays finite.
-# Stated.
-_LEAST_RADIUS = 1e-3
 # [rad] Least bend whose direction is asked for. Derived.
 _LEAST_BEND_RAD = 1e-12
 # [1] EI over the torsional rigidity of a round rod, less one, is Poisson's ratio: of metals and of
@@ -48,18 +45,8 @@ def tangent_growth(
     """Return the share (…) of the final tangent angle reached at an arc length, for small bends: 0
     at the base, 1 from the contact on.
     """
-    turn = _turn(np.minimum(arc_mm, contact_mm), contact_mm, wire.taper_per_mm)
-    return turn / _turn(contact_mm, contact_mm, wire.taper_per_mm)
-
-
-def _turn(s, contact, taper_per_mm):
-    """Return the tangent angle of a tapering rod per point force and base stiffness: the integral
-    of (contact - t)/(1 - t taper)⁴ from 0 to s.
-
-    In this form nothing cancels, whatever the taper; without any it is s (contact - s/2).
-    """
-    w = np.maximum(1.0 - taper_per_mm * s, _LEAST_RADIUS)
-    return s / w**3 * (contact * (1.0 + w + w * w) / 3.0 - s * (w + 2.0) / 6.0)
+    turn = wire.turn(np.minimum(arc_mm, contact_mm), contact_mm)
+    return turn / wire.turn(contact_mm, contact_mm)
 
 
 def bend_growth(
@@ -79,7 +66,7 @@ def bend_growth(
     w²)/30 and less so P/F B (w⁴ − w²)/6, w = 1 − u: within 3 µm at B = 0.6 and 60 mm.
     """
     growth = tangent_growth(arc_mm, contact_mm, wire)
-    if wire.taper_per_mm == 0.0:
+    if wire.is_uniform:
         w2 = np.maximum(1.0 - arc_mm / contact_mm, 0.0) ** 2
         by_bend = turn_rad / 30.0 * (w2**2 - 1.0)
         by_pull = pull / 6.0 * (w2 - 1.0)
@@ -102,10 +89,9 @@ def _growth_of_taper(
     integral = simpson().T * arc_mm[1]  # (m, m) mm: from the base to each node
     remaining_rad = turn_rad * (1.0 - growth)
     shortening_mm = (0.5 * remaining_rad - pull) * remaining_rad @ integral
-    radius = np.maximum(1.0 - wire.taper_per_mm * arc_mm, _LEAST_RADIUS)
-    softness = np.where(arc_mm < contact_mm, radius**-4.0, 0.0)
+    softness = np.where(arc_mm < contact_mm, wire.width(arc_mm) ** -4.0, 0.0)
     lost_turn = softness * (shortening_mm[..., -1:] - shortening_mm) @ integral
-    whole_turn = _turn(contact_mm, contact_mm, wire.taper_per_mm)
+    whole_turn = wire.turn(contact_mm, contact_mm)
     return (growth * lost_turn[..., -1:] - lost_turn) / whole_turn
 
 
@@ -251,13 +237,12 @@ class _Bend:
         pull = pull[..., None]
         step_mm = arc_mm[1]
         steps_to_contact = (contact_mm - arc_mm) / step_mm
-        radius = np.maximum(1.0 - wire.taper_per_mm * arc_mm, _LEAST_RADIUS)
         return cls(
             axis=(-direction[..., 1:], direction[..., :1]),
             straight_rad=turn * bend_growth(turn, pull, arc_mm, contact_mm, wire),
-            strength=turn / _turn(contact_mm, contact_mm, wire.taper_per_mm),
+            strength=turn / wire.turn(contact_mm, contact_mm),
             pull=pull,
-            softness=radius**-4.0,
+            softness=wire.width(arc_mm) ** -4.0,
             before=np.clip(steps_to_contact + 0.5, 0.0, 1.0),
             at_contact=np.maximum(1.0 - np.abs(steps_to_contact), 0.0),
             step_mm=step_mm,

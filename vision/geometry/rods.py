@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 from vision.geometry.checks import require, require_length, require_sigma
 from vision.geometry.touched import OneDiameter, Touched
@@ -11,6 +12,12 @@ from vision.geometry.touched import OneDiameter, Touched
 SHAPES = ("cylinder", "cone", "tapered")
 # Polynomials in arc length over the wire's length, in y and z, mm: lowest power first.
 RestShape = tuple[tuple[float, ...], tuple[float, ...]]
+# [1] Radius of a tapering rod over that at its base: a fit's wild step past the tip stays finite.
+# Stated.
+LEAST_WIDTH = 1e-3
+# Gauss–Legendre on −1…1, of the bend of a wire of measured diameters: within 1e-9 of it up to where
+# 0.1 of the diameter is left. Study: tests/vision/geometry/test_profiled_wire.py.
+_GAUSS_AT, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
 @dataclass(frozen=True)
@@ -55,7 +62,31 @@ class Wire:
     def radius_mm(self, arc_mm: np.ndarray | float) -> np.ndarray:
         """Return the radius (...), mm, at arc lengths (...) from the base, 0 beyond a point."""
         arc_mm = np.asarray(arc_mm, dtype=float)
-        return 0.5 * self.diameter_mm * np.clip(1.0 - self.taper_per_mm * arc_mm, 0.0, None)
+        return 0.5 * self.diameter_mm * np.clip(self._share_left(arc_mm), 0.0, None)
+
+    def width(self, arc_mm: np.ndarray) -> np.ndarray:
+        """Return the diameter (...) at arc lengths (...) over the base's, `LEAST_WIDTH` beyond a point."""
+        return np.maximum(self._share_left(arc_mm), LEAST_WIDTH)
+
+    def turn(self, arc_mm: np.ndarray, contact_mm: np.ndarray) -> np.ndarray:
+        """Return the tangent angle (...), mm², per point force and base stiffness, by small bends.
+
+        It is the integral of (contact - t) over the fourth power of the width from 0 to arc_mm (...),
+        none of which is beyond contact_mm (...). In this form nothing cancels, whatever the taper;
+        without any it is s (contact - s/2).
+        """
+        w = self.width(arc_mm)
+        lever_mm = contact_mm * (1.0 + w + w * w) / 3.0 - arc_mm * (w + 2.0) / 6.0
+        return arc_mm / w**3 * lever_mm
+
+    @property
+    def is_uniform(self) -> bool:
+        """Return whether the diameter is the same all along."""
+        return self.taper_per_mm == 0.0
+
+    def _share_left(self, arc_mm: np.ndarray) -> np.ndarray:
+        """Return the diameter (...) at arc lengths (...) over the base's, below 0 beyond a point."""
+        return 1.0 - self.taper_per_mm * arc_mm
 
     @property
     def taper_per_mm(self) -> float:
@@ -66,6 +97,33 @@ class Wire:
         if self.shape == "tapered":
             return (1.0 - self.tip_diameter_mm / self.diameter_mm) / self.length_mm
         return 1.0 / self.length_mm if self.shape == "cone" else 0.0
+
+
+@dataclass(frozen=True)
+class ProfiledWire(Wire):
+    """A whisker of measured diameters.
+
+    widths: polynomial in the share of the length of the diameter over the base's, lowest power first.
+    shape, tip_diameter_mm: of the taper that it has from end to end.
+    """
+
+    widths: tuple[float, ...] = (1.0,)
+
+    def turn(self, arc_mm: np.ndarray, contact_mm: np.ndarray) -> np.ndarray:
+        """Return the tangent angle (...), mm², per point force and base stiffness, by small bends."""
+        arc_mm, contact_mm = np.broadcast_arrays(arc_mm, contact_mm)
+        at_mm = arc_mm[..., None] * (0.5 * (1.0 + _GAUSS_AT))
+        curvature = (contact_mm[..., None] - at_mm) / self.width(at_mm) ** 4
+        return 0.5 * arc_mm * (curvature @ _GAUSS_WEIGHTS)
+
+    @property
+    def is_uniform(self) -> bool:
+        """Return whether the diameter is the same all along."""
+        return not any(self.widths[1:])
+
+    def _share_left(self, arc_mm: np.ndarray) -> np.ndarray:
+        """Return the diameter (...) at arc lengths (...) over the base's."""
+        return polynomial.polyval(np.asarray(arc_mm) / self.length_mm, self.widths)
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def wire_ends(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     Of a wire that tapers it is empty, for its tip is too thin to be seen.
     """
     wire = whisk.rods.wire
-    if wire.taper_per_mm > 0.0:
+    if not wire.is_uniform:
         return {}
     sure_mm = float(np.min(fitted.state.arcs_mm))
     curves = {}

@@ -69,7 +69,9 @@ def test_the_answer_is_the_same_in_every_unit(
         rest = UnloadedRod(tuple((0.0, 0.0, unit * length * tip) for tip in sets), unit * length)
         unbent = rest.point_mm(np.array([part * unit * length]))
         deflection = part * unit * length * np.array([[-0.5 * theta**2, -theta, 0.3 * theta]])
-        rods = CurvedRods(rest, taper, rigidity * force * unit**2, unbent + deflection)
+        rods = CurvedRods(
+            rest, lambda share: 1.0 - taper * share, rigidity * force * unit**2, unbent + deflection
+        )
         return rods.moments_Nmm(np.array([-0.1]), deflection) / (force * unit)
 
     one = asked(1.0, 1.0)
@@ -82,12 +84,13 @@ def test_a_contact_at_the_point_of_a_cone_has_no_moment():
     rest = UnloadedRod(((0.0, 0.0, 3.0), (0.0,)), 45.0)
     contact = rest.point_mm(np.array([44.9])) - [0.0, 2.0, 0.0]
     with pytest.raises(ArithmeticError, match="too near the end"):
-        CurvedRods(rest, 1.0, 0.24, contact).moments_Nmm(np.zeros(1), np.array([[0.0, -2.0, 0.0]]))
+        rods = CurvedRods(rest, lambda share: 1.0 - share, 0.24, contact)
+        rods.moments_Nmm(np.zeros(1), np.array([[0.0, -2.0, 0.0]]))
 
 
 def test_a_contact_far_beyond_the_end_is_refused_and_not_marched_for_ever():
     """Beyond its end the shape's slope exceeds 1, whose tangent is no number: no step of a march ends."""
     rest = UnloadedRod(((0.0, 0.0, 40.0), (0.0,)), 100.0)
-    rods = CurvedRods(rest, 0.0, 100.0, np.array([[130.0, 10.0, 5.0]]))
+    rods = CurvedRods(rest, np.ones_like, 100.0, np.array([[130.0, 10.0, 5.0]]))
     with pytest.raises(ArithmeticError, match="beyond the end"):
         rods.moments_Nmm(np.zeros(1), np.array([[0.0, 10.0, 5.0]]))
