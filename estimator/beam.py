@@ -8,6 +8,7 @@ from math import inf, nan
 from typing import Self
 
 import numpy as np
+from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike
 
 from estimator.domain import Numbers, elementwise, require_positive
@@ -87,7 +88,8 @@ class Beam:
 
     C_Nmm2 is 3EI at the base (the C of equation (1)); tip_share, of "tapered" alone, is the tip's
     diameter over the base's. rest_mm: the unloaded whisker, polynomials in the share of the length of
-    y and z, lowest power first; all equations but the exact rod's take it as straight. Raises ValueError
+    y and z, lowest power first; all equations but the exact rod's take it as straight. rest_sigma_mm: how far
+    its tip may lie from there in each. Raises ValueError
     for anything but a positive C and length, and as `taper_of` does.
 
     All of them have one compliance: θ/m = d/C with 1/d = 1/d_x − τ/L, τ being the share of the
@@ -101,6 +103,7 @@ class Beam:
     shape: str = "cylinder"
     tip_share: float | None = None
     rest_mm: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,), (0.0,))
+    rest_sigma_mm: float = 0.0
 
     def __post_init__(self):
         """Raise ValueError unless C and length are positive and the shape is a known one."""
@@ -112,6 +115,17 @@ class Beam:
     def width(self, share: ArrayLike) -> Numbers:
         """Return the diameter over the base's at a share of the length."""
         return 1.0 - self.taper * share
+
+    def other_rests_mm(self) -> tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]:
+        """Return the unloaded shapes that are one sigma of the tip's place off: in y, and in z.
+
+        None of them where the shape is exact. The rest of the whisker is off as the square of the length.
+        """
+        if self.rest_sigma_mm == 0:
+            return ()
+        off = (0.0, 0.0, self.rest_sigma_mm)
+        y, z = self.rest_mm
+        return (_sum(y, off), z), (y, _sum(z, off))
 
     @property
     def is_curved(self) -> bool:
@@ -170,6 +184,11 @@ class Beam:
         of_cylinder = np.asarray(of_cylinder)
         wrong = self.distance_mm(self.as_cylinder_mm(d_x_mm) * (1.0 + of_cylinder))
         return np.where(of_cylinder > -1, wrong / d_x_mm, 0.0)[()] - 1.0
+
+
+def _sum(one: tuple[float, ...], other: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the sum of two polynomials."""
+    return tuple(polynomial.polyadd(one, other).tolist())
 
 
 def _inverse_sum(d, per_mm):

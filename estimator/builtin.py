@@ -79,16 +79,19 @@ def exact_rod(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     if isnan(ten.d_x_mm):
         return ten
     felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad)
-    contact = contact_by_exact_rod(felt, whisk.beam, _reach(settings), is_held(whisk))
+    reach = _reach(settings)
+    contact = contact_by_exact_rod(felt, whisk.beam, reach, is_held(whisk))
     if contact is None or abs(contact.d_x_mm / ten.d_x_mm - 1) > _MOST_FROM_10:
         at_tip = ten.d_x_mm == whisk.beam.length_mm
         return ten if at_tip else Estimate(nan, nan, UNCONVERGED)
     d_x = contact.d_x_mm
+    of_rest = _sigma_of_rest(felt, whisk.beam, reach, is_held(whisk), d_x)
     factor = d_x / ten.d_x_mm
-    low = ten.low_mm * factor
-    high = min(ten.high_mm * factor, whisk.beam.length_mm)
+    low, high = _wider(ten.low_mm * factor, d_x, ten.high_mm * factor, of_rest)
+    high = min(high, whisk.beam.length_mm)
     model = _share_of_rod(whisk, settings, d_x, whisk.beam.left(d_x))
-    sigma = hypot(uncertainty.sigma(contact.gradient, **_errors(whisk, settings)), model * d_x)
+    of_inputs = uncertainty.sigma(contact.gradient, **_errors(whisk, settings))
+    sigma = hypot(of_inputs, model * d_x, of_rest)
     return replace(
         ten,
         d_x_mm=d_x,
@@ -99,6 +102,27 @@ def exact_rod(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
         beta_rad=ten.beta_rad if is_held(whisk) else contact.beta_rad,
         gradient=contact.gradient,
     )
+
+
+def _sigma_of_rest(felt, beam, reach, held, d_x):
+    """Return one sigma of the exact rod's distance d_x by the stated unloaded shape, mm.
+
+    All of the distance where no rod of a shape within its sigma has these moments.
+    """
+    off = 0.0
+    for rest_mm in beam.other_rests_mm():
+        moved = contact_by_exact_rod(felt, replace(beam, rest_mm=rest_mm), reach, held)
+        off = hypot(off, d_x if moved is None else moved.d_x_mm - d_x)
+    return off
+
+
+def _wider(low, d_x, high, sigma):
+    """Return the ends of a 95 % interval about d_x, widened by one more sigma; an open end stays so."""
+    if sigma == 0:
+        return low, high
+    wide = uncertainty.Z_95 * sigma
+    low = max(d_x - hypot(d_x - low, wide), 0.0) if low > 0 else low
+    return low, d_x + hypot(high - d_x, wide)
 
 
 def frictionless(whisk: Whisk, settings: EstimatorSettings) -> Estimate:

@@ -46,14 +46,15 @@ class ProfiledBeam(Beam):
         C_Nmm2: float,
         length_mm: float,
         widths: tuple[float, ...],
-        rest_mm: tuple[tuple[float, ...], tuple[float, ...]],
+        rest_mm: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,), (0.0,)),
+        rest_sigma_mm: float = 0.0,
     ) -> Self:
         """Make the beam, with the closest taper."""
         distances = _as_cylinder(widths)[0]
         touched = (_TOUCHED[0] <= _SHARES) & (_TOUCHED[1] >= _SHARES)
         loss = np.mean((1.0 / _SHARES - 1.0 / distances)[touched])
         tip_share = float(np.clip(1.0 - loss, *_TIPS))
-        return cls(C_Nmm2, length_mm, "tapered", tip_share, rest_mm, widths)
+        return cls(C_Nmm2, length_mm, "tapered", tip_share, rest_mm, rest_sigma_mm, widths)
 
     def width(self, share: ArrayLike) -> Numbers:
         """Return the diameter over the base's at a share of the length."""
@@ -90,7 +91,7 @@ class ProfiledBeam(Beam):
         Of a taper that is the diameter's share that is left.
         """
         share = np.asarray(d_x_mm, float) / self.length_mm
-        tabled = np.clip(share, _SHARES[0], 1.0)
+        tabled = np.clip(share, 1e-9, 1.0)  # 0/0 at the base
         spline = _spline(self.widths, False)
         return (spline(tabled) / (tabled * spline(tabled, 1)))[()]
 

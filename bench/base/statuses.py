@@ -211,6 +211,18 @@ _TABLE = (
         _RECORD_GAUGES,
     ),
     Status(
+        "gauge_rod_unconverged",
+        NOTE,
+        "no rod of the stated whisker is bent as this one is ({problem}): it is compared with no gauge",
+        "look at the whisk's overlays, and at the whisker's sizes in session.toml",
+    ),
+    Status("gauge_moments_unknown", NOTE, "no moment is known of this whisk: no gauge rests on it"),
+    Status(
+        "gauge_push_short",
+        NOTE,
+        "a push of {degrees:.2g}° is not felt in this whisk: no gauge rests on it",
+    ),
+    Status(
         "gauges_undetermined",
         WARNING,
         "the gauge trials do not fix the gauges' coefficients",
@@ -476,9 +488,9 @@ _TABLE = (
     ),
     Status(
         "length_unlike_stated",
-        WARNING,
+        NOTE,
         "the whisker is seen to end elsewhere than length_mm says",
-        reaches=(TRUTH,),
+        "measure length_mm again: estimates end there",
     ),
     Status(
         "slope_unlike_stated",

@@ -8,15 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bench.base.statuses import reason
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import FeltStroke, gauge_delay, late_by
 from bench.gauges.matrix import to_follicle
-from bench.gauges.whisker_rods import SeenContacts, rod_of
+from bench.gauges.whisker_rods import SeenContacts, WhiskerRod, rod_of
 from bench.records.trial_result import Deflection, SeenWhisk
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from estimator.signal import FeltTouch, MomentAt
 from vision import Value
+from vision.geometry import Reason, as_reason
 
 # A rod that bends is drawn towards its clamp over the bar, and friction pulls it back. How rough the bar is, is not
 # known at this stage: from nothing to 0.4, all values alike. At 3° this is 0.2 % of the moment, ± 0.1 %.
@@ -138,29 +140,35 @@ def pairs_of(
     drift_rate: np.ndarray,
     whisker: Whisker,
     theta_rad: float,
-) -> Pairs | None:
-    """Return the pairs of one whisk, or None where it has none. theta_rad: the paper's pushing angle."""
+) -> Pairs | Reason:
+    """Return the pairs of one whisk, or the reason why it has none. theta_rad: the paper's pushing angle."""
     touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
     if touch.status:
-        return None
-    if seen.deflection is None:
-        # it counts from felt touch, which is as late as the volts
-        reference = reference_from_nominal(trial, touch, whisker)
-    else:
-        reference = reference_from_pictures(seen, whisker)
-        if reference is not None:
-            late = late_by(gauge_delay(trial.gauge_filter_Hz), stroke.speed_rad_s)
-            reference = replace(reference, late_rad=late)
+        return as_reason(touch.status)
+    try:
+        if seen.deflection is None:
+            # it counts from felt touch, which is as late as the volts
+            reference = reference_from_nominal(trial, touch, whisker)
+        else:
+            reference = reference_from_pictures(seen, whisker)
+            if reference is not None:
+                late = late_by(gauge_delay(trial.gauge_filter_Hz), stroke.speed_rad_s)
+                reference = replace(reference, late_rad=late)
+    except ArithmeticError as problem:
+        return reason("gauge_rod_unconverged", problem=problem)
     if reference is None:
-        return None
+        return reason("gauge_moments_unknown")
     rigid_Nmm = whisker.beam.moment_Nmm(theta_rad, reference.d_x_mm)
     pairs = _paired(trial, seen.whisk, reference, stroke, touch, rigid_Nmm, theta_rad)
-    return None if pairs is None else replace(pairs, source=source_of(seen))
+    if pairs is None:
+        return reason("gauge_push_short", degrees=np.degrees(theta_rad))
+    return replace(pairs, source=source_of(seen))
 
 
 def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMoments | None:
-    """Return the moments of the frames in which the whisker touches; None where there are none, or
-    where no rod of its rigidity is bent so.
+    """Return the moments of the frames in which the whisker touches; None where there are none.
+
+    Raises ArithmeticError where no rod of its rigidity is bent so.
 
     They are those of the exact rod through the contact that was seen, whose place and deflection
     are the wire's: neither the slope of the bar nor the slip is needed, and a whisk without a truth
@@ -171,10 +179,7 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
     good = frames_with_moments(d)
     if not good.any():
         return None
-    try:
-        moments = _seen_loads(d, good, rod_of(whisker).moments_Nmm)
-    except ArithmeticError:
-        return None
+    moments = _seen_loads(d, good, whisker, lambda rod: rod.moments_Nmm)
     by_arc = moments.by_arc
     scale_sigma = float(np.sum(by_arc * moments.values) / np.sum(moments.values**2))
     return ReferenceMoments(
@@ -196,7 +201,7 @@ def loads_from_pictures(deflection: Deflection, whisker: Whisker) -> tuple[np.nd
     Raises ArithmeticError where no rod of its rigidity is bent so.
     """
     good = frames_with_moments(deflection)
-    loads = _seen_loads(deflection, good, rod_of(whisker).loads)
+    loads = _seen_loads(deflection, good, whisker, lambda rod: rod.loads)
     covariance = loads.own_covariance + _common_cause(loads.by_arc)
     return loads.values, covariance + loads.by_camera_error @ loads.by_camera_error.T
 
@@ -220,17 +225,27 @@ class _SeenLoads:
     by_camera_error: np.ndarray
 
 
-def _seen_loads(d: Deflection, good: np.ndarray, loads: Loads) -> _SeenLoads:
-    """Return the loads in the frames `good` (f,), of which there is one. Raises ArithmeticError as `loads` does."""
+def _seen_loads(
+    d: Deflection, good: np.ndarray, whisker: Whisker, loads_of: Callable[[WhiskerRod], Loads]
+) -> _SeenLoads:
+    """Return the loads in the frames `good` (f,), of which there is one.
+
+    loads_of: which loads of a rod. Raises ArithmeticError where no rod is bent so.
+    """
     across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
     along = d.along_mm[good]
     contacts = SeenContacts(along, across, d.theta_rad[good], d.d_x_mm)
     share = _share_along_rod(across, along, d.slip_mm[good], d.slip_sigma_mm[good])
+    loads = loads_of(rod_of(whisker))
     values, by_friction = _with_friction(contacts, share.value, loads)
     by_place = _by_place(contacts, share.value, loads)
     by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
     by_camera_error_mm, of_places = _errors_of_places(d, good)
     by_arc, covariance = _common_and_own(by_place, of_places)
+    for rest_mm in whisker.beam.other_rests_mm():
+        other = loads_of(rod_of(whisker.with_rest(rest_mm)))
+        moved, _ = _with_friction(contacts, share.value, other)
+        covariance = covariance + _common_cause(moved - values)
     return _SeenLoads(
         values,
         by_arc,
@@ -327,7 +342,8 @@ def reference_from_nominal(
     """Return the moments of a bar at right angles to the push, at the distance that a ruler gave.
 
     The bent whisker leans by half the pushing angle where it touches, and rolls that far over the
-    bar towards its base. None where there is no such distance, or no rod is bent so there.
+    bar towards its base. None where there is no such distance. Raises ArithmeticError where no rod is
+    bent so there.
     """
     if trial.d_x_mm is None or abs(trial.beta_deg or 0.0) > _NOMINAL_SLOPE_DEG:
         return None
@@ -335,12 +351,9 @@ def reference_from_nominal(
     radii_mm = 0.5 * trial.bar_diameter_mm + float(whisker.wire.radius_mm(trial.d_x_mm))
     along, across = _nominal_contacts(theta, trial.d_x_mm, radii_mm)
     contacts = SeenContacts(along, across, theta, trial.d_x_mm)
-    try:
-        moments, by_friction = _with_friction(
-            contacts, np.ones_like(theta), rod_of(whisker).moments_Nmm
-        )
-    except ArithmeticError:
-        return None
+    moments, by_friction = _with_friction(
+        contacts, np.ones_like(theta), rod_of(whisker).moments_Nmm
+    )
     by_touch = touch.sigma_rad * moments / theta[:, None]
     return ReferenceMoments(
         touch.motor_rad,

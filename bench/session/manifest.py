@@ -59,6 +59,7 @@ _BY_HAND = "placed by hand"
 LengthSigma = Annotated[float, _RULER]
 DiameterSigma = Annotated[float, _CALIPER]
 StiffnessSigma = Annotated[float, _DATA_SHEET]
+RestSigma = Annotated[float, Assumed(absolute=0.1, of="rest_shape", origin="traced in a picture")]
 
 RingDiameter = Annotated[float, plausible.LENGTH, SizeOf("ring")]
 HalfAngle = Annotated[float, plausible.HALF_ANGLE, SizeOf("cone")]
@@ -95,6 +96,8 @@ class WhiskerKeys(GivenKeys):
     rest_curvature_per_mm: Curvature | None = None
     # or its shape as a table beside session.toml, such as "rest.csv"
     rest_shape: str | None = None
+    # how far its tip may lie from there, in y and in z, the rest as its square of the length
+    rest_shape_sigma_mm: RestSigma = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

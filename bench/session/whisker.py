@@ -1,7 +1,7 @@
 """The whisker as the session states it, for truth and estimate alike."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bench.session.manifest import WhiskerKeys
@@ -56,6 +56,10 @@ class Whisker(WhiskerKeys):
             return self.rest_mm
         return of_curvature(self.rest_curvature_per_mm, self.length_mm)
 
+    def with_rest(self, rest_mm: RestShape) -> "Whisker":
+        """Return the whisker with another unloaded shape."""
+        return replace(self, rest_curvature_per_mm=None, rest_mm=rest_mm)
+
     @property
     def turn_rad(self) -> float:
         """Return by how much the unloaded whisker turns from its base, at most."""
@@ -97,12 +101,23 @@ class Whisker(WhiskerKeys):
         """Return the beam that an estimator may know of."""
         if self.widths:
             return ProfiledBeam.of_widths(
-                self.C_Nmm2, self.length_mm, self.widths, self.unloaded_mm
+                self.C_Nmm2,
+                self.length_mm,
+                self.widths,
+                self.unloaded_mm,
+                self.rest_shape_sigma_mm,
             )
         tip_share = None
         if self.tip_diameter_mm is not None:
             tip_share = self.tip_diameter_mm / self.diameter_mm
-        return Beam(self.C_Nmm2, self.length_mm, self.shape, tip_share, self.unloaded_mm)
+        return Beam(
+            self.C_Nmm2,
+            self.length_mm,
+            self.shape,
+            tip_share,
+            self.unloaded_mm,
+            self.rest_shape_sigma_mm,
+        )
 
     @property
     def C_sigma_Nmm2(self) -> float:

@@ -243,7 +243,9 @@ def _logarithms(ratios: Mapping[str, Value]) -> tuple[np.ndarray, np.ndarray]:
 def check_length(ends: Mapping[str, Value], whisker: Whisker) -> Reason:
     """Compare the distance of the whisker's visible end from its base with the stated length.
 
-    Two cameras must see the end in the same place: before something dark a dark wire seems to end.
+    Two cameras must see the end in the same place: before something dark a dark wire seems to end. The
+    end of a whisker that tapers is not seen; a cylinder's bends as it does however long it is, and no
+    number rests on its length but where estimates end. So this is a note.
     ends: by camera, mm from the base.
     """
     if len(ends) < 2:

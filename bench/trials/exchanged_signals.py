@@ -13,7 +13,7 @@ import numpy as np
 
 from bench.base.statuses import reason
 from bench.gauges.felt import strokes_of
-from bench.gauges.gauge_readings import pairs_of
+from bench.gauges.gauge_readings import Pairs, pairs_of
 from bench.records.trial_result import TrialResult
 from bench.session.signals import read_signals
 from bench.trials.consistency import check_slope
@@ -86,6 +86,6 @@ def _fits(unit: Unit, result: TrialResult, other: Unit) -> bool:
         if seen.deflection is None or seen.contradicted:
             continue
         pairs = pairs_of(unit.trial, seen, stroke, unit.drift_rate, whisker, theta_rad)
-        if pairs is not None:
+        if isinstance(pairs, Pairs):
             chances.append(against_shape(unit, readout, pairs).chance)
     return bool(chances) and min(chances) >= LEAST_CHANCE

@@ -234,7 +234,9 @@ def _against_pictures(
     rate = np.zeros(2) if unit.drift_rate is None else unit.drift_rate
     whisker = unit.session.whisker
     pairs = pairs_of(unit.trial, seen, stroke, rate, whisker, unit.settings.theta_rad)
-    if pairs is None:
+    if not isinstance(pairs, Pairs):
+        if "gauge_rod_unconverged" in pairs.codes:
+            return replace(felt, status=joined(felt.status, pairs))
         return felt
     found = against_shape(unit, readout, pairs)
     status = joined(felt.status, found.status)

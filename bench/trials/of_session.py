@@ -215,7 +215,7 @@ def fit_certificate(
     pairs = []
     seen = see_units(units, pool, "gauge trials", problems)
     for unit, trial_seen, trial_strokes in zip(units, seen, strokes):
-        pairs += _pairs(unit, trial_seen, trial_strokes, rate)
+        pairs += _pairs(unit, trial_seen, trial_strokes, rate, problems)
     return Certificate(
         session.name,
         session.whisker,
@@ -229,14 +229,25 @@ def fit_certificate(
 
 
 def _pairs(
-    unit: Unit, seen: SeenTrial, strokes: Sequence[FeltStroke], rate: np.ndarray
+    unit: Unit,
+    seen: SeenTrial,
+    strokes: Sequence[FeltStroke],
+    rate: np.ndarray,
+    problems: InputProblems,
 ) -> Iterator[Pairs]:
-    """Yield the pairs of each whisk of a trial that has any; rate (2,): drift of the channels, V/s."""
+    """Yield the pairs of each whisk of a trial that has any, and keep why a seen one has none.
+
+    rate (2,): drift of the channels, V/s.
+    """
     theta_rad = unit.settings.theta_rad
     for whisk, stroke in zip(seen.whisks, strokes):
         pairs = pairs_of(unit.trial, whisk, stroke, rate, unit.session.whisker, theta_rad)
-        if pairs is not None:
+        if isinstance(pairs, Pairs):
             yield pairs
+        elif whisk.deflection is not None:
+            code = pairs.codes[0]
+            line = f"{unit.trial.name}, whisk {whisk.whisk} calibrates no gauge: {pairs}"
+            problems.warn(Reason(code, line), [unit.trial.name])
 
 
 def _lacking_truth(units: Sequence[Unit]) -> Iterator[str]:

@@ -133,7 +133,8 @@ def _whisk_of_trial(
 
     warnings: of the recording. of_trial: contradictions of the trial as a whole.
     """
-    contradictions = [*of_trial, *_whisk_contradictions(whisk, session, trial, settings)]
+    contradictions = [*of_trial, *_whisk_contradictions(whisk, trial, settings)]
+    warnings = [*warnings, check_length(whisk.ends, session.whisker)]
     speed_rad_s = None if trial.speed_deg_s is None else float(np.radians(trial.speed_deg_s))
     record = whisk_record(whisk, settings, warnings, contradictions, speed_rad_s)
     return replace(record, by_one_camera=by_one_camera(whisk, session.whisker, settings))
@@ -178,13 +179,10 @@ def _trial_contradictions(truth: TrialTruth, session: Session, trial: Trial) -> 
     ]
 
 
-def _whisk_contradictions(
-    truth: WhiskTruth, session: Session, trial: Trial, settings: Settings
-) -> list[Reason]:
-    """Return how a whisk contradicts the stated length and slope, or friction."""
+def _whisk_contradictions(truth: WhiskTruth, trial: Trial, settings: Settings) -> list[Reason]:
+    """Return how a whisk contradicts the stated slope, or friction."""
     deflected = truth.at(settings.theta_rad).phi_rad
     return [
-        check_length(truth.ends, session.whisker),
         check_slope(truth.beta_rad, trial),
         check_friction_cone(deflected, truth.beta_rad, "seen"),
     ]

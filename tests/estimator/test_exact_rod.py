@@ -8,7 +8,7 @@ from estimator.beam import Beam
 from estimator.builtin import exact_rod, with_friction
 from estimator.exact_rod import Reach, contact_by_exact_rod
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
-from tests.scenes.curved_pushes import NITINOL, CurvedPush, feel, whisker_of
+from tests.scenes.curved_pushes import NITINOL, PROFILED, CurvedPush, feel, whisker_of
 
 NOTHING = Reach(0.0, 0.0)
 
@@ -54,6 +54,14 @@ def test_without_friction_it_inverts_the_rig_s_mechanics(beta_deg, theta_deg):
     assert found.d_x_mm == pytest.approx(d_x, rel=5e-5)
     ten, _ = answered(push, with_friction)
     assert abs(ten.d_x_mm / d_x - 1) > 4e-4
+
+
+@pytest.mark.parametrize("beta_deg", [0.0, 40.0])
+def test_of_measured_diameters_it_inverts_the_rig_s_mechanics(beta_deg):
+    """To 5e-5 of d_x, as for a cone."""
+    push = CurvedPush(rod=PROFILED, beta_deg=beta_deg, theta_deg=6.0, friction=0.0)
+    found, d_x = answered(push, exact_rod)
+    assert found.d_x_mm == pytest.approx(d_x, rel=5e-5)
 
 
 @pytest.mark.parametrize("beta_deg", [0.0, 30.0, 50.0, 70.0])

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from bench.rig.bar import TouchedBar, find_first_touch, unloaded_curve
-from bench.rig.elastic_rod import RestShape, Rod
+from bench.rig.elastic_rod import ProfiledRod, RestShape, Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
@@ -15,6 +15,16 @@ from bench.session.whisker import Whisker
 
 # A rat's vibrissa, as `simulate --protocol vibrissa` has it.
 VIBRISSA = Rod("cone", 45.0, 0.2, 3.0, rest=RestShape(45.0, 0.0, -3.0, -4.0))
+# One that is thicker at its root than a cone.
+PROFILED = ProfiledRod(
+    "tapered",
+    45.0,
+    0.2,
+    3.0,
+    rest=RestShape(45.0, 0.0, -3.0, -4.0),
+    tip_diameter_mm=0.04,
+    widths=(1.0, -0.35, -0.9, 0.4, 0.05),
+)
 NITINOL = Rod("cylinder", 100.0, 1.0, 60.0)
 _STEPS = 6  # of the march from touch, as `bench.theory.model_error` has it
 
@@ -33,10 +43,11 @@ class CurvedPush:
 
 @dataclass(frozen=True)
 class Felt:
-    """Moments m_y, m_z (2,), and true d_x; of the contact, what `records.trial_result.Deflection` has of one frame:
+    """Moments m_y, m_z (2,), the force on the whisker (3,), N, both in the hub's axes, and true d_x; of the contact, what `records.trial_result.Deflection` has of one frame:
     along and across (2,), z and y, mm."""
 
     moments_Nmm: np.ndarray
+    force_N: np.ndarray
     d_x_mm: float
     along_mm: float
     across_mm: np.ndarray
@@ -61,7 +72,8 @@ def feel(push: CurvedPush) -> Felt:
     if states[-1] is None:
         raise ArithmeticError("the whisker slips off the bar")
     along_mm, across_mm = deflection(rod, touch, states[-1])
-    return Felt(np.array(moments_Nmm(states[-1])), touch.d_x_mm, along_mm, across_mm)
+    moments = np.array(moments_Nmm(states[-1]))
+    return Felt(moments, states[-1].force_hub_N, touch.d_x_mm, along_mm, across_mm)
 
 
 def deflection(rod: Rod, touch, state) -> tuple[float, np.ndarray]:
@@ -88,6 +100,8 @@ def whisker_of(rod: Rod) -> Whisker:
         shape=rod.shape,
         length_mm=rod.length_mm,
         diameter_mm=rod.diameter_mm,
+        tip_diameter_mm=rod.tip_diameter_mm,
         youngs_modulus_GPa=rod.youngs_modulus_GPa,
         rest_curvature_per_mm=curvature.tolist(),
+        widths=getattr(rod, "widths", ()),
     )

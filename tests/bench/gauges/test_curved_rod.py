@@ -1,5 +1,7 @@
 """The curved rod against the rig's exact mechanics, the straight rod, and itself in other units."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,7 +10,7 @@ from hypothesis import strategies as st
 from bench.gauges.curved_rod import CurvedRods, UnloadedRod
 from bench.gauges.whisker_rods import CurvedRod, SeenContacts, StraightRod, rod_of
 from bench.session.whisker import Whisker
-from tests.scenes.curved_pushes import CurvedPush, feel, whisker_of
+from tests.scenes.curved_pushes import PROFILED, VIBRISSA, CurvedPush, feel, whisker_of
 
 
 def seen(push: CurvedPush) -> tuple[SeenContacts, np.ndarray]:
@@ -32,6 +34,29 @@ def test_moments_of_a_vibrissa_without_friction_are_the_rig_s(d_x_mm, beta_deg, 
     assert np.abs(found - exact).max() < 1e-6 * size
     straight = StraightRod(whisker).moments_Nmm(contacts, 0.0)[0]
     assert np.linalg.norm(straight - exact) > 3e-3 * size
+
+
+@pytest.mark.parametrize("rod", [VIBRISSA, PROFILED, replace(PROFILED, rest=None)])
+@pytest.mark.parametrize("beta_deg", [0.0, 40.0])
+def test_moments_and_force_of_any_rod_without_friction_are_the_rig_s(rod, beta_deg):
+    """To 1e-6 of the force, as moments are: of a cone, of measured diameters curved, and straight."""
+    push = CurvedPush(rod=rod, beta_deg=beta_deg, friction=0.0, theta_deg=6.0)
+    contacts, exact = seen(push)
+    whisker = whisker_of(rod)
+    found = rod_of(whisker).loads(contacts, 0.0)[0]
+    force_N = feel(push).force_N
+    assert np.abs(found[:2] - exact).max() < 1e-6 * np.linalg.norm(exact)
+    assert np.abs(found[2:] - force_N).max() < 2e-6 * np.linalg.norm(force_N)
+
+
+@pytest.mark.parametrize("rod", [PROFILED, replace(PROFILED, rest=None)])
+def test_a_cone_in_place_of_measured_diameters_would_be_far_off(rod):
+    """By a half of the moment: the diameter goes by its fourth power."""
+    push = CurvedPush(rod=rod, friction=0.0)
+    contacts, exact = seen(push)
+    cone = replace(whisker_of(rod), widths=())
+    found = rod_of(cone).moments_Nmm(contacts, 0.0)[0]
+    assert np.linalg.norm(found - exact) > 0.1 * np.linalg.norm(exact)
 
 
 @pytest.mark.parametrize("friction", [0.0, -0.2, 0.2])

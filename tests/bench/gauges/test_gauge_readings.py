@@ -28,6 +28,7 @@ from bench.session.signals import forward_strokes, read_signals
 from bench.session.whisker import Whisker
 from estimator.signal import FeltTouch
 from vision import WhiskTruth
+from vision.geometry import Reason
 
 WHISKER = Whisker(shape="cylinder", length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=60.0)
 # 155 times as soft.
@@ -162,7 +163,35 @@ def test_no_touch_no_pairs(session, exactly_seen):
         *(getattr(stroke, name)[:250] for name in ("time_s", "motor_rad", "channels", "filtered"))
     )
     assert len(forward_strokes(signals)) == 1
-    assert pairs_of(trial, exactly_seen(trial), free, np.zeros(2), WHISKER, 0.05) is None
+    found = pairs_of(trial, exactly_seen(trial), free, np.zeros(2), WHISKER, 0.05)
+    assert isinstance(found, Reason) and found
+
+
+def test_a_rod_that_is_not_bent_so_is_a_reason_and_not_silence(session, exactly_seen):
+    """A deflection of 0.7 of the distance is that of no clamped rod which a contact holds."""
+    trial = session.trial("gauge_roll0")
+    seen = exactly_seen(trial)
+    stroke = strokes_of(read_signals(trial), trial, Settings())[0]
+    d = seen.deflection
+    far = replace(seen, deflection=replace(d, across_y_mm=0.7 * d.along_mm))
+    found = pairs_of(trial, far, stroke, np.zeros(2), WHISKER, 0.05)
+    assert found.codes == ("gauge_rod_unconverged",)
+    assert "less than 0.6 of its distance aside" in found
+
+
+def test_a_rest_shape_that_is_hardly_known_counts_in_moments(session, exactly_seen):
+    """Moved by one sigma the moments are off by as much in z as is added to their sigma."""
+    seen = exactly_seen(session.trial("gauge_roll0"))
+
+    def reference(set_mm, sigma_mm):
+        whisker = replace(
+            WHISKER, rest_mm=((0.0, 0.0, set_mm), (0.0,)), rest_shape_sigma_mm=sigma_mm
+        )
+        return reference_from_pictures(seen, whisker)
+
+    sure, vague, moved = reference(5.0, 0.0), reference(5.0, 1.0), reference(6.0, 0.0)
+    added = np.sqrt(np.diag(vague.covariance) - np.diag(sure.covariance))[1::2]
+    assert added == pytest.approx(np.abs(moved.moments - sure.moments)[:, 1], rel=0.05)
 
 
 def test_volts_are_read_as_late_as_the_gauges_filter_has_them(session, exactly_seen):
