@@ -147,7 +147,7 @@ class BaseMoments(Analysis):
 def base_loads(seen: SeenWhisk, whisker: Whisker) -> BaseLoads | None:
     """Return the loads at the base in the touching frames of a whisk with a deflection.
 
-    None where no frame is far enough from touch, or no rod of this stiffness is bent so.
+    None where no touching frame is far enough from touch, or no rod of this stiffness is bent so.
     """
     d = seen.deflection
     good = frames_with_moments(d)
@@ -158,6 +158,8 @@ def base_loads(seen: SeenWhisk, whisker: Whisker) -> BaseLoads | None:
     except ArithmeticError:
         return None
     rows, weights = _between(seen, d, good)
+    if not len(rows):
+        return None
     own = covariance.reshape(len(values), 5, len(values), 5)
     of_frames = np.einsum("fi,iajb,fj->fab", weights, own, weights)
     signs = np.outer(_SIGNS, _SIGNS)

@@ -43,7 +43,8 @@ class CurvedPush:
 
 @dataclass(frozen=True)
 class Felt:
-    """Moments m_y, m_z (2,), the force on the whisker (3,), N, both in the hub's axes, and true d_x; of the contact, what `records.trial_result.Deflection` has of one frame:
+    """Moments m_y, m_z (2,), the force on the whisker (3,), N, in the hub's axes, true d_x;
+    of the contact, what `records.trial_result.Deflection` has of one frame:
     along and across (2,), z and y, mm."""
 
     moments_Nmm: np.ndarray
