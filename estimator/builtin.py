@@ -9,7 +9,7 @@ distance beyond the length means slip, not the tip: it is flagged and left.
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import hypot, isnan, nan, sqrt
+from math import hypot, isnan, nan, sqrt, tan
 
 from estimator import distance, first_order, uncertainty
 from estimator.beam import Beam
@@ -25,9 +25,13 @@ TIP = NamedReason(
 )
 NEARER = NamedReason("only_nearer_known", "known only to be nearer than {:.1f} mm (95 %)")
 
-# [1] Of (10): the exact rod's equations have other roots, which are no push; curvature and large angles
-# move the distance by some 0.1. Stated.
-_MOST_FROM_10 = 0.4
+# [1] Of (10): the exact rod's equations have other roots, which are no push; right ones are within 0.08
+# of (10), at turns up to 40° and 15° of push; twice that is left to a wrong α_est.
+# Study: exact_rod_limits.py.
+_MOST_FROM_10 = 0.2
+# [1] Relative sigma of the exact rod over tan α_est: where along its way over the object friction turned
+# is not known. Study: exact_rod_limits.py.
+_ROD_BY_FRICTION = 0.0065
 
 
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
@@ -360,7 +364,7 @@ def _share_left(whisk, settings, d_x, left):
 
 
 def _share_of_rod(whisk, settings, d_x, left):
-    """Return the relative sigma of the exact rod: the object's lean and radius, and friction along the rod."""
+    """Return the relative sigma of the exact rod: the object's lean and radius, and friction's way."""
     if isnan(d_x) or settings.object_reach_mm == 0:
         return 0.0
     theta = whisk.theta_at_rad
@@ -368,8 +372,9 @@ def _share_of_rod(whisk, settings, d_x, left):
     unknown_reach = settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, _phi(whisk), alpha)
     rolling = first_order.rolling(theta, unknown_reach, _phi(whisk), alpha, d_x, left)
-    dragging = first_order.HELD_SPREAD * first_order.dragging(theta, alpha)
-    return hypot(leaning, rolling, dragging)
+    by_friction = _ROD_BY_FRICTION * tan(alpha)
+    held = first_order.HELD_SPREAD * first_order.dragging(theta, alpha) if is_held(whisk) else 0.0
+    return hypot(leaning, rolling, by_friction, held)
 
 
 def _reason(whisk, alpha_est, high):

@@ -15,9 +15,9 @@ RestShape = tuple[tuple[float, ...], tuple[float, ...]]
 # [1] Radius of a tapering rod over that at its base: a fit's wild step past the tip stays finite.
 # Stated.
 LEAST_WIDTH = 1e-3
-# Gauss–Legendre on −1…1, of the bend of a wire of measured diameters: within 1e-9 of it up to where
+# [1] Gauss–Legendre's places on −1…1 and weights, of the bend of a wire of measured diameters: within 1e-9 of it up to where
 # 0.1 of the diameter is left. Study: tests/vision/geometry/test_profiled_wire.py.
-_GAUSS_AT, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(32)
+_GAUSS = np.polynomial.legendre.leggauss(32)
 
 
 @dataclass(frozen=True)
@@ -111,10 +111,11 @@ class ProfiledWire(Wire):
 
     def turn(self, arc_mm: np.ndarray, contact_mm: np.ndarray) -> np.ndarray:
         """Return the tangent angle (...), mm², per point force and base stiffness, by small bends."""
+        at, weights = _GAUSS
         arc_mm, contact_mm = np.broadcast_arrays(arc_mm, contact_mm)
-        at_mm = arc_mm[..., None] * (0.5 * (1.0 + _GAUSS_AT))
+        at_mm = arc_mm[..., None] * (0.5 * (1.0 + at))
         curvature = (contact_mm[..., None] - at_mm) / self.width(at_mm) ** 4
-        return 0.5 * arc_mm * (curvature @ _GAUSS_WEIGHTS)
+        return 0.5 * arc_mm * (curvature @ weights)
 
     @property
     def is_uniform(self) -> bool:
