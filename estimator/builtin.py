@@ -25,8 +25,8 @@ TIP = NamedReason(
 )
 NEARER = NamedReason("only_nearer_known", "known only to be nearer than {:.1f} mm (95 %)")
 
-# [1] Of (10): the exact rod's equations have other roots, which are no push; right ones are within 0.08
-# of (10), at turns up to 40° and 15° of push; twice that is left to a wrong α_est.
+# [1] Of (10): the exact rod's equations have other roots, which are no push; right ones are within 0.103
+# of (10), at turns up to 40° and 15° of push, and as much again is left to a wrong α_est.
 # Study: exact_rod_limits.py.
 _MOST_FROM_10 = 0.2
 # [1] Relative sigma of the exact rod over tan α_est: where along its way over the object friction turned

@@ -34,16 +34,22 @@ class TrialFacts:
 
 @dataclass(frozen=True)
 class WhiskerFacts:
-    """Facts of the whisker, which must be alike in results that are pooled."""
+    """Facts of the whisker, which must be alike in results that are pooled.
+
+    widths: as `bench.session.profile.Profile` has them; none where no diameters are measured.
+    """
 
     shape: str
     length_mm: float
     diameter_mm: float
     EI_Nmm2: float
     tip_diameter_mm: float | None = None
+    widths: tuple[float, ...] = ()
 
     def left(self, x_mm: float) -> float:
         """Return the diameter at a distance from the base as a share of the base's diameter."""
+        if self.widths:
+            return float(np.polynomial.polynomial.polyval(x_mm / self.length_mm, self.widths))
         tips_mm = {"cylinder": self.diameter_mm, "cone": 0.0}
         tip_mm = tips_mm.get(self.shape, self.tip_diameter_mm)
         return 1.0 - (1.0 - tip_mm / self.diameter_mm) * x_mm / self.length_mm

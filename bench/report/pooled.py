@@ -12,6 +12,7 @@ from bench.base.results import read_result
 from bench.records.plain import from_plain
 from bench.records.trial_result import TrialResult, WhiskerFacts
 from estimator.beam import Beam
+from estimator.profiled_beam import ProfiledBeam
 
 TABLE = "whisks.csv"
 _AGAIN = "evaluate the session again into this folder"
@@ -60,6 +61,8 @@ def pooled(outs: Sequence[Path]) -> list[FittedSurface]:
 
 def _beam(whisker: WhiskerFacts) -> Beam:
     """Return the whisker as a beam."""
+    if whisker.widths:
+        return ProfiledBeam.of_widths(3.0 * whisker.EI_Nmm2, whisker.length_mm, whisker.widths)
     tip = None
     if whisker.tip_diameter_mm is not None:
         tip = whisker.tip_diameter_mm / whisker.diameter_mm

@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
-from bench.records.trial_result import SeenTrial, SeenWhisk, TrialResult
+from bench.records.trial_result import SeenTrial, SeenWhisk, TrialResult, WhiskerFacts
 from bench.report.film_curves import with_curves
 from bench.report.painting import as_8_bit, polyline, put_text
 from bench.report.pooled import read_run
@@ -21,7 +21,7 @@ from bench.session.footage import read_frames
 from bench.session.frame_times import FrameTimes, frame_times
 from bench.session.session import load_session
 from bench.session.trial import Trial
-from vision.geometry import Camera, Wire, centrelines
+from vision.geometry import Camera, ProfiledWire, Wire, centrelines
 
 FOURCC = {".webm": "VP90", ".avi": "MJPG"}
 _WIDTH_PX = 720  # of each camera's picture
@@ -223,15 +223,19 @@ def _wire(
     motor_rad = float(whisk.frames.motor_rad[k])
     if shape is None:
         return wire_between(motor_rad, contact_mm, facts.length_mm)
-    wire = Wire(
-        facts.shape, facts.length_mm, facts.diameter_mm, tip_diameter_mm=facts.tip_diameter_mm
-    )
+    wire = _wire_of(facts)
     bend_rad = np.zeros(2)
     arc_mm = facts.length_mm
     for row in np.flatnonzero(shape.index == whisk.frames.index[k]):
         bend_rad = shape.bend_rad[row]
         arc_mm = shape.arc_mm[row]
     return centrelines(shape.rest_mm, bend_rad, arc_mm, motor_rad, wire).points_mm
+
+
+def _wire_of(facts: WhiskerFacts) -> Wire:
+    """Return the wire of a whisker whose unloaded shape stands elsewhere."""
+    sizes = (facts.shape, facts.length_mm, facts.diameter_mm, 0.0, 0.0, facts.tip_diameter_mm)
+    return ProfiledWire(*sizes, widths=facts.widths) if facts.widths else Wire(*sizes)
 
 
 def wire_between(motor_rad: float, contact_mm: np.ndarray | None, length_mm: float) -> np.ndarray:

@@ -90,4 +90,5 @@ def whisker_facts(unit: Unit) -> WhiskerFacts:
         whisker.diameter_mm,
         whisker.EI_Nmm2,
         whisker.tip_diameter_mm,
+        whisker.widths,
     )
