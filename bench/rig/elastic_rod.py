@@ -169,9 +169,19 @@ class ProfiledRod(Rod):
     """A "tapered" whisker that is no cone.
 
     widths: polynomial in the share of the length of the diameter over the base's, lowest power first.
+    Raises ValueError as `Rod` does, and unless it is 1 at the base and positive all along.
     """
 
     widths: tuple[float, ...] = (1.0,)
+
+    def __post_init__(self):
+        super().__post_init__()
+        along = self.width(np.linspace(0.0, self.length_mm, 201))
+        if not (self.widths[0] == 1.0 and along.min() > 0):
+            raise ValueError(
+                "a whisker's widths are 1 at its base and above 0 all along, "
+                f"not {along[0]:g} and {along.min():g}"
+            )
 
     def width(self, arc_mm: float | np.ndarray) -> np.ndarray:
         """Return the diameter at arc length over the base's."""

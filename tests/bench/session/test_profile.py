@@ -6,8 +6,12 @@ import shutil
 import numpy as np
 import pytest
 
+from bench.base.errors import BadInput
+from bench.rig.simulation import simulate
 from bench.session.session import load_session
+from tests.bench.session.test_rest_shape import state
 from tests.scenes.refusals import refusal
+from tests.scenes.rig_sessions import protocol_file
 
 LENGTH_MM = 100.0  # of the sample's whisker, 1 mm thick
 ARC_MM = np.linspace(0.0, LENGTH_MM, 16)
@@ -23,12 +27,6 @@ def diameters(arc_mm):
 def session(steel_signals, tmp_path):
     """A session without pictures, to be changed."""
     return shutil.copytree(steel_signals, tmp_path / "session", copy_function=shutil.copyfile)
-
-
-def state(session, line: str) -> None:
-    """Add a line to [whisker] of session.toml."""
-    file = session / "session.toml"
-    file.write_text(file.read_text().replace("[whisker]\n", f"[whisker]\n{line}\n", 1))
 
 
 def measure(session, rows: np.ndarray, header: str = "arc_mm,diameter_mm") -> None:
@@ -123,3 +121,25 @@ def test_a_stated_tip_that_agrees_is_taken(session):
     measure(session, ROWS)
     state(session, "tip_diameter_mm = 0.203")
     assert load_session(session).whisker.tip_diameter_mm == pytest.approx(0.2, abs=2e-6)
+
+
+def simulated(folder, widths: str):
+    """A session of signals whose whisker has these widths."""
+    text = f"[whisker]\nwidths = {widths}\n[[trials]]\nd_x_mm = 50.0\n"
+    return simulate(folder / "s", protocol=protocol_file(folder, text), signals_only=True)
+
+
+def test_a_simulated_whisker_states_its_diameters(tmp_path):
+    """Written with six decimals of a mm."""
+    session = simulated(tmp_path, "[1.0, -0.35, -0.9, 0.4, 0.05]")
+    whisker = load_session(session).whisker
+    assert whisker.profile == "profile.csv"
+    assert whisker.widths == pytest.approx((1.0, -0.35, -0.9, 0.4, 0.05), abs=1e-4)
+
+
+@pytest.mark.parametrize("widths", ["[0.9, -0.5]", "[1.0, -4.0, 3.5]", "[1.0, 0.5]"])
+def test_a_simulated_whisker_has_diameters(tmp_path, widths):
+    with pytest.raises(
+        BadInput, match=r"protocol.toml: a whisker's (widths are|tip_diameter_mm is)"
+    ):
+        simulated(tmp_path, widths)
