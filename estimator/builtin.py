@@ -31,7 +31,7 @@ NEARER = NamedReason("only_nearer_known", "known only to be nearer than {:.1f} m
 _MOST_FROM_10 = 0.2
 # [1] Relative sigma of the exact rod over tan α_est: where along its way over the object friction turned
 # is not known. Study: exact_rod_limits.py.
-_ROD_BY_FRICTION = 0.0065
+_ROD_BY_FRICTION = 0.0075
 
 
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
