@@ -60,15 +60,17 @@ def read_board_views(session: Session) -> SessionViews:
     sizes_px = {}
     notes: list[str] = []
     for name, source in session.board_sources.items():
-        with refused_as_bad_input(f"boards/{name}"):
+        with refused_as_bad_input(f"boards/{source.name}"):
             frames = Frames.open(source)
         sizes_px[name] = frames.size_px
-        boards[name] = _series(frames, session.board, name)
+        place = session.board_place(name)
+        boards[name] = _series(frames, session.board, place, session.mirrored(name))
         if name in session.rig_pictures:
             rig[name] = rig_view(session, name, frames.size_px)
             trials[name], left_out = _trial_views(session, name, rig[name])
             notes += left_out
-    return SessionViews(boards, sizes_px, rig, trials, _times(session, boards), tuple(notes))
+    times_s = _times(session, boards)
+    return SessionViews(boards, sizes_px, rig, trials, times_s, session.crops, tuple(notes))
 
 
 @dataclass
@@ -89,8 +91,11 @@ class _Samples:
             self.without_board.append(grey)
 
 
-def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
-    """Return a view a frame; frames that are not sampled or damaged count as without a board."""
+def _series(frames: Frames, board: Board, place: str, mirrored: bool) -> list[Corners]:
+    """Return a view a frame; frames that are not sampled or damaged count as without a board.
+
+    place: how messages name them. mirrored: whether they are flipped left to right.
+    """
     views = []
     chosen = sampled_frames(frames.count)
     samples = _Samples(every=max(1, len(chosen) // _SAMPLES))
@@ -106,17 +111,19 @@ def _series(frames: Frames, board: Board, name: str) -> list[Corners]:
         views.append(view)
         samples.add(index, grey, view)
     if sum(fixes_pose(view, board) for view in views) < MIN_VIEWS:
-        _require_no_reason(samples.without_board, board, name)
-    with refused_as_bad_input(f"boards/{name}"):
+        _require_no_reason(samples.without_board, board, place, mirrored)
+    with refused_as_bad_input(place):
         check_marker_size(samples.with_board, board)
     return views
 
 
-def _require_no_reason(greys: Sequence[np.ndarray], board: Board, name: str) -> None:
+def _require_no_reason(
+    greys: Sequence[np.ndarray], board: Board, place: str, mirrored: bool
+) -> None:
     """Raise BadInput where grey pictures show another board than the stated one."""
-    reason = why_not_found(greys, board) if greys else ""
+    reason = why_not_found(greys, board, mirrored=mirrored) if greys else ""
     if reason:
-        raise BadInput(reason, file=f"boards/{name}")
+        raise BadInput(reason, file=place)
 
 
 def sampled_frames(count: int) -> set[int]:
@@ -188,7 +195,11 @@ def _shift_px(view: Corners, rig_view: Corners) -> float:
 
 def _times(session: Session, boards: Mapping[str, list[Corners]]) -> dict[str, np.ndarray] | None:
     """Read boards/frames_<camera>.csv of every camera; None where one has none."""
-    files = {name: session.path / "boards" / f"frames_{name}.csv" for name in boards}
+    files = {}
+    for name in boards:
+        crop = session.crops.get(name)
+        file = f"frames_{name if crop is None else crop.of}.csv"
+        files[name] = session.path / "boards" / file
     if not all(file.is_file() for file in files.values()):
         return None
     times = {}

@@ -103,7 +103,7 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
     background = {name: _background(session, name) for name in cameras.names}
     cameras = _with_optics(cameras, background, session.board)
     of_cameras = [[c, cameras.covariance, cameras.placement] for c in cameras.cameras]
-    made = hash_of(of_cameras, list(background.values()), known.board_print)
+    made = hash_of(of_cameras, list(background.values()), known.board_print, session.crops)
     known = replace(known, cameras=cameras, background=background, hash=made)
     return known.with_notes(*_optics_notes(cameras))
 
@@ -250,13 +250,14 @@ def _key(session: Session, digests: Digests) -> str:
     for trial in session.trials:
         # without T_rig_board motor angles count too
         is_by_strokes = session.T_rig_board is None and session.measured_rig is None
-        paths += [trial.folder] if is_by_strokes else trial.camera_sources.values()
+        paths += [trial.folder] if is_by_strokes else map(Path, trial.camera_sources.values())
     given = [
         session.board,
         session.T_rig_board,
         session.T_rig_board_sigma_mm,
         session.T_rig_board_sigma_rad,
         session.measured_rig,
+        session.crops,
     ]
     files = hash_of_files(paths, digests.of)
     return hash_of(hash_of_code(SEEING), given, session.whisker, files)

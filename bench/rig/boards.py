@@ -1,6 +1,7 @@
 """The views for a camera's lens: the board tilted all ways, near and far, all over the picture."""
 
 import math
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -11,6 +12,8 @@ from bench.rig.printed_board import PrintedBoard
 
 # rad: the golden angle, by which views lean to all sides evenly
 _GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
+# mm along the board's x, y and away from the cameras: how far a board that several see is held from the middle
+_SHARED_REACH_MM = np.array([25.0, 15.0, 45.0])
 
 
 def draw_poses(
@@ -19,6 +22,44 @@ def draw_poses(
     """Draw T_rig_board (3, 4) of each view."""
     order = rng.permutation(count)
     return [_draw_pose(board, camera, i, count, int(order[i]), rng) for i in range(count)]
+
+
+def draw_shared_poses(
+    board: PrintedBoard, cameras: Sequence[PinholeCamera], count: int, rng: np.random.Generator
+) -> list[np.ndarray]:
+    """Draw T_rig_board (3, 4) of each view that several cameras see at once.
+
+    The board is held about the point nearest to all optical axes, tilted about the mean of the
+    directions from there to the cameras.
+    """
+    towards = np.array([-_middle_ray(camera) for camera in cameras])  # (n, 3), unit
+    centres = np.array([camera.centre_mm for camera in cameras])
+    across = np.eye(3) - towards[:, :, None] * towards[:, None]  # onto the planes across the axes
+    middle_mm = np.linalg.solve(across.sum(0), np.einsum("nij,nj->i", across, centres))
+    facing = _facing(towards.sum(0))
+    half_mm = np.append(0.5 * np.array(board.size_mm), 0.0)
+    poses = []
+    for index in range(count):
+        turn = facing @ _draw_rotation(index, rng)
+        place = middle_mm + facing @ rng.uniform(-_SHARED_REACH_MM, _SHARED_REACH_MM)
+        poses.append(np.column_stack([turn, place - turn @ half_mm]))
+    return poses
+
+
+def _middle_ray(camera: PinholeCamera) -> np.ndarray:
+    """Return the direction (3,) in the rig frame of the middle of a camera's picture."""
+    middle_px = 0.5 * (np.array(camera.size_px) - 1)
+    x, y = camera.rays(middle_px[:1], middle_px[1:])
+    ray = camera.rotation.T @ [x.item(), y.item(), 1.0]
+    return ray / np.linalg.norm(ray)
+
+
+def _facing(towards: np.ndarray) -> np.ndarray:
+    """Return the rotation (3, 3) of a board whose face looks along a direction (3,); its x axis is level."""
+    back = -towards / np.linalg.norm(towards)  # the board's z goes into it
+    right = np.cross(back, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return np.column_stack([right, np.cross(back, right), back])
 
 
 def _draw_pose(board, camera, index, count, depth_rank, rng):

@@ -8,12 +8,14 @@ import numpy as np
 from bench.rig.elastic_rod import ProfiledRod, RestShape, Rod
 from bench.rig.light import Light, Material
 from bench.rig.linear import rotation_about_z
+from bench.rig.mirror import MirrorStudio, Part, direct_part, mirrored_part
 from bench.rig.painted_scene import Appearance, Scene, Stand
 from bench.rig.pinhole import PinholeCamera
 from bench.rig.printed_board import Ink, PrintedBoard
 from bench.rig.protocol import Protocol
-from bench.rig.protocol_tables import ColumnTable
+from bench.rig.protocol_tables import CameraTable, ColumnTable
 from bench.rig.sensor import Sensor
+from bench.rig.studio import Studio
 
 
 def rod(protocol: Protocol) -> Rod:
@@ -43,26 +45,52 @@ def rod(protocol: Protocol) -> Rod:
 
 
 def cameras(protocol: Protocol) -> list[PinholeCamera]:
-    """Build the cameras in the protocol's order. Raises ValueError where one has no place."""
-    built = []
+    """Build the cameras in the protocol's order, one that a mirror makes after that before it.
+
+    Raises ValueError where one has no place.
+    """
+    return [part.camera for table in protocol.cameras for part in _parts(table)]
+
+
+def studios(protocol: Protocol) -> list[Studio | MirrorStudio]:
+    """Build the cameras that take pictures, with their scene. Raises ValueError where one has no place."""
+    before = scene(protocol)
+    own_sensor = sensor(protocol)
+    built: list[Studio | MirrorStudio] = []
     for table in protocol.cameras:
-        if table.position_mm is None:
-            raise ValueError(
-                f"camera {table.name} has no position_mm; `whisker-bench plan` finds one"
-            )
-        camera = PinholeCamera.aim(
-            table.name,
-            size_px=table.size_px,
-            focal_px=table.focal,
-            aspect=table.aspect,
-            distortion=table.distortion,
-            position_mm=np.array(table.position_mm),
-            target_mm=np.array(table.target_mm),
-            roll_rad=math.radians(table.roll_deg),
-            centre_px=table.centre_px,
-        )
-        built.append(camera)
+        camera = _camera(table)
+        if table.mirror:
+            built.append(MirrorStudio(camera, _parts(table), before, own_sensor))
+        else:
+            built.append(Studio(camera, before, own_sensor))
     return built
+
+
+def _parts(table: CameraTable) -> list[Part]:
+    """Build the parts of a camera's picture, the whole one where there is no mirror."""
+    camera = _camera(table)
+    mirror = table.mirror
+    if not mirror:
+        return [Part(camera, 0, 0, False)]
+    seen = mirrored_part(camera, mirror.name, mirror.crop, mirror.point_mm, mirror.normal)
+    return [direct_part(camera, mirror.crop), seen]
+
+
+def _camera(table: CameraTable) -> PinholeCamera:
+    """Build a camera, of its whole picture. Raises ValueError where it has no place."""
+    if table.position_mm is None:
+        raise ValueError(f"camera {table.name} has no position_mm; `whisker-bench plan` finds one")
+    return PinholeCamera.aim(
+        table.name,
+        size_px=table.size_px,
+        focal_px=table.focal,
+        aspect=table.aspect,
+        distortion=table.distortion,
+        position_mm=np.array(table.position_mm),
+        target_mm=np.array(table.target_mm),
+        roll_rad=math.radians(table.roll_deg),
+        centre_px=table.centre_px,
+    )
 
 
 def board(protocol: Protocol) -> PrintedBoard:

@@ -43,6 +43,7 @@ def _check_rest(whisker):
 def _check_cameras(protocol):
     """Raise ValueError for cameras' names, half a focal length, or light without direction."""
     names = [camera.name for camera in protocol.cameras]
+    names += [camera.mirror.name for camera in protocol.cameras if camera.mirror]
     if len(set(names)) < len(names) or "rig" in names:
         raise ValueError(f"cameras need names of their own, none of them 'rig'; found {names}")
     for camera in protocol.cameras:

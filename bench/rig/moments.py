@@ -8,6 +8,7 @@ from bench.rig.array_rig import ArrayRecording, MountedWhisker
 from bench.rig.bar import unloaded_curve
 from bench.rig.elastic_rod import Rod
 from bench.rig.light import Material
+from bench.rig.mirror import MirrorStudio
 from bench.rig.painted_scene import HUB_FRONT_MM
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
@@ -21,7 +22,7 @@ _LEAST_RADIUS_MM = 0.01  # of a whisker in pictures
 
 def exposure_moments(
     protocol: Protocol,
-    studio: Studio,
+    studio: Studio | MirrorStudio,
     recording: Recording,
     whisk: WhiskMechanics,
     motor_rad: float,
@@ -44,7 +45,7 @@ def exposure_moments(
 
 def array_exposure_moments(
     protocol: Protocol,
-    studio: Studio,
+    studio: Studio | MirrorStudio,
     recording: ArrayRecording,
     whiskers: Sequence[MountedWhisker],
     time_s: float,

@@ -45,7 +45,7 @@ def session_toml(
         exposure_s = protocol.pictures.exposure_s
         session["cameras"] = [
             {"name": camera.name, "exposure_s": exposure_s} for camera in protocol.cameras
-        ]
+        ] + [_mirror_keys(camera) for camera in protocol.cameras if camera.mirror]
     session["trial"] = {"gauge_filter_Hz": protocol.gauges.filter_Hz}
     if whiskers:
         session.pop("whisker")
@@ -57,6 +57,12 @@ def session_toml(
     elif protocol.gauges.known:
         session["gauges"] = _fields(protocol.gauges, "offset_V matrix_Nmm_per_V")
     return tomli_w.dumps(session)
+
+
+def _mirror_keys(camera) -> dict:
+    """Return the keys of the camera that a mirror makes."""
+    mirror = camera.mirror
+    return {"name": mirror.name, "of": camera.name, "crop": list(mirror.crop), "mirrored": True}
 
 
 def _has_gauge_trials(protocol: Protocol) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from bench.rig import boards, build, papers, truth_files
 from bench.rig.album import write_frames, write_picture
 from bench.rig.array_rig import ArrayRecording, MountedWhisker, mount_whiskers
+from bench.rig.mirror import MirrorStudio
 from bench.rig.moments import array_exposure_moments, exposure_moments
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
@@ -65,7 +66,7 @@ class Job:
         return mount_whiskers(self.protocol, self.stream(_ARRAY)) if self.protocol.columns else []
 
     @cached_property
-    def studios(self) -> list[Studio]:
+    def studios(self) -> list[Studio | MirrorStudio]:
         """Return the cameras with their backdrops, kept while a process works on one session."""
         return _studios(msgspec.json.encode(self.protocol))
 
@@ -94,10 +95,7 @@ class Part:
 @lru_cache(maxsize=2)
 def _studios(protocol_json):
     """Return the studio of each camera of a protocol."""
-    protocol = msgspec.json.decode(protocol_json, type=Protocol)
-    scene = build.scene(protocol)
-    sensor = build.sensor(protocol)
-    return [Studio(camera, scene, sensor) for camera in build.cameras(protocol)]
+    return build.studios(msgspec.json.decode(protocol_json, type=Protocol))
 
 
 def _write_rig_views(job, folder):
@@ -113,7 +111,11 @@ def _write_board_views(job, number, folder):
     count = job.protocol.board.views
     kind = job.protocol.pictures.still
     rng = job.stream(_BOARDS, number)
-    poses = boards.draw_poses(build.board(job.protocol), studio.camera, count, rng)
+    board = build.board(job.protocol)
+    if isinstance(studio, MirrorStudio):
+        poses = boards.draw_shared_poses(board, [p.camera for p in studio.parts], count, rng)
+    else:
+        poses = boards.draw_poses(board, studio.camera, count, rng)
     for i, pose in enumerate(poses):
         brightness = studio.board_brightness(pose)
         picture = studio.sensor.expose(brightness, job.stream(_BOARDS, number, i + 1))

@@ -52,6 +52,15 @@ class BoardTable(ProtocolTable):
     pose_sigma_deg: Zero = 0.0
 
 
+class MirrorTable(ProtocolTable, kw_only=True):
+    """The table [cameras.mirror]: a mirror in a part of the camera's picture."""
+
+    name: Name = "mirrored"  # of the camera that it makes
+    crop: tuple[int, int, int, int]  # left, top, width, height
+    point_mm: Three  # on the mirror
+    normal: Three
+
+
 class CameraTable(ProtocolTable, kw_only=True):
     """One of the tables [[cameras]]."""
 
@@ -66,6 +75,8 @@ class CameraTable(ProtocolTable, kw_only=True):
     size_px: Size = (1280, 720)
     centre_px: Pair | None = None
     distortion: tuple[float, float, float, float, float] = (-0.1, 0.1, 0.0, 0.0, 0.0)
+    # UNSET keeps it out of the fingerprint
+    mirror: MirrorTable | msgspec.UnsetType = msgspec.UNSET
 
     @property
     def focal(self) -> float:

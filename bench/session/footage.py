@@ -11,6 +11,7 @@ from vision.pictures import (
     FILM_SUFFIXES,
     PICTURE_SUFFIXES,
     Frames,
+    PicturePart,
     natural_order,
     pictures_in,
     read_picture,
@@ -50,7 +51,7 @@ def single_pictures(folder: Path, label: str) -> dict[str, Path]:
     return pictures
 
 
-def rig_picture(path: Path) -> np.ndarray:
+def rig_picture(path: Path | PicturePart) -> np.ndarray:
     """Read one of `Session.rig_pictures`, grey (h, w). Raises BadInput where it cannot be read."""
     grey = read_picture(path)
     if grey is None:
@@ -58,7 +59,7 @@ def rig_picture(path: Path) -> np.ndarray:
     return grey
 
 
-def frame_count(source: Path) -> int:
+def frame_count(source: Path | PicturePart) -> int:
     """Return how many frames a source declares; 0 for a video that cannot be opened."""
     if source.is_dir():
         return len(pictures_in(source))
@@ -68,12 +69,12 @@ def frame_count(source: Path) -> int:
         return 0
 
 
-def decoded_count(source: Path) -> int:
+def decoded_count(source: Path | PicturePart) -> int:
     """Count the frames that a source really holds; of a video, by decoding it."""
     return len(pictures_in(source)) if source.is_dir() else Frames.open(source).decoded_count
 
 
-def declared_rate_Hz(source: Path) -> float:
+def declared_rate_Hz(source: Path | PicturePart) -> float:
     """Return the frame rate that a video's header states; 0 where it does not, or cannot be opened."""
     try:
         return Frames.open(source).rate_Hz
@@ -93,7 +94,7 @@ def _holds_frames(entry: Path) -> bool:
     return entry.suffix.lower() in FILM_SUFFIXES
 
 
-def read_frames(source: Path, indices: Iterable[int]) -> dict[int, np.ndarray | None]:
+def read_frames(source: Path | PicturePart, indices: Iterable[int]) -> dict[int, np.ndarray | None]:
     """Read the pictures of one camera with these indices.
 
     None stands for a picture that is damaged, or of a video that does not open.

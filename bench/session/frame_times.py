@@ -13,7 +13,7 @@ from bench.session.signals import Signals
 from bench.session.table import NumberTable, forward_in_time, read_table, require_columns
 from bench.session.trial import Trial
 from vision.geometry import Reason, Refused, counted
-from vision.pictures import Frames
+from vision.pictures import Frames, PicturePart
 
 FRAME = "frame"
 TIME = "time_s"
@@ -85,12 +85,12 @@ def frame_times(trial: Trial) -> FrameTimes:
     if (trial.folder / "frames.csv").is_file():
         return _in_common_file(trial)
     cameras = list(trial.camera_sources)
-    with_own = [camera for camera in cameras if (trial.folder / _own_file(camera)).is_file()]
+    with_own = [c for c in cameras if (trial.folder / _own_file(trial, c)).is_file()]
     if with_own:
         missing = [camera for camera in cameras if camera not in with_own]
         if missing:
             found = f"is missing, and camera {with_own[0]} has its own"
-            raise BadInput(found, file=trial.label(_own_file(missing[0])))
+            raise BadInput(found, file=trial.label(_own_file(trial, missing[0])))
         return _in_own_files(trial)
     if not cameras:
         return FrameTimes(np.array([]), "none", {})
@@ -126,9 +126,11 @@ def dropped(times: FrameTimes, places: Iterable[slice]) -> Iterator[str]:
             yield f"whisk {number}: {frames} dropped by all cameras (after {at} s)"
 
 
-def _own_file(camera: str) -> str:
-    """Return the name of the file of a camera's own times."""
-    return f"frames_{camera}.csv"
+def _own_file(trial: Trial, camera: str) -> str:
+    """Return the name of the file of a camera's own times, those of the picture that it is a part of."""
+    source = trial.camera_sources[camera]
+    pictures = source.crop.of if isinstance(source, PicturePart) else camera
+    return f"frames_{pictures}.csv"
 
 
 def _all_pictures(trial: Trial, count: int) -> dict[str, np.ndarray]:
@@ -157,8 +159,8 @@ def _in_own_files(trial: Trial) -> FrameTimes:
     times_s = {}
     warnings: list[str] = []
     for camera in trial.camera_sources:
-        label = trial.label(_own_file(camera))
-        table, _ = _read(trial.folder / _own_file(camera), label)
+        label = trial.label(_own_file(trial, camera))
+        table, _ = _read(trial.folder / _own_file(trial, camera), label)
         warnings += _count_warnings(trial, camera, len(table), label)
         warnings += _header_warnings(table[TIME], trial, [camera], label)
         times_s[camera] = table[TIME]

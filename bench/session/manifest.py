@@ -154,8 +154,14 @@ class RigKeys(GivenKeys):
 class CameraKeys(Keys):
     """One [[cameras]] of session.toml."""
 
-    # name of the folder or film
+    # name of the folder or film; of a part of another camera's picture: its own
     name: str
+    # the camera in whose picture it is, by a mirror or in a split view ([bring.md](bring.md))
+    of: str | None = None
+    # [left, top, width, height] there, px
+    crop: Annotated[list[int], _FOUR] | None = None
+    # true: seen in a mirror
+    mirrored: bool = False
     # exposure, for the record: checked, and otherwise not used
     exposure_s: Exposure | None = None
     exposure_sigma_s: float = 0.0

@@ -87,7 +87,7 @@ def write_rig(path: Path, keys: RigFileKeys, header: Iterable[str]) -> None:
 
 def hash_of_rig(pictures: Iterable[Path]) -> str:
     """Return the hash of the pictures of the board on the rig."""
-    return hash_of_files(pictures)
+    return hash_of_files(map(Path, pictures))
 
 
 def covariance_as_written(covariance: np.ndarray) -> list[list[float]]:

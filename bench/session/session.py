@@ -1,7 +1,7 @@
 """A session folder, read strictly: what a lab recorded in one sitting (format 1)."""
 
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from bench.session.daq import daq_file
 from bench.session.footage import camera_sources, single_pictures, visible
 from bench.session.givens import Given
 from bench.session.inside import check_inside
+from bench.session.picture_parts import in_parts, stated_crops
 from bench.session.plausible import YOUNGS_MODULUS
 from bench.session.profile import read_profile
 from bench.session.rest_shape import read_rest_shape
@@ -22,8 +23,8 @@ from bench.session.stated import StatedSession
 from bench.session.strict_toml import as_keys, key_names, read_toml, values
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker, profiled_sizes
-from vision.geometry import Board, Reason, invert_transform
-from vision.pictures import natural_order
+from vision.geometry import Board, Crop, Reason, invert_transform
+from vision.pictures import PicturePart, natural_order
 
 FORMAT = 1  # of session.toml; another one is refused
 MANIFEST = "session.toml"
@@ -74,7 +75,7 @@ class Session:
     there is no cameras.toml but pictures. base: of the whisker whose view of an array this is
     (`bench.session.array_view`), whole: the array's session, in the rig frame; both None where the
     session is one whisker's. givens: what session.toml states, without its trials'. measured_rig: of
-    rig.toml, None without it.
+    rig.toml, None without it. crops: of cameras that are parts of another one's picture.
     """
 
     path: Path
@@ -88,8 +89,8 @@ class Session:
     T_rig_board_sigma_rad: float
     gauges: GivenGauges | None
     camera_names: tuple[str, ...]
-    board_sources: dict[str, Path]
-    rig_pictures: dict[str, Path]
+    board_sources: dict[str, Path | PicturePart]
+    rig_pictures: dict[str, Path | PicturePart]
     trials: tuple[Trial, ...]
     cameras_toml: Path | None
     gauges_toml: Path | None
@@ -97,6 +98,7 @@ class Session:
     whole: "Session | None" = None
     givens: tuple[Given, ...] = ()
     measured_rig: MeasuredRig | None = None
+    crops: Mapping[str, Crop] = field(default_factory=dict)
 
     @property
     def whole_name(self) -> str:
@@ -107,6 +109,15 @@ class Session:
     def has_pictures(self) -> bool:
         """Return whether any trial has frames."""
         return any(trial.camera_sources for trial in self.trials)
+
+    def mirrored(self, camera: str) -> bool:
+        """Return whether a camera is what another one sees in a mirror."""
+        return camera in self.crops and self.crops[camera].mirrored
+
+    def board_place(self, camera: str) -> str:
+        """Return how messages name a camera's pictures of the board."""
+        crop = self.crops.get(camera)
+        return f"boards/{camera}" if crop is None else f"boards/{crop.of}, camera {camera}"
 
     def trial(self, name: str) -> Trial:
         """Return the trial of that name. Raise BadInput, naming those that there are."""
@@ -154,7 +165,15 @@ def session_of(
     bar_mm, bar_sigma_mm = _bar_diameter(keys.bar)
     board_sources = camera_sources(path / "boards", "boards")
     board_sources.pop("rig", None)
+    rig_pictures = single_pictures(path / "boards" / "rig", "boards/rig")
     found = _ordered_trials(path, stated, problems, trials)
+    crops: dict[str, Crop] = {}
+    with problems.guard():
+        crops = stated_crops(keys.cameras, _one_source_each(board_sources, found))
+    board_sources = in_parts(board_sources, crops)
+    found = tuple(
+        replace(trial, camera_sources=in_parts(trial.camera_sources, crops)) for trial in found
+    )
     session = Session(
         path=path,
         name=keys.name or path.resolve().name,
@@ -168,11 +187,12 @@ def session_of(
         gauges=given_gauges(keys.gauges),
         camera_names=_camera_names(board_sources, found),
         board_sources=board_sources,
-        rig_pictures=single_pictures(path / "boards" / "rig", "boards/rig"),
+        rig_pictures=in_parts(rig_pictures, crops),
         trials=found,
         cameras_toml=_existing(path / "cameras.toml"),
         gauges_toml=_existing(path / "gauges.toml"),
         givens=stated.givens_of(),
+        crops=crops,
     )
     with problems.guard():
         session = _with_measured_rig(session)
@@ -342,7 +362,17 @@ def _warn_of_unused_surfaces(
             problems.warn(Reason("surface_unused", f"{MANIFEST}: {found}"))
 
 
-def _camera_names(board_sources: dict[str, Path], trials: Iterable[Trial]) -> tuple[str, ...]:
+def _one_source_each(
+    board_sources: Mapping[str, Path], trials: Iterable[Trial]
+) -> dict[str, Path]:
+    """Return a folder or film of each camera that has pictures of the board or of a trial."""
+    sources = dict(board_sources)
+    for trial in trials:
+        sources = trial.camera_sources | sources
+    return sources
+
+
+def _camera_names(board_sources: Mapping[str, Path | PicturePart], trials: Iterable[Trial]) -> tuple[str, ...]:
     """Return the names of all cameras with pictures of the board or of a trial, in natural order."""
     names = set(board_sources).union(*(trial.camera_sources for trial in trials))
     return tuple(sorted(names, key=lambda name: natural_order(Path(name))))
@@ -352,8 +382,9 @@ def _warn_of_unused_cameras(
     session: Session, cameras: Iterable[manifest.CameraKeys], problems: InputProblems
 ) -> None:
     """Warn of each of [[cameras]] that has no pictures."""
+    known = {*session.camera_names, *(crop.of for crop in session.crops.values())}
     for camera in cameras:
-        if session.camera_names and camera.name not in session.camera_names:
+        if session.camera_names and camera.name not in known:
             found = f"[[cameras]] {camera.name!r} has no pictures in boards/ or trials/"
             problems.warn(Reason("camera_unused", f"{MANIFEST}: {found}"))
 

@@ -207,9 +207,9 @@ def _files_of_camera(session: Session, camera: str) -> Iterator[Path]:
     for sources in (session.board_sources, *(trial.camera_sources for trial in session.trials)):
         source = sources.get(camera)
         if source is not None:
-            yield from pictures_in(source) if source.is_dir() else [source]
+            yield from pictures_in(source) if source.is_dir() else [Path(source)]
     if camera in session.rig_pictures:
-        yield session.rig_pictures[camera]
+        yield Path(session.rig_pictures[camera])
 
 
 def _check_stack(file: Path, camera: str, label: str) -> None:
@@ -242,7 +242,9 @@ def _px(size: Size) -> str:
 
 def find_damage(session: Session, problems: InputProblems) -> None:
     """Decode every picture of every trial and note those that cannot be read."""
-    sources = [source for trial in session.trials for source in trial.camera_sources.values()]
+    sources = []
+    for trial in session.trials:
+        sources += dict.fromkeys(map(Path, trial.camera_sources.values()))
     for source in count_parts(sources, "pictures of trials", len(sources)):
         found = _damage(source)
         if found:

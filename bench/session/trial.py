@@ -12,6 +12,7 @@ from bench.session.footage import camera_sources
 from bench.session.givens import Given, with_sigmas
 from bench.session.stated import StatedSession
 from bench.session.strict_toml import as_keys, convert, read_toml, values
+from vision.pictures import PicturePart
 
 MANIFEST = "trial.toml"
 SIGNALS = "signals.csv"
@@ -30,7 +31,7 @@ class Trial(manifest.TrialKeys):
 
     name: str
     folder: Path
-    camera_sources: dict[str, Path]
+    camera_sources: dict[str, Path | PicturePart]
     signals_path: Path
     daq: DaqFile | None = None
     whisker: str = ""

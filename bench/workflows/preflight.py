@@ -38,6 +38,7 @@ from vision.boards import (
     why_not_found,
 )
 from vision.geometry import Board, counted
+from vision.pictures import PicturePart
 
 # [1] Pictures of a board series that are searched: a board that is in none of them is in few. Stated.
 _BOARD_PICTURES = 2
@@ -117,7 +118,7 @@ def _check_boards(session: Session, board: Board, problems: InputProblems) -> No
     """Check each camera's pictures of the board, and of the board on the rig. Raise BadInput."""
     for name, source in session.board_sources.items():
         begin_step(f"board of camera {name}")
-        _check_board_views(source, name, board)
+        _check_board_views(source, board, session.board_place(name), session.mirrored(name))
         picture = session.rig_pictures.get(name)
         if picture is not None:
             _check_rig_board(picture, board, problems)
@@ -192,9 +193,13 @@ def _spread(count: int, wanted: int) -> list[int]:
     return np.unique(np.linspace(0, count - 1, wanted).astype(int)).tolist()
 
 
-def _check_board_views(source: Path, camera: str, board: Board) -> None:
-    """Raise BadInput where a camera has too few views, or its board is not found as entered."""
-    place = f"boards/{camera}"
+def _check_board_views(
+    source: Path | PicturePart, board: Board, place: str, mirrored: bool
+) -> None:
+    """Raise BadInput where a camera has too few views, or its board is not found as entered.
+
+    place: how messages name them. mirrored: whether it is seen in a mirror.
+    """
     count = frame_count(source)
     if count < MIN_VIEWS:
         few = f"has {counted(count, 'view')}, {MIN_VIEWS} are the least and 15 are good"
@@ -203,10 +208,10 @@ def _check_board_views(source: Path, camera: str, board: Board) -> None:
     greys = [grey for grey in frames.values() if grey is not None]
     if not any(in_threads(lambda grey: _shows_board(grey, board), greys)):
         none = f"the board is found in none of {counted(len(greys), 'picture')}"
-        raise BadInput(why_not_found(greys, board) or none, file=place)
+        raise BadInput(why_not_found(greys, board, mirrored=mirrored) or none, file=place)
 
 
-def _check_rig_board(picture: Path, board: Board, problems: InputProblems) -> None:
+def _check_rig_board(picture: Path | PicturePart, board: Board, problems: InputProblems) -> None:
     """Add a warning where a camera's picture of the board on the rig is blurred.
 
     Raise BadInput where the board is not in it.

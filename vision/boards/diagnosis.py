@@ -28,17 +28,26 @@ _MOST_DICTIONARIES = 3
 _NEAR_PX = 3.0
 
 
-def why_not_found(greys: Sequence[np.ndarray], board: Board) -> str | None:
+def why_not_found(
+    greys: Sequence[np.ndarray], board: Board, *, mirrored: bool = False
+) -> str | None:
     """Return a sentence naming the setting that would find the board; None if it is found.
 
     greys: a few pictures of the board (three to five are enough; 0.1 to 1 s a picture where nothing
-    is found).
+    is found). mirrored: whether they were flipped left to right, as seen in a mirror.
     """
     if not greys:
         return "there is no picture of the board"
     share = _corner_share(greys, board)
     if share > _LEAST_SHARE:
         return None
+    flipped = [np.ascontiguousarray(grey[:, ::-1]) for grey in greys]
+    if _corner_share(flipped, board) > max(_LEAST_SHARE, _CLEARLY_MORE * share):
+        seen = "not in a mirror" if mirrored else "in a mirror"
+        return (
+            f"the board is found flipped left to right alone, so it is seen {seen}: set mirrored = "
+            f"{str(not mirrored).lower()} under [[cameras]], with of and crop"
+        )
     settings = _settings(board)
     for candidates in (_other_prints(board), _boards_of_other_dictionaries(greys, board)):
         shares = {candidate: _corner_share(greys, candidate) for candidate in candidates}

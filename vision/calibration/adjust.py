@@ -83,7 +83,7 @@ def adjust_bundle(
     """
     problem = _Problem(seen, corners_mm, priors, width)
     state, normal, converged = _descend(problem, state, tolerance)
-    covariance = _covariance(normal, priors.free)
+    covariance = _covariance(normal, priors.directions())
     return Solution(state, normal.residual_px, covariance, normal.cost, converged)
 
 
@@ -98,8 +98,9 @@ def _descend(
     damping = _DAMPED
     converged = False
     fall = np.inf
+    directions = problem.priors.directions()
     for _ in range(_MOST_STEPS if np.isfinite(normal.cost) else 0):
-        steps = _solve_step(normal, problem.priors.free, damping)
+        steps = _solve_step(normal, directions, damping)
         trial_state = state.move(*steps)
         trial = problem.normal(trial_state)
         if trial.cost <= normal.cost * (1 + 1e-13):
@@ -117,14 +118,18 @@ def _descend(
 
 
 def _solve_step(
-    normal: Normal, free: np.ndarray, damping: float
+    normal: Normal, directions: np.ndarray, damping: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return Marquardt's step of the globals (G,), the views (V, 6) and the instants (V, C)."""
-    reduced, gradient, CB, Cc = _eliminate_views(normal.equations, free, damping)
-    np.einsum("ii->i", reduced)[...] += damping * np.diag(normal.equations.A)[free]
-    step = np.zeros(len(free))
-    step[free] = _solve_scaled(reduced, gradient)
-    view_steps = (Cc - CB @ step[free]).reshape(-1, N_VIEW)
+    """Return Marquardt's step of the globals (G,), the views (V, 6) and the instants (V, C).
+
+    directions (G, F): how the globals move with the free ones.
+    """
+    reduced, gradient, CB, Cc = _eliminate_views(normal.equations, directions, damping)
+    curvature = np.einsum("gf,gf->f", directions, normal.equations.A @ directions)
+    np.einsum("ii->i", reduced)[...] += damping * curvature
+    free_step = _solve_scaled(reduced, gradient)
+    step = directions @ free_step
+    view_steps = (Cc - CB @ free_step).reshape(-1, N_VIEW)
     return step, view_steps, _instant_steps(normal, step, view_steps)
 
 
@@ -140,21 +145,22 @@ def _instant_steps(normal: Normal, step: np.ndarray, view_steps: np.ndarray) -> 
 
 
 def _eliminate_views(
-    equations: Equations, free: np.ndarray, damping: float = 0.0
+    equations: Equations, directions: np.ndarray, damping: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Reduce the equations to the globals: eliminate the views' poses by the Schur complement.
+    """Reduce the equations to the free globals: eliminate the views' poses by the Schur complement.
 
-    Returns the reduced matrix (F, F) and gradient (F,) of the free globals, C⁻¹Bᵀ (6 V, F) and
-    C⁻¹c (6 V,).
+    directions (G, F): how the globals move with the free ones. Returns the reduced matrix (F, F) and
+    gradient (F,) of the free globals, C⁻¹Bᵀ (6 V, F) and C⁻¹c (6 V,).
     """
     A, a, B, C, c = equations
-    B = B[free]
+    B = directions.T @ B
     raised = C.copy()
     raised[0] *= (1.0 + damping) * (1.0 + _RIDGE)
     solved = solveh_banded(raised, np.column_stack([B.T, c]), lower=True, check_finite=False)
     CB = solved[:, :-1]
     Cc = solved[:, -1]
-    return A[np.ix_(free, free)] - B @ CB, a[free] - B @ Cc, CB, Cc
+    reduced = directions.T @ A @ directions - B @ CB
+    return reduced, directions.T @ a - B @ Cc, CB, Cc
 
 
 def _unit_scale(matrix: np.ndarray) -> np.ndarray:
@@ -172,12 +178,15 @@ def _solve_scaled(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return scale * np.linalg.lstsq(unit, scale * vector, rcond=1e-14)[0]
 
 
-def _covariance(normal: Normal, free: np.ndarray) -> np.ndarray:
-    """Return the covariance (G, G) of the globals, all poses and instants being marginalised."""
-    covariance = np.zeros((len(free), len(free)))
-    if normal.equations is not None and free.any():
-        reduced, *_ = _eliminate_views(normal.equations, free)
-        scale = np.outer(_unit_scale(reduced), _unit_scale(reduced))
-        inverse = np.linalg.pinv(reduced * scale, rcond=1e-14, hermitian=True)
-        covariance[np.ix_(free, free)] = inverse * scale
-    return covariance
+def _covariance(normal: Normal, directions: np.ndarray) -> np.ndarray:
+    """Return the covariance (G, G) of the globals, all poses and instants being marginalised.
+
+    directions (G, F): how the globals move with the free ones.
+    """
+    size, free = directions.shape
+    if normal.equations is None or not free:
+        return np.zeros((size, size))
+    reduced, *_ = _eliminate_views(normal.equations, directions)
+    scale = np.outer(_unit_scale(reduced), _unit_scale(reduced))
+    inverse = np.linalg.pinv(reduced * scale, rcond=1e-14, hermitian=True)
+    return directions @ (inverse * scale) @ directions.T

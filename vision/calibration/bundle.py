@@ -11,6 +11,7 @@ Every observation is a corner of the board, seen by one camera in one view. Para
 Poses move as T ← (Exp(w) R, t + v). `vision.calibration.adjust` finds the parameters.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ import numpy as np
 from vision.calibration.board_motion import Trajectory
 from vision.geometry import lens as lens_model
 from vision.geometry.board import PRINT_TERMS, printed_corners
+from vision.geometry.crop import Crop
 from vision.geometry.rotation import exp_rotation, left_jacobian, skew
 from vision.geometry.rows import Rows
 
@@ -129,7 +131,8 @@ class Priors:
     parameters, sigma inf where there is none (poses: always inf). view_free (V,): bool. pose_view,
     pose_T (3, 4), pose_sigma (6,): one view whose pose was measured (the board on the rig), in w
     rad and v mm; pose_view is None where there is none. late_sigma_s (C,): how far a picture's instant
-    strays from its time; None: not at all.
+    strays from its time; None: not at all. shared: cameras with one lens, of which all but the first have no
+    free lens or clock of their own; None: each has its own.
     """
 
     free: np.ndarray
@@ -140,6 +143,53 @@ class Priors:
     pose_T: np.ndarray | None = None
     pose_sigma: np.ndarray | None = None
     late_sigma_s: np.ndarray | None = None
+    shared: "SharedLenses | None" = None
+
+    def directions(self) -> np.ndarray:
+        """Return how the global parameters move with the free ones, (16 C + 4, F)."""
+        moved = np.eye(len(self.free))
+        if self.shared is not None:
+            moved = self.shared.moved_by(moved)
+        return moved[:, self.free]
+
+
+@dataclass(frozen=True, eq=False)
+class SharedLenses:
+    """Which cameras are parts of one picture, and so have one lens and one clock.
+
+    first (C,): of each camera the first one with its lens, itself where it is the first. signs (C, 9): derivative
+    of its lens terms by those of that one.
+    """
+
+    first: np.ndarray
+    signs: np.ndarray
+
+    @classmethod
+    def of(cls, crops: Sequence[Crop]) -> "SharedLenses":
+        """Return which of the cameras with these crops (C,) share a lens."""
+        pictures = [crop.of for crop in crops]
+        first = np.array([pictures.index(name) for name in pictures])
+        signs = np.array([crop.lens_signs for crop in crops])
+        return cls(first, signs * signs[first])
+
+    def tied(self) -> np.ndarray:
+        """Return the mask (C, 16) of parameters that are another camera's."""
+        mask = np.zeros((len(self.first), N_CAMERA), dtype=bool)
+        mask[self.first != np.arange(len(self.first))] = True
+        mask[:, POSE] = False
+        return mask
+
+    def moved_by(self, step: np.ndarray) -> np.ndarray:
+        """Return steps (16 C + 4, F) of which the tied parameters follow those that they share."""
+        followed = step.copy()
+        terms = [*range(len(lens_model.LENS_TERMS)), CLOCK]
+        for camera, first in enumerate(self.first.tolist()):
+            if camera != first:
+                signs = np.append(self.signs[camera], 1.0)
+                of_first = [N_CAMERA * first + term for term in terms]
+                own = [N_CAMERA * camera + term for term in terms]
+                followed[own] = signs[:, None] * step[of_first]
+        return followed
 
 
 def predict(

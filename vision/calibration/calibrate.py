@@ -30,7 +30,7 @@ from vision.boards.sufficiency import (
     without_strays,
 )
 from vision.calibration.adjust import adjust_bundle
-from vision.calibration.bundle import N_BOARD, N_CAMERA, POSE, BundleState, Priors
+from vision.calibration.bundle import N_BOARD, N_CAMERA, POSE, BundleState, Priors, SharedLenses
 from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
 from vision.calibration.exchanged import check_own_lenses
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
@@ -41,6 +41,7 @@ from vision.calibration.tied import JointAdjustment, JointInput, Timing, lens_pr
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.board import PRINT_TERMS, Board
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras, camera_matrix
+from vision.geometry.crop import Crop
 from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
 
@@ -65,7 +66,7 @@ class CameraReport:
     views, corners: used; left_out: corners beyond the rejection limit. rms_px: of the kept
     residuals. error_px: model error per axis in addition to the corners' own sigma. coverage: share of the
     picture within the hull of all corners. depth_ratio: farthest to nearest corner. tilt_deg:
-    largest tilt of the board. intrinsics_sigma: (9,), of fx fy cx cy k1 k2 p1 p2 k3.
+    largest tilt of the board; both of all views by the lens. intrinsics_sigma: (9,), of fx fy cx cy k1 k2 p1 p2 k3.
     """
 
     name: str
@@ -117,10 +118,11 @@ def calibrate_cameras(
 
     Raises Refused, saying what to record, where the views cannot give a calibration.
     """
-    alone = {name: _alone(name, views, board, on_rig is not None) for name in views.boards}
+    crops = [views.crop(name) for name in views.boards]
+    alone = _alone(views, board, on_rig is not None)
     standing = standing_boards(views, board) if on_rig else None
     lens_notes = _check_own_lenses(alone, standing, views, board)
-    joint = JointInput(alone, standing, board, on_rig, views.times_s, triggered).adjust()
+    joint = JointInput(alone, standing, board, on_rig, views.times_s, triggered, crops).adjust()
     adjustment, notes = _with_warp(joint.layout, joint.adjustment, board)
     _check_adjustment(alone, adjustment, triggered)
     adjustment, shared_notes = with_shared_errors(adjustment, board.corners_mm, list(alone))
@@ -128,7 +130,7 @@ def calibrate_cameras(
         notes.append(timing_note(alone, joint.timing))
     stretch_notes, warnings = _stretch_lines(adjustment, board)
     cameras = _place(as_cameras(alone, views.sizes_px, adjustment), on_rig)
-    reports = _checked_reports(cameras, alone, adjustment, board)
+    reports = _checked_reports(cameras, alone, crops, adjustment, board)
     check_work(cameras, alone, standing, work_points_mm)
     return Calibration(
         cameras=cameras,
@@ -163,13 +165,18 @@ def _check_adjustment(names: Iterable[str], adjustment: Adjustment, triggered: b
 
 
 def _checked_reports(
-    cameras: Cameras, alone: Mapping[str, Alone], adjustment: Adjustment, board: Board
+    cameras: Cameras,
+    alone: Mapping[str, Alone],
+    crops: Sequence[Crop],
+    adjustment: Adjustment,
+    board: Board,
 ) -> tuple[CameraReport, ...]:
     """Return a report of each camera; raise Refused where its views do not determine its lens."""
     reports = []
     used = {}
     for c, (name, camera) in enumerate(alone.items()):
-        reports.append(_report(c, cameras, camera, adjustment, board))
+        of_lens = [other for other, crop in zip(alone.values(), crops) if crop.of == crops[c].of]
+        reports.append(_report(c, cameras, camera, of_lens, adjustment, board))
         used[name] = camera.views.values()
     check_lenses(cameras, reports, used)
     return tuple(reports)
@@ -206,29 +213,87 @@ def _check_own_lenses(
     if standing is None:
         return []
     same_in_trials = all(views.trials.get(name) for name in alone)
-    return check_own_lenses(alone, standing, board, same_in_trials=same_in_trials)
+    by_picture = {}
+    for name, camera in alone.items():  # parts of one picture cannot be exchanged
+        by_picture.setdefault(views.crop(name).of, (name, camera))
+    return check_own_lenses(dict(by_picture.values()), standing, board, same_in_trials=same_in_trials)
 
 
-def _alone(name: str, views: BoardViews, board: Board, with_rig: bool) -> Alone:
-    """Calibrate a camera by itself, for the start of the joint adjustment and the error of the
+def _alone(views: BoardViews, board: Board, with_rig: bool) -> dict[str, Alone]:
+    """Calibrate each picture by itself, for the start of the joint adjustment and the error of the
     camera alone.
+
+    The cameras that are parts of one picture have one lens.
     """
-    size_px = views.sizes_px[name]
-    rig_view = views.rig.get(name)
+    pictures: dict[str, list[str]] = {}
+    for name in views.boards:
+        pictures.setdefault(views.crop(name).of, []).append(name)
+    found = {}
+    for names in pictures.values():
+        found |= _alone_of_picture(names, views, board, with_rig)
+    return {name: found[name] for name in views.boards}
+
+
+def _alone_of_picture(
+    names: Sequence[str], views: BoardViews, board: Board, with_rig: bool
+) -> dict[str, Alone]:
+    """Calibrate the cameras that are parts of one picture. Raises Refused where its views do not suffice."""
+    crops = [views.crop(name) for name in names]
+    usable = [_usable(views.boards[name], board) for name in names]
+    lenses = _first_lenses([list(own.values()) for own in usable], board, crops)
+    for own, lens in zip(usable, lenses):
+        for k in list(own):
+            if not has_pose(own[k], board.corners_mm, lens):
+                del own[k]
+    check_views(" and ".join(names), [view for own in usable for view in own.values()], board)
+    for name, own in zip(names, usable):
+        _check_sees_board(name, len(own), views.rig.get(name), board, with_rig)
+    by_camera = [list(own.values()) for own in usable]
+    adjustment = calibrate_picture(by_camera, board, crops)
+    state = adjustment.solution.state
+    poses = iter(state.T_world_board)
+    found = {}
+    for c, (name, own) in enumerate(zip(names, usable)):
+        own_poses = {k: next(poses) for k in own}
+        found[name] = Alone(state.lens[c], float(adjustment.error_px[c]), own, own_poses)
+    return found
+
+
+def _usable(series: Sequence[Corners], board: Board) -> dict[int, Corners]:
+    """Return the views of a series that fix a pose, by index."""
     usable = {}
-    for k, view in enumerate(views.boards[name]):
+    for k, view in enumerate(series):
         view = without_strays(view, board)
         if fixes_pose(view, board):
             usable[k] = view
-    lens = first_lens(usable.values(), board.corners_mm, size_px)
-    usable = {k: view for k, view in usable.items() if has_pose(view, board.corners_mm, lens)}
-    check_views(name, usable.values(), board)
+    return usable
+
+
+def _check_sees_board(
+    name: str, views: int, rig_view: Corners | None, board: Board, with_rig: bool
+) -> None:
+    """Raise Refused for a camera that never sees the board, or not the board on the rig."""
     if with_rig:
         check_rig_view(name, None if rig_view is None else without_strays(rig_view, board), board)
-    adjustment = calibrate_alone(list(usable.values()), board, size_px)
-    state = adjustment.solution.state
-    poses = dict(zip(usable, state.T_world_board))
-    return Alone(state.lens[0], float(adjustment.error_px[0]), usable, poses)
+    if not views:
+        raise Refused(
+            f"camera {name}: the board is in no view well seen: record some that it sees together "
+            "with the rest of the picture"
+        )
+
+
+def _first_lenses(
+    views: Sequence[Sequence[Corners]], board: Board, crops: Sequence[Crop]
+) -> np.ndarray:
+    """Return lenses (C, 9) to begin with of cameras that are parts of one picture, by the views of all.
+
+    Where the picture's middle is the principal point, flipping the picture does not move it.
+    """
+    in_picture = []
+    for own, crop in zip(views, crops):
+        in_picture += [replace(view, px=view.px + crop.offset_px) for view in own]
+    whole = first_lens(in_picture, board.corners_mm, crops[0].whole_px)
+    return np.array([crop.lens_of(whole) for crop in crops])
 
 
 def calibrate_alone(views: Sequence[Corners], board: Board, size_px: tuple[int, int]) -> Adjustment:
@@ -236,13 +301,28 @@ def calibrate_alone(views: Sequence[Corners], board: Board, size_px: tuple[int, 
 
     The world is the camera's frame.
     """
-    lens = first_lens(views, board.corners_mm, size_px)
-    poses = np.array([board_pose(view, board.corners_mm, lens) for view in views])
-    state = BundleState(lens[None], np.eye(3, 4)[None], poses)
-    priors = lens_priors(1, len(views))
-    priors.free[POSE] = False
-    seen = gather([(0, k, view) for k, view in enumerate(views)])
-    return adjust_coarse(state, seen, board.corners_mm, priors)
+    return calibrate_picture([views], board, [Crop.whole("", size_px)])
+
+
+def calibrate_picture(
+    views: Sequence[Sequence[Corners]], board: Board, crops: Sequence[Crop]
+) -> Adjustment:
+    """Calibrate the one lens of cameras that are parts of a picture, robustly, as a start for more.
+
+    views: of each camera, whose frame is their world.
+    """
+    lenses = _first_lenses(views, board, crops)
+    shots = []
+    poses = []
+    for c, own in enumerate(views):
+        for view in own:
+            shots.append((c, len(poses), view))
+            poses.append(board_pose(view, board.corners_mm, lenses[c]))
+    state = BundleState(lenses, np.tile(np.eye(3, 4), (len(crops), 1, 1)), np.array(poses))
+    priors = lens_priors(len(crops), len(poses), SharedLenses.of(crops))
+    for c in range(len(crops)):
+        priors.free[N_CAMERA * c :][POSE] = False
+    return adjust_coarse(state, gather(shots), board.corners_mm, priors)
 
 
 def _with_warp(layout: Layout, flat: Adjustment, board: Board) -> tuple[Adjustment, list[str]]:
@@ -320,22 +400,27 @@ def as_cameras(
 
 
 def _report(
-    c: int, cameras: Cameras, alone: Alone, adjustment: Adjustment, board: Board
+    c: int,
+    cameras: Cameras,
+    alone: Alone,
+    of_lens: Sequence[Alone],
+    adjustment: Adjustment,
+    board: Board,
 ) -> CameraReport:
-    """Return the report of camera number c."""
+    """Return the report of camera number c. of_lens: all cameras that have its lens."""
     camera = cameras.cameras[c]
     kept = adjustment.kept[adjustment.seen.camera == c]
-    views = list(alone.views.values())
-    poses = list(alone.poses.values())
+    views = [view for other in of_lens for view in other.views.values()]
+    poses = [pose for other in of_lens for pose in other.poses.values()]
     variances = np.diag(cameras.covariance)[cameras.parameters_of(camera.name)]
     return CameraReport(
         name=camera.name,
-        views=len(views),
+        views=len(alone.views),
         corners=int(kept.sum()),
         left_out=int((~kept).sum()),
         rms_px=camera.rms_px,
         error_px=float(adjustment.error_px[c]),
-        coverage=coverage(views, camera.size_px),
+        coverage=coverage(list(alone.views.values()), camera.size_px),
         depth_ratio=depth_ratio(poses, views, board),
         tilt_deg=tilt_deg(poses),
         intrinsics_sigma=np.sqrt(variances[:9]),

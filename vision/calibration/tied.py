@@ -22,12 +22,14 @@ from vision.calibration.bundle import (
     POSE,
     BundleState,
     Priors,
+    SharedLenses,
 )
 from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
 from vision.calibration.instants_help import TURNS, Comparison, residuals_by_view
 from vision.calibration.layout import Alone, Layout, lay_out, place_cameras, saw_board_at_once
 from vision.calibration.views import MeasuredPose
 from vision.geometry.board import Board
+from vision.geometry.crop import Crop
 from vision.geometry.refusals import Refused
 
 # One sigma about zero of the distortion terms, for lenses of 3 to 100 mm; wider than any that is not a
@@ -87,7 +89,8 @@ class JointInput:
     """The input of the joint adjustment.
 
     alone: cameras by themselves. standing: the board on the rig in each; on_rig: its measured pose.
-    times_s: of each picture. triggered: see `calibrate_cameras`.
+    times_s: of each picture. triggered: see `calibrate_cameras`. crops: the part of a picture that each
+    camera is, in the cameras' order.
     """
 
     alone: Mapping[str, Alone]
@@ -96,6 +99,12 @@ class JointInput:
     on_rig: MeasuredPose | None
     times_s: Mapping[str, Sequence[float]] | None
     triggered: bool
+    crops: Sequence[Crop]
+
+    @property
+    def _is_one_picture(self) -> bool:
+        """Return whether all cameras are parts of one picture, and so see the board at once."""
+        return len({crop.of for crop in self.crops}) == 1
 
     def adjust(self) -> JointAdjustment:
         """Adjust all cameras jointly.
@@ -105,6 +114,8 @@ class JointInput:
         rig places the cameras. Raises Refused where they explain them far better, and nothing else
         determines how the cameras stand to each other.
         """
+        if self._is_one_picture:
+            return self._adjust(self._layout(together=True))
         if not saw_board_at_once(self.alone):
             return self._adjust(self._layout(together=False))
         try:
@@ -162,7 +173,7 @@ class JointInput:
         Pictures of one view count as of one instant, unless the cameras agree far worse with each
         other than with themselves, and instants of their own help on views held out.
         """
-        if layout.trajectory is None or self.triggered or len(self.alone) == 1:
+        if layout.trajectory is None or self.triggered or self._is_one_picture:
             return JointAdjustment(layout, self._at_once(layout), None)
         coarse = adjust_coarse(
             layout.first, layout.seen, self.board.corners_mm, self._priors_of(layout)
@@ -188,7 +199,7 @@ class JointInput:
 
     def _priors_of(self, layout: Layout) -> Priors:
         """Return the priors of all views."""
-        return _priors(layout.first, self.board, self.on_rig)
+        return _priors(layout.first, self.board, self.on_rig, SharedLenses.of(self.crops))
 
     def _at_once(self, layout: Layout, rounds: int | None = None) -> Adjustment:
         """Adjust all cameras with the pictures of a view as of one instant.
@@ -278,23 +289,34 @@ def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
     free = priors.free.copy()
     sigma = priors.sigma.copy()
     clocks = CLOCK + N_CAMERA * np.arange(len(trajectory.camera_rank))
-    free[clocks[trajectory.camera_rank > 0]] = True
-    sigma[clocks] = _CLOCK_SIGMA * trajectory.interval_s
+    clock_of = priors.shared.first
+    is_own = clock_of == np.arange(len(clocks))
+    is_late = clock_of != clock_of[np.argmin(trajectory.camera_rank)]
+    free[clocks[is_own & is_late]] = True
+    sigma[clocks[is_own]] = _CLOCK_SIGMA * trajectory.interval_s
     late_s = np.full(len(clocks), _FIRST_LATENESS * trajectory.interval_s)
     return replace(priors, free=free, sigma=sigma, late_sigma_s=late_s)
 
 
-def lens_priors(n_cameras: int, n_views: int) -> Priors:
+def lens_priors(n_cameras: int, n_views: int, shared: SharedLenses | None = None) -> Priors:
     """Return the priors with lenses and poses free, LENS_PRIOR on the lenses, an exact board, and
     cameras that are triggered together.
+
+    shared: which cameras have one lens; None: each has its own.
     """
     camera_sigma = [LENS_PRIOR.get(name, np.inf) for name in CAMERA_COLUMNS]
     camera_free = [not name.endswith("_s") for name in CAMERA_COLUMNS]
+    free = np.tile(camera_free, (n_cameras, 1))
+    sigma = np.tile(camera_sigma, (n_cameras, 1))
+    if shared is not None:
+        free[shared.tied()] = False
+        sigma[shared.tied()] = np.inf
     return Priors(
-        np.array(camera_free * n_cameras + [False] * N_BOARD),
+        np.append(free, [False] * N_BOARD),
         np.zeros(N_CAMERA * n_cameras + N_BOARD),
-        np.array(camera_sigma * n_cameras + [np.inf] * N_BOARD),
+        np.append(sigma, [np.inf] * N_BOARD),
         np.ones(n_views, dtype=bool),
+        shared=shared,
     )
 
 
@@ -316,13 +338,16 @@ def with_print(priors: Priors, board: Board) -> Priors:
     return replace(priors, free=free, sigma=sigma)
 
 
-def _priors(first: BundleState, board: Board, on_rig: MeasuredPose | None) -> Priors:
+def _priors(
+    first: BundleState, board: Board, on_rig: MeasuredPose | None, shared: SharedLenses
+) -> Priors:
     """Return the priors with the rig board's measured pose and the print's size and stretch, each
     held where its sigma is 0 and an observation else.
 
     Without a rig board the first camera is the world's frame.
     """
-    priors = with_print(lens_priors(len(first.lens), len(first.T_world_board)), board)
+    priors = lens_priors(len(first.lens), len(first.T_world_board), shared)
+    priors = with_print(priors, board)
     if on_rig is None:
         priors.free[POSE] = False
         return priors

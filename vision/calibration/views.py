@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 
 from vision.boards.corners import Corners
+from vision.geometry.crop import Crop
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +18,7 @@ class BoardViews:
     seen; view k of one camera may be of the same instant as view k of another. sizes_px: of each
     camera's pictures. rig: the board standing on the rig, absent where there is no picture; trials:
     the same board in the trials' frames, of cameras that did not move. times_s: of each picture in
-    `boards`, None where not recorded.
+    `boards`, None where not recorded. crops: of the cameras that are parts of another camera's picture.
     """
 
     boards: Mapping[str, Sequence[Corners]]
@@ -25,6 +26,11 @@ class BoardViews:
     rig: Mapping[str, Corners] = field(default_factory=dict)
     trials: Mapping[str, Sequence[Corners]] = field(default_factory=dict)
     times_s: Mapping[str, Sequence[float]] | None = None
+    crops: Mapping[str, Crop] = field(default_factory=dict)
+
+    def crop(self, name: str) -> Crop:
+        """Return the part of a picture that a camera is, the whole of its own where not stated."""
+        return self.crops.get(name) or Crop.whole(name, self.sizes_px[name])
 
     def without(self, is_held: Sequence[bool] | np.ndarray) -> Self:
         """Return these views without the views k of the held board with is_held[k]."""

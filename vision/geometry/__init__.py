@@ -12,6 +12,7 @@ NAMES = {
     "camera": ("Camera", "Cameras"),
     "centreline": ("REST_POWERS", "centrelines", "unbent_curves", "rotation_z"),
     "contact": ("BarAxis",),
+    "crop": ("Crop",),
     "forms": ("touched_object",),
     "lens": ("LENS_TERMS",),
     "number_words": ("counted",),

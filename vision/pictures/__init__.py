@@ -11,6 +11,7 @@ NAMES = {
     "files": (
         "FILM_SUFFIXES",
         "PICTURE_SUFFIXES",
+        "PicturePart",
         "STACK_SUFFIXES",
         "VIDEO_SUFFIXES",
         "natural_order",

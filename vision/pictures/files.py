@@ -3,17 +3,21 @@
 A picture that is damaged, cut short, or of a size that no camera has is None.
 """
 
+import os
 import re
 import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
 from PIL import Image, UnidentifiedImageError
+
+from vision.geometry.crop import Crop
 
 PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm"})
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mkv"})
@@ -49,10 +53,31 @@ _JPEG_END = b"\xff\xd9"
 _JPEG_TAIL_BYTES = 1024
 
 
-def pictures_in(folder: Path) -> list[Path]:
+@dataclass(frozen=True)
+class PicturePart(os.PathLike):
+    """A part of each picture in a file or folder, in place of its path."""
+
+    path: Path
+    crop: Crop
+
+    def __fspath__(self) -> str:
+        """Return the path of the whole pictures."""
+        return str(self.path)
+
+    @property
+    def name(self) -> str:
+        """Return the name of the file or folder."""
+        return self.path.name
+
+    def is_dir(self) -> bool:
+        """Return whether it is a folder of pictures."""
+        return self.path.is_dir()
+
+
+def pictures_in(folder: Path | PicturePart) -> list[Path]:
     """Return the folder's pictures in natural order, without hidden files."""
     files = []
-    for path in folder.iterdir():
+    for path in Path(folder).iterdir():
         if path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith("."):
             files.append(path)
     return sorted(files, key=natural_order)
@@ -66,11 +91,14 @@ def natural_order(path: Path) -> list[tuple[int, int | str]]:
     return key
 
 
-def read_picture(path: Path) -> np.ndarray | None:
+def read_picture(path: Path | PicturePart) -> np.ndarray | None:
     """Read a picture as grey (height, width), uint8 or uint16.
 
     None where it is damaged or cut short, no regular file, or of a size that no camera has.
     """
+    if isinstance(path, PicturePart):
+        whole = read_picture(path.path)
+        return None if whole is None else path.crop.cut(whole)
     if not path.is_file() or not 0 < path.stat().st_size <= _MOST_BYTES:
         return None
     data = np.fromfile(path, dtype=np.uint8)

@@ -16,11 +16,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vision.geometry.crop import Crop
 from vision.geometry.refusals import Refused
 from vision.pictures.files import (
     AS_STORED,
     MOST_PIXELS,
     STACK_SUFFIXES,
+    PicturePart,
     page_sizes,
     pictures_in,
     quiet_opencv,
@@ -52,11 +54,13 @@ class Frames(ABC):
     rate_Hz: float = 0.0
 
     @staticmethod
-    def open(path: Path | str) -> "Frames":
+    def open(path: Path | PicturePart | str) -> "Frames":
         """Open the frames in a folder of pictures, in a video file or in a TIFF stack.
 
         Raises Refused where there is no picture that can be read, or the file cannot be opened.
         """
+        if isinstance(path, PicturePart):
+            return CroppedFrames(Frames.open(path.path), path.crop)
         path = Path(path)
         if path.is_dir():
             return PictureFolder(path)
@@ -108,6 +112,46 @@ class Frames(ABC):
                 "are never rescaled",
                 code="picture_size_differs",
             )
+
+
+class CroppedFrames(Frames):
+    """A part of each frame of a camera."""
+
+    def __init__(self, whole: Frames, crop: Crop):
+        self.path = whole.path
+        self.count = whole.count
+        self.size_px = crop.size_px
+        self._whole = whole
+        self._crop = crop
+
+    @property
+    def times_s(self) -> np.ndarray | None:
+        """Return the container's times, s; None for pictures."""
+        return self._whole.times_s
+
+    @property
+    def rate_Hz(self) -> float:
+        """Return the frames a second as the header states it; 0 where it does not."""
+        return self._whole.rate_Hz
+
+    @property
+    def decoded_count(self) -> int:
+        """Return how many frames there really are."""
+        return self._whole.decoded_count
+
+    def _read(self, first: int, last: int) -> Iterator[tuple[int, np.ndarray | None]]:
+        yield from self._cut(self._whole.read(first, last))
+
+    def pick(self, wanted: Iterable[int]) -> Iterator[tuple[int, np.ndarray | None]]:
+        """Yield (index, grey) of these frames alone, in order."""
+        yield from self._cut(self._whole.pick(wanted))
+
+    def _cut(
+        self, frames: Iterable[tuple[int, np.ndarray | None]]
+    ) -> Iterator[tuple[int, np.ndarray | None]]:
+        """Yield the part of each frame."""
+        for index, grey in frames:
+            yield index, None if grey is None else self._crop.cut(grey)
 
 
 class _OneByOne(Frames):
