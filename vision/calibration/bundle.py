@@ -172,6 +172,11 @@ class SharedLenses:
         signs = np.array([crop.lens_signs for crop in crops])
         return cls(first, signs * signs[first])
 
+    @classmethod
+    def none(cls, cameras: int) -> "SharedLenses":
+        """Return that each of so many cameras has a lens of its own."""
+        return cls(np.arange(cameras), np.ones((cameras, len(lens_model.LENS_TERMS))))
+
     def tied(self) -> np.ndarray:
         """Return the mask (C, 16) of parameters that are another camera's."""
         mask = np.zeros((len(self.first), N_CAMERA), dtype=bool)

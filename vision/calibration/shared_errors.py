@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from vision.calibration.adjust import adjust_bundle
-from vision.calibration.bundle import CLOCK, N_BOARD, N_CAMERA, Priors, predict
+from vision.calibration.bundle import CLOCK, N_BOARD, N_CAMERA, Priors, SharedLenses, predict
 from vision.calibration.corner_noise import Adjustment
 from vision.geometry.lens import LENS_TERMS
 
@@ -57,7 +57,8 @@ def with_shared_errors(
 
 
 def shared_error_factors(adjustment: Adjustment, corners_mm: np.ndarray) -> np.ndarray:
-    """Return by how much the sigmas of each camera's lens are too small, (C,), 1 or more.
+    """Return by how much the sigmas of each camera's lens are too small, (C,), 1 or more, by all views
+    of that lens.
 
     corners_mm (m, 3): of the board as stated.
     """
@@ -66,14 +67,18 @@ def shared_error_factors(adjustment: Adjustment, corners_mm: np.ndarray) -> np.n
     px, J = predict(state, seen, corners_mm)
     residual = (seen.px - px) / seen.sigma_px[:, None]
     J = J / seen.sigma_px[:, None, None]
-    factors = []
-    for camera in range(len(state.lens)):
+    shared = adjustment.priors.shared or SharedLenses.none(len(state.lens))
+    factors = np.ones(len(state.lens))
+    for first in np.unique(shared.first):
         shots = []
-        for view in np.unique(seen.view[seen.camera == camera]):
-            rows = (seen.camera == camera) & (seen.view == view)
-            shots.append((J[rows].reshape(-1, J.shape[2]), residual[rows].ravel()))
-        factors.append(_factor(camera, shots, adjustment.priors))
-    return np.array(factors)
+        for camera in np.flatnonzero(shared.first == first):
+            for view in np.unique(seen.view[seen.camera == camera]):
+                rows = (seen.camera == camera) & (seen.view == view)
+                by_lens = J[rows].reshape(-1, J.shape[2])
+                by_lens[:, :_N_LENS] *= shared.signs[camera]
+                shots.append((by_lens, residual[rows].ravel()))
+        factors[shared.first == first] = _factor(first, shots, adjustment.priors)
+    return factors
 
 
 def _factor(camera: int, shots: list[tuple[np.ndarray, np.ndarray]], priors: Priors) -> float:
