@@ -28,7 +28,7 @@ CROPS = {
     "high": Crop("high", WHOLE_PX, 0, 490, 640, 530),
     "mirrored": Crop("high", WHOLE_PX, 0, 0, 640, 490, mirrored=True),
 }
-SEEDS = range(8)
+SEEDS = range(100, 112)
 RIG_POINTS = np.array([[x, 0.0, z] for x in (20.0, 50.0, 80.0) for z in (-15.0, 0.0, 15.0)])
 
 
@@ -59,7 +59,7 @@ def calibrated(seed: int):
 
 
 def test_both_views_have_one_lens_and_one_error_of_it():
-    made = calibrated(0).cameras
+    made = calibrated(100).cameras
     high, mirrored = made["high"].lens, made["mirrored"].lens
     whole = high + [0, 0, 0, 490, 0, 0, 0, 0, 0]
     np.testing.assert_allclose(mirrored, CROPS["mirrored"].lens_of(whole), rtol=0, atol=1e-9)
@@ -83,14 +83,14 @@ def test_intervals_of_both_views_hold():
             Sigma = np.einsum("nij,jk,nlk->nil", J, made.covariance[own, own], J)
             error = px - truth[camera.name].project(RIG_POINTS)
             chi2.append(np.einsum("ni,nij,nj->n", error, np.linalg.inv(Sigma), error))
-    # Points of one camera err together: some 6 of the 18 numbers of each of 16 cameras are independent,
-    # so the mean of chi²/2 scatters by √(2/96) = 0.14.
+    # Points of one camera err together: some 6 of the 18 numbers of each of 24 cameras are independent,
+    # so the mean of chi²/2 scatters by √(2/144) = 0.12.
     assert 0.55 < np.mean(chi2) / 2 < 1.5
 
 
 def test_one_lens_is_known_better_than_two():
-    shared = calibrated(0).cameras
-    apart = calibrate_cameras(views_of(0, crops={}), BOARD, MeasuredPose(T_RIG_BOARD)).cameras
+    shared = calibrated(100).cameras
+    apart = calibrate_cameras(views_of(100, crops={}), BOARD, MeasuredPose(T_RIG_BOARD)).cameras
     for row in (0, 15):  # f_x
         assert shared.covariance[row, row] < 0.7 * apart.covariance[row, row]
 
