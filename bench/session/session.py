@@ -362,9 +362,7 @@ def _warn_of_unused_surfaces(
             problems.warn(Reason("surface_unused", f"{MANIFEST}: {found}"))
 
 
-def _one_source_each(
-    board_sources: Mapping[str, Path], trials: Iterable[Trial]
-) -> dict[str, Path]:
+def _one_source_each(board_sources: Mapping[str, Path], trials: Iterable[Trial]) -> dict[str, Path]:
     """Return a folder or film of each camera that has pictures of the board or of a trial."""
     sources = dict(board_sources)
     for trial in trials:
@@ -372,7 +370,9 @@ def _one_source_each(
     return sources
 
 
-def _camera_names(board_sources: Mapping[str, Path | PicturePart], trials: Iterable[Trial]) -> tuple[str, ...]:
+def _camera_names(
+    board_sources: Mapping[str, Path | PicturePart], trials: Iterable[Trial]
+) -> tuple[str, ...]:
     """Return the names of all cameras with pictures of the board or of a trial, in natural order."""
     names = set(board_sources).union(*(trial.camera_sources for trial in trials))
     return tuple(sorted(names, key=lambda name: natural_order(Path(name))))

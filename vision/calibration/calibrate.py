@@ -216,7 +216,9 @@ def _check_own_lenses(
     by_picture = {}
     for name, camera in alone.items():  # parts of one picture cannot be exchanged
         by_picture.setdefault(views.crop(name).of, (name, camera))
-    return check_own_lenses(dict(by_picture.values()), standing, board, same_in_trials=same_in_trials)
+    return check_own_lenses(
+        dict(by_picture.values()), standing, board, same_in_trials=same_in_trials
+    )
 
 
 def _alone(views: BoardViews, board: Board, with_rig: bool) -> dict[str, Alone]:
