@@ -26,7 +26,7 @@ _MOST_BYTES = 1 << 31
 # [names] Most in one line.
 _MOST_LISTED = 8
 # Errors of SciPy's reader on a damaged file.
-_NOT_MATLAB = (ValueError, TypeError, KeyError, OSError, EOFError, OverflowError, MemoryError)
+NOT_MATLAB = (ValueError, TypeError, KeyError, OSError, EOFError, OverflowError, MemoryError)
 # Errors of npTDMS on a damaged file.
 _NOT_TDMS = (ValueError, OSError, KeyError, EOFError, IndexError)
 
@@ -151,7 +151,7 @@ def _mat(path: Path, names: list[str], label: str) -> list:
         content = loadmat(path, simplify_cells=True)
     except NotImplementedError:  # version 7.3 is HDF5
         return _hdf5(path, names, label)
-    except (MatReadError, *_NOT_MATLAB) as problem:
+    except (MatReadError, *NOT_MATLAB) as problem:
         raise BadInput(f"cannot be read as a MATLAB file ({problem})", file=label) from None
     return [_variable(content, name, label) for name in names]
 
@@ -170,7 +170,7 @@ def _variable(content: dict, name: str, label: str) -> Any:
 
 def _hdf5(path: Path, names: list[str], label: str) -> list:
     """Read raw series of an HDF5 file."""
-    h5py = _extra("h5py", "hdf5", label)
+    h5py = optional_library("h5py", "hdf5", label)
     try:
         with h5py.File(path, "r") as file:
             for name in names:
@@ -183,7 +183,7 @@ def _hdf5(path: Path, names: list[str], label: str) -> list:
 
 def _tdms(path: Path, names: list[str], label: str) -> list:
     """Read raw series of a TDMS file."""
-    nptdms = _extra("nptdms", "tdms", label)
+    nptdms = optional_library("nptdms", "tdms", label)
     try:
         file = nptdms.TdmsFile.read(path)
     except _NOT_TDMS as problem:
@@ -198,7 +198,7 @@ def _tdms(path: Path, names: list[str], label: str) -> list:
     return [channels[name][:] for name in names]
 
 
-def _extra(module: str, extra: str, label: str) -> Any:
+def optional_library(module: str, extra: str, label: str) -> Any:
     """Import a library that not everybody needs. Raise BadInput where it is not installed."""
     try:
         return importlib.import_module(module)

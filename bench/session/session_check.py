@@ -16,6 +16,7 @@ from bench.session.array_view import load_views
 from bench.session.frame_times import frame_times
 from bench.session.session import Session, load_session
 from bench.session.signals import Signals, forward_strokes, read_signals
+from bench.session.traces import read_traces
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from vision.calibration import read_cameras
@@ -125,6 +126,9 @@ def check_recording(trial: Trial, problems: InputProblems) -> None:
         times = frame_times(trial)
         for warning in times.warnings:
             problems.warn(warning)
+    if times is not None and trial.trace_files:
+        with problems.guard():
+            read_traces(trial.trace_files, trial.camera_sources, times.picture, trial.place)
     if signals is not None and times is not None and len(times):
         with problems.guard():
             _check_clock(trial, signals.time_s, times.time_s, problems)

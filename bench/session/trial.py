@@ -1,6 +1,6 @@
 """One trial of a session: its settings and where its files are. The files are read elsewhere."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from bench.session.footage import camera_sources
 from bench.session.givens import Given, with_sigmas
 from bench.session.stated import StatedSession
 from bench.session.strict_toml import as_keys, convert, read_toml, values
+from bench.session.trace_files import trace_files
 from vision.pictures import PicturePart
 
 MANIFEST = "trial.toml"
@@ -27,6 +28,7 @@ class Trial(manifest.TrialKeys):
     the frames say it. bar_diameter_mm: the session's where the trial has no own. camera_sources: camera
     to folder of pictures or video, empty where the trial has none. whisker: of an array, whose
     channels `daq` names; '' where it is the only one. givens: what trial.toml and [trial] state.
+    trace_files: the wire's lines by another program, see `bench.session.traces`.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Trial(manifest.TrialKeys):
     daq: DaqFile | None = None
     whisker: str = ""
     givens: tuple[Given, ...] = ()
+    trace_files: dict[str, Path] = field(default_factory=dict)
 
     @property
     def is_bar(self) -> bool:
@@ -94,6 +97,7 @@ def load_trial(
         signals_path=signals_path,
         daq=daq,
         givens=givens,
+        trace_files=trace_files(folder, place),
         **settings,
     )
 

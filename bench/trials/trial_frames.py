@@ -12,9 +12,10 @@ from bench.cameras.session_cameras import SessionCalibration
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes, ways_back
+from bench.session.traces import read_traces
 from bench.session.trial import Trial
 from bench.trials.still_scene import StillScene, still_scene
-from vision import TrialPictures
+from vision import Trace, TrialPictures
 from vision.geometry import Bar, Rods, StatedSizes, Touched, touched_object
 from vision.pictures import Others, RodLines
 
@@ -68,11 +69,20 @@ class TrialFrames:
             object_gives_way=trial.object_gives_way,
             others=others,
             itself=itself,
+            traces=_traces(trial, times),
         )
         places = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
         back = _back_frames(trial, signals, times)
         rods = Rods(session.whisker.wire, stated_object(trial))
         return cls(times, by_camera, scene, places, back, pictures, rods)
+
+
+def _traces(trial: Trial, times: FrameTimes) -> dict[str, Trace]:
+    """Return by camera the wire's lines that another program has traced. Raise BadInput."""
+    if not trial.trace_files:
+        return {}
+    traced = read_traces(trial.trace_files, trial.camera_sources, times.picture, trial.place)
+    return {name: one.trace for name, one in traced.items()}
 
 
 def _chosen_frames(scene: StillScene, settings: Settings) -> dict[str, Mapping[int, np.ndarray]]:

@@ -2,7 +2,7 @@
 
 A pass of the fit needs points near the curves of the pass before. They are traced in pictures
 (`vision.truth.traced_lines`), or predicted for a whisk that is known exactly
-(`vision.truth.predicted_lines`). A tracker that wrote its points to a file would be a third source.
+(`vision.truth.predicted_lines`), or another program has traced them (`vision.truth.given_traces`).
 """
 
 from abc import ABC, abstractmethod
@@ -16,6 +16,11 @@ from vision.geometry.centreline import Curves
 from vision.geometry.refusals import Refused
 from vision.geometry.touched import Axis
 from vision.wire.points import Observed
+
+# [px] A camera whose points scatter by more sees another thing: where a wire is seen at all its
+# points lie on one line to a tenth of a pixel. Study: thresholds.py
+# truth.line_source _MOST_SCATTER_PX ….
+_MOST_SCATTER_PX = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +46,11 @@ class LineSource(ABC):
 
     Points of the wire are numbered by their frame's position among the curves.
     """
+
+    @property
+    def most_scatter_px(self) -> float:
+        """Return by how much a camera's points may scatter about a wire, px."""
+        return _MOST_SCATTER_PX
 
     @abstractmethod
     def wire_points(self, place: WhiskPlace, *, last: bool) -> dict[str, list[Observed]]:

@@ -33,6 +33,7 @@ from vision.touched.search import SeenBar, find_object
 from vision.touched.search_scene import SearchScene
 from vision.touched.width import measure_relative_widths
 from vision.truth.explanations import Explanation, explain
+from vision.truth.given_traces import traces_as_lines
 from vision.truth.moving_bar import in_one_frame
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.trial_pictures import TrialPictures
@@ -160,6 +161,7 @@ def _whisks_of(
             left_out=tuple(left_out),
             stated_velocity=velocity,
             gives=Gives() if pictures.object_gives_way else None,
+            lines=traces_as_lines(pictures.traces),
         )
         seen.append(whisk)
     return _TrialScene(seen, found, still)

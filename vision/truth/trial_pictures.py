@@ -11,6 +11,7 @@ from vision.pictures.others import Others, RodLines
 from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.pyramid import shrunk_frames, shrunk_picture
 from vision.pictures.view import View
+from vision.truth.trace import Trace
 
 # [pictures] Of a camera that is used: two give the noise, a third what moves. Derived.
 _FEWEST_PICTURES = 3
@@ -27,6 +28,8 @@ class TrialPictures:
     where it stands. object_gives_way: the bar stands until it is touched, and comes back.
     others: by camera, rods in its pictures that are not the wire.
     itself: by camera, the wire's place to a pixel or two, where that is known beforehand.
+    traces: by camera, the wire's lines as another program has drawn them; with any, they are the only
+    lines of the wire.
     """
 
     frames: Mapping[str, Mapping[int, np.ndarray]]
@@ -38,6 +41,7 @@ class TrialPictures:
     object_gives_way: bool = False
     others: Mapping[str, Others] = field(default_factory=dict)
     itself: Mapping[str, RodLines] = field(default_factory=dict)
+    traces: Mapping[str, Trace] = field(default_factory=dict)
 
     def shrunk(self, scale: int) -> "TrialPictures":
         """Return the trial with pixels `scale` times as wide."""
@@ -48,8 +52,15 @@ class TrialPictures:
         for name, rods in self.others.items():
             others[name] = {rod: lines.shrunk(scale) for rod, lines in rods.items()}
         itself = {name: lines.shrunk(scale) for name, lines in self.itself.items()}
-        frames = shrunk_frames(self.frames, scale)
-        return replace(self, frames=frames, background=background, others=others, itself=itself)
+        traces = {name: trace.shrunk(scale) for name, trace in self.traces.items()}
+        return replace(
+            self,
+            frames=shrunk_frames(self.frames, scale),
+            background=background,
+            others=others,
+            itself=itself,
+            traces=traces,
+        )
 
     def views(self, cameras: Cameras) -> tuple[View, ...]:
         """Return the view of each camera that has three pictures or more; raise Refused where none

@@ -1,6 +1,6 @@
 """One whisk in a trial's pictures, with what is known beforehand, and the fit to them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
@@ -22,6 +22,7 @@ from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.search import SeenBar
+from vision.truth.line_source import LineSource
 from vision.truth.value import Value, propagated_sigma
 from vision.wire.one_sided import WireAppearance
 
@@ -41,7 +42,8 @@ class WhiskPictures:
 
     indices: the frames of the stroke. time_s, motor_rad (n,): at every frame of the trial. light:
     filled with how each camera sees the wire. left_out: a line on each camera that is not used.
-    stated_velocity: of a bar that moves. gives: of one that gives way.
+    stated_velocity: of a bar that moves. gives: of one that gives way. lines: makes the source of the
+    whisk's lines (`vision.truth.traced_lines.TracedLines` or one made as that is).
     """
 
     number: int
@@ -57,6 +59,7 @@ class WhiskPictures:
     left_out: tuple[Reason, ...] = ()
     stated_velocity: StatedVelocity | None = None
     gives: Gives | None = None
+    lines: Callable[..., LineSource] | None = None
 
     @property
     def motion(self) -> Motion | Yielding | None:

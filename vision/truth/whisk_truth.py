@@ -15,7 +15,7 @@ from vision.geometry.refusals import Misled, Refused
 from vision.geometry.touched import Axis
 from vision.truth.line_source import LineSource, WhiskPlace
 from vision.truth.strategies import Strategy, Touch, early, strategies
-from vision.truth.traced_lines import TracedLines, blurs_px
+from vision.truth.traced_lines import blurs_px
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.wire.points import Observed
 
@@ -23,10 +23,6 @@ from vision.wire.points import Observed
 # over a wide stroke passes for the whisker's turn, which takes up what would show it as scatter.
 # Study: tests/bench/trials/test_placing_pictures.py.
 FREE_SHARED = 4.0
-# [px] A camera whose points scatter by more sees another thing: where a wire is seen at all its
-# points lie on one line to a tenth of a pixel. Study: thresholds.py
-# truth.whisk_truth _MOST_SCATTER_PX ….
-_MOST_SCATTER_PX = 0.7
 
 
 @dataclass(frozen=True)
@@ -65,7 +61,7 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
 def _fit_by(whisk: WhiskPictures, strategy: Strategy) -> FittedWhisk:
     """Fit a whisk by one strategy. Raises Refused where it does not serve."""
     whisk, expected = _expect_coarsely(whisk, strategy.touch)
-    return fit_lines(whisk, TracedLines(whisk, strategy.reader), expected, strategy.touch)
+    return fit_lines(whisk, whisk.lines(whisk, strategy.reader), expected, strategy.touch)
 
 
 def fit_lines(
@@ -81,7 +77,7 @@ def fit_lines(
             raise Refused("a single camera sees wire and bar", code="single_camera")
         problem, state, covariance = _fit(whisk, expected, seen, touch)
         whisk = whisk.yielding_as(problem, state)
-        _check_scatter(problem, state)
+        _check_scatter(problem, state, lines.most_scatter_px)
         touching, free = touch.part_by_fit(problem, state, covariance)
         expected = ExpectedWhisk(
             place=_fitted_place(whisk, problem, state),
@@ -197,15 +193,14 @@ def _fit(
     return problem, state, covariance
 
 
-def _check_scatter(problem: Problem, state: State) -> None:
+def _check_scatter(problem: Problem, state: State, most_px: float) -> None:
     """Raise Misled where a camera's lines are not those of one wire."""
     scatter = scatter_px(problem, state)
     worst = int(np.argmax(scatter))
-    if scatter[worst] > _MOST_SCATTER_PX:
+    if scatter[worst] > most_px:
         raise Misled(
             problem.cameras.names[worst],
-            f"its lines of the wire scatter by {scatter[worst]:.1f} px, "
-            f"{_MOST_SCATTER_PX:g} is allowed",
+            f"its lines of the wire scatter by {scatter[worst]:.1f} px, {most_px:g} is allowed",
         )
 
 
@@ -233,8 +228,8 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
 
 
 def _wire_points(whisk: WhiskPictures, place: WhiskPlace) -> list[Observed]:
-    """Return the points of the wire by all cameras, traced with the blur of each."""
-    lines = TracedLines(whisk, blur_px=blurs_px(whisk))
+    """Return the points of the wire by all cameras, where traced with the blur of each."""
+    lines = whisk.lines(whisk, blur_px=blurs_px(whisk))
     seen = []
     for on_wire in lines.wire_points(place, last=True).values():
         seen += on_wire

@@ -1,0 +1,113 @@
+"""The lines that another program has traced in a trial's pictures: which files, and whether they are
+of these pictures.
+
+A trial's folder holds `trace_<camera>` with the suffix of the tracker (`trace_readers.READERS`), or
+Anipose's points in space, `trace_3d.csv`, with its cameras, `trace_3d.toml`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bench.base.errors import BadInput
+from bench.session.footage import frame_count
+from bench.session.trace_files import IN_SPACE
+from bench.session.trace_readers import DrawnLines, read_lines
+from bench.session.traces_in_space import lines_in_space
+from vision import Trace
+from vision.geometry import counted
+from vision.pictures import Frames
+
+# [1] Of the points: a tracker may draw a line a little beyond the picture's edge; more are of other
+# pictures. Stated.
+_MOST_OUTSIDE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """A camera's trace. has_identity: its lines have the same number in all frames."""
+
+    trace: Trace
+    has_identity: bool
+
+
+def read_traces(
+    files: Mapping[str, Path],
+    sources: Mapping[str, Path],
+    pictures: Mapping[str, np.ndarray],
+    label: str,
+) -> dict[str, Traced]:
+    """Return the traces of a trial by camera, their frames counted as the trial counts.
+
+    files: as of `bench.session.trace_files`. sources: pictures of each camera. pictures: by camera the index of its
+    picture in each frame (n,), −1 where it dropped that. Raises BadInput where a file cannot be read
+    or is not of these pictures.
+    """
+    drawn: dict[str, tuple[DrawnLines, str]] = {}
+    for name, path in files.items():
+        of_file = f"{label}/{path.name}"
+        if name == IN_SPACE:
+            for camera, lines in lines_in_space(path, list(sources), of_file).items():
+                drawn.setdefault(camera, (lines, of_file))
+            continue
+        if name not in sources:
+            found = f"there is no camera {name}; there are {', '.join(sources) or 'none'}"
+            raise BadInput(found, file=of_file)
+        drawn[name] = read_lines(path, of_file), of_file
+    traces = {}
+    for name, (lines, of_file) in drawn.items():
+        traces[name] = _checked(lines, name, sources[name], pictures[name], of_file)
+    return traces
+
+
+def _checked(
+    drawn: DrawnLines, camera: str, source: Path, picture: np.ndarray, label: str
+) -> Traced:
+    """Return a camera's lines as a trace. Raise BadInput where they are not of its pictures."""
+    _require_frames(drawn.frame, camera, frame_count(source), label)
+    is_inside = _inside(drawn.px, camera, Frames.open(source).size_px, label)
+    frame_of = np.full(int(np.max(picture, initial=0)) + 1, -1)
+    recorded = np.flatnonzero(picture >= 0)
+    frame_of[picture[recorded]] = recorded
+    number = drawn.frame.astype(int)
+    frame = np.where(number < len(frame_of), frame_of[np.minimum(number, len(frame_of) - 1)], -1)
+    trace = Trace(frame, drawn.px, drawn.line, drawn.sigma_px)
+    return Traced(trace.select(is_inside & (frame >= 0)), drawn.has_identity)
+
+
+def _require_frames(frame: np.ndarray, camera: str, count: int, label: str) -> None:
+    """Raise BadInput where frames (n,) are no numbers of the camera's pictures."""
+    if len(frame) == 0:
+        raise BadInput("holds no point", file=label)
+    broken = frame[frame != np.round(frame)]
+    if len(broken):
+        rule = "pictures are counted from 0; are these times in seconds?"
+        raise BadInput(f"frame {broken[0]:g} is no whole number; {rule}", file=label)
+    absent = frame[(frame < 0) | (frame >= count)]
+    if len(absent):
+        there = f"camera {camera} has {counted(count, 'picture')}, counted from 0"
+        other = "is it of another trial?"
+        raise BadInput(f"frame {absent[0]:g} is not there; {there}; {other}", file=label)
+
+
+def _inside(px: np.ndarray, camera: str, size_px: tuple[int, int], label: str) -> np.ndarray:
+    """Return which points (n, 2) are in the picture. Raise BadInput where too many are not."""
+    is_inside = _are_in(px, size_px)
+    outside = 1.0 - np.mean(is_inside)
+    if outside <= _MOST_OUTSIDE:
+        return is_inside
+    u, v = px[int(np.argmin(is_inside))]
+    width, height = size_px
+    found = f"{outside:.0%} of its points are outside the picture of camera {camera}"
+    hint = "is it of another camera?"
+    if np.mean(_are_in(px[:, ::-1], size_px)) >= 1.0 - _MOST_OUTSIDE:
+        hint = "are u and v exchanged?"
+    first = f"such as u {u:.1f}, v {v:.1f} px of {width} x {height}"
+    raise BadInput(f"{found}, {first}; {hint}", file=label)
+
+
+def _are_in(px: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
+    """Return which points (n, 2) are in a picture."""
+    return np.all((px >= -0.5) & (px <= np.array(size_px) - 0.5), axis=1)

@@ -1,0 +1,153 @@
+"""Lines of the wire that another program has drawn into a whisk's pictures.
+
+A tracker gives points of one or several lines in each frame, a point a pixel or a point a joint.
+Its errors are smooth along the wire and stay from frame to frame: the points are averaged over
+segments as long as those that our own lines are measured in, and their sigma, where none is stated,
+is their scatter about the curve of the pass before. What neighbours share is measured by the fit
+(`vision.fit.scatter`). What all frames share hides in the rest shape; it has a prior of its own.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from vision.geometry.camera import Camera
+from vision.geometry.centreline import Curves
+from vision.geometry.refusals import Refused
+from vision.geometry.robust import robust_sigma
+from vision.pictures.view import View
+from vision.truth.line_source import WhiskPlace
+from vision.truth.trace import NEAR_PX, BesideWire, Trace, averaged, beside_wire, points_of_wire
+from vision.truth.traced_lines import BESIDE_BAR_PX, TracedLines
+from vision.wire.points import SHARED, LinePoints, Observed
+from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, observed
+
+# [1] Of the frames with a trace: where fewer have one near the wire, the trace is of something
+# else. Stated.
+_LEAST_NEAR = 0.5
+# [px] About the fit, at most: a tracker that scatters by more draws no line of one wire. Stated.
+_MOST_SCATTER_PX = 3.0
+# [px] Least sigma of a point: files have their numbers to a hundredth. Stated.
+_LEAST_SIGMA_PX = 0.02
+# [1] Of the points' sigma: what a line is off by in all frames alike, in each of SHARED shapes along
+# the wire (Legendre's polynomials). Study: given_traces.py.
+_LASTING_SHARE = 0.5
+
+
+@dataclass
+class GivenTraces(TracedLines):
+    """The wire's lines as another program has drawn them; the object's as the pictures show them.
+
+    traces: by camera; one without gives no line of the wire.
+    """
+
+    traces: Mapping[str, Trace] = field(default_factory=dict)
+
+    @property
+    def most_scatter_px(self) -> float:
+        """Return by how much a camera's points may scatter about a wire, px."""
+        return _MOST_SCATTER_PX
+
+    def wire_points(self, place: WhiskPlace, *, last: bool) -> dict[str, list[Observed]]:
+        """Return by camera the points of the traces near the wire's curves.
+
+        Raises Refused where a trace is nowhere near the wire.
+        """
+        found = {}
+        for view in self.whisk.views:
+            trace = self.traces.get(view.camera.name)
+            found[view.camera.name] = [] if trace is None else self._points(view, trace, place)
+        return found
+
+    def _points(self, view: View, trace: Trace, place: WhiskPlace) -> list[Observed]:
+        """Return the points of one camera's trace."""
+        camera = view.camera
+        beside = beside_wire(trace, camera, place.curves)
+        _require_near(beside, trace, camera, place.curves)
+        segments = averaged(points_of_wire(beside), self.whisk.settings.wire_piece_px)
+        middle_px, radius_px = place.axis.covering_discs(camera, place.swept_mm)
+        is_clear = clear_of_bar(segments, middle_px, radius_px, BESIDE_BAR_PX)
+        segments = segments.select(is_clear & (segments.place_mm > NEAR_CLAMP_MM))
+        if not len(segments.place_mm):
+            return []
+        points = _line_points(segments, self.whisk.rods.wire.length_mm)
+        number = self.whisk.cameras.names.index(camera.name)
+        return observed(points, segments.frame, number, list(place.curves))
+
+
+def traces_as_lines(traces: Mapping[str, Trace]) -> Callable[..., TracedLines]:
+    """Return what makes the source of a whisk's lines: other programs' traces, where there are any,
+    else its pictures.
+    """
+    if not traces:
+        return TracedLines
+
+    def from_traces(*made_of, **known) -> TracedLines:
+        """Return the source of a whisk's lines, made as a TracedLines is."""
+        return GivenTraces(*made_of, **known, traces=traces)
+
+    return from_traces
+
+
+def _line_points(segments: BesideWire, length_mm: float) -> LinePoints:
+    """Return segments as line points, with a sigma by their scatter where none is stated."""
+    scatter_px = max(robust_sigma(segments.offset_px), _LEAST_SIGMA_PX)
+    is_stated = np.isfinite(segments.sigma_px)
+    sigma_px = np.where(is_stated, np.maximum(segments.sigma_px, _LEAST_SIGMA_PX), scatter_px)
+    share = 2.0 * segments.place_mm / length_mm - 1.0
+    shapes = np.polynomial.legendre.legvander(share, SHARED - 1)  # (n, SHARED)
+    return LinePoints(
+        px=segments.foot_px + segments.offset_px[:, None] * segments.normal,
+        normal=segments.normal,
+        sigma_px=sigma_px,
+        place=segments.place_mm,
+        shared_px=_LASTING_SHARE * scatter_px * shapes,
+    )
+
+
+def _require_near(
+    beside: BesideWire, trace: Trace, camera: Camera, curves: Mapping[int, Curves]
+) -> None:
+    """Raise Refused where few of the frames with a trace have a line near the wire."""
+    share = _share_near(beside, trace, list(curves))
+    if share >= _LEAST_NEAR:
+        return
+    raise Refused(
+        f"camera {camera.name}: in {1.0 - share:.0%} of its frames the trace is nowhere within "
+        f"{NEAR_PX:g} px of the wire in the pictures; {_hint(trace, camera, curves)}",
+        code="trace_elsewhere",
+    )
+
+
+def _share_near(beside: BesideWire, trace: Trace, frames: Sequence[int]) -> float:
+    """Return the share of the frames with a trace that have a line near the wire; 1 of none.
+
+    A line is near where half of its points beside the wire are.
+    """
+    with_trace = np.intersect1d(trace.frame, frames)
+    near = 0
+    for frame in with_trace.tolist():
+        own = np.abs(beside.offset_px[beside.frame == frame]) < NEAR_PX
+        near += len(own) > 0 and np.mean(own) >= _LEAST_NEAR
+    return near / len(with_trace) if len(with_trace) else 1.0
+
+
+def _hint(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> str:
+    """Return what makes a trace that is elsewhere lie near the wire, in words."""
+    width, height = camera.size_px
+    u, v = trace.px.T
+    changed = {
+        "mirrored left to right it is: give it as the pictures are": (width - 1.0 - u, v),
+        "mirrored top to bottom it is: give it as the pictures are": (u, height - 1.0 - v),
+        "turned by half a turn it is: give it as the pictures are": (
+            width - 1.0 - u,
+            height - 1.0 - v,
+        ),
+        "with u and v exchanged it is: u_px goes to the right, v_px down": (v, u),
+    }
+    for said, columns in changed.items():
+        other = replace(trace, px=np.stack(columns, axis=1))
+        if _share_near(beside_wire(other, camera, curves), other, list(curves)) >= _LEAST_NEAR:
+            return said
+    return "is it of another trial or another camera?"
