@@ -10,7 +10,7 @@ from vision.geometry.lazy_names import lazy_names
 
 NAMES = {
     "fit.beam_check": ("BeamCheck",),
-    "fit.blocks": ("REST_PRIOR_MM",),
+    "fit.blocks": ("REST_PRIOR_MM", "WIRE_OFFSET_PX"),
     "fit.covariance": ("CAUSES",),
     "fit.line_noise": ("LineNoise",),
     "fit.refinements": ("ALONG", "LENS_TERMS", "LeftOut"),
@@ -36,6 +36,6 @@ NAMES = {
     "truth.trial_pictures": ("TrialPictures",),
     "truth.value": ("NAN", "UNKNOWN", "Value"),
     "wire.one_sided": ("SeenWidth",),
-    "wire.trace": ("lines_of",),
+    "wire.trace": ("NEAR_CLAMP_MM", "lines_of"),
 }
 __getattr__ = lazy_names(__name__, NAMES)

@@ -29,6 +29,7 @@ VERBS = (
     "report",
     "compare",
     "view",
+    "score_traces",
     "tradeoff",
     "robot",
     "figures",

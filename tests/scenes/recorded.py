@@ -30,6 +30,14 @@ def _camera(c):
     )
 
 
+def _number(cell):
+    """The number of a cell; NaN where it is a word or empty."""
+    try:
+        return float(cell)
+    except ValueError:
+        return np.nan
+
+
 class Recorded:
     """Pictures, times and truth of one trial."""
 
@@ -38,7 +46,7 @@ class Recorded:
         self.cameras = exact_cameras(session)
         self.truth = tomllib.loads((folder / "truth.toml").read_text())
         rows = list(csv.DictReader((folder / "truth.csv").open()))
-        self.rows = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+        self.rows = {name: np.array([_number(row[name]) for row in rows]) for name in rows[0]}
         self.frames = {c.name: dict(Frames.open(folder / c.name).read()) for c in self.cameras}
         self.background = {
             c.name: read_picture(session / "boards" / "rig" / f"{c.name}.png").astype(float)

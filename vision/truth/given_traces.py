@@ -18,7 +18,15 @@ from vision.geometry.refusals import Refused
 from vision.geometry.robust import robust_sigma
 from vision.pictures.view import View
 from vision.truth.line_source import WhiskPlace
-from vision.truth.trace import NEAR_PX, BesideWire, Trace, averaged, beside_wire, points_of_wire
+from vision.truth.trace import (
+    NEAR_PX,
+    BesideWire,
+    Trace,
+    averaged,
+    beside_wire,
+    nearest_lines,
+    points_of_wire,
+)
 from vision.truth.traced_lines import BESIDE_BAR_PX, TracedLines
 from vision.wire.points import SHARED, LinePoints, Observed
 from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, observed
@@ -123,13 +131,15 @@ def _require_near(
 def _share_near(beside: BesideWire, trace: Trace, frames: Sequence[int]) -> float:
     """Return the share of the frames with a trace that have a line near the wire; 1 of none.
 
-    A line is near where half of its points beside the wire are.
+    The line nearest to the wire is near where half of its points beside the wire are.
     """
     with_trace = np.intersect1d(trace.frame, frames)
+    nearest = nearest_lines(beside)
     near = 0
     for frame in with_trace.tolist():
-        own = np.abs(beside.offset_px[beside.frame == frame]) < NEAR_PX
-        near += len(own) > 0 and np.mean(own) >= _LEAST_NEAR
+        own = (beside.frame == frame) & (beside.line == nearest.get(frame))
+        is_near = np.abs(beside.offset_px[own]) < NEAR_PX
+        near += len(is_near) > 0 and np.mean(is_near) >= _LEAST_NEAR
     return near / len(with_trace) if len(with_trace) else 1.0
 
 

@@ -25,6 +25,7 @@ from vision.geometry.refusals import Refused
 from vision.geometry.vision_settings import VisionSettings
 from vision.touched.search import find_object
 from vision.touched.search_scene import SearchScene
+from vision.truth.traced_lines import TracedLines
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.whisk_truth import fit_whisk
 
@@ -35,7 +36,16 @@ def read_whisk(folder: Path) -> tuple[WhiskPictures, BarAxis]:
     settings, time_s = VisionSettings(), np.arange(len(motor_rad), dtype=float)
     bar = find_object(SearchScene(views, cameras, rods, motor_rad, settings))
     whisk = WhiskPictures(
-        0, range(len(motor_rad)), time_s, motor_rad, tuple(views), cameras, rods, bar, settings
+        0,
+        range(len(motor_rad)),
+        time_s,
+        motor_rad,
+        tuple(views),
+        cameras,
+        rods,
+        bar,
+        settings,
+        lines=TracedLines,
     )
     return whisk.without_gaps(), axis
 
