@@ -17,7 +17,7 @@ from bench.base.progress import show_progress
 from bench.commands.options import BAD_INPUT, DONE, FAULT_OF_OURS, INTERRUPTED
 from vision.geometry import Refused
 
-# Names of the verbs and of their modules, in the order of --help.
+# Names of the verbs and, with _ for -, of their modules, in the order of --help.
 VERBS = (
     "plan",
     "design",
@@ -29,7 +29,7 @@ VERBS = (
     "report",
     "compare",
     "view",
-    "score_traces",
+    "score-traces",
     "tradeoff",
     "robot",
     "figures",
@@ -77,7 +77,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     for name in VERBS:
-        import_module(f"bench.commands.{name}").add(verbs)
+        import_module(f"bench.commands.{name.replace('-', '_')}").add(verbs)
     return parser
 
 

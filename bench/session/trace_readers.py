@@ -95,7 +95,8 @@ def _deeplabcut_text(path: Path, label: str) -> DrawnLines:
     rows = list(csv.reader(io.StringIO(read_text(path, "export it as CSV, UTF-8", label))))
     heads: dict[str, list[str]] = {}
     while rows and rows[0] and rows[0][0] in ("scorer", "individuals", "bodyparts", "coords"):
-        heads[rows[0][0]] = rows.pop(0)
+        head = rows.pop(0)
+        heads[head[0]] = head
     if "bodyparts" not in heads or "coords" not in heads:
         raise BadInput("has no rows bodyparts and coords, as DeepLabCut writes them", file=label)
     first = next((k for k, name in enumerate(heads["coords"]) if name in ("x", "y")), 1)
