@@ -26,7 +26,6 @@ NAMES = {
     "truth.records": ("FrameTruth", "TrialTruth", "WhiskTruth"),
     "truth.sight_lines": ("sights_of",),
     "truth.trace": (
-        "NEAR_PX",
         "BesideWire",
         "Trace",
         "beside_wire",

@@ -28,6 +28,7 @@ _LEAST_LIKELIHOOD = 0.6
 _CURVE_POINTS = 60
 # [px] SLEAP before format 1.1 counts from the corner of the first pixel. Stated by SLEAP.
 _SLEAP_CORNER_PX = 0.5
+# [version] Of SLEAP's files, from which it counts from the centre. Stated by SLEAP.
 _SLEAP_CENTRED = 1.1
 
 

@@ -15,7 +15,6 @@ from bench.base.errors import BadInput
 from bench.session.footage import frame_count
 from bench.session.trace_files import IN_SPACE
 from bench.session.trace_readers import DrawnLines, read_lines
-from bench.session.traces_in_space import lines_in_space
 from vision import Trace
 from vision.geometry import counted
 from vision.pictures import Frames
@@ -49,6 +48,8 @@ def read_traces(
     for name, path in files.items():
         of_file = f"{label}/{path.name}"
         if name == IN_SPACE:
+            from bench.session.traces_in_space import lines_in_space  # with calibration's solvers
+
             for camera, lines in lines_in_space(path, list(sources), of_file).items():
                 drawn.setdefault(camera, (lines, of_file))
             continue

@@ -51,7 +51,7 @@ def test_the_estimator_shown_finds_the_distance():
     assert 0.15 < estimate.sigma_mm < 0.5
 
 
-VERBS = re.findall(r"^\| `([a-z-]+(?: [a-z]+)?)", VERBS_PAGE, flags=re.MULTILINE)
+VERBS = re.findall(r"^\| `([a-z][a-z-]*(?: [a-z]+)?)", VERBS_PAGE, flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -62,7 +62,7 @@ def test_every_verb_shown_exists(verb):
 
 
 def test_every_verb_is_shown():
-    listed = re.findall(r"^    ([a-z]+)\b", cli.make_parser().format_help(), flags=re.MULTILINE)
+    listed = re.findall(r"^    ([a-z][a-z-]*)", cli.make_parser().format_help(), flags=re.MULTILINE)
     assert {verb.split()[0] for verb in VERBS} == set(listed)
 
 
