@@ -141,10 +141,14 @@ def _whisk_of_trial(
 
 
 def _notes(frames: TrialFrames) -> tuple[str, ...]:
-    """Return the notes of a trial: on missing frames, on what was left out, and on the scene."""
+    """Return the notes of a trial: on missing frames, on what was left out, on the scene, and on
+    whose lines of the wire its truth rests.
+    """
     missing = _missing_frames(frames.by_camera, frames.times)
     lost = dropped(frames.times, frames.places)
-    return (*missing, *lost, *frames.scene.notes)
+    traced = ", ".join(frames.pictures.traces)
+    others = [f"the wire's lines are another program's ({traced})"] if traced else []
+    return (*missing, *lost, *frames.scene.notes, *others)
 
 
 def _observe(
