@@ -73,11 +73,14 @@ class GivenTraces(TracedLines):
         camera = view.camera
         beside = beside_wire(trace, camera, place.curves)
         _require_near(beside, trace, camera, place.curves)
-        segments = averaged(points_of_wire(beside), self.whisk.settings.wire_piece_px)
+        near = points_of_wire(beside)
+        if not len(near.frame):
+            return []
+        segments = averaged(near, self.whisk.settings.wire_piece_px)
         middle_px, radius_px = place.axis.covering_discs(camera, place.swept_mm)
         is_clear = clear_of_bar(segments, middle_px, radius_px, BESIDE_BAR_PX)
         segments = segments.select(is_clear & (segments.place_mm > NEAR_CLAMP_MM))
-        if not len(segments.place_mm):
+        if not len(segments.frame):
             return []
         points = _line_points(segments, self.whisk.rods.wire.length_mm)
         number = self.whisk.cameras.names.index(camera.name)

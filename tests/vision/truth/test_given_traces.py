@@ -153,3 +153,12 @@ def test_a_trace_of_another_thing_is_named(example, change, said):
     assert seen.status.codes == ("trace_elsewhere",)
     assert said in seen.status
     assert np.isnan(seen.d_x_mm.value)
+
+
+def test_a_camera_whose_tracker_lost_all_frames_gives_no_line(example):
+    """One line does not determine the wire in space: its slip is vague, and there is no distance."""
+    lost = example.traces["low"].select(slice(0, 0))
+    seen = example.see({"high": example.traces["high"], "low": lost})
+    assert np.isnan(seen.lines["low"].wire_px) and np.isfinite(seen.lines["high"].wire_px)
+    assert np.isnan(seen.d_x_mm.value)
+    assert "slip_vague" in seen.status.codes
