@@ -23,7 +23,7 @@ NAMES = {
     "truth.noise_in_pictures": ("CameraPictures", "line_noise_in_pictures"),
     "truth.observe": ("observe_trial", "wire_lines"),
     "truth.predicted_truth": ("PredictedTruth", "predict_truth"),
-    "truth.records": ("FrameTruth", "TrialTruth", "WhiskTruth"),
+    "truth.records": ("FrameTruth", "SharedSigmas", "TrialTruth", "WhiskTruth"),
     "truth.sight_lines": ("sights_of",),
     "truth.trace": (
         "BesideWire",

@@ -2,7 +2,9 @@
 
 (10) is taken again with what was felt or assumed replaced by what was seen, one thing at a time, in this order: touch,
 moments, friction angle. Each share is the change of d_x that its replacement makes, with the sign that it has in the
-error; what remains is beam theory and slip along the whisker.
+error; what remains is beam theory and slip along the whisker. Where the truth is a stage's, which sees neither touch
+nor moments, the friction angle alone is replaced, by the one fitted to the surface's other whisks; touch and moments
+are in the remainder.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,6 +15,7 @@ import numpy as np
 from bench.analyses.alphas import seen_friction
 from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.pooling import angle_cells, known_rows
+from bench.analyses.runs import FITTED
 from bench.base.drawing import blank
 from bench.base.tables import TRIAL, WHISK, Column, Table, with_sigma
 from bench.gauges.gauge_readings import reference_from_pictures
@@ -38,8 +41,8 @@ EXPLAINED = Table(
         Column("error_mm", "of (10): the sum of the next four"),
         Column("by_touch_mm", "what it changes by when touch felt becomes touch seen"),
         Column("by_moments_mm", "and when then the moments felt become those of the shape seen"),
-        Column("by_alpha_mm", "and when then α_est becomes α seen"),
-        Column("remainder_mm", "beam theory, and slip along the whisker"),
+        Column("by_alpha_mm", "and when then α_est becomes α seen; by a stage, α fitted"),
+        Column("remainder_mm", "beam theory, slip along the whisker; by a stage all else"),
     ),
 )
 TOTAL = "mean"
@@ -123,12 +126,31 @@ def explained_rows(results: Iterable[TrialResult], whisker: Whisker) -> Iterator
         if not answers or not seen.has_truth:
             continue
         alpha_rad, sigma_rad = seen_friction(seen, result.whisker)
+        shares = _shares_by_fit(seen, felt, answers[0])
+        if seen.deflection is not None:
+            shares = _shares(result, seen, felt, answers[0], alpha_rad, whisker)
         yield {
             "trial": result.trial.name,
             "whisk": seen.whisk,
             **angle_cells("alpha_seen_deg", Value(alpha_rad, sigma_rad)),
-            **_shares(result, seen, felt, answers[0], alpha_rad, whisker),
+            **shares,
         }
+
+
+def _shares_by_fit(seen: SeenWhisk, felt: FeltWhisk, answer: EstimateRow) -> dict:
+    """Return the error of (10) and its change by the fitted friction angle, mm; no share is seen."""
+    truth = seen.d_x_mm.value
+    d_x = answer.d_x_est_mm.value
+    fitted = next((row for row in felt.estimates if row.estimator == FITTED), None)
+    d_x_alpha = np.nan if fitted is None else fitted.d_x_est_mm.value
+    return {
+        "d_x_mm": truth,
+        "error_mm": d_x - truth,
+        "by_touch_mm": np.nan,
+        "by_moments_mm": np.nan,
+        "by_alpha_mm": d_x - d_x_alpha,
+        "remainder_mm": d_x_alpha - truth,
+    }
 
 
 def _shares(
@@ -190,9 +212,10 @@ def _moments_seen(seen: SeenWhisk, theta_rad: float, whisker: Whisker) -> tuple[
 def mean_row(rows: Sequence[dict]) -> dict:
     """Return mean error and mean shares over the whisks for which all are known.
 
-    Shares keep their signs, so they add up.
+    Shares keep their signs, so they add up. A share that is known of none of them has no mean.
     """
-    names = ("d_x_mm", "error_mm", *SHARES)
+    shares = [name for name in SHARES if any(np.isfinite(row[name]) for row in rows)]
+    names = ("d_x_mm", "error_mm", *shares)
     complete, _ = known_rows(([row[name] for name in names] for row in rows), len(names))
     means = complete.mean(axis=0).tolist() if len(complete) else []
     return {"trial": TOTAL, **dict(zip(names, means))}

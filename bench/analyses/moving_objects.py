@@ -170,7 +170,12 @@ class MovingObjects(Analysis):
 
 
 def _share_percent(trial: Trial, seen: SeenWhisk) -> float:
-    """Return the object's speed along the push, percent of the whisker's at the contact."""
+    """Return the object's speed along the push, percent of the whisker's at the contact.
+
+    NaN where no frame shows the whisker's.
+    """
+    if seen.frames is None:
+        return np.nan
     velocity_mm_s = np.array(trial.object_velocity_mm_s)
     along_mm_s = in_contact_frame(velocity_mm_s, seen.touch_rad.value)[1]
     whisker_mm_s = motor_speed(seen.frames) * seen.d_x_mm.value

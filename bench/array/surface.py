@@ -71,7 +71,7 @@ def stated_surface(trial: Trial) -> ObjectSurface | None:
     is_thick = FORMS[stated.shape].is_thick
     if trial.bar_diameter_mm is None and is_thick:
         return None
-    axis = np.array(stated.axis, dtype=float)
+    axis = np.array(stated.direction, dtype=float)
     return ObjectSurface(
         stated.shape,
         np.array(stated.point_mm, dtype=float),

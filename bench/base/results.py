@@ -29,6 +29,9 @@ SEEING = (
         "bench/trials/placing.py",
         "bench/trials/still_scene.py",
         "bench/trials/seeing.py",
+        "bench/trials/truth_source.py",
+        "bench/trials/stated_truth.py",
+        "bench/trials/stage_contact.py",
     ),
     *(
         "bench/records",

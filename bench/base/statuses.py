@@ -197,6 +197,38 @@ _TABLE = (
         "look at the frames of this trial; if they are sound, please report it with them",
     ),
     Status("no_pictures", NOTE, "no pictures", _GIVE_PICTURES),
+    Status(
+        "slip_not_seen",
+        NOTE,
+        "the truth is a stage's: touch, slip and deflection are not seen",
+        _GIVE_PICTURES,
+    ),
+    Status(
+        "stage_says_nothing",
+        REFUSAL,
+        "neither d_x_mm, point_mm of [object] nor stage.csv says where the object stands",
+        "state one of them in trial.toml, or take [truth] out of session.toml",
+    ),
+    Status(
+        "stage_unlike_pictures",
+        WARNING,
+        "the stage and the pictures have the contact in different places",
+        "measure the stage's origin against the whisker's base; look at the overlays",
+        reaches=(TRUTH,),
+    ),
+    Status(
+        "distance_unlike_stated",
+        WARNING,
+        "the object's place and d_x_mm have the contact in different places",
+        "take out the one that is not measured",
+        reaches=(TRUTH,),
+    ),
+    Status(
+        "stage_not_read",
+        WARNING,
+        "{label} is not read; where it is the truth, {cure}",
+        _LOOK_AT_FILE,
+    ),
     Status("camera_unused", WARNING, "a camera of the manifest has no pictures", _GIVE_PICTURES),
     Status(
         "no_gauges",

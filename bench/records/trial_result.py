@@ -13,6 +13,10 @@ from bench.records.phases import NO_PHASES, Phases
 from vision import NAN, UNKNOWN, FrameTruth, SeenWidth, TruthAtAngle, Value, WhiskTruth
 from vision.geometry import NO_REASON, Reason
 
+# Where the truth of a whisk comes from.
+BY_PICTURES = "pictures"
+BY_STAGE = "stage"
+
 
 @dataclass(frozen=True)
 class TrialFacts:
@@ -108,9 +112,17 @@ class ByOneCamera:
     status: str = ""
 
 
+@dataclass(frozen=True)
+class PicturedContact:
+    """What the cameras show of a whisk whose truth is another source's: distance and slope."""
+
+    d_x_mm: Value
+    beta_rad: Value
+
+
 @dataclass(frozen=True, eq=False)
 class SeenWhisk:
-    """One whisk as the cameras show it.
+    """The truth of one whisk: as the cameras show it, or with distance and slopes of another source.
 
     truth: without what only a fit's own process needs (`bench.trials.seen.whisk_record`).
     status: the truth's, with warnings of the trial and of the recording. at: truth at the
@@ -119,6 +131,8 @@ class SeenWhisk:
     preset or settings file of the evaluation. contradicted: two records of the same quantity
     disagree (`bench.trials.consistency`). deflection: also of a whisk whose distance or slope is
     not known; None where no frame is seen to touch. by_one_camera: only where the settings name one.
+    source: of d_x, β and ψ, BY_PICTURES or BY_STAGE. pictured: what pictures show of these where they
+    are another source's.
     """
 
     truth: WhiskTruth
@@ -130,6 +144,13 @@ class SeenWhisk:
     looked: str = ""
     contradicted: bool = False
     by_one_camera: ByOneCamera | None = None
+    source: str = BY_PICTURES
+    pictured: PicturedContact | None = None
+
+    @property
+    def truth_source(self) -> str:
+        """Return where the truth comes from; "" where there is none."""
+        return self.source if self.has_truth else ""
 
     @property
     def whisk(self) -> int:

@@ -214,7 +214,7 @@ def _check_cone(bases: Sequence[Base], trial: Trial) -> None:
     if stated is None or stated.shape != "cone" or stated.point_mm is None:
         return
     tip = np.array(stated.point_mm)
-    axis = np.array(stated.axis) / np.linalg.norm(stated.axis)
+    axis = np.array(stated.direction) / np.linalg.norm(stated.direction)
     for base in bases:
         normal = base.T_rig_base[:, 2]
         towards = np.copysign(1.0, (base.T_rig_base[:, 3] - tip) @ normal) * normal

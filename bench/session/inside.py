@@ -19,7 +19,7 @@ _FOOTAGE = PICTURE_SUFFIXES | FILM_SUFFIXES
 _CAMERA_DEPTH = {"boards": 2, "trials": 3}
 # Names that a session gives to files, and to no folder.
 _FILES = {
-    *("session.toml", "trial.toml", "signals.csv", "frames.csv"),
+    *("session.toml", "trial.toml", "signals.csv", "frames.csv", "stage.csv"),
     *("gauges.toml", "cameras.toml", "rig.toml"),
 }
 _NOT_REGULAR = "is no regular file (a pipe, socket or device)"

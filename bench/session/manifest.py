@@ -236,6 +236,11 @@ class ObjectKeys(GivenKeys):
     half_angle_deg: HalfAngle | None = None
 
     @property
+    def direction(self) -> list[float]:
+        """Return its axis; upright where none is stated."""
+        return [0.0, 0.0, 1.0] if self.axis is None else self.axis
+
+    @property
     def sizes(self) -> dict[str, float]:
         """Return the sizes of its shape, in mm and rad, by their names in `StatedSizes`."""
         stated = {}
@@ -349,6 +354,16 @@ class SignalKeys(Keys):
 
 
 @dataclass(frozen=True, kw_only=True)
+class TruthKeys(GivenKeys):
+    """[truth] of session.toml: without it the pictures say where the contact is."""
+
+    # "stage": `d_x_mm`, `[object]` or `stage.csv` of each trial do; pictures are compared with it
+    source: Literal["stage"]
+    # how far the stage's origin may be from the whisker's base, each way: alike in all whisks
+    origin_sigma_mm: Annotated[float, Assumed(absolute=0.2, of="source", origin=_BY_HAND)] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
 class SessionKeys(Keys):
     """session.toml."""
 
@@ -370,6 +385,7 @@ class SessionKeys(Keys):
     cameras: tuple[CameraKeys, ...] = ()
     gauges: GaugeKeys | None = None
     signals: SignalKeys | None = None
+    truth: TruthKeys | None = None
     trial: TrialKeys = TrialKeys()
 
 

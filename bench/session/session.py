@@ -75,7 +75,8 @@ class Session:
     there is no cameras.toml but pictures. base: of the whisker whose view of an array this is
     (`bench.session.array_view`), whole: the array's session, in the rig frame; both None where the
     session is one whisker's. givens: what session.toml states, without its trials'. measured_rig: of
-    rig.toml, None without it. crops: of cameras that are parts of another one's picture.
+    rig.toml, None without it. crops: of cameras that are parts of another one's picture. truth: of
+    [truth], None where the pictures are the truth.
     """
 
     path: Path
@@ -99,6 +100,7 @@ class Session:
     givens: tuple[Given, ...] = ()
     measured_rig: MeasuredRig | None = None
     crops: Mapping[str, Crop] = field(default_factory=dict)
+    truth: manifest.TruthKeys | None = None
 
     @property
     def whole_name(self) -> str:
@@ -193,6 +195,7 @@ def session_of(
         gauges_toml=_existing(path / "gauges.toml"),
         givens=stated.givens_of(),
         crops=crops,
+        truth=keys.truth,
     )
     with problems.guard():
         session = _with_measured_rig(session)
@@ -263,6 +266,9 @@ def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> St
     if visible(path / "trials"):
         needed = ["bar"] if "whiskers" in tables else ["whisker", "bar"]
     as_keys(tables, manifest.SessionKeys, MANIFEST, problems, needed)
+    if "truth" in tables and "whiskers" in tables:
+        found = "[truth] is one whisker's; make a session of each of [[whiskers]]"
+        raise BadInput(found, file=MANIFEST)
     return StatedSession.of(tables)
 
 

@@ -6,10 +6,12 @@ from typing import Any
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.base.statuses import reason
 from bench.session import manifest
 from bench.session.daq import DaqFile
 from bench.session.footage import camera_sources
 from bench.session.givens import Given, with_sigmas
+from bench.session.stage import STAGE, StageLog, read_stage
 from bench.session.stated import StatedSession
 from bench.session.strict_toml import as_keys, convert, read_toml, values
 from bench.session.trace_files import trace_files
@@ -17,7 +19,6 @@ from vision.pictures import PicturePart
 
 MANIFEST = "trial.toml"
 SIGNALS = "signals.csv"
-_UPRIGHT = (0.0, 0.0, 1.0)  # axis of an object that stands somewhere, where it is not stated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +30,7 @@ class Trial(manifest.TrialKeys):
     to folder of pictures or video, empty where the trial has none. whisker: of an array, whose
     channels `daq` names; '' where it is the only one. givens: what trial.toml and [trial] state.
     trace_files: the wire's lines by another program, see `bench.session.traces`.
+    stage: what stage.csv says, where the session's truth is a stage's; None elsewhere.
     """
 
     name: str
@@ -39,6 +41,13 @@ class Trial(manifest.TrialKeys):
     whisker: str = ""
     givens: tuple[Given, ...] = ()
     trace_files: dict[str, Path] = field(default_factory=dict)
+    stage: StageLog | None = None
+
+    @property
+    def states_place(self) -> bool:
+        """Return whether trial.toml or stage.csv says where the object stands."""
+        has_point = self.object is not None and self.object.point_mm is not None
+        return has_point or self.stage is not None
 
     @property
     def is_bar(self) -> bool:
@@ -89,8 +98,9 @@ def load_trial(
         found = "is not there; a trial needs its signals"
         raise BadInput(found, file=f"{place}/{signals_path.name}")
     settings = values(keys) | _bar_diameter(keys, session.keys.bar)
-    settings["object"] = _stated_object(keys.object, settings["bar_diameter_mm"], label)
-    return Trial(
+    if keys.object is not None:
+        _check_object(keys.object, settings["bar_diameter_mm"], label)
+    trial = Trial(
         name=folder.name,
         folder=folder,
         camera_sources=camera_sources(folder, place),
@@ -100,6 +110,48 @@ def load_trial(
         trace_files=trace_files(folder, place),
         **settings,
     )
+    if session.keys.truth is None:
+        _warn_of_unread_stage(trial, problems)
+        return trial
+    trial = replace(trial, stage=read_stage(folder, folder.parents[1], place))
+    _check_stated_truth(trial, table)
+    return trial
+
+
+def _warn_of_unread_stage(trial: Trial, problems: InputProblems) -> None:
+    """Warn of a stage.csv that no key of session.toml asks for."""
+    if (trial.folder / STAGE).is_file():
+        cure = 'write [truth] source = "stage" in session.toml'
+        problems.warn(reason("stage_not_read", label=trial.label(STAGE), cure=cure))
+
+
+def _check_stated_truth(trial: Trial, table: dict[str, Any]) -> None:
+    """Raise BadInput where what trial.toml states is no truth. table: the keys that it states."""
+    label = trial.label(MANIFEST)
+    moves = trial.object_velocity_mm_s is not None and any(trial.object_velocity_mm_s)
+    if trial.states_place:
+        _check_place(trial, label)
+        if moves and (trial.stage is None or not trial.stage.moves):
+            found = "object_velocity_mm_s says that the object moves"
+            if trial.stage is None:
+                raise BadInput(f"{found}; write its places into {STAGE}", file=label)
+            raise BadInput(f"is one place at all times, and {found}", file=trial.stage.label)
+    elif trial.d_x_mm is not None and "d_x_sigma_mm" not in table and not table.get("exact"):
+        found = "d_x_mm is the truth here, and d_x_sigma_mm is missing"
+        raise BadInput(f"{found}; write one sigma, 0 where it is exact", file=label)
+    is_turned = trial.object is not None and trial.object.axis is not None
+    if trial.purpose == "measure" and trial.beta_deg is None and not is_turned:
+        found = "beta_deg is missing: the truth of a stage needs the bar's slope"
+        raise BadInput(f"{found}, 0 where it is upright", file=label)
+
+
+def _check_place(trial: Trial, label: str) -> None:
+    """Raise BadInput for an object whose contact does not follow from its place."""
+    if not trial.is_bar:
+        found = f'[object] shape = "{trial.object.shape}": a place alone gives d_x of a straight bar'
+        raise BadInput(f"{found}; state d_x_mm, and no point_mm", file=label)
+    if trial.bar_diameter_mm is None:
+        raise BadInput("bar_diameter_mm is missing: d_x follows from place and size", file=label)
 
 
 def _check_keys(keys: manifest.TrialKeys, label: str) -> None:
@@ -126,21 +178,6 @@ def _trial_table(
     elsewhere = {manifest.sigma_key(key) for key in own}
     kept = {key: value for key, value in defaults.items() if key not in elsewhere}
     return kept | own
-
-
-def _stated_object(
-    keys: manifest.ObjectKeys | None, thickness_mm: float | None, label: str
-) -> manifest.ObjectKeys | None:
-    """Return the object of trial.toml; None where there is none. Raise BadInput for an impossible one.
-
-    One that stands somewhere, and says not how, stands upright. thickness_mm: bar_diameter_mm.
-    """
-    if keys is None:
-        return None
-    _check_object(keys, thickness_mm, label)
-    if keys.point_mm is not None and keys.axis is None:
-        return replace(keys, axis=list(_UPRIGHT))
-    return keys
 
 
 def _check_object(keys: manifest.ObjectKeys, thickness_mm: float | None, label: str) -> None:

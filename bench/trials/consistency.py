@@ -317,5 +317,9 @@ def nominal_slope(trial: Trial) -> Value:
     """Return β of trial.toml, with a protractor's sigma where none is stated; UNKNOWN without β."""
     if trial.beta_deg is None:
         return UNKNOWN
-    sigma_rad = np.radians(trial.beta_sigma_deg) or _NOMINAL_SLOPE_SIGMA_RAD
-    return Value(float(np.radians(trial.beta_deg)), float(sigma_rad))
+    return Value(float(np.radians(trial.beta_deg)), nominal_slope_sigma_rad(trial))
+
+
+def nominal_slope_sigma_rad(trial: Trial) -> float:
+    """Return the stated sigma of β, rad; a protractor's where none is stated."""
+    return float(np.radians(trial.beta_sigma_deg) or _NOMINAL_SLOPE_SIGMA_RAD)

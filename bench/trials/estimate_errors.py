@@ -121,11 +121,14 @@ def _covariance_mm2(
     is left out: a placement that is off along the whisker, or a scale, changes its size alone. An
     estimate that was set to the whisker's length goes with nothing: both sigmas bound what is left.
     """
-    if seen.truth.shared is None or not len(felt.by_camera_error_Nmm):
+    shared = seen.truth.shared
+    if shared is None or not len(shared.d_x_by_camera_error_mm):
+        return 0.0
+    if not len(felt.by_camera_error_Nmm):
         return 0.0
     moment_Nmm = np.array([felt.m_y_Nmm.value, felt.m_z_Nmm.value])
     by_share = felt.by_camera_error_Nmm @ moment_Nmm / (moment_Nmm @ moment_Nmm)
-    of_truth_mm = seen.truth.shared.d_x_by_camera_error_mm
+    of_truth_mm = shared.d_x_by_camera_error_mm
     d_x_mm = row.d_x_est_mm.value
     covariance_mm2 = -d_x_mm * result.whisker.left(d_x_mm) * float(by_share @ of_truth_mm)
     most_mm2 = row.d_x_est_mm.sigma * seen.d_x_mm.sigma

@@ -146,18 +146,19 @@ def phases_of(
     seen: SeenWhisk,
     beam: Beam,
 ) -> Phases:
-    """Find felt phases, with slope and distance as seen, or nominal ones where no picture shows
-    them.
+    """Find felt phases, with slope and distance by the truth, or nominal ones where there is none.
+
+    There are none where the contact is seen not to slip.
     """
     if not seen.has_truth:
         beta_rad = trial.beta_deg and np.radians(trial.beta_deg)
         d_x_mm = trial.d_x_mm
-    elif slips(seen):
+    elif seen.deflection is None or slips(seen):
         beta_rad = seen.beta_rad.value
         d_x_mm = seen.d_x_mm.value
     else:
         return NO_PHASES
-    if not beta_rad or not d_x_mm:
+    if not beta_rad or not d_x_mm or np.isnan(beta_rad):
         return NO_PHASES
     theta = stroke.motor_rad - touch.motor_rad
     moments = readout.moments_Nmm(stroke, touch)

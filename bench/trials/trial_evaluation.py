@@ -12,7 +12,7 @@ from bench.trials.contradictions import contradicted
 from bench.trials.felt_trial import feel_trial
 from bench.trials.object_motion import MOVING
 from bench.trials.other_wires import lines_in
-from bench.trials.seen import see_trial
+from bench.trials.truth_source import truth_source
 from bench.trials.unit import Unit
 from bench.trials.whose_wire import with_whose
 from vision import NAN
@@ -28,11 +28,13 @@ def see_unit(unit: Unit) -> SeenTrial:
 
 
 def _see(unit: Unit, signals: Signals) -> SeenTrial:
-    """Evaluate the pictures of a trial; with a status where the session contradicts itself, and, of
-    an array, where the wire is not its own.
+    """Find the truth of a trial; with a status where the session contradicts itself, and, of an array,
+    where the wire is not its own.
     """
     wires = lines_in(unit.wires)
-    seen = see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings, wires)
+    seen = truth_source(unit.session).truth(
+        unit.session, unit.trial, signals, unit.calibration, unit.settings, wires
+    )
     seen = contradicted(seen, unit.contradictions)
     if not unit.wires:
         return seen

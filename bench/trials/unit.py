@@ -65,6 +65,7 @@ class Unit:
             session.whisker,
             session.board,
             session.T_rig_board,
+            session.truth,
             self.calibration.hash,
             self.settings.seen(),
             self.wires_hash,

@@ -10,8 +10,8 @@ from vision.geometry.lazy_names import lazy_names
 NAMES = {
     "board": ("Board", "PRINT_TERMS", "printed_corners"),
     "camera": ("Camera", "Cameras"),
-    "centreline": ("REST_POWERS", "centrelines", "unbent_curves", "rotation_z"),
-    "contact": ("BarAxis",),
+    "centreline": ("Curves", "REST_POWERS", "centrelines", "unbent_curves", "rotation_z"),
+    "contact": ("BarAxis", "clearance"),
     "crop": ("Crop",),
     "forms": ("touched_object",),
     "lens": ("LENS_TERMS",),

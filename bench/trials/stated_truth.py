@@ -1,0 +1,278 @@
+"""The truth by a stage: distance and slope as stated, with what is each trial's own and what is shared.
+
+d_x is what an estimator estimates: the distance from the base to the contact at first touch, on the
+whisker's centreline. Either it is stated as it is (`d_x_mm`), or it follows from the bar's place
+(`[object]`, `stage.csv`). When the whisker touches by the motor's angle is known no better than how
+it is clamped, and no stage sees how the contact slips: touch, slip and deflection stay NaN.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from bench.base.errors import BadInput
+from bench.base.settings import Settings
+from bench.base.statuses import reason
+from bench.records.trial_result import BY_STAGE, PicturedContact, SeenTrial, SeenWhisk
+from bench.session.session import Session
+from bench.session.signals import Signals, forward_strokes
+from bench.session.trial import MANIFEST, Trial
+from bench.trials.consistency import nominal_slope, nominal_slope_sigma_rad
+from bench.trials.differences import Difference
+from bench.trials.stage_contact import REST_TERMS, Contact, Offsets, StatedPush
+from vision import NAN, UNKNOWN, SharedSigmas, TruthAtAngle, Value, WhiskTruth
+from vision.geometry import NO_REASON, Reason, joined
+
+NOT_SEEN = reason("slip_not_seen")
+# [mm] One sigma of where the clamp holds the whisker's axis beside the hub's: a collet's runout.
+# Stated.
+_CLAMP_MM = 0.3
+# [1] Of the length: one sigma of the tip's distance from a straight line, by set and sag, where
+# nothing is stated of the unloaded shape. A drawn wire, straightened by hand. Stated.
+_SET_SHARE = 0.01
+# [mm] One sigma of a stated distance without one: a ruler's. Stated.
+_RULER_MM = 0.5
+# Steps of derivatives: mm, rad, mm, mm. What is left out is 1e-6 of them. Derived.
+_STEPS = Offsets(np.full(3, 1e-3), 1e-4, 1e-4, 1e-3, np.full((2, REST_TERMS), 1e-3)).vector
+# Units that a length may be in, and mm in each.
+_UNITS = (
+    ("metres", 1e3),
+    ("centimetres", 10.0),
+    ("tenths of a millimetre", 0.1),
+    ("micrometres", 1e-3),
+)
+_HOW = {
+    "starts_touching": "touches before the stroke begins",
+    "never_touches": "does not come to the object in this stroke",
+}
+
+
+def by_stage(
+    session: Session, trial: Trial, signals: Signals, settings: Settings, seen: SeenTrial
+) -> SeenTrial:
+    """Return a trial's whisks with the truth that its stage states, compared with what is seen.
+
+    seen: what the cameras show. Raises BadInput where no such contact can be.
+    """
+    strokes = forward_strokes(signals)
+    whisks = []
+    for whisk, stroke in zip(seen.whisks, strokes):
+        stated = stated_whisk(session, trial, signals, stroke)
+        whisks.append(_with_stated(whisk, stated, settings))
+    return replace(seen, whisks=tuple(whisks))
+
+
+def _with_stated(seen: SeenWhisk, stated: WhiskTruth, settings: Settings) -> SeenWhisk:
+    """Return a whisk with the stage's distance and slope; touch, slip and bend are those seen."""
+    truth = replace(
+        seen.truth,
+        d_x_mm=stated.d_x_mm,
+        beta_rad=stated.beta_rad,
+        psi_rad=stated.psi_rad,
+        shared=_shared(seen, stated),
+        budget={},
+        status=stated.status,
+    )
+    whisk = replace(seen, truth=truth, source=BY_STAGE)
+    if not seen.has_truth:
+        at = TruthAtAngle(theta_rad=settings.theta_rad, status=_why_not_seen(seen))
+        return replace(whisk, at=at, status=joined(stated.status, at.status))
+    against = _unlike_pictures(stated, seen)
+    return replace(
+        whisk,
+        pictured=PicturedContact(seen.d_x_mm, seen.beta_rad),
+        status=joined(seen.status, stated.status, against),
+        contradicted=seen.contradicted or bool(against),
+    )
+
+
+def _shared(seen: SeenWhisk, stated: WhiskTruth) -> SharedSigmas | None:
+    """Return what all whisks share: of d_x and slopes by the stage, of touch and contact by the cameras."""
+    if seen.truth.shared is None or stated.shared is None:
+        return stated.shared
+    return replace(
+        stated.shared,
+        touch_rad=seen.truth.shared.touch_rad,
+        point_mm=seen.truth.shared.point_mm,
+    )
+
+
+def _why_not_seen(seen: SeenWhisk) -> Reason:
+    """Return why slip and deflection are not known."""
+    if set(seen.status.codes) <= {"no_pictures"}:
+        return NOT_SEEN
+    return Reason(NOT_SEEN.code, f"{NOT_SEEN}, nor do the pictures show it: {seen.status}")
+
+
+def _unlike_pictures(stated: WhiskTruth, seen: SeenWhisk) -> Reason:
+    """Return how the stage's distance contradicts the one seen; NO_REASON where chance explains it."""
+    apart_mm = stated.d_x_mm.value - seen.d_x_mm.value
+    sigma_mm = float(np.hypot(stated.d_x_mm.sigma, seen.d_x_mm.sigma))
+    if not np.isfinite(apart_mm) or Difference.scalar(apart_mm, sigma_mm).is_chance:
+        return NO_REASON
+    found = f"d_x by the stage is {apart_mm:+.2f} ± {sigma_mm:.2f} mm from the one seen"
+    cause = "check the stage's origin, whether the place is the object's middle, and T_rig_board"
+    return Reason("stage_unlike_pictures", f"{found}: {cause}")
+
+
+def _unlike_stated(d_x_mm: Value, trial: Trial) -> Reason:
+    """Return how a distance by the object's place contradicts d_x_mm; NO_REASON where it does not."""
+    if trial.d_x_mm is None:
+        return NO_REASON
+    apart_mm = d_x_mm.value - trial.d_x_mm
+    sigma_mm = float(np.hypot(d_x_mm.sigma, trial.d_x_sigma_mm or _RULER_MM))
+    if Difference.scalar(apart_mm, sigma_mm).is_chance:
+        return NO_REASON
+    found = f"d_x by the object's place is {d_x_mm.value:.2f} mm, d_x_mm says {trial.d_x_mm:g}"
+    rule = "d_x_mm goes from the base to the contact, the place to the bar's axis"
+    return Reason("distance_unlike_stated", f"{found} ({sigma_mm:.2g} mm are chance): {rule}")
+
+
+def _check_on_whisker(d_x_mm: float, session: Session, trial: Trial) -> None:
+    """Raise BadInput for a stated distance that no contact on the whisker has."""
+    length_mm = session.whisker.length_mm
+    if d_x_mm > length_mm:
+        found = f"d_x_mm is {d_x_mm:g}, beyond the whisker's length of {length_mm:g} mm"
+        hint = _in_other_unit(d_x_mm, 1.0, length_mm)
+        raise BadInput(f"{found}{hint}", file=trial.label(MANIFEST))
+
+
+def _check_place(push: StatedPush, trial: Trial) -> None:
+    """Raise BadInput for a bar that stands where no whisker of this length can touch it."""
+    base_mm = push.from_base_mm()
+    least_mm = push.bar_radius_mm
+    most_mm = push.wire.length_mm + least_mm
+    if least_mm < base_mm <= most_mm:
+        return
+    is_near = base_mm <= least_mm
+    found = f"the object's axis passes the whisker's base at {base_mm:.4g} mm"
+    why = f"beyond the whisker's length of {push.wire.length_mm:g} mm"
+    if is_near:
+        why = f"nearer than its radius of {least_mm:g} mm"
+    hint = _in_other_unit(base_mm, least_mm, most_mm)
+    label = trial.label(MANIFEST) if trial.stage is None else trial.stage.label
+    raise BadInput(f"{found}, {why}{hint}", file=label)
+
+
+def _in_other_unit(length: float, least_mm: float, most_mm: float) -> str:
+    """Return '. Is it in metres?' where a length would be on the whisker in another unit, or ''."""
+    for name, factor in _UNITS:
+        if least_mm < length * factor <= most_mm:
+            return f". Is it in {name}?"
+    return ""
+
+
+def stated_whisk(session: Session, trial: Trial, signals: Signals, stroke: slice) -> WhiskTruth:
+    """Return the truth of one stroke as the stage states it; a status where it states none.
+
+    Raises BadInput for a distance beyond the whisker, or a place where no bar can be touched.
+    """
+    if trial.states_place:
+        return _by_place(session, trial, signals, stroke)
+    if trial.d_x_mm is None:
+        return WhiskTruth(0, status=reason("stage_says_nothing"))
+    _check_on_whisker(trial.d_x_mm, session, trial)
+    slope = nominal_slope(trial)
+    tilt = Value(0.0, slope.sigma) if np.isfinite(slope.value) else UNKNOWN
+    shared_mm = session.truth.origin_sigma_mm
+    sigma_mm = float(np.hypot(trial.d_x_sigma_mm, shared_mm))
+    return _truth(Value(trial.d_x_mm, sigma_mm), slope, tilt, shared_mm)
+
+
+def _truth(d_x_mm: Value, beta_rad: Value, psi_rad: Value, shared_mm: float) -> WhiskTruth:
+    """Return a truth by its numbers; shared_mm: the part of d_x's sigma that all whisks share."""
+    shared = SharedSigmas(NAN, shared_mm, 0.0, 0.0, np.full(3, NAN))
+    return WhiskTruth(0, d_x_mm=d_x_mm, beta_rad=beta_rad, psi_rad=psi_rad, shared=shared)
+
+
+def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -> WhiskTruth:
+    """Return the truth of a stroke against a bar that stands where the stage has it."""
+    push = _push(session, trial, signals, stroke)
+    none = Offsets.none()
+    touch = push.touch(none)
+    if touch is None:
+        _check_place(push, trial)
+        code = "starts_touching" if push.starts_touching(none) else "never_touches"
+        return WhiskTruth(0, status=Reason(code, f"by the stage the whisker {_HOW[code]}"))
+    rows = _derivatives(push)
+    own = rows * _own_sigmas(trial, signals, stroke, touch)
+    shared = rows * _shared_sigmas(session, trial)
+    shared_mm = float(np.linalg.norm(shared[0]))
+    values = []
+    for value, of_own, of_shared in zip((touch.d_x_mm, touch.beta_rad, touch.psi_rad), own, shared):
+        values.append(Value(value, float(np.hypot(*map(np.linalg.norm, (of_own, of_shared))))))
+    truth = _truth(*values, shared_mm)
+    return replace(truth, status=_unlike_stated(values[0], trial))
+
+
+def _push(session: Session, trial: Trial, signals: Signals, stroke: slice) -> StatedPush:
+    """Return a stroke against the trial's bar. Raise BadInput where the stage's log does not cover it."""
+    time_s = signals.time_s[stroke]
+    motor_rad = signals.motor_rad[stroke]
+    log = trial.stage
+    if log is not None and not log.covers(time_s):
+        held = f"holds {log.time_s[0]:.6g} to {log.time_s[-1]:.6g} s"
+        found = f"{held}; a stroke of the signals goes from {time_s[0]:.6g} to {time_s[-1]:.6g} s"
+        raise BadInput(f"{found}; both are on one clock", file=log.label)
+    stated = trial.object
+    origin_mm = np.zeros(3) if stated is None or stated.point_mm is None else stated.point_mm
+    rising = np.maximum.accumulate(motor_rad)
+
+    def place_at(angles_rad: np.ndarray) -> np.ndarray:
+        """Return the bar's place (..., 3), mm, when the motor is at angles (...)."""
+        if log is None:
+            return np.broadcast_to(origin_mm, (*np.shape(angles_rad), 3))
+        return origin_mm + log.at(np.interp(angles_rad, rising, time_s))
+
+    axis = None if stated is None or stated.axis is None else np.array(stated.axis, dtype=float)
+    if axis is not None:
+        axis = axis / np.linalg.norm(axis) * (-1.0 if axis[2] < 0 else 1.0)
+    slope_rad = nominal_slope(trial).value
+    return StatedPush(
+        motor_rad,
+        place_at,
+        session.whisker.wire,
+        0.5 * trial.bar_diameter_mm,
+        axis,
+        float(slope_rad) if np.isfinite(slope_rad) else 0.0,
+    )
+
+
+def _derivatives(push: StatedPush) -> np.ndarray:
+    """Return the derivatives (3, p) of d_x, β and ψ by all offsets."""
+    rows = []
+    for k, step in enumerate(_STEPS):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = np.zeros(len(_STEPS))
+            moved[k] = sign * step
+            at = push.touch(Offsets.from_vector(moved))
+            ends.append([NAN] * 3 if at is None else [at.d_x_mm, at.beta_rad, at.psi_rad])
+        rows.append((np.array(ends[0]) - np.array(ends[1])) / (2.0 * step))
+    return np.stack(rows, axis=-1)
+
+
+def _own_sigmas(trial: Trial, signals: Signals, stroke: slice, touch: Contact) -> np.ndarray:
+    """Return one sigma (p,) of each offset that is the trial's own: place and direction."""
+    variances = np.zeros(3)
+    if trial.object is not None and trial.object.point_mm is not None:
+        variances += trial.object.point_sigma_mm**2
+    if trial.stage is not None:
+        rising = np.maximum.accumulate(signals.motor_rad[stroke])
+        time_s = np.interp(touch.motor_rad, rising, signals.time_s[stroke])
+        variances += trial.stage.sigma_at(time_s) ** 2
+    slope_sigma_rad = nominal_slope_sigma_rad(trial)
+    return Offsets(
+        np.sqrt(variances), slope_sigma_rad, slope_sigma_rad, 0.0, np.zeros((2, REST_TERMS))
+    ).vector
+
+
+def _shared_sigmas(session: Session, trial: Trial) -> np.ndarray:
+    """Return one sigma (p,) of each offset that all whisks share: origin, radii, the whisker's shape."""
+    whisker = session.whisker
+    reach_mm = 0.5 * np.hypot(trial.bar_diameter_sigma_mm, whisker.diameter_sigma_mm)
+    is_stated = whisker.rest_curvature_per_mm is not None or whisker.rest_shape is not None
+    set_mm = 0.0 if is_stated else _SET_SHARE * whisker.length_mm
+    rest_mm = np.tile([_CLAMP_MM, 0.0, set_mm], (2, 1))
+    place_mm = np.full(3, session.truth.origin_sigma_mm)
+    return Offsets(place_mm, 0.0, 0.0, float(reach_mm), rest_mm).vector
