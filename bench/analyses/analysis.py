@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from bench.analyses.estimator_accuracy import RunAccuracy
-from bench.base.drawing import is_drawn, save, style
+from bench.base.drawing import is_drawn, name_truth, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.settings import Settings
 from bench.base.tables import Table
-from bench.records.trial_result import TrialResult
+from bench.records.trial_result import BY_STAGE, TrialResult
 from bench.session.session import Session
 from bench.session.whisker import Whisker
 
@@ -51,6 +51,11 @@ class EvaluatedRun:
     def accuracy(self) -> RunAccuracy:
         """Return how well the truth is known, and how far off each estimator is."""
         return RunAccuracy.of_results(self.results)
+
+    @property
+    def is_by_stage(self) -> bool:
+        """Return whether the truth is a stage's."""
+        return self.accuracy.truth.source == BY_STAGE
 
     def found(self, analysis: "Analysis") -> Any:
         """Return what an analysis finds in this run; it is computed at first use."""
@@ -114,6 +119,19 @@ class Analysis(ABC):
         """Draw its figure; None where there is nothing to show."""
         return None
 
+    def figure_of(self, run: EvaluatedRun) -> "Figure | None":
+        """Draw its figure of a run, by a stage's truth with that word; None where nothing is shown."""
+        figure = self.figure(run.found(self))
+        if figure is not None and run.is_by_stage:
+            name_truth(figure, BY_STAGE)
+        return figure
+
+    def caption_of(self, run: EvaluatedRun) -> str:
+        """Return what stands below its figure of a run."""
+        if run.is_by_stage:
+            return f"{self.figure_caption} The truth is a stage's."
+        return self.figure_caption
+
     def page_table(self, out: Path) -> PageTable | None:
         """Return its table of the page, made from the tables in the folder `out`.
 
@@ -140,7 +158,7 @@ class Analysis(ABC):
         stamp = hash_of(hashes, run.settings, hash_of_code(_FIGURE_CODE))
         if not is_drawn(path, stamp):
             with style():
-                figure = self.figure(run.found(self))
+                figure = self.figure_of(run)
                 if figure is None:
                     return []
                 save(figure, path, stamp)

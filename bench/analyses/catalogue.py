@@ -17,6 +17,7 @@ from bench.analyses.moving_objects import MovingObjects
 from bench.analyses.reorientation import Reorientation
 from bench.analyses.single_camera import OneCamera
 from bench.analyses.soft import Softness
+from bench.analyses.stage_and_pictures import StageAndPictures
 from bench.analyses.table_i_sensors import Sensors
 from bench.analyses.tilted import Tilts
 
@@ -39,5 +40,6 @@ ANALYSES: tuple[Analysis, ...] = (
     MovingObjects(),
     BothWays(),
     OneCamera(),
+    StageAndPictures(),
     Ledger(),
 )

@@ -265,7 +265,7 @@ class TruthUncertainty:
     known, measured: numbers of whisks with a truth and of all. d_x_own_mm, d_x_shared_mm: the parts
     of d_x's that are each whisk's own, and that all share; NaN where that is not known. in_doubt:
     of those with a truth, how many have a status that reaches it; contradiction: the commonest of
-    what they say.
+    what they say. source: of the truth, BY_PICTURES or BY_STAGE; "" where there is none.
     """
 
     known: int
@@ -278,6 +278,7 @@ class TruthUncertainty:
     d_x_shared_mm: float = math.nan
     in_doubt: int = 0
     contradiction: Reason = NO_REASON
+    source: str = ""
 
     @property
     def d_x_text(self) -> str:
@@ -305,6 +306,7 @@ def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
         d_x_shared_mm=_finite_median([seen.d_x_shared_sigma_mm for seen in known]),
         in_doubt=sum(map(bool, contradictions)),
         contradiction=_commonest(contradictions),
+        source=known[0].truth_source if known else "",
     )
 
 

@@ -12,7 +12,7 @@ from bench.analyses.alphas import felt_friction, seen_friction
 from bench.analyses.runs import GIVEN, KINETIC
 from bench.base.statuses import reason
 from bench.gauges.felt import motor_speed
-from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
+from bench.records.trial_result import BY_STAGE, EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from bench.session.whisker import Whisker
 from bench.trials.clocks import SharedTouch
 from estimator import first_order
@@ -121,6 +121,8 @@ def effect_on_truth(name: str, model: WhiskModel) -> LeftOut:
     """Return by how much the truth would differ without a refinement."""
     if not model.seen.has_truth:
         return LeftOut(NAN, NAN, NAN, reason("no_truth"))
+    if model.seen.source == BY_STAGE:
+        return LeftOut(why=reason("stage_fits_nothing"))
     if name == "clock":
         return _effect_of_clock(model)
     if name in model.seen.truth.refinements:

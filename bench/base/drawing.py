@@ -173,6 +173,11 @@ def draw_whisks(
     points.set_urls(list(urls))
 
 
+def name_truth(figure: "Figure", source: str) -> None:
+    """Write below a figure where the truth that it shows comes from."""
+    figure.supxlabel(f"truth: {source}", x=0.99, ha="right", fontsize=7, color="0.35")
+
+
 def save(figure: "Figure", path: Path, stamp: str, dpi: int = 160) -> None:
     """Write a PNG whole, with the hash of what it shows."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -203,6 +203,7 @@ _TABLE = (
         "the truth is a stage's: touch, slip and deflection are not seen",
         _GIVE_PICTURES,
     ),
+    Status("stage_fits_nothing", NOTE, "a stage's truth rests on no fit"),
     Status(
         "stage_says_nothing",
         REFUSAL,

@@ -73,6 +73,11 @@ WHISK = Column("whisk", "number of the trial's forward stroke, from 0", Kind.WHO
 SURFACE = Column("surface", "as the manifest names it", Kind.TEXT)
 SPEED = Column("speed_deg_s", "nominal speed of the motor")
 WHISKER = Column("whisker", "name of the array's whisker", Kind.TEXT)
+TRUTH_SOURCE = Column(
+    "truth_source",
+    "what d_x and the slopes of the truth rest on: pictures or stage; empty without a truth",
+    Kind.TEXT,
+)
 WHISKS_KNOWN = Column("whisks", "how many whisks with a distance", Kind.WHOLE)
 WHISKS_WITHOUT = Column("none", "how many whisks without a distance")
 

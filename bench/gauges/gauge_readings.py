@@ -148,7 +148,7 @@ def pairs_of(
     try:
         if seen.deflection is None:
             # it counts from felt touch, which is as late as the volts
-            reference = reference_from_nominal(trial, touch, whisker)
+            reference = reference_from_nominal(_with_stated(trial, seen), touch, whisker)
         else:
             reference = reference_from_pictures(seen, whisker)
             if reference is not None:
@@ -163,6 +163,20 @@ def pairs_of(
     if pairs is None:
         return reason("gauge_push_short", degrees=np.degrees(theta_rad))
     return replace(pairs, source=source_of(seen))
+
+
+def _with_stated(trial: Trial, seen: SeenWhisk) -> Trial:
+    """Return the trial with the distance and slope of a truth that is no picture's, where there is one."""
+    if not seen.has_truth:
+        return trial
+    d_x_mm = seen.d_x_mm
+    beta_deg = float(np.degrees(seen.beta_rad.value))
+    return replace(
+        trial,
+        d_x_mm=float(d_x_mm.value),
+        d_x_sigma_mm=float(d_x_mm.sigma),
+        beta_deg=beta_deg if np.isfinite(beta_deg) else None,
+    )
 
 
 def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMoments | None:

@@ -67,6 +67,7 @@ def whisk_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
         row["cameras"] = seen.truth.cameras
         row["frames_used"] = seen.truth.frames_used
         row["looked"] = seen.looked
+        row["truth_source"] = seen.truth_source
         yield row
 
 
@@ -155,6 +156,7 @@ def estimate_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
                 "beta_est_deg": degrees(estimate.beta_est_rad),
                 "error_mm": error_mm,
                 "error_percent": 100.0 * error_mm / true_mm,
+                "truth_source": seen.truth_source,
                 "status": estimate.status,
             }
             row |= _cells("d_x_est_mm", estimate.d_x_est_mm)

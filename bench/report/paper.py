@@ -34,10 +34,10 @@ def session_figures(run: EvaluatedRun) -> list[SessionFigure]:
     for analysis in ANALYSES:
         if not analysis.figure_name or analysis.needs_session:
             continue
-        drawing = analysis.figure(run.found(analysis))
+        drawing = analysis.figure_of(run)
         if drawing is not None:
             title = analysis.figure_title
-            caption = analysis.figure_caption
+            caption = analysis.caption_of(run)
             figures.append(SessionFigure(analysis.figure_name, title, caption, drawing))
     return figures
 

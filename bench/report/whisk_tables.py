@@ -4,6 +4,7 @@ from bench.base.tables import (
     SPEED,
     SURFACE,
     TRIAL,
+    TRUTH_SOURCE,
     WHISK,
     Column,
     Kind,
@@ -36,6 +37,7 @@ WHISKS = Table(
         *with_sigma("touch_deg", "motor angle of first touch, seen"),
         *with_sigma("touch_felt_deg", "motor angle of first touch, felt"),
         *with_sigma("d_x_mm", "distance from the base to the contact at first touch: the truth"),
+        TRUTH_SOURCE,
         *with_sigma(
             "beta_deg", "slope of the bar in the sensing plane (conventions of the README)"
         ),
@@ -91,6 +93,7 @@ ESTIMATES = Table(
         Column("d_x_est_high_mm", "high end of its 95 % interval; the whisker's length is open"),
         Column("beta_est_deg", "slope estimated, where it gives one"),
         Column("error_mm", "estimate less truth"),
+        TRUTH_SOURCE,
         Column("error_percent", "estimate less truth, % of the truth"),
         *with_sigma(
             "theta_c_deg",

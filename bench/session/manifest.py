@@ -360,7 +360,9 @@ class TruthKeys(GivenKeys):
     # "stage": `d_x_mm`, `[object]` or `stage.csv` of each trial do; pictures are compared with it
     source: Literal["stage"]
     # how far the stage's origin may be from the whisker's base, each way: alike in all whisks
-    origin_sigma_mm: Annotated[float, Assumed(absolute=0.2, of="source", origin=_BY_HAND)] = 0.0
+    origin_sigma_mm: Annotated[
+        float, Assumed(absolute=0.2, unstated="the stage's origin", origin=_BY_HAND)
+    ] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 A robot has no sample of the future. Its filter is causal, and the stroke ends when it estimates:
 felt touch, zero and moments are made of what came before. Nothing that follows the contact takes
-out a drift. The time counts from the touch as seen.
+out a drift. The time counts from the touch as seen, or as felt where the truth is a stage's, which knows no touch.
 """
 
 import math
@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from bench.analyses.alphas import seen_friction
 from bench.gauges.felt import FeltStroke
-from bench.records.trial_result import EstimateRow, SeenWhisk, TrialResult
+from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.trials.estimate_errors import is_sound
@@ -81,6 +81,7 @@ class Answer:
     """
 
     estimator: str
+    truth_source: str
     converter: Converter
     speed_deg_s: float
     rate_Hz: float
@@ -106,19 +107,23 @@ class Task:
 
 @dataclass(frozen=True)
 class _ConvertedWhisk:
-    """A whisk whose truth is sound, and its stroke through a converter."""
+    """A whisk whose truth is sound, and its stroke through a converter.
+
+    touch_rad: motor angle that times count from.
+    """
 
     task: Task
     readout: Readout
     seen: SeenWhisk
+    touch_rad: float
     converter: Converter
     stroke: FeltStroke
     rate_Hz: float
 
     @property
     def touch_s(self) -> float:
-        """Return the time of the touch as seen; NaN where the motor does not come so far."""
-        return _time_at(self.stroke, self.seen.touch_rad.value)
+        """Return the time of touch; NaN where the motor does not come so far."""
+        return _time_at(self.stroke, self.touch_rad)
 
     @property
     def radii_mm(self) -> tuple[float, float]:
@@ -159,9 +164,19 @@ def answers_of_trial(task: Task) -> list[Answer]:
             stroke = _convert_stroke(signals, where, converter, task.range_V)
             if stroke is not None:
                 rate_Hz = signals.rate_Hz / converter.every
-                whisk = _ConvertedWhisk(task, readout, seen, converter, stroke, rate_Hz)
+                touch_rad = _touch_rad(seen, felt)
+                whisk = _ConvertedWhisk(
+                    task, readout, seen, touch_rad, converter, stroke, rate_Hz
+                )
                 found += _answers_of_whisk(whisk)
     return found
+
+
+def _touch_rad(seen: SeenWhisk, felt: FeltWhisk) -> float:
+    """Return the motor angle that times count from: of touch as seen, else as felt."""
+    if np.isfinite(seen.touch_rad.value):
+        return float(seen.touch_rad.value)
+    return float(felt.touch_felt_rad.value)
 
 
 def _convert_stroke(
@@ -184,7 +199,7 @@ def _answers_of_whisk(whisk: _ConvertedWhisk) -> Iterator[Answer]:
     stroke = whisk.stroke
     for push_deg in PUSHES_DEG:
         push_rad = math.radians(push_deg)
-        pushed_s = _time_at(stroke, whisk.seen.touch_rad.value + push_rad)
+        pushed_s = _time_at(stroke, whisk.touch_rad + push_rad)
         end_s = pushed_s + whisk.converter.delay_s
         if not end_s <= stroke.time_s[-1]:  # NaN, too
             return
@@ -224,6 +239,7 @@ def _answers_at(
             noise_percent = 100.0 * row.d_x_est_sigma_alpha_exact_mm / d_x_mm
         yield Answer(
             estimator=expected.estimator,
+            truth_source=whisk.seen.truth_source,
             converter=whisk.converter,
             speed_deg_s=math.degrees(whisk.stroke.speed_rad_s),
             rate_Hz=whisk.rate_Hz,

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.analyses.pooling import mean, rms
 from bench.base.drawing import label_of
-from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
+from bench.base.tables import TRUTH_SOURCE, WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
 from bench.workflows.expected_error import ExpectedRms
 from bench.workflows.robot_answers import Answer
 from vision.geometry import counted
@@ -32,6 +32,7 @@ class Point:
     """
 
     estimator: str
+    truth_source: str
     speed_deg_s: float
     cutoff_Hz: float
     rate_Hz: float
@@ -78,6 +79,7 @@ ROBOT_TRADE = Table(
             "0; by expected_rms_percent, or a measured RMS above expected_high_percent",
         ),
         Column("estimator", "as in estimates.csv", Kind.TEXT),
+        TRUTH_SOURCE,
         Column("speed_deg_s", "speed of the motor, to two digits"),
         Column("cutoff_Hz", "of a causal low-pass (fourth order); empty as recorded"),
         Column("rate_Hz", "samples a second"),
@@ -124,6 +126,7 @@ def _point(answers: Sequence[Answer], speed_deg_s: float) -> Point:
     expected_rms = ExpectedRms.of_errors(expected, noise)
     return Point(
         estimator=first.estimator,
+        truth_source=first.truth_source,
         speed_deg_s=speed_deg_s,
         cutoff_Hz=first.converter.cutoff_Hz or np.nan,
         rate_Hz=float(np.median([one.rate_Hz for one in answers])),

@@ -17,12 +17,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, ScalarFormatter
 
 from bench.base.atomic import lock_output
-from bench.base.drawing import colour_of, label_of, nested_size, publish, style
+from bench.base.drawing import colour_of, label_of, name_truth, nested_size, publish, style
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.records.trial_result import TrialResult
+from bench.records.trial_result import BY_STAGE, TrialResult
 from bench.report.evaluation import finished
 from bench.session.inside import check_outside
 from bench.session.session_check import checked_session
@@ -65,7 +65,10 @@ def robot_trade(
         rows.append({"on_front": int(is_on_front)} | vars(point))
     ROBOT_TRADE.write(out, rows)
     with style():
-        publish(draw(points, on_front), out / FIGURE)
+        figure = draw(points, on_front)
+        if points[0].truth_source == BY_STAGE:
+            name_truth(figure, BY_STAGE)
+        publish(figure, out / FIGURE)
     return points
 
 

@@ -8,7 +8,7 @@ from bench.analyses.alphas import seen_friction
 from bench.base.drawing import label_of
 from bench.base.statuses import cure_of
 from bench.gauges.felt import lateness
-from bench.records.trial_result import EstimateRow, SeenWhisk
+from bench.records.trial_result import BY_STAGE, EstimateRow, SeenWhisk
 from bench.report.assembly import status_of
 from bench.report.page.thumbnails import picture_source
 from bench.report.page.words import (
@@ -127,7 +127,7 @@ def _quantities(row: WhiskRow) -> list[_Quantity]:
     seen = row.seen
     felt = row.felt
     return [
-        ("d_x", seen.d_x_mm, "mm"),
+        ("d_x by a stage" if seen.source == BY_STAGE else "d_x", seen.d_x_mm, "mm"),
         ("touch seen", seen.touch_rad, "°"),
         ("touch felt", felt.touch_felt_rad, "°"),
         ("slope β", seen.beta_rad, "°"),

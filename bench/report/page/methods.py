@@ -64,6 +64,14 @@ def _truth(record: RunRecord, run: Finished) -> Iterator[str]:
         f"(C = 3EI = {whisker.C_Nmm2:.0f} N·mm²) was pushed against a bar in {truth.measured} measured whisks of "
         f"{len(trials)} trials."
     )
+    if run.is_by_stage:
+        yield (
+            f"The true radial distance d_x is known by a stage for {truth.known} of {truth.measured} whisks, with a "
+            f"median standard uncertainty of {number(truth.d_x_mm, 4)} mm, of which {number(truth.d_x_own_mm, 4)} mm "
+            f"are each whisk's own and {number(truth.d_x_shared_mm, 4)} mm are common to all (slope "
+            f"{number(truth.beta_deg, 3)}°)."
+        )
+        return
     if not record.cameras:
         yield "No pictures were recorded, so that no truth stands beside the estimates."
         return

@@ -84,6 +84,7 @@ def page(out: Path, record: RunRecord, run: Finished) -> str:
         **_of_run(record, run, rows),
         **_of_scene(record, rows),
         record=record,
+        run=run,
         drawings=drawings,
         page_tables=page_tables(out),
         citation=bibliography(record),

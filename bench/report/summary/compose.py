@@ -151,7 +151,8 @@ def _sections_of_errors(evaluation: Evaluation) -> Iterator[Section]:
     title = (
         f"Error of d_x at θ = {theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
     )
-    yield _section("truth", "Truth, from the pictures (± one sigma)", truth)
+    source = "by a stage" if evaluation.is_by_stage else "from the pictures"
+    yield _section("truth", f"Truth, {source} (± one sigma)", truth)
     yield _section("clocks", "Clocks", clock_lines(results))
     yield _section("errors", title, [*error_lines(judge(results)), *contact_lines(results)])
 

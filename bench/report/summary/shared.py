@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from bench.records.trial_result import SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import BY_STAGE, SeenWhisk, TrialResult, whisks
 from vision.geometry import Reason, counted
 
 # Chance by which whisks of one recording would scatter so much with a sound part of their own.
@@ -91,11 +91,14 @@ def _other_parts(known: Sequence[SeenWhisk]) -> str:
     for name, field in _ANGLES.items():
         sigma = np.array([getattr(seen, field).sigma for seen in known])
         shared = np.array([getattr(seen.truth.shared, field) for seen in known])
-        texts.append(Parts.of(np.degrees(sigma), np.degrees(shared)).text(name, 4, "deg"))
+        if np.isfinite(sigma).all():  # no stage knows touch
+            texts.append(Parts.of(np.degrees(sigma), np.degrees(shared)).text(name, 4, "deg"))
     texts += _slip_part(known)
     sigmas = np.array([seen.point_mm.sigma for seen in known])
     shared = np.array([seen.truth.shared.point_mm for seen in known])
     for axis, own_sigma, own_shared in zip(_AXES, sigmas.T, shared.T):
+        if not np.isfinite(own_sigma).all():
+            continue
         texts.append(Parts.of(own_sigma, own_shared).text(f"contact {axis}", 3, "mm"))
     return ", ".join(texts)
 
@@ -110,6 +113,13 @@ def _slip_part(known: Sequence[SeenWhisk]) -> list[str]:
         return []
     sigma, shared = np.array(slips).T
     return [Parts.of(sigma, shared).text("slip at θ", 4, "mm")]
+
+
+def _causes(results: Sequence[TrialResult]) -> str:
+    """Return what makes the error that all whisks share."""
+    if _known(results)[0].source == BY_STAGE:
+        return "the stage's origin, diameters, the whisker's shape"
+    return "diameters, light, cameras, placement, clock"
 
 
 def _scatter(results: Sequence[TrialResult], name: str) -> tuple[float, int]:
@@ -134,7 +144,7 @@ def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
         return
     yield (
         f"of d_x's sigma ± {shared.shared_mm:.4f} mm is one error that all {shared.n} whisks share "
-        f"(diameters, light, cameras, placement, clock), ± {shared.own_mm:.4f} mm each whisk's own: "
+        f"({_causes(results)}), ± {shared.own_mm:.4f} mm each whisk's own: "
         f"the mean of {counted(shared.settings, 'recording')} is known to ± {shared.mean_sigma_mm:.4f} mm"
     )
     yield f"  shared by all and each whisk's own, one sigma: {_other_parts(_known(results))}"
@@ -142,6 +152,8 @@ def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
         angles = []
         for name, field in _ANGLES.items():
             scatter_rad, _ = _scatter(results, field)
+            if np.isnan(scatter_rad):
+                continue
             angles.append(f"{name} {np.degrees(scatter_rad):.4f}°")
         yield (
             f"  whisks of one recording scatter about their mean by d_x {shared.scatter_mm:.4f} mm, "

@@ -24,11 +24,13 @@ def truth_lines(results: Iterable[TrialResult]) -> Iterator[str]:
         )
     for result, seen, felt in known:
         late = lateness(seen, felt)
-        late_deg = f"{np.degrees(late.value):+.3f} ± {np.degrees(late.sigma):.3f}"
+        late_deg = "- "
+        if np.isfinite(late.value):
+            late_deg = f"{np.degrees(late.value):+.3f} ± {np.degrees(late.sigma):.3f}°"
         yield (
             f"{result.trial.name:<18}{seen.whisk:>5}  {_degrees(seen.beta_rad, 2):>15}°  "
             f"{_with_sigma(seen.d_x_mm, 3):>14} mm  {_with_sigma(seen.at.slip_mm, 3):>14} mm  "
-            f"{_degrees(seen.touch_rad, 3):>16}°  {late_deg:>16}°"
+            f"{_degrees(seen.touch_rad, 3):>16}°  {late_deg:>17}"
         )
 
 

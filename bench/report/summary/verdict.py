@@ -16,7 +16,7 @@ from bench.analyses.runs import FITTED, RUNS
 from bench.base.settings import Seeing, Settings
 from bench.base.statuses import cure_of
 from bench.gauges.matrix import FROM_ALL, GaugeCalibration
-from bench.records.trial_result import TrialResult, whisks
+from bench.records.trial_result import BY_STAGE, TrialResult, whisks
 from bench.trials.estimate_errors import Judged
 from vision.geometry import counted
 
@@ -66,12 +66,13 @@ def _withheld(truth: TruthUncertainty, compared: Sequence[Accuracy]) -> str:
 def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warnings: int) -> str:
     """Return of how many whisks the truth is known, and how well."""
     count = counted(truth.measured, "measured whisk")
-    if not has_pictures:
-        known = f"no pictures, so the true distance is not known; {count} felt"
-    elif truth.known:
-        known = f"the true distance is known for {truth.known} of {count}, to {truth.d_x_text}"
+    if truth.known:
+        by = " by a stage" if truth.source == BY_STAGE else ""
+        known = f"the true distance is known{by} for {truth.known} of {count}, to {truth.d_x_text}"
         if truth.in_doubt:
             known += _in_doubt(truth)
+    elif not has_pictures:
+        known = f"no pictures, so the true distance is not known; {count} felt"
     else:
         known = f"the true distance is known for none of {count}"
     warned = f"{counted(warnings, 'doubt')}, see below" if warnings else "nothing doubtful"
