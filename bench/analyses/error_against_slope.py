@@ -1,4 +1,4 @@
-"""Error of every estimator against the slope, and of (10) against the friction angle that is seen."""
+"""Error of every estimator against the slope, and of (10) against the friction angle."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,6 +9,7 @@ import numpy as np
 from bench.analyses.alphas import seen_friction
 from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.pooling import grouped, panel_title
+from bench.analyses.runs import FITTED
 from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import (
     SLOPES_DEG,
@@ -59,21 +60,21 @@ class ErrorAgainstSlope(Analysis):
 
 
 class ErrorAgainstFriction(Analysis):
-    """The error of (10) against the friction angle that the pictures show."""
+    """The error of (10) against the friction angle that the pictures show, or that fits."""
 
     figure_name = "error_against_friction"
     figure_title = "Error against friction"
     figure_caption = (
-        "Against the friction angle that the pictures show, of whisks that slip: where α_est is not α, "
-        "(10) errs."
+        "Against the friction angle that the pictures show, of whisks that slip; without pictures, that "
+        "fits the surface's other whisks. Where α_est is not α, (10) errs."
     )
 
     def compute(self, run: EvaluatedRun) -> list[tuple[float, Judged]]:
-        """Return the errors of (10), each with the friction angle seen, deg."""
+        """Return the errors of (10), each with its friction angle, deg."""
         return errors_with_friction(run.results)
 
     def figure(self, found: Sequence[tuple[float, Judged]]) -> "Figure | None":
-        """Draw the errors; None where fewer than two whisks show the friction angle."""
+        """Draw the errors; None where the friction angle of fewer than two whisks is known."""
         return error_against_friction(found) if len(found) > 1 else None
 
 
@@ -156,13 +157,16 @@ def _draw_estimators(
 
 
 def errors_with_friction(results: Sequence[TrialResult]) -> list[tuple[float, Judged]]:
-    """Return the errors of (10), each with the friction angle that the pictures show, deg."""
+    """Return the errors of (10), each with the friction angle seen, or else fitted, deg."""
     alpha_deg = {}
-    for result, seen, _ in whisks(results):
+    for result, seen, felt in whisks(results):
+        key = (result.trial.name, seen.whisk)
         if seen.deflection is not None:
-            alpha_deg[result.trial.name, seen.whisk] = math.degrees(
-                seen_friction(seen, result.whisker)[0]
-            )
+            alpha_deg[key] = math.degrees(seen_friction(seen, result.whisker)[0])
+            continue
+        for row in felt.estimates:
+            if row.estimator == FITTED:
+                alpha_deg[key] = math.degrees(row.alpha_est_rad)
     found = []
     for one in measured(results):
         alpha = alpha_deg.get((one.trial, one.whisk), math.nan)
@@ -172,13 +176,13 @@ def errors_with_friction(results: Sequence[TrialResult]) -> list[tuple[float, Ju
 
 
 def error_against_friction(found: Sequence[tuple[float, Judged]]) -> "Figure":
-    """Draw the error of (10) against the friction angle that the pictures show."""
+    """Draw the error of (10) against the friction angle."""
     chosen = [one for _, one in found]
     figure = blank(5.6, 4.3)
     axes = figure.subplots()
     _draw_group(axes, [alpha for alpha, _ in found], chosen, 0)
     axes.axhline(0.0, color="0.6", lw=0.8, zorder=0)
-    axes.set(xlabel="friction angle α seen  [°]", ylabel="error of d$_x$  [%]")
+    axes.set(xlabel="friction angle α  [°]", ylabel="error of d$_x$  [%]")
     axes.set_title(label_of("with_friction"))
     axes.set_ylim(*_limits(chosen))
     return figure

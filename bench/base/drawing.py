@@ -174,8 +174,8 @@ def draw_whisks(
 
 
 def name_truth(figure: "Figure", source: str) -> None:
-    """Write below a figure where the truth that it shows comes from."""
-    figure.supxlabel(f"truth: {source}", x=0.99, ha="right", fontsize=7, color="0.35")
+    """Write above a figure where the truth that it shows comes from."""
+    figure.suptitle(f"truth: {source}", x=0.99, ha="right", fontsize=7, color="0.35")
 
 
 def save(figure: "Figure", path: Path, stamp: str, dpi: int = 160) -> None:

@@ -12,6 +12,7 @@ _NUMBERS = {
     "--bar-diameter-mm": "of the round bar that is touched",
     "--square-mm": "side of a square of the board, as measured",
     "--marker-mm": "side of one of its markers",
+    "--origin-sigma-mm": "of the stage's origin against the whisker's base",
 }
 
 
@@ -26,6 +27,12 @@ def add(verbs: Verbs) -> None:
     )
     add_session(verb)
     verb.add_argument("--name", default="", help="shown in reports (default: the folder's name)")
+    verb.add_argument(
+        "--truth",
+        choices=("pictures", "stage"),
+        default="pictures",
+        help="where the truth comes from: cameras (default), or a stage or ruler",
+    )
     for option, what in _NUMBERS.items():
         verb.add_argument(option, type=float, metavar="X", help=what)
     verb.add_argument(
@@ -54,7 +61,13 @@ def run(options: argparse.Namespace) -> int:
             given[name] = getattr(options, name)
     ask = input if sys.stdin.isatty() else None
     lines = new_session(
-        options.session, options.name, given, options.squares, options.dictionary, ask
+        options.session,
+        options.name,
+        given,
+        options.squares,
+        options.dictionary,
+        ask,
+        options.truth,
     )
     print(*lines, sep="\n")
     return DONE

@@ -148,7 +148,9 @@ def _check_stated_truth(trial: Trial, table: dict[str, Any]) -> None:
 def _check_place(trial: Trial, label: str) -> None:
     """Raise BadInput for an object whose contact does not follow from its place."""
     if not trial.is_bar:
-        found = f'[object] shape = "{trial.object.shape}": a place alone gives d_x of a straight bar'
+        found = (
+            f'[object] shape = "{trial.object.shape}": a place alone gives d_x of a straight bar'
+        )
         raise BadInput(f"{found}; state d_x_mm, and no point_mm", file=label)
     if trial.bar_diameter_mm is None:
         raise BadInput("bar_diameter_mm is missing: d_x follows from place and size", file=label)

@@ -9,14 +9,14 @@ import tomli_w
 
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
-from bench.session.manifest import BarKeys, BoardKeys, WhiskerKeys
-from bench.session.plausible import PlausibleRange
+from bench.session.manifest import BarKeys, BoardKeys, TruthKeys, WhiskerKeys
+from bench.session.plausible import SIGMA, PlausibleRange
 from bench.session.session import MANIFEST
 from bench.session.strict_toml import plausible_ranges
 
-FOLDERS = ("boards", "boards/rig", "trials")
+FOLDERS = {"pictures": ("boards", "boards/rig", "trials"), "stage": ("trials",)}
 Ask: TypeAlias = Callable[[str], str]
-_TABLES = {"whisker": WhiskerKeys, "bar": BarKeys, "board": BoardKeys}
+_TABLES = {"whisker": WhiskerKeys, "bar": BarKeys, "board": BoardKeys, "truth": TruthKeys}
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Question:
     @property
     def plausible_range(self) -> PlausibleRange:
         """Return the range of plausible answers."""
-        return plausible_ranges(_TABLES[self.table])[self.key]
+        return plausible_ranges(_TABLES[self.table]).get(self.key, SIGMA)
 
 
 QUESTIONS = (
@@ -52,7 +52,15 @@ QUESTIONS = (
         "square_mm", "board", "square_mm", "side of a square of the ChArUco board, as measured, mm"
     ),
     Question("marker_mm", "board", "marker_mm", "side of a marker of the board, mm"),
+    Question(
+        "origin_sigma_mm",
+        "truth",
+        "origin_sigma_mm",
+        "how well the stage's origin is known against the whisker's base, one sigma, mm",
+    ),
 )
+_OF_PICTURES = ("board",)  # tables of questions that a stage has no need of
+_OF_STAGE = ("truth",)
 
 
 def new_session(
@@ -62,11 +70,12 @@ def new_session(
     squares: tuple[int, int],
     dictionary: str,
     ask: Ask | None = None,
+    truth: str = "pictures",
 ) -> list[str]:
     """Make the folder of a session with its manifest; return lines on what comes next.
 
-    given: by option's name; ask: answers a question, '' for not known; None asks nothing. Raises
-    BadInput where there is a session already, or a number is implausible.
+    given: by option's name; ask: answers a question, '' for not known; None asks nothing. truth: what
+    it comes from, a key of FOLDERS. Raises BadInput where there is a session already, or a number is implausible.
     """
     if (path / MANIFEST).exists():
         raise BadInput(f"there is a {MANIFEST} already; nothing was written", file=path)
@@ -75,14 +84,21 @@ def new_session(
             option = f"--{question.option.replace('_', '-')}"
             question.plausible_range.check(given[question.option], option, str(path))
     answers = dict(given)
-    for question in QUESTIONS if ask else ():
+    questions = questions_for(truth)
+    for question in questions if ask else ():
         if question.option not in answers:
             answers |= _ask_until_plausible(question, ask)
-    for folder in FOLDERS:
+    for folder in FOLDERS[truth]:
         (path / folder).mkdir(parents=True, exist_ok=True)
-    text = manifest_text(name or path.resolve().name, answers, squares, dictionary)
+    text = manifest_text(name or path.resolve().name, answers, squares, dictionary, truth)
     write_whole(path / MANIFEST, text)
-    return list(_next_steps(path, answers))
+    return list(_next_steps(path, answers, truth))
+
+
+def questions_for(truth: str) -> list[Question]:
+    """Return the questions of a session whose truth comes from pictures or a stage."""
+    left_out = _OF_PICTURES if truth == "stage" else _OF_STAGE
+    return [question for question in QUESTIONS if question.table not in left_out]
 
 
 def _ask_until_plausible(question: Question, ask: Ask) -> dict[str, float]:
@@ -99,12 +115,18 @@ def _ask_until_plausible(question: Question, ask: Ask) -> dict[str, float]:
 
 
 def manifest_text(
-    name: str, answers: Mapping[str, float], squares: tuple[int, int], dictionary: str
+    name: str,
+    answers: Mapping[str, float],
+    squares: tuple[int, int],
+    dictionary: str,
+    truth: str = "pictures",
 ) -> str:
     """Return session.toml with what is known, and a line to fill in for what is not."""
     lines = {q.option: _line(q.key, answers.get(q.option), q.wanted) for q in QUESTIONS}
     named = tomli_w.dumps({"name": name}).strip()
-    return _TEMPLATE.format(named=named, x=squares[0], y=squares[1], dictionary=dictionary, **lines)
+    return _TEMPLATES[truth].format(
+        named=named, x=squares[0], y=squares[1], dictionary=dictionary, **lines
+    )
 
 
 def _line(key: str, value: float | None, wanted: str) -> str:
@@ -114,16 +136,17 @@ def _line(key: str, value: float | None, wanted: str) -> str:
     return f"{key} = {value:.10g}".ljust(32) + f"# {wanted}"
 
 
-def _next_steps(path: Path, answers: Mapping[str, float]) -> Iterator[str]:
+def _next_steps(path: Path, answers: Mapping[str, float], truth: str) -> Iterator[str]:
     """Yield lines on what to do next."""
     yield f"written: {path / MANIFEST}"
-    missing = sum(q.option not in answers for q in QUESTIONS)
+    missing = sum(q.option not in answers for q in questions_for(truth))
     if missing:
         yield f"{missing} lines are to be filled in: look for FILL IN"
-    yield f"then record boards/ and trials/ (comments in the file say how), and run: whisker-bench check {path}"
+    folders = "trials/" if truth == "stage" else "boards/ and trials/"
+    yield f"then record {folders} (comments in the file say how), and run: whisker-bench check {path}"
 
 
-_TEMPLATE = """\
+_HEAD = """\
 # A session of whisker-bench: what was recorded in one sitting, with one whisker on one rig.
 # Lengths in mm, angles in degrees, gauges in volts. Any length or angle may have its standard deviation beside it:
 # length_sigma_mm, square_sigma_mm. What has none is known as well as a careful lab knows it (docs/formats.md), and the
@@ -143,6 +166,9 @@ shape = "cylinder"              # "cone": base diameter to a point; "tapered": t
 [bar]
 {bar_diameter_mm}
 
+"""
+
+_CAMERAS = """\
 [board]                         # `whisker-bench board` prints one with these numbers
 squares = [{x}, {y}]                # along x, along y
 {square_mm}
@@ -157,12 +183,28 @@ dictionary = "{dictionary}"
 # T_rig_board_sigma_mm and T_rig_board_sigma_deg. Rig frame: origin at the whisker's base, z the motor's axis, x along
 # the whisker at motor angle 0. Board frame: origin at its upper left corner, x right, y down, z into the board.
 
+"""
+
+_STAGE = """\
+[truth]
+source = "stage"                # d_x, or the object's place, is what trials state; no camera is needed
+{origin_sigma_mm}
+
+"""
+
+_TRIAL = """\
 [trial]                         # for all trials; a key in trials/<trial>/trial.toml goes before it
 # surface = "steel"             # groups trials in fits and figures
 # speed_deg_s = 10.0            # nominal
+"""
+
+_FRAMES = """\
 # frame_rate_Hz = 20.0          # where no frames.csv tells the frames' times
 # first_frame_s = 0.0
 
+"""
+
+_RECORD_PICTURES = """\
 # What to record:
 #   boards/<camera>/*.png       10 or more views of the board a camera: tilted, near and far, into the corners
 #   boards/rig/<camera>.png     the empty rig with the board standing on it, one picture a camera
@@ -172,3 +214,21 @@ dictionary = "{dictionary}"
 #   trials/<trial>/trial.toml   surface, speed_deg_s, beta_deg; purpose = "gauge" for trials that calibrate the gauges:
 #                               two of them, follicle_roll_deg = 0 and 90
 """
+
+_RECORD_STAGE = """\
+
+# What to record:
+#   trials/<trial>/signals.csv  time_s,motor_deg,y_V,z_V, or m_y_Nmm,m_z_Nmm
+#   trials/<trial>/trial.toml   surface, speed_deg_s, beta_deg, beta_sigma_deg, and one of these:
+#                               d_x_mm, d_x_sigma_mm   from the base to the contact at first touch
+#                               [object] point_mm      of the bar's axis, rig frame; point_sigma_mm
+#   trials/<trial>/stage.csv    time_s,x_mm,y_mm,z_mm,x_sigma_mm,y_sigma_mm,z_sigma_mm: where the stage has the
+#                               bar's axis, on the signals' clock; added to point_mm where both are there
+# Gauges in volts need [gauges], or trials of purpose = "gauge" at slope 0, follicle_roll_deg = 0 and 90.
+"""
+
+# What each way to the truth has in session.toml.
+_TEMPLATES = {
+    "pictures": _HEAD + _CAMERAS + _TRIAL + _FRAMES + _RECORD_PICTURES,
+    "stage": _HEAD + _STAGE + _TRIAL + _RECORD_STAGE,
+}

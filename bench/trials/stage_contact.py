@@ -15,6 +15,9 @@ from vision.geometry import BarAxis, Curves, Wire, centrelines, clearance, rotat
 # [1] Motor angles of a stroke at which the whisker's distance from the bar is computed: 0.3° apart
 # over 30°, in which no bar is passed and left again. Derived.
 _SCANNED = 101
+# [1] Of the whisker's length: a contact beyond is the tip's. The point of a curve that is nearest to a bar
+# beyond its end is the end itself, to rounding. Derived.
+_BEFORE_TIP = 1.0 - 1e-6
 # [1] Coefficients of the whisker's unloaded shape, each way: offset, slope, curvature.
 REST_TERMS = 3
 
@@ -78,9 +81,12 @@ class StatedPush:
     slope_rad: float = 0.0
 
     def touch(self, offsets: Offsets) -> Contact | None:
-        """Return first touch; None where the whisker does not come to the bar in this stroke."""
+        """Return first touch; None where the whisker does not come to the bar in this stroke.
+
+        Nor does one whose tip passes before the bar: no point load bends that.
+        """
         ends = np.linspace(self.motor_rad.min(), self.motor_rad.max(), _SCANNED)
-        gaps = self._clearance(ends, offsets)[0]
+        gaps, _ = self._clearance(ends, offsets)
         closes = np.flatnonzero((gaps[:-1] > 0.0) & (gaps[1:] <= 0.0))
         if not len(closes):
             return None
@@ -95,6 +101,8 @@ class StatedPush:
         _, points_mm = self._clearance(at, offsets)
         slope, tilt = self._angles(at, offsets)
         d_x_mm = float(np.linalg.norm(points_mm[0]))
+        if d_x_mm > _BEFORE_TIP * self.wire.length_mm:
+            return None
         return Contact(float(motor_rad), d_x_mm, float(slope[0]), float(tilt[0]))
 
     def starts_touching(self, offsets: Offsets) -> bool:

@@ -27,6 +27,7 @@ from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.moment_size import check_moment_size
+from bench.trials.stated_truth import stated_whisk
 from bench.trials.still_scene import evenly_exposed, other_scene
 from vision import FEWEST_FREE
 from vision.boards import (
@@ -144,7 +145,20 @@ def _check_trials(
             if session.whisker is not None and signals.kind == "Nmm":
                 _check_moments(trial, strokes, session.whisker, problems)
             _check_trial(trial, signals, strokes, rig, problems)
+            if session.truth is not None:
+                _check_stage(session, trial, signals, problems)
     return pushes_V
+
+
+def _check_stage(session: Session, trial: Trial, signals: Signals, problems: InputProblems) -> None:
+    """Add a warning for each whisk of which the stage states no truth, or contradicts itself.
+
+    Raise BadInput where no contact can be as stated.
+    """
+    for number, stroke in enumerate(forward_strokes(signals)):
+        said = stated_whisk(session, trial, signals, stroke).status
+        if said:
+            problems.warn(said.about(f"{trial.place}, whisk {number}"))
 
 
 def _check_moments(

@@ -165,9 +165,7 @@ def answers_of_trial(task: Task) -> list[Answer]:
             if stroke is not None:
                 rate_Hz = signals.rate_Hz / converter.every
                 touch_rad = _touch_rad(seen, felt)
-                whisk = _ConvertedWhisk(
-                    task, readout, seen, touch_rad, converter, stroke, rate_Hz
-                )
+                whisk = _ConvertedWhisk(task, readout, seen, touch_rad, converter, stroke, rate_Hz)
                 found += _answers_of_whisk(whisk)
     return found
 

@@ -19,7 +19,7 @@ def truth_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     known = [whisk for whisk in whisks(results) if whisk[1].has_truth]
     if known:
         yield (
-            f"{'trial':<18}{'whisk':>5}  {'β seen':>16}  {'d_x':>17}  {'slip at θ':>17}  {'touch seen':>17}  "
+            f"{'trial':<18}{'whisk':>5}  {'β':>16}  {'d_x':>17}  {'slip at θ':>17}  {'touch seen':>17}  "
             f"{'felt − seen':>17}"
         )
     for result, seen, felt in known:
