@@ -227,7 +227,7 @@ class ObjectKeys(GivenKeys):
     point_mm: Place | None = None
     point_sigma_mm: LengthSigma = 0.0
     # with `point_mm`: the bar's direction, the normal of the ring's plane, or where the cone points
-    # ([0, 0, 1])
+    # ([0, 0, 1]; by `[truth]` that of `beta_deg`)
     axis: Annotated[list[float], _THREE] | None = None
     # diameter of the circle that the ring's axis is
     ring_diameter_mm: RingDiameter | None = None
@@ -266,7 +266,8 @@ class TrialKeys(GivenKeys):
     # allow the difference
     beta_deg: Slope | None = None
     beta_sigma_deg: float = 0.0
-    # nominal distance; one that is seen counts before it
+    # nominal distance; one that is seen counts before it. By `[truth]` it is the truth itself: from
+    # the base to the contact at first touch
     d_x_mm: Length | None = None
     d_x_sigma_mm: float = 0.0
     # diameter of the bar where it differs from the session's (paper wrapped round it)

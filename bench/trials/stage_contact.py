@@ -15,6 +15,8 @@ from vision.geometry import BarAxis, Curves, Wire, centrelines, clearance, rotat
 # [1] Motor angles of a stroke at which the whisker's distance from the bar is computed: 0.3° apart
 # over 30°, in which no bar is passed and left again. Derived.
 _SCANNED = 101
+# [rad] To either side of touch, where steps of derivatives move it to: they do by 1e-4. Derived.
+_NEAR_RAD = 0.01
 # [1] Of the whisker's length: a contact beyond is the tip's. The point of a curve that is nearest to a bar
 # beyond its end is the end itself, to rounding. Derived.
 _BEFORE_TIP = 1.0 - 1e-6
@@ -85,25 +87,34 @@ class StatedPush:
 
         Nor does one whose tip passes before the bar: no point load bends that.
         """
-        ends = np.linspace(self.motor_rad.min(), self.motor_rad.max(), _SCANNED)
-        gaps, _ = self._clearance(ends, offsets)
+        angles = np.linspace(self.motor_rad.min(), self.motor_rad.max(), _SCANNED)
+        gaps, _ = self._clearance(angles, offsets)
         closes = np.flatnonzero((gaps[:-1] > 0.0) & (gaps[1:] <= 0.0))
         if not len(closes):
             return None
-        first = closes[0]
+        return self._touch_between(angles[closes[0]], angles[closes[0] + 1], offsets)
+
+    def moved_touch(self, touch: Contact, offsets: Offsets) -> Contact | None:
+        """Return where first touch goes by small offsets; None where it is not near any more."""
+        low = touch.motor_rad - _NEAR_RAD
+        high = touch.motor_rad + _NEAR_RAD
+        (before, after), _ = self._clearance(np.array([low, high]), offsets)
+        return self._touch_between(low, high, offsets) if after < 0.0 < before else None
+
+    def _touch_between(self, low_rad: float, high_rad: float, offsets: Offsets) -> Contact | None:
+        """Return the touch between two motor angles, of which the second is past it."""
 
         def gap(motor_rad: float) -> float:
             """Return the gap, mm, at one motor angle."""
             return float(self._clearance(np.array([motor_rad]), offsets)[0][0])
 
-        motor_rad = brentq(gap, ends[first], ends[first + 1], xtol=1e-12)
-        at = np.array([motor_rad])
+        at = np.array([brentq(gap, low_rad, high_rad, xtol=1e-12)])
         _, points_mm = self._clearance(at, offsets)
-        slope, tilt = self._angles(at, offsets)
         d_x_mm = float(np.linalg.norm(points_mm[0]))
         if d_x_mm > _BEFORE_TIP * self.wire.length_mm:
             return None
-        return Contact(float(motor_rad), d_x_mm, float(slope[0]), float(tilt[0]))
+        slope, tilt = self._angles(at, offsets)
+        return Contact(float(at[0]), d_x_mm, float(slope[0]), float(tilt[0]))
 
     def starts_touching(self, offsets: Offsets) -> bool:
         """Return whether the whisker is past the bar's surface where the stroke begins."""

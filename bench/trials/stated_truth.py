@@ -194,7 +194,7 @@ def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -
         _check_place(push, trial)
         code = "starts_touching" if push.starts_touching(none) else "never_touches"
         return WhiskTruth(0, status=Reason(code, f"by the stage the whisker {_HOW[code]}"))
-    rows = _derivatives(push)
+    rows = _derivatives(push, touch)
     own = rows * _own_sigmas(trial, signals, stroke, touch)
     shared = rows * _shared_sigmas(session, trial)
     shared_mm = float(np.linalg.norm(shared[0]))
@@ -238,15 +238,15 @@ def _push(session: Session, trial: Trial, signals: Signals, stroke: slice) -> St
     )
 
 
-def _derivatives(push: StatedPush) -> np.ndarray:
-    """Return the derivatives (3, p) of d_x, β and ψ by all offsets."""
+def _derivatives(push: StatedPush, touch: Contact) -> np.ndarray:
+    """Return the derivatives (3, p) of d_x, β and ψ by all offsets; NaN where no touch is left."""
     rows = []
     for k, step in enumerate(_STEPS):
         ends = []
         for sign in (1.0, -1.0):
             moved = np.zeros(len(_STEPS))
             moved[k] = sign * step
-            at = push.touch(Offsets.from_vector(moved))
+            at = push.moved_touch(touch, Offsets.from_vector(moved))
             ends.append([NAN] * 3 if at is None else [at.d_x_mm, at.beta_rad, at.psi_rad])
         rows.append((np.array(ends[0]) - np.array(ends[1])) / (2.0 * step))
     return np.stack(rows, axis=-1)

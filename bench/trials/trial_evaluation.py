@@ -32,9 +32,7 @@ def _see(unit: Unit, signals: Signals) -> SeenTrial:
     where the wire is not its own.
     """
     wires = lines_in(unit.wires)
-    seen = truth_source(unit.session).truth(
-        unit.session, unit.trial, signals, unit.calibration, unit.settings, wires
-    )
+    seen = truth_source(unit.session).truth(unit, signals, wires)
     seen = contradicted(seen, unit.contradictions)
     if not unit.wires:
         return seen

@@ -1,54 +1,46 @@
 """Where a session's truth comes from: one interface, by pictures or by a stage.
 
-Whatever the source, a trial's truth is a `SeenTrial`: analyses ask it for d_x and slope with their
+Whatever the source, a trial's truth is a `SeenTrial`: analyses ask it for d_x and slopes with their
 sigmas, for what whisks share of these, and for its name.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
-from bench.base.settings import Settings
-from bench.cameras.session_cameras import SessionCalibration
 from bench.records.trial_result import SeenTrial
 from bench.session.session import Session
 from bench.session.signals import Signals
-from bench.session.trial import Trial
 from bench.trials.seen import see_trial
 from bench.trials.stated_truth import by_stage
+from bench.trials.unit import Unit
 from vision.pictures import Others
+
+Wires = Mapping[str, Others]  # by camera and name, the wires of an array's whiskers
 
 
 class TruthSource(ABC):
     """A way to the truth of a trial's whisks."""
 
     @abstractmethod
-    def truth(
-        self,
-        session: Session,
-        trial: Trial,
-        signals: Signals,
-        calibration: SessionCalibration,
-        settings: Settings,
-        wires: Mapping[str, Others],
-    ) -> SeenTrial:
-        """Return the truth of each whisk; the arguments are those of `see_trial`. Raise BadInput."""
+    def truth(self, unit: Unit, signals: Signals, wires: Wires) -> SeenTrial:
+        """Return the truth of each whisk of a trial; a status where there is none. Raise BadInput."""
 
 
 class Pictures(TruthSource):
     """What the cameras show."""
 
-    def truth(self, session, trial, signals, calibration, settings, wires) -> SeenTrial:
-        """Return what the cameras show."""
-        return see_trial(session, trial, signals, calibration, settings, wires)
+    def truth(self, unit: Unit, signals: Signals, wires: Wires) -> SeenTrial:
+        """Return what the cameras show of each whisk of a trial."""
+        return see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings, wires)
 
 
-class Stage(TruthSource):
+class Stage(Pictures):
     """What a stage states, compared with what the cameras show where there are pictures."""
 
-    def truth(self, session, trial, signals, calibration, settings, wires) -> SeenTrial:
+    def truth(self, unit: Unit, signals: Signals, wires: Wires) -> SeenTrial:
         """Return the stage's distances and slopes in place of those that are seen. Raise BadInput."""
-        seen = see_trial(session, trial, signals, calibration, settings, wires)
-        return by_stage(session, trial, signals, settings, seen)
+        seen = super().truth(unit, signals, wires)
+        return by_stage(unit.session, unit.trial, signals, unit.settings, seen)
 
 
 def truth_source(session: Session) -> TruthSource:

@@ -161,7 +161,7 @@ def _see_exactly_in(monkeypatch) -> list[str]:
         looks.append(trial.name)
         return see_exactly(session, trial, *rest)
 
-    monkeypatch.setattr("bench.trials.trial_evaluation.see_trial", see)
+    monkeypatch.setattr("bench.trials.truth_source.see_trial", see)
     nothing = SessionCalibration(None, {}, hash_of("exact"))
     monkeypatch.setattr("bench.trials.of_session.calibrate_session", lambda session, out: nothing)
     return looks

@@ -268,7 +268,7 @@ def test_gauge_trials_without_truth_say_what_it_lacks(
         )
         return replace(found, whisks=dark) if trial.purpose == "gauge" else found
 
-    monkeypatch.setattr("bench.trials.trial_evaluation.see_trial", see)
+    monkeypatch.setattr("bench.trials.truth_source.see_trial", see)
     for name in ("gauge_roll0", "gauge_roll90"):
         path = small_copy / "trials" / name / "trial.toml"
         path.write_text(

@@ -64,7 +64,7 @@ def test_gauge_trials_without_a_truth_serve_by_their_wire(
         whisks = tuple(replace(whisk, truth=WhiskTruth(whisk.whisk)) for whisk in seen.whisks)
         return replace(seen, whisks=whisks)
 
-    monkeypatch.setattr("bench.trials.trial_evaluation.see_trial", see)
+    monkeypatch.setattr("bench.trials.truth_source.see_trial", see)
     calibrate(steel_signals, tmp_path / "without.toml")
     said = capsys.readouterr().out
     assert "Moments seen in pictures, by the wire alone: gauge_roll0, gauge_roll90" in said
