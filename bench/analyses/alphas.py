@@ -11,6 +11,7 @@ from bench.analyses.direction import slip_angle
 from bench.base.combined import Measurement, Measurements
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.trial_result import (
+    BY_PICTURES,
     Deflection,
     FeltWhisk,
     SeenWhisk,
@@ -32,7 +33,11 @@ _ROUNDS = 12  # each leaves less than half of the change up to a heading of 45°
 # 0.7 degrees with them, but for the slope's error, and by 0.5, 1.5 and 3.8 without.
 _FARTHEST_RAD = np.radians(10.0)
 _FEWEST_NEAR = 5  # frames
+# [sigmas] Of the slip angle felt, from which on a contact slips for sure: one at rest has as much in one whisk of
+# 400. Derived.
+_SURE_SIGMAS = 3.0
 UNKNOWN = (np.nan, np.nan)
+BY_MANIFEST = "manifest"
 BETA_BY_HAND_RAD = np.radians(1.0)  # one sigma of a slope set by hand, where no picture shows it
 
 
@@ -50,7 +55,7 @@ class WhiskAlphas:
     """Friction angles of one whisk, each a pair (value, sigma) in rad; NaN where it shows none.
 
     shared_seen_rad, shared_felt_rad: sigma that all angles of this whisk share, of β, and felt also of
-    the moments. nominal: β is that of the manifest, because no picture shows it. common_seen,
+    the moments. beta_from: where β comes from, a truth's source or BY_MANIFEST. common_seen,
     common_felt: change of the angles at one sigma of each cause that all whisks of a session share.
     """
 
@@ -65,9 +70,14 @@ class WhiskAlphas:
     phases_felt: Phases
     shared_seen_rad: float
     shared_felt_rad: float
-    nominal: bool = False
+    beta_from: str = BY_PICTURES
     common_seen: tuple[float, ...] = ()
     common_felt: tuple[float, ...] = ()
+
+    @property
+    def nominal(self) -> bool:
+        """Return whether β is that of the manifest, because no truth has it."""
+        return self.beta_from == BY_MANIFEST
 
     def phases(self, record: str) -> Phases:
         """Return rests and jumps as "seen" or "felt"."""
@@ -88,7 +98,7 @@ class WhiskAlphas:
         """Return an angle with its sigma in parts: of the whisk, of its trial's bar, of all whisks."""
         value, sigma = self.angle(name)
         common = self.common_seen if name.endswith("seen") else self.common_felt
-        of_setting = BETA_BY_HAND_RAD if self.nominal else 0.0
+        of_setting = 0.0 if self.beta_from == BY_PICTURES else self.shared_seen_rad
         own = np.sqrt(max(sigma**2 - of_setting**2 - np.sum(np.square(common)), 0.0))
         if not sigma > 0:
             own = np.nan
@@ -141,7 +151,7 @@ def _alphas(
         phases_felt=felt.phases,
         shared_seen_rad=beta.sigma,
         shared_felt_rad=float(np.hypot(beta.sigma, felt.phi_felt_rad.sigma)),
-        nominal=nominal,
+        beta_from=BY_MANIFEST if nominal else seen.source,
         common_seen=(beta_common_rad, _common_seen(seen, sigma_rad), by_theory_rad, by_set_rad),
         common_felt=(beta_common_rad, *_common_felt(felt).tolist()),
     )
@@ -249,10 +259,15 @@ def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> tuple[f
     """Return α and its sigma by |β| − |φ|: the slope as seen, the slip angle by the moments at θ.
 
     Of a whisk that was seen to slip; NaN where the moments are not those of the seen shape, or the slope
-    at θ is not that at touch.
+    at θ is not that at touch. Where the truth is a stage's a slip angle that is not 0 for sure shows the
+    slip: the force on a contact at rest points along the push.
     """
     beta = seen.beta_rad
     phi = felt.phi_felt_rad
+    if seen.deflection is None and seen.has_truth:
+        if felt.apart or not abs(phi.value) > _SURE_SIGMAS * phi.sigma:
+            return UNKNOWN
+        return abs(beta.value) - abs(phi.value), float(np.hypot(beta.sigma, phi.sigma))
     if not (slips(seen) and np.isfinite(phi.value)) or felt.apart or _turns_with_slip(seen):
         return UNKNOWN
     across_rad = abs(beta.value) - abs(phi.value)

@@ -38,7 +38,7 @@ FRICTION = Table(
         SURFACE,
         SPEED,
         Column("beta_deg", "slope of the bar"),
-        Column("beta_from", "pictures; or manifest, where no picture shows the slope", Kind.TEXT),
+        Column("beta_from", "pictures or stage; manifest, where no truth has the slope", Kind.TEXT),
         *with_sigma(
             "alpha_seen_deg",
             "from the deflection, pictures alone, with the friction that acts along the whisker",
@@ -263,7 +263,7 @@ def _whisk_row(whisk: WhiskAlphas, confidence: float | None) -> dict:
         "surface": whisk.surface,
         "speed_deg_s": whisk.speed_deg_s,
         "beta_deg": degrees(whisk.beta_rad),
-        "beta_from": "manifest" if whisk.nominal else "pictures",
+        "beta_from": whisk.beta_from,
         "confidence": confidence,
     }
     for record in RECORDS:

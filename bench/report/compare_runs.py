@@ -147,6 +147,12 @@ class _EvaluatedRun:
             found[result.trial.name, seen.whisk] = (seen, felt)
         return cls(out, record.recordings, run.accuracy.estimators, found)
 
+    @property
+    def truth_sources(self) -> str:
+        """Return where its truth comes from, in words."""
+        sources = {seen.truth_source for seen, _ in self.whisks.values()} - {""}
+        return " and ".join(sorted(sources)) or "none"
+
     def has_recording_of(self, other: "_EvaluatedRun", trial: str) -> bool:
         """Return whether a trial has the same files in both runs."""
         ours = self.recordings.get(trial)
@@ -223,6 +229,8 @@ def _run_lines(
     compared = {change.key for change in changes}
     same = {change.key for change in changes if change.same_recording}
     yield f"{other.out} against {first.out}: {len(compared)} whisks in both, {len(same)} of them of one recording"
+    if first.truth_sources != other.truth_sources:
+        yield f"  the truth is by {first.truth_sources} in {first.out}, by {other.truth_sources} in {other.out}"
     for run, rest in ((first, other), (other, first)):
         alone = sorted(run.whisks.keys() - rest.whisks.keys())
         if alone:
