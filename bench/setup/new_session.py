@@ -14,7 +14,9 @@ from bench.session.plausible import SIGMA, PlausibleRange
 from bench.session.session import MANIFEST
 from bench.session.strict_toml import plausible_ranges
 
-FOLDERS = {"pictures": ("boards", "boards/rig", "trials"), "stage": ("trials",)}
+FOLDERS = ("boards", "boards/rig", "trials")
+# Folders by where the truth comes from.
+_FOLDERS_OF = {"pictures": FOLDERS, "stage": ("trials",)}
 Ask: TypeAlias = Callable[[str], str]
 _TABLES = {"whisker": WhiskerKeys, "bar": BarKeys, "board": BoardKeys, "truth": TruthKeys}
 
@@ -37,7 +39,7 @@ class Question:
         return plausible_ranges(_TABLES[self.table]).get(self.key, SIGMA)
 
 
-QUESTIONS = (
+_RODS = (
     Question("whisker_length_mm", "whisker", "length_mm", "length of the whisker, base to tip, mm"),
     Question(
         "whisker_diameter_mm", "whisker", "diameter_mm", "diameter of the whisker at its base, mm"
@@ -48,19 +50,22 @@ QUESTIONS = (
     Question(
         "bar_diameter_mm", "bar", "diameter_mm", "diameter of the round bar that is touched, mm"
     ),
+)
+QUESTIONS = (
+    *_RODS,
     Question(
         "square_mm", "board", "square_mm", "side of a square of the ChArUco board, as measured, mm"
     ),
     Question("marker_mm", "board", "marker_mm", "side of a marker of the board, mm"),
-    Question(
-        "origin_sigma_mm",
-        "truth",
-        "origin_sigma_mm",
-        "how well the stage's origin is known against the whisker's base, one sigma, mm",
-    ),
 )
-_OF_PICTURES = ("board",)  # tables of questions that a stage has no need of
-_OF_STAGE = ("truth",)
+_ORIGIN = Question(
+    "origin_sigma_mm",
+    "truth",
+    "origin_sigma_mm",
+    "how well the stage's origin is known against the whisker's base, one sigma, mm",
+)
+# Questions by where the truth comes from.
+QUESTIONS_OF = {"pictures": QUESTIONS, "stage": (*_RODS, _ORIGIN)}
 
 
 def new_session(
@@ -74,31 +79,25 @@ def new_session(
 ) -> list[str]:
     """Make the folder of a session with its manifest; return lines on what comes next.
 
-    given: by option's name; ask: answers a question, '' for not known; None asks nothing. truth: what
-    it comes from, a key of FOLDERS. Raises BadInput where there is a session already, or a number is implausible.
+    given: by option's name; ask: answers a question, '' for not known; None asks nothing. truth: where
+    it comes from, a key of QUESTIONS_OF. Raises BadInput where there is a session already, or a number is implausible.
     """
     if (path / MANIFEST).exists():
         raise BadInput(f"there is a {MANIFEST} already; nothing was written", file=path)
-    for question in QUESTIONS:
+    questions = QUESTIONS_OF[truth]
+    for question in questions:
         if question.option in given:
             option = f"--{question.option.replace('_', '-')}"
             question.plausible_range.check(given[question.option], option, str(path))
     answers = dict(given)
-    questions = questions_for(truth)
     for question in questions if ask else ():
         if question.option not in answers:
             answers |= _ask_until_plausible(question, ask)
-    for folder in FOLDERS[truth]:
+    for folder in _FOLDERS_OF[truth]:
         (path / folder).mkdir(parents=True, exist_ok=True)
     text = manifest_text(name or path.resolve().name, answers, squares, dictionary, truth)
     write_whole(path / MANIFEST, text)
     return list(_next_steps(path, answers, truth))
-
-
-def questions_for(truth: str) -> list[Question]:
-    """Return the questions of a session whose truth comes from pictures or a stage."""
-    left_out = _OF_PICTURES if truth == "stage" else _OF_STAGE
-    return [question for question in QUESTIONS if question.table not in left_out]
 
 
 def _ask_until_plausible(question: Question, ask: Ask) -> dict[str, float]:
@@ -122,7 +121,7 @@ def manifest_text(
     truth: str = "pictures",
 ) -> str:
     """Return session.toml with what is known, and a line to fill in for what is not."""
-    lines = {q.option: _line(q.key, answers.get(q.option), q.wanted) for q in QUESTIONS}
+    lines = {q.option: _line(q.key, answers.get(q.option), q.wanted) for q in QUESTIONS_OF[truth]}
     named = tomli_w.dumps({"name": name}).strip()
     return _TEMPLATES[truth].format(
         named=named, x=squares[0], y=squares[1], dictionary=dictionary, **lines
@@ -139,7 +138,7 @@ def _line(key: str, value: float | None, wanted: str) -> str:
 def _next_steps(path: Path, answers: Mapping[str, float], truth: str) -> Iterator[str]:
     """Yield lines on what to do next."""
     yield f"written: {path / MANIFEST}"
-    missing = sum(q.option not in answers for q in questions_for(truth))
+    missing = sum(q.option not in answers for q in QUESTIONS_OF[truth])
     if missing:
         yield f"{missing} lines are to be filled in: look for FILL IN"
     folders = "trials/" if truth == "stage" else "boards/ and trials/"
