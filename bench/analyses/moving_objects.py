@@ -14,7 +14,7 @@ from bench.analyses.pooling import as_cell, column, coverage, degrees, grouped, 
 from bench.base.drawing import add_legend, blank, colour_of, label_of
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, status, with_sigma
 from bench.gauges.felt import motor_speed
-from bench.records.trial_result import EstimateRow, SeenWhisk, whisks
+from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, whisks
 from bench.session.trial import Trial
 from bench.trials.estimate_errors import is_sound
 from bench.trials.object_motion import in_contact_frame
@@ -100,7 +100,7 @@ class MovingObjects(Analysis):
             trial = run.session.trial(result.trial.name)
             if trial.object_velocity_mm_s is None or not (seen.has_truth and felt.has_moments):
                 continue
-            share = _share_percent(trial, seen)
+            share = _share_percent(trial, seen, felt)
             for answer in (*felt.estimates, *felt.sensors):
                 found.append(Moved(trial, seen, answer, share, is_sound(seen, felt)))
         return found
@@ -169,14 +169,17 @@ class MovingObjects(Analysis):
         return drawing
 
 
-def _share_percent(trial: Trial, seen: SeenWhisk) -> float:
+def _share_percent(trial: Trial, seen: SeenWhisk, felt: FeltWhisk) -> float:
     """Return the object's speed along the push, percent of the whisker's at the contact.
 
-    NaN where no frame shows the whisker's.
+    Without frames touch is the one felt and the speed the nominal one, NaN where none is stated.
     """
-    if seen.frames is None:
-        return np.nan
+    touch_rad = felt.touch_felt_rad.value
+    speed_rad_s = np.nan if trial.speed_deg_s is None else np.radians(trial.speed_deg_s)
+    if seen.frames is not None:
+        touch_rad = seen.touch_rad.value
+        speed_rad_s = motor_speed(seen.frames)
     velocity_mm_s = np.array(trial.object_velocity_mm_s)
-    along_mm_s = in_contact_frame(velocity_mm_s, seen.touch_rad.value)[1]
-    whisker_mm_s = motor_speed(seen.frames) * seen.d_x_mm.value
+    along_mm_s = in_contact_frame(velocity_mm_s, touch_rad)[1]
+    whisker_mm_s = speed_rad_s * seen.d_x_mm.value
     return float(100.0 * along_mm_s / whisker_mm_s)

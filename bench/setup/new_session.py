@@ -80,7 +80,8 @@ def new_session(
     """Make the folder of a session with its manifest; return lines on what comes next.
 
     given: by option's name; ask: answers a question, '' for not known; None asks nothing. truth: where
-    it comes from, a key of QUESTIONS_OF. Raises BadInput where there is a session already, or a number is implausible.
+    it comes from, a key of QUESTIONS_OF. Raises BadInput where there is a session already, or a number
+    is implausible.
     """
     if (path / MANIFEST).exists():
         raise BadInput(f"there is a {MANIFEST} already; nothing was written", file=path)
