@@ -15,11 +15,9 @@ from bench.session.table import forward_in_time, read_table, require_columns
 from vision.boards import (
     MIN_VIEWS,
     Corners,
-    check_marker_size,
     find_corners,
     fixes_pose,
     refine_corners,
-    why_not_found,
 )
 from vision.calibration import BoardViews
 from vision.geometry import Board
@@ -113,7 +111,7 @@ def _series(frames: Frames, board: Board, place: str, mirrored: bool) -> list[Co
     if sum(fixes_pose(view, board) for view in views) < MIN_VIEWS:
         _require_no_reason(samples.without_board, board, place, mirrored)
     with refused_as_bad_input(place):
-        check_marker_size(samples.with_board, board)
+        board.check_print(samples.with_board)
     return views
 
 
@@ -121,7 +119,7 @@ def _require_no_reason(
     greys: Sequence[np.ndarray], board: Board, place: str, mirrored: bool
 ) -> None:
     """Raise BadInput where grey pictures show another board than the stated one."""
-    reason = why_not_found(greys, board, mirrored=mirrored) if greys else ""
+    reason = board.why_not_found(greys, mirrored=mirrored) if greys else ""
     if reason:
         raise BadInput(reason, file=place)
 

@@ -182,7 +182,7 @@ def _with_even_rows(views: SessionViews, session: Session) -> SessionViews:
 
 def _rows(view: Corners, session: Session, parity: int) -> Corners:
     """Return the corners in even (0) or odd (1) rows of the board."""
-    return view.select(view.ids // (session.board.squares[0] - 1) % 2 == parity)
+    return view.select(view.ids // session.board.grid[0] % 2 == parity)
 
 
 def report_lines(calibration: Calibration) -> Iterator[str]:

@@ -9,7 +9,7 @@ from bench.rig import boards
 from bench.rig.pinhole import PinholeCamera
 from bench.rig.printed_board import PrintedBoard
 from bench.rig.protocol_tables import BoardTable
-from vision.boards import Corners
+from vision.boards import CharucoBoard, Corners
 from vision.calibration import BoardViews, MeasuredPose, calibrate_cameras
 from vision.geometry import Board, Camera, Cameras, apply
 
@@ -95,9 +95,9 @@ def as_seen_camera(camera: PinholeCamera) -> Camera:
     return Camera(camera.name, camera.size_px, camera.matrix, camera.distortion, T)
 
 
-def as_board(table: BoardTable) -> Board:
+def as_board(table: BoardTable) -> CharucoBoard:
     """Return the board of a protocol for vision."""
-    return Board(
+    return CharucoBoard(
         tuple(table.squares),
         table.square_mm,
         table.marker_mm,

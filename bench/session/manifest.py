@@ -113,20 +113,29 @@ class BarKeys(GivenKeys):
 class BoardKeys(GivenKeys):
     """[board] of session.toml."""
 
-    # how many squares [along x, along y]
-    squares: Annotated[list[int], _TWO]
-    # side of a square; all lengths seen depend on it
-    square_mm: Width
+    one_of = (("squares", "kalibr_target"), ("square_mm", "kalibr_target"))
+
+    # "charuco" (default), "checkerboard", "circles", "asymmetric_circles" or "aprilgrid"
+    kind: Literal["charuco", "checkerboard", "circles", "asymmetric_circles", "aprilgrid"] = (
+        "charuco"
+    )
+    # Kalibr's file of an aprilgrid or checkerboard beside session.toml, in place of the sizes below
+    kalibr_target: str | None = None
+    # how many squares [along x, along y]; circles or tags of the other kinds
+    squares: Annotated[list[int], _TWO] | None = None
+    # side of a square; all lengths seen depend on it. From circle to circle or tag to tag, of
+    # asymmetric circles from row to row
+    square_mm: Width | None = None
     square_sigma_mm: Annotated[float, Assumed(share=1e-3, origin="a print")] = 0.0
     # share by which the print may be longer along y than along x
     stretch_sigma: Annotated[
         float, Assumed(absolute=1e-3, unstated="stretch", origin="a printer's feed")
     ] = 0.0
-    # side of a marker, used to find the board alone; its sigma enters nothing
-    marker_mm: Width
+    # side of a marker or tag, diameter of a circle; not of a checkerboard. Its sigma enters nothing
+    marker_mm: Width | None = None
     marker_sigma_mm: float = 0.0
-    # OpenCV's name, such as "DICT_5X5_100"
-    dictionary: str
+    # of a ChArUco board: OpenCV's name, such as "DICT_5X5_100"
+    dictionary: str | None = None
     # OpenCV's pattern from before 4.6
     legacy: bool = False
     # printed white on black

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.base.input_problems import InputProblems, refused_as_bad_input
+from bench.base.input_problems import InputProblems
 from bench.session import manifest
 from bench.session.daq import daq_file
 from bench.session.footage import camera_sources, single_pictures, visible
@@ -20,7 +20,8 @@ from bench.session.profile import read_profile
 from bench.session.rest_shape import read_rest_shape
 from bench.session.rig_file import RIG_FILE, MeasuredRig, exact_pose, read_rig
 from bench.session.stated import StatedSession
-from bench.session.strict_toml import as_keys, key_names, read_toml, values
+from bench.session.stated_board import stated_board, with_kalibr_target
+from bench.session.strict_toml import as_keys, key_names, read_toml
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker, profiled_sizes
 from vision.geometry import Board, Crop, Reason, invert_transform
@@ -262,6 +263,7 @@ def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> St
     if tables.get("format", FORMAT) != FORMAT:
         found = f"format is {tables['format']!r}; this version reads format {FORMAT}"
         raise BadInput(found, file=MANIFEST)
+    tables = with_kalibr_target(tables, path, MANIFEST)
     needed = []
     if visible(path / "trials"):
         needed = ["bar"] if "whiskers" in tables else ["whisker", "bar"]
@@ -312,8 +314,7 @@ def _board(keys: manifest.BoardKeys | None) -> Board | None:
     """Return the board of [board]; None without that table. Raise BadInput for an impossible one."""
     if keys is None:
         return None
-    with refused_as_bad_input(MANIFEST):
-        return Board(**values(keys, leave_out=("marker_sigma_mm", "exact")))
+    return stated_board(keys, MANIFEST)
 
 
 def _board_pose(rows: list[list[float]] | None) -> np.ndarray | None:

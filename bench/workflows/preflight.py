@@ -36,7 +36,6 @@ from vision.boards import (
     estimate_optics,
     find_corners,
     fixes_pose,
-    why_not_found,
 )
 from vision.geometry import Board, counted
 from vision.pictures import PicturePart
@@ -222,7 +221,7 @@ def _check_board_views(
     greys = [grey for grey in frames.values() if grey is not None]
     if not any(in_threads(lambda grey: _shows_board(grey, board), greys)):
         none = f"the board is found in none of {counted(len(greys), 'picture')}"
-        raise BadInput(why_not_found(greys, board, mirrored=mirrored) or none, file=place)
+        raise BadInput(board.why_not_found(greys, mirrored=mirrored) or none, file=place)
 
 
 def _check_rig_board(picture: Path | PicturePart, board: Board, problems: InputProblems) -> None:

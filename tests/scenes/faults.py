@@ -17,12 +17,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vision.boards import find_corners
-from vision.geometry import Board
+from vision.boards import CharucoBoard, find_corners
 
 TRIAL = "b60_4"
 # The board of the small session.
-BOARD = Board((8, 6), square_mm=15.0, marker_mm=11.0, dictionary="DICT_5X5_100")
+BOARD = CharucoBoard((8, 6), square_mm=15.0, marker_mm=11.0, dictionary="DICT_5X5_100")
 Fault = Callable[[Path], None]
 
 

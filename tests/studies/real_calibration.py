@@ -18,10 +18,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from bench.base.threads import in_threads
+from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import Corners, find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.views import BoardViews
-from vision.geometry.board import Board
 from vision.geometry.lens import LENS_TERMS
 from vision.geometry.refusals import Refused
 from vision.pictures.frames import Frames
@@ -29,10 +29,10 @@ from vision.pictures.frames import Frames
 SEED = 7
 
 
-def read_set(folder: Path) -> tuple[Board, BoardViews]:
+def read_set(folder: Path) -> tuple[CharucoBoard, BoardViews]:
     """The board of a folder, and its views by camera."""
     table = tomllib.loads((folder / "board.toml").read_text())
-    board = Board(**table | {"squares": tuple(table["squares"])})
+    board = CharucoBoard(**table | {"squares": tuple(table["squares"])})
     boards = {}
     sizes_px = {}
     for source in sorted(folder.iterdir()):
@@ -44,7 +44,7 @@ def read_set(folder: Path) -> tuple[Board, BoardViews]:
     return board, BoardViews(boards, sizes_px)
 
 
-def half_differences(views: BoardViews, name: str, board: Board, splits: int) -> np.ndarray:
+def half_differences(views: BoardViews, name: str, board: CharucoBoard, splits: int) -> np.ndarray:
     """Differences of the lens between halves of a camera's views, in stated sigmas, (splits, 9)."""
     rng = np.random.default_rng(SEED)
     series = views.boards[name]
@@ -62,7 +62,7 @@ def half_differences(views: BoardViews, name: str, board: Board, splits: int) ->
     return np.array(z).reshape(-1, len(LENS_TERMS))
 
 
-def _lens_of(views: BoardViews, name: str, half: np.ndarray, board: Board):
+def _lens_of(views: BoardViews, name: str, half: np.ndarray, board: CharucoBoard):
     """The lens of some views of one camera, and its sigmas, (9,) each."""
     kept = [view if k in half else Corners.none() for k, view in enumerate(views.boards[name])]
     made = calibrate_cameras(BoardViews({name: kept}, {name: views.sizes_px[name]}), board, None)
@@ -74,7 +74,7 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def together(views: BoardViews, board: Board) -> str:
+def together(views: BoardViews, board: CharucoBoard) -> str:
     """What the joint calibration says of instants and views."""
     try:
         made = calibrate_cameras(views, board, None)

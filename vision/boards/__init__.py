@@ -1,4 +1,4 @@
-"""ChArUco boards in pictures: corners with sigma, faults of a board, whether its views suffice.
+"""Boards in pictures: corners with sigma, faults of a board, whether its views suffice.
 
 May import geometry, pictures.
 
@@ -8,10 +8,12 @@ May import geometry, pictures.
 from vision.geometry.lazy_names import lazy_names
 
 NAMES = {
+    "april_grid": ("AprilGrid",),
     "board_optics": ("estimate_optics",),
+    "charuco": ("CharucoBoard",),
+    "checkerboard": ("Checkerboard",),
+    "circle_grid": ("AsymmetricCircles", "CircleGrid"),
     "corners": ("Corners", "MIN_CORNERS", "find_corners", "refine_corners"),
-    "diagnosis": ("why_not_found",),
-    "marker_size": ("check_marker_size",),
     "other_markers": ("find_other_markers",),
     "static_board": ("camera_moved",),
     "sufficiency": ("MIN_VIEWS", "fixes_pose"),

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.boards.corners import cut_corners, find_corners, to_8_bit
+from vision.boards.corners import find_corners, to_8_bit
 from vision.boards.edge_pixels import Windows
 from vision.boards.saddle import BLUR, fit_windows, predict_saddles, start_parameters
 from vision.geometry.board import Board
@@ -53,7 +53,7 @@ def estimate_optics(grey: np.ndarray, board: Board) -> Optics:
     """
     picture = to_8_bit(grey)
     corners = find_corners(picture, board)
-    cut = cut_corners(picture, corners.px, corners.ids, board)
+    cut = board.cut(picture, corners.px, corners.ids)
     if cut is None:
         return UNKNOWN
     windows, frames = cut

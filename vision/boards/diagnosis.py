@@ -1,14 +1,17 @@
-"""A board that is not found: which setting would find it, for the user to enter."""
+"""A ChArUco board that is not found: which setting would find it, for the user to enter."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
 from vision.boards.corners import MIN_CORNERS, detect, to_8_bit
-from vision.geometry.board import Board
+
+if TYPE_CHECKING:
+    from vision.boards.charuco import CharucoBoard
 
 # [1] Share of the board's corners by which a setting is believed. Set by eye: chance finds none,
 # a sound view all; names a cause in a refusal, enters no number. Study:
@@ -28,8 +31,8 @@ _MOST_DICTIONARIES = 3
 _NEAR_PX = 3.0
 
 
-def why_not_found(
-    greys: Sequence[np.ndarray], board: Board, *, mirrored: bool = False
+def why_no_charuco(
+    greys: Sequence[np.ndarray], board: "CharucoBoard", *, mirrored: bool = False
 ) -> str | None:
     """Return a sentence naming the setting that would find the board; None if it is found.
 
@@ -61,13 +64,13 @@ def why_not_found(
     return None if share > 0 else _describe_markers(greys, board)
 
 
-def _corner_share(greys: Sequence[np.ndarray], board: Board) -> float:
+def _corner_share(greys: Sequence[np.ndarray], board: "CharucoBoard") -> float:
     """Return the mean share of the board's corners that OpenCV finds and that lie as on a plane."""
     counts = [_count_corners(grey, board) for grey in greys]
     return float(np.mean(counts) / len(board.corners_mm))
 
 
-def _count_corners(grey: np.ndarray, board: Board) -> int:
+def _count_corners(grey: np.ndarray, board: "CharucoBoard") -> int:
     """Count the corners on one homography: a wrong layout finds some, at the wrong places."""
     ids, px = detect(grey, board)
     if len(ids) < MIN_CORNERS + 2:
@@ -77,7 +80,7 @@ def _count_corners(grey: np.ndarray, board: Board) -> int:
     return 0 if H is None else int(is_near.sum())
 
 
-def _other_prints(board: Board) -> list[Board]:
+def _other_prints(board: "CharucoBoard") -> list["CharucoBoard"]:
     """Return the boards that people mix up first: inverted, legacy, columns for rows."""
     prints = []
     for inverted, legacy in product((False, True), repeat=2):
@@ -86,7 +89,7 @@ def _other_prints(board: Board) -> list[Board]:
     return [other for other in prints if other != board]
 
 
-def _boards_of_other_dictionaries(greys: Sequence[np.ndarray], board: Board) -> Iterator[Board]:
+def _boards_of_other_dictionaries(greys: Sequence[np.ndarray], board: "CharucoBoard") -> Iterator["CharucoBoard"]:
     """Yield the board in each other dictionary whose markers are seen, in all prints.
 
     The dictionaries are those of which several markers are seen, the smallest of each kind that
@@ -123,7 +126,7 @@ def _count_markers(greys: Sequence[np.ndarray], dictionary: str) -> float:
     return float(np.mean([len(detector.detectMarkers(to_8_bit(grey))[0]) for grey in greys]))
 
 
-def _describe_markers(greys: Sequence[np.ndarray], board: Board) -> str:
+def _describe_markers(greys: Sequence[np.ndarray], board: "CharucoBoard") -> str:
     """Return a sentence on what is seen of the board's dictionary where no setting finds it."""
     count = _count_markers(greys, board.dictionary)
     if count < 1:
@@ -138,7 +141,7 @@ def _describe_markers(greys: Sequence[np.ndarray], board: Board) -> str:
     )
 
 
-def _settings(board: Board) -> list[str]:
+def _settings(board: "CharucoBoard") -> list[str]:
     """Return the board's settings as lines of session.toml."""
     return [
         f"squares = {list(board.squares)}",

@@ -1,5 +1,6 @@
 """The pixels that show the two edges through a corner of a board, for all corners of a picture."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,11 +58,25 @@ def cut_windows(
     board x and y in the picture at the corner. border: clear rim between a square's edge and its
     marker, in squares.
     """
-    grid = _disc(_reach_px(frames))
+    return cut_where(
+        grey, px_guess, _reach_px(frames), lambda offset: _shows_edges(offset, frames, border)
+    )
+
+
+def cut_where(
+    grey: np.ndarray,
+    px_guess: np.ndarray,
+    reach_px: int,
+    is_wanted: Callable[[np.ndarray], np.ndarray],
+) -> Windows:
+    """Return the pixels within reach of guesses (n, 2) px that are wanted.
+
+    is_wanted: of offsets (n, 2, k) px from the guesses, (n, k) bool.
+    """
+    grid = _disc(reach_px)
     anchor = np.round(px_guess).astype(int)
     place = anchor[:, :, None] + grid  # (n, 2, cells) px
-    is_edge = _shows_edges(place - px_guess[:, :, None], frames, border)
-    is_used = _is_inside(place, grey) & is_edge
+    is_used = _is_inside(place, grey) & is_wanted(place - px_guess[:, :, None])
     order = _used_first(is_used)
     weight = np.take_along_axis(is_used, order, axis=1).astype(float)
     offset = np.swapaxes(grid[:, order], 0, 1)

@@ -5,13 +5,16 @@ the plane's homography, and the markers are measured in it.
 """
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
-from vision.boards.corners import detect_with_markers
-from vision.geometry.board import Board
+from vision.boards.corners import to_8_bit
 from vision.geometry.refusals import Refused
+
+if TYPE_CHECKING:
+    from vision.boards.charuco import CharucoBoard
 
 # [markers] A median of fewer may be two spoilt ones. Origin not known. Study:
 # tests/vision/boards/test_marker_size.py.
@@ -23,7 +26,7 @@ _TOLERANCE = 0.04
 _RIM_PX = 2.0
 
 
-def check_marker_size(greys: Sequence[np.ndarray], board: Board) -> None:
+def check_marker_size(greys: Sequence[np.ndarray], board: "CharucoBoard") -> None:
     """Raise Refused where marker_mm and square_mm contradict the markers in pictures."""
     sides = []
     for grey in greys:
@@ -42,9 +45,9 @@ def check_marker_size(greys: Sequence[np.ndarray], board: Board) -> None:
         )
 
 
-def _marker_sides(grey: np.ndarray, board: Board) -> list[tuple[float, float]]:
+def _marker_sides(grey: np.ndarray, board: "CharucoBoard") -> list[tuple[float, float]]:
     """Measure the side of each marker in a picture: in squares, and in px."""
-    ids, px, markers = detect_with_markers(grey, board)
+    ids, px, markers = board.detect_with_markers(to_8_bit(grey))
     if not len(ids):
         return []
     H, _ = cv2.findHomography(px, board.corners_mm[ids, :2] / board.square_mm, 0)

@@ -57,15 +57,19 @@ class Marker:
 
 
 def find_other_markers(grey: np.ndarray, board: Board) -> list[Marker]:
-    """Find the markers of the board's dictionary that the board does not use, in a grey picture."""
+    """Find the markers of the board's dictionary that the board does not use, in a grey picture.
+
+    Beside a board without markers all count, of DICT_5X5_100.
+    """
     picture = to_8_bit(grey)
-    if board.inverted:
+    if board.is_white_on_black:
         picture = 255 - picture
-    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
+    name, first_spare = board.spare_markers
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
     outlines, numbers, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(picture)
     found = []
     for outline, number in zip(outlines, () if numbers is None else numbers.ravel()):
-        if number < board.marker_count:
+        if number < first_spare:
             continue
         px = _refine(picture, dictionary, int(number), outline.reshape(4, 2))
         if px is not None:

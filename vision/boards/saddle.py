@@ -90,7 +90,7 @@ def fit_saddles(windows: Windows, frames: np.ndarray, px_guess: np.ndarray) -> S
     """Fit the corner nearest each guess (n, 2) px; windows and frames are as of `cut_windows`."""
     start = start_parameters(windows, px_guess, frames)
     parameters, converged = fit_windows(windows, start, predict_saddles)
-    saddles = _report(windows, parameters, converged)
+    saddles = report_fit(windows, parameters, converged, predict_saddles)
     plausible = converged & _is_plausible(saddles, px_guess, frames)
     has_pixels = windows.weight.sum(axis=1) >= _MIN_PIXELS
     return replace(saddles, converged=plausible & has_pixels)
@@ -109,7 +109,13 @@ def start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray)
     p[:, TURN] = np.column_stack([normal_1, normal_2])
     p[:, BLUR] = np.log(_FIRST_BLUR_PX)
     p[:, CONTRAST] = 1.0
-    _, J = predict_saddles(windows, p)
+    return with_linear_part(windows, p, predict_saddles)
+
+
+def with_linear_part(windows: Windows, p: np.ndarray, predict: Predict) -> np.ndarray:
+    """Return parameters p (n, 10) with contrast, level and slope by least squares."""
+    p = p.copy()
+    _, J = predict(windows, p)
     normal, gradient = _normal_equations(J[:, LINEAR], windows.grey, windows.weight)
     p[:, LINEAR] = _solve(normal, gradient, np.zeros(len(p)))
     return p
@@ -247,9 +253,11 @@ def _evaluate(windows: Windows, p: np.ndarray, predict: Predict) -> _Fit:
     return _Fit(p, cost, normal, gradient)
 
 
-def _report(windows: Windows, p: np.ndarray, converged: np.ndarray) -> Saddles:
-    """Return the corners of the parameters p (n, 10), with their sigmas."""
-    grey, J = predict_saddles(windows, p)
+def report_fit(
+    windows: Windows, p: np.ndarray, converged: np.ndarray, predict: Predict
+) -> Saddles:
+    """Return the corners of the parameters p (n, 10) of a model, with their sigmas."""
+    grey, J = predict(windows, p)
     residual = (windows.grey - grey) * windows.weight
     freedom = np.maximum(windows.weight.sum(axis=1) - p.shape[1], 1)
     misfit = np.sqrt(np.sum(residual**2, axis=1) / freedom)

@@ -232,7 +232,7 @@ class _JointFits:
 
         px (n, 2): of the sightings, at their view's own time.
         """
-        columns, lines = (squares - 1 for squares in self.board.squares)
+        columns, lines = self.board.grid
         cameras = self.calibration.cameras
         seen = self.layout.seen
         count = len(self.layout.index) * lines * columns

@@ -1,9 +1,9 @@
-"""The printed ChArUco board."""
+"""The printed board: points in a plane, which cameras are calibrated by."""
 
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from functools import cached_property
 
-import cv2
 import numpy as np
 
 from vision.geometry.checks import require, require_length, require_sigma
@@ -14,75 +14,91 @@ PRINT_TERMS = ("scale", "stretch", "warp_x_mm", "warp_y_mm")
 
 
 @dataclass(frozen=True)
-class Board:
-    """A ChArUco board in OpenCV's frame: origin top left, z into the board.
+class Board(ABC):
+    """A board whose points lie in rows; what is printed there, and how it is found, a kind says.
 
-    squares: (along x, along y). square_sigma_mm: of the mean square. stretch_sigma: of the share by
-    which the print is longer along y than along x. What has a sigma of 0 is exact. Raises Refused
-    for a board that cannot be.
+    squares: cells (along x, along y). square_mm: side of one. square_sigma_mm: of the mean square.
+    stretch_sigma: of the share by which the print is longer along y than along x. What has a sigma
+    of 0 is exact. Raises Refused for a board that cannot be.
     """
 
     squares: tuple[int, int]
     square_mm: float
-    marker_mm: float
-    dictionary: str
-    legacy: bool = False
-    inverted: bool = False
-    square_sigma_mm: float = 0.0
-    stretch_sigma: float = 0.0
+    square_sigma_mm: float = field(default=0.0, kw_only=True)
+    stretch_sigma: float = field(default=0.0, kw_only=True)
+
+    # The kind's name in session.toml.
+    kind: str = field(init=False)
 
     def __post_init__(self):
-        """Raise Refused for counts, lengths or a dictionary that cannot be."""
+        """Raise Refused for counts or lengths that cannot be."""
         object.__setattr__(self, "squares", tuple(int(n) for n in self.squares))
         require(
             len(self.squares) == 2 and min(self.squares) >= 2,
             f"board squares = {list(self.squares)}: two counts, each 2 or more",
         )
-        require_length("board", square_mm=self.square_mm, marker_mm=self.marker_mm)
+        require_length("board", square_mm=self.square_mm)
         require_sigma(
             "board", square_sigma_mm=self.square_sigma_mm, stretch_sigma=self.stretch_sigma
         )
-        require(
-            self.marker_mm < self.square_mm,
-            f"board marker_mm = {self.marker_mm} is not smaller than square_mm = {self.square_mm}",
-        )
-        require(
-            self.dictionary.startswith("DICT_") and hasattr(cv2.aruco, self.dictionary),
-            f"board dictionary {self.dictionary!r} is not one of OpenCV's, such as DICT_5X5_100",
-        )
-        available = len(_dictionary(self.dictionary).bytesList)
-        require(
-            self.marker_count <= available,
-            f"board of {self.squares[0]} x {self.squares[1]} squares needs {self.marker_count} markers, "
-            f"{self.dictionary} has {available}",
-        )
 
     @property
-    def marker_count(self) -> int:
-        """Return the number of markers: one on every second square."""
-        return self.squares[0] * self.squares[1] // 2
-
-    def opencv(self) -> cv2.aruco.CharucoBoard:
-        """Return the board as OpenCV's object, with only the markers of its dictionary that it
-        uses.
-
-        Comparing pictures with a thousand markers takes 40 % of detection. (The other markers are
-        as far from the board's as they are in the whole dictionary, so that they are not taken for
-        it.)
-        """
-        return _opencv_board(self)
+    @abstractmethod
+    def grid(self) -> tuple[int, int]:
+        """Return the number of points in a row, and of rows."""
 
     @cached_property
+    @abstractmethod
     def corners_mm(self) -> np.ndarray:
-        """Return the inner corners in the board frame, ((nx − 1)(ny − 1), 3); the row is the
-        ChArUco id.
+        """Return the points in the board frame, (m, 3), row by row; the index is the point's id."""
+
+    @property
+    def hidden_turns(self) -> tuple[np.ndarray, ...]:
+        """Return the ids (m,) of the points after each turn of the board that no picture shows."""
+        return ()
+
+    @property
+    def is_white_on_black(self) -> bool:
+        """Return whether the board, and markers with it, are printed white on black."""
+        return False
+
+    @property
+    def spare_markers(self) -> tuple[str, int]:
+        """Return a dictionary of markers, and the first number that the board does not use."""
+        return "DICT_5X5_100", 0
+
+    @abstractmethod
+    def detect(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ids (n,) and places (n, 2) px of the points in a picture of 8 bits, as OpenCV
+        finds them; both empty where it does not.
         """
-        x = np.arange(1, self.squares[0]) * self.square_mm
-        y = np.arange(1, self.squares[1]) * self.square_mm
-        x_grid, y_grid = np.meshgrid(x, y)
-        corners = np.stack([x_grid, y_grid, np.zeros_like(x_grid)], axis=-1).reshape(-1, 3)
-        corners.setflags(write=False)
-        return corners
+
+    @abstractmethod
+    def refine(self, grey: np.ndarray, px_guess: np.ndarray, ids: np.ndarray) -> "Corners":  # noqa: F821
+        """Fit the points `ids` (n,) near known places px_guess (n, 2) to a grey picture; return
+        `vision.boards.Corners` of those that are neither hidden nor disturbed.
+        """
+
+    def cut(self, grey: np.ndarray, px: np.ndarray, ids: np.ndarray) -> tuple | None:
+        """Return the pixels about crossing edges at points (n, 2) px and a frame at each; None where
+        the board has no such edges, or too few are seen.
+        """
+        return None
+
+    @abstractmethod
+    def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:
+        """Return a sentence on why the board is not found in some grey pictures; None if it is."""
+
+    def check_print(self, greys: list[np.ndarray]) -> None:  # noqa: B027
+        """Raise Refused where a second known length on the board contradicts the pictures."""
+
+
+def grid_mm(x_mm: np.ndarray, y_mm: np.ndarray) -> np.ndarray:
+    """Return the points (n m, 3) of a grid with columns at x_mm (n,) and rows at y_mm (m,)."""
+    x_grid, y_grid = np.meshgrid(x_mm, y_mm)
+    corners = np.stack([x_grid, y_grid, np.zeros_like(x_grid)], axis=-1).reshape(-1, 3)
+    corners.setflags(write=False)
+    return corners
 
 
 def printed_corners(corners_mm: np.ndarray, terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,20 +116,3 @@ def printed_corners(corners_mm: np.ndarray, terms: np.ndarray) -> tuple[np.ndarr
     by_terms[:, :2, 1] = flat * [-0.5, 0.5]
     by_terms[:, 2, 2:] = 1.0 - unit**2
     return corners_mm + by_terms @ terms, by_terms
-
-
-def _dictionary(name: str) -> cv2.aruco.Dictionary:
-    """Return OpenCV's dictionary of markers of that name."""
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
-
-
-@lru_cache(maxsize=32)
-def _opencv_board(board: Board) -> cv2.aruco.CharucoBoard:
-    """Make OpenCV's board, once for each board: OpenCV warns of narrow borders each time."""
-    whole = _dictionary(board.dictionary)
-    markers = whole.bytesList[: board.marker_count]
-    own = cv2.aruco.Dictionary(markers, whole.markerSize, whole.maxCorrectionBits)
-    square_mm = float(board.square_mm)
-    charuco = cv2.aruco.CharucoBoard(board.squares, square_mm, float(board.marker_mm), own)
-    charuco.setLegacyPattern(board.legacy)
-    return charuco

@@ -19,21 +19,21 @@ from bench.setup.board_pdf import (
     toml_block,
     write_board,
 )
+from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import find_corners
-from vision.geometry.board import Board
 
 DPI = 300
 LENS_PX = 1.0
 EDGE_MM = 12.0
-BOARD = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
+BOARD = CharucoBoard((8, 6), 15.0, 11.0, "DICT_5X5_100")
 BOARDS = [
     BOARD,
-    Board((5, 9), 20.0, 15.0, "DICT_4X4_50", legacy=True),
-    Board((11, 8), 12.5, 9.0, "DICT_6X6_250", inverted=True),
+    CharucoBoard((5, 9), 20.0, 15.0, "DICT_4X4_50", legacy=True),
+    CharucoBoard((11, 8), 12.5, 9.0, "DICT_6X6_250", inverted=True),
 ]
 
 
-def check_found(picture: np.ndarray, board: Board, most_px: float) -> None:
+def check_found(picture: np.ndarray, board: CharucoBoard, most_px: float) -> None:
     """Every corner is found, as through a lens (its blur: edges sharper than a pixel are no photograph), and neighbours
     are a square apart."""
     corners = find_corners(cv2.GaussianBlur(picture, (0, 0), LENS_PX), board)
@@ -127,7 +127,7 @@ def test_nothing_stands_over_the_board_or_off_the_page():
 
 def test_lines_for_the_manifest():
 
-    assert Board(**tomllib.loads("\n".join(toml_block(BOARDS[1])))["board"]) == BOARDS[1]
+    assert CharucoBoard(**tomllib.loads("\n".join(toml_block(BOARDS[1])))["board"]) == BOARDS[1]
 
 
 @pytest.mark.parametrize(

@@ -27,11 +27,11 @@ from bench.trials.placing import _misplaced
 from bench.trials.readout import Readout
 from tests.scenes.model_scenes import begun, scene, with_points
 from tests.scenes.results import seen_whisk
+from vision.boards.charuco import CharucoBoard
 from vision.calibration.place import FALSE_ALARM, Placement, by_board, combine
 from vision.fit.scatter import inflated_by_residuals
 from vision.fit.solve import solve
 from vision.fit.turns import frame_turns
-from vision.geometry.board import Board
 from vision.truth.value import UNKNOWN, Value
 
 SPEED = np.radians(18.0)  # rad/s: 0.9° a frame, 20 frames a second
@@ -122,7 +122,7 @@ def trial(small_session):
     return load_session(small_session).trial("b60_4")
 
 
-BOARD = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
+BOARD = CharucoBoard((8, 6), 15.0, 11.0, "DICT_5X5_100")
 
 
 def test_a_bar_as_thick_as_said_is_without_a_warning(trial):

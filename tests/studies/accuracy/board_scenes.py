@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import Corners
-from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.rotation import apply, compose, exp_rotation, invert_transform
 
-BOARD = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
+BOARD = CharucoBoard((8, 6), 15.0, 11.0, "DICT_5X5_100")
 SIZE_PX = (1280, 720)
 T_RIG_BOARD = np.column_stack([exp_rotation(np.array([np.pi, 0.0, 0.0])), [-10.0, 40.0, -45.0]])
 # Where the whisker is, and a bar's length to either side.

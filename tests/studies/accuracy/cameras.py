@@ -25,21 +25,21 @@ from bench.cameras.board_views import read_board_views
 from bench.cameras.calibrate_session import calibrate_from
 from bench.session.session import load_session
 from fixtures.say_exact import exact_copy
+from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import Corners, detect, find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.held_out import check_held_out
 from vision.calibration.views import BoardViews
-from vision.geometry.board import Board
 from vision.geometry.camera import Camera
 from vision.pictures.frames import Frames
 
 ROOT = Path(__file__).resolve().parents[3]
-WEBCAM_BOARD = Board((4, 5), 54.0, 40.5, "DICT_4X4_1000", inverted=True)
+WEBCAM_BOARD = CharucoBoard((4, 5), 54.0, 40.5, "DICT_4X4_1000", inverted=True)
 # What OpenCV's corners scatter by, an axis, on these videos.
 OPENCV_SIGMA_PX = 0.15
 
 
-def opencv_corners(grey: np.ndarray, board: Board) -> Corners:
+def opencv_corners(grey: np.ndarray, board: CharucoBoard) -> Corners:
     """The corners that others start from."""
     ids, px = detect(grey, board)
     return Corners(ids, px, np.full(len(ids), OPENCV_SIGMA_PX))

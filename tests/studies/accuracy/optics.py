@@ -25,7 +25,7 @@ from bench.session.session import load_session
 from tests.studies.accuracy import error_parts
 from tests.studies.accuracy.bar_scenes import read_scene
 from vision.boards.board_optics import estimate_optics
-from vision.geometry.board import Board
+from vision.boards.charuco import CharucoBoard
 from vision.geometry.optics import UNKNOWN, Optics
 from vision.geometry.refusals import Refused
 from vision.pictures.frames import Frames
@@ -34,10 +34,10 @@ AS_BY_A_BOARD = {"log_gamma_sigma": 0.15, "log_blur_sigma": 0.1}
 PIXEL_PX = 12**-0.5
 
 
-def board_of(folder: Path) -> Board:
+def board_of(folder: Path) -> CharucoBoard:
     """The board of a session."""
     table = tomllib.loads((folder / "session.toml").read_text())["board"]
-    return Board(**table | {"squares": tuple(table["squares"])})
+    return CharucoBoard(**table | {"squares": tuple(table["squares"])})
 
 
 def true_optics(folder: Path) -> Optics:

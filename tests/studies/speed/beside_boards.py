@@ -13,10 +13,10 @@ from bench.rig import boards, build
 from bench.rig.protocol import Protocol, load
 from bench.rig.studio import Studio
 from tests.studies.accuracy.board_scenes import WORK_MM
+from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.views import BoardViews, MeasuredPose
-from vision.geometry.board import Board
 from vision.geometry.camera import Camera
 
 VIEWS = 16  # of the board in the air, as seen by all cameras at once
@@ -62,7 +62,7 @@ def _triangulated(cameras: Sequence[Camera], px: Sequence[np.ndarray]) -> np.nda
 
 
 def ours(
-    pictures: np.ndarray, board: Board, T_rig_board: np.ndarray
+    pictures: np.ndarray, board: CharucoBoard, T_rig_board: np.ndarray
 ) -> tuple[list[Camera], float, float]:
     """Cameras; seconds of processor a picture, and of the adjustment."""
     begin = time.process_time()
@@ -76,7 +76,7 @@ def ours(
     return list(made.cameras), found_s / pictures[..., 0, 0].size, time.process_time() - begin
 
 
-def theirs(others: Path, pictures: np.ndarray, board: Board) -> dict:
+def theirs(others: Path, pictures: np.ndarray, board: CharucoBoard) -> dict:
     """What others_boards.py writes."""
     _, kind, size = board.dictionary.split("_")
     numbers = [*board.squares, board.square_mm, board.marker_mm, kind[0], size]
@@ -111,7 +111,7 @@ def table(others: Path) -> Iterator[str]:
         for c in build.cameras(protocol)
     ]
     given = protocol.board
-    board = Board(given.squares, given.square_mm, given.marker_mm, given.dictionary)
+    board = CharucoBoard(given.squares, given.square_mm, given.marker_mm, given.dictionary)
     title = f"{len(exact)} cameras from {pictures.shape[1]} views"
     yield f"{title:<34}{'RMS mm':>8}{'worst mm':>10}{'find, ms/picture':>18}{'adjust, s':>11}"
     cameras, found_s, adjusted_s = ours(pictures, board, build.T_rig_board(protocol))

@@ -8,7 +8,7 @@ import pytest
 
 from tests.scenes.board_pictures import picture
 from tests.studies.accuracy.board_scenes import BOARD
-from vision.boards.diagnosis import why_not_found
+from vision.boards.diagnosis import why_no_charuco
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def greys():
 
 
 def test_the_right_board_needs_no_word(greys):
-    assert why_not_found(greys, BOARD) is None
+    assert why_no_charuco(greys, BOARD) is None
 
 
 @pytest.mark.parametrize(
@@ -34,11 +34,11 @@ def test_the_right_board_needs_no_word(greys):
     ],
 )
 def test_the_setting_that_works_is_named(greys, change, words):
-    assert re.search(words, why_not_found(greys, replace(BOARD, **change)))
+    assert re.search(words, why_no_charuco(greys, replace(BOARD, **change)))
 
 
 def test_another_size_of_board_is_said_to_be_laid_out_otherwise(greys):
-    reason = why_not_found(greys, replace(BOARD, squares=(9, 6)))
+    reason = why_no_charuco(greys, replace(BOARD, squares=(9, 6)))
     assert (
         "markers of DICT_5X5_100 are seen" in reason
         and "not laid out as on a board of 9 x 6" in reason
@@ -46,6 +46,6 @@ def test_another_size_of_board_is_said_to_be_laid_out_otherwise(greys):
 
 
 def test_no_board_at_all():
-    assert "no marker of DICT_5X5_100" in why_not_found(
+    assert "no marker of DICT_5X5_100" in why_no_charuco(
         [np.full((480, 640), 128, dtype=np.uint8)], BOARD
     )

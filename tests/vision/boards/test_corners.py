@@ -6,8 +6,8 @@ import pytest
 
 from tests.scenes.board_pictures import picture, true_px
 from tests.studies.accuracy.board_scenes import BOARD
+from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import Corners, detect, find_corners, refine_corners
-from vision.geometry.board import Board
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_sigma_is_the_scatter(rng, correlated):
 
 def test_an_inverted_print_is_found_only_as_such(rng):
     grey = picture(BOARD, rng, noise=2.0, invert=True)
-    inverted = Board(
+    inverted = CharucoBoard(
         BOARD.squares, BOARD.square_mm, BOARD.marker_mm, BOARD.dictionary, inverted=True
     )
     assert len(find_corners(grey, BOARD)) == 0

@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
+from vision.boards.charuco import CharucoBoard
 from vision.boards.other_markers import find_other_markers
-from vision.geometry.board import Board
 
-BOARD = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
+BOARD = CharucoBoard((8, 6), 15.0, 11.0, "DICT_5X5_100")
 CORNERS_PX = np.array([[60.3, 40.2], [121.7, 47.9], [118.4, 101.6], [57.1, 92.8]])
 
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import Corners, find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.held_out import check_held_out
 from vision.calibration.views import BoardViews
-from vision.geometry.board import Board
 from vision.pictures.frames import Frames
 
-BOARD = Board((4, 5), 54.0, 40.5, "DICT_4X4_1000", inverted=True)
+BOARD = CharucoBoard((4, 5), 54.0, 40.5, "DICT_4X4_1000", inverted=True)
 
 
 def views_of(folder, names):

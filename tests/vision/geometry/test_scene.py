@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vision.geometry.board import Board
+from vision.boards.charuco import CharucoBoard
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Bar, Wire
@@ -89,7 +89,7 @@ def test_projection_of_1000_points_with_jacobians_takes_under_2_ms():
 
 
 def test_board_corners_are_opencv_s():
-    board = Board((8, 6), 15.0, 11.0, "DICT_5X5_100")
+    board = CharucoBoard((8, 6), 15.0, 11.0, "DICT_5X5_100")
     np.testing.assert_allclose(board.corners_mm, board.opencv().getChessboardCorners(), atol=1e-5)
 
 
@@ -106,9 +106,9 @@ def test_wire_tapers_only_as_a_cone():
         (lambda: Wire("tube", 100, 1), "cylinder, cone"),
         (lambda: Wire("cone", -1, 1), "length_mm"),
         (lambda: Bar(0.0), "diameter_mm"),
-        (lambda: Board((8, 6), 15, 16, "DICT_5X5_100"), "not smaller"),
-        (lambda: Board((8, 6), 15, 11, "DICT_9X9"), "DICT_9X9"),
-        (lambda: Board((20, 20), 15, 11, "DICT_5X5_100"), "needs 200 markers"),
+        (lambda: CharucoBoard((8, 6), 15, 16, "DICT_5X5_100"), "not smaller"),
+        (lambda: CharucoBoard((8, 6), 15, 11, "DICT_9X9"), "DICT_9X9"),
+        (lambda: CharucoBoard((20, 20), 15, 11, "DICT_5X5_100"), "needs 200 markers"),
         (lambda: a_camera(matrix=np.diag([-5.0, 5, 1])), "fx, fy above 0"),
         (lambda: a_camera(distortion=[0, 0, 0, 0]), "distortion must be 5"),
         (lambda: a_camera(T_camera_rig=np.ones((3, 4))), "no rotation"),

@@ -1,0 +1,142 @@
+"""The AprilGrid of Kalibr: tags in rows, with a small dark square in each gap between four of them.
+
+Each corner of a tag is so a crossing of two edges. Frame and numbers are Kalibr's: tag 0 lower
+left, x along its row, y to the next row above, z out of the board.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+from vision.boards.corners import to_8_bit
+from vision.boards.saddle_board import SaddleBoard
+from vision.geometry.board import grid_mm
+from vision.geometry.checks import require, require_length
+
+_DICTIONARY = cv2.aruco.DICT_APRILTAG_36h11
+# [modules] Widths of the dark rim about a tag's code: Kalibr's, and that of AprilTag's own pictures.
+_RIMS = (2, 1)
+# [1] Of a tag's side: the narrower of the two rims, one module of eight. A layout.
+_RIM_SHARE = 1.0 / 8.0
+# A tag's corners, clockwise as OpenCV orders them: column and row, from the lower left of a tag as
+# Kalibr prints it, upside down.
+_ORDER = ((1, 0), (0, 0), (0, 1), (1, 1))
+# [1] Of a tag's side: corners lie off a plane's picture by less, through any lens here; those of a
+# tag taken with a wrong rim by a fifth. Stated.
+_MOST_OFF_PLANE = 0.1
+
+
+@dataclass(frozen=True)
+class AprilGrid(SaddleBoard):
+    """A grid of AprilTags 36h11.
+
+    squares: tags (along x, along y). square_mm: from tag to tag. marker_mm: side of a tag. Raises
+    Refused for a board that cannot be.
+    """
+
+    marker_mm: float
+
+    kind: str = field(default="aprilgrid", init=False)
+
+    def __post_init__(self):
+        """Raise Refused for counts or lengths that cannot be."""
+        super().__post_init__()
+        require_length("board", marker_mm=self.marker_mm)
+        require(
+            self.marker_mm < self.square_mm,
+            f"board marker_mm = {self.marker_mm} is not smaller than square_mm = {self.square_mm}",
+        )
+        available = len(cv2.aruco.getPredefinedDictionary(_DICTIONARY).bytesList)
+        count = self.squares[0] * self.squares[1]
+        require(count <= available, f"board of {count} tags: there are {available}")
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Return the number of tags' corners along x and y."""
+        return 2 * self.squares[0], 2 * self.squares[1]
+
+    @cached_property
+    def corners_mm(self) -> np.ndarray:
+        """Return the tags' corners in the board frame, (4 nx ny, 3)."""
+        x_mm, y_mm = [self._along(count) for count in self.squares]
+        return grid_mm(x_mm, y_mm)
+
+    def _along(self, count: int) -> np.ndarray:
+        """Return where tags begin and end along a row of so many, (2 count,) mm."""
+        return np.add.outer(np.arange(count) * self.square_mm, [0.0, self.marker_mm]).ravel()
+
+    @property
+    def spare_markers(self) -> tuple[str, int]:
+        """Return the tags' dictionary, and the first number that the board does not use."""
+        return "DICT_APRILTAG_36h11", self.squares[0] * self.squares[1]
+
+    @property
+    def cell_mm(self) -> float:
+        """Return the gap between tags, whose edges two corners share, or twice a tag's rim."""
+        return min(self.square_mm - self.marker_mm, 2.0 * _RIM_SHARE * self.marker_mm)
+
+    @property
+    def clear_mm(self) -> float:
+        """Return half a cell: no code reaches into it."""
+        return 0.5 * self.cell_mm
+
+    def detect(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners of the tags that are seen.
+
+        How wide the tags' rims are, and which way up tags were printed, is what puts their corners
+        on one plane.
+        """
+        best = np.empty(0, dtype=int), np.empty((0, 2))
+        least = _MOST_OFF_PLANE
+        for rim in _RIMS:
+            numbers, outlines_px = self._tags(picture, rim)
+            for turn in range(4) if len(numbers) > 1 else ():
+                ids = self._corner_ids(numbers, np.roll(_ORDER, turn, axis=0))
+                off_plane = self._off_plane(ids, outlines_px)
+                if off_plane < least:
+                    least = off_plane
+                    best = ids, outlines_px.reshape(-1, 2)
+        return best
+
+    def _tags(self, picture: np.ndarray, rim: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the numbers (n,) of tags with a rim of so many modules, and their outlines
+        (n, 4, 2) px. A number that is seen twice is left out.
+        """
+        parameters = cv2.aruco.DetectorParameters()
+        parameters.markerBorderBits = rim
+        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        dictionary = cv2.aruco.getPredefinedDictionary(_DICTIONARY)
+        outlines, numbers, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(picture)
+        if numbers is None:
+            return np.empty(0, dtype=int), np.empty((0, 4, 2))
+        numbers = numbers.ravel().astype(int)
+        values, counts = np.unique(numbers, return_counts=True)
+        once = np.isin(numbers, values[counts == 1]) & (numbers < self.squares[0] * self.squares[1])
+        return numbers[once], np.array(outlines, dtype=float).reshape(-1, 4, 2)[once]
+
+    def _corner_ids(self, numbers: np.ndarray, order: np.ndarray) -> np.ndarray:
+        """Return the ids (4 n,) of the corners of tags (n,), in an order (4, 2) of columns and rows."""
+        row, column = np.divmod(numbers[:, None], self.squares[0])
+        return ((2 * row + order[:, 1]) * self.grid[0] + 2 * column + order[:, 0]).ravel()
+
+    def _off_plane(self, ids: np.ndarray, outlines_px: np.ndarray) -> float:
+        """Return how far corners lie off a plane's picture in the median, in sides of a tag."""
+        px = outlines_px.reshape(-1, 2)
+        H, _ = cv2.findHomography(self.corners_mm[ids, :2], px, 0)
+        if H is None:
+            return np.inf
+        on_plane = cv2.perspectiveTransform(self.corners_mm[ids, None, :2], H)[:, 0]
+        side_px = np.linalg.norm(outlines_px[:, 0] - outlines_px[:, 1], axis=1)
+        return float(np.median(np.linalg.norm(on_plane - px, axis=1)) / np.median(side_px))
+
+    def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:
+        """Return a sentence on how many tags are seen; None if the board is found."""
+        counts = [len(self.detect(to_8_bit(grey))[0]) for grey in greys]
+        if any(counts):
+            return None
+        return (
+            f"no tag of DICT_APRILTAG_36h11 numbered 0 to {self.squares[0] * self.squares[1] - 1} is seen: "
+            "is this the board, of this family, lit and sharp?"
+        )

@@ -1,0 +1,107 @@
+"""The plain checkerboard, found whole or not at all.
+
+Its upper left square is dark. One with an odd number of squares one way and an even one the other
+looks otherwise after half a turn; of any other its points are named from the upper left of the
+picture, and `vision.calibration.turned` makes the cameras agree.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+from vision.boards.corners import MIN_CORNERS, to_8_bit
+from vision.boards.saddle_board import SaddleBoard
+from vision.boards.symmetry import possible_labels, turns_onto_itself, upper_left_first
+from vision.geometry.board import grid_mm
+from vision.geometry.checks import require
+
+# OpenCV's detector needs three corners either way.
+_FEWEST_SQUARES = 4
+_FLAGS = cv2.CALIB_CB_NORMALIZE_IMAGE
+# The grid from which OpenCV goes on to all that is there, where it looks for no size.
+_SMALLEST_GRID = (3, 3)
+
+
+@dataclass(frozen=True)
+class Checkerboard(SaddleBoard):
+    """A plain checkerboard: origin at the outer corner of a dark square, z into the board."""
+
+    kind: str = field(default="checkerboard", init=False)
+
+    def __post_init__(self):
+        """Raise Refused for counts or lengths that cannot be."""
+        super().__post_init__()
+        require(
+            min(self.squares) >= _FEWEST_SQUARES,
+            f"board squares = {list(self.squares)}: a checkerboard needs {_FEWEST_SQUARES} or more each way",
+        )
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Return the number of inner corners along x and y."""
+        return self.squares[0] - 1, self.squares[1] - 1
+
+    @cached_property
+    def corners_mm(self) -> np.ndarray:
+        """Return the inner corners in the board frame, ((nx − 1)(ny − 1), 3)."""
+        x_mm = np.arange(1, self.squares[0]) * self.square_mm
+        return grid_mm(x_mm, np.arange(1, self.squares[1]) * self.square_mm)
+
+    @property
+    def hidden_turns(self) -> tuple[np.ndarray, ...]:
+        """Return the turns that put dark squares onto dark squares."""
+        dark = self.is_dark_first
+        return tuple(o for o in turns_onto_itself(self)[1:] if np.array_equal(dark[o], dark))
+
+    @property
+    def cell_mm(self) -> float:
+        """Return the side of a square: neighbouring corners share the edge between them."""
+        return self.square_mm
+
+    @property
+    def clear_mm(self) -> float:
+        """Return half a square: nothing is printed in it."""
+        return 0.5 * self.square_mm
+
+    def detect(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return all corners; none where a part of the board is hidden or out of the picture."""
+        is_found, px = cv2.findChessboardCornersSB(picture, self.grid, flags=_FLAGS)
+        if not is_found:
+            return np.empty(0, dtype=int), np.empty((0, 2))
+        candidates = possible_labels(px.reshape(-1, 2).astype(float), self)
+        dark_first = [px for px in candidates if self._darkness(px, picture) > 0]
+        return np.arange(len(px)), upper_left_first(dark_first or candidates)
+
+    def _darkness(self, px: np.ndarray, picture: np.ndarray) -> float:
+        """Return how much darker the squares are that should be dark, by corners (m, 2) px."""
+        columns, rows = self.grid
+        grid = px.reshape(rows, columns, 2)
+        middles = 0.25 * (grid[1:, 1:] + grid[1:, :-1] + grid[:-1, 1:] + grid[:-1, :-1])
+        column, row = np.round(middles).astype(int).reshape(-1, 2).T
+        sign = 1 - 2 * (np.add.outer(np.arange(rows - 1), np.arange(columns - 1)) % 2)
+        return -float(sign.ravel() @ picture[row, column].astype(float))
+
+    def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:
+        """Return a sentence on what grid is seen in place of the board's; None if it is found."""
+        if any(len(self.detect(to_8_bit(grey))[0]) for grey in greys):
+            return None
+        entered = f"a checkerboard of {self.squares[0]} x {self.squares[1]} squares is not found"
+        sizes = [size for grey in greys if (size := _largest_grid(to_8_bit(grey)))]
+        if not sizes:
+            return f"{entered}, nor one of another size: is it in view whole, flat, lit and sharp?"
+        columns, rows = max(sizes, key=lambda size: size[0] * size[1])
+        return (
+            f"{entered}, but one of {columns + 1} x {rows + 1} is: enter that as squares if it is the board, "
+            "else record views in which no part of the board is hidden or beyond the picture's edge"
+        )
+
+
+def _largest_grid(picture: np.ndarray) -> tuple[int, int] | None:
+    """Return the number of inner corners (columns, rows) of whatever checkerboard is in a picture."""
+    flags = _FLAGS | cv2.CALIB_CB_LARGER
+    is_found, px, meta = cv2.findChessboardCornersSBWithMeta(picture, _SMALLEST_GRID, flags)
+    if not is_found or meta is None or len(px) < MIN_CORNERS:
+        return None
+    return meta.shape[1], meta.shape[0]
