@@ -19,7 +19,7 @@ from vision.boards import (
     fixes_pose,
     refine_corners,
 )
-from vision.calibration import BoardViews
+from vision.calibration import BoardViews, with_turns_resolved
 from vision.geometry import Board
 from vision.pictures import Frames
 
@@ -68,7 +68,9 @@ def read_board_views(session: Session) -> SessionViews:
             trials[name], left_out = _trial_views(session, name, rig[name])
             notes += left_out
     times_s = _times(session, boards)
-    return SessionViews(boards, sizes_px, rig, trials, times_s, session.crops, tuple(notes))
+    found = SessionViews(boards, sizes_px, rig, trials, times_s, session.crops, tuple(notes))
+    with refused_as_bad_input("boards"):
+        return with_turns_resolved(found, session.board)
 
 
 @dataclass

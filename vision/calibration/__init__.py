@@ -11,7 +11,7 @@ from vision.geometry.lazy_names import lazy_names
 NAMES = {
     "calibrate": ("Calibration", "CameraReport", "calibrate_cameras"),
     "cameras_file": ("cameras_as_files", "read_cameras"),
-    "cameras_import": ("import_cameras", "place_on_rig"),
+    "cameras_import": ("WRITERS", "are_placed", "import_cameras", "place_on_rig"),
     "held_out": ("Agreement", "HeldOut", "check_held_out"),
     "hub_marker": ("MarkerSighting", "by_marker", "first_axis"),
     "hub_turning": ("FirstRig", "first_rig", "first_rig_about"),
@@ -20,6 +20,7 @@ NAMES = {
     "moving_line": ("MovingLines", "moving_lines"),
     "place": ("Placement", "by_board", "check_swing_suffices", "combine", "move_rig_frame"),
     "swing": ("by_strokes",),
+    "turned": ("with_turns_resolved",),
     "views": ("BoardViews", "MeasuredPose"),
 }
 __getattr__ = lazy_names(__name__, NAMES)

@@ -1,12 +1,10 @@
-"""Cameras calibrated elsewhere: the TOML that caliscope and aniposelib write.
+"""Cameras calibrated elsewhere, and cameras for other programs: each file's format is a module.
 
-Both keep OpenCV's lens and T_camera_world; caliscope in metres, with the rotation as a matrix or as
-a vector; aniposelib in the unit of its board, with the rotation as a vector. Neither states
-uncertainties, so the lenses are taken as exact; their world is not the rig, where a picture of the
-board on the rig places them (`place_on_rig`).
+Formats state no uncertainties, so the lenses are taken as exact; their world is not the rig, where a
+picture of the board on the rig places them (`place_on_rig`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,9 +12,15 @@ import numpy as np
 
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import check_lens, check_rig_view
+from vision.calibration import (
+    format_kalibr,
+    format_matlab,
+    format_mrcal,
+    format_opencv,
+    format_toml,
+)
 from vision.calibration.bundle import N_CAMERA, BundleState, Priors
 from vision.calibration.calibrate import as_cameras
-from vision.calibration.cameras_file import parse_toml
 from vision.calibration.corner_noise import adjust_with_noise
 from vision.calibration.first_guess import board_pose
 from vision.calibration.layout import gather
@@ -24,83 +28,71 @@ from vision.calibration.tied import lens_priors, with_print
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import compose, exp_rotation, invert_transform
+from vision.geometry.rotation import compose, invert_transform
 
-_NEEDED = ("size", "matrix", "distortions", "rotation", "translation")
+Read = Callable[[Path], list[Camera]]
+Write = Callable[[Cameras, str], dict[str, bytes]]
+# Files that are written: contents by name, of cameras and the names' stem.
+WRITERS: dict[str, Write] = {
+    "anipose": format_toml.write_anipose,
+    "caliscope": format_toml.write_caliscope,
+    "kalibr": format_kalibr.write,
+    "matlab": format_matlab.write,
+    "mrcal": format_mrcal.write,
+    "opencv": format_opencv.write,
+}
+_READERS: dict[str, Read] = {
+    ".toml": format_toml.read,
+    ".mat": format_matlab.read,
+    ".cameramodel": format_mrcal.read,
+    ".xml": format_opencv.read,
+    ".json": format_opencv.read,
+}
+_YAML = (".yml", ".yaml")
+# How OpenCV's YAML begins, and no other.
+_OPENCV_YAML = b"%YAML"
 
 
 def import_cameras(path: Path | str) -> Cameras:
-    """Import cameras of a caliscope or aniposelib TOML, their world as there, in mm, taken as
-    exact.
+    """Import cameras of another program's file, or of a folder's files, their world as there, in mm,
+    taken as exact.
 
-    The file's unit is a metre for caliscope and, for a board that is described in mm, a millimetre
-    for aniposelib. Raises Refused where the file is neither, a camera is a fisheye or unplaced, or
-    its lens cannot be.
+    Raises Refused where a file is of no known format, a lens is another than OpenCV's of five terms,
+    or several cameras are not placed to each other.
     """
-    tables = _tables(Path(path))
-    is_caliscope = any("cam_id" in table or "port" in table for table in tables.values())
-    unit_mm = 1000.0 if is_caliscope else 1.0
-    cameras = Cameras(tuple(_camera(name, table, unit_mm) for name, table in tables.items()))
+    path = Path(path)
+    files = [path]
+    if path.is_dir():
+        files = sorted(file for file in path.iterdir() if _reader(file) is not None)
+    found: list[Camera] = []
+    for file in files:
+        reader = _reader(file)
+        if reader is None:
+            allowed = ", ".join([*_READERS, *_YAML])
+            raise Refused(f"{file.name} is of no known format; {allowed} are read")
+        found += reader(file)
+    if not found:
+        raise Refused(f"{path.name} holds no camera file")
+    cameras = Cameras(tuple(found))
     for camera in cameras:
         check_lens(camera)
     return cameras
 
 
-def _tables(path: Path) -> dict[str, dict]:
-    """Return the tables of the cameras by name; raise Refused where there are none."""
-    document = parse_toml(path, f"{path.name} is not TOML")
-    tables = {}
-    for key, table in document.get("cameras", document).items():
-        if isinstance(table, dict) and "matrix" in table and not table.get("ignore"):
-            tables[_name(str(key), table)] = table
-    if not tables:
-        raise Refused(f"{path.name} holds no camera as caliscope or aniposelib write them")
-    return tables
+def are_placed(cameras: Cameras) -> bool:
+    """Return whether the cameras of a file are placed to each other: no two are at one place."""
+    poses = {tuple(camera.T_camera_rig.ravel()) for camera in cameras}
+    return len(poses) == len(cameras.names)
 
 
-def _name(key: str, table: dict) -> str:
-    """Return the camera's name: aniposelib states it; caliscope numbers cameras and calls the video
-    of camera 0 cam_0.
-    """
-    if "name" in table:
-        return str(table["name"])
-    return f"cam_{key}" if key.isdigit() else key
-
-
-def _camera(name: str, table: dict, unit_mm: float) -> Camera:
-    """Return the camera of one table; raise Refused where it is not calibrated, not placed, or a
-    fisheye.
-    """
-    missing = [key for key in _NEEDED if not table.get(key)]
-    if missing:
-        raise Refused(
-            f"camera {name}: {', '.join(missing)} missing, so it is not calibrated or not placed"
-        )
-    if table.get("fisheye"):
-        raise Refused(
-            f"camera {name} has a fisheye lens, which the five-term lens here does not describe"
-        )
-    rotation = np.array(table["rotation"], dtype=float)
-    R = rotation if rotation.shape == (3, 3) else exp_rotation(rotation.ravel())
-    shift_mm = unit_mm * np.array(table["translation"], dtype=float).ravel()
-    return Camera(
-        name=name,
-        size_px=tuple(table["size"]),
-        matrix=table["matrix"],
-        distortion=_distortion(name, table["distortions"]),
-        T_camera_rig=np.column_stack([R, shift_mm]),
-        rms_px=float(table.get("error", np.nan)),
-    )
-
-
-def _distortion(name: str, terms: Sequence[float]) -> np.ndarray:
-    """Return k1, k2, p1, p2 and k3 of a camera's distortion; raise Refused where it has more terms."""
-    distortion = np.array(terms, dtype=float).ravel()
-    if np.any(distortion[5:]):
-        raise Refused(
-            f"camera {name} has {len(distortion)} distortion terms; up to five (k1 k2 p1 p2 k3) are read"
-        )
-    return np.append(distortion, np.zeros(5))[:5]
+def _reader(file: Path) -> Read | None:
+    """Return what reads a file, by its suffix and, of YAML, its first line; None where nothing does."""
+    suffix = file.suffix.lower()
+    if suffix not in _YAML:
+        return _READERS.get(suffix)
+    with file.open("rb") as content:
+        is_opencv = content.read(len(_OPENCV_YAML)) == _OPENCV_YAML
+    return format_opencv.read if is_opencv else format_kalibr.read
 
 
 def place_on_rig(

@@ -87,7 +87,10 @@ class Board(ABC):
 
     @abstractmethod
     def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:
-        """Return a sentence on why the board is not found in some grey pictures; None if it is."""
+        """Return a sentence on why the board is not found in some grey pictures; None if it is.
+
+        mirrored: whether they were flipped left to right, as seen in a mirror.
+        """
 
     def check_print(self, greys: list[np.ndarray]) -> None:  # noqa: B027
         """Raise Refused where a second known length on the board contradicts the pictures."""

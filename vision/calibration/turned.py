@@ -1,0 +1,144 @@
+"""Boards that look the same after a turn: their points named alike in all cameras.
+
+Each camera names the points from the upper left of its own picture. Where cameras saw the board at
+once, their place relative to each other is the same in all views with the right names, and another
+one in every view with wrong ones.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from vision.boards.corners import Corners
+from vision.boards.sufficiency import MIN_VIEWS, fixes_pose, without_strays
+from vision.calibration.calibrate import calibrate_alone
+from vision.calibration.first_guess import board_pose, first_lens, has_pose
+from vision.calibration.views import BoardViews
+from vision.geometry.board import Board
+from vision.geometry.refusals import Refused
+from vision.geometry.rotation import compose, invert_transform, log_rotation
+
+# [rad] Median over the views by which a place of one camera before another may differ between views
+# of one instant: half of what `layout` takes for one instant. Stated.
+_SAME = 0.1
+# [1] The best place must agree so many times better than one by other names. Stated.
+_CLEARLY_BETTER = 2.0
+ViewsOf = TypeVar("ViewsOf", bound=BoardViews)
+
+
+def with_turns_resolved(views: ViewsOf, board: Board) -> ViewsOf:
+    """Return the views with points of the board named in each camera as in the first.
+
+    Cameras that did not see the board at once keep their names. Raises Refused where the board was
+    never turned enough for names to show.
+    """
+    names = list(views.boards)
+    if not board.hidden_turns or len(names) < 2:
+        return views
+    turns = (np.arange(len(board.corners_mm)), *board.hidden_turns)
+    sight = {name: _Sight(views, name, board, turns) for name in names}
+    boards = dict(views.boards)
+    rig = dict(views.rig)
+    trials = dict(views.trials)
+    first = sight[names[0]]
+    for name in names[1:]:
+        choice = _choose(first, sight[name], name)
+        if choice is None:
+            continue
+        T_other_first, turn_of = choice
+        boards[name] = [
+            _renamed(view, turns[turn_of.get(k, 0)]) for k, view in enumerate(boards[name])
+        ]
+        if name in rig and names[0] in rig:
+            turn = _nearest(first.rig_poses, sight[name].rig_poses, T_other_first)
+            rig[name] = _renamed(rig[name], turns[turn])
+            trials[name] = [_renamed(view, turns[turn]) for view in trials.get(name, ())]
+    return replace(views, boards=boards, rig=rig, trials=trials)
+
+
+class _Sight:
+    """One camera's poses of the board, T_camera_board (turns, 3, 4), by view and on the rig."""
+
+    def __init__(
+        self, views: BoardViews, name: str, board: Board, turns: Sequence[np.ndarray]
+    ) -> None:
+        """Calibrate the camera by itself, which needs no right names."""
+        seen = {}
+        for k, view in enumerate(views.boards[name]):
+            view = without_strays(view, board)
+            if fixes_pose(view, board):
+                seen[k] = view
+        size_px = views.sizes_px[name]
+        start = first_lens(list(seen.values()), board.corners_mm, size_px)
+        seen = {k: view for k, view in seen.items() if has_pose(view, board.corners_mm, start)}
+        lens = start
+        if len(seen) >= MIN_VIEWS:
+            adjusted = calibrate_alone(list(seen.values()), board, size_px)
+            lens = adjusted.solution.state.lens[0]
+
+        def poses(view: Corners) -> np.ndarray:
+            """Return T_camera_board of a view, (turns, 3, 4)."""
+            named = [_renamed(view, turn) for turn in turns]
+            return np.array([board_pose(view, board.corners_mm, lens) for view in named])
+
+        self.poses: Mapping[int, np.ndarray] = {k: poses(view) for k, view in seen.items()}
+        on_rig = views.rig.get(name, Corners.none())
+        self.rig_poses = poses(on_rig) if fixes_pose(on_rig, board) else None
+
+
+def _renamed(view: Corners, turn: np.ndarray) -> Corners:
+    """Return a view's points under their names after a turn."""
+    return replace(view, ids=turn[view.ids])
+
+
+def _choose(
+    first: _Sight, other: _Sight, name: str
+) -> tuple[np.ndarray, dict[int, int]] | None:
+    """Return T_other_first (3, 4), and the turn of each view of the other camera; None where they
+    saw the board each at a time of its own.
+    """
+    shared = sorted(first.poses.keys() & other.poses.keys())
+    if len(shared) < MIN_VIEWS:
+        return None
+    candidates = []
+    for k in shared:
+        T_first_board = invert_transform(first.poses[k][0])
+        candidates.append([compose(pose, T_first_board) for pose in other.poses[k]])
+    candidates = np.array(candidates)  # (views, turns, 3, 4)
+    flat = candidates.reshape(-1, 3, 4)
+    distance = _distances(flat, flat).reshape(len(flat), *candidates.shape[:2])
+    score = np.median(distance.min(axis=2), axis=1)  # (views * turns,)
+    best = int(np.argmin(score))
+    if score[best] > _SAME:
+        return None
+    rivals = score[distance[best].ravel() > _SAME]
+    if len(rivals) and rivals.min() < _CLEARLY_BETTER * score[best]:
+        raise Refused(
+            f"camera {name}: the board looks the same after a turn, and its views do not tell which way round it was: "
+            "turn and tilt it more between views, or take a board with an odd number of squares one way and an even "
+            "one the other"
+        )
+    turn_of = dict(zip(shared, distance[best].argmin(axis=1).tolist()))
+    return flat[best], turn_of
+
+
+def _distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return how transforms a (n, 3, 4) and b (m, 3, 4) differ, (n, m): angle, and shift over its
+    size.
+    """
+    angle = np.linalg.norm(log_rotation(a[:, None, :, :3] @ b[None, :, :, :3].swapaxes(-1, -2)), axis=-1)
+    shift = np.linalg.norm(a[:, None, :, 3] - b[None, :, :, 3], axis=-1)
+    size = max(float(np.median(np.linalg.norm(b[:, :, 3], axis=-1))), 1e-9)
+    return angle + shift / size
+
+
+def _nearest(
+    first: np.ndarray | None, other: np.ndarray | None, T_other_first: np.ndarray
+) -> int:
+    """Return the turn by which another camera's board on the rig stands as the first one's does."""
+    if first is None or other is None:
+        return 0
+    expected = compose(T_other_first, first[0])
+    return int(_distances(expected[None], other)[0].argmin())
