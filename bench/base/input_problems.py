@@ -43,7 +43,8 @@ class InputProblems:
         except BadInput as bad:
             if self.stop_at_first:
                 raise
-            self.refusals.append(str(bad))
+            if str(bad) not in self.refusals:
+                self.refusals.append(str(bad))
 
     def each(self, loaders: Iterable[Callable[[], Any]]) -> list:
         """Run all loaders and return what they give; what they refuse is kept.

@@ -448,6 +448,12 @@ _TABLE = (
         "measure many squares along x and along y; print without scaling, or state the difference",
     ),
     Status(
+        "pixels_not_square",
+        WARNING,
+        "a camera squashes its pictures; taken into account",
+        "state pixel_aspect in [[cameras]], or record without squashing",
+    ),
+    Status(
         "rig_file_contradicts",
         WARNING,
         "rig.toml: {alarm}; {counts}",

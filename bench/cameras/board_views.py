@@ -67,8 +67,16 @@ def read_board_views(session: Session) -> SessionViews:
             rig[name] = rig_view(session, name, frames.size_px)
             trials[name], left_out = _trial_views(session, name, rig[name])
             notes += left_out
-    times_s = _times(session, boards)
-    found = SessionViews(boards, sizes_px, rig, trials, times_s, session.crops, tuple(notes))
+    found = SessionViews(
+        boards,
+        sizes_px,
+        rig,
+        trials,
+        _times(session, boards),
+        session.crops,
+        session.pixel_aspects,
+        tuple(notes),
+    )
     with refused_as_bad_input("boards"):
         return with_turns_resolved(found, session.board)
 

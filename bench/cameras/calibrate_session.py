@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
 from bench.cameras.board_views import SessionViews, read_board_views, rig_view
@@ -15,11 +16,13 @@ from bench.cameras.measured_place import moved_by_file, stated_place
 from bench.session.session import Session, load_session
 from vision.boards import Corners
 from vision.calibration import (
+    WRITERS,
     Agreement,
     Calibration,
     CameraReport,
     HeldOut,
     MeasuredPose,
+    are_placed,
     calibrate_cameras,
     check_held_out,
     import_cameras,
@@ -45,18 +48,24 @@ _NOT_PLACED = (
 
 
 def calibrate_cameras_command(
-    session: Path, out: Path, lenses: Path | None = None, *, follow_links: bool = False
+    session: Path,
+    out: Path,
+    lenses: Path | None = None,
+    *,
+    file_format: str = "",
+    follow_links: bool = False,
 ) -> int:
     """Calibrate, write `out` (TOML) and its .npz, print the report.
 
-    lenses: a camera TOML of caliscope or aniposelib to take the lenses from; the session then only
-    places the cameras. Returns 0, or 1 with warnings. Raises BadInput or Refused, saying what to
-    record, before anything is written.
+    lenses: a camera file of another program, or a folder of them, to take the lenses from; the
+    session then only places the cameras. file_format: another program's, of `WRITERS`, to write in
+    place of ours. Returns 0, or 1 with warnings. Raises BadInput or Refused, saying what to record,
+    before anything is written.
     """
     loaded = load_session(session, lenses_known=lenses is not None, follow_links=follow_links)
     if lenses is not None:
         line = f"lenses as in {lenses.name}, taken as exact"
-        return _write(out, place_imported(loaded, lenses), [line], [])
+        return _write(out, place_imported(loaded, lenses), [line], [], file_format)
     views = read_board_views(loaded)
     calibration = calibrate_from(loaded, views)
     cameras = moved_by_file(loaded, calibration.cameras)
@@ -67,13 +76,22 @@ def calibrate_cameras_command(
     measured = measure_held_out(loaded, views)
     lines = [*report_lines(calibration), *lengths, *held_out_lines(measured, calibration)]
     warnings = [*views.notes, *calibration.warnings, *warnings, *_corner_warnings(calibration)]
-    return _write(out, cameras, lines, warnings)
+    return _write(out, cameras, lines, warnings, file_format)
 
 
-def _write(out: Path, cameras: Cameras, lines: list[str], warnings: list[str]) -> int:
+def _write(
+    out: Path, cameras: Cameras, lines: list[str], warnings: list[str], file_format: str
+) -> int:
     """Write the cameras and print the lines. Return 0, or 1 with warnings."""
-    write_cameras(out, cameras)
-    written = f"written: {out} and {out.with_suffix('.npz').name}"
+    if file_format:
+        with refused_as_bad_input(f"--format {file_format}"):
+            files = WRITERS[file_format](cameras, out.stem)
+        for name, content in files.items():
+            write_whole(out.parent / name, content)
+        written = f"written, without uncertainties: {', '.join(files)} in {out.parent}"
+    else:
+        write_cameras(out, cameras)
+        written = f"written: {out} and {out.with_suffix('.npz').name}"
     print("\n".join([*lines, *warnings, written]))
     return 1 if warnings else 0
 
@@ -84,11 +102,14 @@ def place_imported(session: Session, lenses: Path) -> Cameras:
     They are in their own world where there is no board. Raises BadInput where the file holds none,
     or the board does not place them.
     """
-    if not lenses.is_file():
+    if not lenses.exists():
         raise BadInput("there is no such file", file=str(lenses))
     with refused_as_bad_input(lenses.name):
         cameras = import_cameras(lenses)
         if session.T_rig_board is None:
+            if not are_placed(cameras):
+                found = "does not state where the cameras stand to each other"
+                raise BadInput(f"{found}; [rig] T_rig_board places them", file=lenses.name)
             return cameras
         views = {}
         for name in cameras.names:

@@ -90,7 +90,7 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
         return SessionCalibration(None, {}, hash_of("no pictures"))
     if session.cameras_toml:
         with refused_as_bad_input("cameras.toml"):
-            cameras = read_cameras(session.cameras_toml)
+            cameras = read_cameras(session.cameras_toml, session.pixel_aspects)
         notes = ("cameras as given in cameras.toml",)
         known = SessionCalibration(cameras, {}, "", notes, session.T_rig_board)
     else:
@@ -188,7 +188,7 @@ def _from_boards(session: Session, folder: Path) -> SessionCalibration:
         kept = _calibrate_into(session, folder, key)
     T_rig_board = None if kept["T_rig_board"] is None else np.array(kept["T_rig_board"])
     return SessionCalibration(
-        cameras=read_cameras(folder / "cameras.toml"),
+        cameras=read_cameras(folder / "cameras.toml", session.pixel_aspects),
         background={},
         hash="",
         notes=tuple(kept["notes"]),
@@ -258,6 +258,7 @@ def _key(session: Session, digests: Digests) -> str:
         session.T_rig_board_sigma_rad,
         session.measured_rig,
         session.crops,
+        session.pixel_aspects,
     ]
     files = hash_of_files(paths, digests.of)
     return hash_of(hash_of_code(SEEING), given, session.whisker, files)

@@ -40,7 +40,14 @@ def _add_cameras(what: Verbs) -> None:
         "--lenses",
         type=Path,
         metavar="FILE",
-        help="camera TOML of caliscope or aniposelib: its lenses are taken as exact and only placed in the rig",
+        help="camera file of caliscope, aniposelib, OpenCV, Kalibr, MATLAB (.mat) or mrcal, or a folder of such: its "
+        "lenses are taken as exact and only placed in the rig",
+    )
+    verb.add_argument(
+        "--format",
+        default="",
+        choices=("anipose", "caliscope", "kalibr", "matlab", "mrcal", "opencv"),
+        help="write the cameras for that program, without uncertainties, in place of cameras.toml",
     )
 
 
@@ -86,7 +93,11 @@ def _run_cameras(options: argparse.Namespace) -> int:
     from bench.cameras.calibrate_session import calibrate_cameras_command
 
     return calibrate_cameras_command(
-        options.session, options.out, options.lenses, follow_links=options.follow_links
+        options.session,
+        options.out,
+        options.lenses,
+        file_format=options.format,
+        follow_links=options.follow_links,
     )
 
 

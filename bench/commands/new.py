@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from bench.commands.options import DONE, Verbs, add_session, add_verb, parse_squares
+from bench.commands.options import DONE, KIND_NAMES, Verbs, add_session, add_verb, parse_squares
 
 _NUMBERS = {
     "--whisker-length-mm": "from base to tip",
@@ -43,6 +43,9 @@ def add(verbs: Verbs) -> None:
         help="of the board (default 8x6)",
     )
     verb.add_argument(
+        "--board-kind", default="charuco", choices=KIND_NAMES, help="of the board (default charuco)"
+    )
+    verb.add_argument(
         "--dictionary",
         default="DICT_5X5_100",
         metavar="NAME",
@@ -52,7 +55,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the session's folders, print what is left to do; return the exit code."""
-    from bench.setup.new_session import new_session
+    from bench.setup.new_session import BoardLines, new_session
 
     given = {}
     for option in _NUMBERS:
@@ -60,14 +63,7 @@ def run(options: argparse.Namespace) -> int:
         if getattr(options, name) is not None:
             given[name] = getattr(options, name)
     ask = input if sys.stdin.isatty() else None
-    lines = new_session(
-        options.session,
-        options.name,
-        given,
-        options.squares,
-        options.dictionary,
-        ask,
-        options.truth,
-    )
+    board = BoardLines(options.board_kind, options.squares, options.dictionary)
+    lines = new_session(options.session, options.name, given, board, ask, options.truth)
     print(*lines, sep="\n")
     return DONE

@@ -113,8 +113,6 @@ class BarKeys(GivenKeys):
 class BoardKeys(GivenKeys):
     """[board] of session.toml."""
 
-    one_of = (("squares", "kalibr_target"), ("square_mm", "kalibr_target"))
-
     # "charuco" (default), "checkerboard", "circles", "asymmetric_circles" or "aprilgrid"
     kind: Literal["charuco", "checkerboard", "circles", "asymmetric_circles", "aprilgrid"] = (
         "charuco"
@@ -174,6 +172,9 @@ class CameraKeys(Keys):
     # exposure, for the record: checked, and otherwise not used
     exposure_s: Exposure | None = None
     exposure_sigma_s: float = 0.0
+    # fx/fy where pixels are not square: 0.75 of a camera that squashes 16:9 to 4:3. What is seen
+    # must agree within 3 %; left out: square, or squashed with a warning
+    pixel_aspect: Annotated[float, plausible.PIXEL_ASPECT] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,10 +20,11 @@ from bench.session.profile import read_profile
 from bench.session.rest_shape import read_rest_shape
 from bench.session.rig_file import RIG_FILE, MeasuredRig, exact_pose, read_rig
 from bench.session.stated import StatedSession
-from bench.session.stated_board import stated_board, with_kalibr_target
+from bench.session.stated_board import missing_parts, stated_board, with_kalibr_target
 from bench.session.strict_toml import as_keys, key_names, read_toml
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker, profiled_sizes
+from vision.boards import CharucoBoard
 from vision.geometry import Board, Crop, Reason, invert_transform
 from vision.pictures import PicturePart, natural_order
 
@@ -77,7 +78,7 @@ class Session:
     (`bench.session.array_view`), whole: the array's session, in the rig frame; both None where the
     session is one whisker's. givens: what session.toml states, without its trials'. measured_rig: of
     rig.toml, None without it. crops: of cameras that are parts of another one's picture. truth: of
-    [truth], None where the pictures are the truth.
+    [truth], None where the pictures are the truth. pixel_aspects: fx/fy of cameras, where stated.
     """
 
     path: Path
@@ -102,6 +103,7 @@ class Session:
     measured_rig: MeasuredRig | None = None
     crops: Mapping[str, Crop] = field(default_factory=dict)
     truth: manifest.TruthKeys | None = None
+    pixel_aspects: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def whole_name(self) -> str:
@@ -197,6 +199,7 @@ def session_of(
         givens=stated.givens_of(),
         crops=crops,
         truth=keys.truth,
+        pixel_aspects={c.name: c.pixel_aspect for c in keys.cameras if c.pixel_aspect},
     )
     with problems.guard():
         session = _with_measured_rig(session)
@@ -264,6 +267,11 @@ def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> St
         found = f"format is {tables['format']!r}; this version reads format {FORMAT}"
         raise BadInput(found, file=MANIFEST)
     tables = with_kalibr_target(tables, path, MANIFEST)
+    board = tables.get("board")
+    if isinstance(board, dict):
+        for line in missing_parts(board.get("kind", CharucoBoard.kind), board):
+            with problems.guard():
+                raise BadInput(line, file=MANIFEST)
     needed = []
     if visible(path / "trials"):
         needed = ["bar"] if "whiskers" in tables else ["whisker", "bar"]

@@ -179,7 +179,7 @@ def _calibrated_sizes(session: Session) -> dict[str, Size]:
     if session.cameras_toml is None:
         return {}
     with refused_as_bad_input("cameras.toml"):
-        cameras = read_cameras(session.cameras_toml)
+        cameras = read_cameras(session.cameras_toml, session.pixel_aspects)
     missing = [name for name in session.camera_names if name not in cameras.names]
     if missing:
         found = f"has no camera {missing[0]}; it has {', '.join(cameras.names)}"

@@ -1,5 +1,6 @@
 """The board that session.toml states: of which kind, by its own keys or by Kalibr's target file."""
 
+from collections.abc import Collection, Iterator
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any
@@ -51,9 +52,8 @@ def stated_board(keys: manifest.BoardKeys, label: str) -> Board:
     for name, value in values(keys, leave_out=_OF_THE_TABLE).items():
         if value is not None and value is not False:
             given[name] = value
-    for name, part in parts.items():
-        if _is_needed(part) and name not in given:
-            raise BadInput(f'[board] {name} is missing: kind = "{keys.kind}" needs it', file=label)
+    for line in missing_parts(keys.kind, given):
+        raise BadInput(line, file=label)
     for name in given:
         if name not in parts:
             allowed = ", ".join(part for part in parts if "sigma" not in part)
@@ -63,6 +63,21 @@ def stated_board(keys: manifest.BoardKeys, label: str) -> Board:
         return kind(**given)
 
 
+def missing_parts(kind: object, given: Collection[str]) -> Iterator[str]:
+    """Yield a line for each key that a kind of board needs and that is not given; none for a kind
+    that is not known.
+    """
+    of_kind = KINDS.get(kind) if isinstance(kind, str) else None
+    for part in fields(of_kind) if of_kind else ():
+        if _is_needed(part) and part.name not in given:
+            yield f"[board] {part.name} is missing"
+
+
+def marker_is_part(kind: str) -> bool:
+    """Return whether boards of a kind have marker_mm."""
+    return any(part.name == "marker_mm" for part in fields(KINDS[kind]))
+
+
 def _is_needed(part: Field) -> bool:
     """Return whether a board cannot be without this part."""
-    return part.default is MISSING
+    return part.init and part.default is MISSING

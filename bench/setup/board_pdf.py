@@ -1,9 +1,11 @@
-"""`whisker-bench board`: a ChArUco board as a PDF at exact scale, with rulers to check the print by."""
+"""`whisker-bench board`: a board as a PDF at exact scale, with rulers to check the print by."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import singledispatch
 from pathlib import Path
 
+import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
@@ -13,6 +15,7 @@ from bench.base.drawing import paper_style, publish
 from bench.base.errors import BadInput
 from bench.rig import printed_board as rig
 from bench.session.plausible import WIDTH
+from vision.boards import AprilGrid, CharucoBoard, Checkerboard, CircleGrid
 from vision.geometry import Board
 
 MM_PER_INCH = 25.4
@@ -25,6 +28,8 @@ _RULER_MM = 8.0  # from the board's edge: the white around a board helps to find
 _A4_MM = (210.0, 297.0)  # mm: ISO 216
 _LARGEST = 4  # formats beyond A4: A3, A2, A1, A0
 _INK = rig.Ink(white=1.0, black=0.0)
+_CIRCLE_SIDES = 180  # of a printed circle: it errs by 0.02 % of its radius
+_MODULES = 10  # of an AprilTag 36h11 with its rim of two: across
 MARKER_SHARE = 11.0 / 15.0  # of the square: the marker's white frame is then as wide as its modules
 
 
@@ -70,21 +75,25 @@ def paper_for(board: Board) -> Paper:
 
 
 def _size_mm(board: Board) -> tuple[float, float]:
-    """Return width and height of a board, mm."""
-    across, down = board.squares
-    return across * board.square_mm, down * board.square_mm
+    """Return width and height of what is printed, mm."""
+    shapes = np.concatenate(list(dark_shapes(board)))
+    width, height = np.ptp(shapes, axis=0)
+    return float(width), float(height)
 
 
 def toml_block(board: Board) -> list[str]:
     """Return the lines of the board in session.toml."""
-    lines = [
-        "[board]",
-        f"squares = [{board.squares[0]}, {board.squares[1]}]",
-        f"square_mm = {board.square_mm:g}",
-        f"marker_mm = {board.marker_mm:g}",
-        f'dictionary = "{board.dictionary}"',
-    ]
-    return [*lines, *(f"{name} = true" for name in ("legacy", "inverted") if getattr(board, name))]
+    lines = ["[board]"]
+    if board.kind != CharucoBoard.kind:
+        lines.append(f'kind = "{board.kind}"')
+    lines.append(f"squares = [{board.squares[0]}, {board.squares[1]}]")
+    for name in ("square_mm", "marker_mm"):
+        if hasattr(board, name):
+            lines.append(f"{name} = {getattr(board, name):g}")
+    if hasattr(board, "dictionary"):
+        lines.append(f'dictionary = "{board.dictionary}"')
+    flags = [name for name in ("legacy", "inverted") if getattr(board, name, False)]
+    return [*lines, *(f"{name} = true" for name in flags)]
 
 
 def page(board: Board, paper: Paper) -> Figure:
@@ -96,7 +105,9 @@ def page(board: Board, paper: Paper) -> Figure:
     width, height = _size_mm(board)
     left = 0.5 * (paper.width_mm + _LEFT_MM - _RIGHT_MM - width)
     top = 0.5 * (paper.height_mm + _TOP_MM - _BELOW_MM - height)
-    dark = list(dark_rectangles(board, left, top))
+    shapes = list(dark_shapes(board))
+    upper_left = np.concatenate(shapes).min(axis=0)
+    dark = [shape - upper_left + [left, top] for shape in shapes]
     axes.add_collection(PolyCollection(dark, fc="black", ec="none", lw=0))
     _ruler(axes, (left, top + height + _RULER_MM), width, down=False)
     _ruler(axes, (left - _RULER_MM, top), height, down=True)
@@ -104,12 +115,18 @@ def page(board: Board, paper: Paper) -> Figure:
     return figure
 
 
-def dark_rectangles(board: Board, left_mm: float, top_mm: float) -> Iterator[np.ndarray]:
-    """Return what is printed, as rectangles (4, 2), mm.
+@singledispatch
+def dark_shapes(board: Board) -> Iterator[np.ndarray]:
+    """Yield what is printed as polygons (n, 2), mm from anywhere, y downward.
 
-    They overlap, so that there is no seam between them: runs of cells along rows, runs along
-    columns, and the four cells about each point where both have a seam.
+    They overlap, so that there is no seam between them.
     """
+    raise TypeError(f"no print of a board of kind {board.kind}")
+
+
+@dark_shapes.register
+def _of_charuco(board: CharucoBoard) -> Iterator[np.ndarray]:
+    """Yield the dark rectangles of a ChArUco board, with its margin where it is white on black."""
     made = rig.PrintedBoard(
         board.squares,
         board.square_mm,
@@ -118,9 +135,47 @@ def dark_rectangles(board: Board, left_mm: float, top_mm: float) -> Iterator[np.
         board.legacy,
         board.inverted,
     )
-    margin_mm = board.square_mm / 2 if board.inverted else 0.0
-    printed = made.to_print(_INK, margin_mm).shift(left_mm, top_mm)
+    printed = made.to_print(_INK, board.square_mm / 2 if board.inverted else 0.0)
     return _rectangles(printed.reflectance < 0.5, printed.x_mm, printed.y_mm)
+
+
+@dark_shapes.register
+def _of_checkerboard(board: Checkerboard) -> Iterator[np.ndarray]:
+    """Yield the dark squares of a checkerboard."""
+    columns, rows = [np.arange(count) for count in board.squares]
+    is_dark = np.add.outer(rows, columns) % 2 == 0
+    edges = [np.arange(count + 1) * board.square_mm for count in board.squares]
+    return _rectangles(is_dark, *edges)
+
+
+@dark_shapes.register
+def _of_circles(board: CircleGrid) -> Iterator[np.ndarray]:
+    """Yield the circles of a grid."""
+    angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_SIDES, endpoint=False)
+    circle = 0.5 * board.marker_mm * np.column_stack([np.cos(angle), np.sin(angle)])
+    for centre_mm in board.corners_mm[:, :2]:
+        yield centre_mm + circle
+
+
+@dark_shapes.register
+def _of_april_grid(board: AprilGrid) -> Iterator[np.ndarray]:
+    """Yield the tags of an AprilGrid as Kalibr prints them, and the dark squares between them."""
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+    gap_mm = board.square_mm - board.marker_mm
+    columns, rows = board.squares
+    for row in range(rows):
+        for column in range(columns):
+            number = row * columns + column
+            tag = cv2.aruco.generateImageMarker(dictionary, number, _MODULES, borderBits=2)
+            left_mm = column * board.square_mm
+            top_mm = -row * board.square_mm - board.marker_mm
+            edges = np.linspace(0.0, board.marker_mm, _MODULES + 1)
+            yield from _rectangles(tag[::-1, ::-1] == 0, left_mm + edges, top_mm + edges)
+    for row in range(rows + 1):
+        for column in range(columns + 1):
+            right_mm = column * board.square_mm
+            bottom_mm = -row * board.square_mm + gap_mm
+            yield _box(right_mm - gap_mm, right_mm, bottom_mm - gap_mm, bottom_mm)
 
 
 def _rectangles(dark: np.ndarray, x: np.ndarray, y: np.ndarray) -> Iterator[np.ndarray]:

@@ -1,6 +1,6 @@
 """`whisker-bench new`: the folders of a session, and an annotated session.toml to fill in."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -12,7 +12,9 @@ from bench.base.errors import BadInput
 from bench.session.manifest import BarKeys, BoardKeys, TruthKeys, WhiskerKeys
 from bench.session.plausible import SIGMA, PlausibleRange
 from bench.session.session import MANIFEST
+from bench.session.stated_board import marker_is_part
 from bench.session.strict_toml import plausible_ranges
+from vision.boards import CharucoBoard
 
 FOLDERS = ("boards", "boards/rig", "trials")
 # Folders by where the truth comes from.
@@ -53,9 +55,7 @@ _RODS = (
 )
 QUESTIONS = (
     *_RODS,
-    Question(
-        "square_mm", "board", "square_mm", "side of a square of the ChArUco board, as measured, mm"
-    ),
+    Question("square_mm", "board", "square_mm", "side of a square of the board, as measured, mm"),
     Question("marker_mm", "board", "marker_mm", "side of a marker of the board, mm"),
 )
 _ORIGIN = Question(
@@ -68,12 +68,29 @@ _ORIGIN = Question(
 QUESTIONS_OF = {"pictures": QUESTIONS, "stage": (*_RODS, _ORIGIN)}
 
 
+@dataclass(frozen=True)
+class BoardLines:
+    """What a new session.toml says of its board: its kind, squares, and a ChArUco board's dictionary."""
+
+    kind: str
+    squares: tuple[int, int]
+    dictionary: str
+
+    def text(self) -> str:
+        """Return the lines."""
+        kind = f'kind = "{self.kind}"'.ljust(32) + "# docs/bring.md has the others"
+        squares = f"squares = [{self.squares[0]}, {self.squares[1]}]".ljust(32)
+        lines = [kind, f"{squares}# along x, along y"]
+        if self.kind == CharucoBoard.kind:
+            lines.append(f'dictionary = "{self.dictionary}"')
+        return "\n".join(lines)
+
+
 def new_session(
     path: Path,
     name: str,
     given: Mapping[str, float],
-    squares: tuple[int, int],
-    dictionary: str,
+    board: "BoardLines",
     ask: Ask | None = None,
     truth: str = "pictures",
 ) -> list[str]:
@@ -85,7 +102,7 @@ def new_session(
     """
     if (path / MANIFEST).exists():
         raise BadInput(f"there is a {MANIFEST} already; nothing was written", file=path)
-    questions = QUESTIONS_OF[truth]
+    questions = _questions(truth, board.kind)
     for question in questions:
         if question.option in given:
             option = f"--{question.option.replace('_', '-')}"
@@ -96,9 +113,10 @@ def new_session(
             answers |= _ask_until_plausible(question, ask)
     for folder in _FOLDERS_OF[truth]:
         (path / folder).mkdir(parents=True, exist_ok=True)
-    text = manifest_text(name or path.resolve().name, answers, squares, dictionary, truth)
+    text = manifest_text(name or path.resolve().name, answers, board, truth)
     write_whole(path / MANIFEST, text)
-    return list(_next_steps(path, answers, truth))
+    missing = [question for question in questions if question.option not in answers]
+    return list(_next_steps(path, missing, truth))
 
 
 def _ask_until_plausible(question: Question, ask: Ask) -> dict[str, float]:
@@ -115,18 +133,14 @@ def _ask_until_plausible(question: Question, ask: Ask) -> dict[str, float]:
 
 
 def manifest_text(
-    name: str,
-    answers: Mapping[str, float],
-    squares: tuple[int, int],
-    dictionary: str,
-    truth: str = "pictures",
+    name: str, answers: Mapping[str, float], board: "BoardLines", truth: str = "pictures"
 ) -> str:
     """Return session.toml with what is known, and a line to fill in for what is not."""
     lines = {q.option: _line(q.key, answers.get(q.option), q.wanted) for q in QUESTIONS_OF[truth]}
+    if not marker_is_part(board.kind):
+        lines["marker_mm"] = "# marker_mm                     # of other kinds of board"
     named = tomli_w.dumps({"name": name}).strip()
-    return _TEMPLATES[truth].format(
-        named=named, x=squares[0], y=squares[1], dictionary=dictionary, **lines
-    )
+    return _TEMPLATES[truth].format(named=named, board=board.text(), **lines)
 
 
 def _line(key: str, value: float | None, wanted: str) -> str:
@@ -136,12 +150,17 @@ def _line(key: str, value: float | None, wanted: str) -> str:
     return f"{key} = {value:.10g}".ljust(32) + f"# {wanted}"
 
 
-def _next_steps(path: Path, answers: Mapping[str, float], truth: str) -> Iterator[str]:
-    """Yield lines on what to do next."""
+def _questions(truth: str, kind: str) -> list[Question]:
+    """Return the questions by where the truth comes from, with a kind of board: not all have marker_mm."""
+    has_marker = marker_is_part(kind)
+    return [q for q in QUESTIONS_OF[truth] if has_marker or q.option != "marker_mm"]
+
+
+def _next_steps(path: Path, missing: Sequence[Question], truth: str) -> Iterator[str]:
+    """Yield lines on what to do next. missing: questions that were not answered."""
     yield f"written: {path / MANIFEST}"
-    missing = sum(q.option not in answers for q in QUESTIONS_OF[truth])
     if missing:
-        yield f"{missing} lines are to be filled in: look for FILL IN"
+        yield f"{len(missing)} lines are to be filled in: look for FILL IN"
     folders = "trials/" if truth == "stage" else "boards/ and trials/"
     yield f"then record {folders} (comments in the file say how), and run: whisker-bench check {path}"
 
@@ -170,10 +189,9 @@ shape = "cylinder"              # "cone": base diameter to a point; "tapered": t
 
 _CAMERAS = """\
 [board]                         # `whisker-bench board` prints one with these numbers
-squares = [{x}, {y}]                # along x, along y
+{board}
 {square_mm}
 {marker_mm}
-dictionary = "{dictionary}"
 
 [rig]
 # Where the board stands on the rig, in the pictures boards/rig/<camera>.png, is measured: record free strokes of some

@@ -108,7 +108,9 @@ class AprilGrid(SaddleBoard):
         parameters.markerBorderBits = rim
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         dictionary = cv2.aruco.getPredefinedDictionary(_DICTIONARY)
-        outlines, numbers, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(picture)
+        outlines, numbers, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(
+            picture
+        )
         if numbers is None:
             return np.empty(0, dtype=int), np.empty((0, 4, 2))
         numbers = numbers.ravel().astype(int)

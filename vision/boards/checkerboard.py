@@ -52,8 +52,13 @@ class Checkerboard(SaddleBoard):
     @property
     def hidden_turns(self) -> tuple[np.ndarray, ...]:
         """Return the turns that put dark squares onto dark squares."""
-        dark = self.is_dark_first
-        return tuple(o for o in turns_onto_itself(self)[1:] if np.array_equal(dark[o], dark))
+        return tuple(ids for ids in turns_onto_itself(self)[1:] if self._is_dark_after(ids))
+
+    def _is_dark_after(self, ids: np.ndarray) -> bool:
+        """Return whether the first square between inner corners is dark as the corners (m,) turn it."""
+        columns = self.grid[0]
+        rows_of, columns_of = np.divmod(ids[[0, 1, columns, columns + 1]], columns)
+        return bool((rows_of.min() + columns_of.min()) % 2 == 0)
 
     @property
     def cell_mm(self) -> float:
@@ -91,7 +96,9 @@ class Checkerboard(SaddleBoard):
         sizes = [size for grey in greys if (size := _largest_grid(to_8_bit(grey)))]
         if not sizes:
             return f"{entered}, nor one of another size: is it in view whole, flat, lit and sharp?"
-        columns, rows = max(sizes, key=lambda size: size[0] * size[1])
+        columns, rows = sorted(max(sizes, key=lambda size: size[0] * size[1]))
+        if self.squares[0] > self.squares[1]:  # which way round it lies is not known
+            columns, rows = rows, columns
         return (
             f"{entered}, but one of {columns + 1} x {rows + 1} is: enter that as squares if it is the board, "
             "else record views in which no part of the board is hidden or beyond the picture's edge"

@@ -89,7 +89,9 @@ def _other_prints(board: "CharucoBoard") -> list["CharucoBoard"]:
     return [other for other in prints if other != board]
 
 
-def _boards_of_other_dictionaries(greys: Sequence[np.ndarray], board: "CharucoBoard") -> Iterator["CharucoBoard"]:
+def _boards_of_other_dictionaries(
+    greys: Sequence[np.ndarray], board: "CharucoBoard"
+) -> Iterator["CharucoBoard"]:
     """Yield the board in each other dictionary whose markers are seen, in all prints.
 
     The dictionaries are those of which several markers are seen, the smallest of each kind that

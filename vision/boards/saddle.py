@@ -253,9 +253,7 @@ def _evaluate(windows: Windows, p: np.ndarray, predict: Predict) -> _Fit:
     return _Fit(p, cost, normal, gradient)
 
 
-def report_fit(
-    windows: Windows, p: np.ndarray, converged: np.ndarray, predict: Predict
-) -> Saddles:
+def report_fit(windows: Windows, p: np.ndarray, converged: np.ndarray, predict: Predict) -> Saddles:
     """Return the corners of the parameters p (n, 10) of a model, with their sigmas."""
     grey, J = predict(windows, p)
     residual = (windows.grey - grey) * windows.weight

@@ -38,8 +38,11 @@ _MOST_FOCAL_SIGMA = 0.02
 # [focal lengths] From the middle of a picture to its corner: 87°, more than any lens here has.
 # Stated.
 _MOST_REACH = 20.0
-# [1] Fx over fy: real ones differ by less than 1 %; three times that. Stated.
+# [1] Fx over fy against what it should be: real ones differ by less than 1 %; three times that.
+# Stated.
 _MOST_ASPECT = 0.03
+# [1] Fx over fy of pictures that a camera squashed from 16:9 to 4:3, or from 4:3 to 16:9. Derived.
+SQUASHED = (3.0 / 4.0, 4.0 / 3.0)
 # [1] Decentring shifts the picture's rim by p r² f, some 1e-3 f at most; fifty times that.
 # Stated.
 _MOST_DECENTRING = 0.05
@@ -114,16 +117,19 @@ def check_rig_view(name: str, view: Corners | None, board: Board) -> None:
 
 
 def check_lenses(
-    cameras: Cameras, reports: Sequence, views: Mapping[str, Iterable[Corners]]
+    cameras: Cameras,
+    reports: Sequence,
+    views: Mapping[str, Iterable[Corners]],
+    pixel_aspects: Mapping[str, float],
 ) -> None:
     """Raise Refused for what the views do not determine: no tilt, no depth, a lens that diverged.
 
-    reports: the `CameraReport` of each camera.
+    reports: the `CameraReport` of each camera. pixel_aspects: stated fx/fy by camera.
     """
     for camera, report in zip(cameras, reports):
         _check_geometry(camera.name, report.tilt_deg, report.depth_ratio)
         corners_px = np.concatenate([view.px for view in views[camera.name]])
-        check_lens(camera, _reach(camera, corners_px))
+        check_lens(camera, _reach(camera, corners_px), pixel_aspects.get(camera.name))
         focal_sigma = report.intrinsics_sigma[0] / camera.lens[0]
         if focal_sigma > _MOST_FOCAL_SIGMA:
             raise Refused(
@@ -164,16 +170,18 @@ def _check_geometry(name: str, tilt_deg: float, depth_ratio: float) -> None:
         )
 
 
-def check_lens(camera: Camera, covered: float | None = None) -> None:
+def check_lens(
+    camera: Camera, covered: float | None = None, pixel_aspect: float | None = None
+) -> None:
     """Raise Refused for a lens that cannot be, read from a file or fitted.
 
     Pixels far from square, a lens tilted beyond belief, a picture magnified or folded onto itself
     where it is used.
 
     covered: how far from the principal point corners were seen, px over focal length; None for most
-    of the picture.
+    of the picture. pixel_aspect: fx/fy as stated; None for square pixels, or squashed ones.
     """
-    _check_pixels(camera)
+    _check_pixels(camera, pixel_aspect)
     if np.abs(camera.distortion[2:4]).max() > _MOST_DECENTRING:
         raise _over_fitted(
             camera, f"p1 or p2 is above {_MOST_DECENTRING}, a hundred times what lenses have"
@@ -181,16 +189,31 @@ def check_lens(camera: Camera, covered: float | None = None) -> None:
     _check_rim(camera, _reach_of_most(camera) if covered is None else covered)
 
 
-def _check_pixels(camera: Camera) -> None:
-    """Raise Refused for pixels far from square."""
+def _check_pixels(camera: Camera, pixel_aspect: float | None) -> None:
+    """Raise Refused for pixels far from what is stated, or from square ones and squashed ones."""
     fx, fy = camera.lens[:2]
-    aspect = abs(fx / fy - 1)
-    if aspect > _MOST_ASPECT:
+    if pixel_aspect is not None:
+        if not _is_near(fx / fy, pixel_aspect):
+            raise Refused(
+                f"camera {camera.name}: fx/fy = {fx / fy:.3f}, but pixel_aspect is {pixel_aspect:g}: enter what is seen"
+            )
+    elif not any(_is_near(fx / fy, aspect) for aspect in (1.0, *SQUASHED)):
         raise _over_fitted(
             camera,
-            f"fx = {fx:.0f} and fy = {fy:.0f} differ by {100 * aspect:.0f} %, "
-            "real ones by less than 1 %",
+            f"fx = {fx:.0f} and fy = {fy:.0f} differ by {100 * abs(fx / fy - 1):.0f} %, "
+            "those of square pixels by less than 1 % (others are stated by pixel_aspect)",
         )
+
+
+def squash_of(camera: Camera) -> float | None:
+    """Return fx/fy where it is that of a squashed picture; None of any other."""
+    fx, fy = camera.lens[:2]
+    return fx / fy if any(_is_near(fx / fy, aspect) for aspect in SQUASHED) else None
+
+
+def _is_near(aspect: float, expected: float) -> bool:
+    """Return whether fx/fy is as expected, to within what real cameras have."""
+    return abs(aspect / expected - 1.0) <= _MOST_ASPECT
 
 
 def _reach_of_most(camera: Camera) -> float:

@@ -26,6 +26,7 @@ from vision.boards.sufficiency import (
     check_views,
     depth_ratio,
     fixes_pose,
+    squash_of,
     tilt_deg,
     without_strays,
 )
@@ -130,7 +131,7 @@ def calibrate_cameras(
         notes.append(timing_note(alone, joint.timing))
     stretch_notes, warnings = _stretch_lines(adjustment, board)
     cameras = _place(as_cameras(alone, views.sizes_px, adjustment), on_rig)
-    reports = _checked_reports(cameras, alone, crops, adjustment, board)
+    reports = _checked_reports(cameras, alone, crops, adjustment, board, views.pixel_aspects)
     check_work(cameras, alone, standing, work_points_mm)
     return Calibration(
         cameras=cameras,
@@ -140,7 +141,7 @@ def calibrate_cameras(
         board=adjustment.solution.state.board,
         board_sigma=_print_sigma(adjustment),
         together=joint.layout.trajectory is not None,
-        warnings=(*_disagreement(joint), *warnings),
+        warnings=(*_disagreement(joint), *warnings, *_squashed(cameras, views.pixel_aspects)),
     )
 
 
@@ -149,6 +150,17 @@ def _disagreement(joint: JointAdjustment) -> Iterator[Reason]:
     if joint.disagreement:
         cure = "record views of a board at rest, or trigger the cameras"
         yield Reason("boards_not_at_once", f"{joint.disagreement}: {cure}")
+
+
+def _squashed(cameras: Cameras, pixel_aspects: Mapping[str, float]) -> Iterator[Reason]:
+    """Yield a warning for each camera whose pixels are not square, unless that is stated."""
+    for camera in cameras:
+        aspect = squash_of(camera)
+        if aspect is not None and camera.name not in pixel_aspects:
+            found = f"camera {camera.name}: pixels are not square, fx/fy = {aspect:.4f}"
+            cure = "a camera that squashes pictures; taken into account. If it is meant, state it"
+            key = f"[[cameras]] pixel_aspect = {aspect:.4g}"
+            yield Reason("pixels_not_square", f"{found}: {cure}: {key}")
 
 
 def _check_adjustment(names: Iterable[str], adjustment: Adjustment, triggered: bool) -> None:
@@ -170,6 +182,7 @@ def _checked_reports(
     crops: Sequence[Crop],
     adjustment: Adjustment,
     board: Board,
+    pixel_aspects: Mapping[str, float],
 ) -> tuple[CameraReport, ...]:
     """Return a report of each camera; raise Refused where its views do not determine its lens."""
     reports = []
@@ -178,7 +191,7 @@ def _checked_reports(
         of_lens = [other for other, crop in zip(alone.values(), crops) if crop.of == crops[c].of]
         reports.append(_report(c, cameras, camera, of_lens, adjustment, board))
         used[name] = camera.views.values()
-    check_lenses(cameras, reports, used)
+    check_lenses(cameras, reports, used, pixel_aspects)
     return tuple(reports)
 
 

@@ -3,6 +3,7 @@
 import hashlib
 import tomllib
 import zipfile
+from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 
@@ -54,9 +55,10 @@ def _pack_covariance(cameras: Cameras) -> bytes:
     return buffer.getvalue()
 
 
-def read_cameras(path: Path | str) -> Cameras:
+def read_cameras(path: Path | str, pixel_aspects: Mapping[str, float] | None = None) -> Cameras:
     """Read the cameras of `path`; without a covariance in it they are taken as exact.
 
+    pixel_aspects: fx/fy by camera, where stated.
     Raises Refused where the file is no TOML, misses a key, or its covariance is not the one it was
     written with.
     """
@@ -67,7 +69,7 @@ def read_cameras(path: Path | str) -> Cameras:
         raise Refused("no [cameras.<name>] table found")
     cameras = tuple(_camera(name, table) for name, table in tables.items())
     for camera in cameras:
-        check_lens(camera)
+        check_lens(camera, pixel_aspect=(pixel_aspects or {}).get(camera.name))
     covariance, placement = _read_covariance(path, document, cameras)
     return Cameras(cameras, covariance, placement)
 

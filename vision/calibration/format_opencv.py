@@ -47,9 +47,7 @@ def read(path: Path) -> list[Camera]:
 
 def _camera(path: Path, name: str, number: str, values: Mapping[str, np.ndarray]) -> Camera:
     """Return the camera of that number; raise Refused where something is missing."""
-    matrix = numbers(
-        _first(values, _MATRIX, number), (3, 3), f"{path.name}: the matrix of {name}"
-    )
+    matrix = numbers(_first(values, _MATRIX, number), (3, 3), f"{path.name}: the matrix of {name}")
     terms = _first(values, _DISTORTION, number)
     return foreign_camera(
         name,

@@ -93,9 +93,7 @@ def _renamed(view: Corners, turn: np.ndarray) -> Corners:
     return replace(view, ids=turn[view.ids])
 
 
-def _choose(
-    first: _Sight, other: _Sight, name: str
-) -> tuple[np.ndarray, dict[int, int]] | None:
+def _choose(first: _Sight, other: _Sight, name: str) -> tuple[np.ndarray, dict[int, int]] | None:
     """Return T_other_first (3, 4), and the turn of each view of the other camera; None where they
     saw the board each at a time of its own.
     """
@@ -128,15 +126,15 @@ def _distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return how transforms a (n, 3, 4) and b (m, 3, 4) differ, (n, m): angle, and shift over its
     size.
     """
-    angle = np.linalg.norm(log_rotation(a[:, None, :, :3] @ b[None, :, :, :3].swapaxes(-1, -2)), axis=-1)
+    angle = np.linalg.norm(
+        log_rotation(a[:, None, :, :3] @ b[None, :, :, :3].swapaxes(-1, -2)), axis=-1
+    )
     shift = np.linalg.norm(a[:, None, :, 3] - b[None, :, :, 3], axis=-1)
     size = max(float(np.median(np.linalg.norm(b[:, :, 3], axis=-1))), 1e-9)
     return angle + shift / size
 
 
-def _nearest(
-    first: np.ndarray | None, other: np.ndarray | None, T_other_first: np.ndarray
-) -> int:
+def _nearest(first: np.ndarray | None, other: np.ndarray | None, T_other_first: np.ndarray) -> int:
     """Return the turn by which another camera's board on the rig stands as the first one's does."""
     if first is None or other is None:
         return 0

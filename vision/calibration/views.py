@@ -19,6 +19,7 @@ class BoardViews:
     camera's pictures. rig: the board standing on the rig, absent where there is no picture; trials:
     the same board in the trials' frames, of cameras that did not move. times_s: of each picture in
     `boards`, None where not recorded. crops: of the cameras that are parts of another camera's picture.
+    pixel_aspects: fx/fy of cameras, where stated.
     """
 
     boards: Mapping[str, Sequence[Corners]]
@@ -27,6 +28,7 @@ class BoardViews:
     trials: Mapping[str, Sequence[Corners]] = field(default_factory=dict)
     times_s: Mapping[str, Sequence[float]] | None = None
     crops: Mapping[str, Crop] = field(default_factory=dict)
+    pixel_aspects: Mapping[str, float] = field(default_factory=dict)
 
     def crop(self, name: str) -> Crop:
         """Return the part of a picture that a camera is, the whole of its own where not stated."""

@@ -13,12 +13,13 @@ import pytest
 from bench.commands.cli import main
 from bench.setup.board_pdf import (
     MM_PER_INCH,
-    dark_rectangles,
+    dark_shapes,
     page,
     paper_for,
     toml_block,
     write_board,
 )
+from tests.scenes.board_prints import KINDS, NAMES
 from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import find_corners
 
@@ -52,12 +53,33 @@ def test_the_drawing_is_found_again(board):
     """Each pixel as dark as the share of it that is printed: corners lie where they should to a tenth of a pixel."""
     width, height = (n * board.square_mm + 2 * EDGE_MM for n in board.squares)
     printed = np.zeros([round(DPI / MM_PER_INCH * n) for n in (height, width)])
-    for box in dark_rectangles(board, EDGE_MM, EDGE_MM):
-        (left, top), (right, bottom) = box[[0, 2]] * DPI / MM_PER_INCH
+    for box in dark_shapes(board):
+        (left, top), (right, bottom) = (box[[0, 2]] + EDGE_MM) * DPI / MM_PER_INCH
         rows, columns = (slice(int(a), int(np.ceil(b))) for a, b in ((top, bottom), (left, right)))
         share = np.outer(covered(rows, top, bottom), covered(columns, left, right))
         printed[rows, columns] = np.maximum(printed[rows, columns], share)
     check_found(np.round(255 * (1 - printed)).astype(np.uint8), board, most_px=0.1)
+
+
+@pytest.mark.parametrize("board", KINDS[1:], ids=NAMES[1:])
+def test_boards_of_other_kinds_are_found_again(board):
+    """Polygons drawn four times as fine, with their rims: points lie as they should to such a fine pixel."""
+    shapes = list(dark_shapes(board))
+    low = np.concatenate(shapes).min(axis=0) - EDGE_MM
+    width, height = np.ptp(np.concatenate(shapes), axis=0) + 2 * EDGE_MM
+    fine = 4 * DPI / MM_PER_INCH
+    rows, columns = (4 * round(DPI / MM_PER_INCH * n) for n in (height, width))
+    drawn = np.full((rows, columns), 255, dtype=np.uint8)
+    for shape in shapes:
+        cv2.fillConvexPoly(drawn, np.round((shape - low) * fine).astype(np.int32), 0)
+    coarse = drawn.reshape(rows // 4, 4, columns // 4, 4).mean(axis=(1, 3))
+    picture = np.round(cv2.GaussianBlur(coarse, (0, 0), LENS_PX)).astype(np.uint8)
+    corners = find_corners(picture, board)
+    assert len(corners) == len(board.corners_mm)
+    places = board.corners_mm[corners.ids, :2] * DPI / MM_PER_INCH
+    M, _ = cv2.estimateAffine2D(places, corners.px)
+    np.testing.assert_allclose(np.linalg.norm(M[:, :2], axis=0), 1.0, atol=1e-3)
+    assert np.abs(places @ M[:, :2].T + M[:, 2] - corners.px).max() < 0.25
 
 
 def covered(pixels: slice, low: float, high: float) -> np.ndarray:
@@ -147,6 +169,13 @@ def test_what_is_no_board_is_one_line(bad, tmp_path, monkeypatch, capsys):
     said = capsys.readouterr().err
     assert said.startswith("whisker-bench: ") and said.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("kind", ["checkerboard", "circles", "asymmetric_circles", "aprilgrid"])
+def test_a_board_of_another_kind_is_printed_with_its_lines(kind, tmp_path, capsys):
+    path = tmp_path / "board.pdf"
+    assert main(["board", "--out", str(path), "--kind", kind, "--squares", "5x4"]) == 0
+    assert path.is_file() and f'kind = "{kind}"' in capsys.readouterr().out
 
 
 def test_squares_are_two_counts(capsys):

@@ -9,7 +9,7 @@ from bench.base.input_problems import InputProblems
 from bench.commands.cli import main
 from bench.session.manifest import SessionKeys
 from bench.session.strict_toml import as_keys
-from bench.setup.new_session import FOLDERS, QUESTIONS, new_session
+from bench.setup.new_session import FOLDERS, QUESTIONS, BoardLines, new_session
 
 NUMBERS = {
     "whisker_length_mm": 100.0,
@@ -73,7 +73,7 @@ def test_a_terminal_is_asked_until_the_answer_makes_sense(tmp_path, capsys):
         asked.append(question)
         return next(answers)
 
-    new_session(tmp_path / "s", "s", {}, (8, 6), "DICT_5X5_100", ask)
+    new_session(tmp_path / "s", "s", {}, BoardLines("charuco", (8, 6), "DICT_5X5_100"), ask)
     text = (tmp_path / "s" / "session.toml").read_text()
     assert len(asked) == len(QUESTIONS) + 2
     assert (
@@ -104,6 +104,15 @@ def test_the_board_s_place_is_measured_and_not_filled_in(tmp_path):
     text = (tmp_path / "s" / "session.toml").read_text()
     assert "whisker-bench calibrate rig" in text
     assert "[[1, 0, 0, 0]" not in text and read(tmp_path / "s").rig.T_rig_board is None
+
+
+def test_another_kind_of_board_is_asked_for_what_it_has(tmp_path, capsys):
+    numbers = {name: value for name, value in NUMBERS.items() if name != "marker_mm"}
+    kind = ["--board-kind", "checkerboard"]
+    assert main(["new", str(tmp_path / "s"), *kind, *options(numbers)]) == 0
+    board = read(tmp_path / "s").board
+    assert board.kind == "checkerboard" and board.marker_mm is None and board.dictionary is None
+    assert "FILL IN" not in capsys.readouterr().out
 
 
 def test_every_question_has_its_range():
