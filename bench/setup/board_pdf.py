@@ -119,7 +119,8 @@ def page(board: Board, paper: Paper) -> Figure:
 def dark_shapes(board: Board) -> Iterator[np.ndarray]:
     """Yield what is printed as polygons (n, 2), mm from anywhere, y downward.
 
-    They overlap, so that there is no seam between them.
+    They overlap, so that there is no seam between them. Raises TypeError for a kind that has no
+    print.
     """
     raise TypeError(f"no print of a board of kind {board.kind}")
 

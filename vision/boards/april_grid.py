@@ -16,12 +16,13 @@ from vision.geometry.board import grid_mm
 from vision.geometry.checks import require, require_length
 
 _DICTIONARY = cv2.aruco.DICT_APRILTAG_36h11
-# [modules] Widths of the dark rim about a tag's code: Kalibr's, and that of AprilTag's own pictures.
+# [modules] Widths of the dark rim about a tag's code: Kalibr's, and that of AprilTag's own pictures. A
+# layout.
 _RIMS = (2, 1)
 # [1] Of a tag's side: the narrower of the two rims, one module of eight. A layout.
 _RIM_SHARE = 1.0 / 8.0
-# A tag's corners, clockwise as OpenCV orders them: column and row, from the lower left of a tag as
-# Kalibr prints it, upside down.
+# [columns, rows] Of a tag's corners, clockwise as OpenCV orders them, from the lower left of a tag as
+# Kalibr prints it, upside down. A layout, no threshold.
 _ORDER = ((1, 0), (0, 0), (0, 1), (1, 1))
 # [1] Of a tag's side: corners lie off a plane's picture by less, through any lens here; those of a
 # tag taken with a wrong rim by a fifth. Stated.

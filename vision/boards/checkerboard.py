@@ -17,10 +17,10 @@ from vision.boards.symmetry import possible_labels, turns_onto_itself, upper_lef
 from vision.geometry.board import grid_mm
 from vision.geometry.checks import require
 
-# OpenCV's detector needs three corners either way.
+# [squares] OpenCV's detector needs three corners either way. Stated.
 _FEWEST_SQUARES = 4
 _FLAGS = cv2.CALIB_CB_NORMALIZE_IMAGE
-# The grid from which OpenCV goes on to all that is there, where it looks for no size.
+# [corners] The grid from which OpenCV goes on to all that is there, where it looks for no size. Stated.
 _SMALLEST_GRID = (3, 3)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from vision.geometry.camera import Camera
 from vision.geometry.refusals import Refused
 
+# [mm/m] A unit. Derived.
 MM_PER_M = 1000.0
 
 

@@ -27,7 +27,8 @@ _UNITS_MM = {
     "in": 25.4,
     "inches": 25.4,
 }
-_FIRST_PIXEL = 1.0  # MATLAB's name of the first pixel's middle
+# [px] MATLAB's coordinate of the first pixel's middle. A layout.
+_FIRST_PIXEL = 1.0
 
 
 def read(path: Path) -> list[Camera]:

@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import Any
 
+from vision.calibration.foreign_camera import MM_PER_M
 from vision.calibration.yaml_text import read_yaml
 from vision.geometry.refusals import Refused
 
-_MM_PER_M = 1000.0
 _KINDS = ("aprilgrid", "checkerboard", "circlegrid")
 
 
@@ -22,7 +22,7 @@ def read_kalibr_target(path: Path) -> dict[str, Any]:
             f"{path.name} is no target file of Kalibr: target_type is {kind!r}; {', '.join(_KINDS)} are known"
         )
     if kind == "aprilgrid":
-        tag_mm = _MM_PER_M * _number(target, "tagSize", path)
+        tag_mm = MM_PER_M * _number(target, "tagSize", path)
         gap = _number(target, "tagSpacing", path)
         return {
             "kind": "aprilgrid",
@@ -35,8 +35,8 @@ def read_kalibr_target(path: Path) -> dict[str, Any]:
         raise Refused(
             f"{path.name} does not state the circles' diameter: enter kind, squares, square_mm and marker_mm"
         )
-    across_mm = _MM_PER_M * _number(target, "colSpacingMeters", path)
-    down_mm = _MM_PER_M * _number(target, "rowSpacingMeters", path)
+    across_mm = MM_PER_M * _number(target, "colSpacingMeters", path)
+    down_mm = MM_PER_M * _number(target, "rowSpacingMeters", path)
     if across_mm != down_mm:
         raise Refused(f"{path.name} states {across_mm:g} x {down_mm:g} mm: no squares")
     return {

@@ -30,7 +30,7 @@ def calibrated(camera: Camera, **stated):
 def test_a_squashed_camera_is_calibrated_and_named():
     camera = squashed(0.75)
     made = calibrated(camera)
-    assert [warning.code for warning in made.warnings] == ["pixels_not_square"]
+    assert [warning.codes for warning in made.warnings] == [("pixels_not_square",)]
     assert "pixel_aspect = 0.7" in made.warnings[0]
     fx, fy = made.cameras["high"].lens[:2]
     sigma_px = made.report[0].intrinsics_sigma[:2]
