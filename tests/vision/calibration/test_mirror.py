@@ -11,17 +11,17 @@ import pytest
 
 from bench.rig import boards, build
 from bench.rig.protocol import load
+from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import Corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.views import BoardViews, MeasuredPose
-from vision.geometry.board import Board
 from vision.geometry.crop import Crop
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import apply
 
 PROTOCOL = load("mirror")
 T_RIG_BOARD = build.T_rig_board(PROTOCOL)
-BOARD = Board((7, 5), 10.0, 7.4, "DICT_5X5_100")
+BOARD = CharucoBoard((7, 5), 10.0, 7.4, "DICT_5X5_100")
 SIGMA_PX = 0.05
 WHOLE_PX = (640, 1020)
 CROPS = {
