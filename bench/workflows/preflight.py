@@ -27,7 +27,6 @@ from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.moment_size import check_moment_size
-from bench.trials.stated_truth import stated_whisk
 from bench.trials.still_scene import evenly_exposed, other_scene
 from vision import FEWEST_FREE
 from vision.boards import (
@@ -154,6 +153,8 @@ def _check_stage(session: Session, trial: Trial, signals: Signals, problems: Inp
 
     Raise BadInput where no contact can be as stated.
     """
+    from bench.trials.stated_truth import stated_whisk  # it loads the solvers of the truth
+
     for number, stroke in enumerate(forward_strokes(signals)):
         said = stated_whisk(session, trial, signals, stroke).status
         if said:

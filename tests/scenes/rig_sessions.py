@@ -44,6 +44,12 @@ def protocol_file(folder: Path, text: str) -> Path:
     return path
 
 
+def state_of_whisker(session: Path, line: str) -> None:
+    """Add a line to [whisker] of session.toml."""
+    file = session / "session.toml"
+    file.write_text(file.read_text().replace("[whisker]\n", f"[whisker]\n{line}\n", 1))
+
+
 def contents(folder):
     return {
         p.relative_to(folder).as_posix(): p.read_bytes()

@@ -9,9 +9,8 @@ import pytest
 from bench.base.errors import BadInput
 from bench.rig.simulation import simulate
 from bench.session.session import load_session
-from tests.bench.session.test_rest_shape import state
 from tests.scenes.refusals import refusal
-from tests.scenes.rig_sessions import protocol_file
+from tests.scenes.rig_sessions import protocol_file, state_of_whisker
 
 LENGTH_MM = 100.0  # of the sample's whisker, 1 mm thick
 ARC_MM = np.linspace(0.0, LENGTH_MM, 16)
@@ -34,7 +33,7 @@ def measure(session, rows: np.ndarray, header: str = "arc_mm,diameter_mm") -> No
     lines = [",".join(f"{value:.6f}" for value in row) for row in rows]
     (session / "profile.csv").write_text("\n".join([header, *lines]) + "\n")
     if 'profile = "' not in (session / "session.toml").read_text():
-        state(session, 'profile = "profile.csv"')
+        state_of_whisker(session, 'profile = "profile.csv"')
 
 
 ROWS = np.column_stack([ARC_MM, diameters(ARC_MM)])
@@ -113,13 +112,13 @@ def test_a_fault_of_the_table_is_named_by_its_row(session, change, expected):
 def test_what_contradicts_the_profile_is_one_line(session, line, expected):
     if "tip" in line:
         measure(session, ROWS)
-    state(session, line)
+    state_of_whisker(session, line)
     assert expected in refusal(session)
 
 
 def test_a_stated_tip_that_agrees_is_taken(session):
     measure(session, ROWS)
-    state(session, "tip_diameter_mm = 0.203")
+    state_of_whisker(session, "tip_diameter_mm = 0.203")
     assert load_session(session).whisker.tip_diameter_mm == pytest.approx(0.2, abs=2e-6)
 
 

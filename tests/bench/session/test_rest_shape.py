@@ -11,6 +11,7 @@ from bench.base.input_problems import InputProblems
 from bench.session.session import load_session
 from bench.session.session_check import checked_session
 from tests.scenes.refusals import refusal
+from tests.scenes.rig_sessions import state_of_whisker
 from vision.geometry import as_reason
 from vision.geometry.centreline import centrelines
 
@@ -23,17 +24,11 @@ def session(steel_signals, tmp_path):
     return shutil.copytree(steel_signals, tmp_path / "session", copy_function=shutil.copyfile)
 
 
-def state(session, line: str) -> None:
-    """Add a line to [whisker] of session.toml."""
-    file = session / "session.toml"
-    file.write_text(file.read_text().replace("[whisker]\n", f"[whisker]\n{line}\n", 1))
-
-
 def trace(session, points: np.ndarray, header: str = "x_mm,y_mm,z_mm") -> None:
     """Write points (n, 3) to rest.csv, and name it in session.toml."""
     rows = [",".join(f"{value:.6f}" for value in point) for point in points]
     (session / "rest.csv").write_text("\n".join([header, *rows]) + "\n")
-    state(session, 'rest_shape = "rest.csv"')
+    state_of_whisker(session, 'rest_shape = "rest.csv"')
 
 
 def spiral(arc_mm: float) -> tuple[float, float]:
@@ -82,7 +77,7 @@ def test_noise_of_tracing_does_not_lengthen_the_whisker(session):
 
 def test_a_stated_curvature_is_an_arc(session):
     """y = κ s²/2; what goes aside is lost forward: x = s − κ² s³/6 but for κ⁴ s⁵/40 = 3e-4 mm."""
-    state(session, "rest_curvature_per_mm = [0.002, -0.001]")
+    state_of_whisker(session, "rest_curvature_per_mm = [0.002, -0.001]")
     tip = seen_points(session, np.array([LENGTH_MM]))[0]
     assert tip[1:] == pytest.approx([10.0, -5.0], abs=1e-9)
     kappa = np.hypot(0.002, 0.001)
@@ -145,20 +140,20 @@ def test_text_in_a_number_is_named_by_its_cell(session):
     ],
 )
 def test_a_fault_of_the_keys_is_one_line(session, line, expected):
-    state(session, line)
+    state_of_whisker(session, line)
     assert expected in refusal(session)
 
 
 def test_a_shape_is_stated_once(session):
     trace(session, STRAIGHT)
-    state(session, "rest_curvature_per_mm = [0.001, 0.0]")
+    state_of_whisker(session, "rest_curvature_per_mm = [0.001, 0.0]")
     assert "give either rest_curvature_per_mm or rest_shape" in refusal(session)
 
 
 @pytest.mark.parametrize(("curvature", "said"), [([0.002, -0.001], True), ([0.0005, 0.0], False)])
 def test_a_curved_whisker_is_said_to_be_taken_as_straight(session, curvature, said):
     """0.36 · 0.224² = 1.8 % of d_x at the tip, and 0.36 · 0.05² = 0.09 %, which is nothing beside noise."""
-    state(session, f"rest_curvature_per_mm = {curvature}")
+    state_of_whisker(session, f"rest_curvature_per_mm = {curvature}")
     problems = InputProblems()
     checked_session(session, problems)
     found = [line for line in problems.warnings if as_reason(line).codes == ("whisker_curved",)]
