@@ -229,6 +229,10 @@ _TABLE = (
         WARNING,
         "{label} is not read; where it is the truth, {cure}",
         _LOOK_AT_FILE,
+        "motor_zero_unknown",
+        NOTE,
+        "the motor's angle counts from the recording's start, and pictures have another zero: no truth by them",
+        "record motor_deg, or let a stage say where the contact is",
     ),
     Status("camera_unused", WARNING, "a camera of the manifest has no pictures", _GIVE_PICTURES),
     Status(

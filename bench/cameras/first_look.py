@@ -78,13 +78,18 @@ def first_look(session: Session, cameras: Cameras) -> FirstRig:
 
 def look_at_strokes(session: Session, cameras: Cameras) -> Look:
     """Find what moves in some strokes of some trials."""
-    trials = spread([trial for trial in session.trials if trial.camera_sources])
+    trials = spread([trial for trial in session.trials if _shows_motor(trial)])
     lines: list[MovingLines] = []
     markers: list[MarkerSighting] = []
     for seen in in_threads(lambda trial: _look(trial, session.board, cameras), trials):
         lines += seen.lines
         markers += seen.markers
     return Look(tuple(lines), tuple(markers))
+
+
+def _shows_motor(trial: Trial) -> bool:
+    """Return whether a trial has pictures whose motor angles have the rig frame's zero."""
+    return bool(trial.camera_sources) and trial.angle_from == "log"
 
 
 def _look(trial: Trial, board: Board | None, cameras: Cameras) -> Look:

@@ -82,7 +82,7 @@ class FeltStroke:
 
     time_s, motor_rad (n,); channels (n, 2) as recorded, NaN where saturated, and filtered; drift
     (n, 2) that was taken out of both, None where none was; forces_N (n, 3), None where no load cell
-    was recorded.
+    was recorded. angle_share_sigma: relative sigma of differences of motor_rad.
     """
 
     time_s: np.ndarray
@@ -91,6 +91,7 @@ class FeltStroke:
     filtered: np.ndarray
     drift: np.ndarray | None = None
     forces_N: np.ndarray | None = None
+    angle_share_sigma: float = 0.0
 
     @property
     def saturated(self) -> int:
@@ -171,6 +172,7 @@ def strokes_of(
             channels[where],
             lowpassed[cutoff_Hz][where],
             forces_N=None if signals.forces_N is None else signals.forces_N[where],
+            angle_share_sigma=signals.angle_share_sigma,
         )
         if level:
             stroke = _levelled(stroke, signals, channels, slice(where.stop, end))

@@ -269,7 +269,11 @@ class TrialKeys(GivenKeys):
 
     # groups trials in fits and plots
     surface: str = ""
-    # nominal speed of the motor; signals that say another give a warning; its sigma enters nothing
+    # where the motor's angle is from: "log" (default), the signals' motor_deg, or "speed", the stated
+    # speed times the time, of one forward stroke ([bring.md](bring.md))
+    angle_from: Literal["log", "speed"] = "log"
+    # nominal speed of the motor; signals that say another give a warning; its sigma enters θ of
+    # angle_from = "speed" alone
     speed_deg_s: Speed | None = None
     speed_sigma_deg_s: float = 0.0
     # nominal slope; one that is seen counts before it, with a warning where their sigmas do not
@@ -348,8 +352,8 @@ class SignalKeys(Keys):
     rate_Hz: Rate | None = None
     # times in seconds
     time_s: ChannelKeys | None = None
-    # the motor's angle
-    motor_deg: ChannelKeys
+    # the motor's angle; left out where angle_from has it from elsewhere
+    motor_deg: ChannelKeys | None = None
     # the gauges
     y_V: ChannelKeys | None = None
     z_V: ChannelKeys | None = None

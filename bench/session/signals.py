@@ -15,6 +15,7 @@ from bench.session.plausible import (
     MILLIVOLTS,
     PlausibleRange,
 )
+from bench.session.stated_speed import by_stated_speed
 from bench.session.table import (
     NumberTable,
     column_names,
@@ -57,6 +58,7 @@ class Signals:
     kind: "V" where y and z are the gauges' volts, "Nmm" where they are m_y and m_z, N·mm.
     dropped: rows or wraps mended, by cause. warnings: lines that the user should read.
     forces_N (n, 3): of the base on the whisker in the hub's axes, None without a load cell.
+    angle_share_sigma: relative sigma of differences of motor_rad; 0 where the motor was logged.
     """
 
     time_s: np.ndarray
@@ -67,6 +69,7 @@ class Signals:
     dropped: Mapping[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     forces_N: np.ndarray | None = None
+    angle_share_sigma: float = 0.0
 
     @property
     def channels(self) -> np.ndarray:
@@ -135,11 +138,17 @@ def read_signals(trial: Trial) -> Signals:
     path = trial.signals_path
     label = trial.label(path.name)
     table = read_table(path, label) if trial.daq is None else read_daq(path, trial.daq, label)
-    kind, channels = _kind_and_channels(table, label)
+    kind, channels = _kind_and_channels(table, trial, label)
     forces = _force_columns(table, label)
     table, duplicates = forward_in_time(table, TIME, label)
-    motor_deg, wraps = _unwrapped(table[MOTOR])
     _check_units(table, VOLTAGE if kind == "V" else MOMENT, channels, label)
+    share_sigma = 0.0
+    wraps = 0
+    if trial.angle_from == "log":
+        motor_deg, wraps = _unwrapped(table[MOTOR])
+    else:
+        pair = np.column_stack([table[name] for name in channels])
+        motor_deg, share_sigma = by_stated_speed(table[TIME], pair, trial, label)
     mended = {"duplicate rows": duplicates, "encoder wraps": wraps}
     return Signals(
         time_s=table[TIME],
@@ -150,6 +159,7 @@ def read_signals(trial: Trial) -> Signals:
         dropped={cause: count for cause, count in mended.items() if count},
         warnings=_motor_warnings(table[TIME], motor_deg, trial, label),
         forces_N=_forces_N(table, forces, label) if forces else None,
+        angle_share_sigma=share_sigma,
     )
 
 
@@ -161,14 +171,24 @@ def has_moments(trial: Trial) -> bool:
     return MOMENTS[0] in column_names(path, trial.label(path.name))
 
 
-def _kind_and_channels(table: NumberTable, label: str) -> tuple[str, tuple[str, str]]:
-    """Return "V" or "Nmm", and the names of its two columns. Raise BadInput where not both are there."""
+def _kind_and_channels(
+    table: NumberTable, trial: Trial, label: str
+) -> tuple[str, tuple[str, str]]:
+    """Return "V" or "Nmm", and the names of its two columns. Raise BadInput where not both are there,
+    or the motor's angle is neither a column nor had from elsewhere.
+    """
     has_volts = any(name in table.columns for name in VOLTS)
     has_moments = any(name in table.columns for name in MOMENTS)
     if has_volts and has_moments:
         raise BadInput("has volts and moments; keep y_V,z_V or m_y_Nmm,m_z_Nmm", file=label, row=1)
     kind, channels = ("Nmm", MOMENTS) if has_moments else ("V", VOLTS)
-    require_columns(table, (TIME, MOTOR, *channels), label)
+    require_columns(table, (TIME, *channels), label)
+    has_another = any(name.startswith("motor") for name in table.columns)
+    if trial.angle_from == "log" and has_another:
+        require_columns(table, (MOTOR,), label)
+    elif trial.angle_from == "log" and MOTOR not in table.columns:
+        cure = 'without a motor log write angle_from = "speed", speed_deg_s and speed_sigma_deg_s'
+        raise BadInput(f"has no column {MOTOR}; {cure}", file=label, row=1)
     return kind, channels
 
 

@@ -76,6 +76,7 @@ def as_felt(
     phi_rad = felt_slip_angle(m_y.value, m_z.value)
     return replace(
         felt,
+        theta_sigma_rad=whisk.theta_sigma_rad,
         m_y_Nmm=m_y,
         m_z_Nmm=m_z,
         phi_felt_rad=Value(phi_rad, slip_angle_sigma(m_y.value, m_z.value, whisk.covariance_at)),

@@ -120,7 +120,7 @@ def whisk_at(
         m_y_at_Nmm=float(m_y),
         m_z_at_Nmm=float(m_z),
         covariance_at=readout.covariance(at.values, at.covariance),
-        theta_sigma_rad=touch.sigma_rad,
+        theta_sigma_rad=float(np.hypot(touch.sigma_rad, stroke.angle_share_sigma * theta_rad)),
         beam=beam,
         theta_moment_covariance_at=readout.matrix @ at.theta_covariance,
         unfiltered_Nmm=unfiltered,

@@ -41,6 +41,7 @@ from vision.geometry import Reason, Refused, joined
 from vision.pictures import Others
 
 NO_PICTURES = reason("no_pictures")
+NO_ZERO = reason("motor_zero_unknown")
 _MOST_DEFLECTIONS = 12  # frames of a whisk, kept with their joint covariance
 _MOST_NAMED = 5  # frames in a line
 # [1] Of the contact's distance along the wire: a place that is known worse gives no moment. At this one
@@ -69,6 +70,8 @@ def see_trial(
     count = len(forward_strokes(signals))
     if not trial.camera_sources or calibration.cameras is None:
         return unseen(count, NO_PICTURES)
+    if trial.angle_from == "speed":
+        return unseen(count, NO_ZERO)
     try:
         frames = TrialFrames.read(session, trial, signals, calibration, settings, wires or {})
         return _see(session, trial, frames, calibration, settings)

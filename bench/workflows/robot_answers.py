@@ -189,7 +189,13 @@ def _convert_stroke(
     channels = converter.convert(raw, signals.rate_Hz, range_V)[where][:: converter.every]
     time_s = signals.time_s[where][:: converter.every]
     motor_rad = signals.motor_rad[where][:: converter.every]
-    return FeltStroke(time_s, motor_rad, channels, channels)
+    return FeltStroke(
+        time_s,
+        motor_rad,
+        channels,
+        channels,
+        angle_share_sigma=signals.angle_share_sigma,
+    )
 
 
 def _answers_of_whisk(whisk: _ConvertedWhisk) -> Iterator[Answer]:

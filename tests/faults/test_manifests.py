@@ -97,7 +97,7 @@ def test_no_manifest(session):
         ("[[0.997563342,", "[[1.997563342,", r"\[rig\] T_rig_board: .*not a right-handed rotation"),
         ("4.24180287", "4241.80287e9", r"\[rig\] T_rig_board"),
         ("format = 1", "format = 2", r"format is 2; this version reads format 1"),
-        ("[bar]", "[signals]\nfile = 'daq.mat'\n[bar]", r"\[signals\] motor_deg is missing"),
+        ("[bar]", "[signals]\nfile = 'daq.mat'\n[bar]", r"daq.mat: is not there"),
         (
             "[bar]",
             "[signals]\nfile = '../daq.mat'\nmotor_deg = { channel = 'enc' }\n[bar]",
