@@ -229,6 +229,8 @@ _TABLE = (
         WARNING,
         "{label} is not read; where it is the truth, {cure}",
         _LOOK_AT_FILE,
+    ),
+    Status(
         "motor_zero_unknown",
         NOTE,
         "the motor's angle counts from the recording's start, and pictures have another zero: no truth by them",

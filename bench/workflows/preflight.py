@@ -18,6 +18,7 @@ from bench.gauges.felt import FeltStroke, strokes_of
 from bench.gauges.fit import RECORD, in_two_directions
 from bench.gauges.gauge_faults import check_alive
 from bench.gauges.gauges_file import given_gauges
+from bench.session.abilities import ability_lines
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
 from bench.session.given_lines import assumed_line
@@ -77,6 +78,8 @@ def check(path: Path, *, follow_links: bool = False) -> int:
         return 2
     if placed:
         print(f"rig: {placed}")
+    for line in ability_lines(session):
+        print(line)
     if problems.warnings:
         return 1
     whiskers = f", {counted(len(views), 'whisker')}" if session.base else ""

@@ -1,0 +1,106 @@
+"""What a recording can give, by the files and keys of its session, and what one thing more would give."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from bench.session.session import Session
+from bench.session.signals import has_moments
+from bench.session.trial import Trial
+
+# [cameras] A line in space is where two views of it meet. Derived.
+_FEWEST_CAMERAS = 2
+# [trials] The follicle in two positions, so that both channels are pushed. Derived.
+_FEWEST_GAUGE_TRIALS = 2
+# [trials] Of different slopes: Fig. 8 draws an error against the slope. Derived.
+_FEWEST_SLOPES = 2
+
+
+@dataclass(frozen=True)
+class Ability:
+    """One kind of result. quantity: its name. count: of trials that can have it, of `of`. missing: what
+    one thing more gives the others; '' where there are none.
+    """
+
+    quantity: str
+    count: int
+    of: int
+    missing: str = ""
+
+    @property
+    def line(self) -> str:
+        """Return the row as `check` prints it."""
+        row = f"  {self.quantity:<18}{self.count} of {self.of}"
+        return f"{row}   {self.missing}".rstrip()
+
+
+def abilities(session: Session) -> tuple[Ability, ...]:
+    """Return what the measured trials of a session can give."""
+    measured = [trial for trial in session.trials if trial.purpose != "weight"]
+    seen = [trial for trial in measured if _lacks_of_pictures(trial, session) == ""]
+    true = measured if session.truth is not None else seen
+    felt = [trial for trial in measured if has_moments(trial) or _has_gauges(session)]
+    to_see = _first(_lacks_of_pictures(trial, session) for trial in measured)
+    to_know = to_see and f'{to_see}; or a stage: [truth] source = "stage"'
+    both = [trial for trial in true if trial in felt]
+    slopes = {trial.beta_deg for trial in both}
+    is_sloped = len(slopes) >= _FEWEST_SLOPES or session.truth is None and len(both) > 1
+    rows = (
+        ("truth of d_x", len(true), to_know),
+        ("truth of β", len(true), to_know),
+        ("slip, deflection", len(seen), to_see),
+        ("estimates of d_x", len(felt), _TO_FEEL),
+        ("errors", len(both), _TO_COMPARE),
+        ("Fig. 8", len(both) if is_sloped else 0, _TO_DRAW),
+    )
+    found = []
+    for quantity, count, missing in rows:
+        is_whole = count == len(measured)
+        found.append(Ability(quantity, count, len(measured), "" if is_whole else missing))
+    return tuple(found)
+
+
+_TO_FEEL = f"{_FEWEST_GAUGE_TRIALS} gauge trials with pictures (follicle at 0° and 90°), gauges.toml, or moments"
+_TO_COMPARE = "truth and estimate of one trial"
+_TO_DRAW = f"truth and estimate at {_FEWEST_SLOPES} slopes"
+
+
+def ability_lines(session: Session) -> Iterator[str]:
+    """Yield the table of what a session can give, and where its motor's angles are from."""
+    found = abilities(session)
+    if not found[0].of:
+        return
+    by_speed = sum(trial.angle_from == "speed" for trial in session.trials)
+    if by_speed:
+        yield f"angle: {by_speed} of {len(session.trials)} trials by the stated speed, without a motor log"
+    yield "this recording can give, of its trials:"
+    for ability in found:
+        yield ability.line
+
+
+def _lacks_of_pictures(trial: Trial, session: Session) -> str:
+    """Return the one thing more that pictures need to give a trial's truth; '' where they suffice."""
+    if not trial.camera_sources:
+        return f"{_FEWEST_CAMERAS} cameras with a board"
+    if trial.angle_from == "speed":
+        return "a motor log (motor_deg)"
+    if len(trial.camera_sources) < _FEWEST_CAMERAS:
+        return "a second camera, or a mirror ([[cameras]] of, crop, mirrored)"
+    if session.cameras_toml is None and not session.board_sources:
+        return "views of a board (boards/), or cameras.toml"
+    return ""
+
+
+def _has_gauges(session: Session) -> bool:
+    """Return whether the session has gauges, or gauge trials that calibrate them."""
+    if session.gauges is not None or session.gauges_toml is not None:
+        return True
+    gauge_trials = []
+    for trial in session.trials:
+        if trial.purpose == "gauge" and not _lacks_of_pictures(trial, session):
+            gauge_trials.append(trial)
+    return len(gauge_trials) >= _FEWEST_GAUGE_TRIALS
+
+
+def _first(lacks: Sequence[str] | Iterator[str]) -> str:
+    """Return the first of some lacks that is one; '' where nothing lacks."""
+    return next(filter(None, lacks), "")
