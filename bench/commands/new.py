@@ -33,6 +33,11 @@ def add(verbs: Verbs) -> None:
         default="pictures",
         help="where the truth comes from: cameras (default), or a stage or ruler",
     )
+    verb.add_argument(
+        "--no-motor-log",
+        action="store_true",
+        help="the signals have no motor_deg: the angle is by the motor's stated speed",
+    )
     for option, what in _NUMBERS.items():
         verb.add_argument(option, type=float, metavar="X", help=what)
     verb.add_argument(
@@ -64,6 +69,14 @@ def run(options: argparse.Namespace) -> int:
             given[name] = getattr(options, name)
     ask = input if sys.stdin.isatty() else None
     board = BoardLines(options.board_kind, options.squares, options.dictionary)
-    lines = new_session(options.session, options.name, given, board, ask, options.truth)
+    lines = new_session(
+        options.session,
+        options.name,
+        given,
+        board,
+        ask,
+        options.truth,
+        motor_log=not options.no_motor_log,
+    )
     print(*lines, sep="\n")
     return DONE

@@ -37,10 +37,10 @@ def abilities(session: Session) -> tuple[Ability, ...]:
     """Return what the measured trials of a session can give."""
     measured = [trial for trial in session.trials if trial.purpose != "weight"]
     seen = [trial for trial in measured if _lacks_of_pictures(trial, session) == ""]
-    true = measured if session.truth is not None else seen
+    true = seen if session.truth is None else [trial for trial in measured if _is_stated(trial)]
     felt = [trial for trial in measured if has_moments(trial) or _has_gauges(session)]
     to_see = _first(_lacks_of_pictures(trial, session) for trial in measured)
-    to_know = to_see and f'{to_see}; or a stage: [truth] source = "stage"'
+    to_know = _TO_STATE if session.truth else f'{to_see}; or a stage: [truth] source = "stage"'
     both = [trial for trial in true if trial in felt]
     slopes = {trial.beta_deg for trial in both}
     is_sloped = len(slopes) >= _FEWEST_SLOPES or session.truth is None and len(both) > 1
@@ -56,9 +56,27 @@ def abilities(session: Session) -> tuple[Ability, ...]:
     for quantity, count, missing in rows:
         is_whole = count == len(measured)
         found.append(Ability(quantity, count, len(measured), "" if is_whole else missing))
-    return tuple(found)
+    return (*found, *_of_gauges(session))
 
 
+def _of_gauges(session: Session) -> Iterator[Ability]:
+    """Yield the row of the gauge trials, where there are any or volts need them."""
+    gauge_trials = [trial for trial in session.trials if trial.purpose == "gauge"]
+    usable = sum(not _lacks_of_pictures(trial, session) for trial in gauge_trials)
+    of = max(len(gauge_trials), _FEWEST_GAUGE_TRIALS)
+    if gauge_trials or not _has_gauges(session):
+        lacks = _first(_lacks_of_pictures(trial, session) for trial in gauge_trials)
+        missing = lacks or "gauge trials in two positions of the follicle"
+        yield Ability("gauges", usable, of, "" if usable == of else missing)
+
+
+def _is_stated(trial: Trial) -> bool:
+    """Return whether a trial states where its contact is."""
+    has_place = trial.object is not None and trial.object.point_mm is not None
+    return trial.d_x_mm is not None or trial.stage is not None or has_place
+
+
+_TO_STATE = "d_x_mm, point_mm of [object] or stage.csv in each trial"
 _TO_FEEL = f"{_FEWEST_GAUGE_TRIALS} gauge trials with pictures (follicle at 0° and 90°), gauges.toml, or moments"
 _TO_COMPARE = "truth and estimate of one trial"
 _TO_DRAW = f"truth and estimate at {_FEWEST_SLOPES} slopes"
@@ -83,7 +101,7 @@ def _lacks_of_pictures(trial: Trial, session: Session) -> str:
         return f"{_FEWEST_CAMERAS} cameras with a board"
     if trial.angle_from == "speed":
         return "a motor log (motor_deg)"
-    if len(trial.camera_sources) < _FEWEST_CAMERAS:
+    if len(trial.camera_sources) < _FEWEST_CAMERAS and not trial.is_bar:
         return "a second camera, or a mirror ([[cameras]] of, crop, mirrored)"
     if session.cameras_toml is None and not session.board_sources:
         return "views of a board (boards/), or cameras.toml"

@@ -171,9 +171,7 @@ def has_moments(trial: Trial) -> bool:
     return MOMENTS[0] in column_names(path, trial.label(path.name))
 
 
-def _kind_and_channels(
-    table: NumberTable, trial: Trial, label: str
-) -> tuple[str, tuple[str, str]]:
+def _kind_and_channels(table: NumberTable, trial: Trial, label: str) -> tuple[str, tuple[str, str]]:
     """Return "V" or "Nmm", and the names of its two columns. Raise BadInput where not both are there,
     or the motor's angle is neither a column nor had from elsewhere.
     """

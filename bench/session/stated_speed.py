@@ -35,7 +35,9 @@ def by_stated_speed(
     speed_deg_s = trial.speed_deg_s
     if speed_deg_s is None or not trial.speed_sigma_deg_s > 0:
         missing = "speed_deg_s" if speed_deg_s is None else "speed_sigma_deg_s"
-        found = f'angle_from = "speed" needs speed_deg_s and speed_sigma_deg_s; {missing} is missing'
+        found = (
+            f'angle_from = "speed" needs speed_deg_s and speed_sigma_deg_s; {missing} is missing'
+        )
         raise BadInput(found, file=trial.label("trial.toml"))
     if trial.both_ways:
         found = 'both_ways needs motor_deg: angle_from = "speed" knows the way there alone'

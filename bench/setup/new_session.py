@@ -93,11 +93,13 @@ def new_session(
     board: "BoardLines",
     ask: Ask | None = None,
     truth: str = "pictures",
+    *,
+    motor_log: bool = True,
 ) -> list[str]:
     """Make the folder of a session with its manifest; return lines on what comes next.
 
     given: by option's name; ask: answers a question, '' for not known; None asks nothing. truth: where
-    it comes from, a key of QUESTIONS_OF. Raises BadInput where there is a session already, or a number
+    it comes from, a key of QUESTIONS_OF. motor_log: the signals have motor_deg. Raises BadInput where there is a session already, or a number
     is implausible.
     """
     if (path / MANIFEST).exists():
@@ -114,7 +116,7 @@ def new_session(
     for folder in _FOLDERS_OF[truth]:
         (path / folder).mkdir(parents=True, exist_ok=True)
     text = manifest_text(name or path.resolve().name, answers, board, truth)
-    write_whole(path / MANIFEST, text)
+    write_whole(path / MANIFEST, text if motor_log else _without_motor_log(text))
     missing = [question for question in questions if question.option not in answers]
     return list(_next_steps(path, missing, truth))
 
@@ -141,6 +143,11 @@ def manifest_text(
         lines["marker_mm"] = "# marker_mm                     # of other kinds of board"
     named = tomli_w.dumps({"name": name}).strip()
     return _TEMPLATES[truth].format(named=named, board=board.text(), **lines)
+
+
+def _without_motor_log(text: str) -> str:
+    """Return session.toml for signals without motor_deg: the angle is by the motor's stated speed."""
+    return text.replace(_SPEED, _BY_SPEED).replace("time_s,motor_deg,", "time_s,")
 
 
 def _line(key: str, value: float | None, wanted: str) -> str:
@@ -210,11 +217,20 @@ source = "stage"                # d_x, or the object's place, is what trials sta
 
 """
 
-_TRIAL = """\
-[trial]                         # for all trials; a key in trials/<trial>/trial.toml goes before it
-# surface = "steel"             # groups trials in fits and figures
+_SPEED = """\
 # speed_deg_s = 10.0            # nominal
 """
+
+_BY_SPEED = """\
+angle_from = "speed"            # no motor log: one forward stroke at constant speed a recording
+# speed_deg_s =        # FILL IN: of the motor, deg/s
+# speed_sigma_deg_s =  # FILL IN: one standard deviation of it
+"""
+
+_TRIAL = f"""\
+[trial]                         # for all trials; a key in trials/<trial>/trial.toml goes before it
+# surface = "steel"             # groups trials in fits and figures
+{_SPEED}"""
 
 _FRAMES = """\
 # frame_rate_Hz = 20.0          # where no frames.csv tells the frames' times

@@ -127,3 +127,12 @@ def test_check_counts_as_many_missing_lines_as_new(tmp_path, capsys):
     assert main(["check", str(tmp_path / "s")]) == 2
     missing = [line for line in capsys.readouterr().out.splitlines() if "is missing" in line]
     assert len(missing) == len(QUESTIONS) == 6
+
+
+def test_without_a_motor_log_the_speed_is_to_be_filled_in(tmp_path):
+    path = tmp_path / "session"
+    assert main(["new", str(path), "--no-motor-log", *options(NUMBERS)]) == 0
+    text = (path / "session.toml").read_text()
+    assert read(path).trial.angle_from == "speed"
+    assert text.count("speed") > 2 and "motor_deg" not in text
+    assert "# speed_deg_s =        # FILL IN" in text

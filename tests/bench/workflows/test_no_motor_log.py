@@ -71,7 +71,12 @@ def edited(tmp_path: Path, file: str, old: str, new: str) -> Path:
 @pytest.mark.parametrize(
     ("file", "old", "new", "found"),
     [
-        ("session.toml", 'angle_from = "speed"', "", "has no column motor_deg; without a motor log"),
+        (
+            "session.toml",
+            'angle_from = "speed"',
+            "",
+            "has no column motor_deg; without a motor log",
+        ),
         (f"trials/{TRIAL}/trial.toml", "speed_deg_s", "# ", "speed_deg_s is missing"),
         (f"trials/{TRIAL}/trial.toml", "speed_sigma_deg_s", "# ", "speed_sigma_deg_s is missing"),
         ("session.toml", "[trial]", "[trial]\nboth_ways = true", "both_ways needs motor_deg"),
