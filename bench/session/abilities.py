@@ -43,7 +43,7 @@ def abilities(session: Session) -> tuple[Ability, ...]:
     to_know = _TO_STATE if session.truth else f'{to_see}; or a stage: [truth] source = "stage"'
     both = [trial for trial in true if trial in felt]
     slopes = {trial.beta_deg for trial in both}
-    is_sloped = len(slopes) >= _FEWEST_SLOPES or session.truth is None and len(both) > 1
+    is_sloped = len(slopes) >= _FEWEST_SLOPES or (session.truth is None and len(both) > 1)
     rows = (
         ("truth of d_x", len(true), to_know),
         ("truth of β", len(true), to_know),

@@ -15,9 +15,10 @@ _SMOOTH_SHARE = 0.01
 # [1] Of the largest change of the channels: there the stroke ends. A crest that is held has noise on it.
 # Stated.
 _CREST_SHARE = 0.98
-# [1] Of that change: signals that rose above the one and fell below the other before the crest were
-# recorded over several strokes. Stated.
+# [1] Of that change: signals that rose so far and fell again before the crest are of several strokes.
+# Stated.
 _RISEN = 0.5
+# [1] Of that change: signals that fell so far have let go of the object. Stated.
 _FALLEN = 0.2
 
 

@@ -99,7 +99,8 @@ def new_session(
     """Make the folder of a session with its manifest; return lines on what comes next.
 
     given: by option's name; ask: answers a question, '' for not known; None asks nothing. truth: where
-    it comes from, a key of QUESTIONS_OF. motor_log: the signals have motor_deg. Raises BadInput where there is a session already, or a number
+    it comes from, a key of QUESTIONS_OF.
+    motor_log: the signals have motor_deg. Raises BadInput where there is a session already, or a number
     is implausible.
     """
     if (path / MANIFEST).exists():
