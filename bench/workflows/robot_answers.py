@@ -209,7 +209,13 @@ def _answers_of_whisk(whisk: _ConvertedWhisk) -> Iterator[Answer]:
             return
         now = stroke.time_s <= end_s
         channels = stroke.channels[now]
-        cut = FeltStroke(stroke.time_s[now], stroke.motor_rad[now], channels, channels)
+        cut = FeltStroke(
+            stroke.time_s[now],
+            stroke.motor_rad[now],
+            channels,
+            channels,
+            angle_share_sigma=stroke.angle_share_sigma,
+        )
         time_s = end_s - whisk.touch_s + 1.0 / whisk.rate_Hz
         theta_rad = _theta_rad(push_rad, stroke.speed_rad_s)
         yield from _answers_at(whisk, cut, theta_rad, push_deg, time_s)
