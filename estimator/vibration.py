@@ -93,7 +93,7 @@ def frequency_ratio(share: float) -> float:
     """Return the first natural frequency with a prop at a share of the length, over the free one.
 
     >>> round(frequency_ratio(0.6), 4)
-    4.3006
+    3.858
     """
     root = brentq(
         _characteristic, FREE_WAVE_NUMBER, SECOND_WAVE_NUMBER, args=(share,), xtol=1e-13, rtol=1e-13

@@ -508,6 +508,12 @@ _TABLE = (
     Status(
         "bar_distance_unseen", REFUSAL, "one camera alone does not tell how far away the bar is"
     ),
+    Status(
+        "trace_elsewhere",
+        REFUSAL,
+        "another program's trace is nowhere near the wire in the pictures",
+        "look whether the trace is of this trial and camera, and neither mirrored nor turned",
+    ),
     Status("no_object_seen", REFUSAL, "no object of the stated form is seen near the whisker"),
     Status("object_in_two_places", REFUSAL, "the object may be in either of two places"),
     Status("no_object_edge", REFUSAL, "a camera shows no edge of the object"),
@@ -626,6 +632,12 @@ _TABLE = (
         "at the bound of the search, {bound_deg:.1f}°: no angle between fits",
     ),
     Status("tilts_one_sided", REFUSAL, "the slip angle does not leave zero on both sides"),
+    Status("still_slips", WARNING, "the whisker still slips sideways", "turn the plane once more"),
+    Status("whisker_does_not_ring", REFUSAL, "no ringing stands out of the noise"),
+    Status("ring_not_of_a_prop", REFUSAL, "the ring's frequency is no contact's"),
+    Status("not_a_straight_cylinder", REFUSAL, "the whisker is no straight cylinder"),
+    Status("no_unfiltered_samples", REFUSAL, "no samples as recorded are kept"),
+    Status("two_places_ring_alike", WARNING, "two distances ring alike"),
     Status("whisks_slip_alike", REFUSAL, "the whisks slip alike"),
     Status("whisks_unconverged", REFUSAL, "friction and distance do not converge"),
     Status("whisk_not_pushing", REFUSAL, "a whisk does not push"),

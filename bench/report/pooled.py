@@ -3,6 +3,9 @@
 import csv
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
 
 from bench.analyses.figure_8 import FIGURE_8, figure_8, rows
 from bench.analyses.surfaces import FittedSurface, friction_lines, surfaces
@@ -18,6 +21,7 @@ TABLE = "whisks.csv"
 _AGAIN = "evaluate the session again into this folder"
 # [1] A whisker's length, diameter and stiffness are written down alike on all days: rounding. Stated.
 _SAME_WHISKER = 1e-3
+Fact: TypeAlias = float | str | tuple[float, ...] | None
 # [1] Fig. 8 is of one distance: |m| is scaled to it as 1/d_x, which takes out the error of a ruler,
 # not another set-up. Stated.
 _SAME_DISTANCE = 0.1
@@ -138,14 +142,16 @@ def _check_alike(out: Path, result: TrialResult, first: Path, reference: TrialRe
             raise BadInput(f"{found}; whisks of different whiskers cannot be pooled", file=out)
 
 
-def _is_alike(ours: float | str | None, theirs: float | str | None) -> bool:
+def _is_alike(ours: Fact, theirs: Fact) -> bool:
     """Return whether a fact on two whiskers is the same, apart from rounding."""
+    if isinstance(ours, tuple):
+        return len(ours) == len(theirs) and np.allclose(ours, theirs, rtol=0.0, atol=_SAME_WHISKER)
     if isinstance(ours, str) or ours is None or theirs is None:
         return ours == theirs
     return abs(ours / theirs - 1.0) <= _SAME_WHISKER
 
 
-def _text(fact: float | str | None) -> str:
+def _text(fact: Fact) -> str:
     """Return a fact on a whisker in words."""
     return f"{fact:.6g}" if isinstance(fact, float) else str(fact)
 

@@ -259,7 +259,7 @@ def test_gauge_trials_without_truth_say_what_it_lacks(
     small_copy, exact_vision, tmp_path, monkeypatch
 ):
     """The verdict hangs on them: what their pictures lack stands beside what to record, and another way out."""
-    seen = sys.modules["bench.trials.trial_evaluation"].see_trial
+    seen = sys.modules["bench.trials.truth_source"].see_trial
 
     def see(session, trial, *rest):
         found = seen(session, trial, *rest)

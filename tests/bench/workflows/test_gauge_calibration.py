@@ -57,7 +57,7 @@ def test_gauge_trials_without_a_truth_serve_by_their_wire(
 ):
     """The coefficients are those with a truth, and the certificate names what they rest on."""
     calibrate(steel_signals, tmp_path / "with.toml")
-    see_trial = sys.modules["bench.trials.trial_evaluation"].see_trial
+    see_trial = sys.modules["bench.trials.truth_source"].see_trial
 
     def see(*arguments):
         seen = see_trial(*arguments)

@@ -57,7 +57,8 @@ def test_the_window_ends_where_the_push_does(push_deg, speed_deg_s):
 
 def answer(error: float, time_s: float, estimator: str = "with_friction", **other) -> Answer:
     about = {"converter": Converter(), "speed_deg_s": 10.0, "rate_Hz": RATE_HZ, "push_deg": 3.0}
-    given = {"expected_percent": 1.0, "noise_percent": 0.75} | about | other
+    given = {"expected_percent": 1.0, "noise_percent": 0.75, "truth_source": "pictures"}
+    given |= about | other
     return Answer(estimator=estimator, error_percent=error, time_s=time_s, **given)
 
 
