@@ -127,13 +127,13 @@ def _add_seeing(verb: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--preset",
         metavar="NAME",
-        help="how hard pictures are looked at: draft, standard (default) or fine; what each costs, tradeoff measures",
+        help="how hard pictures are looked at: draft or standard (default); what each costs, tradeoff measures",
     )
     group.add_argument(
         "--accuracy-mm",
         type=float,
         metavar="X",
-        help="look at each whisk by draft, standard and fine in turn until d_x's stated sigma is X or less",
+        help="look at each whisk by draft and standard in turn until d_x's stated sigma is X or less",
     )
     group.add_argument(
         "--settings",

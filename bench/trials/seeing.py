@@ -1,5 +1,4 @@
-"""Settings of the evaluation of pictures: three named presets of rising accuracy, and files with any
-other setting.
+"""Settings of the evaluation of pictures: two named presets, and files with any other setting.
 """
 
 from dataclasses import dataclass, replace
@@ -13,11 +12,10 @@ from bench.session.plausible import PlausibleRange
 from bench.session.strict_toml import Keys, as_keys, plausible_ranges, read_toml, values
 from vision.geometry import VisionSettings
 
-# Each preset has what the one before leaves out. What it costs and how wrong it is, `tradeoff` measures.
+# The second has what the first leaves out. What it costs and how wrong it is, `tradeoff` measures.
 PRESETS = {
     "draft": VisionSettings(rounds=0, every_frame=2, check_beam=False),
     "standard": VisionSettings(),
-    "fine": VisionSettings(rounds=2),
 }
 STANDARD = "standard"
 _OWN_TABLE = "seeing"

@@ -3,8 +3,8 @@
 Tried are the presets, the standard with one setting changed at a time, and the standard with its
 figures drawn. Each setting sees the same trials. It is timed several times, and the least time
 counts: what a clock adds is never negative. Errors are against the known truth where the session is
-simulated, else against the preset `fine`. Settings are ranked by the error that their stated sigmas let
-one expect, and by the measured one where that is larger than chance explains.
+simulated, else against the preset `standard`. Settings are ranked by the error that their stated
+sigmas let one expect, and by the measured one where that is larger than chance explains.
 """
 
 from collections.abc import Iterator, Sequence
@@ -44,7 +44,7 @@ from vision.geometry import counted
 TRADEOFF = Table(
     "tradeoff",
     "A row a setting of `whisker-bench tradeoff`. Errors are against the known truth of a synthetic "
-    "session, else against the preset `fine`. `with-figures` is `standard` with planes and overlays "
+    "session, else against the preset `standard`. `with-figures` is `standard` with planes and overlays "
     "drawn, too: `evaluate` without `--no-figures`.",
     (
         Column("setting", "its name", Kind.TEXT),
@@ -244,15 +244,15 @@ def _time_drawing(units: Sequence[Unit], standard: Trade, repeats: int) -> Trade
 
 
 def _with_errors(session: Session, units: Sequence[Unit], trades: Sequence[Trade]) -> list[Trade]:
-    """Return the settings with their errors against the known truth, or the finest preset."""
-    finest_mm = trades[len(PRESETS) - 1].d_x_mm  # presets come first, the finest last of them
+    """Return the settings with their errors against the known truth, or the standard."""
+    standard_mm = _standard(trades).d_x_mm
     true_mm = []
     for unit in units:
         for number in range(len(forward_strokes(read_signals(unit.trial)))):
             truth = truth_of(session, unit.trial.name, number)
             true_mm.append(np.nan if truth is None else truth["d_x_mm"])
     true_mm = np.array(true_mm, dtype=float)
-    reference_mm = np.where(np.isnan(true_mm), finest_mm, true_mm)
+    reference_mm = np.where(np.isnan(true_mm), standard_mm, true_mm)
     return [replace(trade, errors_mm=trade.d_x_mm - reference_mm) for trade in trades]
 
 

@@ -42,7 +42,7 @@ def test_what_a_file_leaves_out_goes_by_its_preset(tmp_path):
         ),
         ("[seeing]\nrounds = -1\n", r"rounds is -1; from 0 to 5 is allowed"),
         ("[seeing]\nevery_frame = 1.5\n", r"expected .*whole number.*, found a number"),
-        ('[seeing]\npreset = "best"\n', r"--preset best: there are draft, standard, fine"),
+        ('[seeing]\npreset = "best"\n', r"--preset best: there are draft, standard"),
     ],
 )
 def test_a_wrong_file_is_named(text, line, tmp_path):

@@ -52,11 +52,6 @@ def test_a_third_camera_is_left_out_in_turn():
 def test_a_table_and_files_to_give_back(tmp_path, monkeypatch):
     """That of d_x is below the 0.1 mm of tests/bench/test_scenes.py."""
     monkeypatch.setattr(seeing_trade, "_CHANGES", {})
-    monkeypatch.setattr(
-        seeing_trade,
-        "PRESETS",
-        {name: seeing_trade.PRESETS[name] for name in ("draft", "standard")},
-    )
     rows = seeing_trade.tradeoff(RING, tmp_path, Settings(trials="w*"), repeats=1)
     assert "of standard" in next(seeing_trade.tradeoff_lines(rows))
     with (tmp_path / "tradeoff.csv").open(newline="") as file:
