@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -267,11 +268,7 @@ def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> St
         found = f"format is {tables['format']!r}; this version reads format {FORMAT}"
         raise BadInput(found, file=MANIFEST)
     tables = with_kalibr_target(tables, path, MANIFEST)
-    board = tables.get("board")
-    if isinstance(board, dict):
-        for line in missing_parts(board.get("kind", CharucoBoard.kind), board):
-            with problems.guard():
-                raise BadInput(line, file=MANIFEST)
+    _check_board_parts(tables.get("board"), problems)
     needed = []
     if visible(path / "trials"):
         needed = ["bar"] if "whiskers" in tables else ["whisker", "bar"]
@@ -280,6 +277,18 @@ def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> St
         found = "[truth] is one whisker's; make a session of each of [[whiskers]]"
         raise BadInput(found, file=MANIFEST)
     return StatedSession.of(tables)
+
+
+def _check_board_parts(board: Any, problems: InputProblems) -> None:
+    """Report each key that the kind of board in [board] needs and that is not there.
+
+    Where the table has a key that is none, that one is told alone, elsewhere: it may be the one misspelt.
+    """
+    if not isinstance(board, dict) or not board.keys() <= set(key_names(manifest.BoardKeys)):
+        return
+    for line in missing_parts(board.get("kind", CharucoBoard.kind), board):
+        with problems.guard():
+            raise BadInput(line, file=MANIFEST)
 
 
 def _whisker(keys: manifest.WhiskerKeys | None, path: Path) -> Whisker | None:

@@ -1,5 +1,4 @@
-"""Settings of the evaluation of pictures: two named presets, and files with any other setting.
-"""
+"""Settings of the evaluation of pictures: two named presets, and files with any other setting."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path

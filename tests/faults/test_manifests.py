@@ -251,10 +251,10 @@ def test_check_names_every_missing_key(session):
     ):
         edit(session / "session.toml", text, "")
     assert refusals(session) == [
+        "session.toml: [board] squares is missing",
         "session.toml: [bar] is missing",
         "session.toml: format is missing",
         "session.toml: [whisker] length_mm is missing",
-        "session.toml: [board] squares is missing",
         "session.toml: [[cameras]] name is missing",
     ]
 
