@@ -47,6 +47,8 @@ def session_toml(
             {"name": camera.name, "exposure_s": exposure_s} for camera in protocol.cameras
         ] + [_mirror_keys(camera) for camera in protocol.cameras if camera.mirror]
     session["trial"] = {"gauge_filter_Hz": protocol.gauges.filter_Hz}
+    if protocol.stage:
+        session["truth"] = {"source": "stage", "origin_sigma_mm": 0.0}
     if whiskers:
         session.pop("whisker")
         several_motors = len({whisker.column.name for whisker in whiskers}) > 1
@@ -116,8 +118,8 @@ def profile_csv(rod: Rod) -> str:
     return "\n".join(["arc_mm,diameter_mm", *rows, ""])
 
 
-def trial_toml(recording: Recording) -> str:
-    """Return trial.toml of a recording."""
+def trial_toml(recording: Recording, *, by_stage: bool = False) -> str:
+    """Return trial.toml of a recording. by_stage: distance and slope are stated with their sigmas."""
     run = recording.run
     table = run.table
     trial = {
@@ -127,6 +129,9 @@ def trial_toml(recording: Recording) -> str:
         "d_x_mm": float(run.d_x_mm),
         "purpose": table.purpose,
     }
+    if by_stage:
+        trial["d_x_sigma_mm"] = table.d_x_scatter_mm
+        trial["beta_sigma_deg"] = table.beta_scatter_deg
     if table.rotations:
         trial["contact"] = run.contact
         trial["plane_turn_deg"] = round(run.plane_turn_deg, 6)

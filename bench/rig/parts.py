@@ -130,7 +130,7 @@ def _write_trial(job, number, folder):
     recording = Recording.make(job.protocol, run, job.stream(_TRIAL, number))
     clock_offset_s = job.protocol.pictures.clock_offset_s
     texts = {
-        "trial.toml": papers.trial_toml(recording),
+        "trial.toml": papers.trial_toml(recording, by_stage=bool(job.protocol.stage)),
         "signals.csv": papers.signals_csv(recording),
         "frames.csv": papers.frames_csv(recording.frames.time_s, clock_offset_s),
         "truth.csv": truth_files.truth_csv(recording),

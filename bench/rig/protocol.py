@@ -48,6 +48,8 @@ class Protocol(ProtocolTable, kw_only=True):
     friction: FrictionTable = FrictionTable()
     gauges: GaugesTable = GaugesTable()
     load_cell: LoadCellTable | msgspec.UnsetType = msgspec.UNSET
+    # The session's truth is a stage's: it states distance and slope as wanted, their scatter as sigma
+    stage: bool | msgspec.UnsetType = msgspec.UNSET
     columns: list[ColumnTable] | msgspec.UnsetType = msgspec.UNSET
     trials: Annotated[list[TrialTable], msgspec.Meta(min_length=1)]
 

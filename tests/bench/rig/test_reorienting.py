@@ -9,6 +9,7 @@ from bench.base.errors import BadInput
 from bench.rig.protocol import load
 from bench.rig.reorienting import turned_plane
 from bench.rig.simulation import simulate
+from bench.session.session import load_session
 
 ALPHA_DEG = 10.0
 PROTOCOL = """
@@ -67,3 +68,15 @@ def test_rotations_that_would_meet_another_contact_are_refused(protocol, change,
     protocol.write_text(PROTOCOL.replace(*change))
     with pytest.raises(BadInput, match=message):
         load(protocol)
+
+
+def test_a_protocol_whose_truth_is_a_stage_states_distance_and_slope(tmp_path):
+    path = tmp_path / "turning.toml"
+    path.write_text("stage = true\n" + PROTOCOL)
+    session = simulate(tmp_path / "session", protocol=path)
+    assert load_session(session).truth.source == "stage"
+    for trial in load_session(session).trials:
+        recorded = tomllib.loads((trial.folder / "truth.toml").read_text())
+        assert trial.d_x_mm == pytest.approx(recorded["d_x_mm"], abs=1e-6)
+        assert trial.beta_deg == pytest.approx(recorded["beta_deg"], abs=1e-3)
+        assert trial.d_x_sigma_mm == trial.beta_sigma_deg == 0.0
