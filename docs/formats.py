@@ -24,7 +24,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from bench.base.tables import SPEED, SURFACE, TRIAL, WHISK, Column, Table, sigma_name
+from bench.base.tables import SPEED, SURFACE, TRIAL, TRUTH_SOURCE, WHISK, Column, Table, sigma_name
 from bench.report.whisk_tables import WHISKS
 from bench.session.givens import GivenKeys, assumptions, unit_of
 from bench.session.strict_toml import Keys, key_names
@@ -98,16 +98,16 @@ def _part(match: re.Match) -> str:
 def _section(declared: Table | type[Keys]) -> str:
     """Return the text on a table, or on the keys of a table of a TOML file."""
     if not isinstance(declared, Table):
-        return "\n".join(_as_markdown("key", explained_keys(declared)))
+        return "\n".join(_as_markdown(explained_keys(declared)))
     rows = ((column.name, _meaning(declared, column)) for column in declared.columns)
     lines = [f"### `{declared.file}`", "", *textwrap.wrap(declared.rows, 120), ""]
-    return "\n".join([*lines, *_as_markdown("column", rows)])
+    return "\n".join([*lines, *_as_markdown(rows)])
 
 
 def _meaning(table: Table, column: Column) -> str:
-    """Return what a column means; of those of most tables, where that stands."""
-    is_elsewhere = column in WHISKS.columns and column in (TRIAL, WHISK, SURFACE, SPEED)
-    return f"as in {WHISKS.file}" if is_elsewhere and table is not WHISKS else column.meaning
+    """Return what a column means; nothing of those of most tables, which whisks.csv explains."""
+    is_elsewhere = column in (TRIAL, WHISK, SURFACE, SPEED, TRUTH_SOURCE)
+    return "" if is_elsewhere and table is not WHISKS else column.meaning
 
 
 def _declared(name: str) -> list[Table | type[Keys]]:
@@ -122,12 +122,13 @@ def _declared(name: str) -> list[Table | type[Keys]]:
     return [declared]
 
 
-def _as_markdown(head: str, explained: Iterable[tuple[str, str]]) -> list[str]:
-    """Return the lines of a table: a row for each run of names that one meaning explains."""
-    lines = [f"| {head} | what |", "|---|---|"]
+def _as_markdown(explained: Iterable[tuple[str, str]]) -> list[str]:
+    """Return the items of a list: one for each run of names that one meaning explains."""
+    items = []
     for meaning, run in groupby(explained, key=lambda pair: pair[1]):
-        lines.append(f"| {with_sigmas([name for name, _ in run])} | {meaning} |")
-    return lines
+        names = with_sigmas([name for name, _ in run])
+        items.append(f"- {names}: {meaning}" if meaning else f"- {names}")
+    return items
 
 
 def with_sigmas(names: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "formats.md").read_te
 
 @cache
 def documented(heading: str) -> list[str]:
-    """Return the names in backticks in the first column of the table below a heading.
+    """Return the names in backticks that the items of the list below a heading begin with.
 
     '.b' after 'a.c' is 'a.b'; ± after a name stands for the name of its sigma.
     """
@@ -19,8 +19,8 @@ def documented(heading: str) -> list[str]:
         rf"^### {re.escape(heading)}\n(.*?)(?=^#|\Z)", DOCUMENT, flags=re.DOTALL | re.MULTILINE
     )
     names = []
-    for row in re.findall(r"^\| (`.*?) \|", section, flags=re.MULTILINE):
-        for name, has_sigma in re.findall(r"`([^`]+)`(±?)", row):
+    for item in re.findall(r"^- (`.*?)(?:: |$)", section, flags=re.MULTILINE):
+        for name, has_sigma in re.findall(r"`([^`]+)`(±?)", item):
             names.append(names[-1].rpartition(".")[0] + name if name.startswith(".") else name)
             if has_sigma:
                 names.append(sigma_name(names[-1]))
