@@ -33,9 +33,7 @@ def _load_columns() -> Iterator[Column]:
     """Yield the columns of the loads, each with its sigma's two parts."""
     for name, meaning in _LOADS.items():
         yield from with_sigma(name, meaning)
-        yield Column(
-            shared_name(name), "the part of its sigma that the stated stiffness has in all"
-        )
+        yield Column(shared_name(name), "of that sigma, the stated stiffness' part")
 
 
 BASE_MOMENTS = Table(

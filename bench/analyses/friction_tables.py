@@ -93,10 +93,7 @@ SURFACES = Table(
             "by smoothness, section VII: consistency over several distances",
         ),
         Column("error_rms_percent", "of (10) with α_est as given, all whisks alike"),
-        Column(
-            "error_rms_weighted_percent",
-            "of (10) with α_est as given, whisks weighted by confidence",
-        ),
+        Column("error_rms_weighted_percent", "of (10), whisks weighted by confidence"),
         Column(
             "notes",
             "why a way of section VII has no result, or what is doubtful of it",

@@ -61,7 +61,7 @@ CHANGES = Table(
         WHISK,
         Column("kind", "move, lens, views, board, third or light", Kind.TEXT),
         Column("change", "the change in words", Kind.TEXT),
-        *alike(SIGMAS, f"{_EXPECTED}, with that change"),
+        *alike(SIGMAS, "standard deviations expected, with that change"),
     ),
 )
 

@@ -58,7 +58,7 @@ WHISKS = Table(
         *with_sigma("phi_felt_deg", "direction of the deflection as felt, atan2(m_y, m_z)"),
         *alike(
             map(shared_name, WITH_SHARED_SIGMA),
-            "the part of a sigma (of touch, d_x, …) which all whisks of the session have in common",
+            "the part of a sigma that all whisks of the session share",
         ),
         *with_sigma("x_mm", _AT_FIRST_TOUCH),
         *with_sigma("y_mm", _AT_FIRST_TOUCH),

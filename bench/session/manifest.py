@@ -80,10 +80,10 @@ class WhiskerKeys(GivenKeys):
     # diameter at the base
     diameter_mm: Thickness
     diameter_sigma_mm: DiameterSigma = 0.0
-    # diameter at `length_mm`; of "tapered", and of no other shape
+    # of "tapered": diameter at `length_mm`
     tip_diameter_mm: Thickness | None = None
-    # diameters from base to tip as a table beside session.toml, such as "profile.csv"; they replace
-    # shape, and decide where diameter_mm or tip_diameter_mm differ by less than 5 % or 3 sigma
+    # diameters from base to tip as a table, such as "profile.csv"; they replace shape, and decide
+    # where diameter_mm or tip_diameter_mm differ by less than 5 % or 3 sigma
     profile: str | None = None
     # Young's modulus; this, or the rigidity
     youngs_modulus_GPa: Modulus | None = None
@@ -169,7 +169,7 @@ class CameraKeys(Keys):
     crop: Annotated[list[int], _FOUR] | None = None
     # true: seen in a mirror
     mirrored: bool = False
-    # exposure, for the record: checked, and otherwise not used
+    # for the record: checked, not used otherwise
     exposure_s: Exposure | None = None
     exposure_sigma_s: float = 0.0
     # fx/fy where pixels are not square: 0.75 of a camera that squashes 16:9 to 4:3. What is seen
@@ -241,8 +241,8 @@ class ObjectKeys(GivenKeys):
     axis: Annotated[list[float], _THREE] | None = None
     # diameter of the circle that the ring's axis is
     ring_diameter_mm: RingDiameter | None = None
-    # angle of the cone between its axis and its surface. `bar_diameter_mm` then is twice its radius
-    # along its normal where it is touched
+    # angle of the cone between its axis and its surface; with it `bar_diameter_mm` is twice the radius
+    # along the normal at the contact
     half_angle_deg: HalfAngle | None = None
 
     @property
