@@ -24,6 +24,7 @@ from bench.session.text_files import check_size, read_text
 _MOST_BYTES = 1 << 31
 # [1] A joint of DeepLabCut that is less likely counts as not seen: its own default (pcutoff).
 _LEAST_LIKELIHOOD = 0.6
+_DEEPLABCUT_AXES = ("x", "y", "likelihood")  # names of a joint's columns
 # [points] Along a curve of WhiskerMan, given by three or four control points. Stated.
 _CURVE_POINTS = 60
 # [px] SLEAP before format 1.1 counts from the corner of the first pixel. Stated by SLEAP.
@@ -82,29 +83,26 @@ def _own_or_deeplabcut(path: Path, label: str) -> DrawnLines:
         raise BadInput(found, file=label, row=1)
     unknown = np.full(len(table), np.nan)
     sigma_px = table.columns.get("sigma_px", unknown)
-    if np.any(sigma_px <= 0.0):
-        bad = int(np.argmax(sigma_px <= 0.0))
-        found = f"{sigma_px[bad]:g} is no standard deviation; leave the column out if unknown"
-        raise BadInput(found, file=label, row=int(table.row[bad]), column="sigma_px")
+    _check_sigmas(sigma_px, table.row, label)
     line = table.columns.get("line", np.zeros(len(table)))
     px = np.stack([table["u_px"], table["v_px"]], axis=1)
     return DrawnLines(table["frame"], px, line.astype(int), sigma_px)
 
 
+def _check_sigmas(sigma_px: np.ndarray, row: np.ndarray, label: str) -> None:
+    """Raise BadInput for the first standard deviation (n,) that is not positive, naming its row."""
+    bad = np.flatnonzero(sigma_px <= 0.0)
+    if len(bad):
+        found = f"{sigma_px[bad[0]]:g} is no standard deviation; leave the column out if unknown"
+        raise BadInput(found, file=label, row=int(row[bad[0]]), column="sigma_px")
+
+
 def _deeplabcut_text(path: Path, label: str) -> DrawnLines:
     """Read DeepLabCut's CSV: rows of names above each column, then a row a frame."""
     rows = list(csv.reader(io.StringIO(read_text(path, "export it as CSV, UTF-8", label))))
-    heads: dict[str, list[str]] = {}
-    while rows and rows[0] and rows[0][0] in ("scorer", "individuals", "bodyparts", "coords"):
-        head = rows.pop(0)
-        heads[head[0]] = head
-    if "bodyparts" not in heads or "coords" not in heads:
-        raise BadInput("has no rows bodyparts and coords, as DeepLabCut writes them", file=label)
+    heads = _pop_heads(rows, label)
     first = next((k for k, name in enumerate(heads["coords"]) if name in ("x", "y")), 1)
-    names = []
-    for k in range(first, len(heads["coords"])):
-        individual = heads["individuals"][k] if "individuals" in heads else ""
-        names.append((individual, heads["bodyparts"][k], heads["coords"][k]))
+    names = _deeplabcut_names(heads, first)
     frames = []
     values = []
     for row, cells in enumerate(rows, start=len(heads) + 1):
@@ -116,6 +114,26 @@ def _deeplabcut_text(path: Path, label: str) -> DrawnLines:
         except ValueError:
             raise BadInput("names no frame", file=label, row=row) from None
     return _joints_by_name(np.array(frames), np.array(values), names, label)
+
+
+def _pop_heads(rows: list[list[str]], label: str) -> dict[str, list[str]]:
+    """Take the rows of names off the table; return them by their first cell. Raises BadInput where they lack."""
+    heads: dict[str, list[str]] = {}
+    while rows and rows[0] and rows[0][0] in ("scorer", "individuals", "bodyparts", "coords"):
+        head = rows.pop(0)
+        heads[head[0]] = head
+    if "bodyparts" not in heads or "coords" not in heads:
+        raise BadInput("has no rows bodyparts and coords, as DeepLabCut writes them", file=label)
+    return heads
+
+
+def _deeplabcut_names(heads: Mapping[str, Sequence[str]], first: int) -> list[tuple[str, str, str]]:
+    """Return individual, joint and coordinate of each column from `first` on."""
+    names = []
+    for k in range(first, len(heads["coords"])):
+        individual = heads["individuals"][k] if "individuals" in heads else ""
+        names.append((individual, heads["bodyparts"][k], heads["coords"][k]))
+    return names
 
 
 def numbers_with_gaps(cells: Sequence[str], count: int, row: int, label: str) -> list[float]:
@@ -158,12 +176,12 @@ def _joints_by_name(
     px = np.full((len(frame), len(lines), len(joints), 2), np.nan)
     for i, line in enumerate(lines):
         for j, joint in enumerate(joints):
-            at = [column.get((line, joint, coordinate)) for coordinate in ("x", "y", "likelihood")]
-            if at[0] is None or at[1] is None:
+            x, y, likelihood = (column.get((line, joint, axis)) for axis in _DEEPLABCUT_AXES)
+            if x is None or y is None:
                 continue
-            px[:, i, j] = values[:, at[:2]]
-            if at[2] is not None:
-                px[values[:, at[2]] < _LEAST_LIKELIHOOD, i, j] = np.nan
+            px[:, i, j] = values[:, [x, y]]
+            if likelihood is not None:
+                px[values[:, likelihood] < _LEAST_LIKELIHOOD, i, j] = np.nan
     if not np.any(np.isfinite(px)):
         raise BadInput(f"holds no joint with a likelihood of {_LEAST_LIKELIHOOD:g}", file=label)
     return DrawnLines.of_joints(frame, px)
@@ -203,14 +221,18 @@ def _sleap_labels(file: Mapping) -> DrawnLines:
     line = []
     px = []
     for instance in file["instances"][()]:
-        own = points[int(instance["instance_type"])]
-        own = own[int(instance["point_id_start"]) : int(instance["point_id_end"])]
-        own = own[own["visible"] & np.isfinite(own["x"])]
+        own = _visible_points(points[int(instance["instance_type"])], instance)
         frame += [number_of[int(instance["frame_id"])]] * len(own)
         line += [int(instance["track"])] * len(own)
         px += list(zip(own["x"] - corner_px, own["y"] - corner_px))
     unknown = np.full(len(frame), np.nan)
     return DrawnLines(np.array(frame), np.array(px), np.array(line), unknown)
+
+
+def _visible_points(points: np.ndarray, instance: np.void) -> np.ndarray:
+    """Return the rows of SLEAP's table of points that an instance has and that are in the picture."""
+    own = points[int(instance["point_id_start"]) : int(instance["point_id_end"])]
+    return own[own["visible"] & np.isfinite(own["x"])]
 
 
 class _NamesAlone(pickle.Unpickler):
@@ -288,6 +310,13 @@ def _whisk_identities(path: Path, label: str) -> dict[tuple[int, int], int] | No
     """
     if not path.is_file():
         return None
+    found = _read_measurements(path, label)
+    is_classified = any(identity >= 0 for identity in found.values())
+    return found if is_classified and len(set(found.values())) > 1 else None
+
+
+def _read_measurements(path: Path, label: str) -> dict[tuple[int, int], int]:
+    """Read the identity of each segment by frame and number from Whisk's measurements."""
     content = path.read_bytes()
     row_bytes = {b"measv3\0\0": 41, b"measV1\0\0": 40}.get(content[:8])
     if row_bytes is None:
@@ -301,8 +330,7 @@ def _whisk_identities(path: Path, label: str) -> dict[tuple[int, int], int] | No
         start = 16 + row * stride
         _, frame, number, identity = np.frombuffer(content[start : start + 16], "<i4").tolist()
         found[frame, number] = identity
-    is_classified = any(identity >= 0 for identity in found.values())
-    return found if is_classified and len(set(found.values())) > 1 else None
+    return found
 
 
 def _whiskerman(path: Path, label: str) -> DrawnLines:
