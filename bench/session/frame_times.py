@@ -178,17 +178,29 @@ def merge_times(
     within a frame, s.
     """
     every = np.sort(np.concatenate(list(times_s.values())))
-    usual_steps = [np.median(np.diff(times)) for times in times_s.values() if len(times) > 1]
-    gaps = np.diff(every) > min(usual_steps, default=np.inf) / 2
+    gaps = np.diff(every) > _shortest_step_s(times_s) / 2
     firsts = np.append(0, np.flatnonzero(gaps) + 1)  # of each frame, in `every`
     lasts = np.append(firsts[1:], len(every)) - 1
-    picture = {}
-    for name, times in times_s.items():
-        frame = np.searchsorted(every[firsts], times, side="right") - 1
-        picture[name] = np.full(len(firsts), -1)
-        picture[name][frame] = np.arange(len(times))
+    picture = {name: _picture_numbers(times, every[firsts]) for name, times in times_s.items()}
     mean_s = np.add.reduceat(every, firsts) / (lasts - firsts + 1)
     return mean_s, picture, float(np.max(every[lasts] - every[firsts]))
+
+
+def _picture_numbers(times_s: np.ndarray, begins_s: np.ndarray) -> np.ndarray:
+    """Return the number (frames,) of a camera's picture in each frame, −1 where it has none.
+
+    times_s (n,): of its pictures. begins_s (frames,): when each frame begins.
+    """
+    frame = np.searchsorted(begins_s, times_s, side="right") - 1
+    picture = np.full(len(begins_s), -1)
+    picture[frame] = np.arange(len(times_s))
+    return picture
+
+
+def _shortest_step_s(times_s: Mapping[str, np.ndarray]) -> float:
+    """Return the least of the cameras' median steps; infinite where none has two pictures."""
+    steps_s = [np.median(np.diff(times)) for times in times_s.values() if len(times) > 1]
+    return min(steps_s, default=np.inf)
 
 
 def _by_edges(trial: Trial, daq: DaqFile) -> FrameTimes:
