@@ -93,6 +93,11 @@ def _check_places(table: NumberTable, name: str, length_mm: float) -> None:
         before, after = arc_mm[back[0] : back[0] + 2]
         found = f"goes from {before:g} to {after:g}; places go from the base on, rising"
         raise BadInput(found, file=name, row=int(table.row[back[0] + 1]), column="arc_mm")
+    _check_ends(arc_mm, name, length_mm)
+
+
+def _check_ends(arc_mm: np.ndarray, name: str, length_mm: float) -> None:
+    """Raise BadInput where places (n,) lack one near the base or the tip, or have one beyond the tip."""
     first, last = arc_mm[[0, -1]] / length_mm
     if not (0.0 <= first <= _SHORT and 1.0 - _SHORT <= last <= 1.0 + _LONG):
         found = f"goes from {arc_mm[0]:g} to {arc_mm[-1]:g} mm, length_mm is {length_mm:g}"
