@@ -84,6 +84,16 @@ def _check_points(table: NumberTable, name: str, length_mm: float) -> None:
     """Raise BadInput for too few points, points far beyond the tip, or not from the base on along x."""
     if len(table) < _LEAST_ROWS:
         raise BadInput(f"has {len(table)} points; {_LEAST_ROWS} or more are needed", file=name)
+    _check_lengths(table, name, length_mm)
+    back = np.flatnonzero(np.diff(table["x_mm"]) <= 0)
+    if len(back):
+        before, after = table["x_mm"][back[0] : back[0] + 2]
+        found = f"goes from {before:g} to {after:g}; points go from the base on, x rising"
+        raise BadInput(found, file=name, row=int(table.row[back[0] + 1]), column="x_mm")
+
+
+def _check_lengths(table: NumberTable, name: str, length_mm: float) -> None:
+    """Raise BadInput for points far beyond the tip, or a first point that is not at the base."""
     for column in _COLUMNS:
         beyond = np.flatnonzero(np.abs(table[column]) > _FARTHEST * length_mm)
         if len(beyond):
@@ -95,11 +105,6 @@ def _check_points(table: NumberTable, name: str, length_mm: float) -> None:
         found = f"the first point is {first_mm:.3g} mm from the base, which is [0, 0, 0]"
         allowed = f"{_MISPLACED * length_mm:.2g} mm is allowed"
         raise BadInput(f"{found}; {allowed}", file=name, row=int(table.row[0]))
-    back = np.flatnonzero(np.diff(table["x_mm"]) <= 0)
-    if len(back):
-        before, after = table["x_mm"][back[0] : back[0] + 2]
-        found = f"goes from {before:g} to {after:g}; points go from the base on, x rising"
-        raise BadInput(found, file=name, row=int(table.row[back[0] + 1]), column="x_mm")
 
 
 def _fit(table: NumberTable, name: str, length_mm: float) -> tuple[RestShape, float]:
