@@ -169,17 +169,7 @@ def session_of(
     keys = stated.keys
     whisker, board, T_rig_board = _stated_bench(path, keys, problems)
     bar_mm, bar_sigma_mm = _bar_diameter(keys.bar)
-    board_sources = camera_sources(path / "boards", "boards")
-    board_sources.pop("rig", None)
-    rig_pictures = single_pictures(path / "boards" / "rig", "boards/rig")
-    found = _ordered_trials(path, stated, problems, trials)
-    crops: dict[str, Crop] = {}
-    with problems.guard():
-        crops = stated_crops(keys.cameras, _one_source_each(board_sources, found))
-    board_sources = in_parts(board_sources, crops)
-    found = tuple(
-        replace(trial, camera_sources=in_parts(trial.camera_sources, crops)) for trial in found
-    )
+    recorded = _find_recorded(path, stated, problems, trials)
     session = Session(
         path=path,
         name=keys.name or path.resolve().name,
@@ -191,14 +181,14 @@ def session_of(
         T_rig_board_sigma_mm=keys.rig.T_rig_board_sigma_mm,
         T_rig_board_sigma_rad=float(np.radians(keys.rig.T_rig_board_sigma_deg)),
         gauges=given_gauges(keys.gauges),
-        camera_names=_camera_names(board_sources, found),
-        board_sources=board_sources,
-        rig_pictures=in_parts(rig_pictures, crops),
-        trials=found,
+        camera_names=_camera_names(recorded.board_sources, recorded.trials),
+        board_sources=recorded.board_sources,
+        rig_pictures=recorded.rig_pictures,
+        trials=recorded.trials,
         cameras_toml=_existing(path / "cameras.toml"),
         gauges_toml=_existing(path / "gauges.toml"),
         givens=stated.givens_of(),
-        crops=crops,
+        crops=recorded.crops,
         truth=keys.truth,
         pixel_aspects={c.name: c.pixel_aspect for c in keys.cameras if c.pixel_aspect},
     )
@@ -207,6 +197,39 @@ def session_of(
     _warn_of_unused_cameras(session, keys.cameras, problems)
     _check_cameras(session, problems, lenses_known)
     return session
+
+
+@dataclass(frozen=True)
+class _Recorded:
+    """Pictures of the board and trials of a session's folder, by camera as crops divide the files.
+
+    Of cameras: board_sources, rig_pictures (the board on the rig), crops.
+    """
+
+    board_sources: dict[str, Path | PicturePart]
+    rig_pictures: dict[str, Path | PicturePart]
+    trials: tuple[Trial, ...]
+    crops: dict[str, Crop]
+
+
+def _find_recorded(
+    path: Path,
+    stated: StatedSession,
+    problems: InputProblems,
+    trials: Collection[str] | None,
+) -> _Recorded:
+    """Find pictures of the board and trials in the session's folder. Raises BadInput."""
+    board_sources = camera_sources(path / "boards", "boards")
+    board_sources.pop("rig", None)
+    rig_pictures = single_pictures(path / "boards" / "rig", "boards/rig")
+    found = _ordered_trials(path, stated, problems, trials)
+    crops: dict[str, Crop] = {}
+    with problems.guard():
+        crops = stated_crops(stated.keys.cameras, _one_source_each(board_sources, found))
+    in_crops = tuple(
+        replace(trial, camera_sources=in_parts(trial.camera_sources, crops)) for trial in found
+    )
+    return _Recorded(in_parts(board_sources, crops), in_parts(rig_pictures, crops), in_crops, crops)
 
 
 def _with_measured_rig(session: Session) -> Session:
@@ -263,7 +286,11 @@ def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> St
         found = f"there is no {MANIFEST} in this folder, so it is not a session"
         raise BadInput(found, file=str(path))
     check_inside(path, problems, follow_links)
-    tables = read_toml(path / MANIFEST, MANIFEST)
+    return _stated_session(path, read_toml(path / MANIFEST, MANIFEST), problems)
+
+
+def _stated_session(path: Path, tables: dict, problems: InputProblems) -> StatedSession:
+    """Return what session.toml states in its tables. Raises BadInput where that is no session."""
     if tables.get("format", FORMAT) != FORMAT:
         found = f"format is {tables['format']!r}; this version reads format {FORMAT}"
         raise BadInput(found, file=MANIFEST)
