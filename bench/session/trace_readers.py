@@ -176,15 +176,20 @@ def _joints_by_name(
     px = np.full((len(frame), len(lines), len(joints), 2), np.nan)
     for i, line in enumerate(lines):
         for j, joint in enumerate(joints):
-            x, y, likelihood = (column.get((line, joint, axis)) for axis in _DEEPLABCUT_AXES)
-            if x is None or y is None:
-                continue
-            px[:, i, j] = values[:, [x, y]]
-            if likelihood is not None:
-                px[values[:, likelihood] < _LEAST_LIKELIHOOD, i, j] = np.nan
+            of_joint = [column.get((line, joint, axis)) for axis in _DEEPLABCUT_AXES]
+            if None not in of_joint[:2]:
+                px[:, i, j] = _probable_px(values, *of_joint)
     if not np.any(np.isfinite(px)):
         raise BadInput(f"holds no joint with a likelihood of {_LEAST_LIKELIHOOD:g}", file=label)
     return DrawnLines.of_joints(frame, px)
+
+
+def _probable_px(values: np.ndarray, u: int, v: int, likelihood: int | None) -> np.ndarray:
+    """Return a joint's points (frames, 2), px, by the numbers of its columns; NaN where it is unlikely."""
+    px = values[:, [u, v]]
+    if likelihood is not None:
+        px[values[:, likelihood] < _LEAST_LIKELIHOOD] = np.nan
+    return px
 
 
 def _hdf5(path: Path, label: str) -> DrawnLines:
@@ -212,9 +217,7 @@ def _sleap_analysis(file: Mapping) -> DrawnLines:
 
 def _sleap_labels(file: Mapping) -> DrawnLines:
     """Read SLEAP's project file: of each instance its frame, track and points."""
-    corner_px = 0.0
-    if float(file["metadata"].attrs.get("format_id", 1.0)) < _SLEAP_CENTRED:
-        corner_px = _SLEAP_CORNER_PX
+    corner_px = _sleap_corner_px(file)
     number_of = {int(row["frame_id"]): int(row["frame_idx"]) for row in file["frames"][()]}
     points = {0: file["points"][()], 1: file["pred_points"][()]}  # by hand, predicted
     frame = []
@@ -225,8 +228,13 @@ def _sleap_labels(file: Mapping) -> DrawnLines:
         frame += [number_of[int(instance["frame_id"])]] * len(own)
         line += [int(instance["track"])] * len(own)
         px += list(zip(own["x"] - corner_px, own["y"] - corner_px))
-    unknown = np.full(len(frame), np.nan)
-    return DrawnLines(np.array(frame), np.array(px), np.array(line), unknown)
+    return DrawnLines(np.array(frame), np.array(px), np.array(line), np.full(len(frame), np.nan))
+
+
+def _sleap_corner_px(file: Mapping) -> float:
+    """Return how far the centre of the first pixel is from where SLEAP's file counts from."""
+    version = float(file["metadata"].attrs.get("format_id", 1.0))
+    return _SLEAP_CORNER_PX if version < _SLEAP_CENTRED else 0.0
 
 
 def _visible_points(points: np.ndarray, instance: np.void) -> np.ndarray:
