@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -47,19 +47,31 @@ def _joints(path: Path, label: str) -> tuple[np.ndarray, np.ndarray]:
     if not joints or not set(wanted) <= set(names):
         found = "has no columns <joint>_x,<joint>_y,<joint>_z, as Anipose writes them"
         raise BadInput(found, file=label, row=1)
+    columns = _numbers_by_name(names, rows, label)
+    count = len(columns[wanted[0]])
+    points = np.stack([columns[name] for name in wanted], axis=1).reshape(count, -1, 3)
+    return columns.get("fnum", np.arange(float(count))), _in_cameras_frame(points, columns)
+
+
+def _numbers_by_name(
+    names: Sequence[str], rows: Sequence[Sequence[str]], label: str
+) -> dict[str, np.ndarray]:
+    """Return the table's columns (n,) by name. Raises BadInput where there is no row or no number."""
     values = []
     for row, cells in enumerate(rows, start=2):
         values.append(numbers_with_gaps(cells, len(names), row, label))
     if not values:
         raise BadInput("has a header and no rows", file=label)
-    columns = dict(zip(names, np.array(values).T))
-    points = np.stack([columns[name] for name in wanted], axis=1).reshape(len(values), -1, 3)
-    frame = columns.get("fnum", np.arange(float(len(values))))
+    return dict(zip(names, np.array(values).T))
+
+
+def _in_cameras_frame(points: np.ndarray, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return points (n, joints, 3) in the cameras' frame, by Anipose's columns M and center where it has them."""
     if "M_00" not in columns:
-        return frame, points
+        return points
     turn = np.array([[columns[f"M_{i}{j}"][0] for j in range(3)] for i in range(3)])
     centre = np.array([columns[f"center_{i}"][0] for i in range(3)])
-    return frame, (points + centre) @ np.linalg.inv(turn.T)
+    return (points + centre) @ np.linalg.inv(turn.T)
 
 
 def _as_seen(camera: Camera, frame: np.ndarray, points: np.ndarray) -> DrawnLines:
