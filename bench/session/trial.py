@@ -93,10 +93,7 @@ def load_trial(
     table, givens = with_sigmas(table, manifest.TrialKeys, "[trial]", exact=session.keys.exact)
     keys = convert(table, manifest.TrialKeys)
     _check_keys(keys, label)
-    signals_path = folder / (daq.file if daq else SIGNALS)
-    if not signals_path.is_file():
-        found = "is not there; a trial needs its signals"
-        raise BadInput(found, file=f"{place}/{signals_path.name}")
+    signals_path = _signals_path(folder, daq, place)
     settings = values(keys) | _bar_diameter(keys, session.keys.bar)
     if keys.object is not None:
         _check_object(keys.object, settings["bar_diameter_mm"], label)
@@ -113,7 +110,20 @@ def load_trial(
     if session.keys.truth is None:
         _warn_of_unread_stage(trial, problems)
         return trial
-    trial = replace(trial, stage=read_stage(folder, folder.parents[1], place))
+    return _with_stage(trial, table, place)
+
+
+def _signals_path(folder: Path, daq: DaqFile | None, place: str) -> Path:
+    """Return the path of the trial's signals. Raises BadInput where there is no such file."""
+    path = folder / (daq.file if daq else SIGNALS)
+    if not path.is_file():
+        raise BadInput("is not there; a trial needs its signals", file=f"{place}/{path.name}")
+    return path
+
+
+def _with_stage(trial: Trial, table: dict, place: str) -> Trial:
+    """Return the trial with the log of its stage, of a session whose truth is stated. Raises BadInput."""
+    trial = replace(trial, stage=read_stage(trial.folder, trial.folder.parents[1], place))
     _check_stated_truth(trial, table)
     return trial
 
