@@ -129,10 +129,7 @@ def _alphas(
     trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, whisker: Tapering
 ) -> WhiskAlphas:
     """Return the friction angles of one whisk at a pushing angle."""
-    nominal = not np.isfinite(seen.beta_rad.value)
-    beta = seen.beta_rad
-    if nominal:
-        beta = Value(float(np.radians(trial.beta_nominal_deg)), BETA_BY_HAND_RAD)
+    beta, beta_from = _slope(trial, seen)
     phases = NO_PHASES
     alpha_rad, sigma_rad = seen_friction(seen, whisker)
     by_theory_rad = _left_of_bend(seen, alpha_rad)
@@ -151,10 +148,18 @@ def _alphas(
         phases_felt=felt.phases,
         shared_seen_rad=beta.sigma,
         shared_felt_rad=float(np.hypot(beta.sigma, felt.phi_felt_rad.sigma)),
-        beta_from=BY_MANIFEST if nominal else seen.source,
+        beta_from=beta_from,
         common_seen=(beta_common_rad, _common_seen(seen, sigma_rad), by_theory_rad, by_set_rad),
         common_felt=(beta_common_rad, *_common_felt(felt).tolist()),
     )
+
+
+def _slope(trial: TrialFacts, seen: SeenWhisk) -> tuple[Value, str]:
+    """Return the slope β, rad, as seen or else as the manifest states it, and which of both it is."""
+    if np.isfinite(seen.beta_rad.value):
+        return seen.beta_rad, seen.source
+    stated_rad = float(np.radians(trial.beta_nominal_deg))
+    return Value(stated_rad, BETA_BY_HAND_RAD), BY_MANIFEST
 
 
 def _common_slope(seen: SeenWhisk) -> float:
