@@ -14,6 +14,7 @@ from bench.base.tables import TRIAL, WHISK, Column, Kind, Table, shared_name, si
 from bench.gauges.gauge_readings import frames_with_moments, loads_from_pictures
 from bench.records.trial_result import Deflection, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.session.whisker import Whisker
+from vision import Value
 from vision.geometry import counted
 
 # Columns of `WhiskerRod.loads`, with what they mean.
@@ -226,18 +227,24 @@ def felt_beside(one: WhiskLoads) -> dict | None:
     along = moments / size
     stiffness = 0.0 if one.is_by_wire else one.loads.stiffness_share * size
     seen_sigma = float(np.hypot(np.sqrt(along @ covariance @ along), stiffness))
-    felt_size = float(along @ [felt.m_y_Nmm.value, felt.m_z_Nmm.value])
-    felt_sigma = float(np.sqrt(along @ felt.covariance_at @ along))
-    sigma = float(np.hypot(seen_sigma, felt_sigma))
+    beside = _felt_along(felt, along)
+    sigma = float(np.hypot(seen_sigma, beside.sigma))
     return {
         "trial": one.result.trial.name,
         "whisk": one.seen.whisk,
         "theta_deg": one.result.theta_deg,
         "m_seen_Nmm": size,
         "m_seen_sigma_Nmm": seen_sigma,
-        "m_felt_Nmm": felt_size,
-        "m_felt_sigma_Nmm": felt_sigma,
-        "ratio": felt_size / size,
+        "m_felt_Nmm": beside.value,
+        "m_felt_sigma_Nmm": beside.sigma,
+        "ratio": beside.value / size,
         "ratio_sigma": sigma / size,
-        "z": (felt_size - size) / sigma,
+        "z": (beside.value - size) / sigma,
     }
+
+
+def _felt_along(felt: FeltWhisk, direction: np.ndarray) -> Value:
+    """Return the component of the felt moment, N·mm, along a unit vector (2,) of m_y and m_z."""
+    component = direction @ [felt.m_y_Nmm.value, felt.m_z_Nmm.value]
+    sigma = np.sqrt(direction @ felt.covariance_at @ direction)
+    return Value(float(component), float(sigma))
