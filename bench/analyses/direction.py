@@ -15,9 +15,7 @@ def slip_angle(
     across_rad (n,): angle of the force from the bar's normal. Without a push φ is β − across_rad. left: share
     of the base's diameter that the whisker has at the contact, one or (n,).
     """
-    sin = np.sin(theta_rad) * np.sin(beta_rad)
-    cos = np.cos(theta_rad) * np.sin(beta_rad)
-    bar = _vectors(sin, cos, np.cos(beta_rad))  # (n, 3)
+    bar = _bar_directions(theta_rad, beta_rad)
     phi = beta_rad - across_rad
     turn = _tangent_over_chord(left) * theta_rad * np.cos(beta_rad) / np.cos(across_rad)
     tangent = _vectors(np.cos(turn), -np.sin(turn) * np.cos(phi), np.sin(turn) * np.sin(phi))
@@ -25,6 +23,13 @@ def slip_angle(
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     force = -normal - np.tan(across_rad)[..., None] * bar
     return np.arctan2(force[:, 2], -force[:, 1])
+
+
+def _bar_directions(theta_rad: np.ndarray, beta_rad: float) -> np.ndarray:
+    """Return the bar's direction (n, 3) at pushing angles (n,), in the frame that turns with the motor."""
+    sin = np.sin(theta_rad) * np.sin(beta_rad)
+    cos = np.cos(theta_rad) * np.sin(beta_rad)
+    return _vectors(sin, cos, np.cos(beta_rad))
 
 
 def _tangent_over_chord(left: float | np.ndarray) -> float | np.ndarray:
