@@ -119,14 +119,7 @@ class ErrorMap(Analysis):
         mesh = left.pcolormesh(beta_deg, alpha_deg, measured, **colours)
         _write_errors(left, found.cells, most)
         _draw_prediction(right, found, colours)
-        alpha_est_deg = np.degrees(found.alpha_est_rad)
-        for axes, title in ((left, _title(found.cells)), (right, "predicted by (13), (14)")):
-            axes.set(
-                xlabel="slope β  [°]", title=title, xlim=(-2.5, _STEEPEST_DEG), ylim=(0.0, top)
-            )
-            axes.axhline(alpha_est_deg, color="black", lw=0.8, ls=":")
-        left.set_ylabel("friction angle α  [°]")
-        left.text(80.0, alpha_est_deg, "α$_{est}$", va="bottom", ha="right", fontsize=8)
+        _label_axes(left, right, found)
         drawing.colorbar(mesh, ax=[left, right], label="error of d$_x$ by (10)  [%]", extend="both")
         return drawing
 
@@ -199,6 +192,17 @@ def _row(cell: MapCell) -> dict:
         "error_sd_percent": float(cell.errors.std(ddof=1)) if count > 1 else None,
         "predicted_percent": float(cell.predicted.mean()),
     }
+
+
+def _label_axes(left: "Axes", right: "Axes", found: MeasuredMap) -> None:
+    """Label the measured cells and the predicted field, and mark the assumed friction angle."""
+    alpha_est_deg = np.degrees(found.alpha_est_rad)
+    y_limits = (0.0, found.highest_deg)
+    for axes, title in ((left, _title(found.cells)), (right, "predicted by (13), (14)")):
+        axes.set(xlabel="slope β  [°]", title=title, xlim=(-2.5, _STEEPEST_DEG), ylim=y_limits)
+        axes.axhline(alpha_est_deg, color="black", lw=0.8, ls=":")
+    left.set_ylabel("friction angle α  [°]")
+    left.text(80.0, alpha_est_deg, "α$_{est}$", va="bottom", ha="right", fontsize=8)
 
 
 def _title(cells: Sequence[MapCell]) -> str:
