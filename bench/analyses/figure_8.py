@@ -183,10 +183,15 @@ def _draw_panel(top: "Axes", bottom: "Axes", surface: FittedSurface, letter: str
     fitted = ""
     if surface.fit is not None:
         fitted = _draw_fit(top, bottom, surface)
-    spread = 100.0 * float(np.median(m_sd_Nmm / m_Nmm))
-    scaled = f"|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)"
-    top.annotate(fitted + scaled, (0.04, 0.04), **_NOTE)
+    top.annotate(fitted + _scale(surface), (0.04, 0.04), **_NOTE)
     _label_panel(top, bottom, surface, letter)
+
+
+def _scale(surface: FittedSurface) -> str:
+    """Return the note on the distance that |m| is scaled to, and on the spread that this leaves."""
+    points = surface.points()
+    spread = 100.0 * float(np.median(column(points, "m_sd_Nmm") / column(points, "m_Nmm")))
+    return f"|m| at d$_x$ = {surface.common_d_x_mm:.1f} mm, ± {spread:.2g} % (median)"
 
 
 def _label_panel(top: "Axes", bottom: "Axes", surface: FittedSurface, letter: str) -> None:
