@@ -105,6 +105,11 @@ def fit_size(trial: str, contacts: Sequence[ContactPoint], surface: ObjectSurfac
     if freedom < 1:
         sound = counted(distances, "sound distance")
         return replace(unknown, status=reason("contacts_few", distances=sound))
+    return _as_size(unknown, fit, freedom)
+
+
+def _as_size(unknown: FeltSize, fit: "_SizeFit", freedom: int) -> FeltSize:
+    """Return the size with what the fit finds; with a status where the contacts leave it open."""
     change, information, cost = fit.solve()
     if not np.isfinite(information).all() or np.linalg.cond(information) > _MOST_CONDITION:
         return replace(unknown, status=reason("size_open"))
