@@ -47,11 +47,7 @@ def read_board_views(session: Session) -> SessionViews:
 
     Raises BadInput where it is not found, naming the setting that would find it.
     """
-    if session.board is None:
-        found = "[board] is missing: the cameras are calibrated from it"
-        raise BadInput(found, file="session.toml")
-    if not session.board_sources:
-        raise BadInput("there is no folder of pictures nor a video of the board", file="boards")
+    _require_board(session)
     boards = {}
     rig = {}
     trials = {}
@@ -79,6 +75,15 @@ def read_board_views(session: Session) -> SessionViews:
     )
     with refused_as_bad_input("boards"):
         return with_turns_resolved(found, session.board)
+
+
+def _require_board(session: Session) -> None:
+    """Raise BadInput where the session states no board, or has no picture of it."""
+    if session.board is None:
+        found = "[board] is missing: the cameras are calibrated from it"
+        raise BadInput(found, file="session.toml")
+    if not session.board_sources:
+        raise BadInput("there is no folder of pictures nor a video of the board", file="boards")
 
 
 @dataclass
