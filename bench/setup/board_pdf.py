@@ -98,10 +98,7 @@ def toml_block(board: Board) -> list[str]:
 
 def page(board: Board, paper: Paper) -> Figure:
     """Draw the page, in mm from its upper left corner."""
-    figure = Figure(figsize=(paper.width_mm / MM_PER_INCH, paper.height_mm / MM_PER_INCH))
-    axes = figure.add_axes((0, 0, 1, 1))
-    axes.set(xlim=(0, paper.width_mm), ylim=(paper.height_mm, 0))
-    axes.set_axis_off()
+    figure, axes = _blank_page(paper)
     width, height = _size_mm(board)
     left = 0.5 * (paper.width_mm + _LEFT_MM - _RIGHT_MM - width)
     top = 0.5 * (paper.height_mm + _TOP_MM - _BELOW_MM - height)
@@ -113,6 +110,15 @@ def page(board: Board, paper: Paper) -> Figure:
     _ruler(axes, (left - _RULER_MM, top), height, down=True)
     _words(axes, board, left, top + height + _RULER_MM + 11.0)
     return figure
+
+
+def _blank_page(paper: Paper) -> tuple[Figure, Axes]:
+    """Make a page, and axes over all of it that are in mm from its upper left corner."""
+    figure = Figure(figsize=(paper.width_mm / MM_PER_INCH, paper.height_mm / MM_PER_INCH))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(0, paper.width_mm), ylim=(paper.height_mm, 0))
+    axes.set_axis_off()
+    return figure, axes
 
 
 @singledispatch
@@ -161,8 +167,19 @@ def _of_circles(board: CircleGrid) -> Iterator[np.ndarray]:
 @dark_shapes.register
 def _of_april_grid(board: AprilGrid) -> Iterator[np.ndarray]:
     """Yield the tags of an AprilGrid as Kalibr prints them, and the dark squares between them."""
-    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+    yield from _april_tags(board)
     gap_mm = board.square_mm - board.marker_mm
+    columns, rows = board.squares
+    for row in range(rows + 1):
+        for column in range(columns + 1):
+            right_mm = column * board.square_mm
+            bottom_mm = -row * board.square_mm + gap_mm
+            yield _box(right_mm - gap_mm, right_mm, bottom_mm - gap_mm, bottom_mm)
+
+
+def _april_tags(board: AprilGrid) -> Iterator[np.ndarray]:
+    """Yield the dark modules of an AprilGrid's tags."""
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
     columns, rows = board.squares
     for row in range(rows):
         for column in range(columns):
@@ -172,11 +189,6 @@ def _of_april_grid(board: AprilGrid) -> Iterator[np.ndarray]:
             top_mm = -row * board.square_mm - board.marker_mm
             edges = np.linspace(0.0, board.marker_mm, _MODULES + 1)
             yield from _rectangles(tag[::-1, ::-1] == 0, left_mm + edges, top_mm + edges)
-    for row in range(rows + 1):
-        for column in range(columns + 1):
-            right_mm = column * board.square_mm
-            bottom_mm = -row * board.square_mm + gap_mm
-            yield _box(right_mm - gap_mm, right_mm, bottom_mm - gap_mm, bottom_mm)
 
 
 def _rectangles(dark: np.ndarray, x: np.ndarray, y: np.ndarray) -> Iterator[np.ndarray]:
