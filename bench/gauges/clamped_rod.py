@@ -69,6 +69,18 @@ def load_at_clamp(
             "the contact must lie in front of the clamp, less than 0.6 of its distance aside"
         )
     rods = _Rods.at(x, w, rigidity_Nmm2, friction)
+    angle, force = _resolved_equilibrium(rods)
+    direction = _force_direction(angle[:, -1], rods.friction)
+    moment = np.abs(force * _cross(rods.contact, direction))
+    per_chord_N_mm = rods.clamp_rigidity_Nmm2 / rods.chord_mm
+    return moment * per_chord_N_mm, force * direction * per_chord_N_mm / rods.chord_mm
+
+
+def _resolved_equilibrium(rods: "_Rods") -> tuple[np.ndarray, np.ndarray]:
+    """Return angles (n, nodes) and forces (n,) of rods, with as many nodes as their bend needs.
+
+    Raises ArithmeticError where the most nodes do not suffice.
+    """
     for count in _NODES:
         angle, force = rods.equilibrium(_nodes(count))
         end = _series_end(angle)
@@ -78,10 +90,7 @@ def load_at_clamp(
         raise ArithmeticError(
             "no equilibrium found: the contact is too near the end of a rod that ends in a point"
         )
-    direction = _force_direction(angle[:, -1], rods.friction)
-    moment = np.abs(force * _cross(rods.contact, direction))
-    per_chord_N_mm = rods.clamp_rigidity_Nmm2 / rods.chord_mm
-    return moment * per_chord_N_mm, force * direction * per_chord_N_mm / rods.chord_mm
+    return angle, force
 
 
 @dataclass(frozen=True)
