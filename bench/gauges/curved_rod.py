@@ -133,10 +133,7 @@ class CurvedRods:
             if not np.isfinite(step).all():
                 break
             if np.abs(step).max() < _LAST_STEP:
-                moments = -np.cross(points[0], forces[0])
-                per_chord = (self.clamp_rigidity_Nmm2 / chord)[:, None]
-                forces_N = forces[0] * per_chord / chord[:, None]
-                return np.column_stack([moments[:, 1:] * per_chord, forces_N])
+                return self._loads_at_clamp(points[0], forces[0], chord)
             size = np.linalg.norm(missing, axis=1, keepdims=True)
             unknowns = unknowns + step * np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
         raise ArithmeticError("no equilibrium found of a curved rod that is bent so far")
@@ -149,6 +146,18 @@ class CurvedRods:
         deflection = 3.0 * deflection_mm / chord[:, None]
         across = [np.sum(deflection * axis, axis=1) for axis in (first, second)]
         return np.column_stack([*across, arc / chord])
+
+    def _loads_at_clamp(
+        self, points: np.ndarray, forces: np.ndarray, chord: np.ndarray
+    ) -> np.ndarray:
+        """Return m_y and m_z at the clamp, N·mm, and the force on the contact, N: (n, 5).
+
+        points, forces (n, 3): of the contacts, in units of the chord (n,), mm, and of the clamp's EI.
+        """
+        moments = -np.cross(points, forces)
+        per_chord = (self.clamp_rigidity_Nmm2 / chord)[:, None]
+        forces_N = forces * per_chord / chord[:, None]
+        return np.column_stack([moments[:, 1:] * per_chord, forces_N])
 
     def _end_axes(self, arc_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the unloaded tangents (..., 3) at arcs (...), and two directions across each."""
@@ -173,15 +182,35 @@ class CurvedRods:
         unknowns (..., n, 3): two components of the force across the rod's end, and the arc; friction,
         chord (n,). While marching, the axes are those in which the rod's end has not turned.
         """
-        from scipy.integrate import solve_ivp  # it takes longer than reading a session
-
         arc = unknowns[..., 2]
         if np.any(self.width(arc * chord / self.rest.length_mm) < _LEAST_WIDTH):
             raise ArithmeticError("the contact is too near the end of a rod that ends in a point")
-        tangent, first, second = self._end_axes(arc * chord)
+        force = self._force_on_end(unknowns, friction, chord)
+        turn, way = self._turn_and_way(arc, chord, force)
+        to_hub = np.swapaxes(turn, -1, -2)
+        return (
+            np.einsum("...ij,...j->...i", to_hub, way),
+            np.einsum("...ij,...j->...i", to_hub, force),
+        )
+
+    def _force_on_end(
+        self, unknowns: np.ndarray, friction: np.ndarray, chord: np.ndarray
+    ) -> np.ndarray:
+        """Return the forces (..., n, 3) on the rods' ends, in the axes in which these have not turned."""
+        tangent, first, second = self._end_axes(unknowns[..., 2] * chord)
         pull = -friction * np.hypot(unknowns[..., 0], unknowns[..., 1])
         force = pull[..., None] * tangent
-        force = force + unknowns[..., :1] * first + unknowns[..., 1:2] * second
+        return force + unknowns[..., :1] * first + unknowns[..., 1:2] * second
+
+    def _turn_and_way(
+        self, arc: np.ndarray, chord: np.ndarray, force: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Integrate from contact to clamp; return the turn (..., n, 3, 3) and the way (..., n, 3) of each rod.
+
+        arc (..., n): in units of the chord (n,). force (..., n, 3). Raises ArithmeticError.
+        """
+        from scipy.integrate import solve_ivp  # it takes longer than reading a session
+
         lead = arc.shape
 
         def change(left, state):
@@ -203,12 +232,7 @@ class CurvedRods:
         marched = solve_ivp(change, (0.0, 1.0), begin, t_eval=[1.0], **how)
         if not marched.success:
             raise ArithmeticError("no equilibrium found of a curved rod that is bent so far")
-        turn, way = _unpacked(marched.y[:, -1], lead)
-        to_hub = np.swapaxes(turn, -1, -2)
-        return (
-            np.einsum("...ij,...j->...i", to_hub, way),
-            np.einsum("...ij,...j->...i", to_hub, force),
-        )
+        return _unpacked(marched.y[:, -1], lead)
 
 
 def _cross_matrices(vectors: np.ndarray) -> np.ndarray:
