@@ -11,7 +11,7 @@ from bench.base.progress import begin_step, count_parts
 from bench.plan.changes import LIGHT, Change
 from bench.plan.outlook import Outlook, outlook, sigmas
 from bench.plan.painter import Clamp, Painter
-from bench.plan.staged import stage_run
+from bench.plan.staged import StagedWhisk, stage_run
 from bench.rig.protocol import Protocol, ProtocolRun
 from vision import LineNoise, PredictedTruth, predict_truth
 from vision.geometry import Cameras
@@ -156,14 +156,20 @@ def plan_run(task: RigTask) -> Row:
     predicted = predict_truth(staged.known, task.cameras, noise, Clamp.of(staged))
     changes = []
     for change in count_parts(task.changes, f"{task.run.name}, changes", len(task.changes)):
-        if change.light:
-            brighter = painter_of(_with_more_light(protocol))
-            changed = brighter.line_noise(staged, task.cameras)
-        else:
-            changed = change.line_noise(noise, staged.known)
+        changed = _noise_with(change, task, staged, noise)
         after = predict_truth(staged.known, change.cameras, changed, Clamp.of(staged))
         changes.append(changed_sigmas(change, after, task.theta_rad))
     return Row(facts, outlook(predicted, noise, task.theta_rad), tuple(changes), noise)
+
+
+def _noise_with(
+    change: Change, task: RigTask, staged: StagedWhisk, noise: Mapping[str, LineNoise]
+) -> dict[str, LineNoise]:
+    """Return by camera the noise of its lines with a change; noise: on the present bench."""
+    if not change.light:
+        return change.line_noise(noise, staged.known)
+    brighter = painter_of(_with_more_light(task.protocol))
+    return brighter.line_noise(staged, task.cameras)
 
 
 def _facts(run: ProtocolRun) -> Facts:
