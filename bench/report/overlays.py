@@ -59,14 +59,7 @@ def overlay(trial: Trial, whisk: SeenWhisk) -> Image.Image:
     cameras = list(drawings["touch"].cameras)
     frames = {drawing.frame for drawing in drawings.values()}
     pictures = _pictures(trial, cameras, frames)
-    rows = []
-    for camera in cameras:
-        panels = []
-        for drawing in drawings.values():
-            panel = _panel(pictures[camera].get(drawing.frame), drawing.cameras[camera])
-            border = ((_TITLE_PX, _GAP_PX), (0, _GAP_PX), (0, 0))
-            panels.append(np.pad(panel, border, constant_values=255))
-        rows.append(np.hstack(panels))
+    rows = [_row_of_panels(camera, pictures[camera], drawings) for camera in cameras]
     width = rows[0].shape[1]
     below = np.full((_LEGEND_PX, width, 3), 255, np.uint8)
     picture = Image.fromarray(np.vstack([*rows, below]))
@@ -74,6 +67,18 @@ def overlay(trial: Trial, whisk: SeenWhisk) -> Image.Image:
     _write_titles(pen, cameras, drawings, whisk)
     _write_legend(pen, picture.height - _LEGEND_PX)
     return picture
+
+
+def _row_of_panels(
+    camera: str, pictures: Mapping[int, np.ndarray], drawings: Mapping[str, Drawing]
+) -> np.ndarray:
+    """Draw a camera's panels side by side, with room for their titles. pictures: by frame."""
+    border = ((_TITLE_PX, _GAP_PX), (0, _GAP_PX), (0, 0))
+    panels = []
+    for drawing in drawings.values():
+        panel = _panel(pictures.get(drawing.frame), drawing.cameras[camera])
+        panels.append(np.pad(panel, border, constant_values=255))
+    return np.hstack(panels)
 
 
 def _write_legend(pen: ImageDraw.ImageDraw, top: int) -> None:
