@@ -52,9 +52,7 @@ def write_video(
     record = read_record(out)
     result = _result(out, trial)
     path = out / "video" / f"{trial}.webm" if path is None else path
-    code = FOURCC.get(path.suffix.lower())
-    if code is None:
-        raise BadInput(f"must end in {' or '.join(FOURCC)}", file=path)
+    code = _codec(path)
     if not (math.isfinite(rate_Hz) and 0.1 <= rate_Hz <= 240.0):
         raise BadInput(f"--rate-Hz is {rate_Hz:g}; from 0.1 to 240 is allowed")
     source = _session_folder(out) if session is None else session
@@ -67,6 +65,14 @@ def write_video(
     with whole_file(path) as temporary:
         _write(temporary, pictures, code, rate_Hz)
     return path
+
+
+def _codec(path: Path) -> str:
+    """Return the code of the film's codec by its suffix. Raises BadInput for another suffix."""
+    code = FOURCC.get(path.suffix.lower())
+    if code is None:
+        raise BadInput(f"must end in {' or '.join(FOURCC)}", file=path)
+    return code
 
 
 def _result(out: Path, trial: str) -> TrialResult:
