@@ -192,12 +192,7 @@ class KirchhoffRod(BentRod):
         tangents_by_arc (n, 3): of sections that do not turn.
         """
         moment = balance.moment
-        per_newton = arc**2 / self.rod.rigidity_Nmm2
-        moment_by = np.empty((*moment.shape, 4))
-        moment_by[..., :3] = per_newton * _cross_matrices(balance.lever)
-        lever_by_arc = self.nodes.to_load @ tangents_by_arc
-        moment_by[..., 3] = 2 / arc * moment + np.cross(lever_by_arc, load.force)
-        curvature_by = balance.compliance @ moment_by
+        curvature_by = balance.compliance @ self._moment_by(load, balance, tangents_by_arc, arc)
         width = load.softness**-0.25
         thinner_by = self.rod.width_by_arc(self.nodes.at * arc) * self.nodes.at
         softer_by = -4 * thinner_by / width  # (n,) by parts
@@ -207,6 +202,15 @@ class KirchhoffRod(BentRod):
         count = len(moment)
         missing = (self.nodes.from_base @ curvature_by.reshape(count, -1)).reshape(3 * count, 4)
         return linear.solve(balance.jacobian, missing).reshape(count, 3, 4)
+
+    def _moment_by(self, load, balance, tangents_by_arc, arc) -> np.ndarray:
+        """Return the derivatives (n, 3, 4) of the moments by force, N, and arc, mm; sections do not turn."""
+        per_newton = arc**2 / self.rod.rigidity_Nmm2
+        moment_by = np.empty((*balance.moment.shape, 4))
+        moment_by[..., :3] = per_newton * _cross_matrices(balance.lever)
+        lever_by_arc = self.nodes.to_load @ tangents_by_arc
+        moment_by[..., 3] = 2 / arc * balance.moment + np.cross(lever_by_arc, load.force)
+        return moment_by
 
     def _check_resolved(self, balance, arc):
         """Raise ArithmeticError where the nodes do not resolve the curvature."""
