@@ -63,10 +63,8 @@ def mirrored_part(
 
     Raises ValueError where crop [left, top, width, height] is not within the picture.
     """
+    _check_crop(whole, name, crop)
     left, top, width, height = crop
-    columns, rows = whole.size_px
-    if min(left, top) < 0 or left + width > columns or top + height > rows:
-        raise ValueError(f"camera {name}: crop {list(crop)} is not within {columns} x {rows} px")
     unit = np.asarray(normal, float) / np.linalg.norm(normal)
     reflect = np.eye(3) - 2.0 * np.outer(unit, unit)
     shift_mm = 2.0 * (unit @ np.asarray(point_mm, float)) * unit
@@ -83,6 +81,14 @@ def mirrored_part(
         _FLIP @ (whole.rotation @ shift_mm + whole.translation_mm),
     )
     return Part(camera, left, top, True)
+
+
+def _check_crop(whole: PinholeCamera, name: str, crop: Sequence[int]) -> None:
+    """Raise ValueError where crop [left, top, width, height] is not within the camera's picture."""
+    left, top, width, height = crop
+    columns, rows = whole.size_px
+    if min(left, top) < 0 or left + width > columns or top + height > rows:
+        raise ValueError(f"camera {name}: crop {list(crop)} is not within {columns} x {rows} px")
 
 
 class MirrorStudio:
