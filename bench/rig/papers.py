@@ -42,10 +42,7 @@ def session_toml(
         "rig": _rig_keys(protocol, stated_T_rig_board),
     }
     if protocol.cameras:
-        exposure_s = protocol.pictures.exposure_s
-        session["cameras"] = [
-            {"name": camera.name, "exposure_s": exposure_s} for camera in protocol.cameras
-        ] + [_mirror_keys(camera) for camera in protocol.cameras if camera.mirror]
+        session["cameras"] = _camera_keys(protocol)
     session["trial"] = {"gauge_filter_Hz": protocol.gauges.filter_Hz}
     if protocol.stage:
         session["truth"] = {"source": "stage", "origin_sigma_mm": 0.0}
@@ -59,6 +56,13 @@ def session_toml(
     elif protocol.gauges.known:
         session["gauges"] = _fields(protocol.gauges, "offset_V matrix_Nmm_per_V")
     return tomli_w.dumps(session)
+
+
+def _camera_keys(protocol: Protocol) -> list[dict]:
+    """Return the tables [[cameras]]: of the cameras, then of their parts that show a mirror."""
+    exposure_s = protocol.pictures.exposure_s
+    own = [{"name": camera.name, "exposure_s": exposure_s} for camera in protocol.cameras]
+    return own + [_mirror_keys(camera) for camera in protocol.cameras if camera.mirror]
 
 
 def _mirror_keys(camera) -> dict:
