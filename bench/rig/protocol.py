@@ -118,16 +118,19 @@ def _table_runs(table, motor) -> list[ProtocolRun]:
     lists = [value if isinstance(value, list) else [value] for value in values]
     runs = []
     for speed, beta, psi, d_x, _ in itertools.product(*lists, range(table.repeats)):
-        name = table.name or ("gauge" if table.purpose == "gauge" else table.surface)
-        if table.purpose == "gauge":
-            name += f"_roll{table.follicle_roll_deg:g}"
-        else:
-            tilt = f"_psi{psi:g}" if psi else ""
-            name += f"_b{beta:02g}{tilt}_v{speed:g}"
+        name = _run_name(table, speed, beta, psi)
         run = ProtocolRun(name, beta, psi, d_x, speed, before_deg, after_deg, table)
         rotations = range(1, (table.rotations or 1) + 1)
         runs += [msgspec.structs.replace(run, rotation=rotation) for rotation in rotations]
     return runs
+
+
+def _run_name(table, speed_deg_s, beta_deg, psi_deg) -> str:
+    """Return the name of a table's trial, by roll for the gauges, else by slope, tilt and speed."""
+    if table.purpose == "gauge":
+        return (table.name or "gauge") + f"_roll{table.follicle_roll_deg:g}"
+    tilt = f"_psi{psi_deg:g}" if psi_deg else ""
+    return (table.name or table.surface) + f"_b{beta_deg:02g}{tilt}_v{speed_deg_s:g}"
 
 
 def load(protocol: str | Path) -> Protocol:
