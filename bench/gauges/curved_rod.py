@@ -219,10 +219,7 @@ class CurvedRods:
             at_mm = (1.0 - left) * arc * chord
             tangent = (turn @ self.rest.tangent(at_mm)[..., None])[..., 0]
             moment = (_cross_matrices(way) @ force[..., None])[..., 0]
-            twist = np.sum(tangent * moment, axis=-1, keepdims=True)
-            width2 = self.width(at_mm / self.rest.length_mm) ** 2
-            curvature = (arc / width2**2)[..., None] * (moment + _POISSON * twist * tangent)
-            turned = _cross_matrices(curvature) @ turn
+            turned = _cross_matrices(self._bend(arc, at_mm, tangent, moment)) @ turn
             return np.concatenate([-turned.ravel(), (arc[..., None] * tangent).ravel()])
 
         begin = np.concatenate(
@@ -233,6 +230,14 @@ class CurvedRods:
         if not marched.success:
             raise ArithmeticError("no equilibrium found of a curved rod that is bent so far")
         return _unpacked(marched.y[:, -1], lead)
+
+    def _bend(
+        self, arc: np.ndarray, at_mm: np.ndarray, tangent: np.ndarray, moment: np.ndarray
+    ) -> np.ndarray:
+        """Return how far sections at at_mm (..., n) turn along an arc (..., n), for moments (..., n, 3) on them."""
+        twist = np.sum(tangent * moment, axis=-1, keepdims=True)
+        width2 = self.width(at_mm / self.rest.length_mm) ** 2
+        return (arc / width2**2)[..., None] * (moment + _POISSON * twist * tangent)
 
 
 def _cross_matrices(vectors: np.ndarray) -> np.ndarray:
