@@ -55,15 +55,8 @@ def methods(record: RunRecord, run: Finished) -> str:
 
 def _truth(record: RunRecord, run: Finished) -> Iterator[str]:
     """Yield the sentences on the whisker, the cameras, and how well the truth is known."""
-    whisker = record.whisker
     truth = run.accuracy.truth
-    form = {"cylinder": "cylindrical", "cone": "conical", "tapered": "tapered"}[whisker.shape]
-    trials = {result.trial.name for result in run.results if result.trial.purpose == "measure"}
-    yield (
-        f"A {form} whisker of {whisker.diameter_mm:g} mm base diameter and {whisker.length_mm:g} mm length "
-        f"(C = 3EI = {whisker.C_Nmm2:.0f} N·mm²) was pushed against a bar in {truth.measured} measured whisks of "
-        f"{len(trials)} trials."
-    )
+    yield _sentence_on_whisker(record, run)
     if run.is_by_stage:
         yield (
             f"The true radial distance d_x is known by a stage for {truth.known} of {truth.measured} whisks, with a "
@@ -81,6 +74,18 @@ def _truth(record: RunRecord, run: Finished) -> Iterator[str]:
         f"uncertainty of {number(truth.d_x_mm, 4)} mm, of which {number(truth.d_x_own_mm, 4)} mm are each whisk's own "
         f"and {number(truth.d_x_shared_mm, 4)} mm are common to all (touch {number(truth.touch_deg, 4)}°, slope "
         f"{number(truth.beta_deg, 3)}°, slip {number(truth.slip_mm, 4)} mm)."
+    )
+
+
+def _sentence_on_whisker(record: RunRecord, run: Finished) -> str:
+    """Return the sentence on the whisker and how often it was pushed."""
+    whisker = record.whisker
+    form = {"cylinder": "cylindrical", "cone": "conical", "tapered": "tapered"}[whisker.shape]
+    trials = {result.trial.name for result in run.results if result.trial.purpose == "measure"}
+    return (
+        f"A {form} whisker of {whisker.diameter_mm:g} mm base diameter and {whisker.length_mm:g} mm length "
+        f"(C = 3EI = {whisker.C_Nmm2:.0f} N·mm²) was pushed against a bar in {run.accuracy.truth.measured} measured "
+        f"whisks of {len(trials)} trials."
     )
 
 
