@@ -6,6 +6,7 @@ whisker's centreline. Either it is stated as it is (`d_x_mm`), or it follows fro
 it is clamped, and no stage sees how the contact slips: touch, slip and deflection stay NaN.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from bench.base.statuses import reason
 from bench.records.trial_result import BY_STAGE, PicturedContact, SeenTrial, SeenWhisk
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
+from bench.session.stage import StageLog
 from bench.session.trial import MANIFEST, Trial
 from bench.trials.consistency import nominal_slope, nominal_slope_sigma_rad
 from bench.trials.differences import Difference
@@ -188,12 +190,9 @@ def _truth(d_x_mm: Value, beta_rad: Value, psi_rad: Value, shared_mm: float) -> 
 def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -> WhiskTruth:
     """Return the truth of a stroke against a bar that stands where the stage has it."""
     push = _push(session, trial, signals, stroke)
-    none = Offsets.none()
-    touch = push.touch(none)
+    touch = push.touch(Offsets.none())
     if touch is None:
-        _check_place(push, trial)
-        code = "starts_touching" if push.starts_touching(none) else "never_touches"
-        return WhiskTruth(0, status=Reason(code, f"by the stage the whisker {_HOW[code]}"))
+        return _without_touch(push, trial)
     rows = _derivatives(push, touch)
     own = rows * _own_sigmas(trial, signals, stroke, touch)
     shared = rows * _shared_sigmas(session, trial)
@@ -205,15 +204,20 @@ def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -
     return replace(truth, status=_unlike_stated(values[0], trial))
 
 
+def _without_touch(push: StatedPush, trial: Trial) -> WhiskTruth:
+    """Return the truth of a stroke that does not come to touch the bar. Raise BadInput where none could."""
+    _check_place(push, trial)
+    code = "starts_touching" if push.starts_touching(Offsets.none()) else "never_touches"
+    return WhiskTruth(0, status=Reason(code, f"by the stage the whisker {_HOW[code]}"))
+
+
 def _push(session: Session, trial: Trial, signals: Signals, stroke: slice) -> StatedPush:
     """Return a stroke against the trial's bar. Raise BadInput where the stage's log does not cover it."""
     time_s = signals.time_s[stroke]
     motor_rad = signals.motor_rad[stroke]
     log = trial.stage
-    if log is not None and not log.covers(time_s):
-        held = f"holds {log.time_s[0]:.6g} to {log.time_s[-1]:.6g} s"
-        found = f"{held}; a stroke of the signals goes from {time_s[0]:.6g} to {time_s[-1]:.6g} s"
-        raise BadInput(f"{found}; both are on one clock", file=log.label)
+    if log is not None:
+        _check_covers(log, time_s)
     stated = trial.object
     origin_mm = np.zeros(3) if stated is None or stated.point_mm is None else stated.point_mm
     rising = np.maximum.accumulate(motor_rad)
@@ -224,18 +228,29 @@ def _push(session: Session, trial: Trial, signals: Signals, stroke: slice) -> St
             return np.broadcast_to(origin_mm, (*np.shape(angles_rad), 3))
         return origin_mm + log.at(np.interp(angles_rad, rising, time_s))
 
-    axis = None if stated is None or stated.axis is None else np.array(stated.axis, dtype=float)
-    if axis is not None:
-        axis = axis / np.linalg.norm(axis) * (-1.0 if axis[2] < 0 else 1.0)
     slope_rad = nominal_slope(trial).value
     return StatedPush(
         motor_rad,
         place_at,
         session.whisker.wire,
         0.5 * trial.bar_diameter_mm,
-        axis,
+        None if stated is None or stated.axis is None else _upward(stated.axis),
         float(slope_rad) if np.isfinite(slope_rad) else 0.0,
     )
+
+
+def _check_covers(log: StageLog, time_s: np.ndarray) -> None:
+    """Raise BadInput where the stage's log does not cover a stroke's times (n,)."""
+    if not log.covers(time_s):
+        held = f"holds {log.time_s[0]:.6g} to {log.time_s[-1]:.6g} s"
+        found = f"{held}; a stroke of the signals goes from {time_s[0]:.6g} to {time_s[-1]:.6g} s"
+        raise BadInput(f"{found}; both are on one clock", file=log.label)
+
+
+def _upward(axis: Sequence[float]) -> np.ndarray:
+    """Return the unit vector (3,) along an axis whose z is not negative."""
+    axis = np.array(axis, dtype=float)
+    return axis / np.linalg.norm(axis) * (-1.0 if axis[2] < 0 else 1.0)
 
 
 def _derivatives(push: StatedPush, touch: Contact) -> np.ndarray:
