@@ -173,10 +173,7 @@ def score_traces(
     )
     recorded = trials_with_whisks(session)
     require_some(recorded, settings)
-    files = _files_by_trial(traces, [trial for trial in recorded if settings.takes(trial.name)])
-    read = {
-        trial.name: _read(trial, files[trial.name]) for trial in recorded if trial.name in files
-    }
+    read = _read_all(traces, recorded, settings)
     with lock_output(out), Workers(workers) as pool:
         _, units = placed_units(session, recorded, out, settings, pool, problems)
         chosen = [unit for unit in units if unit.trial.name in read]
@@ -185,12 +182,27 @@ def score_traces(
         for unit, trial_seen in zip(chosen, seen):
             scored.append(score_trial(unit, trial_seen, read[unit.trial.name]))
     scores = list(_scores(scored))
+    _write_scores(out, scored, scores)
+    pooled = [score for score in scores if not score.trial]
+    return pooled, list(_warnings(scored, pooled))
+
+
+def _read_all(
+    traces: Path, recorded: Sequence[Trial], settings: Settings
+) -> dict[str, dict[str, Traced]]:
+    """Return by trial the traces of the folder, of the trials that the settings take. Raises BadInput."""
+    files = _files_by_trial(traces, [trial for trial in recorded if settings.takes(trial.name)])
+    return {
+        trial.name: _read(trial, files[trial.name]) for trial in recorded if trial.name in files
+    }
+
+
+def _write_scores(out: Path, scored: Sequence[TrialScores], scores: Sequence[TraceScore]) -> None:
+    """Write the tables of frames and of scores, and the figure."""
     TRACE_FRAMES.write(out, [vars(frame) for trial in scored for frame in trial.frames])
     TRACE_SCORES.write(out, [vars(score) for score in scores])
     with style():
         publish(draw(scored), out / FIGURE)
-    pooled = [score for score in scores if not score.trial]
-    return pooled, list(_warnings(scored, pooled))
 
 
 def _by_pictures(session: Session) -> Session:
@@ -368,14 +380,22 @@ def _mean_of_frames(
     if len(values) < 2:
         return mean, np.nan
     variance = np.var(values, ddof=1)
-    products = []
-    for _, whisk in groupby(frames, key=lambda frame: (frame.trial, frame.whisk)):
-        apart = np.array([value_of(frame) for frame in whisk]) - mean
-        products += (apart[1:] * apart[:-1]).tolist()
+    products = _neighbour_products(frames, value_of, mean)
     alike_share = np.mean(products) / variance if products and variance > 0.0 else 0.0
     alike_share = float(np.clip(alike_share, 0.0, _MOST_ALIKE))
     inflation = (1.0 + alike_share) / (1.0 - alike_share)
     return mean, float(np.sqrt(variance * min(inflation, len(values)) / len(values)))
+
+
+def _neighbour_products(
+    frames: Sequence[FrameScore], value_of: Callable[[FrameScore], float], mean: float
+) -> list[float]:
+    """Return the products of the deviations of neighbouring frames of a whisk from the mean."""
+    products = []
+    for _, whisk in groupby(frames, key=lambda frame: (frame.trial, frame.whisk)):
+        deviation = np.array([value_of(frame) for frame in whisk]) - mean
+        products += (deviation[1:] * deviation[:-1]).tolist()
+    return products
 
 
 def _warnings(scored: Sequence[TrialScores], pooled: Sequence[TraceScore]) -> Iterator[str]:
