@@ -46,11 +46,7 @@ def why_no_charuco(
         return None
     flipped = [np.ascontiguousarray(grey[:, ::-1]) for grey in greys]
     if _corner_share(flipped, board) > max(_LEAST_SHARE, _CLEARLY_MORE * share):
-        seen = "not in a mirror" if mirrored else "in a mirror"
-        return (
-            f"the board is found flipped left to right alone, so it is seen {seen}: set mirrored = "
-            f"{str(not mirrored).lower()} under [[cameras]], with of and crop"
-        )
+        return _describe_flip(mirrored)
     settings = _settings(board)
     for candidates in (_other_prints(board), _boards_of_other_dictionaries(greys, board)):
         shares = {candidate: _corner_share(greys, candidate) for candidate in candidates}
@@ -62,6 +58,15 @@ def why_no_charuco(
                 f"{', '.join(difference)} is; if that is the board in the pictures, enter it"
             )
     return None if share > 0 else _describe_markers(greys, board)
+
+
+def _describe_flip(mirrored: bool) -> str:
+    """Return the sentence for a board that is found left to right alone; mirrored: as it is stated."""
+    seen = "not in a mirror" if mirrored else "in a mirror"
+    return (
+        f"the board is found flipped left to right alone, so it is seen {seen}: set mirrored = "
+        f"{str(not mirrored).lower()} under [[cameras]], with of and crop"
+    )
 
 
 def _corner_share(greys: Sequence[np.ndarray], board: "CharucoBoard") -> float:
