@@ -50,13 +50,18 @@ def check_own_lenses(
     if len(moved) and np.all(own_px[moved] > _CLEAR_RATIO * best_px[moved]):
         found = []
         for k in moved:
-            found.append(
-                f"camera {names[k]}'s picture of the board on the rig by the lens of boards/{names[best[k]]} "
-                f"to {best_px[k]:.3f} px, by that of boards/{names[k]} to {own_px[k]:.3f} px"
-            )
+            found.append(_fit_by_both(names[k], names[best[k]], own_px[k], best_px[k]))
         sentence = _exchanged([names[k] for k in moved], found, same_in_trials)
         raise Refused(sentence, "boards_exchanged")
     return _notes_on_alike(names, residual_px)
+
+
+def _fit_by_both(name: str, other: str, own_px: float, other_px: float) -> str:
+    """Return how well another camera's lens and its own explain a camera's picture."""
+    return (
+        f"camera {name}'s picture of the board on the rig by the lens of boards/{other} "
+        f"to {other_px:.3f} px, by that of boards/{name} to {own_px:.3f} px"
+    )
 
 
 def _notes_on_alike(names: list[str], residual_px: np.ndarray) -> list[str]:
