@@ -65,11 +65,7 @@ def _stereo(path: Path, stereo: dict[str, Any]) -> list[Camera]:
 
 def _camera(path: Path, name: str, lens: dict[str, Any], T: np.ndarray | None) -> Camera:
     """Return the camera of a structure."""
-    if "K" in lens:
-        matrix = numbers(lens["K"], (3, 3), f"{path.name}: K of {name}")
-    else:
-        transposed = lens.get("IntrinsicMatrix")
-        matrix = numbers(transposed, (3, 3), f"{path.name}: IntrinsicMatrix of {name}").T
+    matrix = _matrix(path, name, lens)
     if matrix[0, 1]:
         raise Refused(f"{path.name}: {name} has skew {matrix[0, 1]:.3g} px, which no lens here has")
     matrix[:2, 2] -= _FIRST_PIXEL
@@ -79,6 +75,14 @@ def _camera(path: Path, name: str, lens: dict[str, Any], T: np.ndarray | None) -
     return foreign_camera(
         name, height_width[::-1], matrix, [*radial[:2], *tangential, radial[2]], T
     )
+
+
+def _matrix(path: Path, name: str, lens: dict[str, Any]) -> np.ndarray:
+    """Return the intrinsic matrix (3, 3), px, which older versions of MATLAB write transposed."""
+    if "K" in lens:
+        return numbers(lens["K"], (3, 3), f"{path.name}: K of {name}")
+    transposed = lens.get("IntrinsicMatrix")
+    return numbers(transposed, (3, 3), f"{path.name}: IntrinsicMatrix of {name}").T
 
 
 def write(cameras: Cameras, stem: str) -> dict[str, bytes]:
