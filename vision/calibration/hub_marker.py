@@ -117,14 +117,18 @@ def by_marker(sightings: Sequence[MarkerSighting], cameras: Cameras) -> Placemen
     step[_AXIS] = np.linalg.solve(precision, weighted)
     numbers = ", ".join(str(fit.number) for fit in fits)
     pictures = sum(fit.pictures for fit in fits)
-    sigma = np.sqrt(np.diag(covariance))
     basis = f"marker {numbers} on the hub in {pictures} pictures"
-    note = (
+    note = _note(basis, np.sqrt(np.diag(covariance)))
+    return Placement(step, covariance, source=_SOURCE, basis=basis, notes=(note,))
+
+
+def _note(basis: str, sigma: np.ndarray) -> str:
+    """Return the note on how well the axis is known; sigma (6,): of the placement, rad and mm."""
+    return (
         f"{basis.capitalize()} gives: axis ± "
         f"{np.degrees(max(sigma[0], sigma[1])):.3f} degrees, through a point ± {sigma[3]:.4f} mm along and ± "
         f"{sigma[4]:.4f} mm across the whisker."
     )
-    return Placement(step, covariance, source=_SOURCE, basis=basis, notes=(note,))
 
 
 class _AxisFit:
