@@ -81,11 +81,7 @@ def first_rig_about(T_world_axis: np.ndarray, strokes: Sequence[MovingLines]) ->
     turns about it.
     """
     lines = _of_all(strokes)
-    T_axis_world = invert_transform(T_world_axis)
-    points = lines.point_mm @ T_axis_world[:, :3].T + T_axis_world[:, 3]
-    directions = lines.direction @ T_axis_world[:, :3].T
-    outward = np.sum(points[:, :2] * directions[:, :2], axis=1) >= 0
-    directions *= np.where(outward, 1.0, -1.0)[:, None]
+    points, directions = _outward_lines(lines, T_world_axis)
     shares = np.concatenate([_share_of_stroke(stroke.motor_rad) for stroke in strokes])
     begins = _is_near_axis(points, directions) & (shares <= _MOST_FREE_SHARE)
     if not begins.any():
@@ -97,6 +93,16 @@ def first_rig_about(T_world_axis: np.ndarray, strokes: Sequence[MovingLines]) ->
     widths = [np.ptp(stroke.motor_rad) for stroke in strokes if len(stroke.motor_rad)]
     width_rad = _MOST_FREE_SHARE * float(max(widths))
     return FirstRig(invert_transform(compose(T_world_axis, T_axis_rig)), width_rad, len(widths))
+
+
+def _outward_lines(lines: MovingLines, T_world_axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return points, mm, and directions (n, 3) of lines in the axis's frame, directions away from the axis."""
+    T_axis_world = invert_transform(T_world_axis)
+    points = lines.point_mm @ T_axis_world[:, :3].T + T_axis_world[:, 3]
+    directions = lines.direction @ T_axis_world[:, :3].T
+    outward = np.sum(points[:, :2] * directions[:, :2], axis=1) >= 0
+    directions *= np.where(outward, 1.0, -1.0)[:, None]
+    return points, directions
 
 
 def _is_near_axis(points_mm: np.ndarray, directions: np.ndarray) -> np.ndarray:
