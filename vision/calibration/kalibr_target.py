@@ -22,14 +22,7 @@ def read_kalibr_target(path: Path) -> dict[str, Any]:
             f"{path.name} is no target file of Kalibr: target_type is {kind!r}; {', '.join(_KINDS)} are known"
         )
     if kind == "aprilgrid":
-        tag_mm = MM_PER_M * _number(target, "tagSize", path)
-        gap = _number(target, "tagSpacing", path)
-        return {
-            "kind": "aprilgrid",
-            "squares": [_count(target, "tagCols", path), _count(target, "tagRows", path)],
-            "square_mm": tag_mm * (1.0 + gap),
-            "marker_mm": tag_mm,
-        }
+        return _april_grid(target, path)
     counts = [_count(target, "targetCols", path), _count(target, "targetRows", path)]
     if kind == "circlegrid":
         raise Refused(
@@ -43,6 +36,18 @@ def read_kalibr_target(path: Path) -> dict[str, Any]:
         "kind": "checkerboard",
         "squares": [n + 1 for n in counts],  # Kalibr counts inner corners
         "square_mm": across_mm,
+    }
+
+
+def _april_grid(target: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Return the keys of [board] of an AprilGrid's target. Raises Refused."""
+    tag_mm = MM_PER_M * _number(target, "tagSize", path)
+    gap = _number(target, "tagSpacing", path)
+    return {
+        "kind": "aprilgrid",
+        "squares": [_count(target, "tagCols", path), _count(target, "tagRows", path)],
+        "square_mm": tag_mm * (1.0 + gap),
+        "marker_mm": tag_mm,
     }
 
 
