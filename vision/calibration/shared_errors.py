@@ -14,7 +14,15 @@ from dataclasses import replace
 import numpy as np
 
 from vision.calibration.adjust import adjust_bundle
-from vision.calibration.bundle import CLOCK, N_BOARD, N_CAMERA, Priors, SharedLenses, predict
+from vision.calibration.bundle import (
+    CLOCK,
+    N_BOARD,
+    N_CAMERA,
+    Priors,
+    SharedLenses,
+    Sightings,
+    predict,
+)
 from vision.calibration.corner_noise import Adjustment
 from vision.geometry.lens import LENS_TERMS
 
@@ -72,13 +80,25 @@ def shared_error_factors(adjustment: Adjustment, corners_mm: np.ndarray) -> np.n
     for first in np.unique(shared.first):
         shots = []
         for camera in np.flatnonzero(shared.first == first):
-            for view in np.unique(seen.view[seen.camera == camera]):
-                rows = (seen.camera == camera) & (seen.view == view)
-                by_lens = J[rows].reshape(-1, J.shape[2])
-                by_lens[:, :_N_LENS] *= shared.signs[camera]
-                shots.append((by_lens, residual[rows].ravel()))
+            shots += _shots(camera, seen, J, residual, shared.signs[camera])
         factors[shared.first == first] = _factor(first, shots, adjustment.priors)
     return factors
+
+
+def _shots(
+    camera: int, seen: Sightings, J: np.ndarray, residual: np.ndarray, signs: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return whitened derivatives (2 n, p) and residuals (2 n,) of each picture of a camera.
+
+    J (points, 2, p), residual (points, 2): of all cameras. signs: of the camera's lens in what is shared.
+    """
+    shots = []
+    for view in np.unique(seen.view[seen.camera == camera]):
+        rows = (seen.camera == camera) & (seen.view == view)
+        by_lens = J[rows].reshape(-1, J.shape[2])
+        by_lens[:, :_N_LENS] *= signs
+        shots.append((by_lens, residual[rows].ravel()))
+    return shots
 
 
 def _factor(camera: int, shots: list[tuple[np.ndarray, np.ndarray]], priors: Priors) -> float:
