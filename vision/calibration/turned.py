@@ -93,6 +93,15 @@ def _renamed(view: Corners, turn: np.ndarray) -> Corners:
     return replace(view, ids=turn[view.ids])
 
 
+def _candidates(first: _Sight, other: _Sight, shared: Sequence[int]) -> np.ndarray:
+    """Return T_other_first (views, turns, 3, 4) by each shared view and each turn of the board in it."""
+    candidates = []
+    for k in shared:
+        T_first_board = invert_transform(first.poses[k][0])
+        candidates.append([compose(pose, T_first_board) for pose in other.poses[k]])
+    return np.array(candidates)
+
+
 def _choose(first: _Sight, other: _Sight, name: str) -> tuple[np.ndarray, dict[int, int]] | None:
     """Return T_other_first (3, 4), and the turn of each view of the other camera; None where they
     saw the board each at a time of its own.
@@ -100,11 +109,7 @@ def _choose(first: _Sight, other: _Sight, name: str) -> tuple[np.ndarray, dict[i
     shared = sorted(first.poses.keys() & other.poses.keys())
     if len(shared) < MIN_VIEWS:
         return None
-    candidates = []
-    for k in shared:
-        T_first_board = invert_transform(first.poses[k][0])
-        candidates.append([compose(pose, T_first_board) for pose in other.poses[k]])
-    candidates = np.array(candidates)  # (views, turns, 3, 4)
+    candidates = _candidates(first, other, shared)  # (views, turns, 3, 4)
     flat = candidates.reshape(-1, 3, 4)
     distance = _distances(flat, flat).reshape(len(flat), *candidates.shape[:2])
     score = np.median(distance.min(axis=2), axis=1)  # (views * turns,)
