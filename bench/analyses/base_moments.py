@@ -209,11 +209,7 @@ def _frame_rows(one: WhiskLoads) -> Iterator[dict]:
 
 
 def felt_beside(one: WhiskLoads) -> dict | None:
-    """Return the row of felt moments beside those seen; None where either is not known.
-
-    Gauges that were calibrated by the wire have its stiffness in common with what is seen, which
-    cancels.
-    """
+    """Return the row of felt moments beside those seen; None where either is not known."""
     felt = one.felt
     if not felt.has_moments or felt.covariance_at is None:
         return None
@@ -225,8 +221,7 @@ def felt_beside(one: WhiskLoads) -> dict | None:
     moments, covariance = seen
     size = float(np.linalg.norm(moments))
     along = moments / size
-    stiffness = 0.0 if one.is_by_wire else one.loads.stiffness_share * size
-    seen_sigma = float(np.hypot(np.sqrt(along @ covariance @ along), stiffness))
+    seen_sigma = _seen_sigma(one, size, along, covariance)
     beside = _felt_along(felt, along)
     sigma = float(np.hypot(seen_sigma, beside.sigma))
     return {
@@ -241,6 +236,18 @@ def felt_beside(one: WhiskLoads) -> dict | None:
         "ratio_sigma": sigma / size,
         "z": (beside.value - size) / sigma,
     }
+
+
+def _seen_sigma(
+    one: WhiskLoads, size: float, direction: np.ndarray, covariance: np.ndarray
+) -> float:
+    """Return the sigma of a seen moment, N·mm, of a size along a unit vector (2,).
+
+    Gauges that were calibrated by the wire have its stiffness in common with what is seen, which
+    cancels.
+    """
+    stiffness = 0.0 if one.is_by_wire else one.loads.stiffness_share * size
+    return float(np.hypot(np.sqrt(direction @ covariance @ direction), stiffness))
 
 
 def _felt_along(felt: FeltWhisk, direction: np.ndarray) -> Value:
