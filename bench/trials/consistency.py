@@ -70,11 +70,20 @@ def _turn_causes(
         yield from _causes_at(k, turns, speed_rad_s)
 
 
+def _steps_to_neighbours(motor_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the steps (n,) from each frame's motor angle (n,) to the next and to the one before.
+
+    The first and the last step continue as their neighbours.
+    """
+    ahead = np.diff(motor_rad, append=2.0 * motor_rad[-1] - motor_rad[-2])
+    behind = -np.diff(motor_rad, prepend=2.0 * motor_rad[0] - motor_rad[1])
+    return ahead, behind
+
+
 def _causes_at(k: int, turns: Turns, speed_rad_s: float) -> Iterator[Cause]:
     """Yield the faults of encoder and frame times that begin at, or are of, the k-th frame seen."""
     motor = turns.motor_rad
-    ahead = np.diff(motor, append=2.0 * motor[-1] - motor[-2])
-    behind = -np.diff(motor, prepend=2.0 * motor[0] - motor[1])
+    ahead, behind = _steps_to_neighbours(motor)
     number = np.arange(len(motor))
     nothing = np.zeros(len(motor))
     later = (number >= k).astype(float)
