@@ -178,9 +178,7 @@ def score_traces(
         _, units = placed_units(session, recorded, out, settings, pool, problems)
         chosen = [unit for unit in units if unit.trial.name in read]
         seen = see_units(chosen, pool, "trials seen by their pictures", problems)
-        scored = []
-        for unit, trial_seen in zip(chosen, seen):
-            scored.append(score_trial(unit, trial_seen, read[unit.trial.name]))
+        scored = _score_trials(chosen, seen, read)
     scores = list(_scores(scored))
     _write_scores(out, scored, scores)
     pooled = [score for score in scores if not score.trial]
@@ -195,6 +193,16 @@ def _read_all(
     return {
         trial.name: _read(trial, files[trial.name]) for trial in recorded if trial.name in files
     }
+
+
+def _score_trials(
+    units: Sequence[Unit], seen: Iterable[SeenTrial], read: Mapping[str, Mapping[str, Traced]]
+) -> list[TrialScores]:
+    """Return the scores of trials as seen; read: traces by trial and camera."""
+    scored = []
+    for unit, trial_seen in zip(units, seen):
+        scored.append(score_trial(unit, trial_seen, read[unit.trial.name]))
+    return scored
 
 
 def _write_scores(out: Path, scored: Sequence[TrialScores], scores: Sequence[TraceScore]) -> None:
