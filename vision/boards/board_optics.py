@@ -63,13 +63,18 @@ def estimate_optics(grey: np.ndarray, board: Board) -> Optics:
     log_gammas = np.full((len(saddles), 1), np.log(_FIRST_GAMMA))
     start = np.concatenate([saddles, log_gammas], axis=1)
     fitted, converged = fit_windows(windows, start, _predict_grey)
-    if np.sum(converged) < _FEWEST_CORNERS:
+    return _optics_of(fitted[converged])
+
+
+def _optics_of(fitted: np.ndarray) -> Optics:
+    """Return the optics by the medians over the corners' fitted parameters (n, p)."""
+    if len(fitted) < _FEWEST_CORNERS:
         return UNKNOWN
-    log_blur, blur_scatter = _median(fitted[converged, BLUR].mean(axis=1))
+    log_blur, blur_scatter = _median(fitted[:, BLUR].mean(axis=1))
     if log_blur < np.log(_LEAST_BLUR_PX):
         return UNKNOWN
-    log_gamma, gamma_scatter = _median(fitted[converged, -1])
-    log_blur_sigma = _MEDIAN_BY_MEAN * blur_scatter / np.sqrt(np.sum(converged))
+    log_gamma, gamma_scatter = _median(fitted[:, -1])
+    log_blur_sigma = _MEDIAN_BY_MEAN * blur_scatter / np.sqrt(len(fitted))
     return Optics(
         gamma=float(np.exp(log_gamma)),
         # uneven light, a shadow's border, disturbs neighbouring corners alike: no mean of many
