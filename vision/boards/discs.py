@@ -88,6 +88,13 @@ def fit_discs(windows: DiscWindows, px_guess: np.ndarray) -> Saddles:
     return replace(discs, blur_px=np.exp(parameters[:, _LOG_BLUR]))
 
 
+def _edge_difference(windows: DiscWindows, p: np.ndarray, column: int) -> np.ndarray:
+    """Return the change (n, k) of the disc's grey from a step before to a step beyond a parameter."""
+    step = np.zeros(10)
+    step[column] = _STEP
+    return _edge(windows, p + step) - _edge(windows, p - step)
+
+
 def predict_discs(windows: DiscWindows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Predict the grey (n, k) by the parameters p (n, 10), with its Jacobian (n, 10, k)."""
     J = np.empty((len(p), 10, windows.offset.shape[2]))
@@ -97,10 +104,7 @@ def predict_discs(windows: DiscWindows, p: np.ndarray) -> tuple[np.ndarray, np.n
     J[:, SLOPE] = offset
     contrast = p[:, CONTRAST, None]
     for column in range(*_CURVED.indices(10)):
-        step = np.zeros(10)
-        step[column] = _STEP
-        difference = _edge(windows, p + step) - _edge(windows, p - step)
-        J[:, column] = contrast * difference / (2.0 * _STEP)
+        J[:, column] = contrast * _edge_difference(windows, p, column) / (2.0 * _STEP)
     J[:, PLACE] -= p[:, SLOPE, None]
     grey = p[:, None, LINEAR] @ J[:, LINEAR]
     return grey[:, 0], J
