@@ -20,10 +20,7 @@ def turns_onto_itself(board: Board) -> tuple[np.ndarray, ...]:
 @lru_cache(maxsize=32)
 def _symmetries(board: Board) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
     """Return the ids (m,) after each quarter turn and after each mirroring that the points allow."""
-    flat = board.corners_mm[:, :2]
-    low = flat.min(axis=0)
-    high = flat.max(axis=0)
-    centred = (flat - 0.5 * (low + high)) / (0.5 * np.linalg.norm(high - low))
+    centred = _centred(board)
     quarter = np.array([[0, -1], [1, 0]])
     mirror = np.diag([-1, 1])
     kinds = []
@@ -36,6 +33,14 @@ def _symmetries(board: Board) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray,
                 found.append(distance.argmin(axis=1))
         kinds.append(tuple(found))
     return kinds[0], kinds[1]
+
+
+def _centred(board: Board) -> np.ndarray:
+    """Return the board's points (m, 2) about its middle, in units of half its diagonal."""
+    flat = board.corners_mm[:, :2]
+    low = flat.min(axis=0)
+    high = flat.max(axis=0)
+    return (flat - 0.5 * (low + high)) / (0.5 * np.linalg.norm(high - low))
 
 
 def possible_labels(px: np.ndarray, board: Board) -> list[np.ndarray]:
