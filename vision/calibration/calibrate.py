@@ -257,14 +257,25 @@ def _alone_of_picture(
     usable = [_usable(views.boards[name], board) for name in names]
     lenses = _first_lenses([list(own.values()) for own in usable], board, crops)
     for own, lens in zip(usable, lenses):
-        for k in list(own):
-            if not has_pose(own[k], board.corners_mm, lens):
-                del own[k]
+        _drop_without_pose(own, board, lens)
     check_views(" and ".join(names), [view for own in usable for view in own.values()], board)
     for name, own in zip(names, usable):
         _check_sees_board(name, len(own), views.rig.get(name), board, with_rig)
     by_camera = [list(own.values()) for own in usable]
-    adjustment = calibrate_picture(by_camera, board, crops)
+    return _each_alone(names, usable, calibrate_picture(by_camera, board, crops))
+
+
+def _drop_without_pose(views: dict[int, Corners], board: Board, lens: np.ndarray) -> None:
+    """Remove the views in which a lens gives the board no pose."""
+    for k in list(views):
+        if not has_pose(views[k], board.corners_mm, lens):
+            del views[k]
+
+
+def _each_alone(
+    names: Sequence[str], usable: Sequence[dict[int, Corners]], adjustment: Adjustment
+) -> dict[str, Alone]:
+    """Return by name the cameras of one picture as adjusted together; usable: the views of each."""
     state = adjustment.solution.state
     poses = iter(state.T_world_board)
     found = {}
