@@ -103,6 +103,21 @@ def by_marker(sightings: Sequence[MarkerSighting], cameras: Cameras) -> Placemen
     fits = [_AxisFit(marker, cameras) for marker in _turning(sightings, cameras)]
     if not fits:
         raise Refused("no marker is seen to turn with the motor in two cameras")
+    covariance = np.diag(np.repeat(np.square(_UNSEEN), 3))
+    step = np.zeros(6)
+    step[_AXIS], covariance[np.ix_(_AXIS, _AXIS)] = _combine(fits)
+    numbers = ", ".join(str(fit.number) for fit in fits)
+    pictures = sum(fit.pictures for fit in fits)
+    basis = f"marker {numbers} on the hub in {pictures} pictures"
+    note = _note(basis, np.sqrt(np.diag(covariance)))
+    return Placement(step, covariance, source=_SOURCE, basis=basis, notes=(note,))
+
+
+def _combine(fits: Sequence["_AxisFit"]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the weighted mean (4,) of the markers' axes and its covariance (4, 4).
+
+    The cameras' errors are common to all markers: their part does not decrease with the number.
+    """
     precision = np.zeros((4, 4))
     weighted = np.zeros(4)
     shared = np.zeros((4, 4))
@@ -111,15 +126,7 @@ def by_marker(sightings: Sequence[MarkerSighting], cameras: Cameras) -> Placemen
         precision += own
         weighted += own @ fit.axis
         shared += fit.by_cameras / len(fits)
-    covariance = np.diag(np.repeat(np.square(_UNSEEN), 3))
-    covariance[np.ix_(_AXIS, _AXIS)] = np.linalg.inv(precision) + shared
-    step = np.zeros(6)
-    step[_AXIS] = np.linalg.solve(precision, weighted)
-    numbers = ", ".join(str(fit.number) for fit in fits)
-    pictures = sum(fit.pictures for fit in fits)
-    basis = f"marker {numbers} on the hub in {pictures} pictures"
-    note = _note(basis, np.sqrt(np.diag(covariance)))
-    return Placement(step, covariance, source=_SOURCE, basis=basis, notes=(note,))
+    return np.linalg.solve(precision, weighted), np.linalg.inv(precision) + shared
 
 
 def _note(basis: str, sigma: np.ndarray) -> str:
