@@ -87,12 +87,17 @@ def first_rig_about(T_world_axis: np.ndarray, strokes: Sequence[MovingLines]) ->
     if not begins.any():
         raise Refused(_NOTHING_TURNS.format(0))
     azimuth_rad = _median_azimuth(directions[begins], lines.motor_rad[begins])
-    along_mm = np.hypot(points[:, 0], points[:, 1])
-    heights = points[:, 2] - directions[:, 2] * along_mm
-    T_axis_rig = np.column_stack([rotation_z(azimuth_rad), [0.0, 0.0, np.median(heights[begins])]])
+    height_mm = np.median(_heights_mm(points, directions)[begins])
+    T_axis_rig = np.column_stack([rotation_z(azimuth_rad), [0.0, 0.0, height_mm]])
     widths = [np.ptp(stroke.motor_rad) for stroke in strokes if len(stroke.motor_rad)]
     width_rad = _MOST_FREE_SHARE * float(max(widths))
     return FirstRig(invert_transform(compose(T_world_axis, T_axis_rig)), width_rad, len(widths))
+
+
+def _heights_mm(points: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Return the heights (n,) at the axis of lines through points, mm, by directions (n, 3)."""
+    along_mm = np.hypot(points[:, 0], points[:, 1])
+    return points[:, 2] - directions[:, 2] * along_mm
 
 
 def _outward_lines(lines: MovingLines, T_world_axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
