@@ -65,11 +65,7 @@ class _Sight:
         self, views: BoardViews, name: str, board: Board, turns: Sequence[np.ndarray]
     ) -> None:
         """Calibrate the camera by itself, which needs no right names."""
-        seen = {}
-        for k, view in enumerate(views.boards[name]):
-            view = without_strays(view, board)
-            if fixes_pose(view, board):
-                seen[k] = view
+        seen = _posed_views(views.boards[name], board)
         size_px = views.sizes_px[name]
         start = first_lens(list(seen.values()), board.corners_mm, size_px)
         seen = {k: view for k, view in seen.items() if has_pose(view, board.corners_mm, start)}
@@ -93,6 +89,16 @@ def _renamed(view: Corners, turn: np.ndarray) -> Corners:
     return replace(view, ids=turn[view.ids])
 
 
+def _posed_views(views: Sequence[Corners], board: Board) -> dict[int, Corners]:
+    """Return by number, without stray corners, the views that determine a pose of the board."""
+    found = {}
+    for k, view in enumerate(views):
+        view = without_strays(view, board)
+        if fixes_pose(view, board):
+            found[k] = view
+    return found
+
+
 def _candidates(first: _Sight, other: _Sight, shared: Sequence[int]) -> np.ndarray:
     """Return T_other_first (views, turns, 3, 4) by each shared view and each turn of the board in it."""
     candidates = []
@@ -100,6 +106,16 @@ def _candidates(first: _Sight, other: _Sight, shared: Sequence[int]) -> np.ndarr
         T_first_board = invert_transform(first.poses[k][0])
         candidates.append([compose(pose, T_first_board) for pose in other.poses[k]])
     return np.array(candidates)
+
+
+def _check_unambiguous(score: float, rivals: np.ndarray, name: str) -> None:
+    """Raise Refused where another pose of the camera has a score (n,) that is not clearly worse."""
+    if len(rivals) and rivals.min() < _CLEARLY_BETTER * score:
+        raise Refused(
+            f"camera {name}: the board looks the same after a turn, and its views do not tell which way round it was: "
+            "turn and tilt it more between views, or take a board with an odd number of squares one way and an even "
+            "one the other"
+        )
 
 
 def _choose(first: _Sight, other: _Sight, name: str) -> tuple[np.ndarray, dict[int, int]] | None:
@@ -116,13 +132,7 @@ def _choose(first: _Sight, other: _Sight, name: str) -> tuple[np.ndarray, dict[i
     best = int(np.argmin(score))
     if score[best] > _SAME:
         return None
-    rivals = score[distance[best].ravel() > _SAME]
-    if len(rivals) and rivals.min() < _CLEARLY_BETTER * score[best]:
-        raise Refused(
-            f"camera {name}: the board looks the same after a turn, and its views do not tell which way round it was: "
-            "turn and tilt it more between views, or take a board with an odd number of squares one way and an even "
-            "one the other"
-        )
+    _check_unambiguous(score[best], score[distance[best].ravel() > _SAME], name)
     turn_of = dict(zip(shared, distance[best].argmin(axis=1).tolist()))
     return flat[best], turn_of
 
