@@ -222,11 +222,18 @@ class BarQuestion:
         vectors = vectors[np.argsort(-total, kind="stable")[:_KEPT]]
         for step in _FINE_RADII:
             vectors = _around(vectors, step)
-            total = np.zeros(len(vectors))
-            for band, slope in zip(self.bands, slopes):
-                total += np.mean(band.covered(vectors @ slope), axis=1)
-            vectors = vectors[[np.argmax(total)]]
+            vectors = vectors[[np.argmax(self._covered(vectors, slopes))]]
         return self.axis.shifted(across, vectors[0] * scale)
+
+    def _covered(self, vectors: np.ndarray, slopes: Sequence[np.ndarray]) -> np.ndarray:
+        """Return the share of the change (n,) that each axis covers, the sum over cameras.
+
+        vectors (n, 4): shifts and tilts of the axis. slopes: of each camera, the offsets (4, 2) by them.
+        """
+        total = np.zeros(len(vectors))
+        for band, slope in zip(self.bands, slopes):
+            total += np.mean(band.covered(vectors @ slope), axis=1)
+        return total
 
     def gain(self, place: BarAxis, other: BarAxis) -> tuple[float, float]:
         """Return how much more of the change a place covers than another one, and its sigma."""
@@ -274,25 +281,30 @@ def _straightened(
     across = (np.arange(count) + 0.5) / count * 2.0 * _BAND_RADII - _BAND_RADII
     offset_px = across[:, None] * line.radius_px[:, None, None]
     px = (line.foot_px[:, None] + offset_px * line.normal[:, None]).astype(np.float32)
-
-    def read(picture: np.ndarray) -> np.ndarray:
-        """Return a picture's grey at the samples; NaN outside."""
-        grey = np.asarray(picture, dtype=np.float32)
-        nan = float("nan")
-        border = cv2.BORDER_CONSTANT
-        return cv2.remap(grey, px, None, cv2.INTER_LINEAR, borderMode=border, borderValue=nan)
-
-    pictures = [read(view.frames[frame]) for frame in curves]
+    pictures = [_grey_at(px, view.frames[frame]) for frame in curves]
     still = np.median(pictures, axis=0)
-    empty = read(view.background)
+    empty = _grey_at(px, view.background)
+    is_free = _grey_at(px, _hidden_by_rods(view, curves, rods)) == 0.0
+    return still, empty, np.isfinite(still) & np.isfinite(empty) & is_free
+
+
+def _grey_at(px: np.ndarray, picture: np.ndarray) -> np.ndarray:
+    """Return a picture's grey (m, k) at points (m, k, 2) px, interpolated linearly; NaN outside."""
+    grey = np.asarray(picture, dtype=np.float32)
+    nan = float("nan")
+    border = cv2.BORDER_CONSTANT
+    return cv2.remap(grey, px, None, cv2.INTER_LINEAR, borderMode=border, borderValue=nan)
+
+
+def _hidden_by_rods(view: View, curves: Mapping[int, Curves], rods: Rods) -> np.ndarray:
+    """Return the pixels (h, w) that the wire or other rods cover in any frame: not 0."""
     hidden = np.zeros(view.background.shape, dtype=np.uint8)
     for frame, curve in curves.items():
         _hide_wire(hidden, view.camera, curve, rods)
         others = mask_rods(view.others, frame, hidden.shape)
         if others is not None:
             hidden |= others.astype(np.uint8)
-    shows = np.isfinite(still) & np.isfinite(empty) & (read(hidden) == 0.0)
-    return still, empty, shows
+    return hidden
 
 
 def _hide_wire(hidden: np.ndarray, camera: Camera, curve: Curves, rods: Rods) -> None:
@@ -321,14 +333,19 @@ def _change(still: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarr
     return np.where(seen, changed, _UNKNOWN)
 
 
+def _light_design(empty: np.ndarray) -> np.ndarray:
+    """Return the design (m, k, 4) of a picture (m, k) with a gain that is linear both ways, and an offset."""
+    along = np.linspace(-1.0, 1.0, len(empty))[:, None]
+    across = np.linspace(-1.0, 1.0, empty.shape[1])
+    return np.stack([empty, empty * along, empty * across, np.ones_like(empty)], axis=-1)
+
+
 def _relit(still: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarray:
     """Return the picture (m, k) without rods in the light of that with them.
 
     Its gain is linear in both directions of the band, by weights that leave out what has changed.
     """
-    along = np.linspace(-1.0, 1.0, len(empty))[:, None]
-    across = np.linspace(-1.0, 1.0, empty.shape[1])
-    design = np.stack([empty, empty * along, empty * across, np.ones_like(empty)], axis=-1)
+    design = _light_design(empty)
     rows = design[shows].astype(float)
     grey = still[shows].astype(float)
     unchanged = np.array([1.0, 0.0, 0.0, 0.0])
