@@ -45,12 +45,11 @@ def check_own_lenses(
     residual_px = lens_residuals_px(lenses, standing, board)
     own_px = np.diag(residual_px)
     _, best = linear_sum_assignment(np.log(residual_px))
-    best_px = residual_px[np.arange(len(names)), best]
-    moved = np.flatnonzero(best != np.arange(len(names)))
+    own = np.arange(len(names))
+    best_px = residual_px[own, best]
+    moved = np.flatnonzero(best != own)
     if len(moved) and np.all(own_px[moved] > _CLEAR_RATIO * best_px[moved]):
-        found = []
-        for k in moved:
-            found.append(_fit_by_both(names[k], names[best[k]], own_px[k], best_px[k]))
+        found = [_fit_by_both(names[k], names[best[k]], own_px[k], best_px[k]) for k in moved]
         sentence = _exchanged([names[k] for k in moved], found, same_in_trials)
         raise Refused(sentence, "boards_exchanged")
     return _notes_on_alike(names, residual_px)
