@@ -7,6 +7,7 @@ one in every view with wrong ones.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -74,14 +75,18 @@ class _Sight:
             adjusted = calibrate_alone(list(seen.values()), board, size_px)
             lens = adjusted.solution.state.lens[0]
 
-        def poses(view: Corners) -> np.ndarray:
-            """Return T_camera_board of a view, (turns, 3, 4)."""
-            named = [_renamed(view, turn) for turn in turns]
-            return np.array([board_pose(view, board.corners_mm, lens) for view in named])
-
+        poses = partial(_poses, board=board, lens=lens, turns=turns)
         self.poses: Mapping[int, np.ndarray] = {k: poses(view) for k, view in seen.items()}
         on_rig = views.rig.get(name, Corners.none())
         self.rig_poses = poses(on_rig) if fixes_pose(on_rig, board) else None
+
+
+def _poses(
+    view: Corners, board: Board, lens: np.ndarray, turns: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Return T_camera_board (turns, 3, 4) of a view, with the board's points named by each turn."""
+    named = [_renamed(view, turn) for turn in turns]
+    return np.array([board_pose(view, board.corners_mm, lens) for view in named])
 
 
 def _renamed(view: Corners, turn: np.ndarray) -> Corners:
