@@ -276,16 +276,21 @@ def _straightened(
     view: View, line: _Line, curves: Mapping[int, Curves], rods: Rods
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the picture with the bar, that without rods, and which samples show them, (m, k)."""
-    per_radius = min(_PER_RADIUS, line.width_radius_px)
-    count = 2 * int(np.ceil(_BAND_RADII * per_radius))
-    across = (np.arange(count) + 0.5) / count * 2.0 * _BAND_RADII - _BAND_RADII
-    offset_px = across[:, None] * line.radius_px[:, None, None]
-    px = (line.foot_px[:, None] + offset_px * line.normal[:, None]).astype(np.float32)
+    px = _samples_px(line)
     pictures = [_grey_at(px, view.frames[frame]) for frame in curves]
     still = np.median(pictures, axis=0)
     empty = _grey_at(px, view.background)
     is_free = _grey_at(px, _hidden_by_rods(view, curves, rods)) == 0.0
     return still, empty, np.isfinite(still) & np.isfinite(empty) & is_free
+
+
+def _samples_px(line: _Line) -> np.ndarray:
+    """Return points (m, k, 2), px, in a strip along the line, k across it."""
+    per_radius = min(_PER_RADIUS, line.width_radius_px)
+    count = 2 * int(np.ceil(_BAND_RADII * per_radius))
+    across = (np.arange(count) + 0.5) / count * 2.0 * _BAND_RADII - _BAND_RADII
+    offset_px = across[:, None] * line.radius_px[:, None, None]
+    return (line.foot_px[:, None] + offset_px * line.normal[:, None]).astype(np.float32)
 
 
 def _grey_at(px: np.ndarray, picture: np.ndarray) -> np.ndarray:
