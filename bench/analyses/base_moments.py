@@ -222,19 +222,19 @@ def felt_beside(one: WhiskLoads) -> dict | None:
     size = float(np.linalg.norm(moments))
     along = moments / size
     seen_sigma = _seen_sigma(one, size, along, covariance)
-    beside = _felt_along(felt, along)
-    sigma = float(np.hypot(seen_sigma, beside.sigma))
+    felt_moment = _felt_along(felt, along)
+    sigma = float(np.hypot(seen_sigma, felt_moment.sigma))
     return {
         "trial": one.result.trial.name,
         "whisk": one.seen.whisk,
         "theta_deg": one.result.theta_deg,
         "m_seen_Nmm": size,
         "m_seen_sigma_Nmm": seen_sigma,
-        "m_felt_Nmm": beside.value,
-        "m_felt_sigma_Nmm": beside.sigma,
-        "ratio": beside.value / size,
+        "m_felt_Nmm": felt_moment.value,
+        "m_felt_sigma_Nmm": felt_moment.sigma,
+        "ratio": felt_moment.value / size,
         "ratio_sigma": sigma / size,
-        "z": (beside.value - size) / sigma,
+        "z": (felt_moment.value - size) / sigma,
     }
 
 
