@@ -86,25 +86,30 @@ def sigmas(predicted: PredictedTruth, theta_rad: float) -> dict[str, float]:
 
 def obstacles(predicted: PredictedTruth, noise: Mapping[str, LineNoise]) -> Iterator[str]:
     """Yield what keeps each camera from seeing the whole whisk, a sentence each."""
-    for name, sight in predicted.sights.items():
-        own = noise.get(name)
-        if sight.is_along_bar:
-            angle_deg = np.degrees(sight.angle_to_bar_rad)
-            yield f"camera {name} looks along the bar ({angle_deg:.0f} deg to its axis)"
-        elif own is not None and len(own.bar_px) == 0:
-            yield f"camera {name} does not see the bar's edges"
-        if sight.outside > _SOME:
-            yield f"camera {name} has {_percent(sight.outside)} of the whisker outside its picture"
-        if sight.bar_share < _LEAST_OF_BAR:
-            missing = _percent(1 - sight.bar_share)
-            yield f"camera {name} has {missing} of the bar's middle outside its picture"
-        if sight.behind_bar > _MUCH and sight.is_bar_nearer:
-            yield f"camera {name} has the bar before {_percent(sight.behind_bar)} of the whisker"
-        if sight.hidden > _SOME:
-            hidden = _percent(sight.hidden)
-            yield f"camera {name} has the bar's clamp before {hidden} of the whisker"
-        if own is not None and not np.isfinite(own.wire_px):
-            yield f"camera {name} does not see the whisker"
+    for name in predicted.sights:
+        yield from _obstacles_of(name, predicted, noise.get(name))
+
+
+def _obstacles_of(name: str, predicted: PredictedTruth, own: LineNoise | None) -> Iterator[str]:
+    """Yield what keeps one camera from seeing the whole whisk; own: the noise of its lines, if known."""
+    sight = predicted.sights[name]
+    if sight.is_along_bar:
+        angle_deg = np.degrees(sight.angle_to_bar_rad)
+        yield f"camera {name} looks along the bar ({angle_deg:.0f} deg to its axis)"
+    elif own is not None and len(own.bar_px) == 0:
+        yield f"camera {name} does not see the bar's edges"
+    if sight.outside > _SOME:
+        yield f"camera {name} has {_percent(sight.outside)} of the whisker outside its picture"
+    if sight.bar_share < _LEAST_OF_BAR:
+        missing = _percent(1 - sight.bar_share)
+        yield f"camera {name} has {missing} of the bar's middle outside its picture"
+    if sight.behind_bar > _MUCH and sight.is_bar_nearer:
+        yield f"camera {name} has the bar before {_percent(sight.behind_bar)} of the whisker"
+    if sight.hidden > _SOME:
+        hidden = _percent(sight.hidden)
+        yield f"camera {name} has the bar's clamp before {hidden} of the whisker"
+    if own is not None and not np.isfinite(own.wire_px):
+        yield f"camera {name} does not see the whisker"
 
 
 def _percent(share: float) -> str:
