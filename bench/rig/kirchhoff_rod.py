@@ -133,8 +133,7 @@ class KirchhoffRod(BentRod):
                 return turns, load, balance
             step *= min(1.0, _LONGEST_STEP_RAD / longest)
             turns = Rotation.from_rotvec(step.reshape(-1, 3)) * turns
-        forces = ", ".join(f"{component:.4g}" for component in force_N)
-        raise ArithmeticError(f"no equilibrium found for [{forces}] N at {arc:.4g} mm")
+        raise _no_equilibrium(force_N, arc)
 
     def _load(self, force_N, arc) -> _Load:
         """Return a force, N, at an arc, mm, on the unit of that arc."""
@@ -236,3 +235,9 @@ def _cross_matrices(vectors: np.ndarray) -> np.ndarray:
     zero = np.zeros_like(x)
     rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
     return np.moveaxis(np.array(rows), -1, 0)
+
+
+def _no_equilibrium(force_N: np.ndarray, arc_mm: float) -> ArithmeticError:
+    """Return the error for a force (3,) at an arc under which no equilibrium was found."""
+    forces = ", ".join(f"{component:.4g}" for component in force_N)
+    return ArithmeticError(f"no equilibrium found for [{forces}] N at {arc_mm:.4g} mm")
