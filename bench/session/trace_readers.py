@@ -113,6 +113,8 @@ def _deeplabcut_text(path: Path, label: str) -> DrawnLines:
             frames.append(_picture_number(cells[first - 1]))
         except ValueError:
             raise BadInput("names no frame", file=label, row=row) from None
+    if not frames:
+        raise BadInput("has rows of names and no row of a frame", file=label)
     return _joints_by_name(np.array(frames), np.array(values), names, label)
 
 
@@ -124,6 +126,10 @@ def _pop_heads(rows: list[list[str]], label: str) -> dict[str, list[str]]:
         heads[head[0]] = head
     if "bodyparts" not in heads or "coords" not in heads:
         raise BadInput("has no rows bodyparts and coords, as DeepLabCut writes them", file=label)
+    lengths = [len(head) for head in heads.values()]
+    if len(set(lengths)) > 1:
+        found = f"rows {', '.join(heads)} name {', '.join(map(str, lengths))} columns"
+        raise BadInput(f"{found}; each names all", file=label)
     return heads
 
 

@@ -157,6 +157,20 @@ def test_deeplabcut_tables_are_read_without_making_objects_of_their_names(tmp_pa
         read_lines(path, "x")
 
 
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("scorer,a,a\nbodyparts,p,p\ncoords,x,y\n", "no row of a frame"),
+        ("scorer,a,a\nbodyparts,p\ncoords,x,y\n0,1,2\n", "name 3, 2, 3 columns"),
+    ],
+)
+def test_a_deeplabcut_table_without_frames_or_names_is_one_line(tmp_path, text, message):
+    path = tmp_path / "trace_high.csv"
+    path.write_text(text)
+    with pytest.raises(BadInput, match=message):
+        read_lines(path, "x")
+
+
 def test_sleap_gives_a_line_a_track(tmp_path):
     h5py = pytest.importorskip("h5py")
     tracks = np.full((2, 2, 3, 6), np.nan)
