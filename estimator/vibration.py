@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from math import cos, cosh, hypot, nan, pi, sin, sinh, sqrt
 
 import numpy as np
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import OptimizeResult, brentq, least_squares
 
 from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
@@ -188,43 +188,61 @@ def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None)
     beside: the free ring; one on a contact is no slower, and the short while of a push does not tell it
     from the hum, whose frequency then is known. A cubic stands for the push, a sinusoid for the hum.
     Frequency and damping are those of least squares, all else being linear; the sigma is that of the
-    residuals' scatter.
+    residuals' scatter. Raises ArithmeticError where the fit does not converge.
     """
-    mains_Hz = _best_mains(time_s, moments) if beside is None else beside.mains_Hz
     slowest_Hz = _FEWEST_PERIODS / time_s[-1]
-    if beside is not None:
+    if beside is None:
+        mains_Hz = _best_mains(time_s, moments)
+    else:
+        mains_Hz = beside.mains_Hz
         slowest_Hz = max(slowest_Hz, beside.frequency_Hz)
-    frequencies = _frequencies(time_s, slowest_Hz)
-    sums = [_left(time_s, moments, f, _TYPICAL_DAMPING, mains_Hz)[0] for f in frequencies]
-    best_Hz = frequencies[int(np.argmin(sums))]
-    others = np.abs(frequencies - best_Hz) > _APART / time_s[-1]
-    runner_up = min(np.array(sums)[others], default=np.inf)
-    start = [best_Hz, _TYPICAL_DAMPING]
-    low = [_SLOWER * slowest_Hz, _DAMPING[0]]
-    high = [0.5 / _step_s(time_s), _DAMPING[1]]
-    if beside is None:
-        start.append(mains_Hz)
-        low.append(_MAINS_HZ[0])
-        high.append(_MAINS_HZ[1])
-
-    def residuals(logarithms):
-        frequency, damping, *hum = np.exp(logarithms)
-        return _left(time_s, moments, frequency, damping, *(hum or [mains_Hz]))[1]
-
-    limits = (np.log(low), np.log(high))
-    fit = least_squares(residuals, np.clip(np.log(start), *limits), bounds=limits)
-    frequency = float(np.exp(fit.x[0]))
-    if beside is None:
-        mains_Hz = float(np.exp(fit.x[2]))
+    best_Hz, runner_up = _strongest(time_s, moments, slowest_Hz, mains_Hz)
+    start = np.log([best_Hz, _TYPICAL_DAMPING, mains_Hz])
+    free = 3 if beside is None else 2
+    fit = _refined(time_s, moments, slowest_Hz, start, free)
+    frequency, _, mains_Hz = np.exp([*fit.x, *start[free:]]).tolist()
     left = 2 * fit.cost
-    known = moments.size - _LINEAR_UNKNOWNS * moments.shape[1] - len(start)
+    known = moments.size - _LINEAR_UNKNOWNS * moments.shape[1] - free
     variance = left / known
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * variance
     without = _left(time_s, moments, None, None, mains_Hz)[0]
-    amplitude_sigmas = sqrt(max(without - left, 0.0) / variance)
-    margin_sigmas = sqrt(max(runner_up - left, 0.0) / variance)
-    sigma_Hz = frequency * sqrt(covariance[0, 0])
-    return Ring(frequency, sigma_Hz, amplitude_sigmas, margin_sigmas, mains_Hz)
+    return Ring(
+        frequency,
+        sigma_Hz=frequency * sqrt(covariance[0, 0]),
+        amplitude_sigmas=sqrt(max(without - left, 0.0) / variance),
+        margin_sigmas=sqrt(max(runner_up - left, 0.0) / variance),
+        mains_Hz=mains_Hz,
+    )
+
+
+def _strongest(
+    time_s: np.ndarray, moments: np.ndarray, slowest_Hz: float, mains_Hz: float
+) -> tuple[float, float]:
+    """Return the frequency that explains most, and the sum of squares that any other leaves."""
+    frequencies = _frequencies(time_s, slowest_Hz)
+    sums = [_left(time_s, moments, f, _TYPICAL_DAMPING, mains_Hz)[0] for f in frequencies]
+    best_Hz = float(frequencies[int(np.argmin(sums))])
+    others = np.abs(frequencies - best_Hz) > _APART / time_s[-1]
+    return best_Hz, float(min(np.array(sums)[others], default=np.inf))
+
+
+def _refined(
+    time_s: np.ndarray, moments: np.ndarray, slowest_Hz: float, start: np.ndarray, free: int
+) -> OptimizeResult:
+    """Fit the first `free` of the logarithms of frequency, damping and hum's frequency from their start.
+
+    Raises ArithmeticError where the fit does not converge.
+    """
+    low = np.log([_SLOWER * slowest_Hz, _DAMPING[0], _MAINS_HZ[0]])[:free]
+    high = np.log([0.5 / _step_s(time_s), _DAMPING[1], _MAINS_HZ[1]])[:free]
+
+    def residuals(logarithms):
+        return _left(time_s, moments, *np.exp([*logarithms, *start[free:]]))[1]
+
+    fit = least_squares(residuals, np.clip(start[:free], low, high), bounds=(low, high))
+    if not fit.success:
+        raise ArithmeticError("the frequency of the ringing does not converge")
+    return fit
 
 
 def _step_s(time_s: np.ndarray) -> float:
