@@ -99,3 +99,11 @@ def test_several_strokes_are_refused(tmp_path):
         file, np.vstack([values, again]), delimiter=",", header=header, comments="", fmt="%.6f"
     )
     assert "takes one forward stroke a recording" in refusal(copy)
+
+
+def test_a_place_says_nothing_where_the_motor_has_no_zero(tmp_path):
+    copy = edited(tmp_path, f"trials/{TRIAL}/trial.toml", "d_x_sigma_mm", "# d_x_sigma_mm")
+    with (copy / "trials" / TRIAL / "trial.toml").open("a") as file:
+        file.write("[object]\npoint_mm = [60.0, 5.0, 0.0]\n")
+    with pytest.raises(BadInput, match=r"no zero.*state d_x_mm, and no place"):
+        load_session(copy)
