@@ -1,8 +1,8 @@
 """What the cameras see: calibrated views, the bar and the wire in space, the contact. Knows no torque.
 
 This is the door through which `bench` sees: it imports the names below, those of the doors
-`vision.geometry`, `vision.pictures`, `vision.boards` and `vision.calibration`, and nothing behind
-them (tests/house/test_doors.py). Each name is imported from its module at first use, so that a
+`vision.geometry`, `vision.pictures`, `vision.boards`, `vision.calibration` and `vision.live`, and
+nothing behind them (tests/house/test_doors.py). Each name is imported from its module at first use, so that a
 command that sees no picture starts without what sees.
 """
 
@@ -25,7 +25,7 @@ NAMES = {
     "truth.predicted_truth": ("PredictedTruth", "predict_truth"),
     "truth.records": ("FrameTruth", "SharedSigmas", "TrialTruth", "WhiskTruth"),
     "truth.sight_lines": ("sights_of",),
-    "truth.trace": (
+    "truth.trace_points": (
         "BesideWire",
         "Trace",
         "beside_wire",
@@ -33,6 +33,7 @@ NAMES = {
         "points_of_wire",
     ),
     "truth.trial_pictures": ("TrialPictures",),
+    "truth.whisker_turns": ("whisker_angles",),
     "truth.value": ("NAN", "UNKNOWN", "Value"),
     "wire.one_sided": ("SeenWidth",),
     "wire.trace": ("NEAR_CLAMP_MM", "lines_of"),

@@ -9,6 +9,7 @@ from vision.geometry.lazy_names import lazy_names
 
 NAMES = {
     "april_grid": ("AprilGrid",),
+    "body": ("Body",),
     "board_optics": ("estimate_optics",),
     "charuco": ("CharucoBoard",),
     "checkerboard": ("Checkerboard",),

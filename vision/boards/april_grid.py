@@ -21,6 +21,9 @@ _DICTIONARY = cv2.aruco.DICT_APRILTAG_36h11
 _RIMS = (2, 1)
 # [1] Of a tag's side: the narrower of the two rims, one module of eight. A layout.
 _RIM_SHARE = 1.0 / 8.0
+# [px] Blur added to a picture before tags are looked for: in its noise outlines are taken a module
+# inside a tag. Study: tests/vision/boards/test_board_kinds.py.
+_SMOOTH_PX = (0.0, 1.0, 1.5)
 # [columns, rows] Of a tag's corners, clockwise as OpenCV orders them, from the lower left of a tag as
 # Kalibr prints it, upside down. A layout, no threshold.
 _ORDER = ((1, 0), (0, 0), (0, 1), (1, 1))
@@ -87,8 +90,18 @@ class AprilGrid(SaddleBoard):
         """Return the corners of the tags that are seen.
 
         How wide the tags' rims are, and which way up tags were printed, is what puts their corners
-        on one plane.
+        on one plane; of those the picture as smooth as shows most tags is taken.
         """
+        best = np.empty(0, dtype=int), np.empty((0, 2))
+        for smooth_px in _SMOOTH_PX:
+            smooth = cv2.GaussianBlur(picture, (0, 0), smooth_px) if smooth_px else picture
+            found = self._on_a_plane(smooth)
+            if len(found[0]) > len(best[0]):
+                best = found
+        return best
+
+    def _on_a_plane(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ids (n,) and pixels (n, 2) of tags' corners that are on one plane; none if none are."""
         best = np.empty(0, dtype=int), np.empty((0, 2))
         least = _MOST_OFF_PLANE
         for rim in _RIMS:

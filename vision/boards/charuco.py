@@ -18,14 +18,15 @@ from vision.geometry.checks import require, require_length
 class CharucoBoard(SaddleBoard):
     """A ChArUco board in OpenCV's frame: origin top left, z into the board.
 
-    legacy: OpenCV's pattern from before 4.6. inverted: printed white on black. Raises Refused for
-    a board that cannot be.
+    legacy: OpenCV's pattern from before 4.6. inverted: printed white on black. first_id: of its
+    markers, which are numbered on from there. Raises Refused for a board that cannot be.
     """
 
     marker_mm: float
     dictionary: str
     legacy: bool = False
     inverted: bool = False
+    first_id: int = 0
 
     kind: str = field(default="charuco", init=False)
 
@@ -43,9 +44,9 @@ class CharucoBoard(SaddleBoard):
         )
         available = len(_dictionary(self.dictionary).bytesList)
         require(
-            self.marker_count <= available,
-            f"board of {self.squares[0]} x {self.squares[1]} squares needs {self.marker_count} markers, "
-            f"{self.dictionary} has {available}",
+            0 <= self.first_id <= available - self.marker_count,
+            f"board of {self.squares[0]} x {self.squares[1]} squares needs {self.marker_count} markers"
+            f"{f' from {self.first_id} on' if self.first_id else ''}, {self.dictionary} has {available}",
         )
 
     @property
@@ -61,7 +62,7 @@ class CharucoBoard(SaddleBoard):
     @property
     def spare_markers(self) -> tuple[str, int]:
         """Return the board's dictionary, and the first number that the board does not use."""
-        return self.dictionary, self.marker_count
+        return self.dictionary, self.first_id + self.marker_count
 
     def opencv(self) -> cv2.aruco.CharucoBoard:
         """Return the board as OpenCV's object, with only the markers of its dictionary that it
@@ -137,7 +138,7 @@ def _dictionary(name: str) -> cv2.aruco.Dictionary:
 def _opencv_board(board: CharucoBoard) -> cv2.aruco.CharucoBoard:
     """Make OpenCV's board, once for each board: OpenCV warns of narrow borders each time."""
     whole = _dictionary(board.dictionary)
-    markers = whole.bytesList[: board.marker_count]
+    markers = whole.bytesList[board.first_id :][: board.marker_count]
     own = cv2.aruco.Dictionary(markers, whole.markerSize, whole.maxCorrectionBits)
     square_mm = float(board.square_mm)
     charuco = cv2.aruco.CharucoBoard(board.squares, square_mm, float(board.marker_mm), own)

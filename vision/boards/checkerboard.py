@@ -1,7 +1,7 @@
 """The plain checkerboard, found whole or not at all.
 
 Its upper left square is dark. One with an odd number of squares one way and an even one the other
-looks otherwise after half a turn; of any other its points are named from the upper left of the
+differs after half a turn; of any other its points are named from the upper left of the
 picture, and `vision.calibration.turned` makes the cameras agree.
 """
 
@@ -11,7 +11,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from vision.boards.corners import MIN_CORNERS, to_8_bit
+from vision.boards.corners import MIN_CORNERS, Corners, to_8_bit
 from vision.boards.saddle_board import SaddleBoard
 from vision.boards.symmetry import possible_labels, turns_onto_itself, upper_left_first
 from vision.geometry.board import grid_mm
@@ -78,6 +78,20 @@ class Checkerboard(SaddleBoard):
         candidates = possible_labels(px.reshape(-1, 2).astype(float), self)
         dark_first = [px for px in candidates if self._darkness(px, picture) > 0]
         return np.arange(len(px)), upper_left_first(dark_first or candidates)
+
+    def refine(self, grey: np.ndarray, px_guess: np.ndarray, ids: np.ndarray) -> Corners:
+        """Fit saddles as of any board; none where no corner of an outer row or column is one.
+
+        OpenCV takes the edge of a board that is partly out of the picture for such a row, and all its
+        names are of other corners then.
+        """
+        corners = super().refine(grey, px_guess, ids)
+        row, column = np.divmod(corners.ids, self.grid[0])
+        sides = ((column, self.grid[0]), (row, self.grid[1]))
+        for found, count in sides:
+            if not np.isin([0, count - 1], found).all():
+                return Corners.none()
+        return corners
 
     def _darkness(self, px: np.ndarray, picture: np.ndarray) -> float:
         """Return how much darker the squares are that should be dark, by corners (m, 2) px."""

@@ -47,6 +47,12 @@ class Corners(Rows):
         return len(self.ids)
 
 
+def by_face(view: Corners, board: Board) -> list[Corners]:
+    """Return the corners on each flat face that a view shows; all of them for a board in a plane."""
+    face = board.face_of[view.ids]
+    return [view.select(face == number) for number in np.unique(face)]
+
+
 def find_corners(grey: np.ndarray, board: Board) -> Corners:
     """Find the board's points in a grey picture, uint8 or uint16.
 

@@ -112,7 +112,7 @@ def _boards_of_other_dictionaries(
     sizes = {}
     for name, count in counts.items():
         size = len(_opencv_dictionary(name).bytesList)
-        if count > least and size >= board.marker_count:
+        if count > least and size >= board.spare_markers[1]:
             sizes[name] = size
     for name in sorted(sizes, key=sizes.get)[:_MOST_DICTIONARIES]:
         entered = replace(board, dictionary=name)
@@ -143,8 +143,8 @@ def _describe_markers(greys: Sequence[np.ndarray], board: "CharucoBoard") -> str
         )
     return (
         f"{count:.0f} markers of {board.dictionary} are seen a picture, but not laid out as on a "
-        f"board of {board.squares[0]} x {board.squares[1]} squares: check squares, legacy and the "
-        "printed board"
+        f"board of {board.squares[0]} x {board.squares[1]} squares: check squares, legacy, the first "
+        "marker's number and the printed board"
     )
 
 

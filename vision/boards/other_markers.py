@@ -42,6 +42,8 @@ _LEAST_PIXELS_A_MODULE = 4
 # [parameters] Homography to the print, logarithms of the blur along both sides, light, contrast. A
 # layout, no threshold.
 _TO_PRINT, _BLUR, _LIGHT, _CONTRAST = slice(0, 8), slice(8, 10), slice(10, 13), slice(13, 16)
+# [parameters] Of homography and blur, which come first. A layout, no threshold.
+_GEOMETRY = 10
 # [1] Over sqrt(2 pi): a normal density. Derived.
 _DENSITY = 1.0 / np.sqrt(2.0 * np.pi)
 
@@ -59,7 +61,7 @@ class Marker:
 def find_other_markers(grey: np.ndarray, board: Board) -> list[Marker]:
     """Find the markers of the board's dictionary that the board does not use, in a grey picture.
 
-    Beside a board without markers all count, of DICT_5X5_100.
+    With a board without markers all count, of DICT_5X5_100.
     """
     picture = to_8_bit(grey)
     if board.is_white_on_black:
@@ -100,38 +102,80 @@ def _fit_pattern(
 
     pattern (m, m): 1 where a module is white, with the white rim.
     """
-    middle = corners_px.mean(axis=0)
-    scale_px = np.linalg.norm(corners_px - middle, axis=1).mean()
-    first = ((corners_px - middle) / scale_px).astype(np.float32)
-    on_print = _corners_on_print(len(pattern)).astype(np.float32)
-    to_print = cv2.getPerspectiveTransform(first, on_print).ravel()[:8]
-    parameters = np.append(to_print, np.log(np.repeat(_FIRST_BLUR_PX / scale_px, 2)))
-    rows, columns = np.indices(window.shape).reshape(2, -1)
-    places = (np.column_stack([columns, rows]) - middle) / scale_px
+    units = _MarkerUnits.about(corners_px)
+    on_print = _corners_on_print(len(pattern))
+    parameters = _first_parameters(units, corners_px, on_print)
+    places = units.of_window(window.shape)
     for _ in range(_PASSES):
         is_used = _shows_pattern(places, parameters, len(pattern))
-        model = _Pattern(places[is_used], window.ravel()[is_used], pattern)
         if is_used.sum() < _LEAST_PIXELS_A_MODULE * pattern.size:
             return None
-        start = np.append(parameters, model.light_and_contrast(parameters))
-        fitted = least_squares(
-            model.residuals, start, model.jacobian, method="lm", ftol=_CONVERGED, xtol=_CONVERGED
-        )
-        parameters = fitted.x[:10]
-        if fitted.status <= 0 or not np.all(np.isfinite(parameters)):
+        model = _Pattern(places[is_used], window.ravel()[is_used], pattern)
+        fitted = model.fit(parameters)
+        if fitted is None:
             return None
-    blur_px = scale_px * np.exp(parameters[_BLUR])
-    is_blur = np.all((blur_px > _BLUR_LIMITS_PX[0]) & (blur_px < _BLUR_LIMITS_PX[1]))
-    if not is_blur or np.corrcoef(model.predict(fitted.x), model.grey)[0, 1] < _LEAST_CORRELATION:
+        parameters = fitted[:_GEOMETRY]
+    if not _is_pattern(model, fitted, units.scale_px):
         return None
     from_print = np.linalg.inv(_homography(parameters))
-    return middle + scale_px * cv2.perspectiveTransform(on_print[:, None], from_print)[:, 0]
+    return units.to_px(cv2.perspectiveTransform(on_print[:, None], from_print)[:, 0])
+
+
+@dataclass(frozen=True, eq=False)
+class _MarkerUnits:
+    """Convert pixels to places from a marker's middle (2,), px, in units of its size, px, in which
+    homographies are well conditioned.
+    """
+
+    middle_px: np.ndarray
+    scale_px: float
+
+    @staticmethod
+    def about(corners_px: np.ndarray) -> "_MarkerUnits":
+        """Return the units of a marker with these corners (4, 2)."""
+        middle_px = corners_px.mean(axis=0)
+        return _MarkerUnits(middle_px, np.linalg.norm(corners_px - middle_px, axis=1).mean())
+
+    def from_px(self, px: np.ndarray) -> np.ndarray:
+        """Return places (n, 2) of pixels (n, 2)."""
+        return (px - self.middle_px) / self.scale_px
+
+    def of_window(self, shape: tuple[int, ...]) -> np.ndarray:
+        """Return places (n, 2) of all pixels of a window of this shape (h, w), row by row."""
+        rows, columns = np.indices(shape).reshape(2, -1)
+        return self.from_px(np.column_stack([columns, rows]))
+
+    def to_px(self, places: np.ndarray) -> np.ndarray:
+        """Return pixels (n, 2) of places (n, 2)."""
+        return self.middle_px + self.scale_px * places
+
+
+def _first_parameters(
+    units: _MarkerUnits, corners_px: np.ndarray, on_print: np.ndarray
+) -> np.ndarray:
+    """Return homography and blur (10,) by a marker's corners (4, 2) in the picture and on the print."""
+    corners = units.from_px(corners_px).astype(np.float32)
+    to_print = cv2.getPerspectiveTransform(corners, on_print).ravel()[:8]
+    return np.append(to_print, np.log(np.repeat(_FIRST_BLUR_PX / units.scale_px, 2)))
+
+
+def _is_pattern(model: "_Pattern", fitted: np.ndarray, scale_px: float) -> bool:
+    """Return whether the picture is as fitted, and the blur along both sides that of an edge.
+
+    fitted (16,): all parameters. scale_px: of the marker.
+    """
+    blur_px = scale_px * np.exp(fitted[_BLUR])
+    if not np.all((blur_px > _BLUR_LIMITS_PX[0]) & (blur_px < _BLUR_LIMITS_PX[1])):
+        return False
+    return not np.corrcoef(model.predict(fitted), model.grey)[0, 1] < _LEAST_CORRELATION
 
 
 def _corners_on_print(modules: int) -> np.ndarray:
-    """Return the corners (4, 2) of a marker in a rim, in modules from the rim's own corner."""
+    """Return the corners (4, 2) of a marker in a rim, in modules from the rim's own corner, as OpenCV
+    takes them.
+    """
     far = modules - _RIM
-    return np.array([[_RIM, _RIM], [far, _RIM], [far, far], [_RIM, far]])
+    return np.array([[_RIM, _RIM], [far, _RIM], [far, far], [_RIM, far]], dtype=np.float32)
 
 
 def _homography(parameters: np.ndarray) -> np.ndarray:
@@ -180,14 +224,27 @@ class _Pattern:
 
     def light_and_contrast(self, parameters: np.ndarray) -> np.ndarray:
         """Return the light and the contrast (6,) that fit best."""
-        share = self._share(parameters)[0]
+        share = self._white_share(parameters).share
         design = np.column_stack([self._light, share[:, None] * self._light])
         return np.linalg.lstsq(design, self.grey, rcond=None)[0]
+
+    def fit(self, first: np.ndarray) -> np.ndarray | None:
+        """Return all parameters (16,) that fit best, from those of homography and blur (10,); None
+        where the fit does not converge.
+        """
+        start = np.append(first, self.light_and_contrast(first))
+        fitted = least_squares(
+            self.residuals, start, self.jacobian, method="lm", ftol=_CONVERGED, xtol=_CONVERGED
+        )
+        if fitted.status <= 0 or not np.all(np.isfinite(fitted.x[:_GEOMETRY])):
+            return None
+        return fitted.x
 
     def predict(self, parameters: np.ndarray) -> np.ndarray:
         """Return the grey levels (n,)."""
         light = self._light @ parameters[_LIGHT]
-        return light + self._share(parameters)[0] * (self._light @ parameters[_CONTRAST])
+        share = self._white_share(parameters).share
+        return light + share * (self._light @ parameters[_CONTRAST])
 
     def residuals(self, parameters: np.ndarray) -> np.ndarray:
         """Return the grey levels (n,) less those of the picture."""
@@ -198,50 +255,90 @@ class _Pattern:
 
         How the blur's width in modules changes with the homography is left out: it moves no edge.
         """
-        share, by_uv, by_blur = self._share(parameters)
-        uv, depth = _on_print(self.places, parameters)
+        white = self._white_share(parameters)
         contrast = self._light @ parameters[_CONTRAST]
-        by_uv = contrast[:, None] * by_uv / depth[:, None]  # (n, 2)
-        along = np.einsum("ni,ni->n", by_uv, uv)
         J = np.empty((len(self.places), 16))
-        J[:, 0:3] = by_uv[:, :1] * self._light[:, [1, 2, 0]]
-        J[:, 3:6] = by_uv[:, 1:] * self._light[:, [1, 2, 0]]
-        J[:, 6:8] = -along[:, None] * self.places
-        J[:, _BLUR] = contrast[:, None] * by_blur
+        J[:, _TO_PRINT] = self._by_homography(parameters, contrast[:, None] * white.by_uv)
+        J[:, _BLUR] = contrast[:, None] * white.by_log_blur
         J[:, _LIGHT] = self._light
-        J[:, _CONTRAST] = share[:, None] * self._light
+        J[:, _CONTRAST] = white.share[:, None] * self._light
         return J
 
-    def _share(self, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the white share (n,) of each place, and its derivatives (n, 2) by u, v and by the
-        logarithm of the blur along both.
-
-        Where the print is seen aslant its blur along u and v is correlated: exp(c ∂²/∂u∂v) of the
-        share without that, with the covariance c, is taken to its second order.
-        """
+    def _by_homography(self, parameters: np.ndarray, by_uv: np.ndarray) -> np.ndarray:
+        """Return derivatives (n, 8) by the homography, from those by u and v (n, 2)."""
         uv, depth = _on_print(self.places, parameters)
-        slopes = _slopes(uv, depth, parameters)
+        by_numerator = by_uv / depth[:, None]  # (n, 2)
+        by_denominator = -np.einsum("ni,ni->n", by_numerator, uv)
+        xy1 = self._light[:, [1, 2, 0]]
+        by_u = by_numerator[:, :1] * xy1
+        by_v = by_numerator[:, 1:] * xy1
+        return np.hstack([by_u, by_v, by_denominator[:, None] * self.places])
+
+    def _white_share(self, parameters: np.ndarray) -> "_WhiteShare":
+        """Return how white the print is at each place, under the blur there."""
+        uv, depth = _on_print(self.places, parameters)
         blur = _blur_on_print(uv, depth, parameters)
-        cosine = np.sum(slopes[:, 0] * slopes[:, 1], axis=1) / np.prod(
-            np.linalg.norm(slopes, axis=2), axis=1
+        cosine = _cosine_of_sides(_slopes(uv, depth, parameters))
+        return _WhiteShare(
+            self.pattern,
+            _BlurredModules.at(uv[:, 0], blur[:, 0], len(self.pattern)),
+            _BlurredModules.at(uv[:, 1], blur[:, 1], len(self.pattern)),
+            blur,
+            cosine * np.prod(blur, axis=1),
         )
-        c = cosine * np.prod(blur, axis=1)
-        across = _BlurredModules.at(uv[:, 0], blur[:, 0], len(self.pattern))
-        down = _BlurredModules.at(uv[:, 1], blur[:, 1], len(self.pattern))
 
-        def both(of_v: np.ndarray, of_u: np.ndarray) -> np.ndarray:
-            """Return the sum (n,) over modules."""
-            return np.sum((of_v @ self.pattern) * of_u, axis=1)
 
-        share = both(down.share, across.share)
-        share += c * both(down.slope, across.slope)
-        share += 0.5 * c**2 * both(down.bend, across.bend)
-        by_u = both(down.share, across.slope) + c * both(down.slope, across.bend)
-        by_v = both(down.slope, across.share) + c * both(down.bend, across.slope)
-        # A Gaussian's width s changes a blurred edge by s² times its second derivative.
-        by_u_blur = blur[:, 0] ** 2 * both(down.share, across.bend)
-        by_v_blur = blur[:, 1] ** 2 * both(down.bend, across.share)
-        return share, np.column_stack([by_u, by_v]), np.column_stack([by_u_blur, by_v_blur])
+def _cosine_of_sides(slopes: np.ndarray) -> np.ndarray:
+    """Return the cosine (n,) of the angle between the gradients of u and v, of slopes (n, 2, 2)."""
+    along_both = np.sum(slopes[:, 0] * slopes[:, 1], axis=1)
+    return along_both / np.prod(np.linalg.norm(slopes, axis=2), axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class _WhiteShare:
+    """Hold the white share of n places on a blurred pattern (m, m).
+
+    across, down: the modules along u and v. blur (n, 2): along both, in modules. covariance (n,): of
+    the blur along u with that along v. Where the print is seen aslant these are correlated:
+    exp(covariance ∂²/∂u∂v) of the share without that is taken to its second order.
+    """
+
+    pattern: np.ndarray
+    across: "_BlurredModules"
+    down: "_BlurredModules"
+    blur: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def share(self) -> np.ndarray:
+        """Return the share (n,) itself."""
+        share = self._sum(self.down.share, self.across.share)
+        share += self.covariance * self._sum(self.down.slope, self.across.slope)
+        share += 0.5 * self.covariance**2 * self._sum(self.down.bend, self.across.bend)
+        return share
+
+    @property
+    def by_uv(self) -> np.ndarray:
+        """Return the derivatives (n, 2) by u and v, to the first order in the covariance."""
+        by_u = self._sum(self.down.share, self.across.slope)
+        by_u += self.covariance * self._sum(self.down.slope, self.across.bend)
+        by_v = self._sum(self.down.slope, self.across.share)
+        by_v += self.covariance * self._sum(self.down.bend, self.across.slope)
+        return np.column_stack([by_u, by_v])
+
+    @property
+    def by_log_blur(self) -> np.ndarray:
+        """Return the derivatives (n, 2) by the logarithm of the blur along u and v.
+
+        A Gaussian's width s changes a blurred edge by s² times its second derivative.
+        """
+        by_u_blur = self.blur[:, 0] ** 2 * self._sum(self.down.share, self.across.bend)
+        by_v_blur = self.blur[:, 1] ** 2 * self._sum(self.down.bend, self.across.share)
+        return np.column_stack([by_u_blur, by_v_blur])
+
+    def _sum(self, of_v: np.ndarray, of_u: np.ndarray) -> np.ndarray:
+        """Return the sum (n,) over modules of factors (n, m) of their rows and columns."""
+        return np.sum((of_v @ self.pattern) * of_u, axis=1)
 
 
 @dataclass(frozen=True, eq=False)

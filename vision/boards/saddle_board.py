@@ -33,7 +33,7 @@ class SaddleBoard(Board):
     @property
     @abstractmethod
     def clear_mm(self) -> float:
-        """Return how far beside an edge nothing else is printed."""
+        """Return how far from an edge nothing else is printed."""
 
     @property
     def is_dark_first(self) -> np.ndarray:

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import cv2
 import numpy as np
 
-from vision.boards.corners import Corners
+from vision.boards.corners import Corners, by_face
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.lens import fold_radius
@@ -58,26 +58,39 @@ _LEAST_REACH = 0.7
 
 
 def without_strays(view: Corners, board: Board) -> Corners:
-    """Return the corners that lie as on a plane seen through any lens.
+    """Return the corners of which each face's lie as on a plane seen through any lens.
 
-    None remain where too few do (a mislabelled board).
+    None remain of a face where too few do (a mislabelled board).
     """
+    return Corners.join(
+        [Corners.none(), *(_on_plane(part, board) for part in by_face(view, board))]
+    )
+
+
+def _on_plane(view: Corners, board: Board) -> Corners:
+    """Return the corners of one face that lie as on a plane seen through any lens; none of too few."""
     if len(view) < MIN_VIEW_CORNERS:
         return Corners.none()
     limit_px = max(_STRAY_PX, _STRAY_SHARE * float(np.ptp(view.px, axis=0).max()))
-    H, is_near = cv2.findHomography(board.corners_mm[view.ids, :2], view.px, cv2.RANSAC, limit_px)
+    H, is_near = cv2.findHomography(board.flat_mm[view.ids, :2], view.px, cv2.RANSAC, limit_px)
     return Corners.none() if H is None else view.select(is_near.ravel().astype(bool))
 
 
 def fixes_pose(view: Corners, board: Board) -> bool:
-    """Return whether a view's corners are enough, and spread so that they fix a homography.
+    """Return whether a view's corners on one face are enough, and spread so that they fix a
+    homography.
 
     Five in a row and one beyond it do not. The direct linear transform of the corners onto
     themselves must determine eight of its nine directions.
     """
+    return any(_fixes_plane(part, board) for part in by_face(view, board))
+
+
+def _fixes_plane(view: Corners, board: Board) -> bool:
+    """Return whether a view's corners on one face fix a homography."""
     if len(view) < MIN_VIEW_CORNERS:
         return False
-    points = _normalise(board.corners_mm[view.ids, :2])
+    points = _normalise(board.flat_mm[view.ids, :2])
     homogeneous = np.column_stack([points, np.ones(len(points))])
     zero = np.zeros_like(homogeneous)
     x, y = points.T[:, :, None]

@@ -15,6 +15,7 @@ NAMES = {
     "held_out": ("Agreement", "HeldOut", "check_held_out"),
     "hub_marker": ("MarkerSighting", "by_marker", "first_axis"),
     "hub_turning": ("FirstRig", "first_rig", "first_rig_about"),
+    "hub_turns": ("marker_turns",),
     "kalibr_target": ("read_kalibr_target",),
     "known_lengths": ("check_known_lengths",),
     "moving_line": ("MovingLines", "moving_lines"),

@@ -1,9 +1,10 @@
-"""The adjustment: Levenberg–Marquardt with pictures' instants and board poses eliminated.
+"""The adjustment: Levenberg–Marquardt with pictures' instants, points and board poses eliminated.
 
 A view's pose touches only the cameras that saw it, so that all poses are eliminated from the normal
 equations (Schur complement) after the pictures' instants. The work grows linearly with views; what
 is left to solve is as small as the cameras are few, and its inverse is the covariance of what is
-kept, everything eliminated being marginalised.
+kept, everything eliminated being marginalised. Where the board's points are free they are eliminated
+first, which couples all views.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from vision.calibration.bundle import N_CAMERA, N_VIEW, BundleState, Priors, Sightings
-from vision.calibration.normal_equations import Equations, Normal, normal_equations
+from vision.calibration.normal_equations import LinearisedCost, NormalEquations, normal_equations
+from vision.geometry.board import Board
 
 # [1] Keeps a view whose few corners fix no pose solvable; of what is fixed it changes the tenth
 # digit. Study: thresholds.py calibration.adjust _RIDGE ….
@@ -40,7 +42,8 @@ class Solution:
     """The state of least cost.
 
     residual_px (n, 2): seen − predicted. covariance (G, G): of the global parameters with all view
-    poses marginalised; rows of held parameters are 0.
+    poses marginalised; rows of held parameters are 0. fitted_points: how many coordinates of the
+    board's points the pictures determine.
     """
 
     state: BundleState
@@ -48,29 +51,30 @@ class Solution:
     covariance: np.ndarray
     cost: float
     converged: bool
+    fitted_points: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """What was seen, of a board with corners_mm (m, 3), and what is known besides.
+    """What was seen, of which board, and what is known besides.
 
     width: of Cauchy's loss in sigmas, inf for least squares.
     """
 
     seen: Sightings
-    corners_mm: np.ndarray
+    board: Board
     priors: Priors
     width: float
 
-    def normal(self, state: BundleState) -> Normal:
+    def normal(self, state: BundleState) -> LinearisedCost:
         """Return the cost and the normal equations at a state."""
-        return normal_equations(state, self.seen, self.corners_mm, self.priors, self.width)
+        return normal_equations(state, self.seen, self.board, self.priors, self.width)
 
 
 def adjust_bundle(
     state: BundleState,
     seen: Sightings,
-    corners_mm: np.ndarray,
+    board: Board,
     priors: Priors,
     *,
     width: float = np.inf,
@@ -78,18 +82,19 @@ def adjust_bundle(
 ) -> Solution:
     """Find the state of least cost from `state`, by Levenberg–Marquardt.
 
-    corners_mm (m, 3): of the board. width: of Cauchy's loss in sigmas, inf for least squares.
+    width: of Cauchy's loss in sigmas, inf for least squares.
     tolerance: relative fall of the cost at which the iteration ends.
     """
-    problem = _Problem(seen, corners_mm, priors, width)
+    problem = _Problem(seen, board, priors, width)
     state, normal, converged = _descend(problem, state, tolerance)
     covariance = _covariance(normal, priors.directions())
-    return Solution(state, normal.residual_px, covariance, normal.cost, converged)
+    fitted = normal.points.fitted if normal.points else 0.0
+    return Solution(state, normal.residual_px, covariance, normal.cost, converged, fitted)
 
 
 def _descend(
     problem: _Problem, state: BundleState, tolerance: float
-) -> tuple[BundleState, Normal, bool]:
+) -> tuple[BundleState, LinearisedCost, bool]:
     """Return the state of least cost, its equations, and whether the cost came to rest.
 
     tolerance: relative fall of the cost at which the iteration ends.
@@ -118,9 +123,10 @@ def _descend(
 
 
 def _solve_step(
-    normal: Normal, directions: np.ndarray, damping: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return Marquardt's step of the globals (G,), the views (V, 6) and the instants (V, C).
+    normal: LinearisedCost, directions: np.ndarray, damping: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return Marquardt's step of the globals (G,), the views (V, 6), the instants (V, C) and the
+    points (m, 3).
 
     directions (G, F): how the globals move with the free ones.
     """
@@ -130,22 +136,24 @@ def _solve_step(
     free_step = _solve_scaled(reduced, gradient)
     step = directions @ free_step
     view_steps = (Cc - CB @ free_step).reshape(-1, N_VIEW)
-    return step, view_steps, _instant_steps(normal, step, view_steps)
+    point_steps = normal.points.steps(np.concatenate([step, view_steps.ravel()]))
+    return step, view_steps, _instant_steps(normal, step, view_steps), point_steps
 
 
-def _instant_steps(normal: Normal, step: np.ndarray, view_steps: np.ndarray) -> np.ndarray:
+def _instant_steps(normal: LinearisedCost, step: np.ndarray, view_steps: np.ndarray) -> np.ndarray:
     """Return the steps (V, C) of the pictures' instants that go with those of globals and views."""
     shots = normal.shots
     instants = normal.instants
     others = np.hstack([step[shots.columns], view_steps.ravel()[shots.poses]])  # (s, p)
     gradient = instants.gradient - np.sum(instants.coupling * others, axis=1)
-    instant_steps = np.zeros((len(view_steps), len(step) // N_CAMERA))
+    of_cameras = len(step) + N_CAMERA - shots.columns.shape[1]
+    instant_steps = np.zeros((len(view_steps), of_cameras // N_CAMERA))
     instant_steps[shots.view, shots.camera] = gradient / instants.precision
     return instant_steps
 
 
 def _eliminate_views(
-    equations: Equations, directions: np.ndarray, damping: float = 0.0
+    equations: NormalEquations, directions: np.ndarray, damping: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Reduce the equations to the free globals: eliminate the views' poses by the Schur complement.
 
@@ -178,7 +186,7 @@ def _solve_scaled(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return scale * np.linalg.lstsq(unit, scale * vector, rcond=1e-14)[0]
 
 
-def _covariance(normal: Normal, directions: np.ndarray) -> np.ndarray:
+def _covariance(normal: LinearisedCost, directions: np.ndarray) -> np.ndarray:
     """Return the covariance (G, G) of the globals, all poses and instants being marginalised.
 
     directions (G, F): how the globals move with the free ones.

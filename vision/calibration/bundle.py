@@ -4,7 +4,10 @@ from them.
 Every observation is a corner of the board, seen by one camera in one view. Parameters:
 
 - of each camera, CAMERA_COLUMNS: nine of the lens, w and v of its pose, clock offset (16);
-- of the board, PRINT_TERMS: relative size, stretch, warp along x and y (4);
+- of the board (B): those of its shape, where it is a body of several faces, then PRINT_TERMS:
+  relative size, stretch, warp along x and y (4);
+- of each of the board's points, where these are not exact: how far it is from its place (3), a face's
+  points not moving as one;
 - of each view: w and v of the board's pose (6);
 - where the board moves and cameras are not triggered together, of each picture: how late it is (1).
 
@@ -19,7 +22,7 @@ import numpy as np
 
 from vision.calibration.board_motion import Trajectory
 from vision.geometry import lens as lens_model
-from vision.geometry.board import PRINT_TERMS, printed_corners
+from vision.geometry.board import PRINT_TERMS, Board
 from vision.geometry.crop import Crop
 from vision.geometry.rotation import exp_rotation, left_jacobian, skew
 from vision.geometry.rows import Rows
@@ -72,8 +75,9 @@ class Sightings(Rows):
 class BundleState:
     """All parameters.
 
-    lens (C, 9). T_camera_world (C, 3, 4). T_world_board (V, 3, 4). board (4,): PRINT_TERMS. clock
-    (C,): offset, s. instants (V, C): how much later than it should each picture was taken, s.
+    lens (C, 9). T_camera_world (C, 3, 4). T_world_board (V, 3, 4). board (B,): its
+    shape and PRINT_TERMS. points_mm (m, 3): how far its points are from there, in its frame; (1, 3) for
+    all of them. clock (C,): offset, s. instants (V, C): how much later than it should each picture was taken, s.
     trajectory: the views in time, along which the board moves between pictures of one view; None
     where cameras are triggered together.
     """
@@ -82,6 +86,7 @@ class BundleState:
     T_camera_world: np.ndarray
     T_world_board: np.ndarray
     board: np.ndarray = field(default_factory=lambda: np.zeros(N_BOARD))
+    points_mm: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
     clock: np.ndarray | None = None
     instants: np.ndarray | None = None
     trajectory: Trajectory | None = None
@@ -94,23 +99,29 @@ class BundleState:
             object.__setattr__(self, "instants", np.zeros((len(self.T_world_board), cameras)))
 
     def global_values(self) -> np.ndarray:
-        """Return the values that priors constrain, (16 C + 4,); poses stand as 0."""
+        """Return the values that priors constrain, (16 C + B,); poses stand as 0."""
         per_camera = np.zeros((len(self.lens), N_CAMERA))
         per_camera[:, :9] = self.lens
         per_camera[:, CLOCK] = self.clock
         return np.concatenate([per_camera.ravel(), self.board])
 
     def move(
-        self, global_step: np.ndarray, view_steps: np.ndarray, instant_steps: np.ndarray
+        self,
+        global_step: np.ndarray,
+        view_steps: np.ndarray,
+        instant_steps: np.ndarray,
+        point_steps: np.ndarray | float = 0.0,
     ) -> "BundleState":
-        """Return the state moved by steps (16 C + 4,), (V, 6) and (V, C)."""
-        cameras = global_step[:-N_BOARD].reshape(-1, N_CAMERA)
+        """Return the state moved by steps (16 C + B,), (V, 6), (V, C) and (m, 3)."""
+        of_cameras = N_CAMERA * len(self.lens)
+        cameras = global_step[:of_cameras].reshape(-1, N_CAMERA)
         return replace(
             self,
             lens=self.lens + cameras[:, :9],
             T_camera_world=_move_poses(self.T_camera_world, cameras[:, POSE]),
             T_world_board=_move_poses(self.T_world_board, view_steps),
-            board=self.board + global_step[-N_BOARD:],
+            board=self.board + global_step[of_cameras:],
+            points_mm=self.points_mm + point_steps,
             clock=self.clock + cameras[:, CLOCK],
             instants=self.instants + instant_steps,
         )
@@ -127,12 +138,13 @@ def _move_poses(T: np.ndarray, steps: np.ndarray) -> np.ndarray:
 class Priors:
     """What is known besides the pictures, and what is held.
 
-    free (16 C + 4,): bool. mean, sigma (16 C + 4,): of independent observations of the global
+    free (16 C + B,): bool. mean, sigma (16 C + B,): of independent observations of the global
     parameters, sigma inf where there is none (poses: always inf). view_free (V,): bool. pose_view,
     pose_T (3, 4), pose_sigma (6,): one view whose pose was measured (the board on the rig), in w
     rad and v mm; pose_view is None where there is none. late_sigma_s (C,): how far a picture's instant
     strays from its time; None: not at all. shared: cameras with one lens, of which all but the first have no
-    free lens or clock of their own; None: each has its own.
+    free lens or clock of their own; None: each has its own. point_sigma_mm: how far the board's points are
+    from their places, per axis; 0: not at all.
     """
 
     free: np.ndarray
@@ -144,9 +156,10 @@ class Priors:
     pose_sigma: np.ndarray | None = None
     late_sigma_s: np.ndarray | None = None
     shared: "SharedLenses | None" = None
+    point_sigma_mm: float = 0.0
 
     def directions(self) -> np.ndarray:
-        """Return how the global parameters move with the free ones, (16 C + 4, F)."""
+        """Return how the global parameters move with the free ones, (16 C + B, F)."""
         moved = np.eye(len(self.free))
         if self.shared is not None:
             moved = self.shared.moved_by(moved)
@@ -185,7 +198,7 @@ class SharedLenses:
         return mask
 
     def moved_by(self, step: np.ndarray) -> np.ndarray:
-        """Return steps (16 C + 4, F) of which the tied parameters follow those that they share."""
+        """Return steps (16 C + B, F) of which the tied parameters follow those that they share."""
         followed = step.copy()
         terms = [*range(len(lens_model.LENS_TERMS)), CLOCK]
         for camera, first in enumerate(self.first.tolist()):
@@ -197,15 +210,24 @@ class SharedLenses:
         return followed
 
 
-def predict(
-    state: BundleState, seen: Sightings, corners_mm: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Predict the pixels (n, 2) of all sightings, and their Jacobian (n, 2, 26 or 38).
+def predict(state: BundleState, seen: Sightings, board: Board) -> tuple[np.ndarray, np.ndarray]:
+    """Predict the pixels (n, 2) of all sightings, and their Jacobian (n, 2, 16 + B + 6 or 18).
 
-    Its columns: the camera's 16, the board's 4, the view's 6; with a trajectory also the 6 of
+    Its columns: the camera's 16, the board's B, the view's 6; with a trajectory also the 6 of
     the view before and the 6 of the view after.
     """
-    points_mm, by_board = printed_corners(corners_mm, state.board)
+    px, J, _ = predict_with_points(state, seen, board)
+    return px, J
+
+
+def predict_with_points(
+    state: BundleState, seen: Sightings, board: Board
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Predict the pixels of all sightings and their Jacobian as `predict` does, and return the
+    derivatives (n, 2, 3) by the board's point of each sighting, too.
+    """
+    points_mm, by_board = board.printed(state.board)
+    points_mm = points_mm + state.points_mm
     motion = _board_motion(state, seen)
     placed = _place_corners(state, seen, motion, points_mm)
     px, by_x, by_lens = _project(state, seen.camera, placed.in_camera)
@@ -214,9 +236,10 @@ def predict(
     by_turn = -by_world @ skew(placed.turned)  # Exp(w) y = y + w × y to first order
     by_time = motion.by_time(by_turn, by_world)
     by_camera = [by_lens, -by_x @ skew(placed.in_camera), by_x, by_time]
-    by_print = by_world @ motion.turn @ placed.R_board @ by_board[seen.corner]
+    by_point = by_world @ motion.turn @ placed.R_board
     by_views = motion.by_poses(by_turn, by_world)
-    return px, np.concatenate([*by_camera, by_print, *by_views], axis=2)
+    J = np.concatenate([*by_camera, by_point @ by_board[seen.corner], *by_views], axis=2)
+    return px, J, by_point
 
 
 def _project(

@@ -31,14 +31,16 @@ from vision.boards.sufficiency import (
     without_strays,
 )
 from vision.calibration.adjust import adjust_bundle
-from vision.calibration.bundle import N_BOARD, N_CAMERA, POSE, BundleState, Priors, SharedLenses
-from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
+from vision.calibration.bundle import N_CAMERA, BundleState, Priors
+from vision.calibration.corner_noise import Adjustment, adjust_with_noise
 from vision.calibration.exchanged import check_own_lenses
-from vision.calibration.first_guess import board_pose, first_lens, has_pose
-from vision.calibration.layout import Alone, Layout, gather
+from vision.calibration.faces import place_faces
+from vision.calibration.first_guess import has_pose
+from vision.calibration.layout import Alone, Layout
+from vision.calibration.one_picture import calibrate_picture, first_lenses
 from vision.calibration.place import by_board
 from vision.calibration.shared_errors import with_shared_errors
-from vision.calibration.tied import JointAdjustment, JointInput, Timing, lens_priors, timing_note
+from vision.calibration.tied import JointAdjustment, JointInput, Timing, timing_note
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.board import PRINT_TERMS, Board
 from vision.geometry.camera import N_PARAMETERS, Camera, Cameras, camera_matrix
@@ -57,7 +59,7 @@ _WARP_SIGMA_MM = 2.0
 # of which the views take nearly all into account. Stated.
 _STRETCH_ALARM = 0.01
 # [column] A layout, no threshold.
-_STRETCH = PRINT_TERMS.index("stretch")
+_STRETCH = PRINT_TERMS.index("stretch") - len(PRINT_TERMS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +89,10 @@ class Calibration:
     """Cameras in the rig frame with their covariance, a report each, and notes in plain sentences.
 
     together: whether the cameras saw the board at once. timing: None where pictures of one view
-    count as of one instant. board, board_sigma (4,): the board's print, PRINT_TERMS, sigma 0 of
-    what is held. warnings: where the views contradict what is stated.
+    count as of one instant. board (B,), board_covariance (B, B): the terms of `placed_board`, 0 of
+    what is held: those of its shape, then of its print, PRINT_TERMS. placed_board: with its faces, if it
+    has several, where the adjustment began. points_mm (m, 3) or (1, 3): how far its points are from there.
+    warnings: where the views contradict what is stated.
     """
 
     cameras: Cameras
@@ -96,9 +100,25 @@ class Calibration:
     notes: tuple[str, ...]
     timing: Timing | None
     board: np.ndarray
-    board_sigma: np.ndarray
+    board_covariance: np.ndarray
+    placed_board: Board
+    points_mm: np.ndarray
     together: bool
     warnings: tuple[Reason, ...] = ()
+
+    @property
+    def board_mm(self) -> np.ndarray:
+        """Return the board's points as adjusted, (m, 3)."""
+        return self.placed_board.printed(self.board)[0] + self.points_mm
+
+    def with_board(self, state: BundleState) -> BundleState:
+        """Return a state with the board as adjusted."""
+        return replace(state, board=self.board, points_mm=self.points_mm)
+
+    @property
+    def board_sigma(self) -> np.ndarray:
+        """Return the standard deviations of the board's terms, (B,), 0 of what is held."""
+        return np.sqrt(np.maximum(np.diag(self.board_covariance), 0.0))
 
 
 def calibrate_cameras(
@@ -119,6 +139,7 @@ def calibrate_cameras(
 
     Raises Refused, saying what to record, where the views cannot give a calibration.
     """
+    board = place_faces(views, board)
     crops = [views.crop(name) for name in views.boards]
     alone = _alone(views, board, on_rig is not None)
     standing = standing_boards(views, board) if on_rig else None
@@ -126,7 +147,7 @@ def calibrate_cameras(
     joint = JointInput(alone, standing, board, on_rig, views.times_s, triggered, crops).adjust()
     adjustment, notes = _with_warp(joint.layout, joint.adjustment, board)
     _check_adjustment(alone, adjustment, triggered)
-    adjustment, shared_notes = with_shared_errors(adjustment, board.corners_mm, list(alone))
+    adjustment, shared_notes = with_shared_errors(adjustment, board, list(alone))
     if joint.timing is not None:
         notes.append(timing_note(alone, joint.timing))
     stretch_notes, warnings = _stretch_lines(adjustment, board)
@@ -139,7 +160,9 @@ def calibrate_cameras(
         notes=(*joint.notes, *lens_notes, *notes, *stretch_notes, *shared_notes),
         timing=joint.timing,
         board=adjustment.solution.state.board,
-        board_sigma=_print_sigma(adjustment),
+        board_covariance=_board_covariance(adjustment),
+        placed_board=board,
+        points_mm=adjustment.solution.state.points_mm,
         together=joint.layout.trajectory is not None,
         warnings=(*_disagreement(joint), *warnings, *_squashed(cameras, views.pixel_aspects)),
     )
@@ -255,7 +278,7 @@ def _alone_of_picture(
     """Calibrate the cameras that are parts of one picture. Raises Refused where its views do not suffice."""
     crops = [views.crop(name) for name in names]
     usable = [_usable(views.boards[name], board) for name in names]
-    lenses = _first_lenses([list(own.values()) for own in usable], board, crops)
+    lenses = first_lenses([list(own.values()) for own in usable], board, crops)
     for own, lens in zip(usable, lenses):
         _drop_without_pose(own, board, lens)
     check_views(" and ".join(names), [view for own in usable for view in own.values()], board)
@@ -308,49 +331,6 @@ def _check_sees_board(
         )
 
 
-def _first_lenses(
-    views: Sequence[Sequence[Corners]], board: Board, crops: Sequence[Crop]
-) -> np.ndarray:
-    """Return lenses (C, 9) to begin with of cameras that are parts of one picture, by the views of all.
-
-    Where the picture's middle is the principal point, flipping the picture does not move it.
-    """
-    in_picture = []
-    for own, crop in zip(views, crops):
-        in_picture += [replace(view, px=view.px + crop.offset_px) for view in own]
-    whole = first_lens(in_picture, board.corners_mm, crops[0].whole_px)
-    return np.array([crop.lens_of(whole) for crop in crops])
-
-
-def calibrate_alone(views: Sequence[Corners], board: Board, size_px: tuple[int, int]) -> Adjustment:
-    """Calibrate one camera by itself, robustly, as a start for more.
-
-    The world is the camera's frame.
-    """
-    return calibrate_picture([views], board, [Crop.whole("", size_px)])
-
-
-def calibrate_picture(
-    views: Sequence[Sequence[Corners]], board: Board, crops: Sequence[Crop]
-) -> Adjustment:
-    """Calibrate the one lens of cameras that are parts of a picture, robustly, as a start for more.
-
-    views: of each camera, whose frame is their world.
-    """
-    lenses = _first_lenses(views, board, crops)
-    shots = []
-    poses = []
-    for c, own in enumerate(views):
-        for view in own:
-            shots.append((c, len(poses), view))
-            poses.append(board_pose(view, board.corners_mm, lenses[c]))
-    state = BundleState(lenses, np.tile(np.eye(3, 4), (len(crops), 1, 1)), np.array(poses))
-    priors = lens_priors(len(crops), len(poses), SharedLenses.of(crops))
-    for c in range(len(crops)):
-        priors.free[N_CAMERA * c :][POSE] = False
-    return adjust_coarse(state, gather(shots), board.corners_mm, priors)
-
-
 def _with_warp(layout: Layout, flat: Adjustment, board: Board) -> tuple[Adjustment, list[str]]:
     """Adjust with a warped board where that lowers the cost, at the flat board's noise, by more
     than chance would.
@@ -359,21 +339,21 @@ def _with_warp(layout: Layout, flat: Adjustment, board: Board) -> tuple[Adjustme
     """
     priors = allow_warp(flat.priors)
     kept = flat.seen.select(flat.kept)
-    warped = adjust_bundle(flat.solution.state, kept, board.corners_mm, priors, tolerance=1e-6)
+    warped = adjust_bundle(flat.solution.state, kept, board, priors, tolerance=1e-6)
     if flat.solution.cost - warped.cost < _WARP_GAIN:
         return flat, []
     adjustment = adjust_with_noise(
-        warped.state, layout.seen, board.corners_mm, priors, error_px=flat.error_px, rounds=1
+        warped.state, layout.seen, board, priors, error_px=flat.error_px, rounds=1
     )
-    x_mm, y_mm = adjustment.solution.state.board[2:]
+    x_mm, y_mm = adjustment.solution.state.board[-2:]
     note = f"The board is bent by {x_mm:+.3f} mm along x and {y_mm:+.3f} mm along y; taken into account."
     return adjustment, [note]
 
 
-def _print_sigma(adjustment: Adjustment) -> np.ndarray:
-    """Return the standard deviations (4,) of PRINT_TERMS, 0 of what is held."""
-    variances = np.diag(adjustment.solution.covariance)[-N_BOARD:]
-    return np.sqrt(np.maximum(variances, 0.0))
+def _board_covariance(adjustment: Adjustment) -> np.ndarray:
+    """Return the covariance (B, B) of the board's terms."""
+    terms = len(adjustment.solution.state.board)
+    return adjustment.solution.covariance[-terms:, -terms:]
 
 
 def _stretch_lines(adjustment: Adjustment, board: Board) -> tuple[list[str], tuple[Reason, ...]]:
@@ -386,7 +366,7 @@ def _stretch_lines(adjustment: Adjustment, board: Board) -> tuple[list[str], tup
     if not board.stretch_sigma:
         return [], ()
     stretch = adjustment.solution.state.board[_STRETCH]
-    sigma = _print_sigma(adjustment)[_STRETCH]
+    sigma = np.sqrt(_board_covariance(adjustment)[_STRETCH, _STRETCH])
     found = f"{100 * stretch:+.3f} ± {100 * sigma:.3f} %"
     note = f"The board's print is longer along y than along x by {found}; taken into account."
     by_chance = max(board.stretch_sigma**2 - sigma**2, sigma**2)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vision.boards.body import Body
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import check_lens, check_rig_view
 from vision.calibration import (
@@ -104,8 +105,13 @@ def place_on_rig(
     """Place each camera by its view of the board on the rig, its lens held; the covariance is of
     the poses only, with the share of the print's size and stretch.
 
-    Raises Refused where a camera does not see the board.
+    Raises Refused where a camera does not see the board, and for a body, whose faces have no places
+    without a calibration.
     """
+    if isinstance(board, Body):
+        raise Refused(
+            "a body of several faces places no cameras of known lenses: calibrate with it, or take a board"
+        )
     T_board_rig = invert_transform(T_rig_board)
     lenses = []
     poses = []
@@ -118,14 +124,14 @@ def place_on_rig(
         poses.append(compose(T_camera_board, T_board_rig))
         shots.append((k, 0, view))
     state = BundleState(np.array(lenses), np.array(poses), np.asarray(T_rig_board)[None])
-    priors = with_print(_camera_pose_priors(len(cameras)), board)
-    adjustment = adjust_with_noise(state, gather(shots), board.corners_mm, priors)
+    priors = with_print(_camera_pose_priors(len(cameras), board), board)
+    adjustment = adjust_with_noise(state, gather(shots), board, priors)
     return as_cameras(cameras.names, {c.name: c.size_px for c in cameras}, adjustment)
 
 
-def _camera_pose_priors(n_cameras: int) -> Priors:
+def _camera_pose_priors(n_cameras: int, board: Board) -> Priors:
     """Return the priors with the cameras' poses free, and lenses and board held."""
-    priors = lens_priors(n_cameras, 1)
+    priors = lens_priors(n_cameras, 1, board)
     free = np.zeros_like(priors.free)
     for k in range(n_cameras):
         free[N_CAMERA * k + 9 : N_CAMERA * k + 15] = True

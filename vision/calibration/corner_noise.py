@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 from vision.calibration.adjust import Solution, adjust_bundle
 from vision.calibration.bundle import BundleState, Priors, Sightings, predict
+from vision.geometry.board import Board
 from vision.geometry.refusals import Refused
 
 # [sigma] One Gaussian corner in 25 000 lies beyond (two axes): exp(−4.5²/2). Points of the rig
@@ -74,15 +75,13 @@ class Adjustment:
         return float(np.sqrt(np.mean(np.sum(residual_px**2, axis=1))))
 
 
-def adjust_coarse(
-    state: BundleState, seen: Sightings, corners_mm: np.ndarray, priors: Priors
-) -> Adjustment:
+def adjust_coarse(state: BundleState, seen: Sightings, board: Board, priors: Priors) -> Adjustment:
     """Adjust robustly and once, to see how large each camera's model error is.
 
     Raises Refused where the views contradict each other from the start.
     """
     error = np.full(len(state.lens), _FIRST_ERROR_PX)
-    solution, error, priors = _adjust_robustly(state, seen, corners_mm, priors, error)
+    solution, error, priors = _adjust_robustly(state, seen, board, priors, error)
     kept = np.ones(len(seen), dtype=bool)
     weighted = _with_error(seen, np.full(len(state.lens), _FIRST_ERROR_PX))
     return Adjustment(solution, weighted, kept, solution.residual_px, error, priors)
@@ -91,7 +90,7 @@ def adjust_coarse(
 def adjust_with_noise(
     state: BundleState,
     seen: Sightings,
-    corners_mm: np.ndarray,
+    board: Board,
     priors: Priors,
     *,
     error_px: np.ndarray | None = None,
@@ -106,19 +105,19 @@ def adjust_with_noise(
     """
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
     for _ in range(rounds or (_ROUNDS if state.trajectory is None else _ROUNDS_MOVING)):
-        solution, error, priors = _adjust_robustly(state, seen, corners_mm, priors, error)
+        solution, error, priors = _adjust_robustly(state, seen, board, priors, error)
         state = solution.state
-    return _without_outliers(solution, seen, corners_mm, priors, error)
+    return _without_outliers(solution, seen, board, priors, error)
 
 
 def _adjust_robustly(
-    state: BundleState, seen: Sightings, corners_mm: np.ndarray, priors: Priors, error: np.ndarray
+    state: BundleState, seen: Sightings, board: Board, priors: Priors, error: np.ndarray
 ) -> tuple[Solution, np.ndarray, Priors]:
     """Adjust robustly with model errors (C,) px; also return the errors and the priors learnt by
     it.
     """
     solution = adjust_bundle(
-        state, _with_error(seen, error), corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-4
+        state, _with_error(seen, error), board, priors, width=_ROBUST_WIDTH, tolerance=1e-4
     )
     if not np.isfinite(solution.cost):
         raise Refused(
@@ -130,7 +129,7 @@ def _adjust_robustly(
 
 
 def _without_outliers(
-    solution: Solution, seen: Sightings, corners_mm: np.ndarray, priors: Priors, error: np.ndarray
+    solution: Solution, seen: Sightings, board: Board, priors: Priors, error: np.ndarray
 ) -> Adjustment:
     """Drop outliers and adjust by least squares, from a robust solution and its model errors (C,).
 
@@ -141,10 +140,11 @@ def _without_outliers(
     if not kept.any():
         raise Refused("no corner agrees with the others: is this the board as described?")
     for _ in range(2):
-        error = _error_by_mean(residual_px, seen, kept, error, priors)
+        fitted = solution.fitted_points
+        error = _error_by_mean(residual_px, seen, kept, error, priors, fitted)
         weighted = _with_error(seen, error)
-        solution = adjust_bundle(solution.state, weighted.select(kept), corners_mm, priors)
-        residual_px = seen.px - predict(solution.state, seen, corners_mm)[0]
+        solution = adjust_bundle(solution.state, weighted.select(kept), board, priors)
+        residual_px = seen.px - predict(solution.state, seen, board)[0]
     solution = replace(solution, residual_px=residual_px)
     return Adjustment(solution, weighted, kept, residual_px, error, priors)
 
@@ -198,12 +198,17 @@ def _inliers(residual: np.ndarray, weighted: Sightings) -> np.ndarray:
 
 
 def _error_by_mean(
-    residual, seen: Sightings, kept: np.ndarray, error: np.ndarray, priors: Priors
+    residual,
+    seen: Sightings,
+    kept: np.ndarray,
+    error: np.ndarray,
+    priors: Priors,
+    fitted_points: float,
 ) -> np.ndarray:
     """Return each camera's model error (C,), px, at which the kept residuals' mean square is what
     so many fitted parameters leave of it.
     """
-    parameters = priors.free.sum() + 6 * priors.view_free.sum()
+    parameters = priors.free.sum() + 6 * priors.view_free.sum() + fitted_points
     if priors.late_sigma_s is not None:
         parameters += len(seen.shot_starts())
     freedom = max(1.0 - parameters / max(2 * kept.sum(), 1), _LEAST_FREEDOM)

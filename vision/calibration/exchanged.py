@@ -49,17 +49,20 @@ def check_own_lenses(
     best_px = residual_px[own, best]
     moved = np.flatnonzero(best != own)
     if len(moved) and np.all(own_px[moved] > _CLEAR_RATIO * best_px[moved]):
-        found = [_fit_by_both(names[k], names[best[k]], own_px[k], best_px[k]) for k in moved]
-        sentence = _exchanged([names[k] for k in moved], found, same_in_trials)
-        raise Refused(sentence, "boards_exchanged")
+        exchanged = [names[k] for k in moved]
+        found = [_fit_by_both(names, residual_px, k, best[k]) for k in moved]
+        raise Refused(_exchanged(exchanged, found, same_in_trials), "boards_exchanged")
     return _notes_on_alike(names, residual_px)
 
 
-def _fit_by_both(name: str, other: str, own_px: float, other_px: float) -> str:
-    """Return how well another camera's lens and its own explain a camera's picture."""
+def _fit_by_both(names: list[str], residual_px: np.ndarray, own: int, other: int) -> str:
+    """Return how well another camera's lens and its own explain a camera's picture.
+
+    residual_px (C, C): of each camera's view by each lens.
+    """
     return (
-        f"camera {name}'s picture of the board on the rig by the lens of boards/{other} "
-        f"to {other_px:.3f} px, by that of boards/{name} to {own_px:.3f} px"
+        f"camera {names[own]}'s picture of the board on the rig by the lens of boards/{names[other]} "
+        f"to {residual_px[own, other]:.3f} px, by that of boards/{names[own]} to {residual_px[own, own]:.3f} px"
     )
 
 
@@ -112,6 +115,6 @@ def _residual_px(lens: np.ndarray, view: Corners, board: Board) -> float:
         T_camera_board = board_pose(view, board.corners_mm, lens)
     except Refused:
         return np.inf
-    state = BundleState(lens[None], np.eye(3, 4)[None], T_camera_board[None])
-    fitted = adjust_bundle(state, gather([(0, 0, view)]), board.corners_mm, pose_priors(1, 1))
+    state = BundleState(lens[None], np.eye(3, 4)[None], T_camera_board[None], board.stated_terms)
+    fitted = adjust_bundle(state, gather([(0, 0, view)]), board, pose_priors(1, 1, board))
     return float(np.sqrt(np.mean(fitted.residual_px**2)))

@@ -4,7 +4,8 @@ Good to a few percent, which suffices: the adjustment (`vision.calibration.adjus
 began.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -16,6 +17,10 @@ from vision.geometry.rotation import apply, compose, invert_transform, log_rotat
 
 # [picture widths] 150° to 3° across: where a camera on a bench lies. Derived.
 _FOCAL_LIMITS = (0.15, 20.0)
+# [1] Thickness over size below which points are in a plane: rounding. Derived.
+_FLAT = 1e-9
+Name = TypeVar("Name", bound=Hashable)
+View = TypeVar("View", bound=Hashable)
 
 
 def focal_length_px(
@@ -77,7 +82,8 @@ def first_lens(
 
 
 def board_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> np.ndarray:
-    """Return T_camera_board (3, 4) of one view, the better of a plane's two mirrored poses (IPPE).
+    """Return T_camera_board (3, 4) of one view: of points in a plane the better of its two mirrored
+    poses (IPPE), of others the pose of least squares (SQPnP).
 
     Raises Refused where its corners give none.
     """
@@ -85,7 +91,7 @@ def board_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> np.nd
     is_known = np.all(np.isfinite(ab), axis=1)
     points_mm = corners_mm[view.ids[is_known]]
     solved, turns, shifts, _ = cv2.solvePnPGeneric(
-        points_mm, ab[is_known][:, None], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
+        points_mm, ab[is_known][:, None], np.eye(3), None, flags=_pose_method(points_mm)
     )
     if solved:
         T = np.column_stack([cv2.Rodrigues(turns[0])[0], shifts[0]])
@@ -95,6 +101,13 @@ def board_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> np.nd
         f"a view of {len(view)} corners gives no board pose: corners along one line, or a wrong "
         "board"
     )
+
+
+def _pose_method(points_mm: np.ndarray) -> int:
+    """Return OpenCV's method for the pose of points (n, 3) in a plane, or not in one."""
+    spread = np.linalg.svd(points_mm - points_mm.mean(axis=0), compute_uv=False)
+    is_plane = spread[-1] <= _FLAT * spread[0]
+    return cv2.SOLVEPNP_IPPE if is_plane else cv2.SOLVEPNP_SQPNP
 
 
 def has_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> bool:
@@ -108,32 +121,42 @@ def has_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> bool:
 def chain_cameras(poses: Mapping[str, Mapping[int, np.ndarray]]) -> dict[str, np.ndarray]:
     """Return T_camera_world of every camera, the world being the first camera's frame.
 
-    Cameras are added one by one, each by the boards that it saw together with one of those before.
     poses[camera][k]: T_camera_board of view k. Raises Refused where cameras share no view.
     """
+    T_camera_world = chain_poses(poses)
+    for name in poses:
+        if name not in T_camera_world:
+            raise Refused(
+                f"camera {name} never sees the board at the same time as another: record such views"
+            )
+    return T_camera_world
+
+
+def chain_poses(poses: Mapping[Name, Mapping[View, np.ndarray]]) -> dict[Name, np.ndarray]:
+    """Return T_thing_first of each thing that is tied to the first one, by what both have seen.
+
+    Things are added one by one, each by what it saw together with one of those before.
+    poses[thing][k]: of view k before that thing.
+    """
     first = next(iter(poses))
-    T_camera_world = {first: np.eye(3, 4)}
-    while len(T_camera_world) < len(poses):
+    T_thing_first = {first: np.eye(3, 4)}
+    while len(T_thing_first) < len(poses):
         relative: list[np.ndarray] = []
-        for a in T_camera_world:
+        for a in T_thing_first:
             for b in poses:
-                shared = [] if b in T_camera_world else relative_poses(poses[a], poses[b])
+                shared = [] if b in T_thing_first else relative_poses(poses[a], poses[b])
                 if len(shared) > len(relative):
                     relative = shared
                     known = a
                     added = b
         if not relative:
-            added = next(name for name in poses if name not in T_camera_world)
-            raise Refused(
-                f"camera {added} never sees the board at the same time as another: record such "
-                "views"
-            )
-        T_camera_world[added] = compose(most_central(relative), T_camera_world[known])
-    return T_camera_world
+            break
+        T_thing_first[added] = compose(most_central(relative), T_thing_first[known])
+    return T_thing_first
 
 
 def relative_poses(
-    poses_a: Mapping[int, np.ndarray], poses_b: Mapping[int, np.ndarray]
+    poses_a: Mapping[View, np.ndarray], poses_b: Mapping[View, np.ndarray]
 ) -> list[np.ndarray]:
     """Return T_b_a (3, 4) by each view that both cameras have, from their T_camera_board."""
     shared = sorted(poses_a.keys() & poses_b.keys())

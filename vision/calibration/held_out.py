@@ -24,7 +24,7 @@ from vision.calibration.calibrate import Calibration
 from vision.calibration.first_guess import board_pose, has_pose
 from vision.calibration.layout import Alone, Layout, lay_out
 from vision.calibration.tied import pose_priors
-from vision.geometry.board import Board, printed_corners
+from vision.geometry.board import Board
 from vision.geometry.camera import Camera
 from vision.geometry.triangulate import triangulate
 
@@ -74,7 +74,6 @@ def check_held_out(
     calibration: Calibration,
     views: Mapping[str, Sequence[Corners]],
     is_held: Sequence[bool],
-    board: Board,
     *,
     times_s: Mapping[str, Sequence[float]] | None = None,
     together: bool | None = None,
@@ -87,9 +86,9 @@ def check_held_out(
     usable = {}
     alone_px = {}
     for camera in cameras:
-        alone = _alone(camera, views[camera.name], board)
+        alone = usable_views(camera, views[camera.name], calibration.placed_board)
         usable[camera.name] = alone
-        alone_px[camera.name] = _alone_px(camera, alone, is_held, board, calibration.board)
+        alone_px[camera.name] = _alone_px(camera, alone, is_held, calibration)
     together = calibration.together if together is None else together
     if not together or len(cameras) < 2:
         return HeldOut(alone_px)
@@ -98,10 +97,10 @@ def check_held_out(
     rows = _held_rows(layout, is_held)
     if not rows.any():
         return HeldOut(alone_px)
-    return _JointFits(calibration, layout, board, rows).errors(alone_px)
+    return _JointFits(calibration, layout, rows).errors(alone_px)
 
 
-def _alone(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
+def usable_views(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
     """Return the camera by itself, with its usable views and their board poses."""
     usable = {}
     poses = {}
@@ -114,24 +113,19 @@ def _alone(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
 
 
 def _alone_px(
-    camera: Camera,
-    alone: Alone,
-    is_held: Sequence[bool],
-    board: Board,
-    board_print: np.ndarray,
+    camera: Camera, alone: Alone, is_held: Sequence[bool], calibration: Calibration
 ) -> float:
     """Return the RMS of one camera's residuals with a pose fitted to each view, by plain least
-    squares.
-
-    board_print (4,): PRINT_TERMS.
+    squares, on the board as calibrated.
     """
     held = {k: view for k, view in alone.views.items() if is_held[k]}
     if not held:
         return np.nan
     layout = lay_out({camera.name: replace(alone, views=held)}, np.eye(3, 4)[None], together=False)
     seen = _with_equal_sigmas(layout.seen)
-    first = replace(layout.first, board=board_print)
-    solution = adjust_bundle(first, seen, board.corners_mm, pose_priors(1, len(held)))
+    board = calibration.placed_board
+    first = calibration.with_board(layout.first)
+    solution = adjust_bundle(first, seen, board, pose_priors(1, len(held), board))
     return _rms(solution.residual_px)
 
 
@@ -158,8 +152,12 @@ class _JointFits:
 
     calibration: Calibration
     layout: Layout
-    board: Board
     rows: np.ndarray
+
+    @property
+    def board(self) -> Board:
+        """Return the board as placed."""
+        return self.calibration.placed_board
 
     def errors(self, alone_px: Mapping[str, float]) -> HeldOut:
         """Return the errors of each camera alone with those by every account."""
@@ -175,7 +173,7 @@ class _JointFits:
 
     def at_once(self) -> Agreement:
         """Return the agreement with all pictures of a view as of one instant."""
-        return self._with_equal_sigmas(replace(self.layout.first, board=self.calibration.board))
+        return self._with_equal_sigmas(self.calibration.with_board(self.layout.first))
 
     def offsets(self) -> Agreement:
         """Return the agreement on the board's path, with each camera late by its offset."""
@@ -187,28 +185,26 @@ class _JointFits:
         seen = self.layout.seen
         seen = replace(seen, sigma_px=np.hypot(seen.sigma_px, error_px[seen.camera]))
         priors = replace(self._priors, late_sigma_s=self.calibration.timing.scatter_s)
-        corners_mm = self.board.corners_mm
         fitted = adjust_bundle(
-            self._moving, seen, corners_mm, priors, width=_ROBUST_WIDTH, tolerance=1e-5
+            self._moving, seen, self.board, priors, width=_ROBUST_WIDTH, tolerance=1e-5
         )
         return self._agreement(fitted)
 
     def _with_equal_sigmas(self, first: BundleState) -> Agreement:
         """Return the agreement with all corners alike, from a first state."""
         seen = _with_equal_sigmas(self.layout.seen)
-        return self._agreement(adjust_bundle(first, seen, self.board.corners_mm, self._priors))
+        return self._agreement(adjust_bundle(first, seen, self.board, self._priors))
 
     @property
     def _priors(self) -> Priors:
         """Return the priors of all cameras and views."""
-        return pose_priors(len(self.layout.first.lens), len(self.layout.index))
+        return pose_priors(len(self.layout.first.lens), len(self.layout.index), self.board)
 
     @property
     def _moving(self) -> BundleState:
         """Return the first state with the calibration's board, clocks and the board's path."""
         return replace(
-            self.layout.first,
-            board=self.calibration.board,
+            self.calibration.with_board(self.layout.first),
             clock=self.calibration.timing.offset_s,
             trajectory=self.layout.trajectory,
         )
@@ -216,10 +212,9 @@ class _JointFits:
     def _agreement(self, fitted: Solution) -> Agreement:
         """Return how the cameras agree, by a fit of the board's poses."""
         seen = self.layout.seen
-        corners_mm = self.board.corners_mm
         # Corners as they would have been seen at their view's own time.
-        then_px, _ = predict(fitted.state, seen, corners_mm)
-        still_px, _ = predict(replace(fitted.state, trajectory=None), seen, corners_mm)
+        then_px, _ = predict(fitted.state, seen, self.board)
+        still_px, _ = predict(replace(fitted.state, trajectory=None), seen, self.board)
         px = seen.px + still_px - then_px
         errors_mm = self._pitch_errors_mm(px)
         mean_mm = float(errors_mm.mean()) if len(errors_mm) else np.nan
@@ -232,11 +227,22 @@ class _JointFits:
 
         px (n, 2): of the sightings, at their view's own time.
         """
-        columns, lines = self.board.grid
+        neighbours = self.board.neighbours
+        points_mm = self._triangulated_mm(px).reshape(-1, len(self.board.corners_mm), 3)
+        printed_mm = self.calibration.board_mm
+        errors_mm = _pitches(points_mm, neighbours) - _pitches(printed_mm, neighbours)
+        return errors_mm[np.isfinite(errors_mm)]
+
+    def _triangulated_mm(self, px: np.ndarray) -> np.ndarray:
+        """Return the corners (views · corners, 3) by all cameras that see them; NaN where too few do.
+
+        px (n, 2): of the sightings, at their view's own time.
+        """
         cameras = self.calibration.cameras
         seen = self.layout.seen
-        count = len(self.layout.index) * lines * columns
-        place = seen.view * lines * columns + seen.corner  # (n,) among all corners
+        corners = len(self.board.corners_mm)
+        count = len(self.layout.index) * corners
+        place = seen.view * corners + seen.corner  # (n,) among all corners
         by_camera = {}
         sigma = {}
         for c, name in enumerate(cameras.names):
@@ -244,19 +250,13 @@ class _JointFits:
             by_camera[name] = np.full((count, 2), np.nan)
             by_camera[name][place[own]] = px[own]
             sigma[name] = np.ones(count)
-        points_mm = triangulate(cameras, by_camera, sigma).mm.reshape(-1, lines, columns, 3)
-        printed_mm, _ = printed_corners(self.board.corners_mm, self.calibration.board)
-        printed_mm = printed_mm.reshape(1, lines, columns, 3)
-        errors_mm = [_pitches(points_mm, axis) - _pitches(printed_mm, axis) for axis in (2, 1)]
-        errors_mm = np.concatenate([of_axis.ravel() for of_axis in errors_mm])
-        return errors_mm[np.isfinite(errors_mm)]
+        return triangulate(cameras, by_camera, sigma).mm
 
 
-def _pitches(points_mm: np.ndarray, axis: int) -> np.ndarray:
-    """Return the distances between neighbours of grids of points (views, lines, columns, 3) along
-    one of their axes.
-    """
-    return np.linalg.norm(np.diff(points_mm, axis=axis), axis=-1)
+def _pitches(points_mm: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Return the distances (…, p) between the points (…, m, 3) of each pair of ids (p, 2)."""
+    first, second = neighbours.T
+    return np.linalg.norm(points_mm[..., second, :] - points_mm[..., first, :], axis=-1)
 
 
 def _rms(vectors: np.ndarray) -> float:

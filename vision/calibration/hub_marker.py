@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from vision.calibration.place import Placement
-from vision.geometry.camera import Cameras
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import rotation_z
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import exp_rotation, skew
@@ -31,19 +31,19 @@ _TURNS_AS_MOTOR = 0.2
 # [px] What print, blur and light displace a marker's corner by in all pictures of a camera alike.
 # Painted hubs' are 0.01 to 0.02 px RMS, and the fit raises this where its residuals show more.
 # Study: rig_place.py.
-_BIAS_PX = 0.02
+BIAS_PX = 0.02
 # [1/rad] How fast that changes with the motor's angle, in parts of itself: a print that is foreshortened
 # to a third turns three times as fast in the picture as the motor does. Derived.
-_DRIFT_PER_RAD = 3.0
+DRIFT_PER_RAD = 3.0
 # [passes] Of the fit before the last: each gives scatter and size of the biases to the next. Stated.
 _PASSES = 3
 # [px] Least scatter of a corner from picture to picture: the fit of a pattern has that where there
 # is no noise. Stated.
-_LEAST_SCATTER_PX = 0.01
+LEAST_SCATTER_PX = 0.01
 # [px] First scatter of a corner. The residuals give it then. Stated.
-_FIRST_SCATTER_PX = 0.05
+FIRST_SCATTER_PX = 0.05
 # [1] Standard deviation of normal residuals over the median of their magnitudes. Derived.
-_PER_MEDIAN = 1.4826
+PER_MEDIAN = 1.4826
 # [rad], [mm] Prior sigma of what a marker does not constrain: none. Stated.
 _UNSEEN = (1.0, 1000.0)
 # [parameters] Of the axis: two turns, two shifts. A layout, no threshold.
@@ -78,7 +78,7 @@ class _Turning:
 
 def first_axis(sightings: Sequence[MarkerSighting], cameras: Cameras) -> np.ndarray | None:
     """Return the axis that markers turn about, as T (3, 4) from a frame with that axis as its z, and
-    its origin beside the markers, to the cameras'; None where no marker turns with the motor.
+    its origin relative to the markers, to the cameras'; None where no marker turns with the motor.
     """
     turning = list(_turning(sightings, cameras))
     if not turning:
@@ -156,10 +156,18 @@ class _AxisFit:
         self._camera = np.array([cameras.index(one.camera) for one in marker.sightings])
         self.number = marker.sightings[0].number
         self.pictures = len(marker.sightings)
-        biases = np.repeat(_BIAS_PX, 8 * len(cameras))
-        stated = np.concatenate([biases, _DRIFT_PER_RAD * biases])  # px, px/rad
+        fitted = self._fit(marker)
+        covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
+        self.axis = fitted.x[:4]
+        self.covariance = covariance[:4, :4]
+        self.by_cameras = self._of_cameras(fitted, covariance)
+
+    def _fit(self, marker: _Turning) -> OptimizeResult:
+        """Fit in passes: each gives the corners' scatter and the size of their biases to the next."""
+        biases = np.repeat(BIAS_PX, 8 * len(self._cameras))
+        stated = np.concatenate([biases, DRIFT_PER_RAD * biases])  # px, px/rad
         self._prior = stated
-        self._scatter_px = np.full((len(cameras), 2), _FIRST_SCATTER_PX)
+        self._scatter_px = np.full((len(self._cameras), 2), FIRST_SCATTER_PX)
         parameters = self._first(marker)
         scale = 1.0
         for _ in range(_PASSES):
@@ -168,11 +176,7 @@ class _AxisFit:
             self._scatter_px = self._scatter(fitted)
             scale = max(scale * self._bias_excess(fitted), 1.0)
             self._prior = scale * stated
-        fitted = self._solve(parameters)
-        covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
-        self.axis = fitted.x[:4]
-        self.covariance = covariance[:4, :4]
-        self.by_cameras = self._of_cameras(fitted, covariance)
+        return self._solve(parameters)
 
     def _first(self, marker: _Turning) -> np.ndarray:
         """Return first parameters: axis at z, corners as triangulated, no bias."""
@@ -192,8 +196,8 @@ class _AxisFit:
         scatter_px = self._scatter_px.copy()
         for k in np.unique(self._camera):
             typical = np.median(np.abs(residual[self._camera == k]), axis=(0, 1))
-            scatter_px[k] = _PER_MEDIAN * typical * self._scatter_px[k]
-        return np.maximum(scatter_px, _LEAST_SCATTER_PX)
+            scatter_px[k] = PER_MEDIAN * typical * self._scatter_px[k]
+        return np.maximum(scatter_px, LEAST_SCATTER_PX)
 
     def _bias_excess(self, fitted: OptimizeResult) -> float:
         """Return how many times as large as their prior sigma the biases are, as far as pictures
@@ -275,17 +279,20 @@ def _triangulated(
     for together in by_instant.values():
         if len({one.camera for one in together}) > 1:
             angles.append(together[0].motor_rad)
-            corners.append(_meet(together, cameras))
+            views = [cameras[one.camera] for one in together]
+            corners.append(meet(views, [one.px for one in together]))
     return np.array(angles), np.array(corners).reshape(-1, 4, 3)
 
 
-def _meet(together: Sequence[MarkerSighting], cameras: Cameras) -> np.ndarray:
-    """Return the points (4, 3), mm, nearest to the rays of several cameras to a marker's corners."""
+def meet(cameras: Sequence[Camera], px: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the points (4, 3), mm, nearest to the rays of several cameras to a marker's corners.
+
+    px: of each camera the corners (4, 2).
+    """
     across = np.zeros((4, 3, 3))
     offset = np.zeros((4, 3))
-    for one in together:
-        camera = cameras[one.camera]
-        rays = camera.rays(one.px)
+    for camera, corners_px in zip(cameras, px):
+        rays = camera.rays(corners_px)
         projector = np.eye(3) - rays[:, :, None] * rays[:, None, :]
         across += projector
         offset += projector @ camera.centre_mm

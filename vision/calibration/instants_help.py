@@ -74,10 +74,14 @@ def residuals_by_view(
     priors: with nothing free but the board's poses.
     """
     state = replace(
-        layout.first, board=cameras.board, clock=cameras.clock, trajectory=layout.trajectory
+        layout.first,
+        board=cameras.board,
+        points_mm=cameras.points_mm,
+        clock=cameras.clock,
+        trajectory=layout.trajectory,
     )
     seen = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
-    fitted = adjust_bundle(state, seen, board.corners_mm, priors)
+    fitted = adjust_bundle(state, seen, board, priors)
     squared = np.sum(fitted.residual_px**2, axis=1)
     pictures = np.bincount(seen.view[seen.shot_starts()], minlength=len(layout.index))
     found = {}

@@ -137,15 +137,18 @@ def combine(board: Placement, swing: Placement) -> Placement:
     covariance = board.covariance - gain @ board.covariance
     chi2 = float(difference @ np.linalg.solve(Sigma, difference))
     scale_share = _scale_share(difference, Sigma, board.by_scale, chi2)
-    disagree = chi2 > chdtri(6, _CHANCE_EACH) or scale_share is not None
-    shared = None if swing.shared is None else gain @ swing.shared @ gain.T
+    alarm = None
+    turn_share = None
+    if chi2 > chdtri(6, _CHANCE_EACH) or scale_share is not None:
+        alarm = _alarm(board, swing, Sigma)
+        turn_share = _turn_share(difference, np.sqrt(np.diag(Sigma)))
     combined = replace(
         swing,
         step=board.step + gain @ difference,
         covariance=0.5 * (covariance + covariance.T),
-        shared=shared,
-        alarm=_alarm(board, swing, Sigma) if disagree else None,
-        turn_share=_turn_share(difference, np.sqrt(np.diag(Sigma))) if disagree else None,
+        shared=None if swing.shared is None else gain @ swing.shared @ gain.T,
+        alarm=alarm,
+        turn_share=turn_share,
         scale_share=scale_share,
     )
     return replace(combined, notes=(*swing.notes, f"With the {board.source}: {combined.spread}."))
@@ -209,7 +212,7 @@ def _turn_share(difference: np.ndarray, sigma: np.ndarray) -> float | None:
 def _scale_share(
     difference: np.ndarray, Sigma: np.ndarray, by_scale: np.ndarray | None, chi2: float
 ) -> float | None:
-    """Return by which share all lengths look too long, where that explains a difference (6,) of this
+    """Return by which share all lengths seem too long, where that explains a difference (6,) of this
     covariance (6, 6) that chance does not; None elsewhere. chi2: of the difference.
 
     One number has the power that six have not: a board that is 2 % too large, placed to 0.2 mm and

@@ -16,7 +16,6 @@ import numpy as np
 from vision.calibration.adjust import adjust_bundle
 from vision.calibration.bundle import (
     CLOCK,
-    N_BOARD,
     N_CAMERA,
     Priors,
     SharedLenses,
@@ -24,6 +23,7 @@ from vision.calibration.bundle import (
     predict,
 )
 from vision.calibration.corner_noise import Adjustment
+from vision.geometry.board import Board
 from vision.geometry.lens import LENS_TERMS
 
 # [1] Of a view's share of what is known of the lens, at most: a view that alone determines a
@@ -39,22 +39,22 @@ _N_LENS = len(LENS_TERMS)
 
 
 def with_shared_errors(
-    adjustment: Adjustment, corners_mm: np.ndarray, names: Sequence[str]
+    adjustment: Adjustment, board: Board, names: Sequence[str]
 ) -> tuple[Adjustment, list[str]]:
     """Return the adjustment with each camera's corners weighted as its views scatter, and notes.
 
-    corners_mm (m, 3): of the board as stated. names: of the cameras.
+    names: of the cameras.
     """
-    factor = shared_error_factors(adjustment, corners_mm)
+    factor = shared_error_factors(adjustment, board)
     if np.all(factor == 1.0):
         return adjustment, []
     seen = replace(
         adjustment.seen, sigma_px=adjustment.seen.sigma_px * factor[adjustment.seen.camera]
     )
     solution = adjust_bundle(
-        adjustment.solution.state, seen.select(adjustment.kept), corners_mm, adjustment.priors
+        adjustment.solution.state, seen.select(adjustment.kept), board, adjustment.priors
     )
-    residual_px = seen.px - predict(solution.state, seen, corners_mm)[0]
+    residual_px = seen.px - predict(solution.state, seen, board)[0]
     solution = replace(solution, residual_px=residual_px)
     notes = [
         f"Corners of a view of camera {name} err together: sigmas are {own:.1f} times those of corners by themselves."
@@ -64,15 +64,13 @@ def with_shared_errors(
     return replace(adjustment, solution=solution, seen=seen, residual_px=residual_px), notes
 
 
-def shared_error_factors(adjustment: Adjustment, corners_mm: np.ndarray) -> np.ndarray:
+def shared_error_factors(adjustment: Adjustment, board: Board) -> np.ndarray:
     """Return by how much the sigmas of each camera's lens are too small, (C,), 1 or more, by all views
     of that lens.
-
-    corners_mm (m, 3): of the board as stated.
     """
     state = adjustment.solution.state
     seen = adjustment.seen.select(adjustment.kept)
-    px, J = predict(state, seen, corners_mm)
+    px, J = predict(state, seen, board)
     residual = (seen.px - px) / seen.sigma_px[:, None]
     J = J / seen.sigma_px[:, None, None]
     shared = adjustment.priors.shared or SharedLenses.none(len(state.lens))
@@ -81,7 +79,7 @@ def shared_error_factors(adjustment: Adjustment, corners_mm: np.ndarray) -> np.n
         shots = []
         for camera in np.flatnonzero(shared.first == first):
             shots += _shots(camera, seen, J, residual, shared.signs[camera])
-        factors[shared.first == first] = _factor(first, shots, adjustment.priors)
+        factors[shared.first == first] = _factor(first, shots, adjustment.priors, len(state.board))
     return factors
 
 
@@ -101,19 +99,35 @@ def _shots(
     return shots
 
 
-def _factor(camera: int, shots: list[tuple[np.ndarray, np.ndarray]], priors: Priors) -> float:
+def _factor(
+    camera: int, shots: list[tuple[np.ndarray, np.ndarray]], priors: Priors, n_board: int
+) -> float:
     """Return by how much the sigmas of one camera's lens are too small.
 
-    shots: whitened derivatives (2 n, p) and residuals (2 n,) of each picture.
+    shots: whitened derivatives (2 n, p) and residuals (2 n,) of each picture. n_board: terms of the board.
     """
-    of_prior, columns = _columns(camera, priors)
+    of_prior, columns = _columns(camera, priors, n_board)
     prior = np.diag(priors.sigma[of_prior] ** -2.0)
     information = []
     gradients = []
     for J, residual in shots:
-        design = _without_pose(J, columns)
+        design = _without_pose(J, columns, n_board)
         information.append(design.T @ design)
         gradients.append(design.T @ residual)
+    stated, sandwich = _two_covariances(prior, information, gradients)
+    lens = slice(0, _N_LENS)
+    ratio = np.trace(np.linalg.solve(stated[lens, lens], sandwich[lens, lens])) / _N_LENS
+    return float(np.sqrt(max(ratio, 1.0)))
+
+
+def _two_covariances(
+    prior: np.ndarray, information: list[np.ndarray], gradients: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the stated covariance (k, k), of independent corners, and the sandwich (k, k), by how
+    pictures scatter; both with each parameter in units of its conditional sigma.
+
+    prior (k, k): precision. information (k, k), gradients (k,): of each picture.
+    """
     normal = prior + np.sum(information, axis=0)
     scale = 1.0 / np.sqrt(np.diag(normal))
     units = np.outer(scale, scale)
@@ -124,29 +138,26 @@ def _factor(camera: int, shots: list[tuple[np.ndarray, np.ndarray]], priors: Pri
         whitened = _corrected(leverage) @ (inverse_root @ (scale * gradient))
         scatter += np.outer(root @ whitened, root @ whitened)
     stated = inverse_root @ inverse_root
-    sandwich = stated @ scatter @ stated
-    lens = slice(0, _N_LENS)
-    ratio = np.trace(np.linalg.solve(stated[lens, lens], sandwich[lens, lens])) / _N_LENS
-    return float(np.sqrt(max(ratio, 1.0)))
+    return stated, stated @ scatter @ stated
 
 
-def _without_pose(J: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def _without_pose(J: np.ndarray, columns: np.ndarray, n_board: int) -> np.ndarray:
     """Return the derivatives (2 n, k) of a picture by `columns` (k,) that no pose or instant takes up."""
-    pose = np.column_stack([J[:, CLOCK], J[:, N_CAMERA + N_BOARD :]])
+    pose = np.column_stack([J[:, CLOCK], J[:, N_CAMERA + n_board :]])
     basis, size, _ = np.linalg.svd(pose, full_matrices=False)
     basis = basis[:, size > _LEAST_EIGENVALUE * size[0]]
     return J[:, columns] - basis @ (basis.T @ J[:, columns])
 
 
-def _columns(camera: int, priors: Priors) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a camera's lens and the free terms of the print stand among the globals, and
+def _columns(camera: int, priors: Priors, n_board: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a camera's lens and the free terms of the board stand among the globals, and
     among the columns of `predict`.
     """
-    print_terms = np.flatnonzero(priors.free[-N_BOARD:])
+    board_terms = np.flatnonzero(priors.free[-n_board:])
     of_prior = np.append(
-        N_CAMERA * camera + np.arange(_N_LENS), len(priors.free) - N_BOARD + print_terms
+        N_CAMERA * camera + np.arange(_N_LENS), len(priors.free) - n_board + board_terms
     )
-    return of_prior, np.append(np.arange(_N_LENS), N_CAMERA + print_terms)
+    return of_prior, np.append(np.arange(_N_LENS), N_CAMERA + board_terms)
 
 
 def _roots(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -76,22 +76,18 @@ def by_swing(lines: BaseLines) -> Placement:
     """Return the placement by one swing. Raises Refused with fewer than four frames or a motor at
     rest.
 
-    A narrow swing does not tell an axis that leans along the whisker from a whisker that rises, and
-    the wrong one of both looks far better known. So it is linearised at the most probable place of
+    A narrow swing cannot distinguish an axis that leans along the whisker from a whisker that rises, and
+    the wrong one of both seems far better known. So it is linearised at the most probable place of
     an axis that hardly leans (`_LEAN_RAD`), and that prior is taken out again.
     """
     if len(lines.motor_rad) < _MIN_FRAMES or lines.width_rad == 0:
         raise _too_few(lines)
-    elevation_rad = np.arcsin(np.clip(np.mean(lines.direction[:, 2]), -1, 1))
-    first = np.append(np.zeros(6), elevation_rad)
-    probable = least_squares(_residuals_and_prior, first, args=(lines,), x_scale="jac", method="lm")
-    jacobian = probable.jac[:-_LEANS]
-    residual = probable.fun[:-_LEANS]
+    probable, jacobian, residual = _linearised(lines)
     own = _covariance(jacobian)
     change = -own @ (jacobian.T @ residual)
     excess = _excess(residual + jacobian @ change, len(change))
-    step = probable.x + change
-    by_error = (-own @ (jacobian.T @ _residuals_by_shared(probable.x, lines)))[:6]
+    step = probable + change
+    by_error = (-own @ (jacobian.T @ _residuals_by_shared(probable, lines)))[:6]
     shared = lines.shared_covariance + by_error @ by_error.T
     placement = Placement(
         step[:6],
@@ -102,6 +98,16 @@ def by_swing(lines: BaseLines) -> Placement:
         shared=shared,
     )
     return _with_note(placement, [lines.width_rad])
+
+
+def _linearised(lines: BaseLines) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the most probable parameters (7,) of a swing whose axis hardly leans, and there, without
+    that prior, the derivatives (n, 7) of the residuals and the residuals (n,).
+    """
+    elevation_rad = np.arcsin(np.clip(np.mean(lines.direction[:, 2]), -1, 1))
+    first = np.append(np.zeros(6), elevation_rad)
+    probable = least_squares(_residuals_and_prior, first, args=(lines,), x_scale="jac", method="lm")
+    return probable.x, probable.jac[:-_LEANS], probable.fun[:-_LEANS]
 
 
 def _too_few(lines: BaseLines | None) -> Refused:

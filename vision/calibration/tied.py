@@ -158,7 +158,7 @@ class JointInput:
         """Return all views, those of one index as of one board, or each camera's own."""
         T_rig_board = self.on_rig.T_rig_board if self.on_rig else None
         poses = place_cameras(self.alone, self.standing, self.board, T_rig_board, together=together)
-        return lay_out(
+        layout = lay_out(
             self.alone,
             poses,
             standing=self.standing,
@@ -166,6 +166,7 @@ class JointInput:
             together=together,
             times_s=self.times_s,
         )
+        return replace(layout, first=replace(layout.first, board=self.board.stated_terms))
 
     def _adjust(self, layout: Layout) -> JointAdjustment:
         """Adjust all cameras.
@@ -175,9 +176,7 @@ class JointInput:
         """
         if layout.trajectory is None or self.triggered or self._is_one_picture:
             return JointAdjustment(layout, self._at_once(layout), None)
-        coarse = adjust_coarse(
-            layout.first, layout.seen, self.board.corners_mm, self._priors_of(layout)
-        )
+        coarse = adjust_coarse(layout.first, layout.seen, self.board, self._priors_of(layout))
         own_px = np.maximum(self._own_errors_px(), _LEAST_ERROR_PX)
         if np.median(coarse.error_px / own_px) < _DISAGREE:
             return JointAdjustment(layout, self._at_once(layout), None)
@@ -207,8 +206,7 @@ class JointInput:
         rounds: of learning the noise anew.
         """
         priors = self._priors_of(layout)
-        corners_mm = self.board.corners_mm
-        return adjust_with_noise(layout.first, layout.seen, corners_mm, priors, rounds=rounds)
+        return adjust_with_noise(layout.first, layout.seen, self.board, priors, rounds=rounds)
 
     def _with_instants(
         self, layout: Layout, first: BundleState, rounds: int | None = None
@@ -220,7 +218,7 @@ class JointInput:
         return adjust_with_noise(
             replace(first, trajectory=layout.trajectory),
             layout.seen,
-            self.board.corners_mm,
+            self.board,
             allow_lateness(self._priors_of(layout), layout.trajectory),
             error_px=self._own_errors_px() + _FIRST_EXCESS_PX,
             rounds=rounds,
@@ -264,7 +262,7 @@ class JointInput:
         self, cameras: BundleState, layout: Layout, is_held: Mapping[int, bool]
     ) -> dict[int, float]:
         """Return the residual of each held-out view, by index; see `residuals_by_view`."""
-        priors = pose_priors(len(self.alone), len(layout.index))
+        priors = pose_priors(len(self.alone), len(layout.index), self.board)
         return residuals_by_view(cameras, layout, is_held, self.board, priors)
 
 
@@ -283,8 +281,8 @@ def timing_note(names: Sequence[str], timing: Timing) -> str:
 
 
 def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
-    """Return the priors with clocks and pictures' instants free; the clock of the camera that ranks
-    first is held.
+    """Return the priors with clocks and pictures' instants free, and the board's points held; the
+    clock of the camera that ranks first is held, too.
     """
     free = priors.free.copy()
     sigma = priors.sigma.copy()
@@ -295,12 +293,14 @@ def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
     free[clocks[is_own & is_late]] = True
     sigma[clocks[is_own]] = _CLOCK_SIGMA * trajectory.interval_s
     late_s = np.full(len(clocks), _FIRST_LATENESS * trajectory.interval_s)
-    return replace(priors, free=free, sigma=sigma, late_sigma_s=late_s)
+    return replace(priors, free=free, sigma=sigma, late_sigma_s=late_s, point_sigma_mm=0.0)
 
 
-def lens_priors(n_cameras: int, n_views: int, shared: SharedLenses | None = None) -> Priors:
-    """Return the priors with lenses and poses free, LENS_PRIOR on the lenses, an exact board, and
-    cameras that are triggered together.
+def lens_priors(
+    n_cameras: int, n_views: int, board: Board, shared: SharedLenses | None = None
+) -> Priors:
+    """Return the priors with lenses, poses and the board's shape free, LENS_PRIOR on the lenses, an
+    exact print, and cameras that are triggered together.
 
     shared: which cameras have one lens; None: each has its own.
     """
@@ -311,19 +311,21 @@ def lens_priors(n_cameras: int, n_views: int, shared: SharedLenses | None = None
     if shared is not None:
         free[shared.tied()] = False
         sigma[shared.tied()] = np.inf
+    shape_sigma = board.shape_sigma
     return Priors(
-        np.append(free, [False] * N_BOARD),
-        np.zeros(N_CAMERA * n_cameras + N_BOARD),
-        np.append(sigma, [np.inf] * N_BOARD),
+        np.concatenate([free.ravel(), np.isfinite(shape_sigma), [False] * N_BOARD]),
+        np.zeros(N_CAMERA * n_cameras + len(shape_sigma) + N_BOARD),
+        np.concatenate([sigma.ravel(), shape_sigma, [np.inf] * N_BOARD]),
         np.ones(n_views, dtype=bool),
         shared=shared,
+        point_sigma_mm=board.point_sigma_mm,
     )
 
 
-def pose_priors(n_cameras: int, n_views: int) -> Priors:
-    """Return the priors with the board's poses free, and the cameras held."""
-    priors = lens_priors(n_cameras, n_views)
-    return replace(priors, free=np.zeros_like(priors.free))
+def pose_priors(n_cameras: int, n_views: int, board: Board) -> Priors:
+    """Return the priors with the board's poses free, and the cameras and the board held."""
+    priors = lens_priors(n_cameras, n_views, board)
+    return replace(priors, free=np.zeros_like(priors.free), point_sigma_mm=0.0)
 
 
 def with_print(priors: Priors, board: Board) -> Priors:
@@ -346,7 +348,7 @@ def _priors(
 
     Without a rig board the first camera is the world's frame.
     """
-    priors = lens_priors(len(first.lens), len(first.T_world_board), shared)
+    priors = lens_priors(len(first.lens), len(first.T_world_board), board, shared)
     priors = with_print(priors, board)
     if on_rig is None:
         priors.free[POSE] = False

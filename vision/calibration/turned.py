@@ -14,8 +14,8 @@ import numpy as np
 
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import MIN_VIEWS, fixes_pose, without_strays
-from vision.calibration.calibrate import calibrate_alone
 from vision.calibration.first_guess import board_pose, first_lens, has_pose
+from vision.calibration.one_picture import calibrate_alone
 from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
 from vision.geometry.refusals import Refused
@@ -40,23 +40,33 @@ def with_turns_resolved(views: ViewsOf, board: Board) -> ViewsOf:
         return views
     turns = (np.arange(len(board.corners_mm)), *board.hidden_turns)
     sight = {name: _Sight(views, name, board, turns) for name in names}
-    boards = dict(views.boards)
-    rig = dict(views.rig)
-    trials = dict(views.trials)
     first = sight[names[0]]
     for name in names[1:]:
         choice = _choose(first, sight[name], name)
         if choice is None:
             continue
         T_other_first, turn_of = choice
-        boards[name] = [
-            _renamed(view, turns[turn_of.get(k, 0)]) for k, view in enumerate(boards[name])
-        ]
-        if name in rig and names[0] in rig:
+        views = _with_boards_renamed(
+            views, name, [turns[turn_of.get(k, 0)] for k in range(len(views.boards[name]))]
+        )
+        if name in views.rig and names[0] in views.rig:
             turn = _nearest(first.rig_poses, sight[name].rig_poses, T_other_first)
-            rig[name] = _renamed(rig[name], turns[turn])
-            trials[name] = [_renamed(view, turns[turn]) for view in trials.get(name, ())]
-    return replace(views, boards=boards, rig=rig, trials=trials)
+            views = _with_rig_renamed(views, name, turns[turn])
+    return views
+
+
+def _with_boards_renamed(views: ViewsOf, name: str, orders: Sequence[np.ndarray]) -> ViewsOf:
+    """Return the views with the points of each of a camera's board views in an order of its own."""
+    boards = views.boards[name]
+    renamed = [_renamed(view, order) for view, order in zip(boards, orders, strict=True)]
+    return replace(views, boards={**views.boards, name: renamed})
+
+
+def _with_rig_renamed(views: ViewsOf, name: str, order: np.ndarray) -> ViewsOf:
+    """Return the views with the points of the board on the rig in one order, in a camera's trials too."""
+    rig = {**views.rig, name: _renamed(views.rig[name], order)}
+    in_trials = [_renamed(view, order) for view in views.trials.get(name, ())]
+    return replace(views, rig=rig, trials={**views.trials, name: in_trials})
 
 
 class _Sight:

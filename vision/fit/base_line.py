@@ -49,7 +49,7 @@ _REST = 2 * REST_POWERS
 
 
 @dataclass(frozen=True)
-class _Rows:
+class _FrameRows:
     """Line points of one camera in one frame, over their sigma.
 
     residual (n,) about a straight whisker; by_rest (n, 8), by_nuisance (n, m), by_shared (n, k): its
@@ -96,14 +96,14 @@ def base_lines(problem: Problem, state: State) -> BaseLines | None:
     )
 
 
-def _well_seen_frames(rows: list[_Rows]) -> np.ndarray:
+def _well_seen_frames(rows: list[_FrameRows]) -> np.ndarray:
     """Return the frames that have enough points."""
     frame = np.array([own.frame for own in rows], dtype=int)
     counts = np.bincount(frame, [len(own.residual) for own in rows])
     return np.flatnonzero(counts >= _FEWEST_POINTS)
 
 
-def _free_rows(problem: Problem, state: State) -> list[_Rows]:
+def _free_rows(problem: Problem, state: State) -> list[_FrameRows]:
     """Return the rows of the wire in all frames that do not bend."""
     linear = linear_at(problem, state)
     by_camera_error = camera_rows(problem, state) @ problem.cameras.by_error
@@ -130,7 +130,7 @@ def _rows_of(
     residual: np.ndarray,
     jacobian: np.ndarray,
     by_camera_error: np.ndarray,
-) -> _Rows:
+) -> _FrameRows:
     """Return the rows of one observation, without the offsets that the whole fit gave the line, and
     counted from a straight whisker in its place.
 
@@ -144,7 +144,7 @@ def _rows_of(
     straight = residual - by_offsets @ state.vector[offsets] - by_rest @ state.vector[rest]
     nuisance = _nuisances(problem, seen) / seen.points.sigma_px[:, None]
     shared = np.hstack([_drifts(problem, seen.camera, by_offsets), by_camera_error])
-    return _Rows(seen.frame, straight[clear], by_rest[clear], nuisance[clear], shared[clear])
+    return _FrameRows(seen.frame, straight[clear], by_rest[clear], nuisance[clear], shared[clear])
 
 
 def _nuisances(problem: Problem, seen: Observed) -> np.ndarray:
@@ -164,7 +164,7 @@ def _drifts(problem: Problem, camera: int, by_offsets: np.ndarray) -> np.ndarray
     return np.kron(np.arange(len(problem.cameras)) == camera, own)
 
 
-def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
+def _shape_at_rest(rows: list[_FrameRows]) -> tuple[np.ndarray, np.ndarray]:
     """Fit the rest shape (8,) with its covariance."""
     J = np.concatenate([np.hstack([r.by_rest, r.by_nuisance]) for r in rows])
     residual = np.concatenate([r.residual for r in rows])
@@ -176,7 +176,9 @@ def _shape_at_rest(rows: list[_Rows]) -> tuple[np.ndarray, np.ndarray]:
     return solution[:_REST], covariance[:_REST, :_REST]
 
 
-def _own_line(rows: list[_Rows], shape: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _own_line(
+    rows: list[_FrameRows], shape: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fit the offsets and slopes (4,) of one frame, with their covariance (4, 4) and how they change
     with each error that frames share, (4, k).
     """
@@ -201,8 +203,9 @@ def _in_space(
     R = rotation_z(motor_rad)
     along = R[:, 0]
     across = R[:, 1:]  # (3, 2): y and z of the hub
-    point_by_line = across @ np.hstack([np.eye(2), place * np.eye(2)])  # (3, 4)
-    turn_by_line = across @ np.hstack([np.zeros((2, 2)), np.eye(2) / length_mm])  # (3, 4)
+    identity = np.eye(2)
+    point_by_line = across @ np.hstack([identity, place * identity])  # (3, 4)
+    turn_by_line = across @ np.hstack([np.zeros((2, 2)), identity / length_mm])  # (3, 4)
     return (
         place * length_mm * along + point_by_line @ line,
         point_by_line @ covariance @ point_by_line.T,

@@ -1,9 +1,13 @@
 """By how many frames each camera shows the whisker later than the others do: cameras compared.
 
+Cameras that are parts of one picture, by a mirror or in a split view, were exposed at once.
+
 A camera that lost a frame, or whose pictures are numbered from another one, has every picture in the
 place of the next. It shows the whisker where it was, which the other cameras contradict whatever
 clock or encoder say. One more step of the fit, with a column for the delay of one camera, gives it.
 """
+
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -16,26 +20,39 @@ from vision.fit.turns import by_turn
 _PRIOR = 1e-4
 
 
-def camera_delays(problem: Problem, state: State) -> dict[str, tuple[float, float]]:
+def camera_delays(
+    problem: Problem, state: State, picture_of: Mapping[str, str] | None = None
+) -> dict[str, tuple[float, float]]:
     """Return the delay of each camera in frames, the others having none, and its sigma.
 
-    There is none of a single camera. The fit has converged.
+    picture_of: by camera that is a part of a picture, the camera whose picture it is; the delay is that
+    of all its parts, under its name. There is none of a single picture. The fit has converged.
     """
-    names = problem.cameras.names
-    if len(names) < 2:
+    parts = picture_of or {}
+    pictures = [parts.get(name, name) for name in problem.cameras.names]
+    if len(set(pictures)) < 2:
         return {}
     linear = linear_at(problem, state)
     weight = robust_weights(linear, LAST_SCALE)
     columns = _by_delay(problem, by_turn(problem, state, linear))
     by_cameras = camera_rows(problem, state)
     found = {}
-    for name, column in zip(names, columns.T):
+    for picture in dict.fromkeys(pictures):
+        column = columns[:, [other == picture for other in pictures]].sum(axis=1)
         gain = _gain_of_last(np.column_stack([linear.jacobian, column]), weight)
-        by_camera = gain[:, linear.is_point] @ by_cameras
-        variance = times_residual_covariance(problem, gain) @ gain.T
-        variance += by_camera @ problem.cameras.covariance @ by_camera.T
-        found[name] = (float(gain[0] @ linear.residual), float(np.sqrt(variance[0, 0])))
+        sigma = _sigma(problem, gain, gain[:, linear.is_point] @ by_cameras)
+        found[picture] = (float(gain[0] @ linear.residual), sigma)
     return found
+
+
+def _sigma(problem: Problem, gain: np.ndarray, by_camera: np.ndarray) -> float:
+    """Return the sigma of a delay, by noise and by the cameras.
+
+    gain (1, n): how it depends on the residuals. by_camera (1, 15 c): on the cameras' parameters.
+    """
+    variance = times_residual_covariance(problem, gain) @ gain.T
+    variance += by_camera @ problem.cameras.covariance @ by_camera.T
+    return float(np.sqrt(variance[0, 0]))
 
 
 def _gain_of_last(jacobian: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -89,6 +89,15 @@ class SwingPictures:
         bar_px = axis.covering_discs(view.camera, bar_mm)
         return cls(view, rods, still, 0.5 * np.pi / len(places), bar_px)
 
+    @classmethod
+    def of_standing(cls, view: View, rods: Rods, axis: Axis, bar_mm: float) -> "SwingPictures":
+        """Return the pictures of one camera in whose frames the wire has not moved yet.
+
+        What stands still is then known without wire and bar alone.
+        """
+        bar_px = axis.covering_discs(view.camera, bar_mm)
+        return cls(view, rods, view.background, 1.0, bar_px)
+
     def votes(self, curves: Mapping[int, Curves], reach_px: int = _REACH_PX) -> Votes:
         """Return where the wire may be near predicted curves by frame, clear of hub and bar."""
         pieces = wire_pieces(self.view, curves, self.rods.wire, _PIECE_PX, reach_px - 3, self.still)
@@ -159,18 +168,29 @@ def follow_bends(
     of the last two.
     """
     bends_rad = [np.zeros(2), np.zeros(2)]  # before the first frame
-    prior = _prior_information(axis, len(sights))
-    wire = sights[0].rods.wire
-    views = [sight.view for sight in sights]
     for frame, motor in motor_rad.items():
         guess = 2 * bends_rad[-1] - bends_rad[-2]
-        arc = contact_arc(rest_mm, guess, motor, axis, wire)
-        curve = centrelines(rest_mm, guess, arc, motor, wire)
-        seen = [sight.votes({frame: curve}) for sight in sights]
-        model = _BendModel(views, rest_mm, arc, motor, wire)
-        bend, points = _bend_by_votes(model, seen, guess)
-        bends_rad.append(_fit_bend(model, bend, points, prior))
+        bends_rad.append(find_bend(sights, axis, rest_mm, frame, motor, guess))
     return dict(zip(motor_rad, bends_rad[2:]))
+
+
+def find_bend(
+    sights: Sequence[SwingPictures],
+    axis: Axis,
+    rest_mm: np.ndarray,
+    frame: int,
+    motor_rad: float,
+    guess_rad: np.ndarray,
+) -> np.ndarray:
+    """Return the bend (2,) in rad of one frame, searched for near a guess (2,)."""
+    wire = sights[0].rods.wire
+    views = [sight.view for sight in sights]
+    arc = contact_arc(rest_mm, guess_rad, motor_rad, axis, wire)
+    curve = centrelines(rest_mm, guess_rad, arc, motor_rad, wire)
+    seen = [sight.votes({frame: curve}) for sight in sights]
+    model = _BendModel(views, rest_mm, arc, motor_rad, wire)
+    bend, points = _bend_by_votes(model, seen, guess_rad)
+    return _fit_bend(model, bend, points, _prior_information(axis, len(sights)))
 
 
 @dataclass(frozen=True, eq=False)

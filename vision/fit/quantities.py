@@ -68,14 +68,18 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
         "alpha": _angle_to_normal(force, each.bar_at(point), point, beta),
         **_by_axis(point),
     }
-    whisk = {
+    return Measured(_at_touch(touch, beta, psi), frame)
+
+
+def _at_touch(touch: FirstTouch, beta: np.ndarray, psi: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the quantities of the whisk (…), which are those at touch."""
+    return {
         "touch": touch.motor_rad,
         "d_x": np.linalg.norm(touch.point_mm, axis=-1),
         "beta": beta,
         "psi": psi,
         **_by_axis(touch.point_mm),
     }
-    return Measured(whisk, frame)
 
 
 def _by_axis(points_mm: np.ndarray) -> dict[str, np.ndarray]:

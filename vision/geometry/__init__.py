@@ -8,7 +8,7 @@ Imports nothing else of vision.
 from vision.geometry.lazy_names import lazy_names
 
 NAMES = {
-    "board": ("Board", "PRINT_TERMS", "printed_corners"),
+    "board": ("Board",),
     "camera": ("Camera", "Cameras"),
     "centreline": ("Curves", "REST_POWERS", "centrelines", "unbent_curves", "rotation_z"),
     "contact": ("BarAxis", "clearance"),
@@ -25,6 +25,7 @@ NAMES = {
         "invert_transform",
         "nearest_rotation",
         "skew",
+        "unit",
     ),
     "touched": ("StatedSizes", "Touched"),
     "vision_settings": ("VisionSettings",),

@@ -1,4 +1,4 @@
-"""The printed board: points in a plane, which cameras are calibrated by."""
+"""The printed board: points in a plane, or on the flat faces of a body, which cameras are calibrated by."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
@@ -51,6 +51,48 @@ class Board(ABC):
     @abstractmethod
     def corners_mm(self) -> np.ndarray:
         """Return the points in the board frame, (m, 3), row by row; the index is the point's id."""
+
+    @property
+    def flat_mm(self) -> np.ndarray:
+        """Return the points in the plane of the face that each is printed on, (m, 3), z = 0."""
+        return self.corners_mm
+
+    @cached_property
+    def face_of(self) -> np.ndarray:
+        """Return the number of the flat face that each point is printed on, (m,)."""
+        return np.zeros(len(self.flat_mm), dtype=int)
+
+    @property
+    def shape_sigma(self) -> np.ndarray:
+        """Return how far the parameters of the shape are from 0, (s,): none of a plane."""
+        return np.zeros(0)
+
+    @property
+    def point_sigma_mm(self) -> float:
+        """Return how far each point lies from its place on the print, per axis; 0 takes it as exact."""
+        return 0.0
+
+    @property
+    def stated_terms(self) -> np.ndarray:
+        """Return the terms of the board as stated, all 0: of its shape, then PRINT_TERMS, (s + 4,)."""
+        return np.zeros(len(self.shape_sigma) + len(PRINT_TERMS))
+
+    def printed(self, terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the points as they are (m, 3), mm, and their derivatives by the terms
+        (m, 3, s + 4).
+
+        terms (s + 4,): parameters of the shape, then PRINT_TERMS.
+        """
+        return printed_corners(self.corners_mm, terms)
+
+    @property
+    def neighbours(self) -> np.ndarray:
+        """Return the ids of points that are neighbours in a row or a column of a face, (p, 2)."""
+        columns, rows = self.grid
+        ids = np.arange(columns * rows).reshape(rows, columns)
+        along = np.stack([ids[:, :-1], ids[:, 1:]], axis=-1).reshape(-1, 2)
+        across = np.stack([ids[:-1], ids[1:]], axis=-1).reshape(-1, 2)
+        return np.concatenate([along, across])
 
     @property
     def hidden_turns(self) -> tuple[np.ndarray, ...]:

@@ -104,10 +104,10 @@ def gauss_newton(
     differences = np.vstack([np.zeros(len(prior)), np.diag(steps)])
     for _ in range(rounds):
         residual, *moved = residuals_of(parameters + differences)
-        root_weight = np.sqrt(cauchy_weights(residual, scale))[:, None]
+        root_weight = np.sqrt(cauchy_weights(residual, scale))
         jacobian = (np.array(moved) - residual).T / steps  # (n, k)
-        rows = np.vstack([root_weight * jacobian, np.diag(1.0 / prior)])
-        weighted = np.append(root_weight[:, 0] * residual, parameters / prior)
+        rows = np.vstack([root_weight[:, None] * jacobian, np.diag(1.0 / prior)])
+        weighted = np.append(root_weight * residual, parameters / prior)
         step = -np.linalg.lstsq(rows, weighted, rcond=None)[0]
         parameters = parameters + step
         if np.all(np.abs(step) < steps):

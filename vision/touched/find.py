@@ -42,8 +42,8 @@ _OFFSETS = np.array([1.0, 0.8, 0.6, 1.3, 1.6])
 # [1] How much an edge at each of these offsets counts in the last pass; before it, only the
 # positive ones do. Study: bar_scenes.py.
 _WEIGHTS = np.array([1.0, 0.8, 0.6, -0.5, -0.5])
-# [mm] Places along the bar: bars are clamped farther out. Stated.
-_ALONG_MM = np.arange(-30.0, 30.1, 6.0)
+# [1] Places along the bar, over the length of it that is used: clamps are farther out. Stated.
+_ALONG = np.arange(-5.0, 5.1) / 6.0
 # [rad] Slopes of the grid. Study: bar_scenes.py.
 _BETA_RAD = np.radians(np.arange(-84.0, 85.0, 6.0))
 # [rad] Tilts of the grid. Study: bar_scenes.py.
@@ -67,11 +67,12 @@ _BATCH = 1000
 
 
 def find_bars(
-    edge_maps: Sequence[EdgeMap], rods: Rods, motor_rad: tuple[float, float]
+    edge_maps: Sequence[EdgeMap], rods: Rods, motor_rad: tuple[float, float], bar_reach_mm: float
 ) -> list[BarAxis]:
     """Find axes of what may be the bar, the best first; a few pixels off.
 
-    motor_rad: lowest and highest motor angle, between which the whisker touches.
+    motor_rad: lowest and highest motor angle, between which the whisker touches. bar_reach_mm: see
+    `VisionSettings`.
     """
     radius_mm = rods.bar.radius_mm
     length_mm = rods.wire.length_mm
@@ -83,7 +84,8 @@ def find_bars(
         x, touch, beta, psi = hypotheses.T
         return axis_from_angles(x, touch, beta, psi, rods.reach_mm(x))
 
-    return search_bars(edge_maps, [x_mm, touch_rad, _BETA_RAD, _PSI_RAD], axes_of, radius_mm)
+    values = [x_mm, touch_rad, _BETA_RAD, _PSI_RAD]
+    return search_bars(edge_maps, values, axes_of, radius_mm, bar_reach_mm)
 
 
 def can_touch(axis: BarAxis, rods: Rods, motor_rad: tuple[float, float]) -> bool:
@@ -106,12 +108,15 @@ def search_bars(
     values: Sequence[np.ndarray],
     axes_of: Callable[[np.ndarray], BarAxis],
     radius_mm: float,
+    bar_reach_mm: float,
 ) -> list[BarAxis]:
     """Find the axes whose edges are the strongest, from a grid of hypotheses, the best first.
 
     values: k arrays, the grid's values of each number. axes_of: function of hypotheses (n, k) that
-    returns their axes, points and directions (n, 3).
+    returns their axes, points and directions (n, 3). bar_reach_mm: edges are read on so much of a
+    bar to either side of its point.
     """
+    along_mm = bar_reach_mm * _ALONG
     passes = []
     for blur in _BLURS:
         is_last = blur == _BLURS[-1]
@@ -120,7 +125,7 @@ def search_bars(
             edge_maps=[one.blurred(blur) for one in edge_maps],
             radius_mm=radius_mm,
             weights=_WEIGHTS if is_last else np.maximum(_WEIGHTS, 0.0),
-            along_mm=_ALONG_MM if is_last else _ALONG_MM[::2],
+            along_mm=along_mm if is_last else along_mm[::2],
         )
         passes.append(SearchPass(score, blur / _BLURS[0], 1.0, _KEPT))
     best = axes_of(coarse_to_fine(values, half_steps(values), passes, _SEPARATION, _STARTS))

@@ -45,15 +45,19 @@ _FARTHEST = 1.4
 _SAME_PLANE_RAD = np.radians(1.0)
 
 
-def find_bars_alone(edges: EdgeMap, rods: Rods, motor_rad: float) -> list[BarAxis]:
+def find_bars_alone(
+    edges: EdgeMap, rods: Rods, motor_rad: float, bar_reach_mm: float
+) -> list[BarAxis]:
     """Find axes of what may be the bar in one camera, the best first.
 
     All are at right angles to the line of sight. motor_rad: where the whisker about touches.
+    bar_reach_mm: see `VisionSettings`.
     """
     step_mm = _X_STEP * rods.bar.radius_mm
     x_mm = np.arange(_NEAREST_CONTACT_MM, rods.wire.length_mm, step_mm)
     axes_of = partial(_axes_across_sight, camera=edges.camera, motor_rad=motor_rad)
-    return search_bars([edges], [x_mm, _TURN_RAD, _FARTHER], axes_of, rods.bar.radius_mm)
+    values = [x_mm, _TURN_RAD, _FARTHER]
+    return search_bars([edges], values, axes_of, rods.bar.radius_mm, bar_reach_mm)
 
 
 def _axes_across_sight(hypotheses: np.ndarray, camera: Camera, motor_rad: float) -> BarAxis:

@@ -6,7 +6,7 @@ its lines: the pixels about each of these axes say in every camera where the bar
 clearly it is a bar (`vision.touched.line`). Any two of these lines, each of another camera, are an
 axis (`vision.touched.axis`), so the bar is found even if no axis of the first stage was right in
 two cameras. It is measured again until its lines lie where they were expected: only then are
-detection scores comparable, for a line that still moves scores high beside a bar. All pairs that
+detection scores comparable, for a line that still moves scores high near a bar. All pairs that
 could win are measured, and the axis with the highest detection score over all cameras wins. Third,
 where no camera sees a bar there, or all of them see it from one side, each camera is evaluated
 alone, by the bar's width (`vision.touched.one_view`). Rings, spheres and cones have their own
@@ -16,7 +16,7 @@ searches, in `vision.touched.rounded_search`. Which search a form of object has 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import singledispatch
+from functools import cached_property, singledispatch
 from itertools import combinations, product
 from operator import itemgetter
 
@@ -87,6 +87,19 @@ def find_object(scene: SearchScene) -> SeenBar:
     return _search(scene.rods.bar, scene)
 
 
+def find_object_again(scene: SearchScene, axis: Axis) -> SeenBar:
+    """Find the object where it was before, or search for it where it no longer is.
+
+    axis: where it was. It counts where two cameras or more see a straight bar there, from different
+    sides. Raises Refused where nothing like it is seen.
+    """
+    if isinstance(axis, BarAxis) and isinstance(scene.rods.bar, Bar):
+        there = BarSearch(scene).bar_about(axis)
+        if there is not None:
+            return there
+    return find_object(scene)
+
+
 @singledispatch
 def _search(touched: Touched, scene: SearchScene) -> SeenBar:
     """Find an object by the search that its form has."""
@@ -142,17 +155,47 @@ class BarSearch:
     """The search for a straight bar in one scene, stage by stage, see the module's introduction."""
 
     def __init__(self, scene: SearchScene):
-        """Compute the edge map of every camera."""
         self.scene = scene
-        self.edge_maps: dict[str, EdgeMap] = {}
+
+    @cached_property
+    def edge_maps(self) -> dict[str, EdgeMap]:
+        """Return the edge map of every camera."""
+        scene = self.scene
+        edge_maps = {}
         for view in scene.views:
-            self.edge_maps[view.camera.name] = compute_edge_map(
+            edge_maps[view.camera.name] = compute_edge_map(
                 view.camera,
                 still_picture(view),
                 view.background[::HALF, ::HALF],
                 scene.rods,
                 scene.mid_motor_rad,
             )
+        return edge_maps
+
+    def bar_about(self, axis: BarAxis) -> SeenBar | None:
+        """Return the bar that the cameras see about an axis; None where they do not.
+
+        All of them see its edges, and it converges nearby, within a bar's width.
+        """
+        scene = self.scene
+        found: list[SeenBar] = []
+        with suppress(Refused):
+            self._converge(axis, found)
+        for bar in found:
+            if len(bar.seen_by) < max(2, len(scene.views)) or not self._is_near(bar.axis, axis):
+                continue
+            can_be_touched = can_touch(bar.axis, scene.rods, scene.motor_range_rad)
+            if can_be_touched and not seen_from_one_side(scene.cameras, bar.axis):
+                return bar
+        return None
+
+    def _is_near(self, axis: BarAxis, other: BarAxis) -> bool:
+        """Return whether every camera sees two axes less than a bar's width apart."""
+        for camera in self.scene.cameras:
+            _, radius_px = axis.covering_discs(camera, self.scene.radius_mm)
+            if not offset_px(camera, axis, other) < 2.0 * np.nanmedian(radius_px):
+                return False
+        return True
 
     def best_by_all_cameras(self) -> SeenBar:
         """Find the bar by its lines in all cameras: that with the highest detection score.
@@ -161,7 +204,9 @@ class BarSearch:
         of the best so far. Where none converges, the bar is where edges are the strongest.
         """
         scene = self.scene
-        axes = find_bars(list(self.edge_maps.values()), scene.rods, scene.motor_range_rad)
+        maps = list(self.edge_maps.values())
+        reach_mm = scene.settings.bar_reach_mm
+        axes = find_bars(maps, scene.rods, scene.motor_range_rad, reach_mm)
         found: list[SeenBar] = []
         for highest, one, other in _pairs_of(self._candidates(axes)):
             clearest = max(map(_detection_score, found), default=-np.inf)
@@ -169,7 +214,8 @@ class BarSearch:
                 break
             axis = meeting_axis(one.camera, one.axis, other.camera, other.axis)
             if can_touch(axis, scene.rods, scene.motor_range_rad):
-                one.axis = other.axis = self._converge(axis, found).axis
+                with suppress(Refused):  # lines that contradict each other are no bar's
+                    one.axis = other.axis = self._converge(axis, found).axis
         if not found:
             return self._converge(axes[0], found)
         return max(found, key=_detection_score)
@@ -236,7 +282,8 @@ class BarSearch:
         """
         scene = self.scene
         edges = self.edge_maps[view.camera.name]
-        first = find_bars_alone(edges, scene.rods, float(np.mean(scene.motor_rad)))[0]
+        motor_rad = float(np.mean(scene.motor_rad))
+        first = find_bars_alone(edges, scene.rods, motor_rad, scene.settings.bar_reach_mm)[0]
         wire = scene.rods.wire
         return see_bar_alone(first, view, wire, scene.radius_mm, scene.motor_rad, scene.settings)
 

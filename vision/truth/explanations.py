@@ -101,6 +101,22 @@ def best_explanation(first: Explanation) -> Explanation:
     return replace(best, whisk=replace(best.whisk, bar=SeenBar(best.axis, {}), light=light))
 
 
+def unexplained(fit: Explanation) -> Reason:
+    """Return why a fit may not be the truth, without another fit; no reason where nothing says so.
+
+    Another place explains the pictures better, or the fit ended far from its beginning.
+    """
+    if not _may_be_asked(fit.whisk):
+        return NO_REASON
+    question = fit.question()
+    if len(question.bands) < len(fit.whisk.views):
+        return NO_REASON
+    place = question.best()
+    if _is_better(question, place, fit.axis, _SURE_SIGMAS):
+        return _unexplained(question, place, fit.axis)
+    return _unconverged(question, fit)
+
+
 def _may_be_asked(whisk: WhiskPictures) -> bool:
     """Return whether the bar is straight, stands, and is seen before a known background."""
     is_straight = isinstance(whisk.bar.axis, BarAxis)
@@ -111,7 +127,7 @@ def _may_be_asked(whisk: WhiskPictures) -> bool:
 def _better(fit: Explanation) -> Explanation:
     """Return the fit from a better place where that explains the pictures better, else this one.
 
-    Where a camera looks past the bar, nothing is asked: a fit that reads it there could be worse.
+    Where a camera does not see the bar, the fit stays: one that reads a bar there could be worse.
     Raises Refused where both explain them equally well.
     """
     question = fit.question()

@@ -18,7 +18,7 @@ from vision.geometry.refusals import Refused
 from vision.geometry.robust import robust_sigma
 from vision.pictures.view import View
 from vision.truth.line_source import WhiskPlace
-from vision.truth.trace import (
+from vision.truth.trace_points import (
     NEAR_PX,
     BesideWire,
     Trace,
@@ -134,7 +134,7 @@ def _require_near(
 def _share_near(beside: BesideWire, trace: Trace, frames: Sequence[int]) -> float:
     """Return the share of the frames with a trace that have a line near the wire; 1 of none.
 
-    The line nearest to the wire is near where half of its points beside the wire are.
+    The line nearest to the wire is near where half of its points at the wire's arcs are.
     """
     with_trace = np.intersect1d(trace.frame, frames)
     nearest = nearest_lines(beside)

@@ -2,18 +2,18 @@
 
 Nothing here knows how the bar was found. A bar changes what a camera sees: inside its silhouette
 the picture is another one than that without rods, outside it is the same up to smooth light. So of
-all strips as wide as the bar, its silhouette covers most of what has changed, whatever the bar
-looks like. In each camera the pixels along the drawn silhouette are straightened into a band that
+all strips as wide as the bar, its silhouette covers most of what has changed, of whatever
+colour. In each camera the pixels along the drawn silhouette are straightened into a band that
 reaches two diameters beyond it to either side. The wire is left out. How much of the silhouette's
 area has changed is then known at every shift and tilt, and summed over the cameras for every axis
 nearby in space.
 
 The number that decides is a share of area: by how much more of the bar's width has changed under
 another strip than under the drawn one, summed over the cameras. Its standard error is that of the
-mean over segments along the bar. Rims as dark as the background, shadows beside the bar and hidden
+mean over segments along the bar. Rims as dark as the background, shadows next to the bar and hidden
 pixels make many strips alike and are evidence for none. The blur of the lens widens what has
 changed by a pixel or two: a strip as near as that is no other place. A bar that moves, and an
-object that is no straight bar, are not asked about.
+object that is no straight bar, are left out.
 """
 
 from collections.abc import Mapping, Sequence
@@ -141,7 +141,7 @@ class _Band:
     drawn: np.ndarray
 
     def offsets(self, axes: BarAxis) -> np.ndarray:
-        """Return by how many radii (..., 2) axes (..., 3) pass beside the drawn one at the ends."""
+        """Return by how many radii (..., 2) axes (..., 3) pass the drawn one at the ends."""
         return self.line.offsets(_projected(self.camera, axes)) - self.drawn
 
     def covered(self, offsets: np.ndarray) -> np.ndarray:
@@ -313,7 +313,7 @@ def _hidden_by_rods(view: View, curves: Mapping[int, Curves], rods: Rods) -> np.
 
 
 def _hide_wire(hidden: np.ndarray, camera: Camera, curve: Curves, rods: Rods) -> None:
-    """Mark the pixels (h, w) of a wire and beside it."""
+    """Mark the pixels (h, w) of a wire and around it."""
     points_mm = curve.points_mm
     radius_mm = rods.wire.radius_mm(curve.arc_mm)
     middle_px, half_px = outline(camera, points_mm, curve.tangents, radius_mm)

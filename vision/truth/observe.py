@@ -7,7 +7,7 @@
 Nothing here knows of a gauge.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -142,7 +142,7 @@ def _whisks_of(
     cameras = shrunk_cameras(cameras, settings.picture_scale)
     time_s = np.asarray(pictures.time_s, dtype=float)
     motor_rad = np.asarray(pictures.motor_rad, dtype=float)
-    views, used, left_out = _views_facing(pictures, cameras, rods.wire, motor_rad)
+    views, used, left_out = views_facing(pictures, cameras, rods.wire, motor_rad)
     strokes = [range(*where.indices(len(time_s)))[:: settings.every_frame] for where in whisks]
     velocity, still = _stated_motion(pictures, strokes, views, rods)
     found = find_object(SearchScene(still, used, rods, motor_rad, settings))
@@ -162,12 +162,13 @@ def _whisks_of(
             stated_velocity=velocity,
             gives=Gives() if pictures.object_gives_way else None,
             lines=traces_as_lines(pictures.traces),
+            picture_of=pictures.picture_of,
         )
         seen.append(whisk)
     return _TrialScene(seen, found, still)
 
 
-def _views_facing(
+def views_facing(
     pictures: TrialPictures, cameras: Cameras, wire: Wire, motor_rad: np.ndarray
 ) -> tuple[Sequence[View], Cameras, list[Reason]]:
     """Return the views of cameras that have the whisker before them, the cameras of these, and a
@@ -308,7 +309,7 @@ def _truth(explained: Explanation) -> WhiskTruth:
     truth = to_whisk(whisk, fitted)
     checks_beam = whisk.settings.check_beam
     beam = _check_beam(fitted) if checks_beam else None
-    status = joined(truth.status, explained.warning, *_warnings(whisk, fitted, beam))
+    status = joined(truth.status, explained.warning, *warnings_of(whisk, fitted, beam))
     # Before the free stroke is traced, which changes whisk.light.
     refinements = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
     free = (fitted.problem, fitted.state)
@@ -319,7 +320,7 @@ def _truth(explained: Explanation) -> WhiskTruth:
         refinements=refinements,
         status=status,
         turns=frame_turns(fitted.problem, fitted.state, fitted.frames),
-        delays=_delays(fitted),
+        delays=_delays(fitted, whisk.picture_of),
         base=base_lines(*free),
         ends=wire_ends(whisk, fitted),
         widths=wire_widths(whisk, fitted) if checks_beam and whisk.number == 0 else {},
@@ -327,13 +328,16 @@ def _truth(explained: Explanation) -> WhiskTruth:
     )
 
 
-def _delays(fitted: FittedWhisk) -> dict[str, Value]:
-    """Return by how many frames each camera shows the whisker later than the others."""
-    delays = camera_delays(fitted.problem, fitted.state)
+def _delays(fitted: FittedWhisk, picture_of: Mapping[str, str]) -> dict[str, Value]:
+    """Return by how many frames each camera shows the whisker later than the others.
+
+    picture_of: of cameras that are parts of one picture, the camera whose picture it is.
+    """
+    delays = camera_delays(fitted.problem, fitted.state, picture_of)
     return {name: Value(*delay) for name, delay in delays.items()}
 
 
-def _warnings(
+def warnings_of(
     whisk: WhiskPictures, fitted: FittedWhisk, beam: BeamCheck | None
 ) -> Iterator[Reason]:
     """Yield the reasons, some empty, for which the truth of a fitted whisk may be wrong."""

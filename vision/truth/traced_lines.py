@@ -14,7 +14,15 @@ from vision.wire.bands import Pieces
 from vision.wire.one_sided import WireAppearance, seen_width
 from vision.wire.points import Observed
 from vision.wire.shading import Knots
-from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, observed, to_points, trace, wire_pieces
+from vision.wire.trace import (
+    NEAR_CLAMP_MM,
+    Traced,
+    clear_of_bar,
+    observed,
+    to_points,
+    trace,
+    wire_pieces,
+)
 
 # [mm] Between knots of the wire's shading: light and finish are much the same a centimetre
 # farther on. Study: thresholds.py truth.traced_lines _WIRE_KNOT_MM ….
@@ -82,16 +90,30 @@ def trace_wire(
 
     blur_px: of the pass that gave the curves. Fills whisk.light with how the camera sees the wire.
     """
-    name = view.camera.name
+    traced = trace_camera(whisk, view, place, blur_px=blur_px, last=last)
+    if traced is None:
+        return []
+    points, source = to_points(traced)
+    number = whisk.cameras.names.index(view.camera.name)
+    return observed(points, source, number, list(place.curves))
+
+
+def trace_camera(
+    whisk: WhiskPictures, view: View, place: WhiskPlace, *, blur_px: float | None, last: bool
+) -> Traced | None:
+    """Return the wire's segments brought to where it is; None where there are none.
+
+    Arguments and effect as of `trace_wire`.
+    """
     pieces = clear_pieces(whisk, view, place)
     if len(pieces) == 0:
-        return []
+        return None
     optics = view.camera.optics
     traced = trace(pieces, wire_knots(whisk), optics, seen_blur_px=blur_px, last=last)
     width = seen_width(traced.pieces, traced.blur_px)
-    whisk.light[name] = WireAppearance(traced.blur_px, width, float(np.sqrt(traced.misfit)))
-    points, source = to_points(traced)
-    return observed(points, source, whisk.cameras.names.index(name), list(place.curves))
+    misfit = float(np.sqrt(traced.misfit))
+    whisk.light[view.camera.name] = WireAppearance(traced.blur_px, width, misfit)
+    return traced
 
 
 def clear_pieces(whisk: WhiskPictures, view: View, place: WhiskPlace) -> Pieces:

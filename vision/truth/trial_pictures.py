@@ -11,7 +11,7 @@ from vision.pictures.others import Others, RodLines
 from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.pyramid import shrunk_frames, shrunk_picture
 from vision.pictures.view import View
-from vision.truth.trace import Trace
+from vision.truth.trace_points import Trace
 
 # [pictures] Of a camera that is used: two give the noise, a third what moves. Derived.
 _FEWEST_PICTURES = 3
@@ -30,6 +30,7 @@ class TrialPictures:
     itself: by camera, the wire's place to a pixel or two, where that is known beforehand.
     traces: by camera, the wire's lines as another program has drawn them; with any, they are the only
     lines of the wire.
+    picture_of: of cameras that are parts of one picture, the camera whose picture it is.
     """
 
     frames: Mapping[str, Mapping[int, np.ndarray]]
@@ -42,6 +43,7 @@ class TrialPictures:
     others: Mapping[str, Others] = field(default_factory=dict)
     itself: Mapping[str, RodLines] = field(default_factory=dict)
     traces: Mapping[str, Trace] = field(default_factory=dict)
+    picture_of: Mapping[str, str] = field(default_factory=dict)
 
     def shrunk(self, scale: int) -> "TrialPictures":
         """Return the trial with pixels `scale` times as wide."""

@@ -1,6 +1,6 @@
 """One whisk in a trial's pictures, with what is known beforehand, and the fit to them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
@@ -43,7 +43,8 @@ class WhiskPictures:
     indices: the frames of the stroke. time_s, motor_rad (n,): at every frame of the trial. light:
     filled with how each camera sees the wire. left_out: a line on each camera that is not used.
     stated_velocity: of a bar that moves. gives: of one that gives way. lines: makes the source of the
-    whisk's lines (`vision.truth.traced_lines.TracedLines` or one made as that is).
+    whisk's lines (`vision.truth.traced_lines.TracedLines` or one made as that is). picture_of: as of
+    `TrialPictures`.
     """
 
     number: int
@@ -60,6 +61,7 @@ class WhiskPictures:
     stated_velocity: StatedVelocity | None = None
     gives: Gives | None = None
     lines: Callable[..., LineSource] | None = None
+    picture_of: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def motion(self) -> Motion | Yielding | None:

@@ -73,11 +73,10 @@ def fit_lines(
     """
     for _ in range(whisk.settings.rounds):
         seen = lines.all_points(expected.place, last=False)
-        if len({one.camera for one in seen if one.frame >= 0}) < touch.fewest_cameras:
-            raise Refused("a single camera sees wire and bar", code="single_camera")
+        require_cameras(seen, touch)
         problem, state, covariance = _fit(whisk, expected, seen, touch)
         whisk = whisk.yielding_as(problem, state)
-        _check_scatter(problem, state, lines.most_scatter_px)
+        check_scatter(problem, state, lines.most_scatter_px)
         touching, free = touch.part_by_fit(problem, state, covariance)
         expected = ExpectedWhisk(
             place=_fitted_place(whisk, problem, state),
@@ -87,6 +86,22 @@ def fit_lines(
             touching=touching,
             free=free,
         )
+    return fit_last(whisk, lines, expected, touch)
+
+
+def require_cameras(seen: Sequence[Observed], touch: Touch) -> None:
+    """Raise Refused where fewer cameras see the wire than touch is found with."""
+    if len({one.camera for one in seen if one.frame >= 0}) < touch.fewest_cameras:
+        raise Refused("a single camera sees wire and bar", code="single_camera")
+
+
+def fit_last(
+    whisk: WhiskPictures, lines: LineSource, expected: ExpectedWhisk, touch: Touch
+) -> FittedWhisk:
+    """Fit a whisk's lines near where a pass before has them, with all that enters their sigmas.
+
+    Raises Refused where the fit shows no free stroke.
+    """
     seen = lines.all_points(expected.place, last=True)
     problem, state, covariance = _fit(whisk, expected, seen, touch)
     touch.part_by_fit(problem, state, covariance)  # raises where the last fit shows no free stroke
@@ -95,17 +110,26 @@ def fit_lines(
 
 def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, ExpectedWhisk]:
     """Return the whisk in the frames to fit, and what coarse points say of them."""
-    rest, coarse = coarse_shapes(whisk)
+    return expect_by_bends(whisk, touch, *coarse_shapes(whisk))
+
+
+def expect_by_bends(
+    whisk: WhiskPictures, touch: Touch, rest_mm: np.ndarray, coarse: Mapping[int, np.ndarray]
+) -> tuple[WhiskPictures, ExpectedWhisk]:
+    """Return the whisk in the frames to fit, and what its rest shape (2, 4) and bends say of them.
+
+    coarse: by frame the bend (2,), rad. Raises Refused where they show no touch.
+    """
     whisk = whisk.during(touch.frames_to_fit(whisk.motor, coarse))
     bend = np.array([coarse[f] for f in whisk.frames])
     touching, free = touch.part_by_bends(whisk.angles_rad, bend)
-    curves, arcs_mm = coarse_curves(whisk, rest, coarse)
+    curves, arcs_mm = coarse_curves(whisk, rest_mm, coarse)
     came = _expected_to_come_mm(whisk)
     if whisk.gives is not None:
         came = _given_way(whisk, list(curves.values()), touching)
         whisk = whisk.yielding(came, _coarse_touch_rad(whisk, touching, free))
     place = WhiskPlace(whisk.bar.axis, curves, whisk.bar_swept_mm, came)
-    return whisk, ExpectedWhisk(place, rest, bend, arcs_mm, touching, free)
+    return whisk, ExpectedWhisk(place, rest_mm, bend, arcs_mm, touching, free)
 
 
 def _expected_to_come_mm(whisk: WhiskPictures) -> np.ndarray:
@@ -193,7 +217,7 @@ def _fit(
     return problem, state, covariance
 
 
-def _check_scatter(problem: Problem, state: State, most_px: float) -> None:
+def check_scatter(problem: Problem, state: State, most_px: float) -> None:
     """Raise Misled where a camera's lines are not those of one wire."""
     scatter = scatter_px(problem, state)
     worst = int(np.argmax(scatter))
@@ -225,6 +249,28 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     state = State(vector[: problem.first_bend], middle_mm)
     state, _ = solve(alone, state, scales=[LAST_SCALE] * 3)
     return inflated_by_residuals(alone, state, FREE_SHARED), state
+
+
+def fit_before_touch(
+    whisk: WhiskPictures, lines: LineSource, rest_mm: np.ndarray
+) -> tuple[Axis, np.ndarray]:
+    """Fit frames in which nothing touches; return the object's axis and the rest shape (2, 4), mm.
+
+    rest_mm (2, 4): the rest shape to a pixel or two. Raises Refused where a line is not seen,
+    Misled where a camera's are not those of one wire.
+    """
+    place = _resting_place(whisk, whisk.bar.axis, rest_mm)
+    nothing = np.zeros(len(whisk.frames), dtype=bool)
+    seen = lines.all_points(place, last=False)
+    problem = Problem(
+        whisk.cameras, whisk.rods, whisk.bar.axis, whisk.angles_rad, nothing, nothing, seen
+    )
+    middle_mm = np.full(len(nothing), 0.5 * whisk.rods.wire.length_mm)
+    vector = np.zeros(problem.size)
+    vector[problem.blocks.rest_shape.slice] = np.ravel(rest_mm)
+    state, _ = solve(problem, State(vector, middle_mm))
+    check_scatter(problem, state, lines.most_scatter_px)
+    return bar_axis(problem, state.vector).upward(), rest_shape(problem, state.vector)
 
 
 def _wire_points(whisk: WhiskPictures, place: WhiskPlace) -> list[Observed]:

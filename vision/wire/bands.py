@@ -30,7 +30,8 @@ _SECOND_DIFFERENCE = (-1.0, 16.0, -30.0, 16.0, -1.0)
 class Band(Rows):
     """Hold the pixels near a predicted curve: n steps along it, k pixels across.
 
-    offset_px (n, k): signed distance of each pixel from the curve along its normal.
+    offset_px (n, k): signed distance of each pixel along the curve's normal from the middle between
+    the rod's edges on its row of pixels.
     grey, background (n, k): grey levels of the frame and of the picture without rods; pixels
     outside the picture, or hidden, are NaN.
     foot_px (n, 2): the curve. normal (n, 2): its unit normal. place (n,): the curve's parameter, mm.
@@ -71,14 +72,12 @@ def read_band(
     """
     path = _Path.along_curve(curve_px, place, radius_px, grey.shape)
     pixels = path.pixels(half_width_px)
-    levels = pixels.values(grey)
-    if hidden is not None:
-        levels[pixels.values(hidden) > 0] = np.nan
     across_px = pixels.line - path.middle[:, None]
     cosine = 1.0 / np.hypot(1.0, path.slope)
+    offset_px = across_px * cosine[:, None] - path.between_edges_px[:, None]
     return Band(
-        offset_px=path.side * across_px * cosine[:, None],
-        grey=levels,
+        offset_px=path.side * offset_px,
+        grey=pixels.unhidden_values(grey, hidden),
         background=pixels.values(background),
         foot_px=path.as_xy(path.step, path.middle),
         normal=path.side * path.as_xy(-path.slope * cosine, cosine),
@@ -122,6 +121,19 @@ class _Path:
         return np.gradient(self.middle) if len(self.step) > 1 else np.zeros(len(self.step))
 
     @property
+    def between_edges_px(self) -> np.ndarray:
+        """Return how far (n,) from the curve a row of pixels lies midway between the rod's edges, px
+        along the normal.
+
+        Rows run across at the angle of the slope. So a rod that widens in the picture has one edge
+        on a row where it is wider, the other where it is narrower: r (1 ± r′ sin) from the curve.
+        """
+        if len(self.step) < 2:
+            return np.zeros(len(self.step))
+        sine = self.slope / np.hypot(1.0, self.slope)
+        return self.radius_px * np.gradient(self.radius_px) * sine
+
+    @property
     def side(self) -> float:
         """Return 1 where the axis's own normals lie as normals of a band shall, else -1."""
         return 1.0 if (self.along == 0) == (self.place[-1] >= self.place[0]) else -1.0
@@ -156,6 +168,15 @@ class _BandPixels:
         at = (line, step) if self.along == 0 else (step, line)
         values = picture[at].astype(float)
         values[line != self.line] = np.nan
+        return values
+
+    def unhidden_values(self, picture: np.ndarray, hidden: np.ndarray | None) -> np.ndarray:
+        """Return the values (n, k) of a picture at the pixels; NaN outside it, and where it shows
+        something else, hidden (h, w) bool.
+        """
+        values = self.values(picture)
+        if hidden is not None:
+            values[self.values(hidden) > 0] = np.nan
         return values
 
 

@@ -21,7 +21,7 @@ from vision.wire.bands import Pieces
 from vision.wire.gathered import GatheredEquations, exactly_if_needed
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import WAVE_SHARE, Knots, between_knots, contrast_of
-from vision.wire.summed_segments import Normal
+from vision.wire.summed_segments import ShadingEquations
 
 # [1] Of the widest shift: the grid below. Derived.
 _PARTS = np.linspace(-1.0, 1.0, 15)
@@ -150,7 +150,7 @@ def _three_along(knots: Knots) -> Knots:
 
 
 def _evidences(
-    normal: Normal, own: np.ndarray, contrast: np.ndarray, no_chance: float
+    normal: ShadingEquations, own: np.ndarray, contrast: np.ndarray, no_chance: float
 ) -> np.ndarray:
     """Return minus twice the log evidence (g,) of g normal equations, coefficients of the best
     strength.
@@ -187,7 +187,7 @@ def _bound(strength: np.ndarray, contrast: np.ndarray) -> np.ndarray:
     return np.clip(strength, _LEAST_STRENGTH * level, _MOST_STRENGTH * level)
 
 
-def _integrate(normal: Normal, stiff: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _integrate(normal: ShadingEquations, stiff: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Integrate out the coefficients of g normal equations, with prior precisions stiff (g, size).
 
     Returned are minus twice the log evidence (g,), and the coefficients' expected squares (g,

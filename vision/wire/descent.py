@@ -15,8 +15,8 @@ from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import (
     LEAST_POWER,
     LONGEST_PX,
-    Equations,
     PositionEquations,
+    SegmentEquations,
     stiffness,
     wave_prior,
 )
@@ -53,6 +53,7 @@ class Shared:
     shift_px (s,): positions. shared_px (s, k): by how much each moves with one sigma of each of k
     independent causes that all share. coefficients (s, terms): the shading of each.
     evidence: minus twice the log evidence of positions and blur, the shading integrated out.
+    by_knot (knots, terms): the shading at its knots. causes: how those causes move any segment.
     """
 
     shift_px: np.ndarray
@@ -60,6 +61,37 @@ class Shared:
     coefficients: np.ndarray
     blur_px: float
     evidence: float
+    by_knot: np.ndarray
+    causes: "Causes"
+
+
+@dataclass(frozen=True)
+class Causes:
+    """Hold the independent causes that move segments together: errors of shading and of blur.
+
+    root (size + 1, size + 1): lower root of the inverse covariance of shading and blur, positions
+    eliminated. in_common (size + 1,): the part of each cause that moves all segments to one side, px at
+    the mean half-width, which `common_px` stands for: the sigma of such a shift.
+    """
+
+    root: np.ndarray
+    in_common: np.ndarray | float = 0.0
+    common_px: float = 0.0
+
+    def shifts_px(self, sensitivity: np.ndarray) -> np.ndarray:
+        """Return by how much each of the causes moves segments (s, size + 1), px.
+
+        sensitivity (s, size + 1): of their positions to shading and blur.
+        """
+        return np.linalg.solve(self.root, sensitivity.T).T
+
+    def all_shifts_px(self, sensitivity: np.ndarray, relative_radius: np.ndarray) -> np.ndarray:
+        """Return by how much each of the causes and, last, a common shift moves segments, px.
+
+        relative_radius (s,): half-width over the mean one.
+        """
+        own_px = self.shifts_px(sensitivity) - np.outer(relative_radius, self.in_common)
+        return np.concatenate([own_px, self.common_px * relative_radius[:, None]], axis=1)
 
 
 def descend(here: "Point", coarse: float = 1.0) -> Shared:
@@ -89,11 +121,17 @@ def descend(here: "Point", coarse: float = 1.0) -> Shared:
     return arrow.solve(damping)
 
 
+def _solve_positive(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the solution (n,) of equations with a positive definite matrix (n, n)."""
+    return cho_solve(cho_factor(matrix, check_finite=False), right, check_finite=False)
+
+
 @dataclass(frozen=True)
 class Point:
     """Hold positions and blur, and the most probable shading there.
 
-    left: normal matrix (size, size) of the shading. coefficients (s, terms): of each segment.
+    left: normal matrix (size, size) of the shading. by_knot (knots, terms): the shading at its knots.
+    coefficients (s, terms): of each segment.
     chi2 (s,): of each segment. misfit: all chi² by weight, and what the priors add.
     stiff (size, size): prior of the shading. robust (s,): weight of each segment.
     """
@@ -103,8 +141,9 @@ class Point:
     log_blur: float
     robust: np.ndarray
     stiff: np.ndarray
-    equations: Equations
+    equations: SegmentEquations
     left: np.ndarray
+    by_knot: np.ndarray
     coefficients: np.ndarray
     chi2: np.ndarray
     misfit: float
@@ -117,7 +156,7 @@ class Point:
         log_blur: float,
         robust: np.ndarray,
         stiff: np.ndarray | None = None,
-        equations: Equations | None = None,
+        equations: SegmentEquations | None = None,
     ) -> "Point":
         """Return the point at these positions and this blur.
 
@@ -125,19 +164,32 @@ class Point:
         known already.
         """
         if equations is None:
-            equations = Equations(task.pieces.moved(shift_px), float(np.exp(log_blur)), task.terms)
+            equations = SegmentEquations(
+                task.pieces.moved(shift_px), float(np.exp(log_blur)), task.terms
+            )
         if stiff is None:
             stiff = stiffness(wave_prior(equations.pieces, task.terms), task.knots)
         weights = task.knot_weights
         left, right = equations.shared(weights, robust)
         left += stiff
-        shared = cho_solve(cho_factor(left, check_finite=False), right, check_finite=False)
-        coefficients = weights @ shared.reshape(weights.shape[1], task.terms)
+        shared = _solve_positive(left, right)
+        by_knot = shared.reshape(weights.shape[1], task.terms)
+        coefficients = weights @ by_knot
         chi2 = equations.chi2(coefficients)
         of_priors = shared @ stiff @ shared + task.blur_deviation(log_blur) ** 2
         misfit = float(robust @ chi2 + of_priors)
         return cls(
-            task, shift_px, log_blur, robust, stiff, equations, left, coefficients, chi2, misfit
+            task,
+            shift_px,
+            log_blur,
+            robust,
+            stiff,
+            equations,
+            left,
+            by_knot,
+            coefficients,
+            chi2,
+            misfit,
         )
 
     @classmethod
@@ -212,12 +264,10 @@ class Arrow:
     def __init__(self, point: Point):
         task = point.task
         linear = point.equations.linearised(point.coefficients)
-        by_shading = task.knot_weights[:, :, None] * linear.rod[:, None, 0]
-        by_shading = by_shading.reshape(len(by_shading), -1)
         self.point = point
         self.power = linear.power
         self.right = linear.gram[:, 0, 2]
-        self.cross = np.concatenate([by_shading, linear.gram[:, 0, 1:2]], axis=1)
+        self.cross = positions_with_shared(linear, task.knot_weights)
         self.shared = _shared_block(point, linear)
         from_prior = task.blur_deviation(point.log_blur) / task.blur_sigma
         self.log_blur_right = point.robust @ linear.gram[:, 1, 2] - from_prior
@@ -251,13 +301,26 @@ class Arrow:
         own = self.cross / self.power[:, None]
         left = self.shared - (point.robust[:, None] * self.cross).T @ own
         log_blur = point.log_blur + np.clip(step.log_blur, -_LONGEST_LOG, _LONGEST_LOG)
+        causes = Causes(np.linalg.cholesky(left))
         return Shared(
             shift_px=point.shift_px + np.clip(step.shift_px, -LONGEST_PX, LONGEST_PX),
-            shared_px=np.linalg.solve(np.linalg.cholesky(left), own.T).T,
+            shared_px=causes.shifts_px(own),
             coefficients=point.coefficients,
             blur_px=float(np.exp(log_blur)),
             evidence=point.evidence,
+            by_knot=point.by_knot,
+            causes=causes,
         )
+
+
+def positions_with_shared(linear: PositionEquations, knot_weights: np.ndarray) -> np.ndarray:
+    """Return the normal matrix (s, size + 1) of positions with shading and, last, blur.
+
+    knot_weights (s, knots): weight of each knot in the shading of each segment.
+    """
+    by_shading = knot_weights[:, :, None] * linear.rod[:, None, 0]
+    by_shading = by_shading.reshape(len(by_shading), -1)
+    return np.concatenate([by_shading, linear.gram[:, 0, 1:2]], axis=1)
 
 
 def _shared_block(point: Point, linear: PositionEquations) -> np.ndarray:

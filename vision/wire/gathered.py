@@ -11,8 +11,8 @@ import numpy as np
 
 from vision.wire.bands import Pieces
 from vision.wire.cylinder import alike
-from vision.wire.shading import Equations
-from vision.wire.summed_segments import Normal, SummedSegments
+from vision.wire.shading import SegmentEquations
+from vision.wire.summed_segments import ShadingEquations, SummedSegments
 
 # [px] Pixels farther than this from the rod's edges show the background alone. Derived.
 _BACKGROUND_MARGIN_PX = 2.0
@@ -62,7 +62,7 @@ class GatheredEquations:
 
     def normal(
         self, shifts_px: Sequence[float], models: Sequence[tuple[float, float]], terms: int
-    ) -> Normal:
+    ) -> ShadingEquations:
         """Return the normal equations (shifts, models, …) of segments moved by each common shift,
         px at their mean half-width.
 
@@ -79,7 +79,7 @@ class GatheredEquations:
             lefts.append(sum(group.left for group in groups))
             rights.append(sum(group.right for group in groups))
             powers.append(sum(group.power for group in groups))
-        return Normal(np.array(lefts), np.array(rights), np.array(powers))
+        return ShadingEquations(np.array(lefts), np.array(rights), np.array(powers))
 
 
 def exactly_if_needed(compute: Callable[[bool], np.ndarray]) -> np.ndarray:
@@ -111,7 +111,7 @@ class _PixelSegments:
 
     def normal_at(
         self, shift_px: np.ndarray, models: Sequence[tuple[float, float]], terms: int
-    ) -> Normal:
+    ) -> ShadingEquations:
         """Return the normal equations (models, …) of the segments, each moved by its shift (s,)."""
         moved = self._pieces.moved(shift_px)
         lefts = []
@@ -119,9 +119,9 @@ class _PixelSegments:
         powers = []
         for wider, blur_px in models:
             thick = replace(moved, radius_px=wider * moved.radius_px)
-            equations = Equations(thick, blur_px, terms)
+            equations = SegmentEquations(thick, blur_px, terms)
             left, right = equations.shared(self._knot_weights, self._robust)
             lefts.append(left)
             rights.append(right)
             powers.append(self._robust @ equations.power)
-        return Normal(np.array(lefts), np.array(rights), np.array(powers))
+        return ShadingEquations(np.array(lefts), np.array(rights), np.array(powers))

@@ -23,7 +23,7 @@ import numpy as np
 from vision.wire.common_shift import CommonShift, common_shift
 from vision.wire.descent import Point, Shared, descend
 from vision.wire.shaded_segments import ShadedSegments
-from vision.wire.shading import LEAST_POWER, Equations, PositionEquations
+from vision.wire.shading import LEAST_POWER, PositionEquations, SegmentEquations
 from vision.wire.starts import find_start
 
 # [segments] By so many the probability of a common shift is found: pixels at one distance together
@@ -77,14 +77,25 @@ def _with_all_shifts(task: ShadedSegments, shared: Shared) -> Shared:
             shift = about_other
     own_px = _without_common(task, shared.shared_px, here.robust)
     common_px = shift.rms_px * task.pieces.relative_radius[:, None]
-    return replace(shared, shared_px=np.concatenate([own_px, common_px], axis=1))
+    causes = replace(
+        shared.causes,
+        in_common=_in_common(task, shared.shared_px, here.robust),
+        common_px=shift.rms_px,
+    )
+    return replace(shared, shared_px=np.concatenate([own_px, common_px], axis=1), causes=causes)
 
 
 def _without_common(task: ShadedSegments, shifts_px: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Return shifts (s, k) less the common shift that fits them best by weights (s,)."""
     common = task.pieces.relative_radius
+    return shifts_px - np.outer(common, _in_common(task, shifts_px, weight))
+
+
+def _in_common(task: ShadedSegments, shifts_px: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return the common shift (k,) that fits shifts (s, k) best by weights (s,)."""
+    common = task.pieces.relative_radius
     weighted = weight * common
-    return shifts_px - np.outer(common, (weighted @ shifts_px) / (weighted @ common))
+    return (weighted @ shifts_px) / (weighted @ common)
 
 
 def _weighted_point(task: ShadedSegments, shared: Shared) -> Point:
@@ -112,7 +123,7 @@ def settle(task: ShadedSegments, shared: Shared) -> Solved:
 
     Their common shift stays as it is.
     """
-    here = Equations(task.pieces.moved(shared.shift_px), shared.blur_px, task.terms)
+    here = SegmentEquations(task.pieces.moved(shared.shift_px), shared.blur_px, task.terms)
     linear = here.linearised(shared.coefficients)
     chi2 = here.chi2(shared.coefficients) / task.pieces.freedom
     misfit = chi2 / max(float(np.median(chi2)), 1e-9)
@@ -124,14 +135,16 @@ def settle(task: ShadedSegments, shared: Shared) -> Solved:
         coefficients=shared.coefficients,
         blur_px=shared.blur_px,
         evidence=shared.evidence,
+        by_knot=shared.by_knot,
+        causes=shared.causes,
         own_sigma_px=linear.own_sigma_px(chi2),
         chi2=chi2,
         contrast=linear.contrast,
-        widened_px2=_widened(linear, shared.blur_px, np.maximum(chi2, 1.0)),
+        widened_px2=widened_blurs(linear, shared.blur_px, np.maximum(chi2, 1.0)),
     )
 
 
-def _widened(linear: PositionEquations, blur_px: float, chi2: np.ndarray) -> np.ndarray:
+def widened_blurs(linear: PositionEquations, blur_px: float, chi2: np.ndarray) -> np.ndarray:
     """Return by how much each segment's blur² is above that of all, and sigma, (s, 2).
 
     The segment's position is free as well.

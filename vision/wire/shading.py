@@ -6,7 +6,7 @@ whose coefficients vary slowly along the rod and as it turns: they are known at 
 knots they are interpolated linearly. Each segment of the picture has, of its own, its position
 across the rod and a gain and an offset of the background (shadow, drifting light).
 
-All but position and blur is linear. `Equations` holds each segment's normal equations with gain
+All but position and blur is linear. `SegmentEquations` holds each segment's normal equations with gain
 and offset eliminated; `fit_shading` solves them for the coefficients of all knots together.
 """
 
@@ -98,7 +98,7 @@ class Shading:
 
     def misfit(self, pieces: Pieces) -> np.ndarray:
         """Return the chi² per degree of freedom (s,) that segments leave where they lie."""
-        equations = Equations(pieces, self.blur_px, self.coefficients.shape[1])
+        equations = SegmentEquations(pieces, self.blur_px, self.coefficients.shape[1])
         return equations.chi2(self.knots.weights(pieces) @ self.coefficients) / pieces.freedom
 
 
@@ -127,7 +127,7 @@ def _hidden_light(pieces: Pieces, bells: np.ndarray, blur_px: float) -> np.ndarr
 
 def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots) -> tuple[Shading, float]:
     """Fit the radiance of segments where they lie; also return chi² per pixel."""
-    equations = Equations(pieces, blur_px, terms)
+    equations = SegmentEquations(pieces, blur_px, terms)
     every = np.ones(len(pieces))
     left, right = equations.shared(knots.weights(pieces), every)
     ridge = _RIDGE * np.trace(left) / len(left) * np.eye(len(left))
@@ -138,7 +138,7 @@ def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots) -> tup
     return shading, chi2 / max(1.0, pixels)
 
 
-class Equations:
+class SegmentEquations:
     """Normal equations of each segment for its shading, the background's gain and offset
     eliminated.
 

@@ -34,7 +34,7 @@ _BACKGROUND_TERMS = 3
 _BACKGROUND_PAIRS = [(i, j) for i in range(_BACKGROUND_TERMS) for j in range(i, _BACKGROUND_TERMS)]
 
 
-class Normal(NamedTuple):
+class ShadingEquations(NamedTuple):
     """Normal equations of many models.
 
     left (…, size, size): matrices. right (…, size): right sides. power (…): the squares that the
@@ -45,15 +45,15 @@ class Normal(NamedTuple):
     right: np.ndarray
     power: np.ndarray
 
-    def flattened(self) -> "Normal":
+    def flattened(self) -> "ShadingEquations":
         """Return the normal equations with all models along one axis."""
         size = self.right.shape[-1]
         left = self.left.reshape(-1, size, size)
-        return Normal(left, self.right.reshape(-1, size), self.power.ravel())
+        return ShadingEquations(left, self.right.reshape(-1, size), self.power.ravel())
 
-    def select(self, some: np.ndarray) -> "Normal":
+    def select(self, some: np.ndarray) -> "ShadingEquations":
         """Return the normal equations of some models, by their indices along the first axis."""
-        return Normal(self.left[some], self.right[some], self.power[some])
+        return ShadingEquations(self.left[some], self.right[some], self.power[some])
 
 
 class SummedSegments:
@@ -81,7 +81,7 @@ class SummedSegments:
 
     def normal_at(
         self, shift_px: float, models: Sequence[tuple[float, float]], terms: int
-    ) -> Normal:
+    ) -> ShadingEquations:
         """Return the normal equations (models, …) of the segments moved by one shift.
 
         A pixel's grey level is modelled as Σ cᵢ lightᵢ + gain · background + offset · uncovered.
@@ -95,7 +95,9 @@ class SummedSegments:
         explained = self._join(by_gain[..., :-1], by_offset)
         left = self._left(shapes.light)
         right = self._right(by_grey[..., :-1])
-        return Normal(left - explained.left, right - explained.right, self._power - explained.power)
+        return ShadingEquations(
+            left - explained.left, right - explained.right, self._power - explained.power
+        )
 
     def _left(self, light: np.ndarray) -> np.ndarray:
         """Return the matrices (models, size, size) of shading functions light (d, models, terms)."""
@@ -115,7 +117,7 @@ class SummedSegments:
         right = right.reshape(-1, models, terms).transpose(1, 0, 2)
         return right.reshape(models, -1)
 
-    def _join(self, by_gain: np.ndarray, by_offset: np.ndarray) -> Normal:
+    def _join(self, by_gain: np.ndarray, by_offset: np.ndarray) -> ShadingEquations:
         """Return the part (models, …) of the normal equations that gain and offset explain.
 
         by_gain, by_offset (s, models, terms + 1): what each explains of the segments.
@@ -126,7 +128,9 @@ class SummedSegments:
         by_knot = by_knot.reshape(models, 2 * len(self._one), -1)
         by_seen = (self._root_robust * explained[..., -1]).reshape(models, -1, 1)
         products = by_knot.transpose(0, 2, 1) @ np.concatenate([by_knot, by_seen], axis=2)
-        return Normal(products[..., :-1], products[..., -1], np.sum(by_seen**2, axis=(1, 2)))
+        return ShadingEquations(
+            products[..., :-1], products[..., -1], np.sum(by_seen**2, axis=(1, 2))
+        )
 
     def _explained_by_gain(self, shapes: "_Shapes") -> np.ndarray:
         """Return what the background's gain explains, (s, models, terms + 2).

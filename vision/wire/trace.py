@@ -13,6 +13,7 @@ from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.optics import UNKNOWN, Optics
 from vision.geometry.rods import Wire
+from vision.geometry.rows import Rows
 from vision.geometry.silhouette import edges, normals
 from vision.pictures.others import RodLines, mask_rods
 from vision.pictures.view import View
@@ -166,22 +167,60 @@ def trace(
     return Traced(pieces.moved(solved.shift_px), solved, blur_px)
 
 
-def to_points(traced: Traced) -> tuple[LinePoints, np.ndarray]:
-    """Return the line points that can be trusted, and the source of each; sigmas hold the misfit."""
+@dataclass(frozen=True)
+class Placed(Rows):
+    """Hold segments where the rod is in them, without their pixels.
+
+    px, normal (s, 2), place (s,): as of `LinePoints`. source (s,): the band of each. own_sigma_px,
+    chi2 (s,), shared_px (s, k), widened_px2 (s, 2): as of `vision.wire.joint.Solved`.
+    """
+
+    px: np.ndarray
+    normal: np.ndarray
+    place: np.ndarray
+    source: np.ndarray
+    own_sigma_px: np.ndarray
+    chi2: np.ndarray
+    shared_px: np.ndarray
+    widened_px2: np.ndarray
+
+
+def placed(traced: Traced) -> Placed:
+    """Return traced segments without their pixels."""
     pieces = traced.pieces
     solved = traced.solved
-    most_chi2 = _WORST_MISFIT * max(traced.misfit, _LEAST_MEDIAN_MISFIT)
-    good = (solved.chi2 < most_chi2) & (solved.own_sigma_px < _WORST_SIGMA_PX)
-    shared_px, rest_px = _leading_causes(solved.shared_px)
-    points = LinePoints(
+    return Placed(
         px=pieces.foot_px,
         normal=pieces.normal,
-        sigma_px=np.hypot(solved.own_sigma_px, rest_px),
         place=pieces.place,
-        shared_px=shared_px,
+        source=pieces.source,
+        own_sigma_px=solved.own_sigma_px,
+        chi2=solved.chi2,
+        shared_px=solved.shared_px,
         widened_px2=solved.widened_px2,
     )
-    return points.select(good), pieces.source[good]
+
+
+def to_points(traced: Traced) -> tuple[LinePoints, np.ndarray]:
+    """Return the line points that can be trusted, and the source of each; sigmas hold the misfit."""
+    return points_of(placed(traced))
+
+
+def points_of(segments: Placed) -> tuple[LinePoints, np.ndarray]:
+    """Return the line points of segments that can be trusted, and the source of each."""
+    median = float(np.median(segments.chi2))
+    most_chi2 = _WORST_MISFIT * max(median, _LEAST_MEDIAN_MISFIT)
+    good = (segments.chi2 < most_chi2) & (segments.own_sigma_px < _WORST_SIGMA_PX)
+    shared_px, rest_px = _leading_causes(segments.shared_px)
+    points = LinePoints(
+        px=segments.px,
+        normal=segments.normal,
+        sigma_px=np.hypot(segments.own_sigma_px, rest_px),
+        place=segments.place,
+        shared_px=shared_px,
+        widened_px2=segments.widened_px2,
+    )
+    return points.select(good), segments.source[good]
 
 
 def _leading_causes(shared_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

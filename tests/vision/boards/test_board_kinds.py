@@ -15,6 +15,7 @@ from vision.boards import (
     find_corners,
 )
 from vision.boards.circle_grid import perspective_shift
+from vision.boards.saddle_board import SaddleBoard
 from vision.geometry import lens
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import apply, exp_rotation
@@ -127,3 +128,27 @@ def test_a_circle_s_picture_is_off_the_picture_of_its_centre_as_computed():
 def test_a_board_that_cannot_be_is_refused(make, words):
     with pytest.raises(Refused, match=words):
         make()
+
+
+def test_an_aprilgrid_is_found_in_noise():
+    """Unsmoothed, outlines of most tags are taken a module inside them, and on no plane."""
+    board = next(board for board in KINDS if board.kind == "aprilgrid")
+    lean = exp_rotation(np.array([0.3, 0.1, 0.0])) @ _UPRIGHT[board.kind]
+    T = pose_before(board, CAMERA, (0.0, 0.0, 400.0), lean)
+    grey = picture_of(board, CAMERA, T, np.random.default_rng(5), noise=8.0)
+    true_px = lens.project(apply(T, board.corners_mm), CAMERA.lens)
+    found = find_corners(grey, board)
+    assert len(found) > 0.9 * len(board.corners_mm)
+    assert np.abs((found.px - true_px[found.ids]) / found.sigma_px[:, None]).max() < 4.5
+
+
+def test_a_row_that_is_the_board_s_edge_is_no_checkerboard():
+    """OpenCV takes the edge for a row where the last one is out of the picture: all names are wrong then."""
+    board = Checkerboard((8, 7), 13.0)
+    T = pose_before(board, CAMERA, (0.0, 0.0, 400.0), np.eye(3))
+    grey = picture_of(board, CAMERA, T, np.random.default_rng(5))
+    row_up = board.corners_mm - [0.0, board.square_mm, 0.0]
+    guess_px = lens.project(apply(T, row_up), CAMERA.lens)
+    ids = np.arange(len(guess_px))
+    assert len(SaddleBoard.refine(board, grey, guess_px, ids)) >= 30
+    assert len(board.refine(grey, guess_px, ids)) == 0

@@ -14,22 +14,37 @@ from tests.studies.accuracy.board_scenes import (
     moving_board,
     noisy_view_at,
 )
+from vision.boards.body import Body
+from vision.boards.checkerboard import Checkerboard
 from vision.calibration.adjust import adjust_bundle
 from vision.calibration.board_motion import Trajectory
-from vision.calibration.bundle import N_BOARD, N_CAMERA, N_VIEW, BundleState, Sightings, predict
-from vision.calibration.calibrate import calibrate_alone, calibrate_cameras
+from vision.calibration.bundle import (
+    N_BOARD,
+    N_CAMERA,
+    N_VIEW,
+    BundleState,
+    Sightings,
+    predict,
+    predict_with_points,
+)
+from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.corner_noise import adjust_with_noise
 from vision.calibration.layout import gather
+from vision.calibration.one_picture import calibrate_alone
 from vision.calibration.tied import lens_priors
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.rotation import exp_rotation, left_jacobian, log_rotation
 
 VIEWS, CAMERAS = 4, 2
-CORNERS = np.array([[x, y, 0.0] for y in (0, 15, 30) for x in (0, 15, 30, 45)])
+PLANE = Checkerboard((5, 4), 15.0)
+FACES = [np.eye(3, 4), np.column_stack([exp_rotation([0.0, -1.4, 0.1]), [48.0, 2.0, 1.0]])]
+FACED = Body((4, 3), 15.0, marker_mm=11.0, dictionary="DICT_5X5_100", first_ids=(0, 6)).placed(
+    np.array(FACES)
+)
 TIMES_S = np.array([0.0, 0.2, 0.5, 0.7])
 
 
-def a_state(moving):
+def a_state(board, moving):
     rng = np.random.default_rng(0)
     turns = [exp_rotation(np.array([0.15, 0.05, 0.1]) * (k + 1)) for k in range(VIEWS)]
     boards = np.array(
@@ -42,23 +57,25 @@ def a_state(moving):
         np.array([one, other]),
         cameras,
         boards,
-        board=np.array([0.01, 0.02, 0.3, -0.4]),
+        board=np.append(rng.normal(0, 0.05, len(board.shape_sigma)), [0.01, 0.02, 0.3, -0.4]),
+        points_mm=rng.normal(0, 0.1, board.corners_mm.shape),
         clock=np.array([0, 0.05]),
         instants=rng.normal(0, 0.05, (VIEWS, CAMERAS)),
         trajectory=Trajectory(TIMES_S, np.arange(CAMERAS)) if moving else None,
     )
 
 
-def all_sightings():
-    view, camera, corner = np.array(list(np.ndindex(VIEWS, CAMERAS, len(CORNERS)))).T
+def all_sightings(board):
+    count = len(board.corners_mm)
+    view, camera, corner = np.array(list(np.ndindex(VIEWS, CAMERAS, count))).T
     n = len(view)
     return Sightings(camera, view, corner, np.zeros((n, 2)), np.ones(n), 0.1 * camera)
 
 
-def differences(state, seen, globals_step, view_step):
+def differences(board, state, seen, globals_step, view_step):
     none = np.zeros((VIEWS, CAMERAS))
-    up = predict(state.move(globals_step, view_step, none), seen, CORNERS)[0]
-    return up - predict(state.move(-globals_step, -view_step, none), seen, CORNERS)[0]
+    up = predict(state.move(globals_step, view_step, none), seen, board)[0]
+    return up - predict(state.move(-globals_step, -view_step, none), seen, board)[0]
 
 
 # Step of each parameter: central differences err by step² f‴/6, and by rounding of 1e-13 · 1e3 px / step.
@@ -66,33 +83,46 @@ STEPS = [1e-2] * 4 + [1e-4] * 5 + [1e-5] * 3 + [1e-3] * 3 + [1e-5]
 
 
 @pytest.mark.parametrize("moving", [False, True])
-def test_gradients_by_cameras_and_board_are_finite_differences(moving):
-    state, seen = a_state(moving), all_sightings()
-    J = predict(state, seen, CORNERS)[1]
-    for column in range(N_CAMERA * CAMERAS + N_BOARD):
+@pytest.mark.parametrize("board", [PLANE, FACED], ids=["plane", "body"])
+def test_gradients_by_cameras_and_board_are_finite_differences(board, moving):
+    state, seen = a_state(board, moving), all_sightings(board)
+    J = predict(state, seen, board)[1]
+    size = N_CAMERA * CAMERAS + len(state.board)
+    for column in range(size):
         own = column < N_CAMERA * CAMERAS
         local = column % N_CAMERA if own else N_CAMERA + column - N_CAMERA * CAMERAS
-        step = np.zeros(N_CAMERA * CAMERAS + N_BOARD)
+        step = np.zeros(size)
         step[column] = STEPS[local] if own else 1e-4
-        numeric = differences(state, seen, step, np.zeros((VIEWS, 6))) / (2 * step[column])
+        numeric = differences(board, state, seen, step, np.zeros((VIEWS, 6))) / (2 * step[column])
         of = seen.camera == column // N_CAMERA if own else np.ones(len(seen), dtype=bool)
         analytic = J[:, :, local] * of[:, None]
         np.testing.assert_allclose(analytic, numeric, atol=1e-6 * max(np.abs(numeric).max(), 1e-3))
 
 
 @pytest.mark.parametrize("moving", [False, True])
+def test_gradients_by_points_of_the_board_are_finite_differences(moving):
+    state, seen = a_state(FACED, moving), all_sightings(FACED)
+    by_point = predict_with_points(state, seen, FACED)[2]
+    for axis in range(3):
+        step = 1e-3 * np.eye(3)[axis]
+        up, down = [replace(state, points_mm=state.points_mm + s) for s in (step, -step)]
+        numeric = (predict(up, seen, FACED)[0] - predict(down, seen, FACED)[0]) / 2e-3
+        largest = np.abs(numeric).max()
+        np.testing.assert_allclose(by_point[:, :, axis], numeric, atol=1e-6 * largest)
+
+
+@pytest.mark.parametrize("moving", [False, True])
 def test_gradients_by_board_poses_are_finite_differences(moving):
-    state, seen = a_state(moving), all_sightings()
-    J = predict(state, seen, CORNERS)[1][:, :, N_CAMERA + N_BOARD :]
+    state, seen = a_state(PLANE, moving), all_sightings(PLANE)
+    J = predict(state, seen, PLANE)[1][:, :, N_CAMERA + N_BOARD :]
     touched = [seen.view]
     if moving:
         touched += list(state.trajectory.neighbours[seen.view].T)
     for view, k in np.ndindex(VIEWS, N_VIEW):
         step = np.zeros((VIEWS, 6))
         step[view, k] = 1e-5 if k < 3 else 1e-3
-        numeric = differences(state, seen, np.zeros(N_CAMERA * CAMERAS + N_BOARD), step) / (
-            2 * step[view, k]
-        )
+        still = np.zeros(N_CAMERA * CAMERAS + N_BOARD)
+        numeric = differences(PLANE, state, seen, still, step) / (2 * step[view, k])
         analytic = sum(
             J[:, :, N_VIEW * b + k] * (who == view)[:, None] for b, who in enumerate(touched)
         )
@@ -150,13 +180,11 @@ def test_more_iterations_change_nothing_at_rest():
     boards, _ = recording.seen(0.05, np.random.default_rng(1))
     start = calibrate_alone(boards["high"], BOARD, SIZE_PX).solution.state
     corners = gather([(0, view, seen) for view, seen in enumerate(boards["high"])])
-    priors = lens_priors(1, 6)
+    priors = lens_priors(1, 6, BOARD)
     priors.free[9:15] = False
-    settled = adjust_with_noise(start, corners, BOARD.corners_mm, priors)
+    settled = adjust_with_noise(start, corners, BOARD, priors)
     seen = settled.seen.select(settled.kept)
-    again = adjust_bundle(
-        settled.solution.state, seen, BOARD.corners_mm, replace(priors), tolerance=1e-14
-    )
+    again = adjust_bundle(settled.solution.state, seen, BOARD, replace(priors), tolerance=1e-14)
     sigma = np.sqrt(np.diag(again.covariance)[:9])
     assert np.all(np.abs(again.state.lens[0] - settled.solution.state.lens[0]) < 0.02 * sigma)
 

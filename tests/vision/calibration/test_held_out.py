@@ -31,7 +31,7 @@ def measured(folder, names):
         n: [Corners.none() if out else v for v, out in zip(vs, is_held)] for n, vs in views.items()
     }
     made = calibrate_cameras(BoardViews(kept, sizes), BOARD, None)
-    return check_held_out(made, views, is_held, BOARD)
+    return check_held_out(made, views, is_held)
 
 
 @pytest.mark.parametrize("name, best_of_others_px", [("cam_0", 0.338), ("cam_2", 0.189)])

@@ -54,7 +54,7 @@ def test_a_polished_bar_over_squares_is_found_by_one_camera(rng):
     edge_map = compute_edge_map(
         camera, view.mean[::HALF, ::HALF], view.background[::HALF, ::HALF], rods, 0.0
     )
-    found = find_bars_alone(edge_map, rods, 0.0)[0]
+    found = find_bars_alone(edge_map, rods, 0.0, 36.0)[0]
     px = camera.project(found.point_mm + np.array([-8.0, 8.0])[:, None] * found.direction)
     off = (px - CENTRE) @ [-np.sin(angle), np.cos(angle)] - np.mean(edges_px(across_mm))
     assert np.max(np.abs(off)) < 4.0

@@ -9,6 +9,7 @@ import pytest
 
 from tests.studies.accuracy.bar_scenes import FOUND_PX, axis_off_px, read_scene
 from vision.geometry.contact import BarAxis
+from vision.geometry.refusals import Refused
 from vision.geometry.vision_settings import VisionSettings
 from vision.touched import search
 from vision.touched.axis import meeting_axis, offset_px
@@ -52,6 +53,24 @@ def test_a_line_is_followed_until_it_converges(lamp, monkeypatch):
     start = meeting_axis(one, true, other, farther(true, other, 3.0))
     assert offset_px(other, start, true) > 7.0
     monkeypatch.setattr(search, "find_bars", lambda *_: [start])
+    found = search.BarSearch(scene).best_by_all_cameras()
+    assert max(offset_px(camera, found.axis, true) for camera in scene.cameras) < FOUND_PX
+
+
+def test_lines_that_no_axis_fits_end_their_hypothesis_and_not_the_search(lamp, monkeypatch):
+    scene, true = lamp
+    one, other = scene.cameras
+    wrong = meeting_axis(one, true, other, farther(true, other, 40.0))
+    monkeypatch.setattr(search, "find_bars", lambda *_: [wrong, true])
+    converge = search.BarSearch._converge
+
+    def refuse_wrong(self, axis, found):
+        """Converge, but from where the first hypothesis is."""
+        if offset_px(other, axis, true) > 20.0:
+            raise Refused("no axis fits")
+        return converge(self, axis, found)
+
+    monkeypatch.setattr(search.BarSearch, "_converge", refuse_wrong)
     found = search.BarSearch(scene).best_by_all_cameras()
     assert max(offset_px(camera, found.axis, true) for camera in scene.cameras) < FOUND_PX
 

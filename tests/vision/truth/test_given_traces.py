@@ -16,7 +16,7 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.files import read_picture
 from vision.pictures.frames import Frames
 from vision.truth.observe import observe_trial
-from vision.truth.trace import Trace, averaged, beside_wire, nearest_lines, points_of_wire
+from vision.truth.trace_points import Trace, averaged, beside_wire, nearest_lines, points_of_wire
 from vision.truth.trial_pictures import TrialPictures
 
 BRING = Path(__file__).resolve().parents[3] / "fixtures" / "bring" / "traces"

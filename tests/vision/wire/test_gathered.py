@@ -13,7 +13,7 @@ from vision.wire.binned import binned
 from vision.wire.common_shift import evidences_of
 from vision.wire.gathered import GatheredEquations
 from vision.wire.shaded_segments import ShadedSegments
-from vision.wire.shading import Equations
+from vision.wire.shading import SegmentEquations
 from vision.wire.trace import BIN_PX, WIRE_WAVES
 
 SHIFT_PX, WIDER = 0.4, 1.1
@@ -41,7 +41,7 @@ def both(pieces, **how):
     ]
     moved = pieces.moved(SHIFT_PX * pieces.relative_radius)
     thicker = replace(moved, radius_px=WIDER * pieces.radius_px)
-    one_by_one = Equations(thicker, BLUR_PX, WIRE_WAVES)
+    one_by_one = SegmentEquations(thicker, BLUR_PX, WIRE_WAVES)
     return told, (*one_by_one.shared(hats, robust), robust @ one_by_one.power)
 
 
@@ -73,9 +73,9 @@ def test_shifts_are_as_probable_by_gathered_pixels(pieces, monkeypatch):
 def test_pixels_that_no_light_reaches_are_summed_beforehand(pieces, monkeypatch):
     """Parting them from the others leaves the equations and their derivatives as they are."""
     waves = np.random.default_rng(1).standard_normal((len(pieces), WIRE_WAVES))
-    parted = Equations(pieces, BLUR_PX, WIRE_WAVES)
+    parted = SegmentEquations(pieces, BLUR_PX, WIRE_WAVES)
     monkeypatch.setattr(shading, "_REACH_BLURS", 100.0)
-    whole = Equations(pieces, BLUR_PX, WIRE_WAVES)
+    whole = SegmentEquations(pieces, BLUR_PX, WIRE_WAVES)
     assert parted._columns.shape[1] < 0.8 * whole._columns.shape[1]
     for name in ("gram", "moment", "power"):
         one, other = getattr(parted, name), getattr(whole, name)

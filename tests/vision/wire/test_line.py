@@ -69,6 +69,26 @@ def test_a_band_is_counted_to_the_left_of_its_way_in_any_direction(angle_deg):
     assert np.allclose(away[2:-2], band.offset_px[2:-2])
 
 
+@pytest.mark.parametrize("angle_deg", range(5, 360, 30))
+def test_both_edges_of_a_rod_that_widens_lie_half_a_width_from_a_bands_middle(angle_deg):
+    """Rows of pixels run across askew, where one edge is farther along than the other. Left over is r (r' sin)², 0.001 px."""
+    row, column = np.mgrid[:400, :400].astype(float)
+    way = np.array([np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))])
+    length = np.linspace(0.0, 150.0, 31)
+    radius = 20.0 + 0.01 * (length - 75.0)
+    band = read_band(column, row, 200.0 + (length - 75.0)[:, None] * way, length, radius, 40)
+    pixels = np.stack([band.grey, band.background], axis=-1)
+    along = (pixels - 200.0) @ way
+    across = (pixels - 200.0) @ np.array([-way[1], way[0]])
+    for side in (-1.0, 1.0):
+        beyond_px = side * across - (20.0 + 0.01 * along)
+        rows = list(zip(beyond_px, band.offset_px, band.radius_px))
+        for distance, offset, half in rows[2:-2]:  # the ends are rounded to whole pixels
+            order = np.argsort(distance)
+            edge_px = np.interp(0.0, distance[order], offset[order])
+            assert edge_px == pytest.approx(side * half, abs=0.002)
+
+
 def test_no_pixel_is_read_twice_and_none_outside(rng):
     picture = np.arange(600.0).reshape(20, 30)
     band = read_band(

@@ -1,12 +1,14 @@
-"""Lines in a camera's pictures that another program has drawn, and how far they are beside the wire."""
+"""Lines in a camera's pictures that another program has drawn, and how far they are off the wire."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
+from vision.geometry.rotation import unit
 from vision.geometry.rows import Rows
 from vision.geometry.silhouette import normals
 from vision.pictures.pyramid import shrunk_px
@@ -41,7 +43,7 @@ class Trace(Rows):
 
 @dataclass(frozen=True)
 class BesideWire(Rows):
-    """Points of lines beside the wire in one camera.
+    """Points of lines off the wire in one camera.
 
     frame, line (n,): as of `Trace`. place_mm (n,): along the wire, of the nearest point of its
     curve. offset_px (n,): from there, positive along the curve's normal, which points to the right
@@ -60,7 +62,7 @@ class BesideWire(Rows):
 
 
 def beside_wire(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> BesideWire:
-    """Return where the points of a trace are beside the wire, in the frames that have a curve.
+    """Return how far the points of a trace are off the wire, in the frames that have a curve.
 
     Points beyond the ends of the wire are left out.
     """
@@ -74,15 +76,13 @@ def beside_wire(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> B
 
 
 def _beside_curve(trace: Trace, curve_px: np.ndarray, arc_mm: np.ndarray) -> BesideWire:
-    """Return where points of one frame are beside a curve of nodes (m, 2) px at arcs (m,) mm."""
+    """Return how far points of one frame are off a curve of nodes (m, 2) px at arcs (m,) mm."""
+    node = _nearest_nodes(trace.px, curve_px)
+    from_node = trace.px - curve_px[node]
     normal = normals(curve_px)  # (m, 2)
     tangent = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
-    step_px = np.linalg.norm(np.gradient(curve_px, axis=0), axis=1)
-    length_px = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(curve_px, axis=0), axis=1)))
-    apart = trace.px[:, None] - curve_px  # (n, m, 2)
-    node = np.argmin(np.sum(apart**2, axis=2), axis=1)
-    from_node = apart[np.arange(len(node)), node]
     on_px = np.sum(from_node * tangent[node], axis=1)
+    step_px = np.linalg.norm(np.gradient(curve_px, axis=0), axis=1)
     found = BesideWire(
         frame=trace.frame,
         line=trace.line,
@@ -90,10 +90,22 @@ def _beside_curve(trace: Trace, curve_px: np.ndarray, arc_mm: np.ndarray) -> Bes
         offset_px=np.sum(from_node * normal[node], axis=1),
         foot_px=curve_px[node] + on_px[:, None] * tangent[node],
         normal=normal[node],
-        along_px=length_px[node] + on_px,
+        along_px=_lengths_px(curve_px)[node] + on_px,
         sigma_px=trace.sigma_px,
     )
     return found.select((found.place_mm > 0.0) & (found.place_mm < arc_mm[-1]))
+
+
+def _nearest_nodes(px: np.ndarray, curve_px: np.ndarray) -> np.ndarray:
+    """Return for points (n, 2) which of a curve's nodes (m, 2) is the nearest, (n,)."""
+    apart = px[:, None] - curve_px  # (n, m, 2)
+    return np.argmin(np.sum(apart**2, axis=2), axis=1)
+
+
+def _lengths_px(curve_px: np.ndarray) -> np.ndarray:
+    """Return the length of a curve of nodes (m, 2) px from its first to each node (m,)."""
+    pieces_px = np.linalg.norm(np.diff(curve_px, axis=0), axis=1)
+    return np.append(0.0, np.cumsum(pieces_px))
 
 
 def nearest_lines(beside: BesideWire) -> dict[int, int]:
@@ -123,24 +135,25 @@ def averaged(beside: BesideWire, segment_px: float) -> BesideWire:
     """
     segment = np.floor(beside.along_px / segment_px).astype(int)
     groups, member = np.unique(np.stack([beside.frame, segment]), axis=1, return_inverse=True)
-    member = member.ravel()
-    count = np.bincount(member)
-
-    def mean(values: np.ndarray) -> np.ndarray:
-        """Return the mean (k,) of values (n,) over each segment."""
-        return np.bincount(member, values) / count
-
-    line = np.zeros(len(count), dtype=int)
-    line[member] = beside.line
-    foot_px = np.stack([mean(column) for column in beside.foot_px.T], axis=1)
-    normal = np.stack([mean(column) for column in beside.normal.T], axis=1)
+    mean = partial(_mean_by, member.ravel())
+    line = np.zeros(groups.shape[1], dtype=int)
+    line[member.ravel()] = beside.line
+    count = np.bincount(member.ravel())
     return BesideWire(
         frame=groups[0],
         line=line,
         place_mm=mean(beside.place_mm),
         offset_px=mean(beside.offset_px),
-        foot_px=foot_px,
-        normal=normal / np.linalg.norm(normal, axis=1, keepdims=True),
+        foot_px=mean(beside.foot_px),
+        normal=unit(mean(beside.normal)),
         along_px=mean(beside.along_px),
         sigma_px=np.sqrt(mean(beside.sigma_px**2) / count),
     )
+
+
+def _mean_by(member: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the mean (k, …) over each group of values (n, …), of which member (n,) is the group's number."""
+    count = np.bincount(member)
+    total = np.zeros((len(count), *values.shape[1:]))
+    np.add.at(total, member, values)
+    return (total.T / count).T

@@ -1,0 +1,232 @@
+"""How far a hub has turned in each frame, by the marker on it: the motor's angle where none was logged.
+
+As in `hub_marker.py`, with the rig's axis known and the angles sought. With a frame's turn t, the
+corner's place q in the hub, and the axis near z of the cameras' frame:
+
+    x = Exp(w) Rz(t) q + v
+
+A corner's bias in each camera, its change as the print turns, and the axis within its placement's
+covariance are nuisances. Turns count from the first frame.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+
+from vision.calibration.hub_marker import (
+    BIAS_PX,
+    DRIFT_PER_RAD,
+    FIRST_SCATTER_PX,
+    LEAST_SCATTER_PX,
+    PER_MEDIAN,
+    MarkerSighting,
+    meet,
+)
+from vision.geometry.camera import Cameras, symmetric_root
+from vision.geometry.centreline import rotation_z
+from vision.geometry.refusals import Refused
+from vision.geometry.rotation import exp_rotation
+
+# [frames] In which two cameras see the marker; a smooth motion has no fewer. Derived.
+_FEWEST_FRAMES = 5
+# [rad], [mm] Least prior sigmas of the axis, where its placement is exact: below what a corner shows.
+# Derived.
+_EXACT = np.array([1e-6, 1e-6, 1e-5, 1e-5])
+# [parameters] Of a placement, those of the axis: two turns, two shifts. A layout, no threshold.
+_AXIS = np.array([0, 1, 3, 4])
+# [parameters] Of the axis and of the corners, before the biases. A layout, no threshold.
+_FIRST_BIAS = 16
+# [mixed] Step of differences of a parameter: of mm, rad and px alike. Derived.
+_STEP = 1e-5
+# [passes] Each gives the scatter of corners to the next. Stated.
+_PASSES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class HubTurns:
+    """Turns (n,) of a hub, rad, in frames (n,), with covariance (n, n) of all that makes them err.
+
+    azimuth_rad: of the marker's diagonal in the first frame.
+    """
+
+    frame: np.ndarray
+    turn_rad: np.ndarray
+    covariance: np.ndarray
+    azimuth_rad: float
+
+
+def marker_turns(sightings: Sequence[MarkerSighting], cameras: Cameras) -> HubTurns:
+    """Return the turns of a hub by one marker's sightings in a trial, from its first frame on.
+
+    cameras: in the rig frame. Raises Refused where two cameras see the marker in too few frames, or
+    the fit does not converge.
+    """
+    fit = _TurnFit(sightings, cameras)
+    scatter_px = np.full(len(cameras), FIRST_SCATTER_PX)
+    fitted = fit.solve(fit.start(), scatter_px)
+    for _ in range(_PASSES):
+        scatter_px = fit.scatter_px(fitted, scatter_px)
+        fitted = fit.solve(fitted.x, scatter_px)
+    turns = slice(fit.first_turn, None)
+    covariance = np.zeros((len(fit.frames), len(fit.frames)))
+    covariance[1:, 1:] = fit.covariance(fitted, scatter_px)[turns, turns]
+    x, y, _ = fitted.x[10:13] - fitted.x[4:7]  # from the first corner to the third
+    azimuth_rad = float(np.arctan2(y, x))
+    return HubTurns(fit.frames, fit.turns_rad(fitted.x), covariance, azimuth_rad)
+
+
+class _TurnFit:
+    """The fit of turns to a marker's sightings.
+
+    Parameters: w_x, w_y (rad), v_x, v_y (mm); the corners in the hub (4, 3), mm; of each camera's
+    corners a bias (8,), px, and its change with the turn (8,), px/rad; the turns (n - 1,) of all frames but the first, rad.
+    """
+
+    def __init__(self, sightings: Sequence[MarkerSighting], cameras: Cameras):
+        """Take the sightings of one marker in one trial."""
+        self.cameras = cameras
+        self.px = np.array([one.px for one in sightings])  # (pictures, 4, 2)
+        self.camera = np.array([cameras.index(one.camera) for one in sightings])
+        numbers = [one.instant[1] for one in sightings]
+        self.frames, self.frame = np.unique(numbers, return_inverse=True)
+        self.first_turn = _FIRST_BIAS + 16 * len(cameras)
+        placement = np.zeros((6, 6)) if cameras.placement is None else cameras.placement
+        axis_sigma = np.hypot(np.sqrt(np.diag(placement))[_AXIS], _EXACT)
+        biases = np.repeat(BIAS_PX, 8 * len(cameras))
+        self._prior = np.concatenate([axis_sigma, biases, DRIFT_PER_RAD * biases])
+        # of the axis and the biases; corners and turns have no prior
+        self._with_prior = np.r_[0:4, _FIRST_BIAS : self.first_turn]
+
+    def start(self) -> np.ndarray:
+        """Return first parameters by triangulated corners, turned about z. Raises Refused where two
+        cameras see the marker in too few frames.
+        """
+        corners_mm = self._triangulated_mm()
+        is_met = np.isfinite(corners_mm[:, 0, 0])
+        if is_met.sum() < _FEWEST_FRAMES:
+            raise Refused(
+                f"the marker is seen by two cameras in {is_met.sum()} frames, {_FEWEST_FRAMES} are needed",
+                code="marker_not_seen",
+            )
+        met_mm = corners_mm[is_met]
+        turn = np.interp(self.frames, self.frames[is_met], _turns_about_z(met_mm))
+        in_hub = np.mean(met_mm @ rotation_z(turn[is_met] - turn[0]), axis=0)
+        nuisances = np.zeros(16 * len(self.cameras))
+        return np.concatenate([np.zeros(4), in_hub.ravel(), nuisances, turn[1:] - turn[0]])
+
+    def _triangulated_mm(self) -> np.ndarray:
+        """Return the corners (frames, 4, 3), mm; NaN in frames in which fewer than two cameras see
+        them.
+        """
+        corners_mm = np.full((len(self.frames), 4, 3), np.nan)
+        for k in range(len(self.frames)):
+            own = np.flatnonzero(self.frame == k)
+            if len(own) > 1:
+                views = [self.cameras.cameras[c] for c in self.camera[own]]
+                corners_mm[k] = meet(views, self.px[own])
+        return corners_mm
+
+    def turns_rad(self, parameters: np.ndarray) -> np.ndarray:
+        """Return the turns (n,) of all frames, rad, from the first."""
+        return np.append(0.0, parameters[self.first_turn :])
+
+    def solve(self, start: np.ndarray, scatter_px: np.ndarray) -> OptimizeResult:
+        """Fit from these parameters. Raises Refused where the fit does not converge."""
+        turns_rad = self.turns_rad(start)
+        self._middle_rad = 0.5 * (turns_rad.min() + turns_rad.max())
+        fitted = least_squares(
+            self._residuals, start, self._jacobian, x_scale="jac", args=(scatter_px,)
+        )
+        if fitted.status <= 0:
+            raise Refused(
+                "the turns of the marker on the hub were not found", code="marker_not_fitted"
+            )
+        return fitted
+
+    def scatter_px(self, fitted: OptimizeResult, used_px: np.ndarray) -> np.ndarray:
+        """Return the scatter (cameras,) of a corner's coordinates, px, by the residuals.
+
+        The fit's parameters take up their share of it.
+        """
+        freedom = max(self.px.size - len(fitted.x), 1)
+        residual = np.abs(fitted.fun[: self.px.size]).reshape(self.px.shape)
+        residual *= np.sqrt(self.px.size / freedom)
+        scatter = used_px.copy()
+        for k in np.unique(self.camera):
+            scatter[k] *= PER_MEDIAN * np.median(residual[self.camera == k])
+        return np.maximum(scatter, LEAST_SCATTER_PX)
+
+    def covariance(self, fitted: OptimizeResult, scatter_px: np.ndarray) -> np.ndarray:
+        """Return the covariance of the parameters, with what the cameras' own errors add to it."""
+        own = np.linalg.inv(fitted.jac.T @ fitted.jac)
+        weight = 1.0 / scatter_px[self.camera][:, None, None]
+        here = self._project(fitted.x, self.cameras)
+        by_error = []
+        for error in self._camera_errors.T:
+            moved = self._project(fitted.x, self.cameras.moved(error)) - here
+            by_error.append((weight * moved).ravel())
+        if not by_error:
+            return own
+        gain = own @ fitted.jac[: self.px.size].T @ np.array(by_error).T
+        return own + gain @ gain.T
+
+    @cached_property
+    def _camera_errors(self) -> np.ndarray:
+        """Return the cameras' errors (15 n, k) but that of the axis, which is fitted."""
+        cameras = self.cameras
+        if not cameras.covariance.any():
+            return np.zeros((len(cameras.covariance), 0))
+        if cameras.placement is None:
+            return cameras.by_error
+        by_placement = cameras.by_placement[:, _AXIS]
+        axis = cameras.placement[np.ix_(_AXIS, _AXIS)]
+        return symmetric_root(cameras.covariance - by_placement @ axis @ by_placement.T)
+
+    def _residuals(self, parameters: np.ndarray, scatter_px: np.ndarray) -> np.ndarray:
+        """Return all residuals over their sigmas: of the corners in pictures, then of the priors."""
+        bias_px, drift_px_rad = parameters[_FIRST_BIAS : self.first_turn].reshape(2, -1, 4, 2)
+        turned = self.turns_rad(parameters)[self.frame] - self._middle_rad
+        px = self._project(parameters, self.cameras) + bias_px[self.camera]
+        px += drift_px_rad[self.camera] * turned[:, None, None]
+        seen = (px - self.px) / scatter_px[self.camera][:, None, None]
+        return np.concatenate([seen.ravel(), parameters[self._with_prior] / self._prior])
+
+    def _jacobian(self, parameters: np.ndarray, scatter_px: np.ndarray) -> np.ndarray:
+        """Return the derivatives of the residuals; of the turns all at once, each picture has one."""
+        here = self._residuals(parameters, scatter_px)
+        jacobian = np.zeros((len(here), len(parameters)))
+        for k in range(self.first_turn):
+            moved = parameters.copy()
+            moved[k] += _STEP
+            jacobian[:, k] = (self._residuals(moved, scatter_px) - here) / _STEP
+        moved = parameters.copy()
+        moved[self.first_turn :] += _STEP
+        by_turn = (self._residuals(moved, scatter_px) - here) / _STEP
+        of_frame = np.repeat(self.frame, self.px[0].size)
+        rows = np.flatnonzero(of_frame)  # the first frame has no turn
+        jacobian[rows, self.first_turn + of_frame[rows] - 1] = by_turn[rows]
+        return jacobian
+
+    def _project(self, parameters: np.ndarray, cameras: Cameras) -> np.ndarray:
+        """Return the corners (pictures, 4, 2), px, without bias."""
+        w_x, w_y, v_x, v_y = parameters[:4]
+        in_hub = parameters[4:_FIRST_BIAS].reshape(4, 3)
+        turn = rotation_z(self.turns_rad(parameters)[self.frame])
+        turned = in_hub @ np.swapaxes(turn, 1, 2)  # (pictures, 4, 3)
+        points = turned @ exp_rotation(np.array([w_x, w_y, 0.0])).T + np.array([v_x, v_y, 0.0])
+        px = np.empty_like(self.px)
+        for k, camera in enumerate(cameras):
+            px[self.camera == k] = camera.project(points[self.camera == k])
+        return px
+
+
+def _turns_about_z(corners_mm: np.ndarray) -> np.ndarray:
+    """Return by which angles about z, rad, corners (n, 4, 3) are turned from the first ones, (n,)."""
+    first = corners_mm[0]
+    x, y, _ = np.moveaxis(corners_mm, -1, 0)  # (n, 4) each
+    along = np.sum(x * first[:, 0] + y * first[:, 1], axis=1)
+    across = np.sum(y * first[:, 0] - x * first[:, 1], axis=1)
+    return np.arctan2(across, along)

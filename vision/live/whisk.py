@@ -1,0 +1,394 @@
+"""The truth of one whisk while it is recorded: little work is left after the last frame.
+
+The steps are those of `vision.truth`, with the same physics and the same sigmas, but each is taken
+as soon as its frames are there:
+
+    frames 0 to 2      the touched object; the wire's rest shape; lines of both, and a fit to them;
+                       the object's lines finely; the wire's shading and the lens blur
+    each frame         the wire's bend, by votes near the extrapolation of the last two; its line, by
+                       the shading of the first frames
+    the last frame     its bend, its line, one fit, and whether another place explains the bar better
+
+The first step is the costly one; best is a camera that runs before the motor does. `LiveWhisk.add`
+only keeps a picture, `LiveWhisk.work` takes the next step that is due, and `LiveWhisk.finish` all that
+are left. A program that records calls `work` while it waits for the next frame. What passes on:
+
+    LiveBench ─► LiveWhisk ─► _FirstViews (cameras, object) ─► _Follower (bends) ─► _Lines, WireLines ─► WhiskTruth
+
+Where `vision.truth.observe` would leave a camera out or try another place of the bar, there is no
+number here, and the status says why: the recording can still be evaluated as any other.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from vision.fit.first_bends import SwingPictures, find_bend, find_rest
+from vision.fit.touch import frames_that_touch
+from vision.geometry.camera import Cameras
+from vision.geometry.number_words import counted
+from vision.geometry.reasons import Reason, joined
+from vision.geometry.refusals import Refused
+from vision.geometry.rods import Rods
+from vision.geometry.touched import Axis
+from vision.geometry.vision_settings import VisionSettings
+from vision.live.wire_lines import CarriedLines, WireLines, traced_again
+from vision.pictures.view import View
+from vision.touched.search import SeenBar, find_object, find_object_again
+from vision.touched.search_scene import SearchScene
+from vision.truth.explanations import Explanation, unexplained
+from vision.truth.line_source import WhiskPlace
+from vision.truth.observe import NOT_CONVERGED, views_facing, warnings_of
+from vision.truth.records import WhiskTruth
+from vision.truth.strategies import Strategy, strategies
+from vision.truth.traced_lines import TracedLines
+from vision.truth.trial_pictures import TrialPictures
+from vision.truth.truth_rows import to_whisk
+from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.whisk_truth import (
+    check_scatter,
+    coarse_curves,
+    expect_by_bends,
+    fit_before_touch,
+    fit_last,
+    require_cameras,
+)
+
+# [frames] With which work begins: two give the noise, a third what moves. In fifteen path-traced
+# scenes the bar was as near by three frames as by all. Study: tests/studies/speed/live.py.
+_FIRST_FRAMES = 3
+# [rad] A motor that turns by less from frame to frame stands: a motor's step. Stated.
+_STANDING_RAD = np.radians(0.02)
+# [diameters] Of the whisker, by which its tip has moved where a median of its frames hardly shows it.
+# Set by eye.
+_SWEPT_DIAMETERS = 0.5
+
+_USUAL = VisionSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class LiveBench:
+    """What is known before a whisk.
+
+    background: by camera the scene (h, w) without whisker and bar. stroke_rad: lowest and highest
+    motor angle of the stroke to come. settings: of them, picture_scale, every_frame and rounds do
+    not count here. bar: where the object was in the whisk before; the search begins there.
+    """
+
+    cameras: Cameras
+    rods: Rods
+    background: Mapping[str, np.ndarray | None]
+    stroke_rad: tuple[float, float]
+    settings: VisionSettings = _USUAL
+    bar: Axis | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _FirstViews:
+    """The cameras that face the whisker, their first frames, and the object in these."""
+
+    views: tuple[View, ...]
+    cameras: Cameras
+    left_out: tuple[Reason, ...]
+    bar: SeenBar
+
+
+@dataclass(eq=False)
+class _Follower:
+    """The wire's bend (2,), rad, frame by frame, about a rest shape (2, 4), mm, and an object.
+
+    sights: what stands still in the frames that they were made with. bends_rad: by frame.
+    """
+
+    sights: list[SwingPictures]
+    axis: Axis
+    rest_mm: np.ndarray
+    bends_rad: dict[int, np.ndarray] = field(default_factory=dict)
+
+    def follow(self, frame: int, motor_rad: float, views: Sequence[View]) -> None:
+        """Find the bend in the next frame, which the views have."""
+        before = [np.zeros(2), np.zeros(2), *list(self.bends_rad.values())[-2:]]
+        guess_rad = 2 * before[-1] - before[-2]
+        sights = [replace(sight, view=view) for sight, view in zip(self.sights, views)]
+        self.bends_rad[frame] = find_bend(
+            sights, self.axis, self.rest_mm, frame, motor_rad, guess_rad
+        )
+
+    def free_frames(self, motor_rad: Mapping[int, float]) -> list[int]:
+        """Return the frames that do not touch by their bends."""
+        angles_rad = np.array([motor_rad[frame] for frame in self.bends_rad])
+        if np.ptp(angles_rad) < _STANDING_RAD:
+            return list(self.bends_rad)
+        _, is_free = frames_that_touch(angles_rad, np.array(list(self.bends_rad.values())))
+        return [frame for frame, free in zip(self.bends_rad, is_free) if free]
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """How lines are read, by the pass over the free frames: strategy, and blur of each lens, px."""
+
+    strategy: Strategy
+    blur_px: Mapping[str, float]
+
+
+@dataclass(eq=False)
+class LiveWhisk:
+    """One whisk that is being recorded.
+
+    frames: by camera the pictures so far, by frame. time_s, motor_rad: by frame. refused: why there
+    will be no truth, as soon as that is known. axis: where its truth has the object, None without one.
+    """
+
+    bench: LiveBench
+    number: int = 0
+    frames: dict[str, dict[int, np.ndarray]] = field(default_factory=dict)
+    time_s: dict[int, float] = field(default_factory=dict)
+    motor_rad: dict[int, float] = field(default_factory=dict)
+    refused: Reason | None = None
+    axis: Axis | None = None
+    _standing: set[int] = field(default_factory=set)
+    _found: _FirstViews | None = None
+    _follower: _Follower | None = None
+    _lines: _Lines | None = None
+    _is_bar_fine: bool = False
+    _wire: WireLines | None = None
+
+    def add(
+        self, camera: str, frame: int, time_s: float, motor_rad: float, picture: np.ndarray
+    ) -> None:
+        """Keep a camera's grey picture (h, w) of a frame, its time and the motor's angle; no work.
+
+        Frames come in order; one that a camera lost is left out. Of those in which the motor stands a
+        few are kept.
+        """
+        if frame not in self.motor_rad and self._stands(motor_rad):
+            self._standing.add(frame)
+        if frame in self._standing:
+            return
+        self.frames.setdefault(camera, {})[frame] = picture
+        self.time_s[frame] = time_s
+        self.motor_rad[frame] = motor_rad
+
+    def _stands(self, motor_rad: float) -> bool:
+        """Return whether the motor has not moved since the frame before, and enough are there."""
+        if len(self.motor_rad) < _FIRST_FRAMES:
+            return False
+        *_, before_rad = self.motor_rad.values()
+        return abs(motor_rad - before_rad) < _STANDING_RAD
+
+    def work(self) -> bool:
+        """Take the next step that is due. Return whether there was one."""
+        step = self._step_due()
+        if step is None:
+            return False
+        try:
+            step()
+        except Refused as reason:
+            self.refused = reason.reason
+        except np.linalg.LinAlgError:
+            self.refused = NOT_CONVERGED
+        return True
+
+    def finish(self) -> WhiskTruth:
+        """Return the truth by all frames, without a number where its status says why."""
+        while self.work():
+            pass
+        if self.refused is None:
+            try:
+                return self._truth()
+            except Refused as reason:
+                self.refused = reason.reason
+            except np.linalg.LinAlgError:
+                self.refused = NOT_CONVERGED
+        return self._nothing(self.refused)
+
+    def _step_due(self) -> Callable[[], None] | None:
+        """Return the next step; None where one waits for a frame."""
+        if self.refused is not None:
+            return None
+        if self._found is None:
+            is_due = len(self._shared_frames()) >= _FIRST_FRAMES
+            return self._find if is_due else None
+        if self._follower is None:
+            return self._find_rest
+        if self._next_frame() is not None:
+            return self._follow
+        if self._lines is None:
+            return self._fit_free
+        if not self._is_bar_fine:
+            return self._measure_bar
+        last = list(self._follower.bends_rad)[-1]
+        if self._wire is None or not self._wire.is_lit_alike(self.motor_rad[last]):
+            return self._trace_wire
+        return self._carry_on if last not in self._wire.frames else None
+
+    def _shared_frames(self) -> list[int]:
+        """Return the frames that every camera has."""
+        names = self.bench.cameras.names if self._found is None else self._found.cameras.names
+        return [f for f in self.time_s if all(f in self.frames.get(name, ()) for name in names)]
+
+    def _next_frame(self) -> int | None:
+        """Return the frame after the last whose bend is known; None where there is none yet."""
+        last = max(self._follower.bends_rad, default=-1)
+        return min((f for f in self._shared_frames() if f > last), default=None)
+
+    def _by_frame(self, values: Mapping[int, float]) -> np.ndarray:
+        """Return values (n,) of all frames up to the last, NaN for those that are missing."""
+        count = max(values) + 1
+        return np.array([values.get(frame, np.nan) for frame in range(count)])
+
+    def _views(self, frames: Sequence[int]) -> tuple[View, ...]:
+        """Return the views with these frames alone."""
+        views = []
+        for view in self._found.views:
+            pictures = self.frames[view.camera.name]
+            views.append(replace(view, frames={frame: pictures[frame] for frame in frames}))
+        return tuple(views)
+
+    def _find(self) -> None:
+        """Find the object in the first frames. Raises Refused where none is seen."""
+        bench = self.bench
+        first = self._shared_frames()[:_FIRST_FRAMES]
+        pictures = TrialPictures(
+            {name: {f: self.frames[name][f] for f in first} for name in bench.cameras.names},
+            self._by_frame(self.time_s),
+            self._by_frame(self.motor_rad),
+            bench.background,
+        )
+        stroke_rad = np.array(bench.stroke_rad)
+        views, cameras, left_out = views_facing(
+            pictures, bench.cameras, bench.rods.wire, stroke_rad
+        )
+        scene = SearchScene(views, cameras, bench.rods, stroke_rad, bench.settings)
+        bar = find_object(scene) if bench.bar is None else find_object_again(scene, bench.bar)
+        self._found = _FirstViews(tuple(views), cameras, tuple(left_out), bar)
+
+    def _find_rest(self) -> None:
+        """Find the wire's rest shape in the first frames. Raises Refused where none is seen."""
+        found = self._found
+        axis = found.bar.axis
+        motor = {f: self.motor_rad[f] for f in found.views[0].frames}
+        sights = self._sights(found.views, axis)
+        rest_mm = find_rest(sights, found.cameras, axis, motor)
+        self._follower = _Follower(sights, axis, rest_mm)
+
+    def _sights(self, views: Sequence[View], axis: Axis) -> list[SwingPictures]:
+        """Return what stands still in the frames of some views."""
+        rods = self.bench.rods
+        radius_mm = rods.bar.radius_mm
+        if not self._has_swung(list(views[0].frames)):
+            return [SwingPictures.of_standing(view, rods, axis, radius_mm) for view in views]
+        return [SwingPictures.of(view, rods, axis, list(view.frames), radius_mm) for view in views]
+
+    def _has_swung(self, frames: Sequence[int]) -> bool:
+        """Return whether the whisker moves in some frames by as much as to vanish in their median."""
+        wire = self.bench.rods.wire
+        swept_mm = wire.length_mm * np.ptp([self.motor_rad[frame] for frame in frames])
+        return bool(swept_mm > _SWEPT_DIAMETERS * wire.diameter_mm)
+
+    def _follow(self) -> None:
+        """Find the wire's bend in the next frame."""
+        follower = self._follower
+        frame = self._next_frame()
+        before = list(follower.bends_rad)
+        if before and not self._has_swung(before) and self._has_swung([*before, frame]):
+            follower.sights = self._sights(self._views([*before, frame]), follower.axis)
+        follower.follow(frame, self.motor_rad[frame], self._views([frame]))
+
+    def _whisk(self) -> WhiskPictures:
+        """Return the whisk in the frames whose bends are known."""
+        found = self._found
+        frames = list(self._follower.bends_rad)
+        return WhiskPictures(
+            self.number,
+            frames,
+            self._by_frame(self.time_s),
+            self._by_frame(self.motor_rad),
+            self._views(frames),
+            found.cameras,
+            self.bench.rods,
+            found.bar,
+            self.bench.settings,
+            left_out=found.left_out,
+        )
+
+    def _fit_free(self) -> None:
+        """Fit the free frames so far, and follow the later ones about what that shows.
+
+        Raises Refused where their lines are not seen, or are not those of one wire.
+        """
+        follower = self._follower
+        whisk = self._whisk().during(follower.free_frames(self.motor_rad))
+        strategy = strategies(whisk)[0]
+        lines = TracedLines(whisk, strategy.reader)
+        axis, rest_mm = fit_before_touch(whisk, lines, follower.rest_mm)
+        self._lines = _Lines(strategy, lines.blur_px)
+        self._found = replace(self._found, bar=replace(self._found.bar, axis=axis))
+        sights = self._sights(whisk.views, axis)
+        self._follower = _Follower(sights, axis, rest_mm, follower.bends_rad)
+
+    def _measure_bar(self) -> None:
+        """Measure the object's lines finely, about where the free frames have it."""
+        whisk = self._whisk()
+        lines = TracedLines(whisk, self._lines.strategy.reader)
+        lines.object_points(self._place(whisk), last=True)
+        self._is_bar_fine = True
+
+    def _place(self, whisk: WhiskPictures) -> WhiskPlace:
+        """Return where object and wire are in the frames of a whisk, by the wire's bends."""
+        follower = self._follower
+        curves, _ = coarse_curves(whisk, follower.rest_mm, follower.bends_rad)
+        return WhiskPlace(whisk.bar.axis, curves, whisk.bar_swept_mm)
+
+    def _trace_wire(self) -> None:
+        """Trace the wire in the frames so far in which it is lit alike."""
+        whisk = self._whisk()
+        whisk = whisk.during(traced_again(whisk.frames, self.motor_rad))
+        self._wire = WireLines.trace(whisk, self._place(whisk), self._lines.blur_px)
+
+    def _carry_on(self) -> None:
+        """Find the wire in the frames that came since it was traced."""
+        whisk = self._whisk()
+        known = self._wire.frames
+        whisk = whisk.during([frame for frame in whisk.frames if frame > known[-1]])
+        self._wire.carry_on(whisk, self._place(whisk))
+
+    def _truth(self) -> WhiskTruth:
+        """Return the truth by all frames. Raises Refused where they determine none."""
+        if self._wire is None:
+            few = f"{counted(len(self._shared_frames()), 'frame')} seen by every camera"
+            raise Refused(f"{few}, {_FIRST_FRAMES} are needed", code="too_few_frames")
+        follower = self._follower
+        strategy = self._lines.strategy
+        whisk = replace(self._whisk().during(self._wire.frames), light=self._wire.light)
+        bends_rad = {frame: follower.bends_rad[frame] for frame in whisk.frames}
+        whisk, expected = expect_by_bends(whisk, strategy.touch, follower.rest_mm, bends_rad)
+        lines = CarriedLines(whisk, strategy.reader, wire=self._wire)
+        fitted = fit_last(whisk, lines, expected, strategy.touch)
+        require_cameras(fitted.problem.seen, strategy.touch)
+        check_scatter(fitted.problem, fitted.state, lines.most_scatter_px)
+        return self._unless_elsewhere(whisk, fitted)
+
+    def _unless_elsewhere(self, whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
+        """Return the truth that was fitted; none where another place explains the object better."""
+        explanation = Explanation(whisk, fitted)
+        elsewhere = unexplained(explanation)
+        if elsewhere:
+            return self._nothing(elsewhere)
+        truth = to_whisk(whisk, fitted)
+        self.axis = explanation.axis
+        return replace(truth, status=joined(truth.status, *warnings_of(whisk, fitted, beam=None)))
+
+    def _nothing(self, status: Reason) -> WhiskTruth:
+        """Return the row of a whisk without a truth."""
+        frames = [] if self._follower is None else list(self._follower.bends_rad)
+        cameras = self.bench.cameras if self._found is None else self._found.cameras
+        left_out = () if self._found is None else self._found.left_out
+        return WhiskTruth(
+            self.number,
+            None,
+            cameras=len(cameras),
+            frames_used=len(frames),
+            status=joined(status, *left_out),
+        )

@@ -1,0 +1,66 @@
+"""A rod's line in frames that came after its shading was found: their positions alone are left.
+
+The shading of a wire and the lens blur are alike in all frames of a camera (`joint.py`). Once they are
+known by some frames, those that follow need a few Gauss–Newton steps of each segment by itself. What the
+errors of shading and blur do to their positions is the same cause that moves the segments of the first
+frames, so that all of them together are one set of line points.
+"""
+
+import numpy as np
+
+from vision.wire.bands import Pieces
+from vision.wire.descent import positions_with_shared
+from vision.wire.joint import widened_blurs
+from vision.wire.shading import LONGEST_PX, Knots, PositionEquations, SegmentEquations
+from vision.wire.trace import WIRE_WAVES, Placed, Traced
+
+# [steps] From a curve that is a pixel or two off: each of `LONGEST_PX` at most. Derived.
+_STEPS = 5
+# [px] A segment whose last step is longer has not converged and gives no point. Half of the longest
+# step. Stated.
+_CONVERGED_PX = 0.5 * LONGEST_PX
+# [px] The steps end where the median is shorter: a tenth of a segment's usual sigma. Derived.
+_STILL_PX = 0.005
+
+
+def carry_on(pieces: Pieces, traced: Traced, knots: Knots) -> Placed:
+    """Find where the rod lies in segments of later frames, by the shading and blur of traced ones.
+
+    traced: by a last pass. knots: those of its shading.
+    """
+    light = traced.solved
+    knot_weights = knots.weights(pieces)
+    coefficients = knot_weights @ light.by_knot
+    moved, linear, own_chi2 = _place_segments(pieces, traced.blur_px, coefficients)
+    chi2 = own_chi2 / pieces.freedom
+    has_converged = np.abs(linear.step_px) < _CONVERGED_PX
+    sensitivity = positions_with_shared(linear, knot_weights) / linear.power[:, None]
+    relative_radius = pieces.radius_px / np.mean(traced.pieces.radius_px)
+    return Placed(
+        px=moved.foot_px,
+        normal=moved.normal,
+        place=moved.place,
+        source=moved.source,
+        own_sigma_px=np.where(has_converged, linear.own_sigma_px(chi2), np.inf),
+        chi2=chi2,
+        shared_px=light.causes.all_shifts_px(sensitivity, relative_radius),
+        widened_px2=widened_blurs(linear, traced.blur_px, np.maximum(chi2, 1.0)),
+    )
+
+
+def _place_segments(
+    pieces: Pieces, blur_px: float, coefficients: np.ndarray
+) -> tuple[Pieces, PositionEquations, np.ndarray]:
+    """Return segments where the rod lies, by Gauss–Newton steps of each by itself.
+
+    coefficients (s, terms): shading of each. Returned with them are their equations before the last
+    step, and the chi² (s,) there.
+    """
+    shift_px = np.zeros(len(pieces))
+    for _ in range(_STEPS):
+        here = SegmentEquations(pieces.moved(shift_px), blur_px, WIRE_WAVES)
+        linear = here.linearised(coefficients)
+        shift_px = shift_px + linear.step_px
+        if np.median(np.abs(linear.step_px)) < _STILL_PX:
+            break
+    return pieces.moved(shift_px), linear, here.chi2(coefficients)

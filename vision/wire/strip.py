@@ -1,0 +1,224 @@
+"""The pixels near a curve that may bend by any angle: segments of equal length along it.
+
+Each pixel belongs to the segment that has its foot on the curve, so that a thick object which bends
+is cut across its own direction everywhere. No pixel is interpolated and none is used twice. What is
+behind the object is not known: it is fitted to both of its sides.
+"""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from scipy.spatial import cKDTree
+
+from vision.geometry.robust import robust_sigma
+from vision.pictures.pixel_noise import Noise
+from vision.wire.bands import Pieces
+
+# [px] Between nodes of the curve: a pixel's foot is found from the nearest one. Derived.
+_NODE_PX = 0.5
+# [px] A segment shows so much beside both of its edges. Derived.
+_LEAST_BESIDE_PX = 2.0
+# [blurs] Beyond an edge, where a fifteenth of its contrast is left. Derived.
+_CLEAR_BLURS = 1.5
+# [1] Keeps the equations of a side's few pixels from being singular. Derived.
+_WEAK = 1e-6
+# [1] Share of the pixels beside an object that is left after its background is fitted, at least.
+# Derived.
+_LEAST_FREEDOM = 0.25
+# [1] Level, slope and step of a background, and a slope of its own on either side. Stated.
+_BACKGROUND_TERMS = 4
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Hold a curve: nodes (m, 2) px at equal steps, their arc length (m,) px and the object's
+    half-width (m,) px.
+    """
+
+    px: np.ndarray
+    arc_px: np.ndarray
+    radius_px: np.ndarray
+
+    @staticmethod
+    def through(px: np.ndarray, radius_px: np.ndarray) -> "Curve":
+        """Return the curve of nodes (n, 2) and half-widths (n,), at steps of _NODE_PX."""
+        arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(px, axis=0), axis=1)))
+        count = max(int(np.ceil(arc[-1] / _NODE_PX)), 2)
+        places = np.linspace(0.0, arc[-1], count + 1)
+        nodes = np.stack([np.interp(places, arc, px[:, k]) for k in (0, 1)], axis=1)
+        return Curve(nodes, places, np.interp(places, arc, radius_px))
+
+    @property
+    def length_px(self) -> float:
+        """Return the length."""
+        return float(self.arc_px[-1])
+
+    @property
+    def tangents(self) -> np.ndarray:
+        """Return unit tangents (m, 2)."""
+        along = np.gradient(self.px, axis=0)
+        return along / np.linalg.norm(along, axis=1, keepdims=True)
+
+    def at(self, place_px: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return points (s, 2), unit normals (s, 2) and half-widths (s,) at arc lengths (s,).
+
+        A normal points to the right of the way along the curve in a picture whose y goes down.
+        """
+        point = np.stack([np.interp(place_px, self.arc_px, self.px[:, k]) for k in (0, 1)], axis=1)
+        tangents = self.tangents
+        along = np.stack([np.interp(place_px, self.arc_px, tangents[:, k]) for k in (0, 1)], axis=1)
+        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        return point, normal, np.interp(place_px, self.arc_px, self.radius_px)
+
+
+def cut_strip(grey: np.ndarray, curve: Curve, margin_px: float, length_px: float) -> Pieces:
+    """Cut the pixels near a curve into segments of length_px, their background not known yet.
+
+    grey (h, w). margin_px: beyond the object's edges. Segments of which the picture lacks an edge are
+    left out.
+    """
+    pixels = _pixels_near(grey, curve, margin_px)
+    count = max(int(curve.length_px / length_px), 1)
+    middles = (np.arange(count) + 0.5) * (curve.length_px / count)
+    piece = np.clip((pixels.place_px / curve.length_px * count).astype(int), 0, count - 1)
+    table = _PixelTable.by_segment(piece, pixels.offset_px, count)
+    foot, normal, radius = curve.at(middles)
+    nothing = np.zeros(table.shape)
+    pieces = Pieces(
+        offset_px=table.filled(pixels.offset_px),
+        grey=table.filled(pixels.grey),
+        background=nothing,
+        slope=nothing,
+        curvature=nothing,
+        weight=table.filled(np.ones(len(piece))),
+        place=middles,
+        radius_px=radius,
+        foot_px=foot,
+        normal=normal,
+        source=np.zeros(count, dtype=int),
+    )
+    return pieces.select(_shows_both_sides(pieces))
+
+
+def _shows_both_sides(pieces: Pieces) -> np.ndarray:
+    """Return which segments have pixels beyond both edges of the object, (s,) bool."""
+    needed_px = (pieces.radius_px + _LEAST_BESIDE_PX)[:, None]
+    known_px = pieces.offset_px * pieces.weight
+    shows_one = np.any(known_px > needed_px, axis=1)
+    shows_other = np.any(known_px < -needed_px, axis=1)
+    return shows_one & shows_other
+
+
+@dataclass(frozen=True)
+class _PixelTable:
+    """Hold where pixels (n,) stand in a table of this shape, a row for each segment.
+
+    order (n,): the pixels by segment and then by offset. row, column (n,): of each in that order; a
+    short row's pixels stand in the middle.
+    """
+
+    order: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+    shape: tuple[int, int]
+
+    @staticmethod
+    def by_segment(segment: np.ndarray, offset_px: np.ndarray, count: int) -> "_PixelTable":
+        """Return the table of pixels (n,) in `count` segments, by the segment and offset of each."""
+        order = np.lexsort((offset_px, segment))
+        own = np.bincount(segment, minlength=count)  # pixels of each segment
+        most = own.max()
+        column = np.arange(len(order)) - np.repeat(np.cumsum(own) - own, own)
+        column += np.repeat((most - own) // 2, own)
+        return _PixelTable(order, segment[order], column, (count, max(int(most), 1)))
+
+    def filled(self, values: np.ndarray) -> np.ndarray:
+        """Return the table of values (n,), 0 where no pixel stands."""
+        table = np.zeros(self.shape)
+        table[self.row, self.column] = values[self.order]
+        return table
+
+
+@dataclass(frozen=True)
+class _Pixels:
+    """Hold pixels near a curve: signed distance and arc length of the foot, px, and grey level, (n,)."""
+
+    offset_px: np.ndarray
+    place_px: np.ndarray
+    grey: np.ndarray
+
+
+def _pixels_near(grey: np.ndarray, curve: Curve, margin_px: float) -> _Pixels:
+    """Return the pixels whose foot is on a curve, within margin_px of the object's edge there."""
+    px, node = _nearest_nodes(grey.shape, curve, float(np.max(curve.radius_px)) + margin_px)
+    tangent = curve.tangents[node]
+    apart = px - curve.px[node]
+    along = np.sum(apart * tangent, axis=1)
+    offset = tangent[:, 0] * apart[:, 1] - tangent[:, 1] * apart[:, 0]
+    place = curve.arc_px[node] + along
+    within = (place >= 0.0) & (place <= curve.length_px)
+    within &= np.abs(offset) <= curve.radius_px[node] + margin_px
+    column, row = px[within].T
+    return _Pixels(offset[within], place[within], grey[row, column].astype(float))
+
+
+def _nearest_nodes(
+    shape: tuple[int, ...], curve: Curve, reach_px: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pixels (n, 2) of a picture of this shape (h, w) within reach_px of a curve, and the
+    nearest node (n,) of each.
+    """
+    mask = np.zeros(shape, dtype=np.uint8)
+    nodes = np.rint(curve.px).astype(np.int32)
+    cv2.polylines(mask, [nodes], False, 1, thickness=2 * int(np.ceil(reach_px)) + 3)
+    px = np.argwhere(mask)[:, ::-1]
+    distance, node = cKDTree(curve.px).query(px, distance_upper_bound=reach_px + _NODE_PX)
+    is_near = np.isfinite(distance)
+    return px[is_near], node[is_near]
+
+
+def with_background(pieces: Pieces, blur_px: float, noise: Noise) -> Pieces:
+    """Return segments with a background by both of their sides, weighed by the noise of a pixel.
+
+    The background is a level and a slope on either side, for a shadow next to the object, and a step
+    that the object hides. blur_px: of the lens, by which pixels that show the background alone are
+    known.
+    """
+    background, slope, _ = _sides(pieces, blur_px)
+    is_known = pieces.weight > 0
+    return replace(
+        pieces,
+        background=np.where(is_known, background, 0.0),
+        slope=np.where(is_known, slope[:, None], 0.0),
+        weight=np.where(is_known, 1.0 / noise.sigma(background), 0.0),
+    )
+
+
+def noise_beside(pieces: Pieces, blur_px: float) -> Noise:
+    """Return the noise of a pixel by the residuals of segments' backgrounds outside the object.
+
+    What is printed there counts as noise: nobody knows how it goes on behind.
+    """
+    background, _, is_side = _sides(pieces, blur_px)
+    residual = (pieces.grey - background)[is_side]
+    if len(residual) == 0:
+        return Noise(1.0, 0.0)
+    freedom = max(1.0 - _BACKGROUND_TERMS * len(pieces) / len(residual), _LEAST_FREEDOM)
+    return Noise(robust_sigma(residual) ** 2 / freedom, 0.0)
+
+
+def _sides(pieces: Pieces, blur_px: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the background (s, p), its slope (s,) per px, and which pixels (s, p) show it alone."""
+    radius_px = pieces.radius_px[:, None]
+    step = np.clip(pieces.offset_px / radius_px, -1.0, 1.0)
+    beyond_px = np.abs(pieces.offset_px) - radius_px
+    bend = np.maximum(beyond_px, 0.0)
+    columns = np.stack([np.ones_like(step), pieces.offset_px, step, bend], axis=-1)  # (s, p, 4)
+    is_side = (pieces.weight > 0) & (beyond_px > _CLEAR_BLURS * blur_px)
+    sides = columns * is_side[..., None]
+    normal = sides.transpose(0, 2, 1) @ sides + _WEAK * np.eye(_BACKGROUND_TERMS)
+    right = sides.transpose(0, 2, 1) @ pieces.grey[..., None]
+    found = np.linalg.solve(normal, right)  # (s, 4, 1)
+    return (columns @ found)[..., 0], found[:, 1, 0], is_side
