@@ -231,14 +231,7 @@ class _Rod:
 
         Steps are even in the logarithm of the closest cone's width, so that a cone's thin end has its share of them.
         """
-        parts = np.linspace(1.0, 0.0, 2 * _STEPS + 1)[:, None]
-        if self.taper > 0:
-            log_width = np.log1p(-self.taper * arc)
-            at = -np.expm1(log_width * parts) / self.taper  # (2 steps + 1, n)
-            rate = -log_width / self.taper * (1.0 - self.taper * at)
-        else:
-            at = arc * parts
-            rate = np.broadcast_to(arc, at.shape)
+        at, rate = self._nodes(arc)
         rest = self.tangent(at)[..., None]
         rate = rate[..., None] / _STEPS
         softness = rate / self.width(at[..., None]) ** 4
@@ -264,6 +257,18 @@ class _Rod:
         to_hub = np.swapaxes(turn, 1, 2)
         found = to_hub @ np.stack([way, force[..., 0], rest[0, :, :, 0]], axis=2)
         return found[..., 0], found[..., 1], found[..., 2]
+
+    def _nodes(self, arc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the arcs (2 steps + 1, n) of the march's nodes from contacts at arcs (n,) to the base, and
+        the way there by a unit of the march.
+        """
+        parts = np.linspace(1.0, 0.0, 2 * _STEPS + 1)[:, None]
+        if self.taper > 0:
+            log_width = np.log1p(-self.taper * arc)
+            at = -np.expm1(log_width * parts) / self.taper
+            return at, -log_width / self.taper * (1.0 - self.taper * at)
+        at = arc * parts
+        return at, np.broadcast_to(arc, at.shape)
 
 
 def _sizes(unknowns: np.ndarray) -> np.ndarray:

@@ -202,7 +202,7 @@ def known_motion(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
 
 
 def _why_not(whisk: Whisk) -> str:
-    """Return the reason for having no distance before it is looked for; empty without one."""
+    """Return the reason for having no distance before it is sought; empty without one."""
     if whisk.object_motion is None:
         return MOTION_UNKNOWN
     return distance.why_not(whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)

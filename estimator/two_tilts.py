@@ -173,7 +173,7 @@ class _Equations:
 
 
 def _has_converged(step: np.ndarray, solution: np.ndarray, covariance: np.ndarray) -> bool:
-    """Return whether the last step (2,) of (d, μ) is nothing beside its sigmas."""
+    """Return whether the last step (2,) of (d, μ) is nothing against its sigmas."""
     least = _LAST_STEP * np.array([solution[0], 1.0])
     return bool((np.abs(step) <= _LAST_STEP_SIGMAS * np.sqrt(np.diag(covariance)) + least).all())
 

@@ -73,7 +73,7 @@ class Ring:
     """A damped oscillation: frequency with its standard deviation, Hz, and amplitude in its sigmas.
 
     margin_sigmas: by how much it explains more than a ring of any other frequency. mains_Hz: frequency
-    of the hum beside it.
+    of the hum with it.
     """
 
     frequency_Hz: float
@@ -185,8 +185,8 @@ def _ring(whisk: Whisk, part: np.ndarray, beside: Ring | None = None) -> Ring | 
 def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None) -> Ring:
     """Find the strongest damped oscillation of moments (n, k) at times (n,) from its beginning on.
 
-    beside: the free ring; one on a contact is no slower, and the short while of a push does not tell it
-    from the hum, whose frequency then is known. A cubic stands for the push, a sinusoid for the hum.
+    beside: the free ring; one on a contact is no slower, and in the short while of a push it resembles
+    the hum, whose frequency then is known. A cubic stands for the push, a sinusoid for the hum.
     Frequency and damping are those of least squares, all else being linear; the sigma is that of the
     residuals' scatter. Raises ArithmeticError where the fit does not converge.
     """
@@ -251,7 +251,7 @@ def _step_s(time_s: np.ndarray) -> float:
 
 
 def _frequencies(time_s: np.ndarray, slowest_Hz: float) -> np.ndarray:
-    """Return frequencies a quarter of what the span tells apart."""
+    """Return frequencies a quarter of what the span resolves."""
     return np.arange(slowest_Hz, _FASTEST_SHARE / _step_s(time_s), 0.25 / time_s[-1])
 
 

@@ -100,7 +100,12 @@ class Whisk:
         if np.shape(self.theta_moment_covariance_at) != (2,):
             raise ValueError("theta_moment_covariance_at must have shape (2,)")
         require_sigma("theta_sigma_rad", self.theta_sigma_rad)
-        for name in _ARRAYS:
+        names = _ARRAYS
+        if self.unfiltered_Nmm is not None:
+            if np.shape(self.unfiltered_Nmm) != (len(self.time_s), 2):
+                raise ValueError("unfiltered_Nmm must have shape (n, 2), as many rows as samples")
+            names = (*_ARRAYS, "unfiltered_Nmm")
+        for name in names:
             kept = np.array(getattr(self, name), dtype=float)
             kept.setflags(write=False)
             object.__setattr__(self, name, kept)

@@ -1,0 +1,114 @@
+"""Continuous profile: the shape of a flexible whisker from force and moment at its base, up to the contact.
+
+Scholz and Rahn [21] sweep a whisker on a load cell along an object and integrate its elastica at each instant:
+the contact is where the moment vanishes. Their equations are not at hand. These are derived here from the
+equilibrium of a beam without weight. In the plane of bending let x be along the clamped tangent, w the way back
+from there, ψ the tangent's angle, f and f_x the base's force on the whisker against w and along x:
+
+    M = |m| − x f − w f_x,   dψ/ds = M/EI(s),   dM/ds = −(f cos ψ + f_x sin ψ).
+
+M falls all along the whisker, so that the integral is over M, from |m| at the base to 0 at the contact. Neither
+slope nor friction nor the angle of touch enters. Angles in rad, lengths in mm.
+"""
+
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from estimator import load_cell
+from estimator.beam import Beam
+from estimator.reasons import NamedReason
+
+# [1] Steps of Runge and Kutta's fourth order from base to contact: twice as many move a contact at 20° by less than
+# 2e-6 of its distance (tests/estimator/test_profile.py). Derived.
+_STEPS = 24
+# [1] Of moment and force: steps of the derivatives. Central differences err by its square. Stated.
+_DIFFERENCE = 1e-5
+NO_END = NamedReason("moment_does_not_vanish", "the moment does not fall to zero along the whisker")
+CURVED = NamedReason("curved_unloaded", "the elastica is of a whisker that is straight unloaded")
+
+
+def whisker_shape(
+    moment_Nmm: np.ndarray, across_N: np.ndarray, along_N: np.ndarray, beam: Beam
+) -> np.ndarray:
+    """Integrate the whisker's shape from base to contact.
+
+    moment_Nmm, across_N, along_N (n,): |m|, f and f_x. Returns (steps + 1, 4, n): arc s, x and w, mm, and
+    ψ, rad, where the moment has fallen by equal steps; the last is the contact. NaN where it does not fall, or
+    not within the length.
+    """
+    levels = moment_Nmm * np.linspace(1.0, 0.0, _STEPS + 1)[:, None]
+    rates = partial(_rates, across_N=across_N, along_N=along_N, beam=beam)
+    shapes = [np.zeros((4, len(moment_Nmm)))]
+    with np.errstate(all="ignore"):
+        for start, end in pairwise(levels):
+            shapes.append(_step(rates, start, end, shapes[-1]))
+    return np.stack(shapes)
+
+
+def _rates(
+    moment: np.ndarray,
+    shape: np.ndarray,
+    *,
+    across_N: np.ndarray,
+    along_N: np.ndarray,
+    beam: Beam,
+) -> np.ndarray:
+    """Return the derivatives (4, n) of the shape by the moment; NaN where it does not fall."""
+    arc, _, _, slope = shape
+    per_arc = across_N * np.cos(slope) + along_N * np.sin(slope)
+    per_arc = np.where((per_arc > 0) & (arc <= beam.length_mm), per_arc, np.nan)
+    bend = moment / (beam.rigidity_Nmm2 * beam.width(arc / beam.length_mm) ** 4)
+    return -np.stack([np.ones_like(arc), np.cos(slope), np.sin(slope), bend]) / per_arc
+
+
+def _step(rates, start: np.ndarray, end: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """Return the shape (4, n) at the moment `end` from that at `start`, by Runge and Kutta."""
+    step = end - start
+    middle = 0.5 * (start + end)
+    first = rates(start, shape)
+    second = rates(middle, shape + 0.5 * step * first)
+    third = rates(middle, shape + 0.5 * step * second)
+    last = rates(end, shape + step * third)
+    return shape + step / 6 * (first + 2 * second + 2 * third + last)
+
+
+def contact_in_hub(felt: np.ndarray, beam: Beam) -> np.ndarray:
+    """Compute the contact (n, 3) in the hub's axes, mm, from m_y, m_z, f_x, f_y, f_z (n, 5); NaN where none is."""
+    m_y, m_z, f_x, f_y, f_z = felt.T
+    moment = np.hypot(m_y, m_z)
+    across = load_cell.across(m_y, m_z, f_y, f_z)
+    _, x, back, _ = whisker_shape(moment, across, f_x, beam)[-1]
+    return np.stack([x, -back * m_z / moment, back * m_y / moment], axis=-1)
+
+
+def contact(
+    moments_Nmm: np.ndarray,
+    moment_covariance: np.ndarray,
+    force_N: np.ndarray,
+    force_covariance: np.ndarray,
+    beam: Beam,
+) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return the contact (3,) in the hub's axes, mm, its covariance (3, 3), and why there is none, else "".
+
+    moments_Nmm (2,): m_y and m_z; force_N (3,): of the base on the whisker; with their covariances.
+    """
+    felt = np.concatenate([moments_Nmm, force_N])
+    why_not = CURVED if beam.is_curved else load_cell.why_not(*felt)
+    if why_not:
+        return np.full(3, np.nan), np.full((3, 3), np.nan), why_not
+    point = contact_in_hub(felt[None], beam)[0]
+    gradient = _gradient(felt, beam)  # (3, 5)
+    by_moments = gradient[:, :2] @ moment_covariance @ gradient[:, :2].T
+    by_forces = gradient[:, 2:] @ force_covariance @ gradient[:, 2:].T
+    return point, by_moments + by_forces, "" if np.isfinite(point).all() else NO_END
+
+
+def _gradient(felt: np.ndarray, beam: Beam) -> np.ndarray:
+    """Compute the derivatives (3, 5) of the contact by m_y, m_z, f_x, f_y and f_z."""
+    sizes = np.repeat([np.hypot(*felt[:2]), np.linalg.norm(felt[2:])], [2, 3])
+    steps = _DIFFERENCE * sizes
+    above = contact_in_hub(felt + np.diag(steps), beam)
+    below = contact_in_hub(felt - np.diag(steps), beam)
+    return ((above - below) / (2 * steps[:, None])).T
