@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bench.plan.plan_rows import Plan
+    from bench.workflows.live_push import LivePush
 
 Folder = Path | str
 _log = logging.getLogger(__name__)
@@ -195,6 +196,33 @@ def evaluate(
         announce=_log.info,
     )
     return read(out)
+
+
+def live(
+    session: Folder,
+    out: Folder,
+    trial: str,
+    stroke_deg: tuple[float, float],
+    *,
+    clock_sigma_s: float = 0.0,
+    follow_links: bool = False,
+) -> "LivePush":
+    """Return a push to come against the bar of a trial, to be fed while it is recorded: `add` each
+    picture, `work` while waiting for the next, `finish` after the last.
+
+    stroke_deg: motor angles between which it goes. clock_sigma_s: how well the frames' times are
+    known against the motor's angles. Raise BadInput.
+    """
+    from bench.workflows.live_push import open_push
+
+    return open_push(
+        Path(session),
+        Path(out),
+        trial,
+        stroke_deg,
+        clock_sigma_s=clock_sigma_s,
+        follow_links=follow_links,
+    )
 
 
 def read(out: Folder) -> Run | ArrayRun:

@@ -120,7 +120,7 @@ class Analysis(ABC):
         return None
 
     def figure_of(self, run: EvaluatedRun) -> "Figure | None":
-        """Draw its figure of a run, by a stage's truth with that word; None where nothing is shown."""
+        """Draw its figure of a run, by a stage's truth with that word; None where it has nothing."""
         figure = self.figure(run.found(self))
         if figure is not None and run.is_by_stage:
             name_truth(figure, BY_STAGE)

@@ -1,7 +1,7 @@
 """Moments and force at the base as the pictures show them, frame by frame: base_moments.csv.
 
-They belong to the truth: of the wire's bend as it is seen, by the exact rod of the stated whisker, no gauge
-is asked, and no estimate is given them. Beside them, where moments are felt, what these are of those seen.
+They belong to the truth: the exact rod of the stated whisker turns the wire's seen bend into them. No gauge enters
+them, and no estimate reads them. Where moments are felt, the table compares the two.
 """
 
 from collections.abc import Iterator
@@ -209,7 +209,7 @@ def _frame_rows(one: WhiskLoads) -> Iterator[dict]:
 
 
 def felt_beside(one: WhiskLoads) -> dict | None:
-    """Return the row of felt moments beside those seen; None where either is not known."""
+    """Return the row of felt and of seen moments; None where either is not known."""
     felt = one.felt
     if not felt.has_moments or felt.covariance_at is None:
         return None

@@ -4,6 +4,7 @@ from bench.analyses.against_theta import AgainstTheta
 from bench.analyses.analysis import Analysis
 from bench.analyses.back_strokes import BothWays
 from bench.analyses.base_moments import BaseMoments
+from bench.analyses.continuous_profile import ContinuousProfile
 from bench.analyses.curved import Curvature
 from bench.analyses.error_against_slope import ErrorAgainstFriction, ErrorAgainstSlope
 from bench.analyses.error_map import ErrorMap
@@ -13,6 +14,7 @@ from bench.analyses.friction_tables import FrictionAngles
 from bench.analyses.gave import GivesWay
 from bench.analyses.known_friction import KnownFriction
 from bench.analyses.ledger import Ledger
+from bench.analyses.microphone import Microphone
 from bench.analyses.moving_objects import MovingObjects
 from bench.analyses.reorientation import Reorientation
 from bench.analyses.single_camera import OneCamera
@@ -36,7 +38,9 @@ ANALYSES: tuple[Analysis, ...] = (
     Curvature(),
     Tilts(),
     Reorientation(),
+    ContinuousProfile(),
     Sensors(),
+    Microphone(),
     MovingObjects(),
     BothWays(),
     OneCamera(),

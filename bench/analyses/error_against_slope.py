@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.alphas import seen_friction
 from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.pooling import grouped, panel_title
 from bench.analyses.runs import FITTED
@@ -116,7 +115,7 @@ Lane = tuple[str, bool]  # estimator, and whether it was given one gauge factor 
 
 
 def _lane(judged: Judged) -> Lane:
-    """Return what an estimate is drawn beside others of its whisk by."""
+    """Return by what an estimate is moved, so as not to cover others of its whisk."""
     return judged.estimator, judged.one_factor
 
 
@@ -162,7 +161,7 @@ def errors_with_friction(results: Sequence[TrialResult]) -> list[tuple[float, Ju
     for result, seen, felt in whisks(results):
         key = (result.trial.name, seen.whisk)
         if seen.deflection is not None:
-            alpha_deg[key] = math.degrees(seen_friction(seen, result.whisker)[0])
+            alpha_deg[key] = math.degrees(seen.friction_rad.value)
             continue
         for row in felt.estimates:
             if row.estimator == FITTED:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.alphas import seen_friction
 from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.pooling import angle_cells, known_rows
 from bench.analyses.runs import FITTED
@@ -23,7 +22,6 @@ from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialR
 from bench.session.whisker import Whisker
 from bench.trials.estimate_errors import sound_whisks
 from estimator.distance import with_friction
-from vision import Value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -125,14 +123,14 @@ def explained_rows(results: Iterable[TrialResult], whisker: Whisker) -> Iterator
         answers = [row for row in felt.estimates if row.estimator == "with_friction"]
         if not answers or not seen.has_truth:
             continue
-        alpha_rad, sigma_rad = seen_friction(seen, result.whisker)
+        alpha_rad = seen.friction_rad.value
         shares = _shares_by_fit(seen, felt, answers[0])
         if seen.deflection is not None:
             shares = _shares(result, seen, felt, answers[0], alpha_rad, whisker)
         yield {
             "trial": result.trial.name,
             "whisk": seen.whisk,
-            **angle_cells("alpha_seen_deg", Value(alpha_rad, sigma_rad)),
+            **angle_cells("alpha_seen_deg", seen.friction_rad),
             **shares,
         }
 

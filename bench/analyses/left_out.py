@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.analyses.alphas import felt_friction, seen_friction
+from bench.analyses.alphas import felt_friction
 from bench.analyses.runs import GIVEN, KINETIC
 from bench.base.statuses import reason
 from bench.gauges.felt import motor_speed
@@ -78,7 +78,7 @@ class WhiskModel:
     @property
     def alpha_rad(self) -> float:
         """Return its friction angle, as well as it is known: as seen, as felt, as assumed."""
-        seen, _ = seen_friction(self.seen, self.whisker.beam)
+        seen = self.seen.friction_rad.value
         felt, _ = felt_friction(self.seen, self.felt, self.theta_rad)
         assumed = self.given.alpha_est_rad if self.given else NAN
         for alpha in (seen, felt):

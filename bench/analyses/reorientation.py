@@ -19,14 +19,13 @@ from bench.analyses.pooling import (
     sound_measured_whisks,
     value_cells,
 )
-from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
+from bench.analyses.runs import GIVEN
+from bench.base.settings import Settings
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from bench.session.session import Session
-from bench.trials.estimates import answer, whisk_of
-from estimator.builtin import with_friction
+from bench.trials.estimates import answer, assumed_settings, whisk_of
 from estimator.reorientation import next_turn_rad, reoriented, slip_angle
-from estimator.whisk import EstimatorSettings
 from vision import Value
 from vision.geometry import counted
 
@@ -167,7 +166,7 @@ def _rotation(
     whisk = whisk_of(felt, float(np.radians(result.theta_deg)), session.whisker.beam)
     alpha_sigma_rad = float(np.radians(settings.first_alpha_est_sigma_deg))
     alpha_rad = settings.alpha_est_rad
-    assumed = EstimatorSettings(alpha_rad, alpha_sigma_rad, OBJECT_REACH_MM, TILT_SIGMA_RAD)
+    assumed = assumed_settings(alpha_rad, alpha_sigma_rad)
     return Rotation(
         trial.contact,
         result,
@@ -177,5 +176,5 @@ def _rotation(
         next_turn_rad=next_turn_rad(whisk, assumed),
         d_x_mm=seen.d_x_mm,
         answer=answer("reoriented", reoriented, whisk, alpha_rad, alpha_sigma_rad),
-        one_push=answer("with_friction", with_friction, whisk, alpha_rad, alpha_sigma_rad),
+        one_push=next(row for row in felt.estimates if row.estimator == GIVEN),
     )

@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.analyses.alphas import seen_friction
 from bench.analyses.surfaces import FittedSurface, surfaces
 from bench.analyses.turning_phi import sure_turns, turn, with_turn
-from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
+from bench.base.settings import Settings
 from bench.records.trial_result import (
     EstimateRow,
     FeltAt,
@@ -26,7 +25,7 @@ from bench.records.trial_result import (
     whisks,
 )
 from bench.session.whisker import Whisker
-from bench.trials.estimates import Estimator, answer, whisk_of
+from bench.trials.estimates import Estimator, answer, assumed_settings, whisk_of
 from estimator.beam import Beam
 from estimator.builtin import corrected, exact_rod, with_friction
 from estimator.friction import FrictionFit
@@ -223,7 +222,7 @@ def _runs(
     """Yield (10) with α fitted and seen, where known, and at the kinetic ends, where there are any."""
     whisk = whisk_of(felt, again.theta_rad, again.beam)
     fitted = (fit.alpha_rad, fit.sigma_rad) if fit else (np.nan, np.nan)
-    by_pictures = seen_friction(seen, again.beam)
+    by_pictures = (seen.friction_rad.value, seen.friction_rad.sigma)
     for name, (alpha_rad, sigma_rad) in ((FITTED, fitted), (SEEN, by_pictures)):
         if np.isfinite(alpha_rad):
             alpha = (max(alpha_rad, 0.0), sigma_rad)
@@ -279,6 +278,4 @@ def _rescaled_sensor(row: EstimateRow, beam: Beam, ratio: float) -> EstimateRow:
 
 def settings_without_alpha(result: TrialResult) -> EstimatorSettings:
     """Return what an estimator that assumes no α_est is given of a trial's object."""
-    radii_mm = _radii_mm(result)
-    reach_mm = OBJECT_REACH_MM if np.isnan(radii_mm[0]) else sum(radii_mm)
-    return EstimatorSettings(0.0, 0.0, reach_mm, TILT_SIGMA_RAD, *radii_mm)
+    return assumed_settings(0.0, 0.0, _radii_mm(result))

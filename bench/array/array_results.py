@@ -10,6 +10,7 @@ from bench.analyses.estimator_accuracy import RunAccuracy
 from bench.analyses.runs import alpha_est_sigma
 from bench.array.array_page import write_page
 from bench.array.cloud import ContactPoint, Mount, contacts
+from bench.array.contour import CONTOUR, TrialContour, contours, write_contours
 from bench.array.exchanged_whiskers import exchanged
 from bench.array.shape_verdict import (
     SURFACE_POINTS,
@@ -38,7 +39,9 @@ from vision.geometry import counted
 ARRAY_WHISKS = replace(WHISKS, columns=(WHISKER, *WHISKS.columns))
 ARRAY_ESTIMATES = replace(ESTIMATES, columns=(WHISKER, *ESTIMATES.columns))
 # Of all whiskers, by name.
-TABLES = {table.name: table for table in (ARRAY_WHISKS, ARRAY_ESTIMATES, SURFACE_POINTS, SIZE)}
+TABLES = {
+    table.name: table for table in (ARRAY_WHISKS, ARRAY_ESTIMATES, SURFACE_POINTS, SIZE, CONTOUR)
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,13 +139,13 @@ def write_array(out: Path) -> Summary:
     record = read_array_record(out)
     runs = [WhiskerRun.read(base, folder_of(out, base.name)) for base in record.bases]
     _write_tables(out, runs)
-    cloud = []
-    for run in runs:
-        cloud += contacts(run.mount, run.results, record.surfaces)
+    cloud = _contacts_of_all(record, runs)
     write_surface(out, cloud)
     sizes = fit_sizes(cloud, record.surfaces)
     write_sizes(out, sizes)
-    summary = _summarise(record, runs, cloud, sizes)
+    enclosed = contours(cloud, record.surfaces)
+    write_contours(out, enclosed)
+    summary = _summarise(record, runs, cloud, _shape_sections(cloud, sizes, enclosed))
     figures = []
     if runs[0].record.settings.figures:
         from bench.array.figure import write_figures  # with all of matplotlib
@@ -152,6 +155,14 @@ def write_array(out: Path) -> Summary:
     write_whole(out / "summary.txt", summary.text)
     write_array_record(out, replace(record, verdict=summary.verdict, warnings=summary.warnings))
     return summary
+
+
+def _contacts_of_all(record: ArrayRecord, runs: Sequence[WhiskerRun]) -> list[ContactPoint]:
+    """Return the contacts of all whiskers."""
+    cloud = []
+    for run in runs:
+        cloud += contacts(run.mount, run.results, record.surfaces)
+    return cloud
 
 
 def _seen_surfaces(runs: Sequence[WhiskerRun]) -> dict[str, ObjectSurface]:
@@ -180,18 +191,29 @@ def _named_by_whisker(result: TrialResult, run: WhiskerRun) -> TrialResult:
     return replace(result, trial=trial)
 
 
-def _sections(record, cloud, sizes, first_lines, warnings) -> tuple[Section, ...]:
-    """Return the sections that have lines, in their order.
-
-    first_lines: a verdict a whisker. warnings: see `_warning_lines`.
-    """
-    files = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
+def _shape_sections(
+    cloud: Sequence[ContactPoint], sizes: Sequence[FeltSize], enclosed: Sequence[TrialContour]
+) -> tuple[Section, ...]:
+    """Return the sections on the object's shape: by contacts, as a size, and by touch alone."""
     surface_title = "Surface: contacts from the object, mm (surface.csv)"
     size_title = "Size of the object by (10), its place free (size.csv)"
-    sections = [
-        Section("whiskers", "Whiskers", tuple(first_lines)),
+    contour_title = "Contour by touch alone (contour.csv)"
+    return (
         Section("surface", surface_title, tuple(surface_lines(cloud))),
         Section("size", size_title, tuple(size_lines(sizes))),
+        Section("contour", contour_title, tuple(one.line() for one in enclosed)),
+    )
+
+
+def _sections(record, shape, first_lines, warnings) -> tuple[Section, ...]:
+    """Return the sections that have lines, in their order.
+
+    shape: see `_shape_sections`. first_lines: a verdict a whisker. warnings: see `_warning_lines`.
+    """
+    files = f"report.html, whisks.csv, estimates.csv, surface.csv, size.csv, {RUNS}/<name>/"
+    sections = [
+        Section("whiskers", "Whiskers", tuple(first_lines)),
+        *shape,
         Section("warnings", WARNINGS, tuple(warnings)),
         Section("score", SCORE, record.scores),
         Section("files", "Files", (files,)),
@@ -212,9 +234,12 @@ def _summarise(
     record: ArrayRecord,
     runs: Sequence[WhiskerRun],
     cloud: Sequence[ContactPoint],
-    sizes: Sequence[FeltSize],
+    shape: Sequence[Section],
 ) -> Summary:
-    """Return verdict and sections of the array's summary; sections without lines are left out."""
+    """Return verdict and sections of the array's summary; sections without lines are left out.
+
+    shape: see `_shape_sections`.
+    """
     warnings = _warning_lines(record, runs)
     results = []
     first_lines = []
@@ -225,5 +250,5 @@ def _summarise(
     has_pictures = any(run.record.has_pictures for run in runs)
     settings = runs[0].record.settings
     general = verdict(title, has_pictures, RunAccuracy.of_results(results), settings, len(warnings))
-    kept = _sections(record, cloud, sizes, first_lines, warnings)
+    kept = _sections(record, shape, first_lines, warnings)
     return Summary((*surface_verdict(cloud), *general), tuple(warnings), kept)

@@ -81,7 +81,7 @@ class _Look:
 
 
 def _looks(whiskers: Collection[str]) -> dict[str, _Look]:
-    """Return a look for each whisker: neighbours in colour differ in their markers."""
+    """Return colour and marker of each whisker: neighbours in colour differ in their markers."""
     palette = colormaps["tab10"].colors
     if len(whiskers) > len(palette):
         palette = colormaps["turbo"](np.linspace(0.04, 0.96, len(whiskers)))

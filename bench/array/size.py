@@ -98,7 +98,7 @@ def fit_size(trial: str, contacts: Sequence[ContactPoint], surface: ObjectSurfac
     """Fit place and size of an object, by Gauss and Newton's method from what is stated of it."""
     distances = sum(not contact.status for contact in contacts)
     unknown = FeltSize(trial, surface, len(contacts), distances)
-    of_whiskers = _one_a_whisker(contacts)
+    of_whiskers = one_a_whisker(contacts)
     fit = _SizeFit(of_whiskers, surface)
     known = sum(not contact.status for contact in of_whiskers)
     freedom = len(of_whiskers) + known - fit.count
@@ -119,7 +119,7 @@ def _as_size(unknown: FeltSize, fit: "_SizeFit", freedom: int) -> FeltSize:
     return replace(unknown, size=size, chance=chance, status=_status(size, chance))
 
 
-def _one_a_whisker(contacts: Sequence[ContactPoint]) -> list[ContactPoint]:
+def one_a_whisker(contacts: Sequence[ContactPoint]) -> list[ContactPoint]:
     """Return the mean contact of each whisker, known as well as one of them; doubtful ones where it has no others."""
     found = []
     for of_whisker in grouped(contacts, lambda contact: contact.whisker).values():

@@ -131,7 +131,7 @@ def label_of(estimator: str) -> str:
 def nested_size(number: int, count: int, least: float, step: float) -> float:
     """Return the width of a line, or the size of a marker, in points, of one of several that may coincide.
 
-    Those that are drawn first are larger, so that each shows beside what lies over it.
+    Those that are drawn first are larger, so that each shows under what lies over it.
     """
     return least + step * (count - 1 - number)
 

@@ -32,6 +32,11 @@ SEEING = (
         "bench/trials/truth_source.py",
         "bench/trials/stated_truth.py",
         "bench/trials/stage_contact.py",
+        "bench/trials/seen_friction.py",
+        "bench/gauges/whisker_rods.py",
+        "bench/gauges/held_rod.py",
+        "bench/gauges/clamped_rod.py",
+        "bench/gauges/curved_rod.py",
     ),
     *(
         "bench/records",

@@ -45,6 +45,12 @@ _LOOK_AT_FILE = "look at the file that is named; where it is meant so, nothing i
 _MEASURE_RIG = (
     "measure again by `whisker-bench calibrate rig`, then leave T_rig_board out of session.toml"
 )
+_LOUDER = "move faster: a soft touch is below the microphone's noise"
+_TOUCH_ALL_ROUND = "touch the object from all sides, neighbours less than 180° apart"
+_SHOW_MARKER = "place two cameras that see the marker in all frames, and state hub_marker"
+_SHOW_BASE = "let two cameras see the first third of the wire in all frames"
+_GIVE_ENDS = "give both ends of the object inside the picture, as near to its middle as a few px"
+_LOOK_ALONG_OBJECT = "look at the object in the picture: it must be thin, in view, and lit alike"
 _MEASURE_BOARD = "measure a square of the board with a caliper, then T_rig_board"
 
 
@@ -114,6 +120,25 @@ _TABLE = (
         "no camera shows enough of wire or bar",
         "free the sight: nothing else may stand before or behind wire and bar",
     ),
+    Status("marker_not_seen", REFUSAL, "the hub's marker is not seen often enough", _SHOW_MARKER),
+    Status(
+        "marker_not_fitted", REFUSAL, "the marker's turns are no turns about one axis", _SHOW_MARKER
+    ),
+    Status("base_not_seen", REFUSAL, "the wire's base is not seen", _SHOW_BASE),
+    Status(
+        "base_not_converged", REFUSAL, "the angles of the wire's base do not converge", _SHOW_BASE
+    ),
+    Status("end_outside", REFUSAL, "an end lies outside the picture", _GIVE_ENDS),
+    Status("ends_together", REFUSAL, "the ends are too near to each other", _GIVE_ENDS),
+    Status("no_line", REFUSAL, "no object joins the ends", _GIVE_ENDS),
+    Status("hidden", REFUSAL, "too little of the object is seen", _LOOK_ALONG_OBJECT),
+    Status(
+        "light_not_explained",
+        REFUSAL,
+        "the light along the line is not that of a lit rod",
+        _LOOK_ALONG_OBJECT,
+    ),
+    Status("not_converged", REFUSAL, "the line does not converge", _LOOK_ALONG_OBJECT),
     Status(
         "two_explanations",
         REFUSAL,
@@ -638,6 +663,20 @@ _TABLE = (
     Status("not_a_straight_cylinder", REFUSAL, "the whisker is no straight cylinder"),
     Status("no_unfiltered_samples", REFUSAL, "no samples as recorded are kept"),
     Status("two_places_ring_alike", WARNING, "two distances ring alike"),
+    Status("nothing_heard", REFUSAL, "no sound stands out of the noise", _LOUDER),
+    Status(
+        "moment_does_not_vanish",
+        REFUSAL,
+        "the moment does not fall to zero along the whisker",
+        "calibrate the load cell, and state the whisker's stiffness",
+    ),
+    Status(
+        "curved_unloaded",
+        REFUSAL,
+        "the elastica is of a whisker that is straight unloaded",
+        "use (10) or exact_rod for a curved whisker",
+    ),
+    Status("contour_open", REFUSAL, "touches do not go all round", _TOUCH_ALL_ROUND),
     Status("whisks_slip_alike", REFUSAL, "the whisks slip alike"),
     Status("whisks_unconverged", REFUSAL, "friction and distance do not converge"),
     Status("whisk_not_pushing", REFUSAL, "a whisk does not push"),

@@ -78,6 +78,11 @@ TRUTH_SOURCE = Column(
     "what d_x and the slopes of the truth rest on: pictures or stage; empty without a truth",
     Kind.TEXT,
 )
+ANGLE_FROM = Column(
+    "angle_from",
+    "where the motor's angle is from, as in trial.toml; marker, whisker: θ is seen in the trial's own pictures",
+    Kind.TEXT,
+)
 WHISKS_KNOWN = Column("whisks", "how many whisks with a distance", Kind.WHOLE)
 WHISKS_WITHOUT = Column("none", "how many whisks without a distance")
 

@@ -182,13 +182,13 @@ def measure_held_out(session: Session, views: SessionViews) -> HeldOut | None:
     try:
         made = calibrate_from(session, kept)
         if made.together or len(views.boards) < 2:
-            return check_held_out(made, views.boards, is_held, session.board, times_s=views.times_s)
+            return check_held_out(made, views.boards, is_held, times_s=views.times_s)
         made = calibrate_from(session, _with_even_rows(kept, session))
     except BadInput:
         return None
-    alone = check_held_out(made, views.boards, is_held, session.board).alone_px
+    alone = check_held_out(made, views.boards, is_held).alone_px
     odd = {name: [_rows(view, session, 1)] for name, view in views.rig.items()}
-    on_rig = check_held_out(made, odd, [True], session.board, together=True)
+    on_rig = check_held_out(made, odd, [True], together=True)
     return replace(on_rig, alone_px=alone)
 
 

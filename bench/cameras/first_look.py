@@ -9,6 +9,7 @@ import numpy as np
 
 from bench.base.input_problems import refused_as_bad_input
 from bench.base.threads import in_threads
+from bench.session.angle_source import angle_source
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
@@ -89,7 +90,11 @@ def look_at_strokes(session: Session, cameras: Cameras) -> Look:
 
 def _shows_motor(trial: Trial) -> bool:
     """Return whether a trial has pictures whose motor angles have the rig frame's zero."""
-    return bool(trial.camera_sources) and trial.angle_from == "log"
+    return (
+        bool(trial.camera_sources)
+        and angle_source(trial).has_zero
+        and not angle_source(trial).is_seen
+    )
 
 
 def _look(trial: Trial, board: Board | None, cameras: Cameras) -> Look:

@@ -6,6 +6,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.cameras.first_look import spread
+from bench.session.angle_source import angle_source
 from bench.session.footage import read_frames, rig_picture
 from bench.session.frame_times import frame_times
 from bench.session.session import Session
@@ -62,7 +63,8 @@ def _scatter_warning(shares: np.ndarray, scatter: float) -> Reason:
 def _has_measurable_bar(trial: Trial, session: Session) -> bool:
     """Return whether a trial has a bar of known diameter before cameras with an empty rig picture."""
     cameras = set(session.rig_pictures) & set(trial.camera_sources)
-    return bool(trial.bar_diameter_mm and trial.is_bar and cameras)
+    has_angle = not angle_source(trial).lacks(trial)
+    return bool(trial.bar_diameter_mm and trial.is_bar and cameras and has_angle)
 
 
 def _check_bar_diameter(

@@ -34,7 +34,6 @@ from vision.boards import camera_moved, estimate_optics, refine_corners
 from vision.calibration import Placement, move_rig_frame, read_cameras
 from vision.geometry import (
     NO_REASON,
-    PRINT_TERMS,
     Board,
     Cameras,
     Reason,
@@ -43,7 +42,6 @@ from vision.geometry import (
     compose,
     counted,
     invert_transform,
-    printed_corners,
     skew,
 )
 
@@ -64,8 +62,9 @@ class SessionCalibration:
 
     cameras: None where the session has no pictures. background: the scene by camera, None where
     there is no such picture. hash: of both. notes: lines on what they rest on. T_rig_board: where
-    the board on the rig stands in the cameras' frame, (3, 4) mm, None where not known. board_print:
-    PRINT_TERMS of the board. warnings: where the board's views or the bars' widths contradict what is stated.
+    the board on the rig stands in the cameras' frame, (3, 4) mm, None where not known. board_mm:
+    the board's points as calibrated, (m, 3), None where they are as stated. warnings: where the board's views or the bars' widths
+    contradict what is stated.
     """
 
     cameras: Cameras | None
@@ -73,7 +72,7 @@ class SessionCalibration:
     hash: str
     notes: tuple[str, ...] = ()
     T_rig_board: np.ndarray | None = None
-    board_print: tuple[float, ...] = (0.0,) * len(PRINT_TERMS)
+    board_mm: np.ndarray | None = None
     warnings: tuple[Reason, ...] = ()
 
     def with_notes(self, *notes: str) -> "SessionCalibration":
@@ -103,7 +102,7 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
     background = {name: _background(session, name) for name in cameras.names}
     cameras = _with_optics(cameras, background, session.board)
     of_cameras = [[c, cameras.covariance, cameras.placement] for c in cameras.cameras]
-    made = hash_of(of_cameras, list(background.values()), known.board_print, session.crops)
+    made = hash_of(of_cameras, list(background.values()), known.board_mm, session.crops)
     known = replace(known, cameras=cameras, background=background, hash=made)
     return known.with_notes(*_optics_notes(cameras))
 
@@ -193,7 +192,7 @@ def _from_boards(session: Session, folder: Path) -> SessionCalibration:
         hash="",
         notes=tuple(kept["notes"]),
         T_rig_board=T_rig_board,
-        board_print=tuple(kept["board_print"]),
+        board_mm=np.array(kept["board_mm"]),
         warnings=tuple(Reason(code, sentence) for code, sentence in kept["warnings"]),
     )
 
@@ -213,7 +212,7 @@ def _calibrate_into(session: Session, folder: Path, key: str) -> dict:
             "hash": key,
             "notes": notes,
             "T_rig_board": T_rig_board,
-            "board_print": made.board,
+            "board_mm": made.board_mm,
             "warnings": [part for warning in (*made.warnings, *warnings) for part in warning.parts],
         }
     )
@@ -319,8 +318,8 @@ def _move_of(
     """Return what to say of a camera that moved; nothing where it did not."""
     camera = calibration.cameras[name]
     T = calibration.T_rig_board
-    printed_mm, _ = printed_corners(session.board.corners_mm, np.array(calibration.board_print))
-    points = apply(T, printed_mm)
+    as_made = calibration.board_mm
+    points = apply(T, session.board.corners_mm if as_made is None else as_made)
     corners = refine_corners(grey, camera.project(points), np.arange(len(points)), session.board)
     try:
         shift_px, sigma_px = camera_moved(camera, corners, points)

@@ -2,7 +2,8 @@
 
 import argparse
 
-from bench.commands.options import DONE, KIND_NAMES, Verbs, add_out, add_verb, parse_squares
+from bench.commands.options import DONE, Verbs, add_out, add_verb, parse_squares
+from bench.setup.lab import KIND_NAMES
 
 
 def add(verbs: Verbs) -> None:
@@ -39,6 +40,12 @@ def add(verbs: Verbs) -> None:
     verb.add_argument(
         "--dictionary", default="DICT_5X5_100", metavar="NAME", help="as OpenCV names it"
     )
+    verb.add_argument(
+        "--first-id",
+        type=int,
+        metavar="N",
+        help="its first marker, for a face of a body (default 0)",
+    )
     verb.add_argument("--legacy", action="store_true", help="OpenCV's pattern from before 4.6")
     verb.add_argument("--inverted", action="store_true", help="white on black")
 
@@ -59,6 +66,7 @@ def run(options: argparse.Namespace) -> int:
         square_mm=options.square_mm,
         marker_mm=marker_mm,
         dictionary=options.dictionary if is_charuco else None,
+        first_id=options.first_id,
         legacy=options.legacy,
         inverted=options.inverted,
     )

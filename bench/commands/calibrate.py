@@ -14,7 +14,7 @@ from bench.commands.options import (
 
 
 def add(verbs: Verbs) -> None:
-    """Add the verb with `cameras`, `gauges` and `rig` below it."""
+    """Add the verb with `cameras`, `gauges`, `rig` and `angles` below it."""
     calibrate = verbs.add_parser(
         "calibrate",
         help="cameras from their board views, gauges from the deflection seen, the rig from its turning",
@@ -23,6 +23,7 @@ def add(verbs: Verbs) -> None:
     _add_cameras(what)
     _add_gauges(what)
     _add_rig(what)
+    _add_angles(what)
 
 
 def _add_cameras(what: Verbs) -> None:
@@ -87,6 +88,19 @@ def _add_rig(what: Verbs) -> None:
     add_workers(verb)
 
 
+def _add_angles(what: Verbs) -> None:
+    """Add `calibrate angles`."""
+    verb = add_verb(
+        what,
+        "angles",
+        _run_angles,
+        "find the motor's angle in each frame by the hub's marker or the whisker's base, without a motor log",
+        "whisker-bench calibrate angles recorded/2026-05-04",
+    )
+    add_recorded(verb)
+    add_workers(verb)
+
+
 def _run_cameras(options: argparse.Namespace) -> int:
     """Calibrate the cameras; return the exit code."""
     begin_step(f"reading {options.session}, calibrating its cameras")
@@ -125,4 +139,14 @@ def _run_rig(options: argparse.Namespace) -> int:
         options.out,
         workers=options.workers,
         follow_links=options.follow_links,
+    )
+
+
+def _run_angles(options: argparse.Namespace) -> int:
+    """Find the motor's angles; return the exit code."""
+    begin_step(f"reading {options.session}")
+    from bench.workflows.angle_calibration import calibrate_angles_command
+
+    return calibrate_angles_command(
+        options.session, workers=options.workers, follow_links=options.follow_links
     )

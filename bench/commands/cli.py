@@ -32,6 +32,7 @@ VERBS = (
     "score-traces",
     "tradeoff",
     "robot",
+    "live",
     "figures",
     "simulate",
     "info",

@@ -2,8 +2,11 @@
 
 import argparse
 import sys
+from collections.abc import Iterable
+from typing import Any
 
-from bench.commands.options import DONE, KIND_NAMES, Verbs, add_session, add_verb, parse_squares
+from bench.commands.options import DONE, Verbs, add_session, add_verb, parse_squares
+from bench.setup.lab import CHOICES, Lab
 
 _NUMBERS = {
     "--whisker-length-mm": "from base to tip",
@@ -13,7 +16,15 @@ _NUMBERS = {
     "--square-mm": "side of a square of the board, as measured",
     "--marker-mm": "side of one of its markers",
     "--origin-sigma-mm": "of the stage's origin against the whisker's base",
+    "--speed-deg-s": "of the motor, where its angle is not recorded",
+    "--speed-sigma-deg-s": "one standard deviation of it",
 }
+# Short for an answer: the option, the question, the answer.
+_SHORT = (
+    ("--mirror", "cameras", "mirror"),
+    ("--traces", "truth", "traces"),
+    ("--no-motor-log", "motor_log", "no"),
+)
 
 
 def add(verbs: Verbs) -> None:
@@ -22,61 +33,64 @@ def add(verbs: Verbs) -> None:
         verbs,
         "new",
         run,
-        "the folders of a session and an annotated session.toml; asks in a terminal for what no option gives",
+        "the folders of a session and an annotated session.toml; without options it asks in a terminal what there is",
         "whisker-bench new my-session --whisker-length-mm 100 --whisker-diameter-mm 1 --bar-diameter-mm 6",
     )
     add_session(verb)
     verb.add_argument("--name", default="", help="shown in reports (default: the folder's name)")
-    verb.add_argument(
-        "--truth",
-        choices=("pictures", "stage"),
-        default="pictures",
-        help="where the truth comes from: cameras (default), or a stage or ruler",
-    )
-    verb.add_argument(
-        "--no-motor-log",
-        action="store_true",
-        help="the signals have no motor_deg: the angle is by the motor's stated speed",
-    )
+    for choice in CHOICES:
+        verb.add_argument(
+            f"--{choice.option.replace('_', '-')}", choices=choice.answers, help=choice.wanted
+        )
+    for option, name, answer in _SHORT:
+        verb.add_argument(
+            option,
+            dest=name,
+            action="store_const",
+            const=answer,
+            help=f"the same as --{name.replace('_', '-')} {answer}",
+        )
     for option, what in _NUMBERS.items():
         verb.add_argument(option, type=float, metavar="X", help=what)
     verb.add_argument(
-        "--squares",
-        type=parse_squares,
-        default=(8, 6),
-        metavar="NxM",
-        help="of the board (default 8x6)",
-    )
-    verb.add_argument(
-        "--board-kind", default="charuco", choices=KIND_NAMES, help="of the board (default charuco)"
+        "--squares", type=parse_squares, metavar="NxM", help="of the board (default 8x6)"
     )
     verb.add_argument(
         "--dictionary",
-        default="DICT_5X5_100",
         metavar="NAME",
-        help="of its markers, as OpenCV names it",
+        help="of its markers, as OpenCV names it (default DICT_5X5_100)",
     )
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the session's folders, print what is left to do; return the exit code."""
-    from bench.setup.new_session import BoardLines, new_session
+    from bench.setup.new_session import new_session, require_no_session
 
-    given = {}
-    for option in _NUMBERS:
-        name = option.removeprefix("--").replace("-", "_")
-        if getattr(options, name) is not None:
-            given[name] = getattr(options, name)
-    ask = input if sys.stdin.isatty() else None
-    board = BoardLines(options.board_kind, options.squares, options.dictionary)
-    lines = new_session(
-        options.session,
-        options.name,
-        given,
-        board,
-        ask,
-        options.truth,
-        motor_log=not options.no_motor_log,
-    )
-    print(*lines, sep="\n")
+    require_no_session(options.session)
+    answers = _given(options, (choice.option for choice in CHOICES))
+    numbers = _given(options, (option.removeprefix("--").replace("-", "_") for option in _NUMBERS))
+    board = _given(options, ("squares", "dictionary"))
+    asks = not (answers or numbers or board) and sys.stdin.isatty() and sys.stdout.isatty()
+    ask = _answer if asks else None
+    lab = Lab.of(answers, ask)
+    print(*new_session(options.session, options.name, lab, numbers, ask=ask, **board), sep="\n")
     return DONE
+
+
+def _given(options: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
+    """Return the options of these names that were given."""
+    found = {}
+    for name in names:
+        value = getattr(options, name)
+        if value is not None:
+            found[name] = value
+    return found
+
+
+def _answer(question: str) -> str:
+    """Return what a terminal answers; '' where its input ends."""
+    try:
+        return input(question)
+    except EOFError:
+        print()
+        return ""

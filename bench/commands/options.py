@@ -9,7 +9,6 @@ DONE = 0
 WITH_WARNINGS = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
-KIND_NAMES = ("charuco", "checkerboard", "circles", "asymmetric_circles", "aprilgrid")
 FAULT_OF_OURS = 70  # EX_SOFTWARE: neither a result nor the user's input
 
 Run = Callable[[argparse.Namespace], int]

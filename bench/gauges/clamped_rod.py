@@ -37,6 +37,19 @@ _LAST_SERIES_END = 1e-6
 _MOST_ASIDE = 0.6
 
 
+@dataclass(frozen=True, eq=False)
+class ClampLoad:
+    """What holds n rods at their contacts.
+
+    moment_Nmm (n,): size of the moment at the clamp. force_N (2, n): on the contact, along the clamp's axis and
+    across it. end_rad (n,): angle of the tangent at the contact.
+    """
+
+    moment_Nmm: np.ndarray
+    force_N: np.ndarray
+    end_rad: np.ndarray
+
+
 def moment_at_clamp(
     along_mm: float | np.ndarray,
     across_mm: float | np.ndarray,
@@ -44,7 +57,7 @@ def moment_at_clamp(
     friction: float | np.ndarray = 0.0,
 ) -> np.ndarray:
     """Return the size (n,) of the moment at the clamp of rods, N·mm; arguments and errors as of `load_at_clamp`."""
-    return load_at_clamp(along_mm, across_mm, rigidity_Nmm2, friction)[0]
+    return load_at_clamp(along_mm, across_mm, rigidity_Nmm2, friction).moment_Nmm
 
 
 def load_at_clamp(
@@ -52,9 +65,8 @@ def load_at_clamp(
     across_mm: float | np.ndarray,
     rigidity_Nmm2: Callable,
     friction: float | np.ndarray = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the size (n,) of the moment at the clamp of rods, N·mm, and the forces (2, n) on their contacts,
-    N, along the clamp's axis and across it.
+) -> ClampLoad:
+    """Return what holds rods at their contacts.
 
     along_mm, across_mm (n,): where the contacts lie. rigidity_Nmm2: EI as a function of arc lengths
     (n, nodes) in mm. friction: friction over normal force along the rod at the contact, one or
@@ -73,7 +85,8 @@ def load_at_clamp(
     direction = _force_direction(angle[:, -1], rods.friction)
     moment = np.abs(force * _cross(rods.contact, direction))
     per_chord_N_mm = rods.clamp_rigidity_Nmm2 / rods.chord_mm
-    return moment * per_chord_N_mm, force * direction * per_chord_N_mm / rods.chord_mm
+    force_N = force * direction * per_chord_N_mm / rods.chord_mm
+    return ClampLoad(moment * per_chord_N_mm, force_N, angle[:, -1])
 
 
 def _resolved_equilibrium(rods: "_Rods") -> tuple[np.ndarray, np.ndarray]:
@@ -240,7 +253,7 @@ class _Rods:
 
 
 def _has_converged(step: np.ndarray, unknowns: np.ndarray) -> bool:
-    """Return whether the last step (n, nodes + 2) is nothing beside the unknowns that it led to.
+    """Return whether the last step (n, nodes + 2) is nothing against the unknowns that it led to.
 
     A straight rod has neither angle nor force.
     """

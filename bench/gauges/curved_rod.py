@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.polynomial import polynomial
 
+from bench.gauges.held_rod import HeldRod
 from bench.session.rest_shape import RestShape
 
 # [1] EI over the torsional rigidity, less one, is Poisson's ratio: of metals and of polymers. Stated.
@@ -95,6 +96,15 @@ class UnloadedRod:
 
 
 @dataclass(frozen=True, eq=False)
+class _Marched:
+    """Contacts, forces and tangents (..., n, 3) at the ends of rods, in the hub's axes and the rods' own units."""
+
+    contact: np.ndarray
+    force: np.ndarray
+    tangent: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class CurvedRods:
     """Rods of one whisker, held at contacts (n, 3), mm, in the hub's axes.
 
@@ -108,11 +118,11 @@ class CurvedRods:
     contacts_mm: np.ndarray
 
     def moments_Nmm(self, friction: np.ndarray, deflection_mm: np.ndarray) -> np.ndarray:
-        """Return m_y and m_z (n, 2) of the clamp on the rods, N·mm; arguments and errors as of `loads`."""
-        return self.loads(friction, deflection_mm)[:, :2]
+        """Return m_y and m_z (n, 2) of the clamp on the rods, N·mm; arguments and errors as of `held`."""
+        return self.held(friction, deflection_mm).moments_Nmm
 
-    def loads(self, friction: np.ndarray, deflection_mm: np.ndarray) -> np.ndarray:
-        """Return m_y and m_z of the clamp on the rods, N·mm, and the force on their contacts, N: (n, 5).
+    def held(self, friction: np.ndarray, deflection_mm: np.ndarray) -> HeldRod:
+        """Return what holds the rods at their contacts.
 
         friction (n,): friction over the force across the rod at the contact, positive where it pulls
         towards the clamp. deflection_mm (n, 3): about how far the contact is from the unloaded rod.
@@ -123,7 +133,8 @@ class CurvedRods:
         unknowns = self._start(deflection_mm, chord)
         for _ in range(_MOST_STEPS):
             tried = self._with_differences(unknowns)  # (4, n, 3)
-            points, forces = self._march(tried, friction, chord)
+            marched = self._march(tried, friction, chord)
+            points = marched.contact
             missing = wanted - points[0]
             by_unknowns = np.moveaxis(points[1:] - points[0], 0, -1) / _DIFFERENCE
             try:
@@ -133,7 +144,7 @@ class CurvedRods:
             if not np.isfinite(step).all():
                 break
             if np.abs(step).max() < _LAST_STEP:
-                return self._loads_at_clamp(points[0], forces[0], chord)
+                return self._in_units(marched, chord)
             size = np.linalg.norm(missing, axis=1, keepdims=True)
             unknowns = unknowns + step * np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
         raise ArithmeticError("no equilibrium found of a curved rod that is bent so far")
@@ -147,17 +158,13 @@ class CurvedRods:
         across = [np.sum(deflection * axis, axis=1) for axis in (first, second)]
         return np.column_stack([*across, arc / chord])
 
-    def _loads_at_clamp(
-        self, points: np.ndarray, forces: np.ndarray, chord: np.ndarray
-    ) -> np.ndarray:
-        """Return m_y and m_z at the clamp, N·mm, and the force on the contact, N: (n, 5).
-
-        points, forces (n, 3): of the contacts, in units of the chord (n,), mm, and of the clamp's EI.
-        """
-        moments = -np.cross(points, forces)
+    def _in_units(self, marched: "_Marched", chord: np.ndarray) -> HeldRod:
+        """Return the first of the marched rods, in N and mm. chord (n,): their unit of length, mm."""
+        force = marched.force[0]
+        moments = -np.cross(marched.contact[0], force)
         per_chord = (self.clamp_rigidity_Nmm2 / chord)[:, None]
-        forces_N = forces * per_chord / chord[:, None]
-        return np.column_stack([moments[:, 1:] * per_chord, forces_N])
+        forces_N = force * per_chord / chord[:, None]
+        return HeldRod(moments[:, 1:] * per_chord, forces_N, marched.tangent[0])
 
     def _end_axes(self, arc_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the unloaded tangents (..., 3) at arcs (...), and two directions across each."""
@@ -174,10 +181,8 @@ class CurvedRods:
             tried[k + 1, :, k] += _DIFFERENCE
         return tried
 
-    def _march(
-        self, unknowns: np.ndarray, friction: np.ndarray, chord: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """March rods from contact to clamp; return contacts and forces (..., n, 3) in the hub's axes.
+    def _march(self, unknowns: np.ndarray, friction: np.ndarray, chord: np.ndarray) -> "_Marched":
+        """Return rods that are marched from contact to clamp.
 
         unknowns (..., n, 3): two components of the force across the rod's end, and the arc; friction,
         chord (n,). While marching, the axes are those in which the rod's end has not turned.
@@ -188,10 +193,9 @@ class CurvedRods:
         force = self._force_on_end(unknowns, friction, chord)
         turn, way = self._turn_and_way(arc, chord, force)
         to_hub = np.swapaxes(turn, -1, -2)
-        return (
-            np.einsum("...ij,...j->...i", to_hub, way),
-            np.einsum("...ij,...j->...i", to_hub, force),
-        )
+        tangent = self.rest.tangent(arc * chord)
+        in_hub = [np.einsum("...ij,...j->...i", to_hub, own) for own in (way, force, tangent)]
+        return _Marched(*in_hub)
 
     def _force_on_end(
         self, unknowns: np.ndarray, friction: np.ndarray, chord: np.ndarray

@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.base.settings import Settings
 from bench.records.trial_result import FeltWhisk, SeenWhisk
+from bench.session.angle_source import EXACT, AngleSigma
 from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, back_stroke, forward_strokes, stroke_ends, ways_back
 from bench.session.trial import Trial
@@ -82,7 +83,7 @@ class FeltStroke:
 
     time_s, motor_rad (n,); channels (n, 2) as recorded, NaN where saturated, and filtered; drift
     (n, 2) that was taken out of both, None where none was; forces_N (n, 3), None where no load cell
-    was recorded. angle_share_sigma: relative sigma of differences of motor_rad.
+    was recorded. angle_sigma: how well motor_rad is known.
     """
 
     time_s: np.ndarray
@@ -91,7 +92,7 @@ class FeltStroke:
     filtered: np.ndarray
     drift: np.ndarray | None = None
     forces_N: np.ndarray | None = None
-    angle_share_sigma: float = 0.0
+    angle_sigma: AngleSigma = EXACT
 
     @property
     def saturated(self) -> int:
@@ -172,7 +173,7 @@ def strokes_of(
             channels[where],
             lowpassed[cutoff_Hz][where],
             forces_N=None if signals.forces_N is None else signals.forces_N[where],
-            angle_share_sigma=signals.angle_share_sigma,
+            angle_sigma=signals.angle_sigma.part(where),
         )
         if level:
             stroke = _levelled(stroke, signals, channels, slice(where.stop, end))

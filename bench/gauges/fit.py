@@ -1,7 +1,7 @@
 """Four gauge coefficients from pairs of moment and volts: one weighted regression, errors on both sides.
 
 The cameras' errors move the moments of all whisks together, so that more whisks do not average them
-away. They are unknowns of the regression beside the coefficients, each with its unit variance.
+away. They are unknowns of the regression as the coefficients are, each with its unit variance.
 """
 
 from collections.abc import Sequence

@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.gauges.clamped_rod import load_at_clamp
 from bench.gauges.curved_rod import CurvedRods, UnloadedRod
+from bench.gauges.held_rod import HeldRod
 from bench.session.whisker import Whisker
 
 
@@ -34,14 +35,19 @@ class WhiskerRod(ABC):
     """A clamped rod of which it is seen where a contact holds it."""
 
     def moments_Nmm(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
-        """Return m_y and m_z (n, 2) at the clamp, N·mm, in the hub's axes; see `loads`."""
-        return self.loads(contacts, friction)[:, :2]
+        """Return m_y and m_z (n, 2) at the clamp, N·mm, in the hub's axes; see `held`."""
+        return self.held(contacts, friction).moments_Nmm
+
+    def loads(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
+        """Return moments, N·mm, and the force on the whisker, N: (n, 5), in the hub's axes; see `held`."""
+        held = self.held(contacts, friction)
+        return np.hstack([held.moments_Nmm, held.force_N])
 
     @abstractmethod
-    def loads(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
-        """Return m_y and m_z at the clamp, N·mm, and the object's force on the whisker, N: (n, 5), in the hub's axes.
+    def held(self, contacts: SeenContacts, friction: float | np.ndarray) -> HeldRod:
+        """Return what holds the rod at its contacts.
 
-        friction: friction over normal force along the rod at the contact, one or (n,), positive
+        friction: friction over the force across the rod at the contact, one or (n,), positive
         where it pulls towards the clamp. Raises ArithmeticError where no equilibrium is found.
         """
 
@@ -52,19 +58,30 @@ class StraightRod(WhiskerRod):
 
     whisker: Whisker
 
-    def loads(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
-        """Return moments at the clamp, N·mm, and the force on the whisker, N: (n, 5), in the hub's axes."""
+    def held(self, contacts: SeenContacts, friction: float | np.ndarray) -> HeldRod:
+        """Return what holds the rod at its contacts."""
         size = np.linalg.norm(contacts.across_mm, axis=1)
-        moment, force_N = load_at_clamp(contacts.along_mm, size, self._rigidity_Nmm2, friction)
-        along_N, aside_N = force_N
+        load = load_at_clamp(contacts.along_mm, size, self._rigidity_Nmm2, friction)
         across = contacts.across_mm / size[:, None]
-        z, y = across.T
-        return np.column_stack([moment[:, None] * across, along_N, -aside_N * y, aside_N * z])
+        return HeldRod(
+            load.moment_Nmm[:, None] * across,
+            _in_bending_plane(*load.force_N, across),
+            _in_bending_plane(np.cos(load.end_rad), np.sin(load.end_rad), across),
+        )
 
     def _rigidity_Nmm2(self, arc_mm: np.ndarray) -> np.ndarray:
         """Return EI at arc lengths."""
         whisker = self.whisker
         return whisker.EI_Nmm2 * self.whisker.beam.width(arc_mm / whisker.length_mm) ** 4
+
+
+def _in_bending_plane(along: np.ndarray, aside: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """Return vectors (n, 3) in the hub's axes of components (n,) along the clamp and in the bending direction.
+
+    across (n, 2): the unit vectors of that direction, along z and against y.
+    """
+    z, y = across.T
+    return np.column_stack([along, -aside * y, aside * z])
 
 
 @dataclass(frozen=True)
@@ -73,14 +90,14 @@ class CurvedRod(WhiskerRod):
 
     whisker: Whisker
 
-    def loads(self, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
-        """Return moments at the clamp, N·mm, and the force on the whisker, N: (n, 5), in the hub's axes."""
+    def held(self, contacts: SeenContacts, friction: float | np.ndarray) -> HeldRod:
+        """Return what holds the rod at its contacts."""
         whisker = self.whisker
         rest = UnloadedRod(whisker.unloaded_mm, whisker.length_mm)
         unbent, deflection = _in_hub(rest, contacts)
         rods = CurvedRods(rest, whisker.beam.width, whisker.EI_Nmm2, unbent + deflection)
         friction = np.broadcast_to(np.asarray(friction, float), contacts.along_mm.shape)
-        return rods.loads(friction, deflection)
+        return rods.held(friction, deflection)
 
 
 def _in_hub(rest: UnloadedRod, contacts: SeenContacts) -> tuple[np.ndarray, np.ndarray]:

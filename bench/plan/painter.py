@@ -12,13 +12,13 @@ from bench.plan.staged import StagedWhisk
 from bench.rig import boards, build
 from bench.rig.album import JPEG_QUALITY
 from bench.rig.moments import exposure_moments
+from bench.rig.other_boards import AnyBoard
 from bench.rig.painted_scene import block_corners_mm
-from bench.rig.printed_board import PrintedBoard
 from bench.rig.protocol import Protocol
 from bench.rig.studio import Setting, Studio
 from vision import CameraPictures, LineNoise, line_noise_in_pictures
 from vision.boards import refine_corners
-from vision.geometry import Board, Camera, Cameras, Refused, apply
+from vision.geometry import Board, Camera, Cameras, Refused, apply, compose
 
 # [corners] Of a board held up to a camera; fewer, and it would not be found. Stated.
 _FEWEST_CORNERS = 6
@@ -52,7 +52,7 @@ class Painter:
         return as_board(self.protocol.board)
 
     @cached_property
-    def printed(self) -> PrintedBoard:
+    def printed(self) -> AnyBoard:
         """Return the board for the rig."""
         return build.board(self.protocol)
 
@@ -84,7 +84,8 @@ class Painter:
         pose = boards.draw_poses(self.printed, studio.camera, 2, self._stream(number))[0]
         brightness = studio.board_brightness(pose)
         picture = studio.sensor.expose(brightness, self._stream(number, _BOARD_PICTURE))
-        px = camera.project(apply(pose, self.board.corners_mm))
+        T_rig_board = compose(pose, self.printed.T_print_board)
+        px = camera.project(apply(T_rig_board, self.board.corners_mm))
         corners = refine_corners(picture, px, np.arange(len(px)), self.board)
         if len(corners) < _FEWEST_CORNERS:
             raise Refused(

@@ -5,13 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.rig import boards
+from bench.rig import boards, papers
+from bench.rig.other_boards import AnyBoard
 from bench.rig.pinhole import PinholeCamera
-from bench.rig.printed_board import PrintedBoard
 from bench.rig.protocol_tables import BoardTable
-from vision.boards import CharucoBoard, Corners
+from bench.session.manifest import BoardKeys
+from bench.session.stated_board import stated_board
+from vision.boards import Corners
 from vision.calibration import BoardViews, MeasuredPose, calibrate_cameras
-from vision.geometry import Board, Camera, Cameras, apply
+from vision.geometry import Board, Camera, Cameras, apply, compose
 
 # [px] A corner nearer to the picture's edge is not found. Stated.
 _RIM_PX = 8.0
@@ -27,7 +29,7 @@ class BoardWork:
     """
 
     board: Board
-    printed: PrintedBoard
+    printed: AnyBoard
     on_rig: MeasuredPose
     views: int
     corner_px: Mapping[str, float]
@@ -59,15 +61,20 @@ def expected_cameras(cameras: Sequence[Camera], work: BoardWork, seed: int = 0) 
     for number, camera in enumerate(cameras):
         rng = np.random.default_rng([seed, _NOISE, number])
         sigma_px = work.corner_px.get(camera.name, work.largest_corner_px)
-        of_views = np.random.default_rng([seed, _VIEWS, number])
-        poses = boards.draw_poses(work.printed, as_rig_camera(camera), work.views, of_views)
-        held[camera.name] = [_corners(camera, work.board, pose, sigma_px, rng) for pose in poses]
+        views = _draw_views(camera, work, np.random.default_rng([seed, _VIEWS, number]))
+        held[camera.name] = [_corners(camera, work.board, pose, sigma_px, rng) for pose in views]
         on_rig = work.on_rig.T_rig_board
         standing[camera.name] = _corners(camera, work.board, on_rig, sigma_px, rng)
         sizes_px[camera.name] = camera.size_px
     views = BoardViews(held, sizes_px, standing)
     found = calibrate_cameras(views, work.board, work.on_rig, triggered=True).cameras
     return Cameras(tuple(cameras), found.covariance, found.placement)
+
+
+def _draw_views(camera: Camera, work: BoardWork, rng: np.random.Generator) -> list[np.ndarray]:
+    """Draw the poses (3, 4) of the board in the views of a camera, rig frame."""
+    poses = boards.draw_poses(work.printed, as_rig_camera(camera), work.views, rng)
+    return [compose(pose, work.printed.T_print_board) for pose in poses]
 
 
 def _corners(
@@ -95,13 +102,6 @@ def as_seen_camera(camera: PinholeCamera) -> Camera:
     return Camera(camera.name, camera.size_px, camera.matrix, camera.distortion, T)
 
 
-def as_board(table: BoardTable) -> CharucoBoard:
+def as_board(table: BoardTable) -> Board:
     """Return the board of a protocol for vision."""
-    return CharucoBoard(
-        tuple(table.squares),
-        table.square_mm,
-        table.marker_mm,
-        table.dictionary,
-        table.legacy,
-        table.inverted,
-    )
+    return stated_board(BoardKeys(**papers.board_keys(table)), "[board]")

@@ -27,8 +27,9 @@ from bench.records.trial_result import SeenTrial
 from bench.rig import build
 from bench.rig.protocol import Protocol, load
 from bench.session.inside import check_outside
-from bench.session.session import MANIFEST
+from bench.session.session import MANIFEST, Session
 from bench.session.session_check import checked_session
+from bench.session.trial import Trial
 from bench.trials.of_session import placed_units, trials_with_whisks
 from bench.trials.trial_evaluation import see_unit
 from bench.trials.unit import Unit
@@ -116,7 +117,7 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
 class _PlacedRig:
     """A rig whose cameras all have a place.
 
-    target_mm (3,): what they look at. work: what they would be calibrated from. cameras: with the
+    target_mm (3,): what they are aimed at. work: what they would be calibrated from. cameras: with the
     covariance that this leaves.
     """
 
@@ -128,7 +129,7 @@ class _PlacedRig:
 
 
 def _place_rig(protocol: Protocol, whisks: Sequence[StagedWhisk]) -> _PlacedRig:
-    """Return the rig with a place for each camera, which looks at the whisks' mean contact.
+    """Return the rig with a place for each camera, which is aimed at the whisks' mean contact.
 
     Raises BadInput, Refused, ValueError or cv2.error where that cannot be.
     """
@@ -271,9 +272,7 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
     check_outside(out, path)
     problems = InputProblems()
     session = checked_session(path, problems, follow_links=options.follow_links)
-    trials = [trial for trial in trials_with_whisks(session) if trial.camera_sources]
-    if not trials:
-        raise BadInput("has no pictures: there is nothing to plan", file="trials")
+    trials = _pictured_trials(session)
     settings = Settings(theta_deg=options.theta_deg)
     with lock_output(out):
         calibration, units = placed_units(session, trials, out, settings, pool, problems)
@@ -290,6 +289,14 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
         theta_deg=options.theta_deg,
         assumptions=(_AS_RECORDED,) if staged else (),
     )
+
+
+def _pictured_trials(session: Session) -> list[Trial]:
+    """Return the trials with whisks that have pictures. Raise BadInput where there are none."""
+    trials = [trial for trial in trials_with_whisks(session) if trial.camera_sources]
+    if not trials:
+        raise BadInput("has no pictures: there is nothing to plan", file="trials")
+    return trials
 
 
 def _see_whisks(

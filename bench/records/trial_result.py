@@ -29,6 +29,7 @@ class TrialFacts:
     d_x_nominal_mm: float = NAN
     beta_nominal_deg: float = NAN
     bar_diameter_mm: float = NAN
+    angle_from: str = "log"
 
     @property
     def panel(self) -> tuple[str, float | None]:
@@ -132,13 +133,14 @@ class SeenWhisk:
     disagree (`bench.trials.consistency`). deflection: also of a whisk whose distance or slope is
     not known; None where no frame is seen to touch. by_one_camera: only where the settings name one.
     source: of d_x, β and ψ, BY_PICTURES or BY_STAGE. pictured: what pictures show of these where they
-    are another source's.
+    are another source's. friction_rad: the angle α by pictures alone (`bench.trials.seen_friction`).
     """
 
     truth: WhiskTruth
     status: Reason = NO_REASON
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None
+    friction_rad: Value = UNKNOWN
     overlay: dict[str, Drawing] = field(default_factory=dict)
     touch_shared_rad: float = 0.0
     looked: str = ""
@@ -297,7 +299,11 @@ class EstimateRow:
 
 @dataclass(frozen=True, eq=False)
 class FeltAt:
-    """Moments at one pushing angle and the estimates from them; for the fields see `FeltWhisk`."""
+    """Moments at one pushing angle and the estimates from them; for the fields see `FeltWhisk`.
+
+    force_N (3,), force_covariance (3, 3): of the base on the whisker, in the hub's axes, with what its
+    scale may differ from that of the moments; None without a load cell.
+    """
 
     theta_rad: float
     m_y_Nmm: Value
@@ -306,6 +312,8 @@ class FeltAt:
     covariance_at: np.ndarray
     theta_moment_covariance_at: np.ndarray
     estimates: tuple[EstimateRow, ...] = ()
+    force_N: np.ndarray | None = None
+    force_covariance: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,7 @@ def whisk_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
         row["frames_used"] = seen.truth.frames_used
         row["looked"] = seen.looked
         row["truth_source"] = seen.truth_source
+        row["angle_from"] = result.trial.angle_from
         yield row
 
 
@@ -157,6 +158,7 @@ def estimate_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
                 "error_mm": error_mm,
                 "error_percent": 100.0 * error_mm / true_mm,
                 "truth_source": seen.truth_source,
+                "angle_from": result.trial.angle_from,
                 "status": estimate.status,
             }
             row |= _cells("d_x_est_mm", estimate.d_x_est_mm)

@@ -69,6 +69,13 @@ def overlay(trial: Trial, whisk: SeenWhisk) -> Image.Image:
     return picture
 
 
+def last_frame(
+    pictures: Mapping[str, np.ndarray], lines: Mapping[str, Mapping[str, np.ndarray]]
+) -> np.ndarray:
+    """Draw a panel for each camera (h, w, 3), one below the other. lines: by camera, of its picture."""
+    return np.vstack([_panel(pictures[camera], own) for camera, own in lines.items()])
+
+
 def _row_of_panels(
     camera: str, pictures: Mapping[int, np.ndarray], drawings: Mapping[str, Drawing]
 ) -> np.ndarray:

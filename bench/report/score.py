@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.continuous_profile import PROFILE, interpolated_mm
+from bench.analyses.microphone import MICROPHONE
 from bench.analyses.pooling import grouped, rms
 from bench.base.tables import sigma_name
 from bench.gauges.matrix import GaugeCalibration
@@ -46,7 +48,8 @@ class Score:
 
     def line(self) -> str:
         """Return bias, RMS, and how well the stated sigmas hold, in a line."""
-        z = np.abs(self.errors) / self.sigmas
+        with np.errstate(invalid="ignore", divide="ignore"):  # what is exact has a sigma of 0
+            z = np.abs(self.errors) / self.sigmas
         finite = z[np.isfinite(z)]
         coverage = "    -       -"
         if len(finite):
@@ -112,6 +115,8 @@ def scores_of(session: Session, out: Path) -> Iterator[Score]:
         yield from _compare(column, _frames(session, out, column), f"{column}, touching frames")
     yield from _friction(session, out)
     yield from _estimates(session, out, truths)
+    yield from _profile(session, out)
+    yield from _heard(session, out)
 
 
 def _estimates(session: Session, out: Path, truths: Sequence[tuple[Row, dict]]) -> Iterator[Score]:
@@ -196,6 +201,41 @@ def _frames(session: Session, out: Path, column: str) -> Iterator[Pair]:
             true = truth.get(int(row["frame"]))
             if true is not None and float(true["contact"]) == 1 and row["touching"] == "1":
                 yield row, float(true[column])
+
+
+def _profile(session: Session, out: Path) -> Iterator[Score]:
+    """Yield the scores of contacts through sweeps, of trials with one whisk."""
+    path = out / PROFILE.file
+    rows = _read_rows(path) if path.is_file() else ()
+    pairs: dict[str, list[Pair]] = {"x_est_mm": [], "y_est_mm": [], "z_est_mm": []}
+    for trial, mine in grouped(rows, lambda row: row["trial"]).items():
+        motor_deg, points_mm = _true_contacts(session.trial(trial).own("truth.csv"))
+        if not len(motor_deg) or np.any(np.diff(motor_deg) < 0):
+            continue
+        for row in mine:
+            true_mm = interpolated_mm(float(row["motor_deg"]), motor_deg, points_mm)
+            for column, true in zip(pairs, true_mm.tolist()):
+                pairs[column].append((row, true))
+    for column, mine in pairs.items():
+        yield from _compare(column, mine, f"{column}, profile")
+
+
+def _heard(session: Session, out: Path) -> Iterator[Score]:
+    """Yield the score of touches that a microphone hears."""
+    path = out / MICROPHONE.file
+    pairs = []
+    for row in _read_rows(path) if path.is_file() else ():
+        truth = truth_of(session, row["trial"], int(row["whisk"]))
+        pairs.append((row, truth and truth["touch_deg"]))
+    yield from _compare("touch_heard_deg", pairs)
+
+
+def _true_contacts(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Return motor angles (n,), degrees, and contacts (n, 3) of the frames that touch."""
+    rows = [row for row in (_read_rows(path) if path.is_file() else ()) if row["contact"] == "1"]
+    table = [[float(row[name]) for name in ("motor_deg", "x_mm", "y_mm", "z_mm")] for row in rows]
+    numbers = np.array(table).reshape(-1, 4)
+    return numbers[:, 0], numbers[:, 1:]
 
 
 def _gauge_lines(session: Session, gauges: GaugeCalibration | None) -> Iterator[str]:

@@ -156,7 +156,7 @@ def _draw_force(axes: Axes, points: PlanePoints) -> None:
 
 
 def _write_names(axes: Axes, points: PlanePoints) -> None:
-    """Write the names of P0, P and V beside them.
+    """Write the names of P0, P and V next to them.
 
     P's stands beyond the slip and in the bar, where neither cone nor slip are.
     """
@@ -173,7 +173,7 @@ def _write_names(axes: Axes, points: PlanePoints) -> None:
 
 
 def _draw_slip(axes: Axes, points: PlanePoints) -> None:
-    """Draw σ from P0 to P as an arrow beside them, on the side that the whisker came from."""
+    """Draw σ from P0 to P as an arrow next to them, on the side that the whisker came from."""
     if np.linalg.norm(points.contact) < _LEAST_SLIP_MM:
         return
     offset = 0.95 * points.normal

@@ -1,6 +1,7 @@
 """The tables of whisks that every evaluated session has: their columns."""
 
 from bench.base.tables import (
+    ANGLE_FROM,
     SPEED,
     SURFACE,
     TRIAL,
@@ -34,6 +35,7 @@ WHISKS = Table(
         SPEED,
         Column("beta_nominal_deg", "nominal slope of the bar"),
         Column("theta_deg", "the pushing angle θ at which slip, moments and estimates are taken"),
+        ANGLE_FROM,
         *with_sigma("touch_deg", "motor angle of first touch, seen"),
         *with_sigma("touch_felt_deg", "motor angle of first touch, felt"),
         *with_sigma("d_x_mm", "distance from the base to the contact at first touch: the truth"),
@@ -92,6 +94,7 @@ ESTIMATES = Table(
         Column("d_x_est_low_mm", "low end of its 95 % interval; 0 is open"),
         Column("d_x_est_high_mm", "high end of its 95 % interval; the whisker's length is open"),
         Column("beta_est_deg", "slope estimated, where it gives one"),
+        ANGLE_FROM,
         Column("error_mm", "estimate less truth"),
         TRUTH_SOURCE,
         Column("error_percent", "estimate less truth, % of the truth"),

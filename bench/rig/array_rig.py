@@ -155,8 +155,10 @@ def _find_touch(
 
 
 def _motor_towards(whisker: MountedWhisker, angle_rad: float) -> float:
-    """Return the motor angle at which a whisker points as one at the rig's origin does at
-    `angle_rad`."""
+    """Return the motor angle that its column states, else that at which a whisker points as one at
+    the rig's origin does at `angle_rad`."""
+    if whisker.column.near_deg is not msgspec.UNSET:
+        return math.radians(whisker.column.near_deg)
     x, y, _ = whisker.pose[:, :3].T @ [math.cos(angle_rad), math.sin(angle_rad), 0.0]
     return math.atan2(y, x)
 

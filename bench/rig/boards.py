@@ -7,27 +7,32 @@ import cv2
 import numpy as np
 
 from bench.rig.linear import rotation_about_z
+from bench.rig.other_boards import AnyBoard
 from bench.rig.pinhole import PinholeCamera
-from bench.rig.printed_board import PrintedBoard
 
 # rad: the golden angle, by which views lean to all sides evenly
 _GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
+_STEP_BACK = np.array([0.9, 0.9, 1.05])  # of a board that is not seen whole, in the camera's axes
+_RIM_PX = 12.0  # of white round a board that is seen whole
 # mm along the board's x, y and away from the cameras: how far a board that several see is held from the middle
 _SHARED_REACH_MM = np.array([25.0, 15.0, 45.0])
 
 
 def draw_poses(
-    board: PrintedBoard, camera: PinholeCamera, count: int, rng: np.random.Generator
+    board: AnyBoard, camera: PinholeCamera, count: int, rng: np.random.Generator
 ) -> list[np.ndarray]:
-    """Draw T_rig_board (3, 4) of each view."""
+    """Draw the pose (3, 4) of the print in each view, in the rig frame."""
     order = rng.permutation(count)
-    return [_draw_pose(board, camera, i, count, int(order[i]), rng) for i in range(count)]
+    poses = [_draw_pose(board, camera, i, count, int(order[i]), rng) for i in range(count)]
+    if board.is_found_in_parts:
+        return poses
+    return [_in_view(board, camera, pose) for pose in poses]
 
 
 def draw_shared_poses(
-    board: PrintedBoard, cameras: Sequence[PinholeCamera], count: int, rng: np.random.Generator
+    board: AnyBoard, cameras: Sequence[PinholeCamera], count: int, rng: np.random.Generator
 ) -> list[np.ndarray]:
-    """Draw T_rig_board (3, 4) of each view that several cameras see at once.
+    """Draw the pose (3, 4) of the print in each view that several cameras see at once.
 
     The board is held about the point nearest to all optical axes, tilted about the mean of the
     directions from there to the cameras.
@@ -37,13 +42,34 @@ def draw_shared_poses(
     across = np.eye(3) - towards[:, :, None] * towards[:, None]  # onto the planes across the axes
     middle_mm = np.linalg.solve(across.sum(0), np.einsum("nij,nj->i", across, centres))
     facing = _facing(towards.sum(0))
-    half_mm = np.append(0.5 * np.array(board.size_mm), 0.0)
+    half_mm = _middle_mm(board)
     poses = []
     for index in range(count):
         turn = facing @ _draw_rotation(index, rng)
         place = middle_mm + facing @ rng.uniform(-_SHARED_REACH_MM, _SHARED_REACH_MM)
         poses.append(np.column_stack([turn, place - turn @ half_mm]))
     return poses
+
+
+def _middle_mm(board: AnyBoard) -> np.ndarray:
+    """Return the middle (3,) of a print."""
+    return np.append(0.5 * np.array(board.size_mm), 0.0)
+
+
+def _in_view(board: AnyBoard, camera: PinholeCamera, pose: np.ndarray) -> np.ndarray:
+    """Return a pose (3, 4) moved to the camera's axis and away from it until the whole print is seen."""
+    width, height = board.size_mm
+    outline_mm = np.array([[0, 0, 0], [width, 0, 0], [width, height, 0], [0, height, 0]])
+    middle_mm = _middle_mm(board)
+    place = camera.in_camera(pose[:, :3] @ middle_mm + pose[:, 3])
+    while True:
+        in_rig = camera.rotation.T @ (place - camera.translation_mm)
+        moved = np.column_stack([pose[:, :3], in_rig - pose[:, :3] @ middle_mm])
+        px = camera.project(outline_mm @ moved[:, :3].T + moved[:, 3])
+        last_px = np.array(camera.size_px) - 1 - _RIM_PX
+        if np.all((px > _RIM_PX) & (px < last_px)):
+            return moved
+        place = place * _STEP_BACK
 
 
 def _middle_ray(camera: PinholeCamera) -> np.ndarray:
@@ -55,7 +81,7 @@ def _middle_ray(camera: PinholeCamera) -> np.ndarray:
 
 
 def _facing(towards: np.ndarray) -> np.ndarray:
-    """Return the rotation (3, 3) of a board whose face looks along a direction (3,); its x axis is level."""
+    """Return the rotation (3, 3) of a board that faces along a direction (3,); its x axis is level."""
     back = -towards / np.linalg.norm(towards)  # the board's z goes into it
     right = np.cross(back, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -72,7 +98,7 @@ def _draw_pose(board, camera, index, count, depth_rank, rng):
     offset_px = 0.28 * _direction(2.4 * (index * _GOLDEN_RAD)) * place * camera.size_px
     offset_px += rng.uniform(-20, 20, 2)
     ray = np.append(offset_px / np.diag(camera.matrix)[:2], 1.0)
-    middle = rotation @ np.append(0.5 * np.array(board.size_mm), 0.0)
+    middle = rotation @ _middle_mm(board)
     to_rig = camera.rotation.T
     shift = to_rig @ (depth_mm * ray - middle - camera.translation_mm)
     return np.column_stack([to_rig @ rotation, shift])

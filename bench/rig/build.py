@@ -7,8 +7,14 @@ import numpy as np
 
 from bench.rig.elastic_rod import ProfiledRod, RestShape, Rod
 from bench.rig.light import Light, Material
-from bench.rig.linear import rotation_about_z
+from bench.rig.linear import compose, rotation_about_z
 from bench.rig.mirror import MirrorStudio, Part, direct_part, mirrored_part
+from bench.rig.other_boards import (
+    AnyBoard,
+    PrintedAprilGrid,
+    PrintedCheckerboard,
+    PrintedCircles,
+)
 from bench.rig.painted_scene import Appearance, Scene, Stand
 from bench.rig.pinhole import PinholeCamera
 from bench.rig.printed_board import Ink, PrintedBoard
@@ -93,11 +99,21 @@ def _camera(table: CameraTable) -> PinholeCamera:
     )
 
 
-def board(protocol: Protocol) -> PrintedBoard:
+def board(protocol: Protocol) -> AnyBoard:
     """Build the board."""
     table = protocol.board
+    squares = tuple(table.squares)
+    if table.kind == "checkerboard":
+        return PrintedCheckerboard(squares, table.square_mm, table.dictionary)
+    if table.kind == "aprilgrid":
+        return PrintedAprilGrid(squares, table.square_mm, table.marker_mm, table.dictionary)
+    if table.kind in ("circles", "asymmetric_circles"):
+        is_shifted = table.kind == "asymmetric_circles"
+        return PrintedCircles(
+            squares, table.square_mm, table.marker_mm, table.dictionary, is_shifted
+        )
     return PrintedBoard(
-        tuple(table.squares),
+        squares,
         table.square_mm,
         table.marker_mm,
         table.dictionary,
@@ -107,7 +123,12 @@ def board(protocol: Protocol) -> PrintedBoard:
 
 
 def T_rig_board(protocol: Protocol) -> np.ndarray:
-    """Return the board's pose (3, 4): lying face up, turned about the rig's z and tilted a
+    """Return the pose (3, 4) of the board's frame."""
+    return compose(_T_rig_print(protocol), board(protocol).T_print_board)
+
+
+def _T_rig_print(protocol):
+    """Return the pose (3, 4) of the board's print: lying face up, turned about the rig's z and tilted a
     little."""
     table = protocol.board
     tilt = cv2.Rodrigues(np.radians([*table.tilt_deg, 0.0]))[0]
@@ -120,12 +141,13 @@ def stated_T_rig_board(protocol: Protocol, rng: np.random.Generator) -> np.ndarr
     """Draw the pose (3, 4) that session.toml states of the board: the true one, wrong by the
     protocol's sigmas about the board's middle."""
     table = protocol.board
-    pose = T_rig_board(protocol)
+    pose = _T_rig_print(protocol)
     error = cv2.Rodrigues(math.radians(table.pose_sigma_deg) * rng.standard_normal(3))[0]
     shift = table.pose_sigma_mm * rng.standard_normal(3)
-    middle = pose @ np.append(0.5 * np.array(board(protocol).size_mm), [0.0, 1.0])
+    own = board(protocol)
+    middle = pose @ np.append(0.5 * np.array(own.size_mm), [0.0, 1.0])
     origin = error @ (pose[:, 3] - middle) + middle + shift
-    return np.column_stack([error @ pose[:, :3], origin])
+    return compose(np.column_stack([error @ pose[:, :3], origin]), own.T_print_board)
 
 
 def scene(protocol: Protocol) -> Scene:
@@ -145,7 +167,7 @@ def scene(protocol: Protocol) -> Scene:
         Stand.of_column(column_pose(column), column.heights_mm) for column in protocol.columns or ()
     ]
     return Scene(
-        board(protocol), T_rig_board(protocol), appearance, tuple(stands) or (Stand.alone(),)
+        board(protocol), _T_rig_print(protocol), appearance, tuple(stands) or (Stand.alone(),)
     )
 
 

@@ -19,7 +19,7 @@ class RestShape:
 
     sag_mm: the tip's drop (towards −z) of a cantilever under its own weight. set_y_mm, set_z_mm:
     of a wire that keeps a curvature from its spool, or a whisker that grew so, how far its tip lies
-    aside. All are laid off over arc length, and what is left of each unit of it goes forward:
+    sideways. All are laid off over arc length, and what is left of each unit of it goes forward:
     exact, and inextensible. Raises ValueError where the whisker would turn back.
     """
 

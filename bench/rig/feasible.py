@@ -26,6 +26,7 @@ def check_protocol(protocol: "Protocol", path: Path) -> None:
         _check_rest(protocol.whisker)
         _check_cameras(protocol)
         _check_columns(protocol)
+        _check_microphone(protocol)
         for run in protocol.runs():
             _check_run(protocol, run)
             _check_object(run)
@@ -68,6 +69,19 @@ def _check_columns(protocol):
                 raise ValueError(
                     f"[[columns]] {column.name}: {found}; one for all, or one a height"
                 )
+
+
+def _check_microphone(protocol):
+    """Raise ValueError for a microphone at an array, or a band that no samples hold."""
+    if not protocol.microphone:
+        return
+    if protocol.columns:
+        raise ValueError("[microphone] is simulated at one whisker; leave out [[columns]]")
+    low_Hz, high_Hz = protocol.microphone.band_Hz
+    highest_Hz = protocol.gauges.rate_Hz / 2
+    if not 0 < low_Hz < high_Hz < highest_Hz:
+        found = f"[microphone] band_Hz {low_Hz:g} to {high_Hz:g}"
+        raise ValueError(f"{found}; rising, above 0 and below {highest_Hz:g} is allowed")
 
 
 def _check_run(protocol, run: "ProtocolRun"):

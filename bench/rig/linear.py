@@ -41,6 +41,12 @@ def rotation_about_z(angle_rad: float) -> np.ndarray:
     return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1.0]])
 
 
+def compose(T_a_b: np.ndarray, T_b_c: np.ndarray) -> np.ndarray:
+    """Return the pose T_a_c (3, 4) of two poses (3, 4), the second in the first one's frame."""
+    turn = T_a_b[:, :3]
+    return np.column_stack([turn @ T_b_c[:, :3], turn @ T_b_c[:, 3] + T_a_b[:, 3]])
+
+
 def rotate_about_z(vectors: np.ndarray, angle_rad: float) -> np.ndarray:
     """Rotate vectors (..., 3) about the z axis."""
     x, y, z = np.moveaxis(np.asarray(vectors, float), -1, 0)

@@ -37,7 +37,7 @@ class Part:
 
 
 def direct_part(whole: PinholeCamera, crop: Sequence[int]) -> Part:
-    """Return the largest part of a picture beside the mirror's crop [left, top, width, height]."""
+    """Return the largest part of a picture outside the mirror's crop [left, top, width, height]."""
     left, top, width, height = crop
     columns, rows = whole.size_px
     sides = [

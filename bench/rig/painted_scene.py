@@ -12,9 +12,10 @@ from bench.rig.box import Box
 from bench.rig.layer import Occluder, draw_layers
 from bench.rig.light import Light, Material
 from bench.rig.linear import rotate_about_z
+from bench.rig.other_boards import AnyBoard
 from bench.rig.pinhole import PinholeCamera
 from bench.rig.plate import Plate, Print
-from bench.rig.printed_board import Ink, PrintedBoard, marker_print
+from bench.rig.printed_board import Ink, marker_count, marker_print
 from bench.rig.rays import unit
 from bench.rig.solid import Solid
 from bench.rig.tube import Tube, draw_tubes
@@ -106,9 +107,9 @@ class Stand:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The rig that a board, a bar and whiskers on their stands make. T_rig_board: (3, 4)."""
+    """The rig that a board, a bar and whiskers on their stands make. T_rig_board (3, 4): of its print."""
 
-    board: PrintedBoard
+    board: AnyBoard
     T_rig_board: np.ndarray
     appearance: Appearance
     stands: tuple[Stand, ...]
@@ -179,7 +180,7 @@ class Scene:
 
     def _marker(self, from_end) -> Print:
         """Return the print of a marker by its place from the end of the board's dictionary."""
-        number = len(self.board.opencv().getDictionary().bytesList) + from_end
+        number = marker_count(self.board.dictionary) + from_end
         return marker_print(self.board.dictionary, number, _MARKER_MM, self.appearance.ink)
 
     def draw_moving(

@@ -9,6 +9,7 @@ import tomli_w
 from bench.rig.array_rig import ArrayRecording, MountedWhisker, base_keys
 from bench.rig.elastic_rod import Rod
 from bench.rig.protocol import Protocol, ProtocolRun
+from bench.rig.protocol_tables import BoardTable
 from bench.rig.recording import Recording
 from bench.rig.touched_object import TouchedObject
 
@@ -16,6 +17,16 @@ from bench.rig.touched_object import TouchedObject
 _PROFILE_POINTS = 16
 _GAUGES = ("time_s", "motor_deg", "y_V", "z_V")
 _FORCES = ("f_x_N", "f_y_N", "f_z_N")
+_PRESSURE = ("p_Pa",)
+
+
+def board_keys(table: BoardTable) -> dict:
+    """Return [board] of session.toml."""
+    if not table.kind:
+        return _fields(table, "squares square_mm marker_mm dictionary legacy inverted")
+    if table.kind == "checkerboard":
+        return _fields(table, "kind squares square_mm")
+    return _fields(table, "kind squares square_mm marker_mm")
 
 
 def session_toml(
@@ -35,10 +46,7 @@ def session_toml(
         "surfaces": list(dict.fromkeys(measured)),
         "whisker": _whisker_keys(protocol),
         "bar": {"diameter_mm": protocol.bar_diameter_mm},
-        "board": _fields(
-            protocol.board,
-            "squares square_mm marker_mm dictionary legacy inverted",
-        ),
+        "board": board_keys(protocol.board),
         "rig": _rig_keys(protocol, stated_T_rig_board),
     }
     if protocol.cameras:
@@ -197,10 +205,11 @@ def frames_csv(times_s: Iterable[float], clock_offset_s: float) -> str:
 
 
 def signals_csv(recording: Recording) -> str:
-    """Return signals.csv of a recording: gauges, V, and the load cell's forces, N, where there is
-    one."""
-    names = _GAUGES + _FORCES
-    return _signals_csv(names[: recording.signals.shape[1]], recording.signals)
+    """Return signals.csv of a recording: gauges, V, a load cell's forces, N, and a microphone's
+    pressure, Pa, where there are these."""
+    count = recording.signals.shape[1]
+    names = _GAUGES + (_FORCES if count >= 7 else ()) + (_PRESSURE if count in (5, 8) else ())
+    return _signals_csv(names, recording.signals)
 
 
 def array_signals_csv(recording: ArrayRecording) -> str:

@@ -40,14 +40,14 @@ class Job:
         """Return whether cameras take pictures."""
         return bool(self.protocol.cameras) and not self.signals_only
 
-    def parts(self) -> Iterator["Part"]:
+    def parts(self) -> Iterator["SessionPart"]:
         """Yield boards first, then trials."""
         if self.has_pictures:
-            yield Part("rig", 0, self.session / "boards" / "rig")
+            yield SessionPart("rig", 0, self.session / "boards" / "rig")
             for i, camera in enumerate(self.protocol.cameras):
-                yield Part("board", i, self.session / "boards" / camera.name)
+                yield SessionPart("board", i, self.session / "boards" / camera.name)
         for i, run in enumerate(self.protocol.runs()):
-            yield Part("trial", i, self.session / "trials" / run.name)
+            yield SessionPart("trial", i, self.session / "trials" / run.name)
 
     def papers(self) -> dict[str, str]:
         """Return the session's own text files by name."""
@@ -72,7 +72,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Part:
+class SessionPart:
     """A "rig" picture a camera, the "board" views of one camera, or one "trial"; and the folder it
     fills."""
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
 from bench.rig.layer import Layer
@@ -13,6 +14,7 @@ from bench.rig.light import Light
 from bench.rig.window import Window
 
 _LEAST_INVERSE_DEPTH = np.float32(1e-5)  # 1/mm: of rays that miss the plane in front of the camera
+_TINY_MM = 1e-9  # a direction from a circle's centre is none nearer than that
 _ROOT_2PI = np.float32(np.sqrt(2 * np.pi))  # of the normal density, as wide as the samples
 
 
@@ -36,6 +38,10 @@ class Print:
         """Return the print with its coordinates shifted."""
         return Print(self.reflectance, self.x_mm + x_mm, self.y_mm + y_mm)
 
+    def tone(self, across: "_Footprint", down: "_Footprint") -> np.ndarray:
+        """Return the mean reflectance under each of some spots."""
+        return _tone(self, across, down)
+
     def frame(self, margin_mm: float, reflectance: float) -> "Print":
         """Return the print with a margin of one grey all round."""
         edges = []
@@ -45,13 +51,52 @@ class Print:
 
 
 @dataclass(frozen=True, eq=False)
+class CirclePrint:
+    """Circles of one grey on paper of another.
+
+    centres_mm (n, 2). paper, ink: reflectances. x_mm, y_mm (2,): the paper's edges.
+    """
+
+    centres_mm: np.ndarray
+    radius_mm: float
+    paper: float
+    ink: float
+    x_mm: np.ndarray
+    y_mm: np.ndarray
+
+    def tone(self, across: "_Footprint", down: "_Footprint") -> np.ndarray:
+        """Return the mean reflectance under each of some spots, which are smaller than a circle.
+
+        The circle's edge is taken as a parabola: where it curves away, less of the spot is on ink.
+        """
+        places = np.stack([across.mm, down.mm], axis=-1)  # (..., 2)
+        distance_mm, nearest = cKDTree(self.centres_mm).query(places)
+        from_centre = places - self.centres_mm[nearest]
+        cosine, sine = np.moveaxis(
+            from_centre / np.maximum(distance_mm, _TINY_MM)[..., None], -1, 0
+        )
+        normal = _size_towards(cosine, sine, across, down)
+        along = _size_towards(-sine, cosine, across, down)
+        beyond_mm = distance_mm - self.radius_mm + 0.5 * along**2 / self.radius_mm
+        is_ink = ndtr(-beyond_mm / normal)
+        return (self.paper + (self.ink - self.paper) * is_ink).astype(np.float32)
+
+
+def _size_towards(
+    x: np.ndarray, y: np.ndarray, across: "_Footprint", down: "_Footprint"
+) -> np.ndarray:
+    """Return the size of each spot towards the unit vector (x, y) on the print."""
+    return np.hypot(x * across.by_x + y * down.by_x, x * across.by_y + y * down.by_y)
+
+
+@dataclass(frozen=True, eq=False)
 class Plate:
     """A print in space.
 
     pose (3, 4), T_rig_plate: its x and y run along the print, its z away from the print's viewer.
     """
 
-    print: Print
+    print: Print | CirclePrint
     pose: np.ndarray
 
     def corners_mm(self) -> np.ndarray:
@@ -81,7 +126,7 @@ class Plate:
             return
         across, down = self._footprints(part, *part.rays())
         cover = _coverage(self.print, across, down)
-        tone = np.float32(light.shade_flat(-self.pose[:, 2])) * _tone(self.print, across, down)
+        tone = np.float32(light.shade_flat(-self.pose[:, 2])) * self.print.tone(across, down)
         canvas = radiance[part.slices_in(window)]
         canvas += cover * (tone - canvas)
 

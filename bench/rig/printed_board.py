@@ -1,6 +1,7 @@
 """Printed ChArUco boards and markers as prints, cell by cell, from OpenCV's own dictionaries."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -30,6 +31,7 @@ class PrintedBoard:
     dictionary: str
     legacy: bool = False
     inverted: bool = False
+    is_found_in_parts: ClassVar[bool] = True
 
     def __post_init__(self):
         if not self.dictionary.startswith("DICT_") or not hasattr(cv2.aruco, self.dictionary):
@@ -54,6 +56,11 @@ class PrintedBoard:
         return self.squares[0] * self.square_mm, self.squares[1] * self.square_mm
 
     @property
+    def T_print_board(self) -> np.ndarray:
+        """Return the board frame's pose (3, 4) on the print."""
+        return np.eye(3, 4)
+
+    @property
     def corners_mm(self) -> np.ndarray:
         """Return the inner corners in the board frame, (n, 3)."""
         return np.asarray(self.opencv().getChessboardCorners(), float)
@@ -75,6 +82,11 @@ class PrintedBoard:
         starts = self.square_mm * np.arange(count)
         cell_starts = np.add.outer(starts, np.append(0, marker))
         return np.append(cell_starts, count * self.square_mm)
+
+
+def marker_count(dictionary: str) -> int:
+    """Return how many markers a dictionary has."""
+    return len(_dictionary(dictionary).bytesList)
 
 
 def marker_print(dictionary: str, number: int, side_mm: float, ink: Ink) -> Print:

@@ -19,6 +19,7 @@ from bench.rig.protocol_tables import (
     GaugesTable,
     LightTable,
     LoadCellTable,
+    MicrophoneTable,
     MotorTable,
     PicturesTable,
     Positive,
@@ -33,7 +34,7 @@ FOLDER = Path(__file__).with_name("protocols")
 class Protocol(ProtocolTable, kw_only=True):
     """A session to be simulated.
 
-    load_cell: without it there are no channels of one. columns: of an array; without any there is
+    load_cell, microphone: without them there are no channels of theirs. columns: of an array; without any there is
     one whisker at the origin.
     """
 
@@ -48,6 +49,7 @@ class Protocol(ProtocolTable, kw_only=True):
     friction: FrictionTable = FrictionTable()
     gauges: GaugesTable = GaugesTable()
     load_cell: LoadCellTable | msgspec.UnsetType = msgspec.UNSET
+    microphone: MicrophoneTable | msgspec.UnsetType = msgspec.UNSET
     # The session's truth is a stage's: it states distance and slope as wanted, their scatter as sigma
     stage: bool | msgspec.UnsetType = msgspec.UNSET
     columns: list[ColumnTable] | msgspec.UnsetType = msgspec.UNSET

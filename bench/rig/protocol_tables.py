@@ -38,6 +38,10 @@ class WhiskerTable(ProtocolTable):
 class BoardTable(ProtocolTable):
     """The table [board]."""
 
+    # as in session.toml; left out: ChArUco. UNSET keeps it out of the fingerprint
+    kind: (
+        Literal["checkerboard", "circles", "asymmetric_circles", "aprilgrid"] | msgspec.UnsetType
+    ) = msgspec.UNSET
     squares: Size = (8, 6)
     square_mm: Positive = 15.0
     marker_mm: Positive = 11.0
@@ -197,6 +201,15 @@ class LoadCellTable(ProtocolTable):
     step_N: Zero = 0.0  # of its converter; 0: none
 
 
+class MicrophoneTable(ProtocolTable):
+    """The table [microphone]: its pressure is recorded too, sampled as the gauges."""
+
+    Pa_per_Nmm: Positive = 1.0
+    band_Hz: Pair = (80.0, 800.0)
+    noise_Pa: Zero = 0.01
+    texture_Pa_per_N: Zero = 0.1  # of a rough surface, ahead of the band
+
+
 class ColumnTable(ProtocolTable, kw_only=True):
     """One of the tables [[columns]]: a motor and its whiskers, one a height along its axis, named
     <name>1, <name>2 …"""
@@ -209,6 +222,9 @@ class ColumnTable(ProtocolTable, kw_only=True):
     length_mm: Positive | list[Positive] | None = None
     diameter_mm: Positive | list[Positive] | None = None
     gauge_scatter: Zero = 0.03  # sigma of each whisker's own coefficients, in parts of [gauges]'
+    # Motor angle about which its first touch is searched. By default, and kept out of the fingerprint,
+    # that at which it points as a whisker at the rig's origin does where that touches
+    near_deg: float | msgspec.UnsetType = msgspec.UNSET
 
 
 class TrialTable(ProtocolTable):

@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.rig import build
 from bench.rig.bar import TouchedBar, UnloadedTouch, find_first_touch
+from bench.rig.contact_microphone import sample_pressure_Pa
 from bench.rig.elastic_rod import Rod
 from bench.rig.force_sensor import sample_forces_N
 from bench.rig.linear import rotate_about_z
@@ -55,7 +56,8 @@ class Exposures:
 class Recording:
     """A trial of one whisker.
 
-    signals (n, 4): time_s, motor_deg, y_V, z_V; with a load cell (n, 7): f_x_N, f_y_N, f_z_N too.
+    signals (n, 4): time_s, motor_deg, y_V, z_V; three more of a load cell, f_x_N, f_y_N, f_z_N; one more of
+    a microphone, p_Pa.
     stated_velocity_mm_s (3,): of the object, as trial.toml has it; None where it stands still.
     """
 
@@ -202,9 +204,11 @@ def sample_signals(
         motor_deg = np.rint(motor_deg / step_deg) * step_deg
     roll_rad = math.radians(run.table.follicle_roll_deg)
     columns = [times_s, motor_deg, sample_volts(gauges, moments, roll_rad, rng)]
+    force_N = base_force_N(stroke, whisks, fine_s)
     if protocol.load_cell:
-        force_N = base_force_N(stroke, whisks, fine_s)
         columns.append(sample_forces_N(protocol.load_cell, gauges, force_N, rng))
+    if protocol.microphone:
+        columns.append(sample_pressure_Pa(protocol.microphone, gauges, moments, force_N, rng))
     return np.column_stack(columns)
 
 

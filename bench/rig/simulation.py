@@ -10,7 +10,7 @@ import cv2
 from bench.base.errors import BadInput
 from bench.base.workers import Workers
 from bench.rig import build, papers
-from bench.rig.parts import Job, Part
+from bench.rig.parts import Job, SessionPart
 from bench.rig.protocol import load
 
 _PIXELS = 1280 * 720  # of the pictures that the sizes and times below are of
@@ -124,7 +124,7 @@ def _claim(job):
             papers.write(job.session / name, text)
 
 
-def make_part(job: Job, part: Part) -> None:
+def make_part(job: Job, part: SessionPart) -> None:
     """Make one part, written next to its place under another name and moved there when whole.
 
     Raises BadInput where the whisker slips off the bar or buckles.

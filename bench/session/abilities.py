@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from bench.session.angle_source import SOURCES, angle_source
 from bench.session.session import Session
 from bench.session.signals import has_moments
 from bench.session.trial import Trial
@@ -87,9 +88,13 @@ def ability_lines(session: Session) -> Iterator[str]:
     found = abilities(session)
     if not found[0].of:
         return
-    by_speed = sum(trial.angle_from == "speed" for trial in session.trials)
-    if by_speed:
-        yield f"angle: {by_speed} of {len(session.trials)} trials by the stated speed, without a motor log"
+    for name, source in SOURCES.items():
+        count = sum(trial.angle_from == name for trial in session.trials)
+        if count and source.unknown:
+            of = f"{count} of {len(session.trials)} trials"
+            yield f"angle: {of} by {source.by}, without a motor log; not known: {source.unknown}"
+            if source.is_seen:
+                yield "  estimates there have θ of their own pictures: seen, not felt alone"
     yield "this recording can give, of its trials:"
     for ability in found:
         yield ability.line
@@ -99,8 +104,10 @@ def _lacks_of_pictures(trial: Trial, session: Session) -> str:
     """Return the one thing more that pictures need to give a trial's truth; '' where they suffice."""
     if not trial.camera_sources:
         return f"{_FEWEST_CAMERAS} cameras with a board"
-    if trial.angle_from == "speed":
-        return "a motor log (motor_deg)"
+    if not angle_source(trial).has_zero:
+        return 'a motor log (motor_deg), or angle_from = "marker" or "whisker"'
+    if angle_source(trial).lacks(trial):
+        return angle_source(trial).lacks(trial)
     if len(trial.camera_sources) < _FEWEST_CAMERAS and not trial.is_bar:
         return "a second camera, or a mirror ([[cameras]] of, crop, mirrored)"
     if session.cameras_toml is None and not session.board_sources:

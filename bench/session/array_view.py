@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.session import manifest
+from bench.session.angle_source import MOTOR, TIME
 from bench.session.daq import DaqFile
 from bench.session.manifest import ChannelKeys
 from bench.session.rig_file import RIG_FILE
@@ -28,7 +29,7 @@ from bench.session.session import (
     session_of,
     stated_whisker,
 )
-from bench.session.signals import FORCES, MOMENTS, MOTOR, TIME, VOLTS
+from bench.session.signals import FORCES, MOMENTS, VOLTS
 from bench.session.stated import whisker_label
 from bench.session.strict_toml import values
 from bench.session.table import column_names

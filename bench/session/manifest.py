@@ -113,10 +113,11 @@ class BarKeys(GivenKeys):
 class BoardKeys(GivenKeys):
     """[board] of session.toml."""
 
-    # "charuco" (default), "checkerboard", "circles", "asymmetric_circles" or "aprilgrid"
-    kind: Literal["charuco", "checkerboard", "circles", "asymmetric_circles", "aprilgrid"] = (
-        "charuco"
-    )
+    # "charuco" (default), "checkerboard", "circles", "asymmetric_circles", "aprilgrid" or "body": equal
+    # ChArUco boards on the faces of a rigid body, such as a cube
+    kind: Literal[
+        "charuco", "checkerboard", "circles", "asymmetric_circles", "aprilgrid", "body"
+    ] = "charuco"
     # Kalibr's file of an aprilgrid or checkerboard beside session.toml, in place of the sizes below
     kalibr_target: str | None = None
     # how many squares [along x, along y]; circles or tags of the other kinds
@@ -134,6 +135,10 @@ class BoardKeys(GivenKeys):
     marker_sigma_mm: float = 0.0
     # of a ChArUco board: OpenCV's name, such as "DICT_5X5_100"
     dictionary: str | None = None
+    # of a ChArUco board: the number of its first marker, 0 by default
+    first_id: int | None = None
+    # of a body: the number of the first marker on each face; the first face is the body's frame
+    first_ids: list[int] | None = None
     # OpenCV's pattern from before 4.6
     legacy: bool = False
     # printed white on black
@@ -269,9 +274,12 @@ class TrialKeys(GivenKeys):
 
     # groups trials in fits and plots
     surface: str = ""
-    # where the motor's angle is from: "log" (default), the signals' motor_deg, or "speed", the stated
-    # speed times the time, of one forward stroke ([bring.md](bring.md))
-    angle_from: Literal["log", "speed"] = "log"
+    # where the motor's angle is from: "log" (default), the signals' motor_deg; "speed", the stated
+    # speed times the time, of one forward stroke; "marker" on the hub or "whisker", seen in the
+    # trial's own pictures by `calibrate angles` ([bring.md](bring.md))
+    angle_from: Literal["log", "speed", "marker", "whisker"] = "log"
+    # number of the marker on the hub, of angle_from = "marker"
+    hub_marker: int | None = None
     # nominal speed of the motor; signals that say another give a warning; its sigma enters θ of
     # angle_from = "speed" alone
     speed_deg_s: Speed | None = None
@@ -364,6 +372,8 @@ class SignalKeys(Keys):
     f_x_N: ChannelKeys | None = None
     f_y_N: ChannelKeys | None = None
     f_z_N: ChannelKeys | None = None
+    # pressure of a microphone at the base
+    p_Pa: ChannelKeys | None = None
     # each rising edge through its middle is a frame of every camera, where there is no frames.csv
     frame_V: ChannelKeys | None = None
 

@@ -3,26 +3,31 @@
 from collections.abc import Iterable, Mapping
 from itertools import combinations, product
 from pathlib import Path
+from typing import Any
 
 from bench.base.errors import BadInput
-from bench.base.input_problems import refused_as_bad_input
+from bench.base.input_problems import InputProblems, refused_as_bad_input
 from bench.session.manifest import CameraKeys
 from vision.geometry import Crop
 from vision.pictures import Frames, PicturePart
 
 _FILE = "session.toml"
+_NEEDED_OF_PART = {
+    "of": "the camera in whose picture this part is",
+    "crop": "[left, top, width, height] of the part, px",
+}
 
 
 def stated_crops(cameras: Iterable[CameraKeys], sources: Mapping[str, Path]) -> dict[str, Crop]:
     """Return the part of a picture of each camera that is one, by the camera's name.
 
     sources: a folder or film of each camera that has pictures. A picture of which mirrors alone are stated is a
-    camera of its own, too, by the largest rectangle beside them. Raises BadInput for a part that cannot be.
+    camera of its own, too, by the largest rectangle outside them. Raises BadInput for a part that cannot be.
     """
     of_picture: dict[str, dict[str, Crop]] = {}
-    for keys in cameras:
-        _check_keys(keys, sources)
-        if keys.of is not None:
+    for keys in cameras if sources else ():  # nothing is recorded yet
+        if keys.of is not None and keys.crop is not None:
+            _check_of(keys, sources)
             crop = _crop(keys, _size_px(keys.of, sources[keys.of]))
             of_picture.setdefault(keys.of, {})[keys.name] = crop
     found: dict[str, Crop] = {}
@@ -33,6 +38,20 @@ def stated_crops(cameras: Iterable[CameraKeys], sources: Mapping[str, Path]) -> 
             found[of] = rest
         found |= crops
     return found
+
+
+def check_part_keys(cameras: Any, problems: InputProblems) -> None:
+    """Report each table of [[cameras]] with a part's keys of which `of` or `crop` is missing.
+
+    cameras: as the file has them. Raises BadInput at the first one, where `problems` does not collect.
+    """
+    for table in cameras if isinstance(cameras, list) else ():
+        if not isinstance(table, dict) or not table.keys() & {"of", "crop", "mirrored"}:
+            continue
+        for key, what in _NEEDED_OF_PART.items():
+            with problems.guard():
+                if key not in table:
+                    raise _bad(table.get("name", "?"), f"{key} is missing: {what}")
 
 
 def in_parts(
@@ -50,12 +69,8 @@ def in_parts(
     return found
 
 
-def _check_keys(keys: CameraKeys, sources: Mapping[str, Path]) -> None:
-    """Raise BadInput where `of` and `crop` are no pair, or `of` is no camera with pictures of its own."""
-    if (keys.of is None) != (keys.crop is None) or (keys.mirrored and keys.of is None):
-        raise _bad(keys.name, "of, the camera in whose picture it is, and crop belong together")
-    if keys.of is None:
-        return
+def _check_of(keys: CameraKeys, sources: Mapping[str, Path]) -> None:
+    """Raise BadInput where `of` is no camera with pictures of its own, or the part has some, too."""
     if keys.name in sources:
         raise _bad(keys.name, f"is a part of {keys.of}'s picture, and has pictures of its own")
     if keys.of not in sources:
@@ -96,7 +111,7 @@ def _overlap(a: Crop, b: Crop) -> bool:
 
 
 def _rest(crops: list[Crop]) -> Crop | None:
-    """Return the largest rectangle of a picture beside the parts; None where nothing is left."""
+    """Return the largest rectangle of a picture outside the parts; None where nothing is left."""
     of = crops[0].of
     width, height = crops[0].whole_px
     columns = {0, width}

@@ -44,7 +44,7 @@ _STEPS = 401
 
 
 def of_curvature(curvature_per_mm: list[float], length_mm: float) -> RestShape:
-    """Return the shape that lies κ s²/2 aside at arc length s, for κ in y and z, 1/mm."""
+    """Return the shape that lies κ s²/2 off the x axis at arc length s, for κ in y and z, 1/mm."""
     y, z = (0.5 * curvature * length_mm**2 for curvature in curvature_per_mm)
     return (0.0, 0.0, y), (0.0, 0.0, z)
 
@@ -61,7 +61,7 @@ def read_rest_shape(session: Path, name: str, length_mm: float) -> RestShape:
 
     Raises BadInput, in a line with the file's name and row: no such file, a name that leads out of
     the session, text in a number, too few points, a point far beyond the tip, a first point off the base, points that do not
-    go on along x, or beside the smooth curve through all, a whisker that coils, or is longer or
+    go on along x, or off the smooth curve through all, a whisker that coils, or is longer or
     much shorter than length_mm.
     """
     check_is_beside(session, name, "rest_shape")
@@ -132,7 +132,7 @@ def _fit(table: NumberTable, name: str, length_mm: float) -> tuple[RestShape, fl
 def _check_residuals(
     beside_mm: np.ndarray, table: NumberTable, name: str, length_mm: float
 ) -> None:
-    """Raise BadInput for the point that lies farthest beside the curve (n,), mm, where that is too far."""
+    """Raise BadInput for the point that lies farthest off the curve (n,), mm, where that is too far."""
     farthest = int(np.argmax(beside_mm))
     if beside_mm[farthest] > _MISPLACED * length_mm:
         found = f"lies {beside_mm[farthest]:.3g} mm beside the smooth curve through all points"

@@ -15,7 +15,7 @@ from bench.session.daq import daq_file
 from bench.session.footage import camera_sources, single_pictures, visible
 from bench.session.givens import Given
 from bench.session.inside import check_inside
-from bench.session.picture_parts import in_parts, stated_crops
+from bench.session.picture_parts import check_part_keys, in_parts, stated_crops
 from bench.session.plausible import YOUNGS_MODULUS
 from bench.session.profile import read_profile
 from bench.session.rest_shape import read_rest_shape
@@ -296,8 +296,12 @@ def _stated_session(path: Path, tables: dict, problems: InputProblems) -> Stated
         raise BadInput(found, file=MANIFEST)
     tables = with_kalibr_target(tables, path, MANIFEST)
     _check_board_parts(tables.get("board"), problems)
+    check_part_keys(tables.get("cameras"), problems)
+    has_trials = bool(visible(path / "trials"))
+    if not has_trials:
+        _check_speed_parts(tables.get("trial"), problems)
     needed = []
-    if visible(path / "trials"):
+    if has_trials:
         needed = ["bar"] if "whiskers" in tables else ["whisker", "bar"]
     as_keys(tables, manifest.SessionKeys, MANIFEST, problems, needed)
     if "truth" in tables and "whiskers" in tables:
@@ -309,13 +313,26 @@ def _stated_session(path: Path, tables: dict, problems: InputProblems) -> Stated
 def _check_board_parts(board: Any, problems: InputProblems) -> None:
     """Report each key that the kind of board in [board] needs and that is not there.
 
-    Where the table has a key that is none, that one is told alone, elsewhere: it may be the one misspelt.
+    Where the table has a key that is none, that one is reported alone, elsewhere: it may be the one misspelt.
     """
     if not isinstance(board, dict) or not board.keys() <= set(key_names(manifest.BoardKeys)):
         return
     for line in missing_parts(board.get("kind", CharucoBoard.kind), board):
         with problems.guard():
             raise BadInput(line, file=MANIFEST)
+
+
+def _check_speed_parts(trial: Any, problems: InputProblems) -> None:
+    """Report each key that angles by the stated speed need and that [trial] does not have.
+
+    Where there are trials, each of them may have it.
+    """
+    if not isinstance(trial, dict) or trial.get("angle_from") != "speed":
+        return
+    for key in ("speed_deg_s", "speed_sigma_deg_s"):
+        with problems.guard():
+            if key not in trial:
+                raise BadInput(f'[trial] {key} is missing: angle_from = "speed"', file=MANIFEST)
 
 
 def _whisker(keys: manifest.WhiskerKeys | None, path: Path) -> Whisker | None:
@@ -432,10 +449,10 @@ def _camera_names(
 def _warn_of_unused_cameras(
     session: Session, cameras: Iterable[manifest.CameraKeys], problems: InputProblems
 ) -> None:
-    """Warn of each of [[cameras]] that has no pictures."""
+    """Warn of each of [[cameras]] that has no pictures, but of no part: that has them, or is refused."""
     known = {*session.camera_names, *(crop.of for crop in session.crops.values())}
     for camera in cameras:
-        if session.camera_names and camera.name not in known:
+        if session.camera_names and camera.name not in known and camera.of is None:
             found = f"[[cameras]] {camera.name!r} has no pictures in boards/ or trials/"
             problems.warn(Reason("camera_unused", f"{MANIFEST}: {found}"))
 

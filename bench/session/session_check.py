@@ -151,7 +151,9 @@ def _check_clock(
     """Raise BadInput where most frames were not taken while signals were recorded; note the rest."""
     first = signals_s[0]
     last = signals_s[-1]
-    outside = int(((frames_s < first) | (frames_s > last)).sum())
+    # samples that have no angle by pictures end within a step of the first and last frame
+    step_s = float(np.median(np.diff(signals_s)))
+    outside = int(((frames_s < first - step_s) | (frames_s > last + step_s)).sum())
     frames = f"frames from {frames_s[0]:.6g} to {frames_s[-1]:.6g} s"
     found = f"{frames}, signals from {first:.6g} to {last:.6g} s"
     if outside > len(frames_s) / 2:

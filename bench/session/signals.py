@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.session import strokes
+from bench.session.angle_source import EXACT, TIME, TURN_DEG, AngleSigma, angle_source
 from bench.session.daq import read_daq
 from bench.session.plausible import (
     DEGREES_PER_RADIAN,
@@ -15,7 +16,6 @@ from bench.session.plausible import (
     MILLIVOLTS,
     PlausibleRange,
 )
-from bench.session.stated_speed import by_stated_speed
 from bench.session.table import (
     NumberTable,
     column_names,
@@ -26,11 +26,10 @@ from bench.session.table import (
 from bench.session.trial import Trial
 from vision.geometry import Reason
 
-TIME = "time_s"
-MOTOR = "motor_deg"
 VOLTS = ("y_V", "z_V")
 MOMENTS = ("m_y_Nmm", "m_z_Nmm")
 FORCES = ("f_x_N", "f_y_N", "f_z_N")
+PRESSURE = "p_Pa"
 
 # [s] 1 MHz to 20 Hz.
 SAMPLING_STEP = PlausibleRange(1e-6, 0.05, (MILLISECONDS, MICROSECONDS))
@@ -39,8 +38,6 @@ VOLTAGE = PlausibleRange(-30.0, 30.0, (MILLIVOLTS,))
 # [N] A whisker of 1 mm gives way at a hundredth of it.
 FORCE = PlausibleRange(-20.0, 20.0, (("millinewtons", 1e-3),))
 MOMENT = PlausibleRange(-1e5, 1e5, (("N um", 1e-3), ("nN m", 1e-3)))
-# [°] An encoder that wraps does so by a turn.
-_TURN_DEG = 360.0
 # [°] Less is an encoder that stands still.
 _STILL_DEG = 0.02
 # [°] No whisk is so short, and any usual one is, in radians.
@@ -58,7 +55,8 @@ class Signals:
     kind: "V" where y and z are the gauges' volts, "Nmm" where they are m_y and m_z, N·mm.
     dropped: rows or wraps mended, by cause. warnings: lines that the user should read.
     forces_N (n, 3): of the base on the whisker in the hub's axes, None without a load cell.
-    angle_share_sigma: relative sigma of differences of motor_rad; 0 where the motor was logged.
+    angle_sigma: how well motor_rad is known.
+    pressure_Pa (n,): of a microphone at the base, None without one.
     """
 
     time_s: np.ndarray
@@ -69,7 +67,8 @@ class Signals:
     dropped: Mapping[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     forces_N: np.ndarray | None = None
-    angle_share_sigma: float = 0.0
+    angle_sigma: AngleSigma = EXACT
+    pressure_Pa: np.ndarray | None = None
 
     @property
     def channels(self) -> np.ndarray:
@@ -84,6 +83,11 @@ class Signals:
     def motor_at(self, time_s: np.ndarray) -> np.ndarray:
         """Interpolate the motor angle at other times, rad; NaN where nothing was recorded."""
         return np.interp(time_s, self.time_s, self.motor_rad, left=np.nan, right=np.nan)
+
+    def motor_sigma_at(self, time_s: np.ndarray) -> np.ndarray:
+        """Interpolate the sigma of the motor angle's own error at other times, rad; 0 without one."""
+        own_rad = self.angle_sigma.own_rad
+        return np.zeros(len(time_s)) if own_rad is None else np.interp(time_s, self.time_s, own_rad)
 
 
 def forward_strokes(signals: Signals) -> tuple[slice, ...]:
@@ -138,55 +142,49 @@ def read_signals(trial: Trial) -> Signals:
     path = trial.signals_path
     label = trial.label(path.name)
     table = read_table(path, label) if trial.daq is None else read_daq(path, trial.daq, label)
-    kind, channels = _kind_and_channels(table, trial, label)
+    kind, channels = _kind_and_channels(table, label)
     forces = _force_columns(table, label)
     table, duplicates = forward_in_time(table, TIME, label)
     _check_units(table, VOLTAGE if kind == "V" else MOMENT, channels, label)
-    share_sigma = 0.0
-    wraps = 0
-    if trial.angle_from == "log":
-        motor_deg, wraps = _unwrapped(table[MOTOR])
-    else:
-        pair = np.column_stack([table[name] for name in channels])
-        motor_deg, share_sigma = by_stated_speed(table[TIME], pair, trial, label)
-    mended = {"duplicate rows": duplicates, "encoder wraps": wraps}
+    pair = np.column_stack([table[name] for name in channels])
+    angle = angle_source(trial).of_samples(table, pair, trial, label)
+    table = angle.table
+    mended = {"duplicate rows": duplicates, "encoder wraps": angle.wraps}
     return Signals(
         time_s=table[TIME],
-        motor_rad=np.radians(motor_deg),
+        motor_rad=np.radians(angle.motor_deg),
         y=table[channels[0]],
         z=table[channels[1]],
         kind=kind,
         dropped={cause: count for cause, count in mended.items() if count},
-        warnings=_motor_warnings(table[TIME], motor_deg, trial, label),
+        warnings=_motor_warnings(table[TIME], angle.motor_deg, trial, label),
         forces_N=_forces_N(table, forces, label) if forces else None,
-        angle_share_sigma=share_sigma,
+        angle_sigma=angle.sigma,
+        pressure_Pa=table[PRESSURE] if PRESSURE in table.columns else None,
     )
 
 
 def has_moments(trial: Trial) -> bool:
     """Return whether a trial's signals are moments; only the head of its file is read."""
+    return has_column(trial, MOMENTS[0])
+
+
+def has_column(trial: Trial, name: str) -> bool:
+    """Return whether a trial's signals have a column; only the head of its file is read."""
     path = trial.signals_path
     if trial.daq is not None:
-        return MOMENTS[0] in trial.daq.channels
-    return MOMENTS[0] in column_names(path, trial.label(path.name))
+        return name in trial.daq.channels
+    return name in column_names(path, trial.label(path.name))
 
 
-def _kind_and_channels(table: NumberTable, trial: Trial, label: str) -> tuple[str, tuple[str, str]]:
-    """Return "V" or "Nmm", and the names of its two columns. Raise BadInput where not both are there,
-    or the motor's angle is neither a column nor had from elsewhere.
-    """
+def _kind_and_channels(table: NumberTable, label: str) -> tuple[str, tuple[str, str]]:
+    """Return "V" or "Nmm", and the names of its two columns. Raise BadInput where not both are there."""
     has_volts = any(name in table.columns for name in VOLTS)
     has_moments = any(name in table.columns for name in MOMENTS)
     if has_volts and has_moments:
         raise BadInput("has volts and moments; keep y_V,z_V or m_y_Nmm,m_z_Nmm", file=label, row=1)
     kind, channels = ("Nmm", MOMENTS) if has_moments else ("V", VOLTS)
     require_columns(table, (TIME, *channels), label)
-    has_another = any(name.startswith("motor") for name in table.columns)
-    if trial.angle_from == "log" and has_another:
-        require_columns(table, (MOTOR,), label)
-    elif trial.angle_from == "log" and MOTOR not in table.columns:
-        cure = 'without a motor log write angle_from = "speed", speed_deg_s and speed_sigma_deg_s'
-        raise BadInput(f"has no column {MOTOR}; {cure}", file=label, row=1)
     return kind, channels
 
 
@@ -203,12 +201,6 @@ def _force_columns(table: NumberTable, label: str) -> tuple[str, ...]:
         return ()
     require_columns(table, FORCES, label)
     return FORCES
-
-
-def _unwrapped(motor_deg: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return the angle without the encoder's jumps by a full turn, and how many there were."""
-    wraps = int((np.abs(np.diff(motor_deg)) > _TURN_DEG / 2).sum())
-    return (np.unwrap(motor_deg, period=_TURN_DEG), wraps) if wraps else (motor_deg, 0)
 
 
 def _check_units(
@@ -239,7 +231,7 @@ def _motor_warnings(
     range_deg = float(np.ptp(strokes.without_spikes(motor_deg)[0]))
     if range_deg < _STILL_DEG:
         return (f"{label}: the motor stands still ({range_deg:.3g}°): no whisk",)
-    if range_deg > _TURN_DEG:
+    if range_deg > TURN_DEG:
         found = f"motor_deg spans {range_deg:.6g}, more than a turn. Is it in encoder counts?"
         raise BadInput(found, file=label)
     speed_deg_s = _measured_speed(time_s, motor_deg)

@@ -9,13 +9,13 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
 from bench.session import manifest
 from bench.session.strict_toml import values
-from vision.boards import AprilGrid, AsymmetricCircles, CharucoBoard, Checkerboard, CircleGrid
+from vision.boards import AprilGrid, AsymmetricCircles, Body, CharucoBoard, Checkerboard, CircleGrid
 from vision.calibration import read_kalibr_target
 from vision.geometry import Board
 
 KINDS: dict[str, type[Board]] = {
     of_kind.kind: of_kind
-    for of_kind in (CharucoBoard, Checkerboard, CircleGrid, AsymmetricCircles, AprilGrid)
+    for of_kind in (CharucoBoard, Checkerboard, CircleGrid, AsymmetricCircles, AprilGrid, Body)
 }
 # Keys of [board] that are not a board's own.
 _OF_THE_TABLE = ("kind", "kalibr_target", "marker_sigma_mm", "exact")

@@ -271,7 +271,7 @@ def _deeplabcut_table(table: Any, label: str) -> DrawnLines:
 
 
 def _whisk(path: Path, label: str) -> DrawnLines:
-    """Read whisk's .whiskers, with the identities of .measurements where that stands beside it."""
+    """Read whisk's .whiskers, with the identities of .measurements where that is in the same folder."""
     content = path.read_bytes()
     header = b"bwhiskbin1\0\0"
     if not content.startswith(header):

@@ -42,8 +42,9 @@ def read_traces(
 
     files: as of `bench.session.trace_files`. sources: pictures of each camera. pictures: by camera the index of its
     picture in each frame (n,), −1 where it dropped that. Raises BadInput where a file cannot be read
-    or is not of these pictures.
+    or is not of these pictures, or there are none.
     """
+    _require_pictures(files, sources, label)
     drawn: dict[str, tuple[DrawnLines, str]] = {}
     for name, path in files.items():
         of_file = f"{label}/{path.name}"
@@ -54,13 +55,23 @@ def read_traces(
                 drawn.setdefault(camera, (lines, of_file))
             continue
         if name not in sources:
-            found = f"there is no camera {name}; there are {', '.join(sources) or 'none'}"
-            raise BadInput(found, file=of_file)
+            found = f"there are no pictures of camera {name}; there are those of"
+            raise BadInput(f"{found} {', '.join(sources)}", file=of_file)
         drawn[name] = read_lines(path, of_file), of_file
     traces = {}
     for name, (lines, of_file) in drawn.items():
         traces[name] = _checked(lines, name, sources[name], pictures[name], of_file)
     return traces
+
+
+def _require_pictures(files: Mapping[str, Path], sources: Mapping[str, Path], label: str) -> None:
+    """Raise BadInput for the first of some files of traces where no camera has pictures."""
+    if sources or not files:
+        return
+    first = next(iter(files.values())).name
+    found = "the trial has no pictures, in which the object is found beside its traces"
+    cure = 'add them, or take the traces out: the truth of a stage ([truth] source = "stage")'
+    raise BadInput(f"{found}; {cure} needs neither", file=f"{label}/{first}")
 
 
 def _checked(

@@ -20,7 +20,7 @@ _AXES = ("x", "y", "z")
 def lines_in_space(path: Path, cameras: Sequence[str], label: str) -> dict[str, DrawnLines]:
     """Return by camera the joints of Anipose's CSV as one line in its picture.
 
-    Its calibration stands beside it under the same name, as TOML, and has the cameras' names. Points
+    Its calibration is in the same folder under the same name, as TOML, and has the cameras' names. Points
     are turned back from the axes that Anipose may have aligned them to. Raises BadInput where one of
     the files cannot be read.
     """

@@ -164,8 +164,9 @@ def _check_place(trial: Trial, label: str) -> None:
         raise BadInput(f"{found}; state d_x_mm, and no point_mm", file=label)
     if trial.bar_diameter_mm is None:
         raise BadInput("bar_diameter_mm is missing: d_x follows from place and size", file=label)
-    if trial.angle_from == "speed":
-        found = "a stated speed gives the motor no zero, so a place does not say when it is touched"
+    if trial.angle_from != "log":
+        given = f'angle_from = "{trial.angle_from}" gives the motor no zero in the rig'
+        found = f"{given}, so a place does not say when it is touched"
         raise BadInput(f"{found}; state d_x_mm, and no place", file=label)
 
 

@@ -92,6 +92,8 @@ def toml_block(board: Board) -> list[str]:
             lines.append(f"{name} = {getattr(board, name):g}")
     if hasattr(board, "dictionary"):
         lines.append(f'dictionary = "{board.dictionary}"')
+    if getattr(board, "first_id", 0):
+        lines.append(f"first_id = {board.first_id}")
     flags = [name for name in ("legacy", "inverted") if getattr(board, name, False)]
     return [*lines, *(f"{name} = true" for name in flags)]
 

@@ -123,7 +123,7 @@ def expected_error(
         moments = _moments(design, equipment, slope, alpha, d_x)
         of_cylinder, noise_mm = _cylinder_distance(design, equipment, *moments)
         noise_share = noise_mm / of_cylinder * design.thickness(d_x)
-        by_friction = 1.0 / (1.0 / of_cylinder + design.taper / design.length_mm) / d_x - 1.0
+        by_friction = _taper_distance(design, of_cylinder) / d_x - 1.0
         lean_sigma = np.radians(region.lean_sigma_deg)
         lean = first_order.leaning(design.theta_rad, lean_sigma, np.arctan2(*moments), alpha)
     bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
@@ -149,6 +149,11 @@ def _cylinder_distance(
     distance_mm = distance.with_friction(theta, m_y, m_z, alpha_est, C)
     gradient = uncertainty.gradient_with_friction(theta, m_y, m_z, alpha_est, C)
     return distance_mm, _noise_sigma(gradient, theta, np.stack([m_y, m_z], axis=-1), noise)
+
+
+def _taper_distance(design: Design, of_cylinder: Numbers) -> Numbers:
+    """Return the distance (n,) of the tapered whisker from that of the base's cylinder, mm."""
+    return 1.0 / (1.0 / of_cylinder + design.taper / design.length_mm)
 
 
 def _noise_sigma(gradient, theta, moments: np.ndarray, noise: StrokeNoise) -> Numbers:

@@ -106,7 +106,7 @@ def _scale_message(speed_rad_s: float, stated_speed_rad_s: float | None, size: f
 def turn_cause(share: float, trials: Iterable[Trial]) -> str:
     """Return the sentence on a whisker that turns `share` times as far as the motor in all trials.
 
-    It follows the alarm of an axis that leans, which looks the same in the pictures.
+    It follows the alarm of an axis that leans, which gives the same pictures.
     """
     ratios = []  # of the motor's speed by the signals to the stated one
     stated_rad_s = []

@@ -1,7 +1,7 @@
 """What a session contradicts of itself as a whole, in the status of each whisk that rests on it.
 
 A warning of the session, or of a trial, whose code puts truth or estimates in doubt
-(`bench.base.statuses.Status.reaches`) is no remark beside the numbers: each whisk that has them has
+(`bench.base.statuses.Status.reaches`) is no mere remark: each whisk that has them has
 it, and no verdict takes a whisk with a warning.
 """
 
@@ -15,12 +15,12 @@ from vision.geometry import Reason, as_reason, joined
 
 
 def contradictions_of(problems: InputProblems, trial: str) -> Reason:
-    """Return the warnings about the session and a trial that put truth or estimates in doubt."""
+    """Return the warnings about the session and a trial that question truth or estimates."""
     return reaching((TRUTH, ESTIMATES), problems.about(trial))
 
 
 def contradictions_alone(problems: InputProblems) -> InputProblems:
-    """Return the warnings that put numbers in doubt, for the run of one whisker of an array."""
+    """Return the warnings that question numbers, for the run of one whisker of an array."""
     kept = InputProblems()
     for line in problems.warnings:
         if reaching((TRUTH, ESTIMATES), as_reason(line)):

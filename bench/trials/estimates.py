@@ -92,9 +92,9 @@ def _moments(whisk: Whisk) -> tuple[Value, Value]:
 
 
 def felt_at(whisk: Whisk, estimates: tuple[EstimateRow, ...] = ()) -> FeltAt:
-    """Return the record of a whisk at its pushing angle."""
+    """Return the record of a whisk at its pushing angle, with the force where that was recorded."""
     m_y, m_z = _moments(whisk)
-    return FeltAt(
+    felt = FeltAt(
         whisk.theta_at_rad,
         m_y,
         m_z,
@@ -103,6 +103,12 @@ def felt_at(whisk: Whisk, estimates: tuple[EstimateRow, ...] = ()) -> FeltAt:
         whisk.theta_moment_covariance_at,
         estimates,
     )
+    if whisk.others is None:
+        return felt
+    force_N = whisk.others.force_N
+    by_scale = whisk.others.scale_sigma * force_N
+    covariance = whisk.others.force_covariance + np.outer(by_scale, by_scale)
+    return replace(felt, force_N=force_N, force_covariance=covariance)
 
 
 def whisk_of(felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam) -> Whisk:
@@ -133,6 +139,14 @@ def answers(
     return tuple(rows)
 
 
+def assumed_settings(
+    alpha_est_rad: float, sigma_rad: float, radii_mm: tuple[float, float] = UNKNOWN_RADII_MM
+) -> EstimatorSettings:
+    """Return what estimators assume of friction and object. radii_mm: as `answer` has them."""
+    reach_mm = OBJECT_REACH_MM if math.isnan(radii_mm[0]) else sum(radii_mm)
+    return EstimatorSettings(alpha_est_rad, float(sigma_rad), reach_mm, TILT_SIGMA_RAD, *radii_mm)
+
+
 def answer(
     name: str,
     estimator: Estimator,
@@ -148,10 +162,7 @@ def answer(
     estimate's sigma as if the friction angle were exact; computed where it is None. Raises BadInput
     where the estimator returns no Estimate.
     """
-    reach_mm = OBJECT_REACH_MM if math.isnan(radii_mm[0]) else sum(radii_mm)
-    assumed = EstimatorSettings(
-        alpha_est_rad, float(sigma_rad), reach_mm, TILT_SIGMA_RAD, *radii_mm
-    )
+    assumed = assumed_settings(alpha_est_rad, sigma_rad, radii_mm)
     estimate = _estimate(name, estimator, whisk, assumed)
     if estimator in WITHOUT_ALPHA:
         exact_sigma_mm = estimate.sigma_mm

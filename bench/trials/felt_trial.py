@@ -168,7 +168,7 @@ class _FeltStroke:
     def _rows(self, whisk: Whisk) -> tuple[EstimateRow, ...]:
         """Return the rows of the built-in and the user's own estimators."""
         own = self.unit.settings.estimators
-        if own:
+        if own and whisk.others is None:
             whisk = self._with_sensors(whisk)
         return answers(whisk, estimators(own, whisk.beam), self.unit.settings, _radii_mm(self.unit))
 
@@ -179,6 +179,8 @@ class _FeltStroke:
         for theta_rad in np.radians(THETAS_DEG).tolist():
             whisk = whisk_at(self.stroke, self.readout, self.touch, beam, theta_rad)
             if isinstance(whisk, Whisk):
+                if self.stroke.forces_N is not None:
+                    whisk = self._with_sensors(whisk)
                 found.append(felt_at(whisk, self._rows(whisk)))
         return tuple(found)
 

@@ -121,7 +121,7 @@ def units_in_rig(
     """Return the cameras in the rig frame of board and free strokes, and the units with these.
 
     What the board's views contradict is a warning in `problems`. The units have the warnings so far
-    that put their truth or estimates in doubt. Raises BadInput.
+    that question their truth or estimates. Raises BadInput.
     """
     problems.warnings += units[0].calibration.warnings
     calibration = place_rig(session, units[0].calibration, units, pool, problems)

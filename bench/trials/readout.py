@@ -111,6 +111,7 @@ def whisk_at(
     moments = (stroke.filtered - touch.offset) @ readout.matrix.T  # (n, 2) N·mm
     unfiltered = (stroke.channels - touch.offset) @ readout.matrix.T
     m_y, m_z = readout.matrix @ at.values
+    of_angles = stroke.angle_sigma.of_push(stroke.motor_rad, touch.motor_rad, theta_rad)
     return Whisk(
         time_s=stroke.time_s,
         theta_rad=stroke.motor_rad - touch.motor_rad,
@@ -120,7 +121,7 @@ def whisk_at(
         m_y_at_Nmm=float(m_y),
         m_z_at_Nmm=float(m_z),
         covariance_at=readout.covariance(at.values, at.covariance),
-        theta_sigma_rad=float(np.hypot(touch.sigma_rad, stroke.angle_share_sigma * theta_rad)),
+        theta_sigma_rad=float(np.hypot(touch.sigma_rad, of_angles)),
         beam=beam,
         theta_moment_covariance_at=readout.matrix @ at.theta_covariance,
         unfiltered_Nmm=unfiltered,

@@ -20,6 +20,7 @@ from bench.records.trial_result import (
     SeenTrial,
     SeenWhisk,
 )
+from bench.session.angle_source import angle_source
 from bench.session.frame_times import FrameTimes, dropped
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
@@ -35,6 +36,7 @@ from bench.trials.consistency import (
 )
 from bench.trials.one_camera import by_one_camera
 from bench.trials.seeing import presets_for
+from bench.trials.seen_friction import seen_friction
 from bench.trials.trial_frames import TrialFrames
 from vision import Smooth, TrialTruth, Value, WhiskTruth, observe_trial
 from vision.geometry import Reason, Refused, joined
@@ -70,7 +72,7 @@ def see_trial(
     count = len(forward_strokes(signals))
     if not trial.camera_sources or calibration.cameras is None:
         return unseen(count, NO_PICTURES)
-    if trial.angle_from == "speed":
+    if not angle_source(trial).has_zero:
         return unseen(count, NO_ZERO)
     try:
         frames = TrialFrames.read(session, trial, signals, calibration, settings, wires or {})
@@ -103,6 +105,7 @@ def _see(
     warnings = frames.scene.left_out.values()
     seen = []
     for name, whisk in whisks:
+        whisk = _with_angles_sigma(whisk, frames.motor_sigma_rad)
         if whisk.status:  # what the missing frames may have cost comes with their cause
             whisk = replace(whisk, status=joined(*frames.scene.unusable, whisk.status))
         record = _whisk_of_trial(session, trial, whisk, settings, warnings, of_trial)
@@ -124,6 +127,15 @@ def _see(
     )
 
 
+def _with_angles_sigma(whisk: WhiskTruth, sigma_rad: np.ndarray) -> WhiskTruth:
+    """Return a whisk whose turns are as uncertain as pictures and motor angles are, (frames,) rad."""
+    if whisk.turns is None:
+        return whisk
+    of_angles = np.diag(sigma_rad[whisk.turns.index] ** 2)
+    turns = replace(whisk.turns, covariance=whisk.turns.covariance + of_angles)
+    return replace(whisk, turns=turns)
+
+
 def _whisk_of_trial(
     session: Session,
     trial: Trial,
@@ -140,7 +152,11 @@ def _whisk_of_trial(
     warnings = [*warnings, check_length(whisk.ends, session.whisker)]
     speed_rad_s = None if trial.speed_deg_s is None else float(np.radians(trial.speed_deg_s))
     record = whisk_record(whisk, settings, warnings, contradictions, speed_rad_s)
-    return replace(record, by_one_camera=by_one_camera(whisk, session.whisker, settings))
+    return replace(
+        record,
+        friction_rad=seen_friction(record, session.whisker),
+        by_one_camera=by_one_camera(whisk, session.whisker, settings),
+    )
 
 
 def _notes(frames: TrialFrames) -> tuple[str, ...]:

@@ -19,14 +19,12 @@ from bench.records.phases import KINETIC, NO_PHASES, STATIC, Angle, Phases
 from bench.records.trial_result import SeenWhisk
 from bench.session.trial import Trial
 from bench.trials.readout import Readout
+from bench.trials.seen_friction import slips
 from estimator.beam import Beam
 from estimator.signal import FeltTouch
 from estimator.uncertainty import slip_angle_sigma
 from vision import FrameTruth
 
-# [mm] Less slip shows neither rest nor jump. Study: tests/bench/trials/test_phases.py, which holds at half and
-# at twice of it.
-_LEAST_SLIP_MM = 0.1
 # [frames] Fewer show neither rest nor jump: three have two intervals, of which one may rest. Derived.
 _LEAST_FRAMES = 3
 _FIRST_RAD = np.radians(0.5)  # before, the slip angle is mostly noise
@@ -51,16 +49,6 @@ _PLATEAU_SHARE = 1 / 3
 # [1] How far the motor may be from the line of its speed, over the most that it is from it in the middle of the stroke.
 # A ramp of 20 ms leaves it within a few samples. Study: tests/studies/accuracy/felt_phases.py.
 _OFF_PLATEAU = 2.0
-
-
-def slips(seen: SeenWhisk) -> bool:
-    """Return whether the contact moves along the bar. Else the force may lie anywhere within the
-    friction cone.
-    """
-    deflection = seen.deflection
-    if deflection is None or not seen.has_truth or len(deflection.theta_rad) < _LEAST_FRAMES:
-        return False
-    return bool(np.ptp(deflection.slip_mm) >= _LEAST_SLIP_MM)
 
 
 def seen_phases(frames: FrameTruth, beta_rad: float, d_x_mm: float) -> Phases:
@@ -230,7 +218,7 @@ def find_rests(
 ) -> tuple[int, list[ContactRest]]:
     """Return the number of jumps, and the rests between two of them; arguments as `felt_phases`.
 
-    They are looked for where the motor moves steadily. Where it starts, stops or turns round the slip
+    They are sought where the motor moves steadily. Where it starts, stops or turns round the slip
     per angle changes with its speed, as the moments come late out of the gauges' filter.
     """
     steady = _steady(time_s, theta_rad)

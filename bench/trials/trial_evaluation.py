@@ -78,7 +78,9 @@ def trial_facts(unit: Unit) -> TrialFacts:
     for stated in (trial.d_x_mm, trial.beta_deg, trial.bar_diameter_mm):
         numbers.append(NAN if stated is None else float(stated))
     purpose = trial.purpose if trial.object_velocity_mm_s is None else MOVING
-    return TrialFacts(trial.name, purpose, trial.surface, trial.speed_deg_s, *numbers)
+    return TrialFacts(
+        trial.name, purpose, trial.surface, trial.speed_deg_s, *numbers, trial.angle_from
+    )
 
 
 def whisker_facts(unit: Unit) -> WhiskerFacts:

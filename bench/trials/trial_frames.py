@@ -28,6 +28,7 @@ class TrialFrames:
 
     by_camera: pictures by frame, as read. places: frames of each forward stroke. back: frames of
     ways back by the number of the whisk, last frame first. pictures: what vision evaluates.
+    motor_sigma_rad (n,): of each frame's own motor angle.
     """
 
     times: FrameTimes
@@ -37,6 +38,7 @@ class TrialFrames:
     back: dict[int, slice]
     pictures: TrialPictures
     rods: Rods
+    motor_sigma_rad: np.ndarray
 
     @classmethod
     def read(
@@ -70,11 +72,13 @@ class TrialFrames:
             others=others,
             itself=itself,
             traces=_traces(trial, times),
+            picture_of={name: crop.of for name, crop in session.crops.items()},
         )
         places = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
         back = _back_frames(trial, signals, times)
         rods = Rods(session.whisker.wire, stated_object(trial))
-        return cls(times, by_camera, scene, places, back, pictures, rods)
+        motor_sigma_rad = signals.motor_sigma_at(times.time_s)
+        return cls(times, by_camera, scene, places, back, pictures, rods, motor_sigma_rad)
 
 
 def _traces(trial: Trial, times: FrameTimes) -> dict[str, Trace]:

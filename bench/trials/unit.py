@@ -26,7 +26,7 @@ class Unit:
     folder of a seen half that is part of the session's calibration. wires: of an array, by the
     names of its whiskers, files with the places of their wires in the pictures, and wires_hash of
     all of them. straight: the same were all wires straight. contradictions: warnings about the
-    session or the trial that put its truth or its estimates in doubt.
+    session or the trial that question its truth or its estimates.
     """
 
     session: Session

@@ -2,13 +2,12 @@
 
 from dataclasses import replace
 
-from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
+from bench.base.settings import Settings
 from bench.base.statuses import reason
 from bench.records.trial_result import EstimateRow, FeltWhisk
-from bench.trials.estimates import whisk_of
+from bench.trials.estimates import assumed_settings, whisk_of
 from estimator.beam import Beam
 from estimator.both_ways import there_and_back
-from estimator.whisk import EstimatorSettings
 from vision import Value
 
 BOTH_WAYS = "both_ways"
@@ -30,7 +29,7 @@ def with_both_ways(back: FeltWhisk, there: FeltWhisk, beam: Beam, settings: Sett
     found = there_and_back(
         whisk_of(there, settings.theta_rad, beam),
         whisk_of(back, settings.theta_rad, beam),
-        EstimatorSettings(settings.alpha_est_rad, 0.0, OBJECT_REACH_MM, TILT_SIGMA_RAD),
+        assumed_settings(settings.alpha_est_rad, 0.0),
         (there.shared_Nmm, back.shared_Nmm),
     )
     row = EstimateRow(

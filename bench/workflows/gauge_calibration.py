@@ -30,7 +30,7 @@ def calibrate_gauges_command(
     workers: int = 1,
     follow_links: bool = False,
 ) -> int:
-    """Calibrate the gauges, write `out` (TOML) and its certificate beside it as PDF, and print it.
+    """Calibrate the gauges, write `out` (TOML) and its certificate as PDF in the same folder, and print it.
 
     Return 0, or 1 with warnings. every_trial: all trials with whisks, not only those marked
     "gauge". Raise BadInput.

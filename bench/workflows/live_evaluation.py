@@ -177,7 +177,7 @@ def watch(
 def _recordings(trials: _CompleteTrials, wait: Callable[[], object]) -> Iterator[_Recording]:
     """Yield the session so far, complete trials alone, whenever it is to be evaluated (anew).
 
-    Ends where the waiting is interrupted. The user is told once if every evaluation calibrates.
+    Ends where the waiting is interrupted. The user is informed once if every evaluation calibrates.
     """
     evaluated = _Recording()
     has_hinted = False

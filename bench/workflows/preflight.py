@@ -68,10 +68,7 @@ def check(path: Path, *, follow_links: bool = False) -> int:
         assumed = assumed_line(views)
         if session.has_pictures:
             placed = place_line(session)
-    for line in dict.fromkeys(problems.refusals):
-        print(f"bad: {line}")
-    for line in dict.fromkeys(problems.warnings):
-        print(f"doubtful: {line}")
+    _print_problems(problems)
     if assumed:
         print(f"assumed: {assumed}")
     if problems.refusals:
@@ -88,6 +85,14 @@ def check(path: Path, *, follow_links: bool = False) -> int:
     if session.trials:
         print(f"then run: whisker-bench evaluate {path} --out OUT")
     return 0
+
+
+def _print_problems(problems: InputProblems) -> None:
+    """Print each refusal, then each warning, once."""
+    for line in dict.fromkeys(problems.refusals):
+        print(f"bad: {line}")
+    for line in dict.fromkeys(problems.warnings):
+        print(f"doubtful: {line}")
 
 
 def check_contents(session: Session, problems: InputProblems) -> None:

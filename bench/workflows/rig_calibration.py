@@ -70,7 +70,7 @@ class RigCalibration:
 def calibrate_rig_command(
     session: Path, out: Path | None = None, *, workers: int = 1, follow_links: bool = False
 ) -> int:
-    """Measure the rig, write `out` (rig.toml in the session where it is None) and its picture beside it,
+    """Measure the rig, write `out` (rig.toml in the session where it is None) and its picture next to it,
     and print what was found.
 
     Return 0, or 1 with warnings. Raise BadInput; nothing is overwritten.
@@ -105,7 +105,7 @@ def _write(target: Path, picture: Path, found: RigCalibration, lines: list[str])
 
 def _check_target(target: Path) -> None:
     """Raise BadInput where the file cannot be written, before minutes of work, or where it, or the
-    picture beside it, exists: a measurement is never overwritten.
+    picture next to it, exists: a measurement is never overwritten.
     """
     for path in (target, target.with_suffix(".png")):
         if path.exists():
@@ -121,7 +121,7 @@ def _check_target(target: Path) -> None:
 def calibrate_rig(session: Session, problems: InputProblems, *, workers: int = 1) -> RigCalibration:
     """Measure where the board on the rig stands, by a marker on the hub and by the free strokes.
 
-    A stated T_rig_board enters nothing. Raise BadInput where that cannot be told, saying what to
+    A stated T_rig_board enters nothing. Raise BadInput where that cannot be found, saying what to
     record.
     """
     _check_measurable(session)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from bench.analyses.alphas import seen_friction
 from bench.gauges.felt import FeltStroke
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from bench.session.rails import off_the_rails
@@ -194,7 +193,7 @@ def _convert_stroke(
         motor_rad,
         channels,
         channels,
-        angle_share_sigma=signals.angle_share_sigma,
+        angle_sigma=signals.angle_sigma.part(where).part(slice(None, None, converter.every)),
     )
 
 
@@ -214,7 +213,7 @@ def _answers_of_whisk(whisk: _ConvertedWhisk) -> Iterator[Answer]:
             stroke.motor_rad[now],
             channels,
             channels,
-            angle_share_sigma=stroke.angle_share_sigma,
+            angle_sigma=stroke.angle_sigma.part(now),
         )
         time_s = end_s - whisk.touch_s + 1.0 / whisk.rate_Hz
         theta_rad = _theta_rad(push_rad, stroke.speed_rad_s)
@@ -300,7 +299,7 @@ def _expected_whisk(whisk: _ConvertedWhisk, theta_rad: float) -> Whisk:
 
 def _friction_angle_rad(whisk: _ConvertedWhisk) -> float:
     """Return the friction angle as it was seen, not below 0; α_est where it was not."""
-    alpha_rad, _ = seen_friction(whisk.seen, whisk.task.unit.session.whisker.beam)
+    alpha_rad = whisk.seen.friction_rad.value
     if np.isfinite(alpha_rad):
         return max(alpha_rad, 0.0)
     return whisk.task.unit.settings.alpha_est_rad

@@ -277,20 +277,25 @@ def _score_whisk(
         if not len(own.offset_px):
             rows.append(of_frame(frame, ELSEWHERE if frame in with_trace else ABSENT))
             continue
-        first_mm, last_mm = _in_picture_mm(camera, curve)
-        covered_mm = np.ptp(np.clip(own.place_mm, first_mm, last_mm))
         rows.append(
             of_frame(
                 frame,
                 NEAR,
                 line=float(line[frame]),
                 points=len(own.offset_px),
-                coverage_percent=100.0 * covered_mm / max(last_mm - first_mm, _BIN_MM),
+                coverage_percent=_coverage_percent(own, camera, curve),
                 bias_px=float(np.mean(own.offset_px)),
                 scatter_px=float(np.std(own.offset_px)),
             )
         )
     return near, rows
+
+
+def _coverage_percent(own: BesideWire, camera: Camera, curve) -> float:
+    """Return the share of the wire in the picture, from its first point of a trace to its last."""
+    first_mm, last_mm = _in_picture_mm(camera, curve)
+    covered_mm = np.ptp(np.clip(own.place_mm, first_mm, last_mm))
+    return 100.0 * covered_mm / max(last_mm - first_mm, _BIN_MM)
 
 
 def wire_curves(truth: WhiskTruth, wire: Wire) -> dict:
@@ -330,11 +335,10 @@ def _scores(scored: Sequence[TrialScores]) -> Iterator[TraceScore]:
 
 def _score(name: str, camera: str, scored: Sequence[TrialScores]) -> TraceScore:
     """Return the score of a camera over some trials."""
-    frames = [frame for trial in scored for frame in trial.frames if frame.camera == camera]
+    frames = _frames_of(camera, scored)
     states = Counter(frame.state for frame in frames)
     near = [frame for frame in frames if frame.state == NEAR]
-    offsets = [trial.points[camera][1] for trial in scored if camera in trial.points]
-    offset_px = np.concatenate(offsets) if offsets else np.zeros(0)
+    offset_px = _offsets_px(camera, scored)
     bias_px, bias_sigma_px = _mean_of_frames(near, lambda frame: frame.bias_px)
     scatter_px, scatter_sigma_px = np.nan, np.nan
     if near:
@@ -353,6 +357,20 @@ def _score(name: str, camera: str, scored: Sequence[TrialScores]) -> TraceScore:
         scatter_px=scatter_px,
         scatter_sigma_px=scatter_sigma_px,
     )
+
+
+def _frames_of(camera: str, scored: Iterable[TrialScores]) -> list[FrameScore]:
+    """Return the scores of a camera's frames over some trials."""
+    frames = []
+    for trial in scored:
+        frames += [frame for frame in trial.frames if frame.camera == camera]
+    return frames
+
+
+def _offsets_px(camera: str, scored: Iterable[TrialScores]) -> np.ndarray:
+    """Return the offsets (n,) of a camera's points from the wire over some trials, px."""
+    offsets = [trial.points[camera][1] for trial in scored if camera in trial.points]
+    return np.concatenate(offsets) if offsets else np.zeros(0)
 
 
 def _identity_mistakes(scored: Iterable[TrialScores], camera: str) -> float:

@@ -2,6 +2,7 @@
 
 import shutil
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from bench.records.trial_result import SeenTrial, SeenWhisk
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes
 from bench.trials.seen import whisk_record
+from bench.trials.seen_friction import seen_friction
 from bench.workflows.session_evaluation import evaluate
 from vision.truth.at_angle import Smooth
 from vision.truth.records import FrameTruth, WhiskTruth
@@ -115,7 +117,8 @@ def see_exactly(session, trial, signals, calibration, settings, wires=None) -> S
     for number, stroke in enumerate(strokes):
         first, last = signals.time_s[stroke][[0, -1]]
         rows = np.flatnonzero((time_s >= first) & (time_s <= last))
-        whisks.append(whisk_record(exact_truth(trial.folder, number, rows), settings))
+        record = whisk_record(exact_truth(trial.folder, number, rows), settings)
+        whisks.append(replace(record, friction_rad=seen_friction(record, session.whisker)))
     return SeenTrial(tuple(whisks), bar_radius_mm=3.0, wire_radius_mm=0.5)
 
 
@@ -125,7 +128,9 @@ def exact_record():
 
     def record(trial) -> SeenWhisk:
         rows = np.arange(len(read_csv(trial.folder / "truth.csv")["frame"]))
-        return whisk_record(exact_truth(trial.folder, 0, rows), Settings())
+        whisk = whisk_record(exact_truth(trial.folder, 0, rows), Settings())
+        whisker = load_session(trial.folder.parents[1]).whisker
+        return replace(whisk, friction_rad=seen_friction(whisk, whisker))
 
     return record
 

@@ -17,6 +17,7 @@ FOLDERS = {
         "touched",
         "fit",
         "truth",
+        "live",
         "",
     ),
     "estimator": ("",),

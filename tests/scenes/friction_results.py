@@ -93,6 +93,8 @@ def result(beta_deg, d_x=60.0, *, alpha=ALPHA, name=None, nominal_mm=60.0) -> Tr
     }
     truth["frames"] = FREE_FRAME
     seen = {"truth": truth, "deflection": deflection(d_x, beta), "status": ""}
+    if abs(beta) > ALPHA:
+        seen |= {"friction_rad": ALPHA, "friction_sigma_rad": np.radians(0.1)}
     trial = {
         "name": name or f"b{beta_deg:g}",
         "surface": "steel",

@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.analyses.alphas import seen_friction
 from bench.base.drawing import label_of
 from bench.base.statuses import cure_of
 from bench.gauges.felt import lateness
@@ -216,7 +215,7 @@ def cells(row: WhiskRow, estimators: list[str]) -> list[Cell]:
     trial = row.result.trial
     speed = math.nan if trial.speed_deg_s is None else trial.speed_deg_s
     slip = seen.at.slip_mm if seen.at is not None else UNKNOWN
-    alpha = Value(*seen_friction(seen, row.result.whisker))
+    alpha = seen.friction_rad
     fixed = [
         Cell(trial.surface, wide=True),
         Cell(f"{speed:g}" if math.isfinite(speed) else MISSING, speed, wide=True),

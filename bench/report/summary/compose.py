@@ -26,8 +26,11 @@ from bench.report.summary.warning_lines import (
     light_lines,
     whisk_warnings,
 )
+from bench.session.angle_source import SOURCES
 from bench.session.given_lines import given_lines
+from bench.session.session import Session
 from bench.trials.estimate_errors import judge
+from vision.geometry import counted
 
 WARNINGS = "Doubtful"
 SCORE = "Score against the truth files of this synthetic session (no result knows them)"
@@ -119,8 +122,19 @@ def _verdict_lines(evaluation: Evaluation, warnings: int) -> Iterator[str]:
     settings = evaluation.settings
     has_pictures = any(trial.camera_sources for trial in session.trials)
     yield from verdict(session.name, has_pictures, evaluation.accuracy, settings, warnings)
+    yield from angle_lines(session)
     yield from gauge_source_lines(evaluation.gauges)
     yield from preset_lines(evaluation.results, settings)
+
+
+def angle_lines(session: Session) -> Iterator[str]:
+    """Yield a line on each source of motor angles but a log: how many trials, and whether θ is seen."""
+    for name, source in SOURCES.items():
+        count = sum(trial.angle_from == name for trial in session.trials)
+        if count and source.unknown:
+            seen = "; θ of their estimates is seen" if source.is_seen else ""
+            trials = f"{count} of {counted(len(session.trials), 'trial')}"
+            yield f"No motor log: the angle of {trials} is by {source.by}{seen}."
 
 
 def _given_lines(evaluation: Evaluation) -> Iterator[str]:

@@ -80,7 +80,7 @@ def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warni
 
 
 def _in_doubt(truth: TruthUncertainty) -> str:
-    """Return of how many whisks the truth is in doubt, and by what where the others have a verdict."""
+    """Return of how many whisks the truth is questioned, and by what where the others have a verdict."""
     if truth.in_doubt == truth.known:
         return ", but in doubt"
     return f", but in doubt for {truth.in_doubt} of these ({truth.contradiction})"
@@ -96,7 +96,7 @@ def _slope_lines(accuracy: Accuracy) -> Iterator[str]:
     """Yield RMS and worst error by surface and slope, a line a surface and speed.
 
     There is none where all whisks are of one surface and of alike slopes. Of many surfaces those of
-    the largest error are shown.
+    the largest error are named.
     """
     panels = list(grouped(accuracy.judged, lambda one: (one.surface, one.speed_deg_s)).items())
     if len(panels) == 1 and len(_by_steepness(panels[0][1])) == 1:

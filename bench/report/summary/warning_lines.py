@@ -74,7 +74,7 @@ def _without(said: Collection[tuple[str, str]], status: Reason) -> Reason:
 
 
 def estimator_limits(results: Iterable[TrialResult]) -> Iterator[Reason]:
-    """Yield a line for each limit that estimators met: no doubt of the truth, nor of the recording."""
+    """Yield a line for each limit that estimators met: they question neither the truth nor the recording."""
     for estimator, warned in _answers(results):
         if not FAILURES.intersection(warned[0].status.codes):
             yield _cause_line(warned, f", {estimator}")

@@ -12,7 +12,15 @@ from bench.workflows.session_evaluation import evaluate
 from tests.scenes.friction_results import WHISKER, result, run_of
 
 COUNTS = Table("counts", "A row.", (Column("whisks", "how many", Kind.WHOLE),))
-TRIAL = SimpleNamespace(d_x_sigma_mm=0.1, object_velocity_mm_s=None, contact="", plane_turn_deg=0.0)
+WITHOUT_MICROPHONE = SimpleNamespace(channels=("y_V", "z_V"))
+TRIAL = SimpleNamespace(
+    d_x_sigma_mm=0.1,
+    object_velocity_mm_s=None,
+    contact="",
+    plane_turn_deg=0.0,
+    signals_path=None,
+    daq=WITHOUT_MICROPHONE,
+)
 SESSION = SimpleNamespace(whisker=WHISKER, trial=lambda name: TRIAL)
 
 

@@ -1,4 +1,4 @@
-"""The worked example of one camera and a mirror, from its pictures."""
+"""The worked examples of one camera and a mirror, and of a plain checkerboard, from their pictures."""
 
 import json
 import shutil
@@ -12,15 +12,17 @@ from bench.cameras.board_views import read_board_views
 from bench.cameras.calibrate_session import calibrate_from
 from bench.session.session import load_session
 
-EXAMPLE = Path(__file__).resolve().parents[3] / "fixtures" / "bring" / "mirror"
+BRING = Path(__file__).resolve().parents[3] / "fixtures" / "bring"
+EXAMPLE = BRING / "mirror"
 RIG_POINTS = np.array([[x, 0.0, z] for x in (20.0, 50.0, 80.0) for z in (-15.0, 0.0, 15.0)])
 
 
-def test_both_views_are_placed_as_the_rig_has_them():
-    session = load_session(EXAMPLE)
+@pytest.mark.parametrize("example", ["mirror", "boards"])
+def test_both_views_are_placed_as_the_rig_has_them(example):
+    session = load_session(BRING / example)
     made = calibrate_from(session, read_board_views(session)).cameras
-    assert made.names == ("high", "mirrored")
-    truth = json.loads((EXAMPLE / "truth.json").read_text())["cameras"]
+    truth = json.loads((BRING / example / "truth.json").read_text())["cameras"]
+    assert set(made.names) == set(truth) and len(made) == 2
     for camera in made:
         true = truth[camera.name]
         assert camera.size_px == (true["width"], true["height"])

@@ -7,6 +7,8 @@ from bench.session.session import load_session
 
 APRIL = "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 5\ntagSize: 0.03\ntagSpacing: 0.3\n"
 SIZES = "squares = [8, 7]\nsquare_mm = 13.0\n"
+MARKERS = 'marker_mm = 9.0\ndictionary = "DICT_5X5_100"\n'
+BODY = f'kind = "body"\n{SIZES}{MARKERS}first_ids = [0, 28, 60]\n'
 
 
 def session_with(board: str, folder):
@@ -31,6 +33,15 @@ def test_kalibr_s_file_states_the_board(tmp_path):
     assert board.square_sigma_mm == pytest.approx(0.039)
 
 
+def test_a_body_is_read_with_its_faces(tmp_path):
+    body = session_with(BODY, tmp_path).board
+    assert body.kind == "body" and body.first_ids == (0, 28, 60)
+    assert [face.first_id for face in body.faces] == [0, 28, 60]
+    assert body.square_sigma_mm == pytest.approx(0.013)
+    single = session_with(f"{SIZES}{MARKERS}first_id = 28\n", tmp_path).board
+    assert single.first_id == 28 and single.spare_markers == ("DICT_5X5_100", 56)
+
+
 @pytest.mark.parametrize(
     "board, words",
     [
@@ -41,6 +52,11 @@ def test_kalibr_s_file_states_the_board(tmp_path):
         (f'kind = "checkerboard"\n{SIZES}legacy = true\n', "legacy is none of kind"),
         (f'kind = "circles"\n{SIZES}marker_mm = 14.0\n', "touch each other"),
         ('kind = "checkerboard"\nsquare_mm = 9.0\n', r"\[board\] squares is missing"),
+        (BODY.replace("first_ids = [0, 28, 60]", ""), r"\[board\] first_ids is missing"),
+        (BODY.replace("28", "20"), "faces from 0 and 20 on share markers, each has 28"),
+        (BODY.replace("60", "80"), "needs 28 markers from 80 on, DICT_5X5_100 has 100"),
+        (BODY.replace("[0, 28, 60]", "[0]"), "a body has two faces or more"),
+        (f"{SIZES}{MARKERS}first_ids = [0, 28]\n", "first_ids is none of kind"),
         ('kalibr_target = "april.yaml"\nsquare_mm = 9.0\n', "state the same: keep one"),
         ('kalibr_target = "other.yaml"\n', "there is no such file"),
         ('kalibr_target = "bad.yaml"\n', "no target file of Kalibr"),

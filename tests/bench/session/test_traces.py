@@ -10,10 +10,14 @@ import pytest
 import scipy.io
 
 from bench.base.errors import BadInput
+from bench.session.abilities import abilities
 from bench.session.session_check import checked_session
+from bench.session.signals import forward_strokes, read_signals
+from bench.session.strict_toml import read_toml
 from bench.session.trace_files import IN_SPACE, SUFFIXES, trace_files
 from bench.session.trace_readers import READERS, read_lines
 from bench.session.traces_in_space import lines_in_space
+from bench.trials.stated_truth import stated_whisk
 from tests.scenes.refusals import refusal
 from vision.geometry import Camera
 
@@ -338,6 +342,55 @@ def test_wrong_columns_are_named(traced, head, said):
 def test_a_trace_of_no_camera_or_no_kind_is_refused(traced):
     folder = next((traced / "trials").iterdir())
     shutil.copy(folder / "trace_high.csv", folder / "trace_hihg.csv")
-    assert "there is no camera hihg; there are high, low" in refusal(traced)
+    assert "no pictures of camera hihg; there are those of high, low" in refusal(traced)
     (folder / "trace_hihg.csv").rename(folder / "trace_hihg.txt")
     assert "trace_hihg.txt: is of no kind that is read" in refusal(traced)
+
+
+def without_pictures(session):
+    """A session's one trial, which has its pictures no longer."""
+    trial = next((session / "trials").iterdir())
+    for camera in ("high", "low"):
+        shutil.rmtree(trial / camera)
+    return trial
+
+
+def state_place(session, trial):
+    """Let a stage say where the object of a trial stands: a bar's and a wire's radius beyond the contact."""
+    with (session / "session.toml").open("a") as manifest:
+        manifest.write('\n[truth]\nsource = "stage"\n')
+    with (trial / "trial.toml").open("a") as manifest:
+        manifest.write("\n[object]\npoint_mm = [57.61, 5.93, 0.0]\npoint_sigma_mm = 0.02\n")
+
+
+@pytest.mark.parametrize("is_stated", [False, True])
+def test_traces_without_pictures_are_refused_with_what_to_do(traced, is_stated):
+    trial = without_pictures(traced)
+    if is_stated:
+        state_place(traced, trial)
+    line = refusal(traced)
+    assert line.startswith(f"trials/{trial.name}/trace_high.csv: the trial has no pictures")
+    assert "add them, or take the traces out" in line and '[truth] source = "stage"' in line
+
+
+def test_points_in_space_without_pictures_are_refused_too(traced):
+    trial = without_pictures(traced)
+    for camera in ("high", "low"):
+        (trial / f"trace_{camera}.csv").unlink()
+    anipose(trial)
+    assert f"{IN_SPACE}: the trial has no pictures" in refusal(traced)
+
+
+def test_a_stage_gives_the_truth_once_the_traces_are_taken_out(traced):
+    trial = without_pictures(traced)
+    state_place(traced, trial)
+    for path in trace_files(trial, trial.name).values():
+        path.unlink()
+    session = checked_session(traced)
+    distance, slope, seen, *_ = abilities(session)
+    assert (distance.count, slope.count, seen.count) == (1, 1, 0)
+    signals = read_signals(session.trials[0])
+    stroke = forward_strokes(signals)[0]
+    d_x_mm = stated_whisk(session, session.trials[0], signals, stroke).d_x_mm
+    true_mm = read_toml(trial / "truth.toml", "truth.toml")["d_x_mm"]
+    assert abs(d_x_mm.value - true_mm) < 2.0 * d_x_mm.sigma < 1.0, (d_x_mm, true_mm)

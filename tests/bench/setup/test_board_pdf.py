@@ -178,6 +178,14 @@ def test_a_board_of_another_kind_is_printed_with_its_lines(kind, tmp_path, capsy
     assert path.is_file() and f'kind = "{kind}"' in capsys.readouterr().out
 
 
+def test_a_face_of_a_body_is_printed_with_its_own_markers(tmp_path, capsys):
+    out = ["board", "--out", str(tmp_path / "face.pdf"), "--first-id"]
+    assert main([*out, "30"]) == 0
+    assert "first_id = 30" in capsys.readouterr().out
+    assert main([*out, "80"]) == 2
+    assert "needs 24 markers from 80 on, DICT_5X5_100 has 100" in capsys.readouterr().err
+
+
 def test_squares_are_two_counts(capsys):
     with pytest.raises(SystemExit) as done:
         main(["board", "--out", "b.pdf", "--squares", "8"])

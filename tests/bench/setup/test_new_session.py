@@ -1,6 +1,9 @@
 """A new session's manifest: what is filled in is read as it was given, what is not is asked for by `check`."""
 
+import io
+import sys
 import tomllib
+from itertools import product
 
 import pytest
 
@@ -8,8 +11,11 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.commands.cli import main
 from bench.session.manifest import SessionKeys
+from bench.session.session import load_session
 from bench.session.strict_toml import as_keys
-from bench.setup.new_session import FOLDERS, QUESTIONS, BoardLines, new_session
+from bench.setup.lab import CHOICES, Lab
+from bench.setup.new_session import new_session
+from bench.setup.questions import QUESTIONS, questions_of
 
 NUMBERS = {
     "whisker_length_mm": 100.0,
@@ -52,7 +58,7 @@ def test_all_given_is_a_sound_manifest(tmp_path, capsys):
         1.02,
         6.0,
     )
-    assert all((path / folder).is_dir() for folder in FOLDERS)
+    assert all((path / folder).is_dir() for folder in ("boards", "boards/rig", "trials"))
     assert "FILL IN" not in capsys.readouterr().out
 
 
@@ -73,9 +79,9 @@ def test_a_terminal_is_asked_until_the_answer_makes_sense(tmp_path, capsys):
         asked.append(question)
         return next(answers)
 
-    new_session(tmp_path / "s", "s", {}, BoardLines("charuco", (8, 6), "DICT_5X5_100"), ask)
+    new_session(tmp_path / "s", "s", Lab.of({}), {}, ask)
     text = (tmp_path / "s" / "session.toml").read_text()
-    assert len(asked) == len(QUESTIONS) + 2
+    assert len(asked) == len(NUMBERS) + 2
     assert (
         "length_mm = 100 " in text
         and "# diameter_mm = " in text
@@ -121,12 +127,125 @@ def test_every_question_has_its_range():
             question.plausible_range.check(-1.0, question.key, "session.toml")
 
 
-def test_check_counts_as_many_missing_lines_as_new(tmp_path, capsys):
-    assert main(["new", str(tmp_path / "s")]) == 0
-    assert "6 lines are to be filled in" in capsys.readouterr().out
-    assert main(["check", str(tmp_path / "s")]) == 2
-    missing = [line for line in capsys.readouterr().out.splitlines() if "is missing" in line]
-    assert len(missing) == len(QUESTIONS) == 6
+LABS = [
+    dict(zip((choice.option for choice in CHOICES), answers))
+    for answers in product(
+        ("two", "mirror", "none"),
+        ("pictures", "traces", "stage"),
+        ("charuco", "checkerboard"),
+        ("yes", "no"),
+        ("trials", "known", "moments"),
+    )
+    if answers[0] != "none"
+]
+LABS += [
+    {"cameras": "none", "motor_log": log, "gauges": gauges}
+    for log in ("yes", "no")
+    for gauges in ("trials", "known", "moments")
+]
+
+
+@pytest.mark.parametrize("lab", LABS, ids=lambda lab: "-".join(lab.values()))
+def test_check_counts_as_many_missing_lines_as_new(lab, tmp_path):
+    """And as many as are marked in the file; once filled in, nothing is wrong."""
+    path = tmp_path / "s"
+    said = new_session(path, "", Lab.of(lab), {})
+    text = (path / "session.toml").read_text()
+    problems = InputProblems(stop_at_first=False)
+    with problems.guard():
+        load_session(path, problems)
+    assert said[1].startswith(f"{len(problems.refusals)} lines are to be filled in")
+    assert text.count("FILL IN") == len(problems.refusals) >= 4
+    filled = text
+    for key, value in FILLED.items():
+        filled = filled.replace(f"# {key} =        # FILL IN", f"{key} = {value} #")
+    assert "FILL IN" not in filled
+    (path / "session.toml").write_text(filled)
+    assert load_session(path).whisker.length_mm == 100.0
+
+
+FILLED = {
+    "length_mm": 100.0,
+    "diameter_mm": 1.02,
+    "youngs_modulus_GPa": 60.0,
+    "square_mm": 15.0,
+    "marker_mm": 11.0,
+    "speed_deg_s": 10.0,
+    "speed_sigma_deg_s": 0.1,
+    "crop": [0, 0, 640, 490],
+    "offset_V": [0.0, 0.0],
+    "matrix_Nmm_per_V": [[11.0, 0.0], [0.0, 11.0]],
+}
+
+
+class Terminal(io.StringIO):
+    """What a terminal answers, or shows."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def new_at_a_terminal(path, answers, monkeypatch, arguments=()) -> tuple[str, str]:
+    """What `new` shows, and the session.toml that it makes of a terminal's answers."""
+    shown = Terminal()
+    monkeypatch.setattr(sys, "stdin", Terminal(answers))
+    monkeypatch.setattr(sys, "stdout", shown)
+    assert main(["new", str(path), *arguments]) == 0
+    return shown.getvalue(), (path / "session.toml").read_text()
+
+
+def test_answers_make_the_same_session_as_options(tmp_path, monkeypatch, capsys):
+    answers = "mirror\ntraces\ncheckerboard\nno\nknown\n100\n1.02\n60\n6\n15.03\n10\n0.1\n"
+    asked, by_answers = new_at_a_terminal(tmp_path / "a" / "s", answers, monkeypatch)
+    monkeypatch.undo()
+    given = ["--mirror", "--traces", "--board-kind", "checkerboard", "--no-motor-log"]
+    numbers = {name: value for name, value in NUMBERS.items() if name != "marker_mm"}
+    speed = {"speed_deg_s": 10.0, "speed_sigma_deg_s": 0.1}
+    given += ["--gauges", "known", *options(numbers | speed)]
+    assert main(["new", str(tmp_path / "b" / "s"), *given]) == 0
+    assert (tmp_path / "b" / "s" / "session.toml").read_text() == by_answers
+    assert "one and a mirror" in asked and "3 lines are to be filled in" in asked
+    assert (tmp_path / "a" / "s" / "boards" / "camera").is_dir()
+    assert "trace_<camera>.csv" in by_answers and "motor_deg" not in by_answers
+
+
+def test_enter_takes_every_default(tmp_path, monkeypatch):
+    _, by_enter = new_at_a_terminal(tmp_path / "a" / "s", "\n" * 11, monkeypatch)
+    # a terminal that ends answers nothing more
+    _, by_end = new_at_a_terminal(tmp_path / "b" / "s", "", monkeypatch)
+    _, by_options = new_at_a_terminal(
+        tmp_path / "c" / "s", "none\n", monkeypatch, ["--cameras", "two"]
+    )
+    assert by_enter == by_end == by_options
+
+
+def test_an_answer_is_requested_until_it_is_one_of_those_allowed(capsys):
+    answers = iter(["ring", "c", "ci"])
+    lab = Lab.of({"cameras": "two", "truth": "pictures"}, lambda question: next(answers, ""))
+    assert (lab.board_kind, lab.motor_log, lab.gauges) == ("circles", "yes", "trials")
+    said = capsys.readouterr().out
+    assert "'ring' is none of" in said and "'c' is none of" in said
+
+
+@pytest.mark.parametrize(
+    "contradictory",
+    [
+        ["--cameras", "none", "--truth", "pictures"],
+        ["--cameras", "none", "--board-kind", "circles"],
+    ],
+)
+def test_answers_that_contradict_are_one_line(contradictory, tmp_path, capsys):
+    assert main(["new", str(tmp_path / "s"), *contradictory]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "does not go with cameras none" in said.replace(
+        "truth pictures", "cameras none"
+    )
+    assert not (tmp_path / "s").exists()
+
+
+def test_no_question_is_asked_for_what_cannot_be():
+    options = [question.option for question in questions_of(Lab.of({"cameras": "none"}))]
+    assert options[-1] == "origin_sigma_mm" and not {"square_mm", "speed_deg_s"} & set(options)
 
 
 def test_without_a_motor_log_the_speed_is_to_be_filled_in(tmp_path):

@@ -45,7 +45,7 @@ def steel(steel_signals, exact_vision, evaluated):
 
 def test_tables_have_the_columns_of_the_format_in_their_order(steel):
     """Names are what other people's scripts rely on, so they stand here as in the format's description."""
-    first = "trial,whisk,surface,speed_deg_s,beta_nominal_deg,theta_deg,touch_deg,touch_sigma_deg,touch_felt_deg"
+    first = "trial,whisk,surface,speed_deg_s,beta_nominal_deg,theta_deg,angle_from,touch_deg,touch_sigma_deg,touch_felt_deg"
     assert ",".join(WHISKS.names).startswith(first)
     assert WHISKS.names[-10:] == (
         "x_mm",

@@ -45,7 +45,7 @@ def test_the_angle_stops_at_the_crest():
     trial = load_session(NO_LOG).trial(TRIAL)
     signals = read_signals(trial)
     steps = np.diff(signals.motor_rad)
-    assert signals.angle_share_sigma == pytest.approx(0.1 / trial.speed_deg_s)
+    assert signals.angle_sigma.share == pytest.approx(0.1 / trial.speed_deg_s)
     assert np.all(steps >= 0.0) and steps[0] == pytest.approx(
         np.radians(trial.speed_deg_s) / signals.rate_Hz
     )

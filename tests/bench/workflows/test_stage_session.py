@@ -11,7 +11,8 @@ from bench.base.settings import Settings
 from bench.commands.cli import main
 from bench.report.record import read_record
 from bench.session.session import load_session
-from bench.setup.new_session import BoardLines, new_session
+from bench.setup.lab import Lab
+from bench.setup.new_session import new_session
 from bench.workflows.session_evaluation import DONE, evaluate
 from tests.scenes.results import codes, table
 
@@ -112,13 +113,12 @@ def test_a_new_session_for_a_stage_asks_for_no_board(tmp_path):
         asked.append(question)
         return ""
 
-    lines = new_session(
-        tmp_path / "s", "", {}, BoardLines("charuco", (8, 6), "DICT_5X5_100"), ask, "stage"
-    )
+    lab = Lab.of({"truth": "stage"})
+    lines = new_session(tmp_path / "s", "", lab, {}, ask)
     assert not any("board" in question for question in asked)
     assert any("stage's origin" in question for question in asked)
     assert {entry.name for entry in (tmp_path / "s").iterdir()} == {"session.toml", "trials"}
-    assert "5 lines are to be filled in" in lines[1]
+    assert "4 lines are to be filled in" in lines[1]  # the origin has an assumed sigma
     given = {
         "whisker_length_mm": 100.0,
         "whisker_diameter_mm": 1.0,
@@ -126,9 +126,7 @@ def test_a_new_session_for_a_stage_asks_for_no_board(tmp_path):
         "bar_diameter_mm": 6.0,
         "origin_sigma_mm": 0.1,
     }
-    new_session(
-        tmp_path / "t", "", given, BoardLines("charuco", (8, 6), "DICT_5X5_100"), None, "stage"
-    )
+    new_session(tmp_path / "t", "", lab, given)
     assert load_session(tmp_path / "t").truth.origin_sigma_mm == 0.1
 
 

@@ -1,0 +1,46 @@
+"""The verb `live`: a recorded push, evaluated as if it were being recorded (bench/workflows/live_push.py)."""
+
+import argparse
+
+from bench.base.progress import begin_step
+from bench.commands.options import (
+    DONE,
+    WITH_WARNINGS,
+    Verbs,
+    add_out,
+    add_recorded,
+    add_verb,
+)
+
+
+def add(verbs: Verbs) -> None:
+    """Add the verb."""
+    verb = add_verb(
+        verbs,
+        "live",
+        run,
+        "play a recorded trial at its own speed, and say distance, touch and slip right after its last frame",
+        "whisker-bench live fixtures/small-session b30_3 --out live-out",
+    )
+    add_recorded(verb)
+    verb.add_argument("trial", metavar="TRIAL", help="name of the trial")
+    add_out(verb, "OUT", "folder for OUT/live/TRIAL_WHISK.png, the last frame with its lines")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Play the trial, print a line a whisk; return the exit code."""
+    from bench.base.workers import single_thread
+
+    begin_step(f"reading {options.session}")
+    single_thread()  # before NumPy is imported
+    from bench.base.atomic import lock_output
+    from bench.workflows.live_push import play_trial
+
+    has_status = False
+    with lock_output(options.out):
+        for line, status in play_trial(
+            options.session, options.out, options.trial, follow_links=options.follow_links
+        ):
+            print(line)
+            has_status = has_status or bool(status)
+    return WITH_WARNINGS if has_status else DONE

@@ -1,0 +1,253 @@
+"""The friction angle α of a whisk that slips, by pictures alone: the exact rod's force against the seen surface.
+
+The rod of the stated whisker, bent as it is seen, shows which way the object pushes it, whatever its stiffness. The
+normal of the contact stands across bar and whisker. Coulomb's friction acts against the sliding; its part across the
+whisker bends the rod, that along the whisker hardly does. So tan α is the force across the whisker and the normal over
+that along the normal, over the cosine of the angle at which the whisker slides along itself.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from bench.gauges.held_rod import HeldRod
+from bench.gauges.whisker_rods import SeenContacts, rod_of
+from bench.records.trial_result import Deflection, SeenWhisk
+from bench.session.whisker import Whisker
+from vision import Value
+from vision.geometry import unit
+
+# [rad] Of a frame that is used. How the whisker slides along itself is known to second order in the pushing angle:
+# at 8° α is then off by 0.06°. Derived; study: tests/studies/accuracy/combined_numbers.py.
+_FARTHEST_RAD = np.radians(10.0)
+# [rad] Nearer to touch the force has no direction yet. Set by eye.
+_NEAREST_RAD = np.radians(0.3)
+_FEWEST_NEAR = 5  # frames
+# [1] Sigma of α over the square of the slope at the contact of an unloaded whisker that is stated to be straight: six
+# whisks of a vibrissa with s² = 0.01 to 0.016 are off by up to 0.7 s². Study: tests/studies/accuracy/species.py.
+_SET_LEFT = 1 / 2
+# [1] Share of what sliding along the whisker changes α by that may be wrong: two whisks of a vibrissa that slide along
+# themselves at 10 and 16° are off by a tenth and a seventh of it. Study: tests/studies/accuracy/species.py.
+_HEADING_LEFT = 1 / 8
+# [1] Step of differences over the contact's distance: far above rounding, far below what curves. Derived.
+_STEP_SHARE = 1e-5
+# [rad] The same of slope and tilt of the bar. Derived.
+_STEP_RAD = 1e-5
+# [mm] Less slip shows neither rest nor jump. Study: tests/bench/trials/test_phases.py, which holds at half and
+# at twice of it.
+_LEAST_SLIP_MM = 0.1
+# [frames] Fewer show no slip: three have two intervals, of which one may rest. Derived.
+_LEAST_FRAMES = 3
+_UNKNOWN = Value(np.nan, np.nan)
+
+
+def seen_friction(seen: SeenWhisk, whisker: Whisker) -> Value:
+    """Return α, rad, of a whisk that slips; NaN where it hardly does, or no rod is bent so.
+
+    It is the slope of α · size over the size of the deflection, frame by frame, so that an offset of all
+    deflections drops out. Along a sphere or a ring the slope turns with the slip, so that α there is that
+    at the wanted pushing angle, by the normal at the contact.
+    """
+    if not slips(seen):
+        return _UNKNOWN
+    if turns_with_slip(seen):
+        return _UNKNOWN if seen.at is None else seen.at.alpha_rad
+    d = _near_touch(seen.deflection)
+    sliding = _Sliding(seen.deflection, d, seen.beta_rad.value, np.nan_to_num(seen.psi_rad.value))
+    try:
+        return _of_sliding(sliding, seen, whisker)
+    except ArithmeticError:
+        return _UNKNOWN
+
+
+def slips(seen: SeenWhisk) -> bool:
+    """Return whether the contact moves along the bar. Else the force may lie anywhere within the
+    friction cone.
+    """
+    deflection = seen.deflection
+    if deflection is None or not seen.has_truth or len(deflection.theta_rad) < _LEAST_FRAMES:
+        return False
+    return bool(np.ptp(deflection.slip_mm) >= _LEAST_SLIP_MM)
+
+
+def turns_with_slip(seen: SeenWhisk) -> bool:
+    """Return whether the object is curved along itself: a cone is straight there."""
+    return seen.truth.rounded is not None and seen.truth.rounded.shape != "cone"
+
+
+def heading(d: Deflection, theta_rad: float | np.ndarray) -> float | np.ndarray:
+    """Return the angle h between the slip at θ and the bar, as seen.
+
+    The whisker's material moves along itself, too. Friction acts against the whole motion, so that the
+    force across the whisker has less than α: tan(|β| − |φ|) = tan α cos h. The slip begins in proportion
+    to θ, the motion along a straight whisker to θ², along a curved one to θ, too; each has one power more.
+    """
+    past_per_rad = _rate(d.theta_rad, d.past_mm, (0, 2, 1, 3), theta_rad)
+    slip_per_rad = _rate(d.theta_rad, d.slip_mm, (1, 2), theta_rad)
+    return np.arctan(past_per_rad / slip_per_rad)
+
+
+def _rate(
+    theta_rad: np.ndarray, values: np.ndarray, powers: tuple[int, ...], at_rad: float | np.ndarray
+) -> float | np.ndarray:
+    """Return the derivative at angles of the polynomial that fits values (n,) best.
+
+    powers: of the polynomial, the most needed ones first; of few values the last are left out.
+    """
+    powers = powers[: max(2, len(theta_rad) // 2)]
+    columns = np.stack([theta_rad**power for power in powers], axis=1)
+    coefficients = np.linalg.lstsq(columns, values, rcond=None)[0]
+    return sum(c * power * at_rad ** (power - 1) for c, power in zip(coefficients, powers) if power)
+
+
+def _of_sliding(sliding: "_Sliding", seen: SeenWhisk, whisker: Whisker) -> Value:
+    """Return α of a contact that slides. Raises ArithmeticError where no rod is bent so."""
+    d = sliding.deflection
+    rod = rod_of(whisker)
+    contacts = SeenContacts(d.along_mm, _across_mm(d), d.theta_rad, d.d_x_mm)
+    friction = sliding.friction_along(rod.held(contacts, 0.0))
+    held = rod.held(contacts, friction)
+    alpha_rad = sliding.slope_rad(held)
+    by_place = _by_place(sliding, contacts, lambda moved: rod.held(moved, friction))
+    by_beta, by_psi = _by_direction(sliding, held)
+    parts = [
+        np.sqrt(by_place @ d.covariance @ by_place),
+        by_beta * seen.beta_rad.sigma,
+        by_psi * np.nan_to_num(seen.psi_rad.sigma),
+        _HEADING_LEFT * (alpha_rad - sliding.weights @ sliding.across_rad(held)),
+        _left_of_set(seen, whisker),
+    ]
+    return Value(alpha_rad, float(np.linalg.norm(parts)))
+
+
+def _by_place(
+    sliding: "_Sliding", contacts: SeenContacts, held_at: Callable[[SeenContacts], HeldRod]
+) -> np.ndarray:
+    """Return the derivatives (3n,) of α by where contacts are along, across z and across y, frame by frame.
+
+    held_at: the rod held at contacts. Raises ArithmeticError where no rod is bent so.
+    """
+    step_mm = _STEP_SHARE * float(contacts.along_mm.max())
+    here_rad = sliding.alpha_rad(held_at(contacts))
+    by_place = np.empty((len(here_rad), 3))
+    for k, step in enumerate(step_mm * np.eye(3)):
+        moved_rad = sliding.alpha_rad(held_at(contacts.moved(step)))
+        by_place[:, k] = sliding.weights * (moved_rad - here_rad) / step_mm
+    return by_place.ravel()
+
+
+def _by_direction(sliding: "_Sliding", held: HeldRod) -> tuple[float, float]:
+    """Return the derivatives of α by the object's slope and by its tilt."""
+    alpha_rad = sliding.slope_rad(held)
+    steeper = replace(sliding, beta_rad=sliding.beta_rad + _STEP_RAD)
+    leaning = replace(sliding, psi_rad=sliding.psi_rad + _STEP_RAD)
+    by_beta = (steeper.slope_rad(held) - alpha_rad) / _STEP_RAD
+    by_psi = (leaning.slope_rad(held) - alpha_rad) / _STEP_RAD
+    return by_beta, by_psi
+
+
+@dataclass(frozen=True, eq=False)
+class _Sliding:
+    """n frames of a contact that slides along a straight object.
+
+    whole: the deflection of all touching frames; deflection: that of the n frames. beta_rad, psi_rad: slope and
+    tilt of the object.
+    """
+
+    whole: Deflection
+    deflection: Deflection
+    beta_rad: float
+    psi_rad: float
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Return the weights (n,) by which angles make the slope of angle · size over the deflection's size."""
+        size = np.linalg.norm(_across_mm(self.deflection), axis=1)
+        centred = size - size.mean()
+        return centred * size / np.sum(centred**2)
+
+    def slope_rad(self, held: HeldRod) -> float:
+        """Return α of all frames by the forces of a rod."""
+        return float(self.weights @ self.alpha_rad(held))
+
+    def alpha_rad(self, held: HeldRod) -> np.ndarray:
+        """Return α (n,) by the forces of a rod in these frames."""
+        along_bar, cosine = self._across_whisker(held)
+        return np.arctan(along_bar / cosine)
+
+    def across_rad(self, held: HeldRod) -> np.ndarray:
+        """Return the angle (n,) of the force across the whisker: α, were nothing sliding along it."""
+        return np.arctan(self._across_whisker(held)[0])
+
+    def friction_along(self, held: HeldRod) -> np.ndarray:
+        """Return the friction along the whisker over the force across it (n,), below 0: away from the clamp.
+
+        A whisker that bends is drawn towards its clamp over the object, and friction acts against that.
+        """
+        along_bar, cosine = self._across_whisker(held)
+        sine = np.sqrt(1.0 - cosine**2)
+        return -np.abs(along_bar / cosine) * sine / np.hypot(1.0, along_bar)
+
+    def _across_whisker(self, held: HeldRod) -> tuple[np.ndarray, np.ndarray]:
+        """Return the friction across the whisker over the normal force (n,), against the slip positive, and the
+        cosine (n,) of the angle at which the whisker slides along itself.
+        """
+        bar = self._bar_directions()
+        normal = unit(np.cross(bar, held.tangent))
+        across = np.cross(normal, held.tangent)
+        slip = np.sign(self.deflection.slip_mm.sum())
+        friction = -slip * _dot(held.force_N, across) / _dot(held.force_N, normal)
+        share = _dot(bar, across)
+        friction = np.sign(share) * np.sign(_dot(held.force_N, normal)) * friction
+        past = np.tan(heading(self.whole, self.deflection.theta_rad))
+        past = past + _dot(bar, held.tangent) - np.sin(self.psi_rad)
+        return friction, np.abs(share) / np.hypot(share, past)
+
+    def _bar_directions(self) -> np.ndarray:
+        """Return the object's direction (n, 3) in the axes of the hub."""
+        lean = np.cos(self.psi_rad)
+        x = np.sin(self.psi_rad)
+        y = lean * np.sin(self.beta_rad)
+        z = lean * np.cos(self.beta_rad)
+        cos = np.cos(self.deflection.theta_rad)
+        sin = np.sin(self.deflection.theta_rad)
+        return np.stack([cos * x + sin * y, cos * y - sin * x, np.full_like(cos, z)], axis=1)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the scalar products (n,) of vectors (n, 3)."""
+    return np.sum(a * b, axis=1)
+
+
+def _across_mm(d: Deflection) -> np.ndarray:
+    """Return the deflections (n, 2) along z and against y."""
+    return np.stack([d.across_z_mm, d.across_y_mm], axis=1)
+
+
+def _near_touch(d: Deflection) -> Deflection:
+    """Return the frames from `_NEAREST_RAD` to `_FARTHEST_RAD`, those beyond too where the former are few."""
+    bent = d.theta_rad > _NEAREST_RAD
+    near = bent & (d.theta_rad <= _FARTHEST_RAD)
+    chosen = near if np.sum(near) >= _FEWEST_NEAR else bent
+    rows = np.repeat(chosen, 3)
+    of_frames = {name: values[chosen] for name, values in vars(d).items() if np.ndim(values) == 1}
+    return replace(
+        d,
+        **of_frames,
+        covariance=d.covariance[np.ix_(rows, rows)],
+        by_camera_error_mm=d.by_camera_error_mm[rows],
+    )
+
+
+def _left_of_set(seen: SeenWhisk, whisker: Whisker) -> float:
+    """Return what α seen may be off by because a whisker that is stated to be straight is curved, rad.
+
+    Where it slopes by s at the contact, as much as s² of a push goes sideways and into twist.
+    """
+    if seen.truth.shape is None or whisker.turn_rad > 0:
+        return 0.0
+    share = seen.deflection.d_x_mm / whisker.length_mm
+    slopes = [Polynomial(own).deriv()(share) for own in seen.truth.shape.rest_mm]
+    return float(_SET_LEFT * np.sum(np.square(slopes)) / whisker.length_mm**2)
