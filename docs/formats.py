@@ -24,7 +24,17 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from bench.base.tables import SPEED, SURFACE, TRIAL, TRUTH_SOURCE, WHISK, Column, Table, sigma_name
+from bench.base.tables import (
+    ANGLE_FROM,
+    SPEED,
+    SURFACE,
+    TRIAL,
+    TRUTH_SOURCE,
+    WHISK,
+    Column,
+    Table,
+    sigma_name,
+)
 from bench.report.whisk_tables import WHISKS
 from bench.session.givens import GivenKeys, assumptions, unit_of
 from bench.session.strict_toml import Keys, key_names
@@ -106,7 +116,7 @@ def _section(declared: Table | type[Keys]) -> str:
 
 def _meaning(table: Table, column: Column) -> str:
     """Return what a column means; nothing of those of most tables, which whisks.csv explains."""
-    is_elsewhere = column in (TRIAL, WHISK, SURFACE, SPEED, TRUTH_SOURCE)
+    is_elsewhere = column in (TRIAL, WHISK, SURFACE, SPEED, ANGLE_FROM, TRUTH_SOURCE)
     return "" if is_elsewhere and table is not WHISKS else column.meaning
 
 

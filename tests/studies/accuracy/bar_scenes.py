@@ -11,6 +11,7 @@ hold what both points have in common.
 
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -18,8 +19,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
+from bench.session.footage import rig_picture
+from vision.boards.board_optics import estimate_optics
+from vision.boards.charuco import CharucoBoard
 from vision.calibration.cameras_file import read_cameras
-from vision.geometry.camera import Camera
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Bar, Rods, Wire
@@ -36,16 +40,30 @@ from vision.touched.width import combine_widths, measure_relative_widths
 FOUND_PX = 1.0
 
 
-def read_scene(folder: Path) -> tuple[list[View], list[Camera], Rods, np.ndarray, BarAxis]:
+def board_of(folder: Path) -> CharucoBoard:
+    """The board of a session."""
+    table = tomllib.loads((folder / "session.toml").read_text())["board"]
+    return CharucoBoard(**table | {"squares": tuple(table["squares"])})
+
+
+def read_cameras_with_optics(folder: Path) -> Cameras:
+    """A scene's exact cameras, with the transfer curve and blur that a board in its rig pictures shows."""
+    cameras, board = read_cameras(folder / "cameras.toml"), board_of(folder)
+    known = []
+    for camera in cameras:
+        picture = rig_picture(folder / "boards" / "rig" / f"{camera.name}.png")
+        known.append(replace(camera, optics=estimate_optics(picture, board)))
+    return replace(cameras, cameras=tuple(known))
+
+
+def read_scene(folder: Path) -> tuple[list[View], Cameras, Rods, np.ndarray, BarAxis]:
     """Views, cameras, rods, motor angles (rad) of all frames, and the true axis of a scene."""
     session = tomllib.loads((folder / "session.toml").read_text())
     wire = Wire(
         **{name: session["whisker"][name] for name in ("shape", "length_mm", "diameter_mm")}
     )
-    rods, cameras = (
-        Rods(wire, Bar(session["bar"]["diameter_mm"])),
-        read_cameras(folder / "cameras.toml"),
-    )
+    rods = Rods(wire, Bar(session["bar"]["diameter_mm"]))
+    cameras = read_cameras_with_optics(folder)
     views = []
     for camera in cameras:
         files = sorted((folder / "trials" / "w" / camera.name).iterdir())

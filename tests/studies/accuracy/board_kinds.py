@@ -1,11 +1,15 @@
 """Cameras by each kind of board: are the stated sigmas true, and what does a contact's place lose against ChArUco?
 
     python tests/studies/accuracy/board_kinds.py --count 10
+    python tests/studies/accuracy/board_kinds.py --whisks FOLDER
 
 Each board is painted through the lenses of two known cameras, held at the same random poses and standing on the rig;
 its points are found in the pictures. One calibration is made of these, and `count` more of the true points with noise
 of the sigmas that the pictures gave. Prints RMS of error over stated sigma of places where the whisker is, for the
 calibration by pictures and for all others, and the sigma of x there, which is that of d_x by the cameras.
+
+With --whisks sessions of each kind are simulated in FOLDER and evaluated, boards to verdict: prints errors of d_x (mm)
+and slope (deg), RMS and largest z, and what is warned of. A session that has its row in FOLDER/whisks.csv is not made again.
 """
 
 import argparse
@@ -17,8 +21,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
+from bench import api
+from bench.rig.simulation import simulate
+from bench.session.session import load_session
 from tests.scenes.board_prints import KINDS, NAMES, picture_of, pose_before
 from tests.studies.accuracy.board_scenes import SIZE_PX, T_RIG_BOARD, WORK_MM, two_cameras
+from tests.studies.accuracy.rows import all_rows
+from tests.studies.accuracy.sessions import errors
 from vision.boards import Corners, find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.turned import with_turns_resolved
@@ -119,11 +128,78 @@ def study(board: Board, count: int) -> str:
     )
 
 
+# The boards of --whisks: each is seen whole on the rig, too.
+ON_RIG = {
+    "charuco": "",
+    "checkerboard": 'kind = "checkerboard"\nsquares = [8, 7]\nsquare_mm = 13.0',
+    "circles": 'kind = "circles"\nsquares = [8, 6]\nsquare_mm = 14.0\nmarker_mm = 8.0',
+    "asymmetric": 'kind = "asymmetric_circles"\nsquares = [4, 9]\nsquare_mm = 9.0\nmarker_mm = 7.0',
+    "aprilgrid": 'kind = "aprilgrid"\nsquares = [5, 4]\nsquare_mm = 22.0\nmarker_mm = 17.0',
+}
+PROTOCOL = """
+name = "{name}"
+[[cameras]]
+name = "high"
+position_mm = [38.0, -175.0, 335.0]
+focal_px = 2010.0
+distortion = [-0.11, 0.14, 0.0006, -0.0004, 0.0]
+[[cameras]]
+name = "low"
+position_mm = [98.0, -325.0, 120.0]
+target_mm = [53.0, 7.0, 0.0]
+focal_px = 1932.0
+[gauges]
+known = true
+[board]
+{board}
+views = 12
+[[trials]]
+beta_deg = [0, 25, 50]
+d_x_mm = 58.0
+"""
+QUANTITIES = {"d_x": "d_x_mm", "beta": "beta_deg"}
+OF_EACH = ("n", "rms", "rms_z", "most_z")
+WHISK_COLUMNS = ("look", *(f"{name}_{what}" for name in QUANTITIES for what in OF_EACH), "status")
+
+
+def whisks_of(folder: Path, name: str) -> dict:
+    """A session by one kind of board, evaluated and reduced."""
+    path = folder / name
+    out = folder / f"{name}_out"
+    protocol = folder / f"{name}.toml"
+    folder.mkdir(parents=True, exist_ok=True)
+    protocol.write_text(PROTOCOL.format(name=name, board=ON_RIG[name]))
+    simulate(path, protocol=protocol, seed=5, workers=2)
+    run = api.evaluate(path, out, figures=False, workers=2)
+    row: dict = {"look": name, "status": " ".join(filter(None, run.whisks["status"]))}
+    for quantity, column in QUANTITIES.items():
+        error, sigma, _ = errors(load_session(path), out, run.whisks, column).T
+        z = error / sigma
+        values = (len(z), np.sqrt(np.mean(error**2)), np.sqrt(np.mean(z**2)), np.abs(z).max())
+        row |= {f"{quantity}_{what}": float(value) for what, value in zip(OF_EACH, values)}
+    return row
+
+
+def print_whisks(folder: Path, only: str) -> None:
+    names = [name for name in ON_RIG if name.startswith(only)]
+    table = folder / "whisks.csv"
+    rows = all_rows(table, WHISK_COLUMNS, names, lambda name: whisks_of(folder, name))
+    for row in rows:
+        print(f"{row['look']}: {row['d_x_n']:.0f} whisks {row['status']}")
+        for name in QUANTITIES:
+            rms, rms_z, most_z = (row[f"{name}_{what}"] for what in OF_EACH[1:])
+            print(f"  {name} off by {rms:.4f} RMS, z {rms_z:.2f} RMS, {most_z:.1f} at most")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--whisks", type=Path, metavar="FOLDER", help="whole whisks, into FOLDER")
     parser.add_argument("--count", type=int, default=10)
     parser.add_argument("--only", default="", help="names that begin so")
     options = parser.parse_args()
+    if options.whisks:
+        print_whisks(options.whisks, options.only)
+        return
     for board, name in zip(KINDS, NAMES):
         if name.startswith(options.only):
             print(f"{name}: {study(board, options.count)}", flush=True)

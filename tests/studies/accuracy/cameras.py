@@ -61,7 +61,7 @@ def real_video(folder: Path, names: list[str], find, **how) -> str:
     sizes = {name: frames.size_px for name, frames in series.items()}
     made = calibrate_cameras(BoardViews(kept, sizes), WEBCAM_BOARD, None, **how)
     done = time.perf_counter()
-    got = check_held_out(made, views, is_held, WEBCAM_BOARD)
+    got = check_held_out(made, views, is_held)
     alone = np.sqrt(np.mean(np.square(list(got.alone_px.values()))))
     seconds = f"{found - begin:.1f} s corners, {done - found:.1f} s adjustment"
     if not got.corners:

@@ -45,6 +45,7 @@ from bench.rig.whisk_mechanics import WhiskMechanics
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_touch
 from bench.trials.estimates import whisk_of
+from bench.trials.seen_friction import seen_friction
 from estimator.two_tilts import SharedContact, shared_contact
 from estimator.uncertainty import Z_95
 from tests.scenes.friction_results import run_of
@@ -56,6 +57,7 @@ from tests.studies.accuracy.estimates_montecarlo import (
     rod_and_beam,
 )
 from vision import Value, WhiskTruth
+from vision.truth.at_angle import TruthAtAngle
 from vision.truth.records import FrameTruth, SharedSigmas
 
 SLOPES_DEG = (-60, -45, -30, 0, 30, 45, 60)
@@ -184,7 +186,7 @@ class DrawnSession:
 
     def _seen(self, number: int, mechanics: WhiskMechanics, speed_rad_s: float) -> SeenWhisk:
         """Draw what cameras see of a push."""
-        beta, _ = mechanics.slope
+        beta, psi = mechanics.slope
         touch_rad = mechanics.touch.motor_rad
         late_rad = self.shared.touch_rad - self.shared.clock_s * speed_rad_s
         seen_touch = touch_rad + late_rad + OWN_TOUCH_RAD * self.rng.normal()
@@ -199,10 +201,15 @@ class DrawnSession:
             touch_rad=Value(seen_touch, float(touch_sigma)),
             d_x_mm=Value(mechanics.touch.d_x_mm + 0.01 * self.rng.normal(), 0.015),
             beta_rad=Value(seen_beta, float(np.hypot(OWN_SLOPE_RAD, SHARED_SLOPE_RAD))),
+            psi_rad=Value(psi + OWN_SLOPE_RAD * self.rng.normal(), OWN_SLOPE_RAD),
             frames=frames_at(speed_rad_s),
             shared=shared,
         )
-        return SeenWhisk(truth, deflection=self._deflection(mechanics))
+        at = TruthAtAngle(
+            theta_rad=THETAS_RAD[2], slip_mm=Value(np.nan, OWN_PLACE_MM), slip_shared_mm=0.0
+        )
+        whisk = SeenWhisk(truth, at=at, deflection=self._deflection(mechanics))
+        return replace(whisk, friction_rad=seen_friction(whisk, self.whisker))
 
     def _deflection(self, mechanics: WhiskMechanics) -> Deflection:
         """Draw the contact's place in the hub's axes at the pushing angles."""

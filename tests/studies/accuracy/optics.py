@@ -23,21 +23,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from bench.session.footage import rig_picture
 from bench.session.session import load_session
 from tests.studies.accuracy import error_parts
-from tests.studies.accuracy.bar_scenes import read_scene
+from tests.studies.accuracy.bar_scenes import board_of, read_scene
 from vision.boards.board_optics import estimate_optics
-from vision.boards.charuco import CharucoBoard
 from vision.geometry.optics import UNKNOWN, Optics
 from vision.geometry.refusals import Refused
 from vision.pictures.frames import Frames
 
 AS_BY_A_BOARD = {"log_gamma_sigma": 0.15, "log_blur_sigma": 0.1}
 PIXEL_PX = 12**-0.5
-
-
-def board_of(folder: Path) -> CharucoBoard:
-    """The board of a session."""
-    table = tomllib.loads((folder / "session.toml").read_text())["board"]
-    return CharucoBoard(**table | {"squares": tuple(table["squares"])})
 
 
 def true_optics(folder: Path) -> Optics:

@@ -23,9 +23,11 @@ from tests.studies.accuracy.bar_scenes import read_scene
 from tests.studies.accuracy.coverage import QUANTITIES, Seen, row_of
 from tests.studies.accuracy.rows import HALF_WIDTH_95, all_rows
 from tests.studies.accuracy.scenes import Truth
+from vision.geometry.contact import BarAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.touched.one_view import widest_angle_rad
 from vision.truth.observe import observe_trial
+from vision.truth.records import WhiskTruth
 from vision.truth.trial_pictures import TrialPictures
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -52,16 +54,23 @@ class PathTraced:
 def see_scene(folder: Path, settings: VisionSettings = _STANDARD) -> tuple[PathTraced, Seen]:
     """Return a scene with its truth, and what is seen of it."""
     views, cameras, rods, motor_rad, axis = read_scene(folder)
-    written = _written_truth(folder)
-    frames = np.genfromtxt(folder / "trials" / "w" / "truth.csv", delimiter=",", names=True)
-    slip = np.where(frames["contact"] > 0, frames["slip_mm"], np.nan)
     pictures = TrialPictures(
         {view.camera.name: view.frames for view in views},
-        frames["time_s"],
+        frames_of(folder)["time_s"],
         motor_rad,
         {view.camera.name: view.background for view in views},
     )
     (whisk,) = observe_trial(pictures, [slice(0, len(motor_rad))], cameras, rods, settings).whisks
+    return beside_truth(folder, cameras, motor_rad, axis, whisk)
+
+
+def beside_truth(
+    folder: Path, cameras: tuple, motor_rad: np.ndarray, axis: BarAxis, whisk: WhiskTruth
+) -> tuple[PathTraced, Seen]:
+    """Return a scene with its truth in the frames of a whisk, and what that has."""
+    written = _written_truth(folder)
+    frames = frames_of(folder)
+    slip = np.where(frames["contact"] > 0, frames["slip_mm"], np.nan)
     looked_at = slice(None) if whisk.frames is None else whisk.frames.index
     truth = Truth(
         np.radians(written["touch_deg"]),
@@ -82,6 +91,11 @@ def see_scene(folder: Path, settings: VisionSettings = _STANDARD) -> tuple[PathT
     values = {name: one.value for name, one in found.items()}
     sigmas = {name: one.sigma for name, one in found.items()}
     return scene, Seen(values, sigmas, whisk.status)
+
+
+def frames_of(folder: Path) -> np.ndarray:
+    """Return the truth of a scene's frames, with their times and motor angles."""
+    return np.genfromtxt(folder / "trials" / "w" / "truth.csv", delimiter=",", names=True)
 
 
 def scene_row(folder: Path) -> dict:

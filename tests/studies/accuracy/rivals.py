@@ -5,13 +5,13 @@
 Each contact is pushed at 90°/s by the exact mechanics of the rig, with ringing, noise, hum and a load cell;
 drawn anew are its distance (30 to 80 mm) and the lean of the bar (N(0, 5°)); the bar is 6 mm thick, θ is 3°,
 α_est = 10 ± 4°. By friction angle and slope: RMS error and stated sigma (RMS) of d_x in % of the truth, and over
-all contacts how often the 95 % interval holds. Reorientation turns the plane of rotation until the slip that
-is left does not matter, at most four times; its pushes are counted, and its seconds with them.
+all contacts how often the 95 % interval holds, and error over sigma. Reorientation turns the plane of rotation until the
+slip that is left does not matter, at most four times; its pushes are counted, and its seconds with them.
 """
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,10 +20,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.base.drawing import nested_size, save, style
-from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD, Settings
-from bench.gauges.drift import allow_drift, drift_rate
-from bench.gauges.felt import strokes_of
-from bench.gauges.matrix import GaugeMatrix
+from bench.base.settings import OBJECT_REACH_MM, TILT_SIGMA_RAD
 from bench.rig.protocol import Protocol
 from bench.rig.protocol_tables import (
     GaugesTable,
@@ -32,11 +29,6 @@ from bench.rig.protocol_tables import (
     PicturesTable,
     TrialTable,
 )
-from bench.rig.recording import Recording
-from bench.session.signals import Signals
-from bench.trials.readout import Readout, whisk_at
-from bench.trials.sensor_readings import with_others
-from estimator.beam import Beam
 from estimator.builtin import no_slip, with_friction
 from estimator.longitudinal import compliance_with_rolling
 from estimator.reorientation import next_turn_rad, reoriented
@@ -44,12 +36,11 @@ from estimator.sensors import SENSORS
 from estimator.uncertainty import Z_95
 from estimator.vibration import vibration
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
+from tests.studies.accuracy.sensors import felt_whisk, recorded_stroke
 
 ALPHAS_DEG = (3.0, 10.0, 20.0)
 SLOPES_DEG = (0.0, 20.0, 40.0, 60.0, 75.0)
 THETA_RAD = np.radians(3.0)
-BEAM = Beam.from_modulus(60.0, 1.0, 100.0)
-READOUT = Readout(GaugeMatrix(10.0 * np.eye(2)))
 MOST_PUSHES = 4
 SPEED_DEG_S = 90.0
 BEFORE_DEG = 20.0
@@ -181,36 +172,32 @@ def pushes_of(contact: Contact, rng: np.random.Generator) -> Push:
 
 def felt(protocol: Protocol, rng: np.random.Generator) -> tuple[Whisk, float] | None:
     """Return a push as it is felt, and its true distance; None where it finds no hold or is not felt."""
-    (run,) = protocol.runs()
-    try:
-        recording = Recording.make(protocol, run, rng)
-    except ArithmeticError:
+    found = recorded_stroke(protocol, rng)
+    if found is None:
         return None
-    time, motor_deg, y, z, *forces = recording.signals.T
-    signals = Signals(time, np.radians(motor_deg), y, z, "V", forces_N=np.stack(forces, axis=1))
-    (stroke,) = strokes_of(signals, run, Settings())
-    touch = allow_drift(stroke.touch(), drift_rate([]), stroke.speed_rad_s)
-    whisk = touch.status or whisk_at(stroke, READOUT, touch, BEAM, THETA_RAD)
-    if isinstance(whisk, str):
-        return None
-    whisk = with_others(
-        whisk, stroke, READOUT, touch, force_drift_rate=np.zeros(3), scale_sigma=0.0
-    )
-    return whisk, recording.touch.d_x_mm
+    truth_mm, stroke = found
+    whisk = felt_whisk(stroke, THETA_RAD)
+    return None if whisk is None else (whisk, truth_mm)
 
 
-def contacts(count: int, rng: np.random.Generator) -> Iterator[Contact]:
-    """Yield the contacts of the table, `count` a cell."""
-    for alpha_deg in ALPHAS_DEG:
+def contacts(
+    count: int, seed: int, alphas_deg: Sequence[float]
+) -> Iterator[tuple[Contact, np.random.Generator]]:
+    """Yield the contacts of the table, `count` a cell, each cell with a random stream of its own."""
+    for alpha_deg in alphas_deg:
         for beta_deg in SLOPES_DEG:
+            rng = np.random.default_rng([seed, int(alpha_deg), int(beta_deg)])
             for _ in range(count):
-                yield Contact(beta_deg, alpha_deg, rng.uniform(30.0, 80.0), 5.0 * rng.normal())
+                contact = Contact(beta_deg, alpha_deg, rng.uniform(30.0, 80.0), 5.0 * rng.normal())
+                yield contact, rng
 
 
-def answers(count: int, rng: np.random.Generator) -> dict[tuple[str, float, float], list[Answer]]:
+def answers(
+    count: int, seed: int, alphas_deg: Sequence[float] = ALPHAS_DEG
+) -> dict[tuple[str, float, float], list[Answer]]:
     """Return what each method says, by its title, friction angle and slope."""
     found = {}
-    for contact in contacts(count, rng):
+    for contact, rng in contacts(count, seed, alphas_deg):
         for method in METHODS:
             answer = method.answer(pushes_of(contact, rng))
             if answer is not None:
@@ -246,15 +233,16 @@ def table_lines(found: dict) -> Iterator[str]:
 
 def needs_lines(found: dict) -> Iterator[str]:
     """Yield what each method needs, and how often its intervals hold over all contacts."""
-    yield "| method | pushes | seconds | axes | sensors | 95 % hold |"
-    yield "|---|---|---|---|---|---|"
+    yield "| method | pushes | seconds | axes | sensors | 95 % hold | z RMS |"
+    yield "|---|---|---|---|---|---|---|"
     for method in METHODS:
         said = [one for key, cell in found.items() if key[0] == method.title for one in cell]
         pushes = np.mean([one.pushes for one in said])
         known = [one.is_inside for one in said if np.isfinite(one.error)]
         held = f"{100 * np.mean(known):.0f} % of {len(known)}"
         needs = f"{pushes:.1f} | {pushes * PUSH_S:.2g} | {method.axes} | {method.sensors}"
-        yield f"| {method.title} | {needs} | {held} |"
+        z = 0.01 * rms_percent([one.error * one.truth_mm / one.estimate.sigma_mm for one in said])
+        yield f"| {method.title} | {needs} | {held} | {z:.2f} |"
 
 
 def draw(found: dict, path: Path) -> None:
@@ -294,7 +282,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--figure", type=Path)
     options = parser.parse_args()
-    found = answers(options.count, np.random.default_rng(options.seed))
+    found = answers(options.count, options.seed)
     print(*table_lines(found), "", *needs_lines(found), sep="\n")
     if options.figure:
         draw(found, options.figure)

@@ -45,6 +45,7 @@ from bench.trials.sensor_readings import with_others
 from estimator.beam import Beam
 from estimator.builtin import no_slip, with_friction
 from estimator.sensors import SENSORS
+from estimator.whisk import Whisk
 from tests.studies.accuracy.estimates_montecarlo import (
     ALPHA_EST_DEG,
     ALPHA_SIGMA_DEG,
@@ -127,6 +128,13 @@ def recorded(one: Drawn, rng: np.random.Generator) -> tuple[float, FeltStroke] |
         motor=MotorTable(after_deg=5.0),
         pictures=PicturesTable(step_deg=3.0),
     )
+    return recorded_stroke(protocol, rng)
+
+
+def recorded_stroke(
+    protocol: Protocol, rng: np.random.Generator
+) -> tuple[float, FeltStroke] | None:
+    """(true d_x, the stroke as felt) of a protocol's one push; None where the whisker finds no hold."""
     (run,) = protocol.runs()
     try:
         recording = Recording.make(protocol, run, rng)
@@ -138,16 +146,21 @@ def recorded(one: Drawn, rng: np.random.Generator) -> tuple[float, FeltStroke] |
     return recording.touch.d_x_mm, stroke
 
 
-def answered(one: Drawn, stroke: FeltStroke, settings: Settings) -> dict[str, EstimateRow]:
-    """What each sensor says; nothing where no touch is felt. Nothing drifts, and the bench is told so."""
+def felt_whisk(stroke: FeltStroke, theta_rad: float) -> Whisk | None:
+    """The whisk of a stroke at a pushing angle; None where no touch is felt. Nothing drifts, and the bench is told so."""
     readout = Readout(GaugeMatrix(10.0 * np.eye(2)))
     touch = allow_drift(stroke.touch(), drift_rate([]), stroke.speed_rad_s)
-    whisk = touch.status or whisk_at(stroke, readout, touch, BEAM, np.radians(one.theta_deg))
+    whisk = touch.status or whisk_at(stroke, readout, touch, BEAM, theta_rad)
     if isinstance(whisk, str):
+        return None
+    return with_others(whisk, stroke, readout, touch, force_drift_rate=np.zeros(3), scale_sigma=0.0)
+
+
+def answered(one: Drawn, stroke: FeltStroke, settings: Settings) -> dict[str, EstimateRow]:
+    """What each sensor says; nothing where no touch is felt."""
+    whisk = felt_whisk(stroke, np.radians(one.theta_deg))
+    if whisk is None:
         return {}
-    whisk = with_others(
-        whisk, stroke, readout, touch, force_drift_rate=np.zeros(3), scale_sigma=0.0
-    )
     return {row.estimator: row for row in answers(whisk, NAMED, settings, RADII_MM)}
 
 

@@ -21,7 +21,7 @@ import cv2
 from bench.rig import build
 from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import RestShape, Rod
-from bench.rig.parts import Job, Part, render_frames
+from bench.rig.parts import Job, SessionPart, render_frames
 from bench.rig.protocol import load
 from bench.rig.recording import Recording
 from bench.rig.simulation import make_part
@@ -86,7 +86,7 @@ def session_cost(protocol_name: str, every: int) -> tuple[float, float]:
     return spent / 60, size / 1e9
 
 
-def _made(job: Job, part: Part) -> tuple[float, int]:
+def _made(job: Job, part: SessionPart) -> tuple[float, int]:
     begin = time.process_time()
     make_part(job, part)
     cost = time.process_time() - begin
