@@ -4,11 +4,15 @@ import os
 import shutil
 from pathlib import Path
 
-import numpy as np
-import pytest
-from hypothesis import settings
+from bench.base.workers import single_thread
 
-from fixtures.say_exact import exact_copy
+single_thread()  # as every verb does, before NumPy is imported
+
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
+from hypothesis import settings  # noqa: E402
+
+from fixtures.say_exact import exact_copy  # noqa: E402
 
 # The same examples on every machine, however busy it is.
 settings.register_profile("repeatable", deadline=None, derandomize=True)

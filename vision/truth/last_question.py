@@ -109,6 +109,16 @@ class _Line:
         """Return half the width in the middle of the line."""
         return float(np.median(self.radius_px))
 
+    @property
+    def is_strip(self) -> bool:
+        """Return whether the silhouette is longer than it may be shifted.
+
+        Where a camera looks along the bar it is shorter, and changes that end beside it count as much as
+        those that follow it.
+        """
+        length_px = np.linalg.norm(self.foot_px[-1] - self.foot_px[0])
+        return bool(length_px > _FARTHEST_RADII * self.width_radius_px)
+
     def offsets(self, px: np.ndarray) -> np.ndarray:
         """Return how far lines through two points (..., 2, 2) px are from this one at its ends.
 
@@ -192,7 +202,7 @@ class BarQuestion:
         axis: BarAxis,
         rods: Rods,
     ):
-        """Straighten the pictures of each camera that shows the drawn bar along it.
+        """Straighten the pictures along the drawn bar, of each camera that shows it from a side.
 
         curves: by frame, of the wire, which is left out; the frames whose pictures are used.
         """
@@ -201,6 +211,8 @@ class BarQuestion:
         self.bands = []
         for view in views:
             line = _Line.of(view.camera, axis, self.radius_mm)
+            if not line.is_strip:
+                continue
             changed = _change(*_straightened(view, line, curves, rods))
             if np.mean(changed == _UNKNOWN) > _MOST_HIDDEN:
                 continue

@@ -119,6 +119,16 @@ def test_a_shadow_beside_the_bar_makes_no_other_place_better():
     assert gain < max(0.02, 2.5 * sigma) or question.apart_px(question.best(), TRUE) < 2.0
 
 
+@pytest.mark.parametrize("degrees, asked", [(8.0, 0), (25.0, 1)])
+def test_a_camera_that_looks_along_the_bar_is_not_asked(degrees, asked):
+    """60 mm of a bar of 6 mm look 10 sin(degrees) of its width long: 1.4 and 4.2, where 2 are needed."""
+    across = axis_frame(TRUE.direction)[0]
+    angle = np.radians(degrees)
+    looks = camera("along", tuple(np.cos(angle) * TRUE.direction + np.sin(angle) * across))
+    question = BarQuestion([view(looks, np.random.default_rng(3), 1.0)], wire(), TRUE, RODS)
+    assert len(question.bands) == asked
+
+
 def test_a_wire_on_the_bar_is_left_out():
     hidden = ask(TRUE).bands[0].changed == 0.5
     assert 0.005 < np.mean(hidden) < 0.1
