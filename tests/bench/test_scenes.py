@@ -20,7 +20,7 @@ def test_a_scene_is_seen_within_what_it_states(name, tmp_path):
     """Three values and some eight slips that err alike: |z| beyond 3 once in a hundred such scenes.
 
     The truth lies outside of what is evaluated. So that no wide sigma passes, errors are below five times those of two
-    cameras 20 degrees apart in docs/proof.md (0.005 and 0.12 degrees, 0.003 mm of slip). That of d_x hangs on the bar's
+    cameras 20 degrees apart in docs/ladder.md (0.005 and 0.12 degrees, 0.003 mm of slip). That of d_x hangs on the bar's
     lines, and these bars have a rim as dark as the bench: it is below 0.1 mm, four times the median sigma there.
     """
     session = tmp_path / "session"

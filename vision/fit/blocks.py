@@ -29,11 +29,11 @@ PULL_PRIOR = 0.2
 # [px] Offset of a wire's whole line beyond that by light and lens: shadows, reflections. With it
 # the true wires of 65 path-traced views are most probable. Study: wire_scenes.py.
 WIRE_OFFSET_PX = 0.08
-# [px] Tilt of such a line, at its ends: the RMS of 72 views (docs/proof.md). Study: wire_scenes.py.
+# [px] Tilt of such a line, at its ends: the RMS of 72 views (docs/ladder.md). Study: wire_scenes.py.
 WIRE_TILT_PX = 0.09
 # [px] As the whisker swings before light and background its offset changes a little, at its ends
 # and in the middle: 0.020 to 0.034 px in path-traced views, 0.012 to 0.021 in painted ones
-# (docs/proof.md). Besides, what moves a line by so much moves it by as much over a radian of the
+# (docs/ladder.md). Besides, what moves a line by so much moves it by as much over a radian of the
 # swing. Study: no script.
 WIRE_DRIFT_PX = 0.02
 # [px] Sigmas of the six shapes of `problem.wire_modes`, in their order.

@@ -35,7 +35,7 @@ from vision.wire.points import LinePoints
 from vision.wire.shading import Knots, fit_shading
 
 # [px] An edge's error beyond its formal sigma: half widths of path-traced and painted bars show it
-# (docs/proof.md, one camera). Study: coverage.py alone.
+# (docs/ladder.md, one camera). Study: coverage.py alone.
 EDGE_PX = 0.12
 # [1] True over formal sigma of an edge, by the same bars. Study: coverage.py alone.
 FORMAL_TO_TRUE = 2.0
