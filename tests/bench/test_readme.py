@@ -51,7 +51,7 @@ def test_the_estimator_shown_finds_the_distance():
     assert 0.15 < estimate.sigma_mm < 0.5
 
 
-VERBS = re.findall(r"^\| `([a-z][a-z-]*(?: [a-z]+)?)", VERBS_PAGE, flags=re.MULTILINE)
+VERBS = re.findall(r"^- `([a-z][a-z-]*(?: [a-z]+)?)", VERBS_PAGE, flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize("verb", VERBS)
