@@ -13,7 +13,7 @@ from math import hypot, isnan, nan, sqrt, tan
 
 from estimator import distance, first_order, uncertainty
 from estimator.beam import Beam
-from estimator.exact_rod import UNCONVERGED, Reach, contact_by_exact_rod
+from estimator.exact_rod import UNCONVERGED, Reach, RodContact, contact_by_exact_rod
 from estimator.reasons import NamedReason
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
@@ -88,8 +88,22 @@ def exact_rod(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     if contact is None or abs(contact.d_x_mm / ten.d_x_mm - 1) > _MOST_FROM_10:
         at_tip = ten.d_x_mm == whisk.beam.length_mm
         return ten if at_tip else Estimate(nan, nan, UNCONVERGED)
+    of_rest = _sigma_of_rest(felt, whisk.beam, reach, is_held(whisk), contact.d_x_mm)
+    return _as_of_rod(ten, contact, of_rest, whisk, settings)
+
+
+def _as_of_rod(
+    ten: Estimate,
+    contact: RodContact,
+    of_rest: float,
+    whisk: Whisk,
+    settings: EstimatorSettings,
+) -> Estimate:
+    """Return the estimate of (10), `ten`, with distance, slope and sigma of the exact rod's contact.
+
+    of_rest: one sigma by the stated unloaded shape, mm.
+    """
     d_x = contact.d_x_mm
-    of_rest = _sigma_of_rest(felt, whisk.beam, reach, is_held(whisk), d_x)
     factor = d_x / ten.d_x_mm
     low, high = _wider(ten.low_mm * factor, d_x, ten.high_mm * factor, of_rest)
     high = min(high, whisk.beam.length_mm)

@@ -98,14 +98,20 @@ class ProfiledBeam(Beam):
 
 @lru_cache(maxsize=16)
 def _as_cylinder(widths: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the base's cylinder's distances (n,) at `_SHARES`, and their derivatives by these."""
-    at = _SHARES[:, None] * 0.5 * (1.0 + _AT)
-    lever = _SHARES[:, None] - at
-    softness = np.maximum(polynomial.polyval(at, widths), _LEAST_WIDTH) ** -4.0
+    """Return the base's cylinder's distances (n,) at `_SHARES`, and their derivatives by these.
+
+    A rod of width w(s) that is touched at x is as stiff as the base's cylinder that is touched at
+    d = 3/x² ∫₀ˣ (x − s)² / w⁴ ds; integrals are Gauss–Legendre's.
+    """
     half = 0.5 * _SHARES
-    twice = half * ((lever * softness) @ _WEIGHTS)
+    at = _SHARES[:, None] * 0.5 * (1.0 + _AT)  # (n, nodes): s, from the base to d
+    lever = _SHARES[:, None] - at
+    width = np.maximum(polynomial.polyval(at, widths), _LEAST_WIDTH)
+    softness = width**-4.0
+    by_lever = half * ((lever * softness) @ _WEIGHTS)
     distance = 3.0 * half * ((lever**2 * softness) @ _WEIGHTS) / _SHARES**2
-    return distance, 6.0 * twice / _SHARES**2 - 2.0 * distance / _SHARES
+    slope = 6.0 * by_lever / _SHARES**2 - 2.0 * distance / _SHARES
+    return distance, slope
 
 
 @lru_cache(maxsize=32)

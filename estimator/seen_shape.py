@@ -202,11 +202,28 @@ def contact_of_shape(
         vector, covariance = fit.solve(begin)
     except ArithmeticError:
         return ShapeContact(status=UNCONVERGED)
+    model_share = fit.model_share(vector, reach_mm / length, tilt_sigma_rad)
+    force_share = fit.force_share(rigidity_share)
+    return _contact_of_fit(fit, vector, covariance, beam, model_share, force_share)
+
+
+def _contact_of_fit(
+    fit: "_ShapeFit",
+    vector: np.ndarray,
+    covariance: np.ndarray,
+    beam: Beam,
+    model_share: float,
+    force_share: float,
+) -> ShapeContact:
+    """Return the contact of fitted parameters, in mm and N, without a force where the plane of bending
+    is not known.
+
+    model_share, force_share: relative sigmas of d_x and force by models.
+    """
+    length = beam.length_mm
     values = fit.observables(vector)
     gradient = _derivatives(fit.observables, vector)  # (4, parameters)
     spread = gradient @ covariance @ gradient.T
-    model_share = fit.model_share(vector, values[1], reach_mm / length, tilt_sigma_rad)
-    force_share = fit.force_share(rigidity_share)
     unit = np.array([1.0, length, beam.rigidity_Nmm2 / length**2, length])
     spread_in_mm = spread * np.outer(unit, unit)
     contact = _with_sigmas(unit * values, spread_in_mm, length, model_share, force_share)
@@ -355,11 +372,13 @@ class _ShapeFit:
     def _tangents(self, vector, arc, contact, per_force):
         """Compute unit tangents (…, 3): those of the rest shape, turned by the bend."""
         secant = hypot(1.0, vector[_TAN])  # of φ
-        angle = per_force * bend(arc, contact, self.taper) * secant
-        turn = np.sin(angle) / secant
-        powers = np.stack([0 * arc, 1 + 0 * arc, 2 * arc, 3 * arc * arc], axis=-1)
-        y = powers @ vector[:4] + turn
-        z = powers @ vector[4:8] + turn * vector[_TAN]
+        bend_rad = per_force * bend(arc, contact, self.taper) * secant
+        turn_y = np.sin(bend_rad) / secant
+        turn_z = turn_y * vector[_TAN]
+        # Slopes of the rest shape's polynomials, whose first coefficient is an offset.
+        slopes = np.stack([0 * arc, 1 + 0 * arc, 2 * arc, 3 * arc * arc], axis=-1)
+        y = slopes @ vector[:4] + turn_y
+        z = slopes @ vector[4:8] + turn_z
         x = np.sqrt(np.maximum(1.0 - y * y - z * z, 0.01))
         return np.stack([x, y, z], axis=-1)
 
@@ -395,9 +414,10 @@ class _ShapeFit:
         moved = x * sin(theta) + y * cos(theta)
         return np.array([vector[_TOUCH], d_x, force, moved])
 
-    def model_share(self, vector, d_x, reach, tilt_sigma_rad) -> float:
+    def model_share(self, vector, reach, tilt_sigma_rad) -> float:
         """Return the relative sigma of d_x by thickness and lean of the object."""
         phi = atan(abs(vector[_TAN]))
+        d_x = self.observables(vector)[1]
         rolling = load_cell.rolling(self.theta_rad, reach, 0.0, d_x, 1.0 - self.taper * d_x)
         return hypot(rolling, load_cell.leaning(self.theta_rad, tilt_sigma_rad, phi, 0.0))
 

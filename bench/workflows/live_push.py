@@ -133,7 +133,7 @@ def play_trial(
     """
     recorded = load_session(session, trials=[name], follow_links=follow_links)
     trial = recorded.trial(name)
-    recording = Recording.read(trial)
+    recording = RecordedPush.read(trial)
     settings = VisionSettings(clock_sigma_s=recording.times.clock_sigma_s)
     bench = _bench(recorded, trial, out, (0.0, 0.0), settings)
     for number, frames in enumerate(recording.strokes):
@@ -151,7 +151,7 @@ def play_trial(
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class RecordedPush:
     """A trial's pictures by camera and frame, with times and motor angles, deg, by frame.
 
     strokes: of each forward stroke its frames (n,).
@@ -163,7 +163,7 @@ class Recording:
     strokes: list[np.ndarray]
 
     @classmethod
-    def read(cls, trial: Trial) -> "Recording":
+    def read(cls, trial: Trial) -> "RecordedPush":
         """Read the pictures of a trial. Raises BadInput where there are none, or no push."""
         signals = read_signals(trial)
         times = frame_times(trial)

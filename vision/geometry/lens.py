@@ -118,8 +118,9 @@ def _by_lens(ab: np.ndarray, distorted: np.ndarray, lens: np.ndarray) -> np.ndar
     jacobian = np.zeros((len(ab), 2, 9))
     jacobian[:, [0, 1], [0, 1]] = distorted
     jacobian[:, [0, 1], [2, 3]] = 1.0
+    # Each distortion term moves a point along (a, b); p1 and p2 also along one axis, by r².
     factors = np.stack([r2, r2 * r2, 2.0 * b, 2.0 * a, r2 * r2 * r2], axis=1)  # k1 k2 p1 p2 k3
-    by_distortion = ab[:, :, None] * factors[:, None]
+    by_distortion = ab[:, :, None] * factors[:, None]  # (n, 2, 5)
     by_distortion[:, [1, 0], [2, 3]] += r2[:, None]
     jacobian[:, :, 4:] = lens[:2, None] * by_distortion
     return jacobian
@@ -131,4 +132,5 @@ def _solve_2x2(J: np.ndarray, y: np.ndarray) -> np.ndarray:
     determinant = a * d - b * c
     determinant = np.where(np.abs(determinant) > 1e-12, determinant, np.nan)
     y0, y1 = y.T
-    return np.column_stack([d * y0 - b * y1, a * y1 - c * y0]) / determinant[:, None]
+    numerators = np.column_stack([d * y0 - b * y1, a * y1 - c * y0])
+    return numerators / determinant[:, None]

@@ -67,10 +67,12 @@ def left_jacobian(w: np.ndarray) -> np.ndarray:
     """Return J (..., 3, 3) with Exp(w + d) = Exp(J d) Exp(w) to first order in d, at w (..., 3)."""
     angle = np.linalg.norm(w, axis=-1)[..., None, None]
     is_small = angle < _SMALL_ANGLE_RAD
-    safe = np.where(is_small, 1.0, angle)
-    second = np.where(is_small, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
+    divisor = np.where(is_small, 1.0, angle)
+    # J = 1 + (1 − cos a) / a² W + (a − sin a) / a³ W², with limits of 1/2 and 1/6.
+    first = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    second = np.where(is_small, 1.0 / 6.0, (divisor - np.sin(divisor)) / divisor**3)
     W = skew(w)
-    return np.eye(3) + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * W + second * (W @ W)
+    return np.eye(3) + first * W + second * (W @ W)
 
 
 def _axis_of_half_turn(R: np.ndarray) -> np.ndarray:

@@ -61,16 +61,23 @@ class Balls:
     growth: float
 
     def silhouette(self, centre_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute where sights graze the surface of the balls, see `RoundedAxis.silhouette`."""
-        root = np.sqrt(1.0 - self.growth**2)
+        """Compute where sights graze the surface of the balls, see `RoundedAxis.silhouette`.
+
+        A surface of growing balls has normals n with n·ahead = −growth, and a sight grazes it where
+        n·sight = −radius. Both leave two normals, one on either side of the plane of sight and middle.
+        """
+        root = np.sqrt(1.0 - self.growth**2)  # length of n across the middle
         towards, along, distance = self._sights(centre_mm)
+        # Of the angle round the middle between n and the sight; beyond 1 the centre is within a ball.
         cosine = (self.growth * along - self.radius_mm) / (root * distance)
         cosine = np.where(np.abs(cosine) < 1.0, cosine, np.nan)
-        between = root * cosine * towards - self.growth * self.ahead
-        sideways = root * np.sqrt(1.0 - cosine**2) * np.cross(self.ahead, towards)
-        normals = np.stack([between + sideways, between - sideways], axis=-3)
-        both_mm = self.middle_mm[..., None, :, :] + self.radius_mm[..., None, :, :] * normals
-        return both_mm, normals
+        sine = np.sqrt(1.0 - cosine**2)
+        in_plane = root * cosine * towards - self.growth * self.ahead
+        off_plane = root * sine * np.cross(self.ahead, towards)
+        normals = np.stack([in_plane + off_plane, in_plane - off_plane], axis=-3)  # (..., 2, m, 3)
+        middle_mm = self.middle_mm[..., None, :, :]
+        radius_mm = self.radius_mm[..., None, :, :]
+        return middle_mm + radius_mm * normals, normals
 
     def _sights(self, centre_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the sights from a centre to the balls, in parts.

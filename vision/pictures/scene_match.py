@@ -82,12 +82,14 @@ def likeness(first: np.ndarray, second: np.ndarray) -> Likeness:
     cross = fft.rfft2(first) * np.conj(fft.rfft2(second))
     magnitude = np.abs(cross)
     floor = 1e-6 * max(float(magnitude.max()), 1e-6)
-    surface = fft.irfft2(cross / np.maximum(magnitude, floor), first.shape)
+    phases = cross / np.maximum(magnitude, floor)  # each frequency counts alike
+    surface = fft.irfft2(phases, first.shape)  # (h, w): the correlation at each shift
     row, column = np.unravel_index(int(np.argmax(surface)), surface.shape)
     scatter = max(float(surface.std()), 1e-12)
+    peak = float(surface[row, column]) / scatter
     y = HALF * _signed(row, surface.shape[0])
     x = HALF * _signed(column, surface.shape[1])
-    return Likeness(float(surface[row, column]) / scatter, (float(x), float(y)))
+    return Likeness(peak, (float(x), float(y)))
 
 
 def _signed(index: int, size: int) -> int:
