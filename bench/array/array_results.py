@@ -38,10 +38,9 @@ from vision.geometry import counted
 
 ARRAY_WHISKS = replace(WHISKS, columns=(WHISKER, *WHISKS.columns))
 ARRAY_ESTIMATES = replace(ESTIMATES, columns=(WHISKER, *ESTIMATES.columns))
+_OF_ALL = (ARRAY_WHISKS, ARRAY_ESTIMATES, SURFACE_POINTS, SIZE, CONTOUR)
 # Of all whiskers, by name.
-TABLES = {
-    table.name: table for table in (ARRAY_WHISKS, ARRAY_ESTIMATES, SURFACE_POINTS, SIZE, CONTOUR)
-}
+TABLES = {table.name: table for table in _OF_ALL}
 
 
 @dataclass(frozen=True, eq=False)

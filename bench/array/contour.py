@@ -94,11 +94,12 @@ def contours(
         if isinstance(polygon, Contour):
             names = tuple(mine[number].whisker for number in polygon.line)
             height_mm = step * _HEIGHT_MM
-            outside = [
-                _outside_mm(points, height_mm, surfaces.get(trial))
-                for points in (polygon.middle_mm, polygon.corner_mm)
-            ]
-            found.append(TrialContour(trial, names, height_mm, polygon, *outside))
+            surface = surfaces.get(trial)
+            middles_off_mm = _outside_mm(polygon.middle_mm, height_mm, surface)
+            corners_off_mm = _outside_mm(polygon.corner_mm, height_mm, surface)
+            found.append(
+                TrialContour(trial, names, height_mm, polygon, middles_off_mm, corners_off_mm)
+            )
     return found
 
 
@@ -137,6 +138,8 @@ def _outside_mm(
 
 def write_contours(out: Path, found: Sequence[TrialContour]) -> None:
     """Write contour.csv where there is any contour."""
-    rows = [row for one in found for row in one.rows()]
+    rows = []
+    for one in found:
+        rows += one.rows()
     if rows:
         CONTOUR.write(out, rows)

@@ -53,7 +53,8 @@ def _check_opencv() -> None:
     version = getattr(cv2, "__version__", None)
     if version is None or not hasattr(getattr(cv2, "aruco", None), "CharucoDetector"):
         raise BadInput(f"cv2 is broken (no cv2.aruco.CharucoDetector); {_cure([OPENCV])}")
-    if tuple(int(part) for part in re.findall(r"\d+", version)[:2]) < OLDEST_OPENCV:
+    major_minor = re.findall(r"\d+", version)[:2]
+    if tuple(map(int, major_minor)) < OLDEST_OPENCV:
         needed = ".".join(str(part) for part in OLDEST_OPENCV)
         raise BadInput(f"OpenCV is {version}, {needed} or newer is needed; {_cure([OPENCV])}")
 

@@ -156,7 +156,9 @@ class Clamp:
         if not np.all(np.isfinite(corners_px)):
             return np.zeros(len(px), dtype=bool)
         hull = cv2.convexHull(corners_px.astype(np.float32))
-        is_inside = [cv2.pointPolygonTest(hull, (float(u), float(v)), False) >= 0 for u, v in px]
+        is_inside = []
+        for u, v in px.tolist():
+            is_inside.append(cv2.pointPolygonTest(hull, (u, v), False) >= 0)
         distance_mm = np.linalg.norm(points_mm - camera.centre_mm, axis=1)
         clamp_mm = np.linalg.norm(self.corners_mm.mean(axis=0) - camera.centre_mm)
         return np.array(is_inside, dtype=bool) & (distance_mm > clamp_mm)

@@ -151,9 +151,11 @@ def _stated_lines(rows: Sequence[Row]) -> Iterator[str]:
     if not both:
         return
     ratios = {}  # by quantity, expected over stated (rows,)
+    medians = []
     for name in QUANTITIES:
-        ratios[name] = np.array([row.outlook.sigma[name] / row.stated[name] for row in both])
-    medians = [f"{_SYMBOLS[name]} {np.median(ratio):.2f}" for name, ratio in ratios.items()]
+        ratio = np.array([row.outlook.sigma[name] / row.stated[name] for row in both])
+        ratios[name] = ratio
+        medians.append(f"{_SYMBOLS[name]} {np.median(ratio):.2f}")
     yield ""
     yield f"Expected over stated, median over {len(both)} whisks: {', '.join(medians)}."
     for name, ratio in ratios.items():

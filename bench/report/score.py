@@ -232,10 +232,13 @@ def _heard(session: Session, out: Path) -> Iterator[Score]:
 
 def _true_contacts(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Return motor angles (n,), degrees, and contacts (n, 3) of the frames that touch."""
-    rows = [row for row in (_read_rows(path) if path.is_file() else ()) if row["contact"] == "1"]
-    table = [[float(row[name]) for name in ("motor_deg", "x_mm", "y_mm", "z_mm")] for row in rows]
-    numbers = np.array(table).reshape(-1, 4)
-    return numbers[:, 0], numbers[:, 1:]
+    motor_deg = []
+    contacts_mm = []
+    for row in _read_rows(path) if path.is_file() else ():
+        if row["contact"] == "1":
+            motor_deg.append(float(row["motor_deg"]))
+            contacts_mm.append([float(row["x_mm"]), float(row["y_mm"]), float(row["z_mm"])])
+    return np.array(motor_deg), np.array(contacts_mm).reshape(-1, 3)
 
 
 def _gauge_lines(session: Session, gauges: GaugeCalibration | None) -> Iterator[str]:

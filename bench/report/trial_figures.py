@@ -106,8 +106,10 @@ def variance_of_truth(results: Sequence[TrialResult]) -> Figure | None:
 
 def _least_sure(results: Sequence[TrialResult]) -> list[_WhiskOfTrial]:
     """Return the whisks whose variance of d_x has known causes, those of the largest sigma first."""
-    known = [(r.trial.name, seen) for r, seen, _ in whisks(results) if seen.has_truth]
-    known = [(trial, seen) for trial, seen in known if seen.truth.budget]
+    known = []
+    for result, seen, _ in whisks(results):
+        if seen.has_truth and seen.truth.budget:
+            known.append((result.trial.name, seen))
     known.sort(key=lambda one: -one[1].d_x_mm.sigma)
     return known[:_MOST_BARS]
 
@@ -117,8 +119,10 @@ def _draw_shares(axes: Axes, known: Sequence[_WhiskOfTrial]) -> None:
     places = np.arange(len(known))
     ends = np.zeros(len(known))
     for number, cause in enumerate(CAUSES):
-        shares = np.array([100.0 * seen.truth.budget.get(cause, math.nan) for _, seen in known])
-        shares = np.nan_to_num(shares)
+        percents = []
+        for _, seen in known:
+            percents.append(100.0 * seen.truth.budget.get(cause, math.nan))
+        shares = np.nan_to_num(np.array(percents))
         bars = axes.barh(places, shares, left=ends, color=f"C{number}", label=cause)
         for bar, (trial, seen) in zip(bars, known):
             bar.set_url(whisk_url(trial, seen.whisk))
@@ -127,13 +131,14 @@ def _draw_shares(axes: Axes, known: Sequence[_WhiskOfTrial]) -> None:
 
 def _write_whisks(axes: Axes, known: Sequence[_WhiskOfTrial]) -> None:
     """Write trial and whisk before each bar, and the sigma of d_x after it: its own, and shared."""
-    for place, (_, seen) in enumerate(known):
+    names = []
+    for place, (trial, seen) in enumerate(known):
+        names.append(f"{trial} {seen.whisk}" if seen.whisk else trial)
         own_mm = seen.d_x_own_sigma_mm
         text = f"± {own_mm:.3f} ± {seen.d_x_shared_sigma_mm:.3f} mm"
         if math.isnan(own_mm):
             text = f"± {seen.d_x_mm.sigma:.3f} mm"
         axes.annotate(text, (101.0, place), va="center", fontsize=7)
-    names = [trial + (f" {seen.whisk}" if seen.whisk else "") for trial, seen in known]
     axes.set_yticks(np.arange(len(known)), names, fontsize=7)
 
 

@@ -41,7 +41,8 @@ WHISKS = Table(
         *with_sigma("d_x_mm", "distance from the base to the contact at first touch: the truth"),
         TRUTH_SOURCE,
         *with_sigma(
-            "beta_deg", "slope of the bar in the sensing plane, positive where it leans towards +y as z rises"
+            "beta_deg",
+            "slope of the bar in the sensing plane, positive where it leans towards +y as z rises",
         ),
         *with_sigma("psi_deg", "tilt of the bar out of the sensing plane"),
         *with_sigma("slip_mm", "slip of the contact along the bar since touch, at θ"),

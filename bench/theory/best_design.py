@@ -236,7 +236,7 @@ def best_design(
     Returns it and that error in %. Raises BadInput where no design within the ranges is one.
     """
     design = Design(**{name: low for name, (low, _) in ranges.items()})
-    free = [name for name in NAMES if ranges[name][0] < ranges[name][1]]
+    free = _free(ranges)
     if free:
 
         def worst(values: np.ndarray) -> float:
@@ -246,6 +246,16 @@ def best_design(
         design = _with_values(design, free, _least(worst, limits, seed))
     _require_design(design, region, equipment)
     return design, largest_percent(design, region, equipment)
+
+
+def _free(ranges: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Return the names whose range leaves a choice, in the order of NAMES."""
+    free = []
+    for name in NAMES:
+        low, high = ranges[name]
+        if low < high:
+            free.append(name)
+    return free
 
 
 def _least(function: Callable, limits: np.ndarray, seed: int) -> np.ndarray:
@@ -297,7 +307,7 @@ def costs_of_paper_values(
     It is infinite where there is no such design.
     """
     costs = {}
-    free = [name for name in NAMES if ranges[name][0] < ranges[name][1]]
+    free = _free(ranges)
     for name in count_parts(free, "searches with one value of the paper's", len(free)):
         value = getattr(Design(), name)
         try:

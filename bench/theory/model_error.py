@@ -170,13 +170,15 @@ def _panel(pool: Workers, title: str, push: Push, axes: Mapping[str, Sequence[fl
     """Compute one panel: a push with the values of two fields, of columns and of rows."""
     x, y = axes
     pushes = []
+    predicted = []
     for row in axes[y]:
-        pushes.append(
-            tuple(replace(push, **{x: float(column), y: float(row)}) for column in axes[x])
-        )
+        of_row = []
+        for column in axes[x]:
+            of_row.append(replace(push, **{x: float(column), y: float(row)}))
+        pushes.append(tuple(of_row))
+        predicted.append([predicted_percent(one) for one in of_row])
     errors = np.array(pool.run(_row_errors, pushes, title))  # (rows, columns, 2)
-    predicted = np.array([[predicted_percent(one) for one in row] for row in pushes])
-    return Panel(title, x, y, tuple(pushes), errors[..., 0], predicted, errors[..., 1])
+    return Panel(title, x, y, tuple(pushes), errors[..., 0], np.array(predicted), errors[..., 1])
 
 
 def _row_errors(pushes) -> list[tuple[float, float]]:

@@ -153,7 +153,8 @@ def _draw(number, curves):
     grid = figure.subplots(len(forms), 3, sharex=True, sharey=True, squeeze=False)
     for axes, form in zip(grid, forms):
         for ax, panel in zip(axes, "abc"):
-            _draw_panel(ax, number, [c for c in curves if (c.panel, c.form) == (panel, form)])
+            own = [one for one in curves if one.panel == panel and one.form == form]
+            _draw_panel(ax, number, own)
     _draw_legend(figure, grid)
     for ax in grid[:, 0]:
         ax.set_ylabel(r"$\beta_\mathrm{thresh}$  [°]")

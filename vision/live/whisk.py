@@ -13,7 +13,8 @@ The first step is the costly one; best is a camera that runs before the motor do
 only keeps a picture, `LiveWhisk.work` takes the next step that is due, and `LiveWhisk.finish` all that
 are left. A program that records calls `work` while it waits for the next frame. What passes on:
 
-    LiveBench ─► LiveWhisk ─► _FirstViews (cameras, object) ─► _Follower (bends) ─► _Lines, WireLines ─► WhiskTruth
+    LiveBench ─► LiveWhisk ─► _FirstViews (cameras, object) ─► _Follower (rest shape, bends)
+                                  ─► _LineReading (blur, strategy), WireLines (the wire's line) ─► WhiskTruth
 
 Where `vision.truth.observe` would leave a camera out or try another place of the bar, there is no
 number here, and the status says why: the recording can still be evaluated as any other.
@@ -33,7 +34,7 @@ from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods
 from vision.geometry.touched import Axis
 from vision.geometry.vision_settings import VisionSettings
-from vision.live.wire_lines import CarriedLines, WireLines, traced_again
+from vision.live.wire_lines import CarriedLines, WireLines, frames_lit_alike
 from vision.pictures.view import View
 from vision.touched.search import SeenBar, find_object, find_object_again
 from vision.touched.search_scene import SearchScene
@@ -64,7 +65,7 @@ _STANDING_RAD = np.radians(0.02)
 # Set by eye.
 _SWEPT_DIAMETERS = 0.5
 
-_USUAL = VisionSettings()
+_DEFAULT = VisionSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,21 +73,24 @@ class LiveBench:
     """What is known before a whisk.
 
     background: by camera the scene (h, w) without whisker and bar. stroke_rad: lowest and highest
-    motor angle of the stroke to come. settings: of them, picture_scale, every_frame and rounds do
-    not count here. bar: where the object was in the whisk before; the search begins there.
+    motor angle of the stroke to come. settings: all but picture_scale, every_frame and rounds, which
+    a live whisk does without. bar: where the object was in the whisk before; the search begins there.
     """
 
     cameras: Cameras
     rods: Rods
     background: Mapping[str, np.ndarray | None]
     stroke_rad: tuple[float, float]
-    settings: VisionSettings = _USUAL
+    settings: VisionSettings = _DEFAULT
     bar: Axis | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class _FirstViews:
-    """The cameras that face the whisker, their first frames, and the object in these."""
+    """The cameras that face the whisker, their first frames, and the object.
+
+    bar: found in the first frames, and moved to where the fit to the free frames has it.
+    """
 
     views: tuple[View, ...]
     cameras: Cameras
@@ -96,9 +100,10 @@ class _FirstViews:
 
 @dataclass(eq=False)
 class _Follower:
-    """The wire's bend (2,), rad, frame by frame, about a rest shape (2, 4), mm, and an object.
+    """Finds the wire's bend (2,), rad, frame by frame, about a rest shape (2, 4), mm, and an object.
 
-    sights: what stands still in the frames that they were made with. bends_rad: by frame.
+    sights: a camera each, with what stood still in the frames that it was made from. bends_rad: by
+    frame.
     """
 
     sights: list[SwingPictures]
@@ -125,8 +130,11 @@ class _Follower:
 
 
 @dataclass(frozen=True, eq=False)
-class _Lines:
-    """How lines are read, by the pass over the free frames: strategy, and blur of each lens, px."""
+class _LineReading:
+    """How the last lines are read: what the fit to the free frames chose and measured.
+
+    blur_px: of each camera's lens.
+    """
 
     strategy: Strategy
     blur_px: Mapping[str, float]
@@ -137,7 +145,8 @@ class LiveWhisk:
     """One whisk that is being recorded.
 
     frames: by camera the pictures so far, by frame. time_s, motor_rad: by frame. refused: why there
-    will be no truth, as soon as that is known. axis: where its truth has the object, None without one.
+    will be no truth, None as long as nothing says so. axis: the object's by the truth, None before
+    it and without one.
     """
 
     bench: LiveBench
@@ -150,7 +159,7 @@ class LiveWhisk:
     _standing: set[int] = field(default_factory=set)
     _found: _FirstViews | None = None
     _follower: _Follower | None = None
-    _lines: _Lines | None = None
+    _reading: _LineReading | None = None
     _is_bar_fine: bool = False
     _wire: WireLines | None = None
 
@@ -159,8 +168,8 @@ class LiveWhisk:
     ) -> None:
         """Keep a camera's grey picture (h, w) of a frame, its time and the motor's angle; no work.
 
-        Frames come in order; one that a camera lost is left out. Of those in which the motor stands a
-        few are kept.
+        Frames come in order; one that a camera lost is left out. Of frames in which the motor stands
+        only the first few are kept.
         """
         if frame not in self.motor_rad and self._stands(motor_rad):
             self._standing.add(frame)
@@ -171,7 +180,7 @@ class LiveWhisk:
         self.motor_rad[frame] = motor_rad
 
     def _stands(self, motor_rad: float) -> bool:
-        """Return whether the motor has not moved since the frame before, and enough are there."""
+        """Return whether the motor stands since the frame before, and there are frames enough to begin."""
         if len(self.motor_rad) < _FIRST_FRAMES:
             return False
         *_, before_rad = self.motor_rad.values()
@@ -201,10 +210,10 @@ class LiveWhisk:
                 self.refused = reason.reason
             except np.linalg.LinAlgError:
                 self.refused = NOT_CONVERGED
-        return self._nothing(self.refused)
+        return self._without_truth(self.refused)
 
     def _step_due(self) -> Callable[[], None] | None:
-        """Return the next step; None where one waits for a frame."""
+        """Return the next step, in the order of the module's introduction; None where it waits for a frame."""
         if self.refused is not None:
             return None
         if self._found is None:
@@ -214,7 +223,7 @@ class LiveWhisk:
             return self._find_rest
         if self._next_frame() is not None:
             return self._follow
-        if self._lines is None:
+        if self._reading is None:
             return self._fit_free
         if not self._is_bar_fine:
             return self._measure_bar
@@ -323,7 +332,7 @@ class LiveWhisk:
         strategy = strategies(whisk)[0]
         lines = TracedLines(whisk, strategy.reader)
         axis, rest_mm = fit_before_touch(whisk, lines, follower.rest_mm)
-        self._lines = _Lines(strategy, lines.blur_px)
+        self._reading = _LineReading(strategy, lines.blur_px)
         self._found = replace(self._found, bar=replace(self._found.bar, axis=axis))
         sights = self._sights(whisk.views, axis)
         self._follower = _Follower(sights, axis, rest_mm, follower.bends_rad)
@@ -331,7 +340,7 @@ class LiveWhisk:
     def _measure_bar(self) -> None:
         """Measure the object's lines finely, about where the free frames have it."""
         whisk = self._whisk()
-        lines = TracedLines(whisk, self._lines.strategy.reader)
+        lines = TracedLines(whisk, self._reading.strategy.reader)
         lines.object_points(self._place(whisk), last=True)
         self._is_bar_fine = True
 
@@ -344,8 +353,8 @@ class LiveWhisk:
     def _trace_wire(self) -> None:
         """Trace the wire in the frames so far in which it is lit alike."""
         whisk = self._whisk()
-        whisk = whisk.during(traced_again(whisk.frames, self.motor_rad))
-        self._wire = WireLines.trace(whisk, self._place(whisk), self._lines.blur_px)
+        whisk = whisk.during(frames_lit_alike(whisk.frames, self.motor_rad))
+        self._wire = WireLines.trace(whisk, self._place(whisk), self._reading.blur_px)
 
     def _carry_on(self) -> None:
         """Find the wire in the frames that came since it was traced."""
@@ -360,7 +369,7 @@ class LiveWhisk:
             few = f"{counted(len(self._shared_frames()), 'frame')} seen by every camera"
             raise Refused(f"{few}, {_FIRST_FRAMES} are needed", code="too_few_frames")
         follower = self._follower
-        strategy = self._lines.strategy
+        strategy = self._reading.strategy
         whisk = replace(self._whisk().during(self._wire.frames), light=self._wire.light)
         bends_rad = {frame: follower.bends_rad[frame] for frame in whisk.frames}
         whisk, expected = expect_by_bends(whisk, strategy.touch, follower.rest_mm, bends_rad)
@@ -375,12 +384,12 @@ class LiveWhisk:
         explanation = Explanation(whisk, fitted)
         elsewhere = unexplained(explanation)
         if elsewhere:
-            return self._nothing(elsewhere)
+            return self._without_truth(elsewhere)
         truth = to_whisk(whisk, fitted)
         self.axis = explanation.axis
         return replace(truth, status=joined(truth.status, *warnings_of(whisk, fitted, beam=None)))
 
-    def _nothing(self, status: Reason) -> WhiskTruth:
+    def _without_truth(self, status: Reason) -> WhiskTruth:
         """Return the row of a whisk without a truth."""
         frames = [] if self._follower is None else list(self._follower.bends_rad)
         cameras = self.bench.cameras if self._found is None else self._found.cameras

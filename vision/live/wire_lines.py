@@ -15,10 +15,11 @@ from vision.wire.points import Observed
 from vision.wire.shading import Knots
 from vision.wire.trace import Placed, Traced, observed, placed, points_of
 
-# [rad] A wire that has turned by more than this since it was traced is lit otherwise: as of the shading's
-# own knots (`vision.wire.shading`).
+# [rad] A wire that has turned by more since it was traced is lit otherwise, and is traced anew: as much
+# as `vision.wire.shading` takes for alike. Stated.
 _LIT_ALIKE_RAD = np.radians(8.0)
-# [rad] Of the frames that are then traced anew, so that another two degrees are alike. Stated.
+# [rad] It is traced anew in the frames of so much of the stroke before: then it is lit alike for two more
+# degrees. Stated.
 _TRACED_RAD = np.radians(6.0)
 
 
@@ -67,15 +68,15 @@ class WireLines:
         self.frames += whisk.frames
 
 
-def traced_again(frames: Sequence[int], motor_rad: Mapping[int, float]) -> list[int]:
-    """Return those of the frames in which the wire is lit as in the last, which are traced together."""
+def frames_lit_alike(frames: Sequence[int], motor_rad: Mapping[int, float]) -> list[int]:
+    """Return the frames to trace together: those in which the wire is lit as in the last one."""
     last_rad = motor_rad[frames[-1]]
     return [frame for frame in frames if abs(motor_rad[frame] - last_rad) <= _TRACED_RAD]
 
 
 @dataclass
 class CarriedLines(TracedLines):
-    """The lines of a whisk whose wire is known in all frames; the object's as of `TracedLines`."""
+    """The lines of a whisk whose wire is traced already; the object's are traced as by `TracedLines`."""
 
     wire: WireLines | None = None
 

@@ -19,17 +19,21 @@ from vision.pictures.change import HALF
 # [1] Two pictures show one scene: peak of the phase correlation over its scatter, twice the
 # largest of 150 pairs of different scenes. Study: faults.py.
 LEAST_PEAK = 20.0
-# [px] Blur below which lies noise. Set by eye.
+# [px] Blur below which lies noise. At half and twice as much the least peak of three pictures with a
+# texture falls from 114 to 59 and 73; other scenes have 12 at most. Study: thresholds.py.
 _FINE_PX = 1.0
-# [px] Blur beyond which lies shading; edges and texture lie between. Set by eye.
+# [px] Blur beyond which lies shading; edges and texture lie between. At half and twice as much that peak
+# falls to 103 and 48. Study: thresholds.py.
 _COARSE_PX = 4.0
-# [1] One bright edge counts no more. Set by eye.
+# [1] One bright edge counts no more. At half and twice as much that peak falls to 100 and 82. Study:
+# thresholds.py.
 _MOST_SIGMAS = 8.0
 # [grey levels] Less between the darkest and the brightest hundredth is no picture. Stated.
 _LEAST_RANGE = 3.0
 # [px] Plenty for one number. Derived.
 _EVERY = 4
-# [1] Of the median ratio: noise of a dark pixel, less than what a moving rod changes. Set by eye.
+# [1] Of the median ratio: noise of a dark pixel, less than what a moving rod changes. Known changes of
+# brightness are missed by 0.34 % RMS, with 0.1 too, with 0.4 by 0.39 %. Study: thresholds.py.
 _STILL = 0.2
 # [grey levels] Black level below does not scale with exposure. Stated.
 _LEAST_GREY = 16.0

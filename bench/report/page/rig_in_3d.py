@@ -60,7 +60,9 @@ def _whisk(row: WhiskRow) -> dict:
     frames = seen.frames
     spread = np.linspace(0, len(frames.index) - 1, _MOST_FRAMES)
     chosen = np.unique(spread.round().astype(int))
-    points = [_rounded(frames.point_mm.value[k]) if frames.touching[k] else None for k in chosen]
+    points = []
+    for k in chosen:
+        points.append(_rounded(frames.point_mm.value[k]) if frames.touching[k] else None)
     bar = None
     if trial.bar is not None:
         bar = _rounded(trial.bar.segment(seen.point_mm.value, _BAR_HALF_MM))

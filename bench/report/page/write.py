@@ -95,25 +95,33 @@ def page(out: Path, record: RunRecord, run: Finished) -> str:
 
 def _of_whisks(out: Path, rows: Sequence[WhiskRow]) -> dict[str, object]:
     """Return what the template shows of each whisk: the rows of the table, its head, the cards."""
-    estimators = list(dict.fromkeys(a.estimator for row in rows for a in row.felt.estimates))
-    return {
-        "rows": [(row, cells(row, estimators), is_flagged(row)) for row in rows],
-        "columns": columns(estimators),
-        "cards": [card(row, out, len(rows)) for row in rows],
-    }
+    estimators: list[str] = []  # in the order in which they first come
+    for row in rows:
+        for estimate in row.felt.estimates:
+            if estimate.estimator not in estimators:
+                estimators.append(estimate.estimator)
+    lines = []
+    cards = []
+    for row in rows:
+        lines.append((row, cells(row, estimators), is_flagged(row)))
+        cards.append(card(row, out, len(rows)))
+    return {"rows": lines, "columns": columns(estimators), "cards": cards}
 
 
 def _of_run(record: RunRecord, run: Finished, rows: Sequence[WhiskRow]) -> dict[str, object]:
     """Return what the template shows of the run as a whole: errors, warnings, settings, gauges."""
     row_of = by_whisk(rows)
-    cures = [cure_of(codes) for codes in record.warning_codes]
+    accuracies = []
+    for one in run.accuracy.estimators:
+        accuracies.append((one, row_of.get(one.worst_at)))
+    settings = []
+    for field in fields(Settings):
+        settings.append((field.name, _setting(getattr(record.settings, field.name))))
     return {
-        "accuracies": [(one, row_of.get(one.worst_at)) for one in run.accuracy.estimators],
+        "accuracies": accuracies,
         "truth": run.accuracy.truth,
-        "warnings": list(zip(record.warnings, cures)),
-        "settings": [
-            (f.name, _setting(getattr(record.settings, f.name))) for f in fields(Settings)
-        ],
+        "warnings": list(zip(record.warnings, map(cure_of, record.warning_codes))),
+        "settings": settings,
         "gauges": gauge_part(record.gauges, rows),
         "others": [one for one in record.sections if one.code not in _WITH_OWN_PLACE],
     }

@@ -185,7 +185,11 @@ def _sections_of_analyses(evaluation: Evaluation) -> dict[str, Section]:
         titles[heading.code] = heading.title
         of_section = lines.setdefault(heading.code, [])
         of_section += analysis.lines(evaluation.found(analysis))
-    return {code: _section(code, titles[code], lines[code]) for code in lines if code in titles}
+    sections = {}
+    for code, of_section in lines.items():
+        if code in titles:
+            sections[code] = _section(code, titles[code], of_section)
+    return sections
 
 
 def _section(code: str, title: str, lines: Iterable[str]) -> Section:

@@ -47,7 +47,9 @@ def _head(judged: Judged) -> str:
 
 def _in_columns(heads: Iterable[str], cells: Iterable[str]) -> str:
     """Return cells in columns as wide as their heads."""
-    padded = [f"{cell:>{max(_NARROWEST, len(head))}}" for head, cell in zip(heads, cells)]
+    padded = []
+    for head, cell in zip(heads, cells):
+        padded.append(cell.rjust(max(_NARROWEST, len(head))))
     return "  ".join(padded)
 
 

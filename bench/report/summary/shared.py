@@ -74,9 +74,14 @@ def shared_distance(results: Sequence[TrialResult]) -> SharedDistance | None:
     sigma = np.array([seen.d_x_mm.sigma for seen in known])
     shared = np.array([seen.truth.shared.d_x_mm for seen in known])
     parts = Parts.of(sigma, shared)
-    settings = sum(any(seen in known for seen in result.seen.whisks) for result in results)
+    settings = sum(_has_any(result, known) for result in results)
     scatter = _scatter(results, "d_x_mm")
     return SharedDistance(parts.shared, parts.own, len(known), settings, *scatter)
+
+
+def _has_any(result: TrialResult, known: Sequence[SeenWhisk]) -> bool:
+    """Return whether any of some whisks is of a trial."""
+    return any(seen in known for seen in result.seen.whisks)
 
 
 def _known(results: Sequence[TrialResult]) -> list[SeenWhisk]:

@@ -77,8 +77,11 @@ def budget_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     rows = list(budget_rows(results))
     if not rows:
         return
-    table = np.array([[row[f"{cause}_percent"] for cause in CAUSES] for row in rows])
-    means = np.nan_to_num(table).mean(axis=0)  # (causes,)
+    columns = []
+    for cause in CAUSES:
+        columns.append([row[f"{cause}_percent"] for row in rows])
+    table = np.array(columns).T  # (rows, causes)
+    means = np.nan_to_num(table).mean(axis=0)
     parts = []
     for k in np.argsort(-means, kind="stable"):
         if means[k] >= _LEAST_SHOWN_PERCENT:
@@ -95,7 +98,9 @@ def beam_lines(results: Iterable[TrialResult]) -> Iterator[str]:
         return
     parts = []
     for name, unit in BEAM_UNITS.items():
-        changes = [row[f"{name}_spline_{unit}"] - row[f"{name}_beam_{unit}"] for row in rows]
+        changes = []
+        for row in rows:
+            changes.append(row[f"{name}_spline_{unit}"] - row[f"{name}_beam_{unit}"])
         largest = int(np.argmax(np.abs(changes)))
         row = rows[largest]
         sigma = row[f"{name}_difference_sigma_{unit}"]

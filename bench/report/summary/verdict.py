@@ -55,7 +55,9 @@ def verdict(
 
 def _withheld(truth: TruthUncertainty, compared: Sequence[Accuracy]) -> str:
     """Return why there is no verdict on the estimators, and what would allow one."""
-    left_out = [judged for one in compared for judged in one.left_out]
+    left_out = []
+    for one in compared:
+        left_out += one.left_out
     if not left_out:
         return "No verdict on the estimators: no whisk has both a truth and an estimate."
     # What speaks against the truth of many comes before what a single whisk has.
@@ -120,10 +122,11 @@ def _by_steepness(judged: Iterable[Judged]) -> list[list[Judged]]:
 def _slope_part(judged: Sequence[Judged]) -> str:
     """Return RMS and worst error of whisks, and from what slope to what slope they are."""
     slopes_deg = [abs(one.beta_deg) for one in judged]
-    ends = dict.fromkeys(f"{slope:.0f}" for slope in (min(slopes_deg), max(slopes_deg)))
+    least = f"{min(slopes_deg):.0f}"
+    most = f"{max(slopes_deg):.0f}"
     errors = _errors_percent(judged)
     worst = max(errors, key=abs)
-    slopes = f"{' to '.join(ends)}°"
+    slopes = f"{least}°" if least == most else f"{least} to {most}°"
     if len(errors) == 1:
         return f"{slopes} {worst:+.1f} %"
     return f"{slopes} {rms(errors):.1f} % RMS (worst {worst:+.1f} %)"

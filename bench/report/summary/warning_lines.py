@@ -41,7 +41,9 @@ def whisk_warnings(
     of_session: warnings that have a line of their own, whichever whisks they reach. A gauge trial
     that cannot be judged is as it should be; limits of estimators are in `estimator_limits`.
     """
-    said = {part for line in of_session for part in as_reason(line).parts}
+    said: set[tuple[str, str]] = set()
+    for line in of_session:
+        said.update(as_reason(line).parts)
     results = list(results)
     by_cause: dict[tuple[str, ...], list[_Warned]] = {}
     for result, seen, felt in whisks(results):

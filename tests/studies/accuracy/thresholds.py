@@ -3,12 +3,14 @@
     python tests/studies/accuracy/thresholds.py boards.edge_pixels _BAND_PX 3 4 6 8 12
     python tests/studies/accuracy/thresholds.py calibration.corner_noise REJECT_SIGMA 3.5 6
 
-A line a value, the present one marked. Of boards: corners kept in the twenty board views of fixtures/small-session; the
-two rig pictures' corners against the true cameras, RMS error in px and over the stated sigma; the same of a drawn board
-in noise of 8 levels with a rod before it (tests/scenes/board_pictures.py). Of calibration: where the cameras calibrated
-from that session project points of the rig, against the true ones, RMS in px and over the stated sigma. Of all other
-folders: two whisks of that session and one of each scene in fixtures/scenes, through their true cameras; by how much of
-its usual sigma touch, d_x, slope or slip at 3° changes most, and which sigma by what factor; or a status.
+A line a value, the present one marked. Of boards: corners kept in the twenty board views of fixtures/small-session;
+the two rig pictures' corners against the true cameras, RMS error in px and over the stated sigma; the same of a drawn
+board in noise of 8 levels with a rod before it (tests/scenes/board_pictures.py). Of calibration: where the cameras
+calibrated from that session project points of the rig, against the true ones, RMS in px and over the stated sigma. Of
+pictures.scene_match: peaks of frames against their own rig pictures, the largest against another's, and by how much a
+known change of brightness is missed, RMS. Of all other folders: two whisks of that session and one of each scene in
+fixtures/scenes, through their true cameras (of live: pushes in these scenes); by how much of its usual sigma touch,
+d_x, slope or slip at 3° changes most, and which sigma by what factor; or a status.
 """
 
 import importlib
@@ -31,14 +33,17 @@ from bench.session.signals import forward_strokes, read_signals
 from tests.scenes.board_pictures import picture, true_px
 from tests.scenes.recorded import exact_cameras
 from tests.studies.accuracy.board_scenes import BOARD
+from tests.studies.speed.live import Recording
 from vision.boards.corners import find_corners
 from vision.calibration.cameras_file import read_cameras
 from vision.geometry.camera import Cameras
 from vision.geometry.rods import Bar, Rods
 from vision.geometry.rotation import apply
+from vision.pictures import scene_match
 from vision.pictures.files import read_picture
 from vision.pictures.frames import Frames
 from vision.truth.observe import observe_trial
+from vision.truth.records import TrialTruth
 from vision.truth.trial_pictures import TrialPictures
 
 SESSION = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
@@ -102,6 +107,36 @@ def of_calibration(session) -> str:
     return f"points of the rig: {rms(errors):.4f} px, z {rms(z):.2f}"
 
 
+def of_still_scenes(_session) -> str:
+    """Peaks of frames against rig pictures, and how far a known brightness is off, by this session and the scenes."""
+    frames, rigs, errors = [], [], []
+    rng = np.random.default_rng(1)
+    for folder in (SESSION, *sorted(SCENES.iterdir())):
+        session = load_session(folder)
+        trial = session.trials[-1]
+        for camera, own in read_trial(trial, frame_times(trial)).items():
+            pictures = list(own.values())
+            frames.append(pictures[0])
+            rigs.append(read_picture(session.rig_pictures[camera]))
+            gains = rng.uniform(0.85, 1.15, len(pictures))
+            brighter = [np.clip(np.rint(one * g), 0, 255) for one, g in zip(pictures, gains)]
+            found = scene_match.exposures(brighter, 255.0)
+            errors.append(found / np.median(found) / (gains / np.median(gains)) - 1.0)
+    height, width = np.min([one.shape for one in (*frames, *rigs)], axis=0)
+    textures = [
+        [scene_match.texture(one[:height, :width]) for one in some] for some in (frames, rigs)
+    ]
+    peaks = np.array(
+        [[scene_match.likeness(one, rig).peak for rig in textures[1]] for one in textures[0]]
+    )
+    same = np.eye(len(frames), dtype=bool)
+    own = ", ".join(f"{peak:.0f}" for peak in sorted(peaks[same]))
+    return (
+        f"peaks of their own scene {own}; of {peaks[~same].size} others {peaks[~same].max():.1f} at most; "
+        f"brightness off by {100 * rms(np.concatenate(errors)):.2f} %"
+    )
+
+
 def whisks() -> dict[str, partial]:
     """By name, a call that looks at a trial and gives the truth of its one whisk."""
     scenes = {
@@ -128,6 +163,23 @@ def look_at(folder: Path, name: str, cameras: Cameras) -> partial:
         cameras,
         Rods(session.whisker.wire, Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm)),
     )
+
+
+def pushes() -> dict[str, partial]:
+    """By name, a call that evaluates a scene's push as if it were recorded: at once, or once it has stood."""
+    found = {}
+    for path in sorted(SCENES.iterdir()):
+        recording = Recording(path)
+        at_leisure_s = 1e3 * np.arange(len(recording.time_s))
+        found[f"{path.name} live"] = partial(play, recording, at_leisure_s)
+        found[f"{path.name} standing"] = partial(play, recording, at_leisure_s, stands=True)
+    return found
+
+
+def play(recording: Recording, arrivals_s: np.ndarray, *, stands: bool = False) -> TrialTruth:
+    """The truth of a push as that of a trial of one whisk."""
+    nowhere = np.full(3, np.nan)
+    return TrialTruth(nowhere, nowhere, (recording.play(arrivals_s, stands=stands).truth,))
 
 
 def seen_values(look: partial) -> dict[str, tuple[float, float]]:
@@ -165,7 +217,7 @@ def put(module, constant: str, value) -> None:
 
 
 def sweep_whisks(module, constant: str, values: list[str]) -> None:
-    looks = whisks()
+    looks = pushes() if module.__name__.startswith("vision.live") else whisks()
     usual = {name: seen_values(look) for name, look in looks.items()}
     for value in map(literal_eval, values):
         is_array = isinstance(getattr(module, constant), np.ndarray)
@@ -177,9 +229,14 @@ def sweep_whisks(module, constant: str, values: list[str]) -> None:
 def main() -> None:
     name, constant, *values = sys.argv[1:]
     module, session = importlib.import_module(f"vision.{name}"), load_session(SESSION)
-    if not name.startswith(("boards.", "calibration.")):
+    measures = {
+        "boards": of_boards,
+        "calibration": of_calibration,
+        "pictures.scene_match": of_still_scenes,
+    }
+    measure = measures.get(name) or measures.get(name.partition(".")[0])
+    if measure is None:
         return sweep_whisks(module, constant, values)
-    measure = of_boards if name.startswith("boards.") else of_calibration
     usual = getattr(module, constant)
     print(constant)
     for value in (usual, *map(literal_eval, values)):
