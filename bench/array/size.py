@@ -216,6 +216,7 @@ class _SizeFit:
         for axis in np.eye(self.count):
 
             def distances_after(step, axis=axis):
+                """Return distances and cosines at the same arcs, one parameter a step farther."""
                 return np.array(self.distances(self.surface_at(parameters + step * axis), arcs))
 
             outside, cosine = _derivative(distances_after)

@@ -240,6 +240,7 @@ def best_design(
     if free:
 
         def worst(values: np.ndarray) -> float:
+            """Return the worst error, %, of the design with these values of its free choices."""
             return worst_percent(_with_values(design, free, values), region, equipment)
 
         limits = np.array([ranges[name] for name in free])

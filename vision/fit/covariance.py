@@ -168,8 +168,8 @@ def camera_rows(problem: Problem, state: State) -> np.ndarray:
 def _by_cameras(problem: Problem, seen: Observed, state: State, curves: Curves) -> np.ndarray:
     """Return derivatives (n, 15 cameras) of one observation's residuals by the cameras' parameters.
 
-    They are means over the points in space that its line points show. Sights graze a rod's edge, so
-    that what moves the point where they do so does not move the edge.
+    Each is the mean over the points in space that a line point shows. These count as fixed: where a
+    sight grazes a rod's edge, a move of the grazing point along the sight moves no edge.
     """
     points = seen.points
     camera = problem.cameras.cameras[seen.camera]

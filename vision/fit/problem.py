@@ -36,9 +36,9 @@ class Problem:
 
     motor_rad (f,); touching, bent (f,) bool: frames held to the touching distance, frames that may
     bend. axis: where the object's four parameters are counted from, and a fifth of a rounded
-    object, along its direction. onset: when the whisker begins to bend, where the cameras do not
-    determine the distance of whisker and bar in space, or when a bar begins to give way: touch is
-    then later by the motion's first parameter. neighbour_correlation: by camera, the share of its error that a
+    object, along its direction. onset: when the whisker begins to bend; None where the cameras determine
+    the distance of whisker and bar in space. Of a bar that gives way it is when that begins, and touch
+    is later by the motion's first parameter. neighbour_correlation: by camera, the share of its error that a
     point of the wire has in common with the next one; 0 where empty (see `vision.fit.scatter`).
     motion: of a bar that does not stand still.
 

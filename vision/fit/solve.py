@@ -37,8 +37,8 @@ from vision.wire.points import Observed
 # [sigma] Width of the Cauchy weights once the state is near: 95 % efficient on Gaussian noise at
 # 2.4, more at 4. Study: coverage.py points.
 LAST_SCALE = 4.0
-# [steps] Of differences (0.1 mm, 1 mrad; bends 10 mrad): a state that moved by less keeps its
-# Jacobian. Study: gradients.py.
+# [steps] A state that moved by fewer steps of the differences (that is by 0.1 mm, 1 mrad; bends
+# 10 mrad) keeps its Jacobian. Study: gradients.py.
 _ALIKE = 1000.0
 # [sigma] A step that moves all parameters together by less is the last. Derived.
 _STILL_SIGMA = 0.01

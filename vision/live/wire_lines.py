@@ -12,14 +12,11 @@ from vision.truth.whisk_pictures import WhiskPictures
 from vision.wire.carried import carry_on
 from vision.wire.one_sided import WireAppearance
 from vision.wire.points import Observed
-from vision.wire.shading import Knots
+from vision.wire.shading import LIT_ALIKE_RAD, Knots
 from vision.wire.trace import Placed, Traced, observed, placed, points_of
 
-# [rad] A wire that has turned by more since it was traced is lit otherwise, and is traced anew: as much
-# as `vision.wire.shading` takes for alike. Stated.
-_LIT_ALIKE_RAD = np.radians(8.0)
-# [rad] It is traced anew in the frames of so much of the stroke before: then it is lit alike for two more
-# degrees. Stated.
+# [rad] A wire that is lit otherwise than where it was traced (`LIT_ALIKE_RAD`) is traced anew, in the frames
+# of so much of the stroke before: then it is lit alike for two more degrees. Stated.
 _TRACED_RAD = np.radians(6.0)
 
 
@@ -55,7 +52,7 @@ class WireLines:
 
     def is_lit_alike(self, motor_rad: float) -> bool:
         """Return whether the wire is lit at a motor angle as in the frames that were traced."""
-        return abs(motor_rad - self.first_rad) <= _LIT_ALIKE_RAD
+        return abs(motor_rad - self.first_rad) <= LIT_ALIKE_RAD
 
     def carry_on(self, whisk: WhiskPictures, place: WhiskPlace) -> None:
         """Find the wire in the frames of a whisk, which come later."""

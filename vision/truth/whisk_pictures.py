@@ -176,8 +176,8 @@ class FittedWhisk:
 
     @classmethod
     def of(cls, problem: Problem, state: State, gain: np.ndarray, frames: list[int]) -> Self:
-        """Return a fit with its uncertainty; gain (size, size): sensitivity of the parameters to
-        the observations (see `Uncertainty`).
+        """Return a fit with its uncertainty; gain (size, size): the second result of `solve`, which is
+        `Uncertainty.inverse_normal`.
         """
         measured, by_parameter = jacobians(problem, state)
         errors = uncertainty(problem, state, gain)

@@ -39,8 +39,8 @@ _MOST_ROUNDS = 12
 _CONVERGED_SIGMAS = 0.3
 # [px] Or by less than this. Derived.
 _CONVERGED_PX = 0.02
-# [1] Of the width that is seen: sigma of the line by light from one side. Who does not know how thick
-# an object is does not see that a side of it is as dark as what is behind. With it z RMS of 22
+# [1] Sigma of the line by light from one side, of the width that is seen: where the thickness is not
+# known, a side as dark as what is behind is not missed. With it z RMS of 22
 # path-traced lines is 0.98, without it 3.0. Study: real_wires.py.
 _LIGHT_SHARE = 0.15
 # [rounds] In which the width is found anew. Study: real_wires.py.

@@ -26,8 +26,8 @@ LEAST_POWER = 1e-9
 WEAK = 1e-6
 # [rad] A rod that turned by more is lit otherwise: before a lamp's highlight a fan of 24°, taken
 # as lit alike, moved all lines by half a pixel, and by a quarter of one from end to end. Study:
-# thresholds.py wire.shading _LIT_ALIKE_RAD ….
-_LIT_ALIKE_RAD = np.radians(8.0)
+# thresholds.py wire.shading LIT_ALIKE_RAD ….
+LIT_ALIKE_RAD = np.radians(8.0)
 # [blurs] Beyond its edge, where a blurred rod has 3e-6 of its light: pixels farther off show the
 # background alone. Derived.
 _REACH_BLURS = 4.5
@@ -42,7 +42,7 @@ WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
 # farther on. Free at every knot, shading bends the line of a wire before an even floor by up to a
 # pixel. Study: thresholds.py wire.shading _CHANGE_SHARE ….
 _CHANGE_SHARE = 0.1
-# [1] What of it changes from turn to turn of `_LIT_ALIKE_RAD`: light and rod keep, the angle at
+# [1] What of it changes from turn to turn of `LIT_ALIKE_RAD`: light and rod keep, the angle at
 # which they meet does not. Set by eye. Study: thresholds.py wire.shading _TURNED_SHARE ….
 _TURNED_SHARE = 0.3
 # [1] Added to the normal matrix over its mean diagonal where there is no prior. Derived.
@@ -66,9 +66,9 @@ class Knots:
         """Return the knots of a rod whose bands stand at these angles, rad."""
         angles = np.array(list(turns.values()))
         width = float(np.ptp(angles)) if len(angles) else 0.0
-        if width <= _LIT_ALIKE_RAD:
+        if width <= LIT_ALIKE_RAD:
             return Knots(place_mm)
-        count = 1 + int(np.ceil(width / _LIT_ALIKE_RAD))
+        count = 1 + int(np.ceil(width / LIT_ALIKE_RAD))
         return Knots(place_mm, np.linspace(angles.min(), angles.max(), count), turns)
 
     def __len__(self) -> int:

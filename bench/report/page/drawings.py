@@ -72,6 +72,7 @@ def inside(figure: "Figure", name: str, alt: str, rows: Sequence[WhiskRow]) -> M
     at = by_whisk(rows)
 
     def link(found: re.Match) -> str:
+        """Return the page's own link to the whisk that a link of the drawing names."""
         row = at[unquote(found[1]), int(found[2])]
         which = f'href="#{row.key}" class="mark" data-w="{row.key}"'
         return f"<a {which}><title>{escape(row.name)}</title>"
