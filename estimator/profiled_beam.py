@@ -104,7 +104,7 @@ def _as_cylinder(widths: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
     d = 3/x² ∫₀ˣ (x − s)² / w⁴ ds; integrals are Gauss–Legendre's.
     """
     half = 0.5 * _SHARES
-    at = _SHARES[:, None] * 0.5 * (1.0 + _AT)  # (n, nodes): s, from the base to d
+    at = _SHARES[:, None] * 0.5 * (1.0 + _AT)  # (n, nodes): s, from 0 to x
     lever = _SHARES[:, None] - at
     width = np.maximum(polynomial.polyval(at, widths), _LEAST_WIDTH)
     softness = width**-4.0

@@ -17,9 +17,8 @@ ALPHA_EST_SIGMA_DEG = 5.0
 # [mm] Allowance of a robot for an object that it knows nothing of: as thick as the paper's bar of 6 mm, with the whisker
 # of 1 mm, and leaning along the whisker as set up by hand. Both enter the sigma of (10) alone (docs/maps.md).
 OBJECT_REACH_MM = 3.5
-TILT_SIGMA_RAD = math.radians(
-    5.0
-)  # rad, one sigma: how upright a lab sets a bar without a level. Stated.
+# [rad] One sigma: how upright a lab sets a bar without a level. Stated.
+TILT_SIGMA_RAD = math.radians(5.0)
 
 
 @dataclass(frozen=True)
