@@ -24,18 +24,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from bench.base.tables import (
-    ANGLE_FROM,
-    SPEED,
-    SURFACE,
-    TRIAL,
-    TRUTH_SOURCE,
-    WHISK,
-    Column,
-    Table,
-    sigma_name,
-)
-from bench.report.whisk_tables import WHISKS
+from bench.base.tables import Column, Table, sigma_name
 from bench.session.givens import GivenKeys, assumptions, unit_of
 from bench.session.strict_toml import Keys, key_names
 
@@ -44,8 +33,12 @@ PART = re.compile(r"<!-- made from ([\w.]+) -->\n.*?<!-- end -->", re.DOTALL)
 
 
 def page(text: str) -> str:
-    """Return the page with each part made anew from what its comment names."""
-    return PART.sub(_part, text)
+    """Return the page with each part made anew from what its comment names.
+
+    A column that means what it means in the last table before that has it is listed without a word.
+    """
+    known: dict[str, str] = {}  # by a column's name what it meant last
+    return PART.sub(lambda match: _part(match, known), text)
 
 
 def named_parts(text: str) -> list[Table | type[Keys]]:
@@ -99,25 +92,32 @@ def _comment_above(lines: list[str], node: ast.AnnAssign) -> str:
     return " ".join(above)
 
 
-def _part(match: re.Match) -> str:
-    """Return a part of the page, with its two comments."""
-    sections = [_section(declared) for declared in _declared(match[1])]
+def _part(match: re.Match, known: dict[str, str]) -> str:
+    """Return a part of the page, with its two comments; known: see `page`."""
+    sections = [_section(declared, known) for declared in _declared(match[1])]
     return "\n\n".join([f"<!-- made from {match[1]} -->", *sections, "<!-- end -->"])
 
 
-def _section(declared: Table | type[Keys]) -> str:
-    """Return the text on a table, or on the keys of a table of a TOML file."""
+def _section(declared: Table | type[Keys], known: dict[str, str]) -> str:
+    """Return the text on a table, or on the keys of a table of a TOML file; known: see `page`."""
     if not isinstance(declared, Table):
         return "\n".join(_as_markdown(explained_keys(declared)))
-    rows = ((column.name, _meaning(declared, column)) for column in declared.columns)
     lines = [f"### `{declared.file}`", "", *textwrap.wrap(declared.rows, 120), ""]
-    return "\n".join([*lines, *_as_markdown(rows)])
+    return "\n".join([*lines, *_as_markdown(_explained_columns(declared, known))])
 
 
-def _meaning(table: Table, column: Column) -> str:
-    """Return what a column means; nothing of those of most tables, which whisks.csv explains."""
-    is_elsewhere = column in (TRIAL, WHISK, SURFACE, SPEED, ANGLE_FROM, TRUTH_SOURCE)
-    return "" if is_elsewhere and table is not WHISKS else column.meaning
+def _explained_columns(table: Table, known: dict[str, str]) -> Iterator[tuple[str, str]]:
+    """Yield the columns of a table, each with its meaning, or '' where that is known.
+
+    A sigma is explained as its value is.
+    """
+    value: Column | None = None
+    for column in table.columns:
+        if value is None or column.name != sigma_name(value.name):
+            value = column
+            is_known = known.get(column.name) == column.meaning
+            known[column.name] = column.meaning
+        yield column.name, "" if is_known else column.meaning
 
 
 def _declared(name: str) -> list[Table | type[Keys]]:

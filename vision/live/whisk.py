@@ -61,8 +61,9 @@ from vision.truth.whisk_truth import (
 _FIRST_FRAMES = 3
 # [rad] A motor that turns by less from frame to frame stands: a motor's step. Stated.
 _STANDING_RAD = np.radians(0.02)
-# [diameters] Of the whisker, by which its tip has moved where a median of its frames hardly shows it.
-# Set by eye.
+# [diameters] Of the whisker, by which its tip has moved from the first frame to the last where their median
+# stands for the scene without it; where less, the scene known before is taken. Set by eye. Study:
+# thresholds.py.
 _SWEPT_DIAMETERS = 0.5
 
 _DEFAULT = VisionSettings()
