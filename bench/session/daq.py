@@ -27,6 +27,8 @@ _MOST_BYTES = 1 << 31
 _MOST_LISTED = 8
 # Errors of SciPy's reader on a damaged file.
 NOT_MATLAB = (ValueError, TypeError, KeyError, OSError, EOFError, OverflowError, MemoryError)
+# Errors of h5py on a damaged file.
+NOT_HDF5 = (OSError, KeyError, TypeError, ValueError, IndexError, RuntimeError, MemoryError)
 # Errors of npTDMS on a damaged file.
 _NOT_TDMS = (ValueError, OSError, KeyError, EOFError, IndexError)
 
@@ -177,7 +179,7 @@ def _hdf5(path: Path, names: list[str], label: str) -> list:
                 if not isinstance(file.get(name), h5py.Dataset):
                     raise _no_channel(name, file, label)
             return [file[name][()] for name in names]
-    except OSError as problem:
+    except NOT_HDF5 as problem:
         raise BadInput(f"cannot be read as HDF5 ({problem})", file=label) from None
 
 

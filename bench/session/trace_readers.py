@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.session.daq import NOT_MATLAB, optional_library
+from bench.session.daq import NOT_HDF5, NOT_MATLAB, optional_library
 from bench.session.table import read_table, require_columns
 from bench.session.text_files import check_size, read_text
 
@@ -207,10 +207,11 @@ def _hdf5(path: Path, label: str) -> DrawnLines:
                 return _sleap_analysis(file)
             if "pred_points" in file and "instances" in file:
                 return _sleap_labels(file)
-            tables = [group["table"] for group in file.values() if "table" in group]
-            if len(tables) == 1 and "values_block_0" in tables[0].dtype.names:
+            groups = [group for group in file.values() if isinstance(group, h5py.Group)]
+            tables = [group["table"] for group in groups if "table" in group]
+            if len(tables) == 1 and "values_block_0" in (tables[0].dtype.names or ()):
                 return _deeplabcut_table(tables[0], label)
-    except (OSError, KeyError, TypeError, ValueError, IndexError) as problem:
+    except NOT_HDF5 as problem:
         raise BadInput(f"cannot be read ({problem})", file=label) from None
     raise BadInput("is neither a table of DeepLabCut nor an analysis of SLEAP", file=label)
 

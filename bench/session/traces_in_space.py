@@ -11,7 +11,7 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
 from bench.session.text_files import read_text
 from bench.session.trace_readers import DrawnLines, numbers_with_gaps
-from vision.calibration import import_cameras
+from vision.calibration import foreign_cameras
 from vision.geometry import Camera
 
 _AXES = ("x", "y", "z")
@@ -30,7 +30,7 @@ def lines_in_space(path: Path, cameras: Sequence[str], label: str) -> dict[str, 
         found = f"needs its cameras beside it: Anipose's calibration.toml as {calibration.name}"
         raise BadInput(found, file=label)
     with refused_as_bad_input(f"{folder}/{calibration.name}"):
-        known = import_cameras(calibration)
+        known = foreign_cameras(calibration)
     missing = [name for name in cameras if name not in known.names]
     if missing:
         found = f"has no camera {missing[0]}; it has {', '.join(known.names)}"

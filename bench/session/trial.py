@@ -150,18 +150,14 @@ def _check_stated_truth(trial: Trial, table: dict[str, Any]) -> None:
         found = "d_x_mm is the truth here, and d_x_sigma_mm is missing"
         raise BadInput(f"{found}; write one sigma, 0 where it is exact", file=label)
     is_turned = trial.object is not None and trial.object.axis is not None
-    if trial.purpose == "measure" and trial.beta_deg is None and not is_turned:
+    has_slope = is_turned or (trial.states_place and not trial.is_bar)
+    if trial.purpose == "measure" and trial.beta_deg is None and not has_slope:
         found = "beta_deg is missing: the truth of a stage needs the bar's slope"
         raise BadInput(f"{found}, 0 where it is upright", file=label)
 
 
 def _check_place(trial: Trial, label: str) -> None:
     """Raise BadInput for an object whose contact does not follow from its place."""
-    if not trial.is_bar:
-        found = (
-            f'[object] shape = "{trial.object.shape}": a place alone gives d_x of a straight bar'
-        )
-        raise BadInput(f"{found}; state d_x_mm, and no point_mm", file=label)
     if trial.bar_diameter_mm is None:
         raise BadInput("bar_diameter_mm is missing: d_x follows from place and size", file=label)
     if trial.angle_from != "log":

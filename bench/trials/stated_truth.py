@@ -1,7 +1,7 @@
 """The truth by a stage: distance and slope as stated, with what is each trial's own and what is shared.
 
 d_x is what an estimator estimates: the distance from the base to the contact at first touch, on the
-whisker's centreline. Either it is stated as it is (`d_x_mm`), or it follows from the bar's place
+whisker's centreline. Either it is stated as it is (`d_x_mm`), or it follows from the object's place
 (`[object]`, `stage.csv`). When the whisker touches by the motor's angle is known no better than how
 it is clamped, and no stage sees how the contact slips: touch, slip and deflection stay NaN.
 """
@@ -21,9 +21,18 @@ from bench.session.stage import StageLog
 from bench.session.trial import MANIFEST, Trial
 from bench.trials.consistency import nominal_slope, nominal_slope_sigma_rad
 from bench.trials.differences import Difference
-from bench.trials.stage_contact import REST_TERMS, Contact, Offsets, StatedPush
+from bench.trials.stage_contact import (
+    REST_TERMS,
+    Contact,
+    Offsets,
+    StatedBar,
+    StatedObject,
+    StatedPush,
+    StatedRounded,
+)
+from bench.trials.trial_frames import stated_object
 from vision import NAN, UNKNOWN, SharedSigmas, TruthAtAngle, Value, WhiskTruth
-from vision.geometry import NO_REASON, Reason, joined
+from vision.geometry import NO_REASON, Reason, Rounded, joined
 
 NOT_SEEN = reason("slip_not_seen")
 # [mm] One sigma of where the clamp holds the whisker's axis beside the hub's: a collet's runout.
@@ -130,6 +139,17 @@ def _unlike_stated(d_x_mm: Value, trial: Trial) -> Reason:
     return Reason("distance_unlike_stated", f"{found} ({sigma_mm:.2g} mm are chance): {rule}")
 
 
+def _other_slope(beta_rad: Value, trial: Trial) -> Reason:
+    """Return how a slope by the object's place contradicts beta_deg; NO_REASON where it does not."""
+    stated = nominal_slope(trial)
+    apart = beta_rad.value - stated.value
+    sigma = float(np.hypot(beta_rad.sigma, stated.sigma))
+    if not np.isfinite(apart) or Difference.scalar(apart, sigma).is_chance:
+        return NO_REASON
+    found = f"the slope by the object's place is {np.degrees(beta_rad.value):.1f}°"
+    return Reason("slope_unlike_stated", f"{found}, beta_deg says {trial.beta_deg:g}: check both")
+
+
 def _check_on_whisker(d_x_mm: float, session: Session, trial: Trial) -> None:
     """Raise BadInput for a stated distance that no contact on the whisker has."""
     length_mm = session.whisker.length_mm
@@ -140,14 +160,14 @@ def _check_on_whisker(d_x_mm: float, session: Session, trial: Trial) -> None:
 
 
 def _check_place(push: StatedPush, trial: Trial) -> None:
-    """Raise BadInput for a bar that stands where no whisker of this length can touch it."""
+    """Raise BadInput for an object that stands where no whisker of this length can touch it."""
     base_mm = push.from_base_mm()
-    least_mm = push.bar_radius_mm
+    least_mm = push.object.radius_mm
     most_mm = push.wire.length_mm + least_mm
     if least_mm < base_mm <= most_mm:
         return
     is_near = base_mm <= least_mm
-    found = f"the object's axis passes the whisker's base at {base_mm:.4g} mm"
+    found = f"the object's middle passes the whisker's base at {base_mm:.4g} mm"
     why = f"beyond the whisker's length of {push.wire.length_mm:g} mm"
     if is_near:
         why = f"nearer than its radius of {least_mm:g} mm"
@@ -188,7 +208,7 @@ def _truth(d_x_mm: Value, beta_rad: Value, psi_rad: Value, shared_mm: float) -> 
 
 
 def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -> WhiskTruth:
-    """Return the truth of a stroke against a bar that stands where the stage has it."""
+    """Return the truth of a stroke against an object that stands where the stage has it."""
     push = _push(session, trial, signals, stroke)
     touch = push.touch(Offsets.none())
     if touch is None:
@@ -201,18 +221,20 @@ def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -
     for value, of_own, of_shared in zip((touch.d_x_mm, touch.beta_rad, touch.psi_rad), own, shared):
         values.append(Value(value, float(np.hypot(*map(np.linalg.norm, (of_own, of_shared))))))
     truth = _truth(*values, shared_mm)
-    return replace(truth, status=_unlike_stated(values[0], trial))
+    return replace(
+        truth, status=joined(_unlike_stated(values[0], trial), _other_slope(values[1], trial))
+    )
 
 
 def _without_touch(push: StatedPush, trial: Trial) -> WhiskTruth:
-    """Return the truth of a stroke that does not come to touch the bar. Raise BadInput where none could."""
+    """Return the truth of a stroke that does not come to touch the object. Raise BadInput where none could."""
     _check_place(push, trial)
     code = "starts_touching" if push.starts_touching(Offsets.none()) else "never_touches"
     return WhiskTruth(0, status=Reason(code, f"by the stage the whisker {_HOW[code]}"))
 
 
 def _push(session: Session, trial: Trial, signals: Signals, stroke: slice) -> StatedPush:
-    """Return a stroke against the trial's bar. Raise BadInput where the stage's log does not cover it."""
+    """Return a stroke against the trial's object. Raise BadInput where the stage's log does not cover it."""
     time_s = signals.time_s[stroke]
     motor_rad = signals.motor_rad[stroke]
     log = trial.stage
@@ -223,18 +245,25 @@ def _push(session: Session, trial: Trial, signals: Signals, stroke: slice) -> St
     rising = np.maximum.accumulate(motor_rad)
 
     def place_at(angles_rad: np.ndarray) -> np.ndarray:
-        """Return the bar's place (..., 3), mm, when the motor is at angles (...)."""
+        """Return the object's place (..., 3), mm, when the motor is at angles (...)."""
         if log is None:
             return np.broadcast_to(origin_mm, (*np.shape(angles_rad), 3))
         return origin_mm + log.at(np.interp(angles_rad, rising, time_s))
 
+    return StatedPush(motor_rad, place_at, session.whisker.wire, _standing_object(trial))
+
+
+def _standing_object(trial: Trial) -> StatedObject:
+    """Return the trial's object with its direction."""
+    form = stated_object(trial)
+    if isinstance(form, Rounded):
+        axis = np.array(trial.object.direction)
+        return StatedRounded(form, axis / np.linalg.norm(axis))
     slope_rad = nominal_slope(trial).value
-    return StatedPush(
-        motor_rad,
-        place_at,
-        session.whisker.wire,
-        0.5 * trial.bar_diameter_mm,
-        None if stated is None or stated.axis is None else _upward(stated.axis),
+    is_turned = trial.object is not None and trial.object.axis is not None
+    return StatedBar(
+        form.radius_mm,
+        _upward(trial.object.axis) if is_turned else None,
         float(slope_rad) if np.isfinite(slope_rad) else 0.0,
     )
 

@@ -16,7 +16,7 @@ import tempfile
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr
 from pathlib import Path
 
@@ -30,10 +30,14 @@ from bench.session.rig_file import hash_of_rig
 from bench.session.session import load_session
 from tests.faults.fuzz import BYTES, GAUGES, TEXT, TRIAL, small_base
 
-# [s] A file of a few lines is read in milliseconds.
+# Reads a session; returns how that ended and a line on it.
+Read = Callable[[Path], tuple[str, str]]
+# [s] Of a processor: a file of a few lines is read in milliseconds.
 _MOST_S = 5
 # Of the mutations, those that put a value or a key in place of another; the rest change bytes.
 _OF_VALUES = 0.6
+# Files whose bytes are no text.
+_BINARY = (".h5", ".slp", ".mat", ".tr4", ".whiskers", ".measurements")
 _FIRST_LINE = "format = 1\nexact = true\n"
 _REST_OF_WHISKER = {
     "curvature": "rest_curvature_per_mm = [1e-3, -2e-4]\n",
@@ -163,16 +167,15 @@ def stated_files(session: Path) -> list[Path]:
     return sorted([*session.glob("*.toml"), *session.glob("*.csv"), *session.rglob("trial.toml")])
 
 
-def mutate(session: Path, rng: np.random.Generator) -> list[str]:
-    """Make one or two changes to the stated files; return what was done."""
-    files = stated_files(session)
+def mutate(session: Path, files: list[Path], rng: np.random.Generator) -> list[str]:
+    """Make one or two changes to some files of a session; return what was done."""
     done = []
     for _ in range(int(rng.integers(1, 3))):
         path = files[int(rng.integers(len(files)))]
         if path.suffix == ".toml" and rng.random() < _OF_VALUES:
             ways = (another_value, another_key)
         else:
-            ways = BYTES + TEXT
+            ways = BYTES + TEXT if path.suffix not in _BINARY else BYTES
         way = ways[int(rng.integers(len(ways)))]
         path.write_bytes(way(path.read_bytes(), rng))
         done.append(f"{way.__name__} {path.relative_to(session).as_posix()}")
@@ -250,12 +253,12 @@ def _out_of_time(*_) -> None:
     raise TimeoutError(f"more than {_MOST_S} s")
 
 
-def tried(session: Path, seed: int) -> tuple[str, str]:
+def tried(session: Path, seed: int, files: list[Path], read: Read) -> tuple[str, str]:
     """Read a session with the seed's mutations, and undo them. Return how it ended and a line on it."""
-    sound = {path: path.read_bytes() for path in stated_files(session)}
-    done = "; ".join(mutate(session, np.random.default_rng(seed)))
+    sound = {path: path.read_bytes() for path in files}
+    done = "; ".join(mutate(session, files, np.random.default_rng(seed)))
     said = io.StringIO()
-    signal.alarm(_MOST_S)
+    signal.setitimer(signal.ITIMER_PROF, _MOST_S)
     try:
         with redirect_stderr(said), warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -265,30 +268,34 @@ def tried(session: Path, seed: int) -> tuple[str, str]:
         how = f"raised {type(fault).__name__}"
         line = f"{Path(place.filename).name}:{place.lineno}: {fault}"
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
     for path, content in sound.items():
         path.write_bytes(content)
     return how, f"seed {seed}: {done}: {line[:300]}"
 
 
-def fuzz(first: int, count: int) -> tuple[Counter, list[str]]:
+def fuzz(
+    first: int, count: int, bases: list[Path], files_of: Callable[[Path], list[Path]], read: Read
+) -> tuple[Counter, list[str]]:
     """Return how many mutations ended how, and a line for each that is neither accepted nor refused."""
-    signal.signal(signal.SIGALRM, _out_of_time)
+    signal.signal(signal.SIGPROF, _out_of_time)
     ways: Counter = Counter()
     bad = []
-    with tempfile.TemporaryDirectory() as folder:
-        bases = [stated_base(Path(folder), rest) for rest in _REST_OF_WHISKER]
-        for base in bases:
-            assert read(base) == ("accepted", ""), read(base)
-        for seed in range(first, first + count):
-            how, line = tried(bases[seed % len(bases)], seed)
-            ways[how] += 1
-            if how not in ("accepted", "refused"):
-                bad.append(f"{how}: {line}")
+    for base in bases:
+        assert read(base) == ("accepted", ""), read(base)
+    files = {base: files_of(base) for base in bases}
+    for seed in range(first, first + count):
+        base = bases[seed % len(bases)]
+        how, line = tried(base, seed, files[base], read)
+        ways[how] += 1
+        if how not in ("accepted", "refused"):
+            bad.append(f"{how}: {line}")
     return ways, bad
 
 
 if __name__ == "__main__":
-    ended, wrong = fuzz(int(sys.argv[1]), int(sys.argv[2]))
+    with tempfile.TemporaryDirectory() as place:
+        stated = [stated_base(Path(place), rest) for rest in _REST_OF_WHISKER]
+        ended, wrong = fuzz(int(sys.argv[1]), int(sys.argv[2]), stated, stated_files, read)
     print(*wrong, dict(ended), sep="\n")
     sys.exit(bool(wrong))

@@ -11,7 +11,13 @@ from vision.geometry.lazy_names import lazy_names
 NAMES = {
     "calibrate": ("Calibration", "CameraReport", "calibrate_cameras"),
     "cameras_file": ("cameras_as_files", "read_cameras"),
-    "cameras_import": ("WRITERS", "are_placed", "import_cameras", "place_on_rig"),
+    "cameras_import": (
+        "WRITERS",
+        "are_placed",
+        "foreign_cameras",
+        "import_cameras",
+        "place_on_rig",
+    ),
     "held_out": ("Agreement", "HeldOut", "check_held_out"),
     "hub_marker": ("MarkerSighting", "by_marker", "first_axis"),
     "hub_turning": ("FirstRig", "first_rig", "first_rig_about"),

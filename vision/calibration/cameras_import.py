@@ -58,8 +58,19 @@ def import_cameras(path: Path | str) -> Cameras:
     """Import cameras of another program's file, or of a folder's files, their world as there, in mm,
     taken as exact.
 
-    Raises Refused where a file is of no known format, a lens is another than OpenCV's of five terms,
-    or several cameras are not placed to each other.
+    Raises Refused as `foreign_cameras`, and where a lens folds its picture back.
+    """
+    cameras = foreign_cameras(path)
+    for camera in cameras:
+        check_lens(camera)
+    return cameras
+
+
+def foreign_cameras(path: Path | str) -> Cameras:
+    """Read cameras of another program, to project by: what a lens does at the picture's rim is not
+    checked.
+
+    Raises Refused where a file is of no known format, or a lens is another than OpenCV's of five terms.
     """
     path = Path(path)
     files = [path]
@@ -74,10 +85,7 @@ def import_cameras(path: Path | str) -> Cameras:
         found += reader(file)
     if not found:
         raise Refused(f"{path.name} holds no camera file")
-    cameras = Cameras(tuple(found))
-    for camera in cameras:
-        check_lens(camera)
-    return cameras
+    return Cameras(tuple(found))
 
 
 def are_placed(cameras: Cameras) -> bool:

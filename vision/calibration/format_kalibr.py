@@ -49,7 +49,7 @@ def _camera(path: Path, name: str, table: dict[str, Any], T_camera_world: np.nda
     """Return the camera of one table; raise Refused where its model is another."""
     projection = table.get("camera_model")
     lens = table.get("distortion_model")
-    if projection != "pinhole" or lens not in _TERMS:
+    if projection != "pinhole" or not isinstance(lens, str) or lens not in _TERMS:
         raise Refused(
             f"{path.name}: {name} is {projection}-{lens}, which the five-term lens here does not describe; "
             "calibrate with pinhole-radtan"

@@ -31,7 +31,7 @@ def read(path: Path) -> list[Camera]:
     model = _dictionary(path)
     lens = model.get("lensmodel")
     name = path.stem
-    if lens not in _TERMS:
+    if not isinstance(lens, str) or lens not in _TERMS:
         raise Refused(
             f"camera {name} has {lens}, which the five-term lens here does not describe; "
             "solve with LENSMODEL_OPENCV5"

@@ -13,6 +13,8 @@ from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import exp_rotation
 
+# [1] Of a matrix that is a camera's or a lens': more are views or covariances. Stated.
+_MOST_NUMBERS = 64
 # Names without underscores, in lower case.
 _MATRIX = ("cameramatrix", "intrinsicmatrix", "intrinsic", "k", "m")
 _DISTORTION = ("distortioncoefficients", "distcoeffs", "distcoeff", "distortion", "dist", "d")
@@ -106,7 +108,7 @@ def _values(path: Path) -> dict[str, np.ndarray]:
             if value is not None:
                 values[key.replace("_", "").lower()] = value
         storage.release()
-    except (cv2.error, SystemError) as error:
+    except (cv2.error, SystemError, UnicodeDecodeError) as error:
         words = " ".join(str(error.__cause__ or error).split())[:120]
         raise Refused(f"{path.name} is no FileStorage of OpenCV: {words}") from None
     return values
@@ -120,9 +122,23 @@ def _value(node: cv2.FileNode) -> np.ndarray | None:
         parts = [node.at(k) for k in range(node.size())]
         if all(part.isReal() or part.isInt() for part in parts):
             return np.array([part.real() for part in parts])
-    if node.isMap():
-        return node.mat()
-    return None
+    return _matrix(node) if node.isMap() else None
+
+
+def _matrix(node: cv2.FileNode) -> np.ndarray | None:
+    """Return a matrix by its rows, columns and numbers; None where these do not agree.
+
+    OpenCV's own reader writes beyond its memory where a damaged file declares fewer than it holds.
+    """
+    rows, columns, data = (node.getNode(name) for name in ("rows", "cols", "data"))
+    if not (rows.isInt() and columns.isInt() and data.isSeq()) or data.size() > _MOST_NUMBERS:
+        return None
+    shape = int(rows.real()), int(columns.real())
+    parts = [data.at(k) for k in range(data.size())]
+    are_numbers = all(part.isReal() or part.isInt() for part in parts)
+    if min(shape) < 1 or shape[0] * shape[1] != len(parts) or not are_numbers:
+        return None
+    return np.array([part.real() for part in parts]).reshape(shape)
 
 
 def write(cameras: Cameras, stem: str) -> dict[str, bytes]:

@@ -11,7 +11,7 @@ NAMES = {
     "board": ("Board",),
     "camera": ("Camera", "Cameras"),
     "centreline": ("Curves", "REST_POWERS", "centrelines", "unbent_curves", "rotation_z"),
-    "contact": ("BarAxis", "clearance"),
+    "contact": ("BarAxis", "axis_frame", "clearance"),
     "crop": ("Crop",),
     "forms": ("touched_object",),
     "lens": ("LENS_TERMS",),
@@ -27,7 +27,8 @@ NAMES = {
         "skew",
         "unit",
     ),
-    "touched": ("StatedSizes", "Touched"),
+    "rounded": ("Rounded", "RoundedAxis"),
+    "touched": ("Axis", "StatedSizes", "Touched"),
     "vision_settings": ("VisionSettings",),
 }
 __getattr__ = lazy_names(__name__, NAMES)

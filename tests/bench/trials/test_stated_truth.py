@@ -23,12 +23,15 @@ from bench.session.session import Session, load_session
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.trials.differences import LEAST_CHANCE
 from bench.trials.seen import NO_PICTURES, unseen
-from bench.trials.stage_contact import Offsets, StatedPush
+from bench.trials.stage_contact import Offsets, StatedBar, StatedPush, StatedRounded
 from bench.trials.stated_truth import by_stage, stated_whisk
 from fixtures.bring_stage import bar_of
 from tests.scenes.results import seen_whisk
 from vision import SharedSigmas, Value
 from vision.geometry import Wire
+from vision.geometry.cone import Cone
+from vision.geometry.ring import Ring
+from vision.geometry.sphere import Sphere
 
 # One sigma of what a lab knows of place, origin, slope and diameter, drawn in `drawn_z`.
 PLACE_MM = 0.05
@@ -74,9 +77,7 @@ def push(truth: dict[str, float], wire: Wire = WIRE, *, by_axis: bool = True) ->
         motor_rad,
         lambda at: np.broadcast_to(place_mm, (*np.shape(at), 3)),
         wire,
-        3.0,
-        direction if by_axis else None,
-        math.radians(truth["beta_deg"]),
+        StatedBar(3.0, direction if by_axis else None, math.radians(truth["beta_deg"])),
     )
 
 
@@ -90,6 +91,44 @@ def test_a_straight_whisker_touches_where_the_definitions_say(beta_deg, by_axis)
     assert touch.d_x_mm == pytest.approx(60.0, abs=1e-6)
     assert math.degrees(touch.beta_rad) == pytest.approx(beta_deg, abs=1e-6)
     assert math.degrees(touch.psi_rad) == pytest.approx(truth["psi_deg"], abs=1e-6)
+
+
+def rounded(shape: str, truth: dict[str, float]) -> tuple[StatedRounded, np.ndarray]:
+    """Return an object and its place (3,), such that the straight whisker touches it as a truth says.
+
+    By the definitions: its surface's straightest way there is the bar's direction, its middle REACH_MM from
+    the whisker's, and of a cone as far as its radius there says.
+    """
+    spot_mm, along = bar_of(truth, 0.0)
+    middle_mm, _ = bar_of(truth, REACH_MM)
+    inwards = (middle_mm - spot_mm) / REACH_MM
+    if shape == "sphere":
+        return StatedRounded(Sphere(6.0), np.array([0.0, 0.0, 1.0])), middle_mm
+    if shape == "ring":
+        centre_mm = middle_mm + 40.0 * inwards
+        return StatedRounded(Ring(6.0, ring_diameter_mm=80.0), np.cross(along, inwards)), centre_mm
+    half_rad = math.radians(20.0)
+    radius_mm = 3.0  # along the normal there
+    surface_mm = spot_mm + 0.5 * inwards
+    tip_mm = surface_mm + radius_mm / math.tan(half_rad) * along
+    axis = math.cos(half_rad) * along - math.sin(half_rad) * inwards
+    return StatedRounded(Cone(half_rad), axis), tip_mm
+
+
+@pytest.mark.parametrize("shape", ["sphere", "ring", "cone"])
+@pytest.mark.parametrize("beta_deg", [-50.0, 0.0, 35.0])
+def test_a_rounded_object_is_touched_where_the_definitions_say(shape, beta_deg):
+    truth = {"touch_deg": 4.0, "d_x_mm": 60.0, "beta_deg": beta_deg, "psi_deg": 0.0}
+    standing, place_mm = rounded(shape, truth)
+    stroke = replace(
+        push(truth),
+        object=standing,
+        place_at=lambda at: np.broadcast_to(place_mm, (*np.shape(at), 3)),
+    )
+    touch = stroke.touch(Offsets.none())
+    assert math.degrees(touch.motor_rad) == pytest.approx(4.0, abs=1e-6)
+    assert touch.d_x_mm == pytest.approx(60.0, abs=1e-5)
+    assert math.degrees(touch.beta_rad) == pytest.approx(beta_deg, abs=1e-5)
 
 
 def test_a_curved_whisker_touches_where_it_lies_tangent():
@@ -271,9 +310,14 @@ FAULTS = {
         lambda s: change(s / "trials" / RULER / "trial.toml", "beta_deg"),
         "beta_deg is missing: the truth of a stage needs the bar's slope",
     ),
-    "a sphere's place": (
-        lambda s: change(s / "trials" / TRIAL / "trial.toml", object={"shape": "sphere"}),
-        '[object] shape = "sphere": a place alone gives d_x of a straight bar',
+    "a sphere about the whisker's base": (
+        lambda s: (
+            change(
+                s / "trials" / TRIAL / "trial.toml", bar_diameter_mm=6.0, object={"shape": "sphere"}
+            ),
+            stage_text(s, "0,1.0,1.0,0,0.1,0.1,0.1"),
+        ),
+        "passes the whisker's base at 1.414 mm, nearer than its radius of 3 mm",
     ),
     "another source": (
         lambda s: change(s / "session.toml", truth={"source": "ruler"}),

@@ -1,16 +1,21 @@
 """Scores of trackers on sessions: one made here of scikit-image's skeletons, or files of any other.
 
-    python tests/studies/accuracy/trackers.py OUT SESSION … [--trials 'b60*'] [--traces FOLDER]
+    python tests/studies/accuracy/trackers.py OUT SESSION … [--trials 'b60*'] [--whisk TRACE | --traces FOLDER]
 
 The tracker made here takes the largest thing that differs from the median of a camera's pictures,
-and of that the skeleton: whole pixels, nothing of the wire where it hardly moves. It writes
-OUT/<session>/traces, and `score-traces` holds that, or FOLDER, against ours in OUT/<session>.
+and of that the skeleton: whole pixels, nothing of the wire where it hardly moves. With --whisk it is Janelia's, by the
+program `trace` of whisk (of PyPI's whisk-janelia), as it is installed. Either is written to OUT/<session>/traces, and
+`score-traces` holds that, or FOLDER, against ours in OUT/<session>.
 """
 
 import argparse
+import shutil
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
+import cv2
 import numpy as np
 from skimage.filters import apply_hysteresis_threshold, gaussian
 from skimage.measure import label
@@ -34,31 +39,51 @@ def main() -> None:
     parser.add_argument("sessions", type=Path, nargs="+")
     parser.add_argument("--trials", default="*")
     parser.add_argument("--traces", type=Path)
+    parser.add_argument("--whisk", type=Path)
     arguments = parser.parse_args()
     settings = Settings(trials=arguments.trials)
     for session in arguments.sessions:
         out = arguments.out / session.name
         traces = arguments.traces or out / "traces"
         if arguments.traces is None:
-            track(session, traces, settings)
+            track(session, traces, settings, arguments.whisk)
         scores, warnings = score_traces(session, traces, out, settings, workers=0)
         print(session.name, *scores, *warnings, sep="\n  ", flush=True)
 
 
-def track(session: Path, traces: Path, settings: Settings) -> None:
-    """Write trace_<camera>.csv for each trial of a session."""
+def track(session: Path, traces: Path, settings: Settings, whisk: Path | None) -> None:
+    """Write the trace of each camera for each trial of a session. whisk: its program, or None."""
     for trial in load_session(session).trials:
         if not settings.takes(trial.name):
             continue
         folder = traces / trial.name
         folder.mkdir(parents=True, exist_ok=True)
         for camera, source in trial.camera_sources.items():
-            pictures = [grey.astype(float) for _, grey in Frames.open(source).read()]
-            still = np.median(pictures, axis=0)
-            rows = ["frame,u_px,v_px"]
-            for frame, picture in enumerate(pictures):
-                rows += [f"{frame},{u},{v}" for v, u in skeleton(picture - still)]
-            (folder / f"trace_{camera}.csv").write_text("\n".join(rows) + "\n")
+            pictures = [grey for _, grey in Frames.open(source).read()]
+            if whisk is None:
+                (folder / f"trace_{camera}.csv").write_text(skeletons(pictures))
+            else:
+                trace_by_whisk(whisk, pictures, folder / f"trace_{camera}")
+
+
+def trace_by_whisk(whisk: Path, pictures: list[np.ndarray], target: Path) -> None:
+    """Write <target>.whiskers by whisk's own program, of a stack of the pictures."""
+    with tempfile.TemporaryDirectory() as work:
+        stack = Path(work) / "pictures.tif"
+        none = [cv2.IMWRITE_TIFF_COMPRESSION, 1]
+        assert cv2.imwritemulti(str(stack), [np.uint8(grey) for grey in pictures], none)
+        command = [str(whisk.resolve()), stack.name, "traced.whiskers"]
+        subprocess.run(command, cwd=work, check=True, capture_output=True)
+        shutil.copyfile(Path(work) / "traced.whiskers", target.with_suffix(".whiskers"))
+
+
+def skeletons(pictures: list[np.ndarray]) -> str:
+    """Return the table of a camera's trace by skeletons."""
+    still = np.median(np.array(pictures, dtype=float), axis=0)
+    rows = ["frame,u_px,v_px"]
+    for frame, picture in enumerate(pictures):
+        rows += [f"{frame},{u},{v}" for v, u in skeleton(picture - still)]
+    return "\n".join(rows) + "\n"
 
 
 def skeleton(difference: np.ndarray) -> np.ndarray:
