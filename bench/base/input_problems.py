@@ -51,13 +51,17 @@ class InputProblems:
 
         Raises the first one's BadInput when all have been run.
         """
-        before = len(self.refusals)
+        refused = []  # also what was refused before, elsewhere, in the same words
         given = []
         for load in loaders:
             with self.guard():
-                given.append(load())
-        if len(self.refusals) > before:
-            raise BadInput(self.refusals[before])
+                try:
+                    given.append(load())
+                except BadInput as bad:
+                    refused.append(str(bad))
+                    raise
+        if refused:
+            raise BadInput(refused[0])
         return given
 
     def warn(self, line: str, trials: Iterable[str] = ()) -> None:

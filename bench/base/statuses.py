@@ -223,6 +223,13 @@ _TABLE = (
     ),
     Status("no_pictures", NOTE, "no pictures", _GIVE_PICTURES),
     Status(
+        "stated_in_other_unit",
+        WARNING,
+        "the stage's distance is what (10) estimates, in another unit",
+        "write millimetres",
+        reaches=(ESTIMATES,),
+    ),
+    Status(
         "slip_not_seen",
         NOTE,
         "the truth is a stage's: touch, slip and deflection are not seen",

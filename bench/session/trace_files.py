@@ -20,8 +20,12 @@ def trace_files(folder: Path, label: str) -> dict[str, Path]:
     found: dict[str, Path] = {}
     for path in visible(folder):
         suffix = path.suffix.lower()
-        if not path.name.startswith(_PREFIX) or not path.is_file() or suffix in _BESIDE:
+        if not path.name.startswith(_PREFIX) or suffix in _BESIDE:
             continue
+        if path.is_dir():
+            if suffix in SUFFIXES:
+                raise BadInput("is a folder; a file is expected there", file=f"{label}/{path.name}")
+            continue  # pictures of a camera of such a name
         name = IN_SPACE if path.name == IN_SPACE else path.stem.removeprefix(_PREFIX)
         if suffix not in SUFFIXES:
             known = ", ".join(SUFFIXES)

@@ -22,6 +22,8 @@ from vision.pictures import Frames
 # [1] Of the points: a tracker may draw a line a little beyond the picture's edge; more are of other
 # pictures. Stated.
 _MOST_OUTSIDE = 0.05
+# [px] Of all points of a trace together, across and down: a line of a wire is longer. Stated.
+_LEAST_SPAN_PX = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +82,7 @@ def _checked(
     """Return a camera's lines as a trace. Raise BadInput where they are not of its pictures."""
     _require_frames(drawn.frame, camera, frame_count(source), label)
     is_inside = _inside(drawn.px, camera, Frames.open(source).size_px, label)
+    _require_span(drawn.px, label)
     frame_of = np.full(int(np.max(picture, initial=0)) + 1, -1)
     recorded = np.flatnonzero(picture >= 0)
     frame_of[picture[recorded]] = recorded
@@ -102,6 +105,14 @@ def _require_frames(frame: np.ndarray, camera: str, count: int, label: str) -> N
         there = f"camera {camera} has {counted(count, 'picture')}, counted from 0"
         other = "is it of another trial?"
         raise BadInput(f"frame {absent[0]:g} is not there; {there}; {other}", file=label)
+
+
+def _require_span(px: np.ndarray, label: str) -> None:
+    """Raise BadInput where all points (n, 2) are at one spot."""
+    span_px = float(np.max(np.ptp(px, axis=0)))
+    if span_px < _LEAST_SPAN_PX:
+        found = f"all of its points are within {span_px:.2g} px"
+        raise BadInput(f"{found}; are u_px and v_px in pixels, and of a line?", file=label)
 
 
 def _inside(px: np.ndarray, camera: str, size_px: tuple[int, int], label: str) -> np.ndarray:

@@ -19,6 +19,7 @@ from bench.gauges.felt import (
 )
 from bench.gauges.gauge_readings import Pairs, pairs_of
 from bench.records.trial_result import (
+    BY_STAGE,
     EstimateRow,
     FeltAt,
     FeltTrial,
@@ -38,6 +39,7 @@ from bench.trials.object_motion import MOTION_ESTIMATORS, with_motion
 from bench.trials.readout import Readout, felt_whisk, whisk_at
 from bench.trials.seen import NO_PICTURES, unseen
 from bench.trials.sensor_readings import with_others
+from bench.trials.stated_length import stated_in_other_unit
 from bench.trials.stick_slip_phases import phases_of
 from bench.trials.unit import Unit
 from bench.trials.ways_back import NO_WAY_BACK, with_both_ways, with_late_release
@@ -109,7 +111,22 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
         with_drift=_with_drift(unit, stroke, readout),
     )
     felt = _against_pictures(felt, unit, stroke, readout, seen)
-    return _FeltStroke(unit, stroke, readout, touch).with_estimates(felt, usable)
+    felt = _FeltStroke(unit, stroke, readout, touch).with_estimates(felt, usable)
+    return felt if seen.source != BY_STAGE else _against_stated(felt, seen)
+
+
+def _against_stated(felt: FeltWhisk, seen: SeenWhisk) -> FeltWhisk:
+    """Return the felt whisk with a status where (10) has the contact where the stage does in another unit.
+
+    Nothing is concluded from such a whisk.
+    """
+    (ten,) = (row for row in felt.estimates if row.estimator == _TEN)
+    unit_name = stated_in_other_unit(seen.d_x_mm.value, ten.d_x_est_mm.value)
+    if not unit_name:
+        return felt
+    found = f"the stage has the contact at {seen.d_x_mm.value:.4g} mm, (10) at {ten.d_x_est_mm.value:.3g} mm"
+    odd = Reason("stated_in_other_unit", f"{found}: is the stage's in {unit_name}?")
+    return replace(felt, apart=True, status=joined(felt.status, odd))
 
 
 def _beyond_calibration(unit: Unit, readout: Readout, whisk: Whisk) -> Reason:

@@ -30,6 +30,7 @@ from bench.trials.stage_contact import (
     StatedPush,
     StatedRounded,
 )
+from bench.trials.stated_length import unit_within
 from bench.trials.trial_frames import stated_object
 from vision import NAN, UNKNOWN, SharedSigmas, TruthAtAngle, Value, WhiskTruth
 from vision.geometry import NO_REASON, Reason, Rounded, joined
@@ -45,13 +46,6 @@ _SET_SHARE = 0.01
 _RULER_MM = 0.5
 # Steps of derivatives: mm, rad, mm, mm. What is left out is 1e-6 of them. Derived.
 _STEPS = Offsets(np.full(3, 1e-3), 1e-4, 1e-4, 1e-3, np.full((2, REST_TERMS), 1e-3)).vector
-# Units that a length may be in, and mm in each.
-_UNITS = (
-    ("metres", 1e3),
-    ("centimetres", 10.0),
-    ("tenths of a millimetre", 0.1),
-    ("micrometres", 1e-3),
-)
 _HOW = {
     "starts_touching": "touches before the stroke begins",
     "never_touches": "does not come to the object in this stroke",
@@ -178,10 +172,8 @@ def _check_place(push: StatedPush, trial: Trial) -> None:
 
 def _in_other_unit(length: float, least_mm: float, most_mm: float) -> str:
     """Return '. Is it in metres?' where a length would be on the whisker in another unit, or ''."""
-    for name, factor in _UNITS:
-        if least_mm < length * factor <= most_mm:
-            return f". Is it in {name}?"
-    return ""
+    name = unit_within(length, least_mm, most_mm)
+    return f". Is it in {name}?" if name else ""
 
 
 def stated_whisk(session: Session, trial: Trial, signals: Signals, stroke: slice) -> WhiskTruth:

@@ -299,6 +299,10 @@ def beside(rows):
     rows[:, 1] += 900
 
 
+def in_metres(rows):
+    rows[:, 1:] /= 1000.0
+
+
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
@@ -308,6 +312,7 @@ def beside(rows):
             "frame 40 is not there; camera high has 13 pictures, counted from 0; is it of anot",
         ),
         (exchanged, "are u and v exchanged?"),
+        (in_metres, "all of its points are within 0.24 px; are u_px and v_px in pixels"),
         (beside, "100% of its points are outside the picture of camera high"),
     ],
 )
@@ -337,6 +342,13 @@ def test_wrong_columns_are_named(traced, head, said):
         rows = np.column_stack([rows, np.ones(len(rows))])
     write(path, rows, head)
     assert said in refusal(traced)
+
+
+def test_a_folder_in_the_place_of_a_trace_is_refused(traced):
+    path = next((traced / "trials").iterdir()) / "trace_high.csv"
+    path.unlink()
+    path.mkdir()
+    assert "trace_high.csv: is a folder; a file is expected there" in refusal(traced)
 
 
 def test_a_trace_of_no_camera_or_no_kind_is_refused(traced):

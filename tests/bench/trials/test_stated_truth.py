@@ -16,29 +16,22 @@ from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.statuses import TRUTH, reaching
 from bench.records.trial_result import BY_STAGE
-from bench.rig.bar import TouchedBar, find_first_touch
-from bench.rig.elastic_rod import RestShape, Rod
-from bench.session.manifest import ObjectKeys
-from bench.session.session import Session, load_session
-from bench.session.signals import Signals, forward_strokes, read_signals
+from bench.session.session import load_session
+from bench.session.signals import forward_strokes, read_signals
 from bench.trials.differences import LEAST_CHANCE
 from bench.trials.seen import NO_PICTURES, unseen
 from bench.trials.stage_contact import Offsets, StatedBar, StatedPush, StatedRounded
+from bench.trials.stated_length import stated_in_other_unit
 from bench.trials.stated_truth import by_stage, stated_whisk
 from fixtures.bring_stage import bar_of
 from tests.scenes.results import seen_whisk
+from tests.scenes.stated_places import drawn_whisk
 from vision import SharedSigmas, Value
 from vision.geometry import Wire
 from vision.geometry.cone import Cone
 from vision.geometry.ring import Ring
 from vision.geometry.sphere import Sphere
 
-# One sigma of what a lab knows of place, origin, slope and diameter, drawn in `drawn_z`.
-PLACE_MM = 0.05
-ORIGIN_MM = 0.1
-SLOPE_DEG = 0.5
-BAR_MM = 0.02
-SET_MM = 1.0  # at the tip of the whisker, as the stage's truth allows for
 WHISKS = 40
 STAGE = Path(__file__).parents[3] / "fixtures" / "bring" / "stage"
 TRIAL = "steel_b20_v10"
@@ -353,6 +346,20 @@ def test_a_fault_is_one_clear_line(session, name):
     assert said in line and "\n" not in line
 
 
+@pytest.mark.parametrize(
+    ("stated_mm", "by_moments_mm", "unit"),
+    [
+        (6.0, 61.0, "centimetres"),
+        (2.4, 60.0, "inches"),
+        (600.0, 58.0, "tenths of a millimetre"),
+        (60.0, 190.0, ""),  # an estimator that ignores slip, on a slope of 60°
+        (60.0, math.nan, ""),
+    ],
+)
+def test_a_distance_in_another_unit_is_known_by_the_moments(stated_mm, by_moments_mm, unit):
+    assert stated_in_other_unit(stated_mm, by_moments_mm) == unit
+
+
 def test_a_log_that_no_key_asks_for_is_named(session):
     change(session / "session.toml", "truth")
     problems = InputProblems()
@@ -370,50 +377,14 @@ def test_one_log_serves_all_trials(session):
     assert after.d_x_mm.value == before.d_x_mm.value
 
 
-def drawn_z(session: Session, rng: np.random.Generator) -> tuple[float, float]:
-    """Return the errors of d_x and β of a drawn whisk, over their sigmas.
-
-    First touch is the rig's, which shares no code with the bench's. The whisker keeps a set that nobody
-    stated; the bar is thinner or thicker, and stands elsewhere and otherwise, than is stated.
-    """
-    set_y_mm, set_z_mm = SET_MM * rng.standard_normal(2)
-    rod = Rod("cylinder", 100.0, 1.0, 60.0, 6450.0, RestShape(100.0, 0.0, set_y_mm, set_z_mm))
-    d_x_mm = rng.uniform(40.0, 80.0)
-    beta_deg = rng.uniform(-65.0, 65.0)
-    touch_rad = math.radians(rng.uniform(2.0, 6.0))
-    bar = TouchedBar.at_contact(
-        d_x_mm=d_x_mm,
-        beta_rad=math.radians(beta_deg),
-        psi_rad=math.radians(SLOPE_DEG * rng.standard_normal()),
-        touch_rad=touch_rad,
-        radius_mm=3.0 + 0.5 * BAR_MM * rng.standard_normal(),
-        whisker_radius_mm=0.5,
-    )
-    touch = find_first_touch(rod, bar, touch_rad, d_x_mm)
-    place_mm = bar.point_mm + np.hypot(PLACE_MM, ORIGIN_MM) * rng.standard_normal(3)
-    trial = replace(
-        session.trial(RULER),
-        d_x_mm=None,
-        object=ObjectKeys(point_mm=place_mm.tolist(), point_sigma_mm=PLACE_MM),
-        beta_deg=beta_deg + SLOPE_DEG * rng.standard_normal(),
-        beta_sigma_deg=SLOPE_DEG,
-        bar_diameter_sigma_mm=BAR_MM,
-    )
-    motor_rad = np.radians(np.linspace(-8.0, 15.0, 500))
-    time_s = np.linspace(0.0, 2.3, 500)
-    signals = Signals(time_s, motor_rad, np.zeros(500), np.zeros(500), "V")
-    truth = stated_whisk(session, trial, signals, slice(0, 500))
-    z_d_x = (truth.d_x_mm.value - touch.d_x_mm) / truth.d_x_mm.sigma
-    # The whisker's set turns touch, and with it β, by less than 0.1°.
-    z_beta = (truth.beta_rad.value - math.radians(beta_deg)) / truth.beta_rad.sigma
-    return z_d_x, z_beta
-
-
 def test_intervals_of_a_stage_hold_and_are_no_wider_than_they_must():
     """Over drawn whisks the squares of z add up as χ² says, at a chance of 1 in 10 000 to either side."""
     session = load_session(STAGE)
     rng = np.random.default_rng(7)
-    z = np.array([drawn_z(session, rng) for _ in range(WHISKS)])
+    drawn = [drawn_whisk(session, RULER, rng) for _ in range(WHISKS)]
+    z = np.array(
+        [(w.d_x_error_mm / w.d_x_sigma_mm, w.beta_error_rad / w.beta_sigma_rad) for w in drawn]
+    )
     low, high = chdtri(WHISKS, 1.0 - 1e-4), chdtri(WHISKS, 1e-4)
     squares = np.sum(z**2, axis=0)
     assert low < squares[0] < high, squares
