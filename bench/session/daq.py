@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 
 from bench.base.errors import BadInput
+from bench.base.input_problems import refused_as_bad_input
 from bench.session import manifest
 from bench.session.manifest import ChannelKeys
 from bench.session.strict_toml import values
 from bench.session.table import NumberTable, column_names, read_table
 from bench.session.text_files import check_size
+from vision.calibration import load_matlab
 
 _TIME = "time_s"
 _FRAME = "frame_V"
@@ -25,8 +27,6 @@ _FRAME = "frame_V"
 _MOST_BYTES = 1 << 31
 # [names] Most in one line.
 _MOST_LISTED = 8
-# Errors of SciPy's reader on a damaged file.
-NOT_MATLAB = (ValueError, TypeError, KeyError, OSError, EOFError, OverflowError, MemoryError)
 # Errors of h5py on a damaged file.
 NOT_HDF5 = (OSError, KeyError, TypeError, ValueError, IndexError, RuntimeError, MemoryError)
 # Errors of npTDMS on a damaged file.
@@ -146,15 +146,11 @@ def _csv(path: Path, names: list[str], label: str) -> list:
 
 def _mat(path: Path, names: list[str], label: str) -> list:
     """Read raw series of a MATLAB file."""
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
     try:
-        content = loadmat(path, simplify_cells=True)
+        with refused_as_bad_input(label):
+            content = load_matlab(path)
     except NotImplementedError:  # version 7.3 is HDF5
         return _hdf5(path, names, label)
-    except (MatReadError, *NOT_MATLAB) as problem:
-        raise BadInput(f"cannot be read as a MATLAB file ({problem})", file=label) from None
     return [_variable(content, name, label) for name in names]
 
 

@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.session.daq import NOT_HDF5, NOT_MATLAB, optional_library
+from bench.base.input_problems import refused_as_bad_input
+from bench.session.daq import NOT_HDF5, optional_library
 from bench.session.table import read_table, require_columns
 from bench.session.text_files import check_size, read_text
+from vision.calibration import load_matlab
 
 # [bytes] No larger file is read at once.
 _MOST_BYTES = 1 << 31
@@ -353,13 +355,11 @@ def _whiskerman(path: Path, label: str) -> DrawnLines:
 
     They count from 1 within its region of interest.
     """
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
     try:
-        content = loadmat(path, simplify_cells=True, appendmat=False)
-    except (MatReadError, NotImplementedError, *NOT_MATLAB) as problem:
-        raise BadInput(f"cannot be read as a MATLAB file ({problem})", file=label) from None
+        with refused_as_bad_input(label):
+            content = load_matlab(path)
+    except NotImplementedError:
+        raise BadInput("is of MATLAB's version 7.3; save it with -v7", file=label) from None
     whiskers = content.get("whisker")
     if isinstance(whiskers, dict):
         whiskers = [whiskers]

@@ -24,6 +24,7 @@ NAMES = {
     "hub_turns": ("marker_turns",),
     "kalibr_target": ("read_kalibr_target",),
     "known_lengths": ("check_known_lengths",),
+    "matlab_file": ("load_matlab",),
     "moving_line": ("MovingLines", "moving_lines"),
     "place": ("Placement", "by_board", "check_swing_suffices", "combine", "move_rig_frame"),
     "swing": ("by_strokes",),

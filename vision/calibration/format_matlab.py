@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat, savemat
-from scipy.io.matlab import MatReadError
+from scipy.io import savemat
 
 from vision.calibration.foreign_camera import foreign_camera, numbers
+from vision.calibration.matlab_file import load_matlab
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import compose, invert_transform
@@ -37,10 +37,9 @@ def read(path: Path) -> list[Camera]:
     Raises Refused where the file holds no such structure, or a lens is skewed.
     """
     try:
-        values = loadmat(path, simplify_cells=True)
-    except (MatReadError, NotImplementedError, ValueError, OSError, TypeError) as error:
-        words = " ".join(str(error).split())[:100]
-        raise Refused(f"{path.name} is not read: {words}; save it with -v7") from None
+        values = load_matlab(path)
+    except (Refused, NotImplementedError) as problem:
+        raise Refused(f"{path.name} is not read: {problem}; save it with -v7") from None
     for value in values.values():
         if isinstance(value, dict) and "CameraParameters1" in value:
             return _stereo(path, value)
