@@ -93,6 +93,8 @@ def _trials_of_all(
             channels = _channels_of_all(trial, keys)
             _check_motors(bases, channels)
             _check_cone(bases, trial)
+            if session.truth is not None:
+                _check_stated_place(trial)
             for base in bases:
                 trials[base.name].append(_trial_of(base, trial, channels[base.name]))
     return trials
@@ -207,6 +209,17 @@ def _check_motors(bases: Sequence[Base], channels: Mapping[str, DaqFile]) -> Non
             found = f"{one.name} and {other.name} are on one motor ({motor.channel}), {angle}"
             fix = "name each one's own motor_deg in [whiskers.channels]"
             raise BadInput(f"[[whiskers]] {found}; {fix}", file=MANIFEST)
+
+
+def _check_stated_place(trial: Trial) -> None:
+    """Raise BadInput where a stage's truth is one whisker's: by d_x_mm, or a bar's slope without its axis."""
+    if not trial.states_place:
+        found = "states no place of the object; d_x_mm is one whisker's, of an array write point_mm of [object]"
+    elif trial.is_bar and (trial.object is None or trial.object.axis is None):
+        found = "beta_deg is one whisker's slope; of an array write axis of [object], the bar's direction"
+    else:
+        return
+    raise BadInput(found, file=f"{trial.place}/trial.toml")
 
 
 def _check_cone(bases: Sequence[Base], trial: Trial) -> None:

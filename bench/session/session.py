@@ -304,9 +304,6 @@ def _stated_session(path: Path, tables: dict, problems: InputProblems) -> Stated
     if has_trials:
         needed = ["bar"] if "whiskers" in tables else ["whisker", "bar"]
     as_keys(tables, manifest.SessionKeys, MANIFEST, problems, needed)
-    if "truth" in tables and "whiskers" in tables:
-        found = "[truth] is one whisker's; make a session of each of [[whiskers]]"
-        raise BadInput(found, file=MANIFEST)
     return StatedSession.of(tables)
 
 

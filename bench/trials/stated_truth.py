@@ -33,7 +33,7 @@ from bench.trials.stage_contact import (
 from bench.trials.stated_length import unit_within
 from bench.trials.trial_frames import stated_object
 from vision import NAN, UNKNOWN, SharedSigmas, TruthAtAngle, Value, WhiskTruth
-from vision.geometry import NO_REASON, Reason, Rounded, joined
+from vision.geometry import NO_REASON, Reason, Rounded, apply, joined
 
 NOT_SEEN = reason("slip_not_seen")
 # [mm] One sigma of where the clamp holds the whisker's axis beside the hub's: a collet's runout.
@@ -207,7 +207,7 @@ def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -
         return _without_touch(push, trial)
     rows = _derivatives(push, touch)
     own = rows * _own_sigmas(trial, signals, stroke, touch)
-    shared = rows * _shared_sigmas(session, trial)
+    shared = rows * _shared_sigmas(session, trial, touch)
     shared_mm = float(np.linalg.norm(shared[0]))
     values = []
     for value, of_own, of_shared in zip((touch.d_x_mm, touch.beta_rad, touch.psi_rad), own, shared):
@@ -234,28 +234,31 @@ def _push(session: Session, trial: Trial, signals: Signals, stroke: slice) -> St
         _check_covers(log, time_s)
     stated = trial.object
     origin_mm = np.zeros(3) if stated is None or stated.point_mm is None else stated.point_mm
+    T_base_rig = np.eye(3, 4) if session.base is None else session.base.T_base_rig
     rising = np.maximum.accumulate(motor_rad)
 
     def place_at(angles_rad: np.ndarray) -> np.ndarray:
         """Return the object's place (..., 3), mm, when the motor is at angles (...)."""
-        if log is None:
-            return np.broadcast_to(origin_mm, (*np.shape(angles_rad), 3))
-        return origin_mm + log.at(np.interp(angles_rad, rising, time_s))
+        in_rig_mm = np.broadcast_to(origin_mm, (*np.shape(angles_rad), 3))
+        if log is not None:
+            in_rig_mm = in_rig_mm + log.at(np.interp(angles_rad, rising, time_s))
+        return apply(T_base_rig, in_rig_mm)
 
-    return StatedPush(motor_rad, place_at, session.whisker.wire, _standing_object(trial))
+    standing = _standing_object(trial, T_base_rig[:, :3])
+    return StatedPush(motor_rad, place_at, session.whisker.wire, standing)
 
 
-def _standing_object(trial: Trial) -> StatedObject:
-    """Return the trial's object with its direction."""
+def _standing_object(trial: Trial, to_base: np.ndarray) -> StatedObject:
+    """Return the trial's object with its direction. to_base (3, 3): turns rig vectors into the whisker's base frame."""
     form = stated_object(trial)
     if isinstance(form, Rounded):
-        axis = np.array(trial.object.direction)
+        axis = to_base @ trial.object.direction
         return StatedRounded(form, axis / np.linalg.norm(axis))
     slope_rad = nominal_slope(trial).value
     is_turned = trial.object is not None and trial.object.axis is not None
     return StatedBar(
         form.radius_mm,
-        _upward(trial.object.axis) if is_turned else None,
+        _upward(to_base @ trial.object.axis) if is_turned else None,
         float(slope_rad) if np.isfinite(slope_rad) else 0.0,
     )
 
@@ -303,12 +306,17 @@ def _own_sigmas(trial: Trial, signals: Signals, stroke: slice, touch: Contact) -
     ).vector
 
 
-def _shared_sigmas(session: Session, trial: Trial) -> np.ndarray:
-    """Return one sigma (p,) of each offset that all whisks share: origin, radii, the whisker's shape."""
+def _shared_sigmas(session: Session, trial: Trial, touch: Contact) -> np.ndarray:
+    """Return one sigma (p,) of each offset that all whisks share: origin, radii, the whisker's shape, its base."""
     whisker = session.whisker
     reach_mm = 0.5 * np.hypot(trial.bar_diameter_sigma_mm, whisker.diameter_sigma_mm)
     is_stated = whisker.rest_curvature_per_mm is not None or whisker.rest_shape is not None
     set_mm = 0.0 if is_stated else _SET_SHARE * whisker.length_mm
     rest_mm = np.tile([_CLAMP_MM, 0.0, set_mm], (2, 1))
-    place_mm = np.full(3, session.truth.origin_sigma_mm)
-    return Offsets(place_mm, 0.0, 0.0, float(reach_mm), rest_mm).vector
+    place_mm = session.truth.origin_sigma_mm
+    turn_rad = 0.0
+    if session.base is not None:
+        turn_rad = session.base.sigma_rad
+        of_base_mm = np.hypot(session.base.sigma_mm, turn_rad * touch.d_x_mm)
+        place_mm = float(np.hypot(place_mm, of_base_mm))
+    return Offsets(np.full(3, place_mm), turn_rad, turn_rad, float(reach_mm), rest_mm).vector

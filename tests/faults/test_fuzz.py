@@ -10,6 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests" / "faults" / "fuzz.py"
 STATED = ROOT / "tests" / "faults" / "fuzz_stated.py"
+BROUGHT = ROOT / "tests" / "faults" / "fuzz_brought.py"
 pytestmark = pytest.mark.skipif(
     not hasattr(os, "fork"), reason="each mutation runs in a forked process"
 )
@@ -44,6 +45,12 @@ def test_a_few_mutations_of_what_is_stated():
     done = stated(0, 60)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "'refused'" in done.stdout and "'accepted'" in done.stdout
+
+
+@pytest.mark.slow
+def test_many_mutations_of_what_is_brought():
+    done = run(BROUGHT, "100000", "5000")
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.slow

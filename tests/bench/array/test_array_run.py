@@ -15,6 +15,9 @@ from bench.base.settings import Settings
 from bench.report.compare_runs import compare_runs
 from bench.report.video import write_video
 from bench.rig.simulation import simulate
+from bench.session.array_view import load_views
+from bench.session.signals import forward_strokes, read_signals
+from bench.trials.stated_truth import stated_whisk
 from bench.workflows.preflight import check
 from bench.workflows.session_evaluation import evaluate
 from tests.scenes.rig_sessions import protocol_file
@@ -74,6 +77,25 @@ def test_felt_contacts_lie_on_the_bar(out):
         "Score against the truth files" in summary
         and '<a href="whiskers/w2/report.html">' in (out / "report.html").read_text()
     )
+
+
+def test_a_stage_s_place_is_the_truth_of_each_whisker(session, tmp_path):
+    """By the object of the manifest and each base: within three of the sigmas that these have."""
+    stated = shutil.copytree(session, tmp_path / "session", copy_function=shutil.copyfile)
+    manifest = stated / "session.toml"
+    manifest.write_text(f'{manifest.read_text()}\n[truth]\nsource = "stage"\n')
+    for view in load_views(stated):
+        (trial,) = view.trials
+        signals = read_signals(trial)
+        truth = stated_whisk(view, trial, signals, forward_strokes(signals)[0])
+        true_mm = tomllib.loads(trial.own("truth.toml").read_text())["d_x_mm"]
+        assert abs(truth.d_x_mm.value - true_mm) < 3.0 * truth.d_x_mm.sigma < 3.0
+    text = re.sub(r"axis = \[[^\]]*\]\n", "", (trial.folder / "trial.toml").read_text())
+    (trial.folder / "trial.toml").write_text(f"beta_deg = 30.0\n{text}")
+    with pytest.raises(
+        BadInput, match="beta_deg is one whisker's slope; of an array write axis of"
+    ):
+        load_views(stated)
 
 
 def test_a_whisker_of_an_array_gives_what_its_own_session_gives(session, out, tmp_path):

@@ -316,22 +316,6 @@ FAULTS = {
         lambda s: change(s / "session.toml", truth={"source": "ruler"}),
         "[truth] source",
     ),
-    "an array": (
-        lambda s: change(
-            s / "session.toml",
-            "whisker",
-            whiskers=[
-                {
-                    "name": "a",
-                    "length_mm": 100.0,
-                    "diameter_mm": 1.0,
-                    "youngs_modulus_GPa": 60.0,
-                    "base_mm": [0.0, 0.0, 0.0],
-                }
-            ],
-        ),
-        "[truth] is one whisker's",
-    ),
 }
 
 

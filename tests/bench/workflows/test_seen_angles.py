@@ -18,6 +18,7 @@ from bench.session.manifest import TrialKeys
 from bench.session.session import load_session
 from bench.session.signals import read_signals
 from bench.workflows.session_evaluation import DONE, evaluate
+from tests.scenes.no_motor_log import without_log
 from tests.scenes.recorded import exact_cameras
 from tests.scenes.results import table
 
@@ -28,24 +29,6 @@ TRACES = (
 SMALL = FIXTURES / "small-session"
 WHISKER = 'angle_from = "whisker"'
 MARKER = 'angle_from = "marker"\nhub_marker = 40'
-
-
-def without_log(source: Path, target: Path, keys: str, trials: int | None = None) -> Path:
-    """Copy a session without motor_deg and traces, with these keys in [trial] and some of its trials."""
-    shutil.copytree(source, target, ignore=shutil.ignore_patterns("trace_*"))
-    folders = sorted((target / "trials").iterdir())
-    for folder in folders[len(folders) if trials is None else trials :]:
-        shutil.rmtree(folder)
-    text = (target / "session.toml").read_text()
-    if "[trial]" not in text:
-        text += "\n[trial]\n"
-    (target / "session.toml").write_text(text.replace("[trial]", f"[trial]\n{keys}"))
-    for file in target.glob("trials/*/signals.csv"):
-        rows = [line.split(",") for line in file.read_text().split()]
-        motor = rows[0].index("motor_deg")
-        lines = [",".join(row[:motor] + row[motor + 1 :]) for row in rows]
-        file.write_text("\n".join(lines) + "\n")
-    return target
 
 
 @pytest.fixture(scope="module")
