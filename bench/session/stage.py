@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.session.plausible import PLACE, SIGMA
+from bench.session.plausible import PLACE, PlausibleRange
 from bench.session.table import NumberTable, forward_in_time, read_table, require_columns
 
 STAGE = "stage.csv"
 _TIME = "time_s"
 _PLACES = ("x_mm", "y_mm", "z_mm")
+_SIGMA = PlausibleRange(0.0, PLACE.high)
 _SIGMAS = ("x_sigma_mm", "y_sigma_mm", "z_sigma_mm")
 
 
@@ -67,7 +68,7 @@ def _read(path: Path, label: str) -> StageLog:
     for name in _PLACES:
         _check(table, name, PLACE, label)
     for name in _SIGMAS:
-        _check(table, name, SIGMA, label)
+        _check(table, name, _SIGMA, label)
     return StageLog(
         label,
         table[_TIME],

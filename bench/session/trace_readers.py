@@ -29,6 +29,8 @@ _LEAST_LIKELIHOOD = 0.6
 _DEEPLABCUT_AXES = ("x", "y", "likelihood")  # names of a joint's columns
 # [points] Along a curve of WhiskerMan, given by three or four control points. Stated.
 _CURVE_POINTS = 60
+# [1] Numbers of lines are whole, and no tracker knows as many again. Stated.
+_MOST_LINES = 1e6
 # [px] SLEAP before format 1.1 counts from the corner of the first pixel. Stated by SLEAP.
 _SLEAP_CORNER_PX = 0.5
 # [version] Of SLEAP's files, from which it counts from the centre. Stated by SLEAP.
@@ -87,6 +89,7 @@ def _own_or_deeplabcut(path: Path, label: str) -> DrawnLines:
     sigma_px = table.columns.get("sigma_px", unknown)
     _check_sigmas(sigma_px, table.row, label)
     line = table.columns.get("line", np.zeros(len(table)))
+    _check_lines(line, table.row, label)
     px = np.stack([table["u_px"], table["v_px"]], axis=1)
     return DrawnLines(table["frame"], px, line.astype(int), sigma_px)
 
@@ -97,6 +100,14 @@ def _check_sigmas(sigma_px: np.ndarray, row: np.ndarray, label: str) -> None:
     if len(bad):
         found = f"{sigma_px[bad[0]]:g} is no standard deviation; leave the column out if unknown"
         raise BadInput(found, file=label, row=int(row[bad[0]]), column="sigma_px")
+
+
+def _check_lines(line: np.ndarray, row: np.ndarray, label: str) -> None:
+    """Raise BadInput for the first number of a line (n,) that is none, naming its row."""
+    bad = np.flatnonzero((line != np.round(line)) | (np.abs(line) > _MOST_LINES))
+    if len(bad):
+        found = f"{line[bad[0]]:g} is no number of a line: a whole number, the same in all frames"
+        raise BadInput(found, file=label, row=int(row[bad[0]]), column="line")
 
 
 def _deeplabcut_text(path: Path, label: str) -> DrawnLines:
@@ -150,9 +161,12 @@ def numbers_with_gaps(cells: Sequence[str], count: int, row: int, label: str) ->
         found = f"has {len(cells)} numbers, the header names {count}"
         raise BadInput(found, file=label, row=row)
     try:
-        return [float(cell) if cell.strip() else np.nan for cell in cells]
+        numbers = [float(cell) if cell.strip() else np.nan for cell in cells]
     except ValueError:
         raise BadInput("holds a cell that is no number", file=label, row=row) from None
+    if np.any(np.isinf(numbers)):
+        raise BadInput("holds a number without end", file=label, row=row)
+    return numbers
 
 
 def _picture_number(index: str | bytes | float) -> float:
@@ -336,11 +350,11 @@ def _read_measurements(path: Path, label: str) -> dict[tuple[int, int], int]:
     """Read the identity of each segment by frame and number from Whisk's measurements."""
     content = path.read_bytes()
     row_bytes = {b"measv3\0\0": 41, b"measV1\0\0": 40}.get(content[:8])
-    if row_bytes is None:
+    if row_bytes is None or len(content) < 16:
         raise BadInput(f"{path.name} beside it is no file of measurements", file=label)
     rows, measures = np.frombuffer(content[8:16], "<i4").tolist()
     stride = row_bytes + 16 * measures
-    if len(content) < 16 + rows * stride:
+    if min(rows, measures) < 0 or len(content) < 16 + rows * stride:
         raise BadInput(f"{path.name} beside it is cut short", file=label)
     found = {}
     for row in range(rows):

@@ -15,6 +15,13 @@ from vision.calibration import foreign_cameras
 from vision.geometry import Camera
 
 _AXES = ("x", "y", "z")
+# Anipose's columns of the axes that it has aligned points to.
+_TURN = tuple(f"M_{i}{j}" for i in range(3) for j in range(3))
+_CENTRE = tuple(f"center_{i}" for i in range(3))
+# [mm] Of a place from the cameras: 100 m. Stated.
+_MOST_MM = 1e5
+# [1] Of a turn in a table. Stated.
+_ROUNDING = 1e-3
 
 
 def lines_in_space(path: Path, cameras: Sequence[str], label: str) -> dict[str, DrawnLines]:
@@ -41,7 +48,10 @@ def lines_in_space(path: Path, cameras: Sequence[str], label: str) -> dict[str, 
 
 def _joints(path: Path, label: str) -> tuple[np.ndarray, np.ndarray]:
     """Return frames (n,) and points (n, joints, 3) in the cameras' frame."""
-    names, *rows = csv.reader(io.StringIO(read_text(path, "export it as CSV, UTF-8", label)))
+    table = list(csv.reader(io.StringIO(read_text(path, "export it as CSV, UTF-8", label))))
+    if not table:
+        raise BadInput("is empty", file=label)
+    names, *rows = table
     joints = [name.removesuffix("_x") for name in names if name.endswith("_x")]
     wanted = [f"{joint}_{axis}" for joint in joints for axis in _AXES]
     if not joints or not set(wanted) <= set(names):
@@ -50,7 +60,11 @@ def _joints(path: Path, label: str) -> tuple[np.ndarray, np.ndarray]:
     columns = _numbers_by_name(names, rows, label)
     count = len(columns[wanted[0]])
     points = np.stack([columns[name] for name in wanted], axis=1).reshape(count, -1, 3)
-    return columns.get("fnum", np.arange(float(count))), _in_cameras_frame(points, columns)
+    largest_mm = np.max(np.abs(points[np.isfinite(points)]), initial=0.0)
+    if largest_mm > _MOST_MM:
+        raise BadInput(f"holds {largest_mm:g}, which is no place in mm", file=label)
+    frame = columns.get("fnum", np.arange(float(count)))
+    return frame, _in_cameras_frame(points, columns, label)
 
 
 def _numbers_by_name(
@@ -65,13 +79,24 @@ def _numbers_by_name(
     return dict(zip(names, np.array(values).T))
 
 
-def _in_cameras_frame(points: np.ndarray, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return points (n, joints, 3) in the cameras' frame, by Anipose's columns M and center where it has them."""
-    if "M_00" not in columns:
+def _in_cameras_frame(
+    points: np.ndarray, columns: Mapping[str, np.ndarray], label: str
+) -> np.ndarray:
+    """Return points (n, joints, 3) in the cameras' frame, by Anipose's columns M and center where it has them.
+
+    Raises BadInput where these are no turn and no place.
+    """
+    if not any(name in columns for name in (*_TURN, *_CENTRE)):
         return points
-    turn = np.array([[columns[f"M_{i}{j}"][0] for j in range(3)] for i in range(3)])
-    centre = np.array([columns[f"center_{i}"][0] for i in range(3)])
-    return (points + centre) @ np.linalg.inv(turn.T)
+    missing = [name for name in (*_TURN, *_CENTRE) if name not in columns]
+    if missing:
+        raise BadInput(f"column {missing[0]} is missing beside the others", file=label, row=1)
+    turn = np.array([columns[name][0] for name in _TURN]).reshape(3, 3)
+    centre = np.array([columns[name][0] for name in _CENTRE])
+    if not np.allclose(turn @ turn.T, np.eye(3), atol=_ROUNDING) or not np.all(np.isfinite(centre)):
+        found = "columns M_00 to M_22 and center are no turn and place of axes"
+        raise BadInput(found, file=label, row=2)
+    return (points + centre) @ turn
 
 
 def _as_seen(camera: Camera, frame: np.ndarray, points: np.ndarray) -> DrawnLines:

@@ -78,7 +78,7 @@ def parse_toml(path: Path, complaint: str) -> dict:
     """Parse a TOML file; raise Refused with the complaint and the parser's own where it is none."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # of TOML, of text, of a number's length
         raise Refused(f"{complaint}: {error}") from error
 
 

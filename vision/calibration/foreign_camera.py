@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vision.geometry.camera import Camera
+from vision.geometry.camera import MOST_NUMBER, Camera
 from vision.geometry.refusals import Refused
 
 # [mm/m] A unit. Derived.
@@ -24,7 +24,7 @@ def foreign_camera(
     distortion: k1 k2 p1 p2 and perhaps k3 and more. Raises Refused where a term beyond k3 is not 0,
     or numbers are no camera's.
     """
-    terms = np.array(distortion, dtype=float).ravel()
+    terms = _terms(name, distortion)
     if np.any(terms[5:]):
         raise Refused(
             f"camera {name} has {len(terms)} distortion terms; up to five (k1 k2 p1 p2 k3) are read"
@@ -40,13 +40,21 @@ def foreign_camera(
         raise Refused(f"camera {name}: {error}") from error
 
 
+def _terms(name: str, distortion: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return distortion terms as an array (n,). Raise Refused where they are no numbers."""
+    try:
+        return np.array(distortion, dtype=float).ravel()
+    except (TypeError, ValueError):
+        raise Refused(f"camera {name}: its distortion is no list of numbers") from None
+
+
 def numbers(value: object, shape: tuple[int, ...], what: str) -> np.ndarray:
     """Return a value as an array of that shape; raise Refused, naming it, where it is none."""
     try:
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
-    if array.size != np.prod(shape) or not np.all(np.isfinite(array)):
+    if array.size != np.prod(shape) or not np.all(np.abs(array) < MOST_NUMBER):
         raise Refused(f"{what} must be {' x '.join(map(str, shape))} numbers")
     return array.reshape(shape)
 

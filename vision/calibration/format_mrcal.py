@@ -33,7 +33,7 @@ def read(path: Path) -> list[Camera]:
     name = path.stem
     if not isinstance(lens, str) or lens not in _TERMS:
         raise Refused(
-            f"camera {name} has {lens}, which the five-term lens here does not describe; "
+            f"camera {name} has {lens!r}, which the five-term lens here does not describe; "
             "solve with LENSMODEL_OPENCV5"
         )
     found = f"{path.name}: intrinsics of {lens}"

@@ -10,7 +10,7 @@ import numpy as np
 import tomli_w
 
 from vision.calibration.cameras_file import parse_toml
-from vision.calibration.foreign_camera import MM_PER_M, foreign_camera
+from vision.calibration.foreign_camera import MM_PER_M, foreign_camera, numbers
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import exp_rotation, log_rotation
@@ -103,9 +103,11 @@ def _camera(name: str, table: dict, unit_mm: float) -> Camera:
         raise Refused(
             f"camera {name} has a fisheye lens, which the five-term lens here does not describe"
         )
-    rotation = np.array(table["rotation"], dtype=float)
-    R = rotation if rotation.shape == (3, 3) else exp_rotation(rotation.ravel())
-    shift_mm = unit_mm * np.array(table["translation"], dtype=float).ravel()
+    stated = table["rotation"]
+    is_matrix = isinstance(stated, list) and isinstance(stated[0], list) and len(stated) == 3
+    rotation = numbers(stated, (3, 3) if is_matrix else (3,), f"camera {name}: rotation")
+    R = rotation if is_matrix else exp_rotation(rotation)
+    shift_mm = unit_mm * numbers(table["translation"], (3,), f"camera {name}: translation")
     return foreign_camera(
         name,
         table["size"],

@@ -18,6 +18,8 @@ from vision.geometry.rotation import apply, exp_rotation, nearest_rotation, skew
 # [parameters] A layout, no threshold: nine of the lens, six of the pose.
 N_PARAMETERS = 15
 PARAMETERS = (*lens_model.LENS_TERMS, "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
+# [px, mm, 1] No lens, picture or rig has a larger one, and its powers stay finite. Stated.
+MOST_NUMBER = 1e9
 # [1] Written-out rotations carry rounding; beyond this the matrix is none at all. Stated.
 _ROTATION_TOLERANCE = 1e-4
 
@@ -152,6 +154,8 @@ def _require_finite(name: str, value, shape: tuple[int, ...]) -> np.ndarray:
         f"{name} must be {' x '.join(map(str, shape))} finite numbers, "
         f"found {' x '.join(map(str, array.shape))}",
     )
+    largest = float(np.abs(array).max())
+    require(largest < MOST_NUMBER, f"{name} holds {largest:g}, which no camera has")
     array.setflags(write=False)
     return array
 
