@@ -9,12 +9,12 @@ rad, lengths in mm.
 """
 
 from dataclasses import replace
-from math import degrees, hypot, isnan, sqrt, tan
+from math import degrees, hypot, isnan, tan
 
 from estimator.builtin import with_friction
 from estimator.distance import felt_slip_angle
 from estimator.reasons import NamedReason
-from estimator.uncertainty import Z_95
+from estimator.uncertainty import Z_95, slip_angle_sigma
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
 STILL_SLIPS = NamedReason(
@@ -23,18 +23,11 @@ STILL_SLIPS = NamedReason(
 
 
 def slip_angle(whisk: Whisk) -> tuple[float, float]:
-    """Return the felt slip angle φ of (8) and its standard deviation, rad; φ is NaN without a push.
-
-    The sigma is that of noise across the deflection's direction, over the moment.
-    """
+    """Return the felt slip angle φ of (8) and its standard deviation, rad; φ is NaN without a push."""
     m_y = whisk.m_y_at_Nmm
     m_z = whisk.m_z_at_Nmm
-    moment = hypot(m_y, m_z)
-    across_yy = m_z**2 * whisk.covariance_at[0, 0]
-    across_zz = m_y**2 * whisk.covariance_at[1, 1]
-    across_yz = 2 * m_y * m_z * whisk.covariance_at[0, 1]
-    variance = (across_yy + across_zz - across_yz) / moment**4
-    return float(felt_slip_angle(m_y, m_z)), sqrt(max(variance, 0.0))
+    phi = float(felt_slip_angle(m_y, m_z))
+    return phi, slip_angle_sigma(m_y, m_z, whisk.covariance_at)
 
 
 def reoriented(whisk: Whisk, settings: EstimatorSettings) -> Estimate:

@@ -12,13 +12,14 @@ known. It rises from 1 at the base to 6.27 at 0.783 of the length, the node of t
 and falls to 4.39 at the tip: a ratio above 4.39 has two distances. Angles in rad, lengths in mm, times in s.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, cosh, hypot, nan, pi, sin, sinh, sqrt
 
 import numpy as np
 from scipy.optimize import OptimizeResult, brentq, least_squares
 
 from estimator.reasons import NamedReason
+from estimator.signal import FeltTouch, MomentAt, felt_touch, moment_at
 from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
@@ -72,11 +73,12 @@ TWO_PLACES = NamedReason(
 class Ring:
     """A damped oscillation: frequency with its standard deviation, Hz, and amplitude in its sigmas.
 
-    margin_sigmas: by how much it explains more than a ring of any other frequency. mains_Hz: frequency
-    of the hum with it.
+    damping: share of the critical one. margin_sigmas: by how much it explains more than a ring of any
+    other frequency. mains_Hz: frequency of the hum with it.
     """
 
     frequency_Hz: float
+    damping: float
     sigma_Hz: float
     amplitude_sigmas: float
     margin_sigmas: float
@@ -173,6 +175,67 @@ def moves_steadily(motor_rad: np.ndarray) -> np.ndarray:
     return speed > _STEADY_SHARE * np.median(speed)
 
 
+def without_ringing(whisk: Whisk) -> Whisk:
+    """Return the whisk as felt without its ringing: touch, moments and their covariances anew.
+
+    A free whisker rings at another frequency than one that touches, and stops when it does. As noise
+    (`estimator.noise`) its ringing would count in the push, too. So each ring is fitted and taken out
+    of its own samples; those of the motor's ramps are left out. What the whisk's covariances hold
+    besides the samples' noise is kept. The whisk is returned as it is where no free ring is heard, or
+    what is left shows no touch.
+    """
+    if whisk.unfiltered_Nmm is None:
+        return whisk
+    steady = moves_steadily(whisk.theta_rad) & np.isfinite(whisk.unfiltered_Nmm).all(axis=1)
+    samples = np.where(steady[:, None], whisk.unfiltered_Nmm, np.nan)
+    free = steady & (whisk.theta_rad < 0)
+    propped = steady & (whisk.theta_rad >= 0)
+    ring = _ring(whisk, free)
+    if ring is None or not ring.is_heard:
+        return whisk
+    samples[free] -= _ring_alone(whisk, free, ring)
+    ring = _ring(whisk, propped, beside=ring)
+    if ring is not None and ring.is_heard:
+        samples[propped] -= _ring_alone(whisk, propped, ring)
+    return _felt_anew(whisk, samples)
+
+
+def _ring_alone(whisk: Whisk, part: np.ndarray, ring: Ring) -> np.ndarray:
+    """Return the moments (n, 2) of a ring in the samples of a part."""
+    time_s = whisk.time_s[part] - whisk.time_s[part][0]
+    columns = _columns(time_s, ring.frequency_Hz, ring.damping, ring.mains_Hz)
+    amplitudes, *_ = np.linalg.lstsq(columns, whisk.unfiltered_Nmm[part], rcond=None)
+    return columns[:, -2:] @ amplitudes[-2:]
+
+
+def _felt_anew(whisk: Whisk, samples: np.ndarray) -> Whisk:
+    """Return the whisk by other samples (n, 2), N·mm, of its moments."""
+    before, before_touch = _felt(whisk, whisk.unfiltered_Nmm)
+    after, after_touch = _felt(whisk, samples)
+    if before.status or after.status:
+        return whisk
+    besides = whisk.theta_sigma_rad**2 - before_touch.sigma_rad**2
+    values, axes = np.linalg.eigh(whisk.covariance_at - before.covariance)
+    shared = (axes * np.maximum(values, 0.0)) @ axes.T
+    m_y, m_z = after.values.tolist()
+    return replace(
+        whisk,
+        theta_rad=whisk.theta_rad - after_touch.motor_rad,
+        m_y_at_Nmm=m_y,
+        m_z_at_Nmm=m_z,
+        covariance_at=after.covariance + shared,
+        theta_sigma_rad=sqrt(after_touch.sigma_rad**2 + max(besides, 0.0)),
+        theta_moment_covariance_at=after.theta_covariance,
+    )
+
+
+def _felt(whisk: Whisk, samples: np.ndarray) -> tuple[MomentAt, FeltTouch]:
+    """Return moments at the pushing angle, and the touch, of samples (n, 2), N·mm."""
+    touch = felt_touch(whisk.theta_rad, samples, whisk.time_s)
+    at = moment_at(whisk.theta_at_rad, whisk.theta_rad, samples, touch, time_s=whisk.time_s)
+    return at, touch
+
+
 def _ring(whisk: Whisk, part: np.ndarray, beside: Ring | None = None) -> Ring | None:
     """Return the ring in a part of the samples; None where the part is too short for one."""
     part = part & np.isfinite(whisk.unfiltered_Nmm).all(axis=1)
@@ -200,7 +263,7 @@ def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None)
     start = np.log([best_Hz, _TYPICAL_DAMPING, mains_Hz])
     free = 3 if beside is None else 2
     fit = _refined(time_s, moments, slowest_Hz, start, free)
-    frequency, _, mains_Hz = np.exp([*fit.x, *start[free:]]).tolist()
+    frequency, damping, mains_Hz = np.exp([*fit.x, *start[free:]]).tolist()
     left = 2 * fit.cost
     known = moments.size - _LINEAR_UNKNOWNS * moments.shape[1] - free
     variance = left / known
@@ -208,6 +271,7 @@ def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None)
     without = _left(time_s, moments, None, None, mains_Hz)[0]
     return Ring(
         frequency,
+        damping,
         sigma_Hz=frequency * sqrt(covariance[0, 0]),
         amplitude_sigmas=sqrt(max(without - left, 0.0) / variance),
         margin_sigmas=sqrt(max(runner_up - left, 0.0) / variance),
@@ -269,6 +333,15 @@ def _left(
     mains_Hz: float,
 ) -> tuple[float, np.ndarray]:
     """Return what push, hum and ring leave of moments: the sum of squares, and the residuals."""
+    orthonormal, _ = np.linalg.qr(_columns(time_s, frequency_Hz, damping, mains_Hz))
+    residuals = (moments - orthonormal @ (orthonormal.T @ moments)).ravel()
+    return float(residuals @ residuals), residuals
+
+
+def _columns(
+    time_s: np.ndarray, frequency_Hz: float | None, damping: float | None, mains_Hz: float
+) -> np.ndarray:
+    """Return the columns (n, 6 or 8) of push, hum and, last, ring."""
     share = time_s / time_s[-1]
     basis = [share**power for power in range(4)]
     basis += [np.cos(2 * pi * mains_Hz * time_s), np.sin(2 * pi * mains_Hz * time_s)]
@@ -276,7 +349,4 @@ def _left(
         turn = 2 * pi * frequency_Hz * time_s
         decay = np.exp(-damping * turn)
         basis += [decay * np.cos(turn), decay * np.sin(turn)]
-    columns = np.stack(basis, axis=1)
-    orthonormal, _ = np.linalg.qr(columns)
-    residuals = (moments - orthonormal @ (orthonormal.T @ moments)).ravel()
-    return float(residuals @ residuals), residuals
+    return np.stack(basis, axis=1)
