@@ -209,7 +209,10 @@ def _ring_alone(whisk: Whisk, part: np.ndarray, ring: Ring) -> np.ndarray:
 
 
 def _felt_anew(whisk: Whisk, samples: np.ndarray) -> Whisk:
-    """Return the whisk by other samples (n, 2), N·mm, of its moments."""
+    """Return the whisk by other samples (n, 2), N·mm, of its moments, at the same angle of the motor.
+
+    So it is at that at which other sensors were read, whatever the touch.
+    """
     before, before_touch = _felt(whisk, whisk.unfiltered_Nmm)
     after, after_touch = _felt(whisk, samples)
     if before.status or after.status:
@@ -221,6 +224,7 @@ def _felt_anew(whisk: Whisk, samples: np.ndarray) -> Whisk:
     return replace(
         whisk,
         theta_rad=whisk.theta_rad - after_touch.motor_rad,
+        theta_at_rad=after.theta_rad,
         m_y_at_Nmm=m_y,
         m_z_at_Nmm=m_z,
         covariance_at=after.covariance + shared,
@@ -232,7 +236,8 @@ def _felt_anew(whisk: Whisk, samples: np.ndarray) -> Whisk:
 def _felt(whisk: Whisk, samples: np.ndarray) -> tuple[MomentAt, FeltTouch]:
     """Return moments at the pushing angle, and the touch, of samples (n, 2), N·mm."""
     touch = felt_touch(whisk.theta_rad, samples, whisk.time_s)
-    at = moment_at(whisk.theta_at_rad, whisk.theta_rad, samples, touch, time_s=whisk.time_s)
+    theta_rad = whisk.theta_at_rad if touch.status else whisk.theta_at_rad - touch.motor_rad
+    at = moment_at(theta_rad, whisk.theta_rad, samples, touch, time_s=whisk.time_s)
     return at, touch
 
 
@@ -255,7 +260,7 @@ def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None)
     """
     slowest_Hz = _FEWEST_PERIODS / time_s[-1]
     if beside is None:
-        mains_Hz = _best_mains(time_s, moments)
+        mains_Hz = _mains_beside_ring(time_s, moments, slowest_Hz)
     else:
         mains_Hz = beside.mains_Hz
         slowest_Hz = max(slowest_Hz, beside.frequency_Hz)
@@ -280,7 +285,7 @@ def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None)
 
 
 def _strongest(
-    time_s: np.ndarray, moments: np.ndarray, slowest_Hz: float, mains_Hz: float
+    time_s: np.ndarray, moments: np.ndarray, slowest_Hz: float, mains_Hz: float | None
 ) -> tuple[float, float]:
     """Return the frequency that explains most, and the sum of squares that any other leaves."""
     frequencies = _frequencies(time_s, slowest_Hz)
@@ -319,10 +324,27 @@ def _frequencies(time_s: np.ndarray, slowest_Hz: float) -> np.ndarray:
     return np.arange(slowest_Hz, _FASTEST_SHARE / _step_s(time_s), 0.25 / time_s[-1])
 
 
-def _best_mains(time_s: np.ndarray, moments: np.ndarray) -> float:
-    """Return the frequency of mains that explains most, Hz."""
+def _mains_beside_ring(time_s: np.ndarray, moments: np.ndarray, slowest_Hz: float) -> float:
+    """Return the frequency of mains that explains most together with a ring, Hz.
+
+    A hum alone would stand for a louder ring near it, so either is looked for first, and the pair
+    that leaves less counts.
+    """
+    hum_first_Hz = _best_mains(time_s, moments, None)
+    ring_beside_Hz, _ = _strongest(time_s, moments, slowest_Hz, hum_first_Hz)
+    ring_first_Hz, _ = _strongest(time_s, moments, slowest_Hz, None)
+    hum_beside_Hz = _best_mains(time_s, moments, ring_first_Hz)
+    by_hum, _ = _left(time_s, moments, ring_beside_Hz, _TYPICAL_DAMPING, hum_first_Hz)
+    by_ring, _ = _left(time_s, moments, ring_first_Hz, _TYPICAL_DAMPING, hum_beside_Hz)
+    return hum_first_Hz if by_hum < by_ring else hum_beside_Hz
+
+
+def _best_mains(time_s: np.ndarray, moments: np.ndarray, ring_Hz: float | None) -> float:
+    """Return the frequency of mains that explains most beside a ring, if there is one, Hz."""
     candidates = np.arange(_MAINS_HZ[0], _MAINS_HZ[1] + 0.5, 1.0)
-    return float(min(candidates, key=lambda f: _left(time_s, moments, None, None, f)[0]))
+    return float(
+        min(candidates, key=lambda f: _left(time_s, moments, ring_Hz, _TYPICAL_DAMPING, f)[0])
+    )
 
 
 def _left(
@@ -330,7 +352,7 @@ def _left(
     moments: np.ndarray,
     frequency_Hz: float | None,
     damping: float | None,
-    mains_Hz: float,
+    mains_Hz: float | None,
 ) -> tuple[float, np.ndarray]:
     """Return what push, hum and ring leave of moments: the sum of squares, and the residuals."""
     orthonormal, _ = np.linalg.qr(_columns(time_s, frequency_Hz, damping, mains_Hz))
@@ -339,12 +361,13 @@ def _left(
 
 
 def _columns(
-    time_s: np.ndarray, frequency_Hz: float | None, damping: float | None, mains_Hz: float
+    time_s: np.ndarray, frequency_Hz: float | None, damping: float | None, mains_Hz: float | None
 ) -> np.ndarray:
-    """Return the columns (n, 6 or 8) of push, hum and, last, ring."""
+    """Return the columns (n, 4 to 8) of push, hum and, last, ring; of what has no frequency none."""
     share = time_s / time_s[-1]
     basis = [share**power for power in range(4)]
-    basis += [np.cos(2 * pi * mains_Hz * time_s), np.sin(2 * pi * mains_Hz * time_s)]
+    if mains_Hz is not None:
+        basis += [np.cos(2 * pi * mains_Hz * time_s), np.sin(2 * pi * mains_Hz * time_s)]
     if frequency_Hz is not None:
         turn = 2 * pi * frequency_Hz * time_s
         decay = np.exp(-damping * turn)

@@ -81,7 +81,9 @@ class Microphone(Analysis):
             stated = f", to {1e3 * np.mean(sigmas_s):.2g} ms" if sigmas_s else ""
             late = ""
             if delays_s:
-                late = f"; late by {1e3 * np.mean(delays_s):+.2g} ms, scatter {1e3 * np.std(delays_s):.2g} ms"
+                late = f"; late by {1e3 * np.mean(delays_s):+.2g} ms"
+            if len(delays_s) > 1:
+                late += f", scatter {1e3 * np.std(delays_s, ddof=1):.2g} ms"
             at = "" if speed is None else f"at {speed:g}°/s "
             yield f"{at}{len(sigmas_s)} of {len(mine)} touches are heard{stated}{late}"
 

@@ -26,7 +26,7 @@ def add(verbs: Verbs) -> None:
         "--protocol",
         default="quick",
         metavar="NAME|FILE",
-        help="quick, paper, mirror, nitinol, thin-wire, polymer-cone, vibrissa or a TOML file",
+        help="quick, paper, mirror, nitinol, thin-wire, polymer-cone, vibrissa, reorient, sweep, ring, tap or a TOML file",
     )
     verb.add_argument(
         "--signals-only",

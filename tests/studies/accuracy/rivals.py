@@ -51,7 +51,7 @@ SLOPES_DEG = (0.0, 20.0, 40.0, 60.0, 75.0)
 TABLE_SLOPES_DEG = (0.0, 40.0, 75.0)
 BARS_MM = (6.0, 20.0, 60.0)
 BAR_SLOPES_DEG = (0.0, 20.0, 40.0)
-MARKERS = "soDv^Px"
+STYLES = ("s-", "o-", "D--", "v-", "^-", "P-", "x-")
 THETA_RAD = np.radians(3.0)
 MOST_PUSHES = 4
 SPEED_DEG_S = 90.0
@@ -366,7 +366,7 @@ def draw(found: dict, path: Path) -> None:
                     panel.plot(
                         SLOPES_DEG,
                         values,
-                        f"{MARKERS[number]}-",
+                        STYLES[number],
                         lw=nested_size(number, len(METHODS), 1.0, 0.5),
                         ms=nested_size(number, len(METHODS), 4.0, 0.6),
                         color=f"C{number}",
