@@ -6,6 +6,7 @@ All parameters are counted from what was found or stated beforehand, so that eve
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -153,12 +154,12 @@ class Blocks:
         """Return the number of all parameters."""
         return self.bends.slice.stop
 
-    @property
+    @cached_property
     def prior_sigma(self) -> np.ndarray:
         """Return the prior's standard deviation (size,) of each parameter."""
         return np.concatenate([block.sigma for block in self.in_order])
 
-    @property
+    @cached_property
     def steps(self) -> np.ndarray:
         """Return the step (size,) of finite differences of each parameter."""
         return np.concatenate([np.broadcast_to(b.step, len(b)) for b in self.in_order])

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit.problem import Problem, State, point_rows
-from vision.fit.solve import linear_at
+from vision.fit.solve import residuals
 from vision.geometry.robust import robust_sigma
 
 # [sigma] Of the camera's scatter: an outlier is not what all share. Study: coverage.py points.
@@ -87,8 +87,8 @@ def scatter_px(problem: Problem, state: State) -> list[float]:
 
 def _residuals_px(problem: Problem, state: State) -> list[np.ndarray]:
     """Return the residuals (n,) px of each of the problem's observations."""
-    linear = linear_at(problem, state)
-    return [linear.residual[rows] * seen.points.sigma_px for seen, rows in point_rows(problem)]
+    over_sigma = residuals(problem, state)
+    return [over_sigma[rows] * seen.points.sigma_px for seen, rows in point_rows(problem)]
 
 
 def _of_wire(problem: Problem, values: Sequence, camera: int) -> list:

@@ -71,17 +71,32 @@ def linearise(
     perturbed = Perturbed(state.vector[None])
     if jacobian is None:
         perturbed = perturb(problem, state.vector)
-    curves, arcs = curves_of(problem, perturbed.vectors, state.arcs_mm)
-    parts = _point_parts(problem, curves, perturbed)
-    parts.append(_contact_part(problem, curves, arcs, perturbed))
-    parts.append(_prior_part(problem, state.vector))
-    if problem.onset is not None:
-        parts.append(_onset_part(problem, problem.onset, perturbed))
+    parts, arcs_mm = _parts(problem, state, perturbed)
     residual = np.concatenate([part[0] for part in parts])
     if jacobian is None:
         jacobian = np.concatenate([part[1] for part in parts])
     is_point = np.arange(len(residual)) < problem.contact_rows.start
-    return Linear(residual, jacobian, is_point), replace(state, arcs_mm=arcs[0])
+    return Linear(residual, jacobian, is_point), replace(state, arcs_mm=arcs_mm)
+
+
+def residuals(problem: Problem, state: State) -> np.ndarray:
+    """Return the residuals (n,) over their sigma alone: a tenth of the work of `linearise`."""
+    parts, _ = _parts(problem, state, Perturbed(state.vector[None]))
+    return np.concatenate([part[0] for part in parts])
+
+
+def _parts(problem: Problem, state: State, perturbed: Perturbed) -> tuple[list[Part], np.ndarray]:
+    """Return residuals and Jacobian rows of all observations, and the contact arcs (f,), mm.
+
+    The rows are empty of derivatives where no copy of the vector is moved.
+    """
+    curves, arcs_mm = curves_of(problem, perturbed.vectors, state.arcs_mm)
+    parts = _point_parts(problem, curves, perturbed)
+    parts.append(_contact_part(problem, curves, arcs_mm, perturbed))
+    parts.append(_prior_part(problem, state.vector))
+    if problem.onset is not None:
+        parts.append(_onset_part(problem, problem.onset, perturbed))
+    return parts, arcs_mm[0]
 
 
 def _point_parts(problem: Problem, curves: Curves, perturbed: Perturbed) -> list[Part]:

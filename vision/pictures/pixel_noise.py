@@ -51,11 +51,15 @@ def _medians_by_level(level: np.ndarray, deviation: np.ndarray) -> np.ndarray:
     """Return median level, variance of the deviation and number of pixels by class of level, (3,
     classes).
     """
-    edges = np.unique(np.quantile(level, np.linspace(0, 1, _CLASSES + 1)))
-    classes = np.digitize(level, edges[1:-1])
+    order = np.argsort(level, axis=None)
+    level = level.ravel()[order]
+    deviation = deviation.ravel()[order]
+    rank = np.linspace(0, len(level) - 1, _CLASSES + 1)
+    edges = np.unique(np.interp(rank, np.arange(len(level)), level))
+    first = np.searchsorted(level, edges[1:-1])
     rows = []
-    for k in np.unique(classes):
-        members = classes == k
-        variance = robust_sigma(deviation[members]) ** 2
-        rows.append((np.median(level[members]), variance, np.sum(members)))
+    for levels, deviations in zip(np.split(level, first), np.split(deviation, first)):
+        if len(levels):
+            variance = robust_sigma(deviations) ** 2
+            rows.append((np.median(levels), variance, len(levels)))
     return np.array(rows).T

@@ -166,10 +166,9 @@ class LitRod:
         The last diagonal element of the Cholesky factor of [[AᵀWA + P, ·], [yᵀWA, yᵀWy]] is the
         root of χ².
         """
-        normal = normal.copy()
-        normal[..., :-1, :-1] += precision
-        normal[..., -1, -1] += 1.0  # keeps it positive definite where χ² is 0
-        diagonal = np.diagonal(np.linalg.cholesky(normal), axis1=-2, axis2=-1)
+        prior = np.eye(len(precision) + 1)  # 1 keeps it positive definite where χ² is 0
+        prior[:-1, :-1] = precision
+        diagonal = np.diagonal(np.linalg.cholesky(normal + prior), axis1=-2, axis2=-1)
         chi2 = diagonal[..., -1] ** 2 - 1.0
         log_determinant = 2.0 * np.sum(np.log(diagonal[..., :-1]), axis=-1)
         prior_log_determinant = np.linalg.slogdet(precision)[1]

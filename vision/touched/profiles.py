@@ -154,16 +154,21 @@ class _PatchSums:
 
         is_used, position (s, p): of the pixels, which of them count and their places, in bins.
         """
-        light, light_per_grey = light_of(pieces.grey, FULL_SCALE, gamma)
-        background, background_per_grey = light_of(pieces.background, FULL_SCALE, gamma)
-        background_slope = background_per_grey * pieces.slope
-        weight = np.where(is_used, (pieces.weight / light_per_grey) ** 2, 0.0)
-        one = np.ones_like(light)
-        order = np.argsort(pieces.place)
-        sums = []
-        for values in (one, light, background, background_slope, light_per_grey, None):
-            sums.append(_sum_in_bins(weight, values, position, bins)[order])
-        return cls(*sums)
+        light, light_per_grey = light_of(pieces.grey[is_used], FULL_SCALE, gamma)
+        background, background_per_grey = light_of(pieces.background[is_used], FULL_SCALE, gamma)
+        background_slope = background_per_grey * pieces.slope[is_used]
+        weight = (pieces.weight[is_used] / light_per_grey) ** 2
+        patch, _ = np.nonzero(is_used)
+        patch = np.argsort(np.argsort(pieces.place))[patch]  # its number along the bar
+        shared = _SharedPixels.between(position[is_used], patch, len(pieces), bins)
+        return cls(
+            weight=shared.sums(weight),
+            light=shared.sums(weight * light),
+            background=shared.sums(weight * background),
+            background_slope=shared.sums(weight * background_slope),
+            light_per_grey=shared.sums(weight * light_per_grey),
+            variance_share=shared.sums_by_squares(weight),
+        )
 
     def mean(self, sums: np.ndarray) -> np.ndarray:
         """Return sums (s, b) over the weight, 0 where there is none."""
@@ -233,20 +238,42 @@ def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: floa
     return _average_patches(patches, place_mm, grid_px, radius_px, is_saturated)
 
 
-def _sum_in_bins(weight, value, position, size: int) -> np.ndarray:
-    """Compute weighted sums (s, size) of pixels (s, p), each shared between the two bins nearest to
-    its position.
+@dataclass(frozen=True)
+class _SharedPixels:
+    """Pixels (n,), each shared between the two bins nearest to its position.
 
-    value None: of the squared interpolation weights in place of interpolation weight times value.
+    cell (2 n,): first the nearer bin below each pixel, then that above, counted through all
+    patches. share (2, n): the interpolation weights. patches, bins: how many there are.
     """
-    below = np.clip(np.floor(position), 0, size - 2)
-    fraction = np.clip(position - below, 0.0, 1.0)
-    first = size * np.arange(len(position))[:, None] + below.astype(int)
-    bins = np.concatenate([first.ravel(), first.ravel() + 1])
-    share = np.concatenate([(1.0 - fraction).ravel(), fraction.ravel()])
-    factor = share if value is None else np.tile(value.ravel(), 2)
-    weighted = share * np.tile(weight.ravel(), 2)
-    return np.bincount(bins, weighted * factor, len(position) * size).reshape(-1, size)
+
+    cell: np.ndarray
+    share: np.ndarray
+    patches: int
+    bins: int
+
+    @classmethod
+    def between(
+        cls, position: np.ndarray, patch: np.ndarray, patches: int, bins: int
+    ) -> "_SharedPixels":
+        """Return the pixels at positions (n,), in bins, of patches by their number (n,)."""
+        below = np.clip(np.floor(position), 0, bins - 2)
+        fraction = np.clip(position - below, 0.0, 1.0)
+        first = bins * patch + below.astype(int)
+        share = np.stack([1.0 - fraction, fraction])
+        return cls(np.concatenate([first, first + 1]), share, patches, bins)
+
+    def sums(self, values: np.ndarray) -> np.ndarray:
+        """Return the sums (s, b) of values (n,), by the interpolation weights."""
+        return self._sums(self.share * values)
+
+    def sums_by_squares(self, values: np.ndarray) -> np.ndarray:
+        """Return the sums (s, b) of values (n,), by the squared interpolation weights."""
+        return self._sums(self.share**2 * values)
+
+    def _sums(self, shares: np.ndarray) -> np.ndarray:
+        """Return the sums (s, b) of what each pixel gives its two bins (2, n)."""
+        sums = np.bincount(self.cell, shares.ravel(), self.patches * self.bins)
+        return sums.reshape(self.patches, self.bins)
 
 
 def _average_patches(
@@ -402,5 +429,6 @@ def light_range(light: np.ndarray) -> float:
     """Return the range of light (n,) between its 5th and 95th percentile, a grey level at least."""
     if len(light) == 0:
         return 1.0 / FULL_SCALE
-    low, high = np.percentile(light, [5.0, 95.0])
+    rank = np.array([0.05, 0.95]) * (len(light) - 1)
+    low, high = np.interp(rank, np.arange(len(light)), np.sort(light))
     return max(float(high - low), 1.0 / FULL_SCALE)

@@ -12,6 +12,7 @@ somewhere, and a dark rim or a highlight no longer pulls the position to one sid
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import correlate1d
@@ -71,8 +72,9 @@ def read_band(
     point to the same side of the direction in which `place` grows, however that lies in the picture.
     """
     path = _Path.along_curve(curve_px, place, radius_px, grey.shape)
-    pixels = path.pixels(half_width_px)
-    across_px = pixels.line - path.middle[:, None]
+    line = path.lines(half_width_px)
+    pixels = _BandPixels.of(path, line, grey.shape)
+    across_px = line - path.middle[:, None]
     cosine = 1.0 / np.hypot(1.0, path.slope)
     offset_px = across_px * cosine[:, None] - path.between_edges_px[:, None]
     return Band(
@@ -115,7 +117,7 @@ class _Path:
         at_steps = [np.interp(step, knots, values[order]) for values in others]
         return _Path(along, step, *at_steps)
 
-    @property
+    @cached_property
     def slope(self) -> np.ndarray:
         """Return the slope (n,) of the curve against the axis."""
         return np.gradient(self.middle) if len(self.step) > 1 else np.zeros(len(self.step))
@@ -143,31 +145,36 @@ class _Path:
         parts = (along, across) if self.along == 0 else (across, along)
         return np.stack(parts, axis=1)
 
-    def pixels(self, half_width_px: int) -> "_BandPixels":
-        """Return the pixels within so many of the curve, across the axis."""
+    def lines(self, half_width_px: int) -> np.ndarray:
+        """Return the pixels (n, k) within so many of the curve, on the other axis."""
         across = np.arange(-half_width_px, half_width_px + 1)
-        line = np.round(self.middle).astype(int)[:, None] + across
-        return _BandPixels(self.along, self.step, line)
+        return np.round(self.middle).astype(int)[:, None] + across
 
 
 @dataclass(frozen=True)
 class _BandPixels:
-    """Pixels of a band: at n steps along one axis of the picture, k pixels along the other.
+    """Pixels (n, k) of a band in pictures of one size.
 
-    along: 0 where the band runs along x, 1 along y. step (n,), line (n, k): pixels on the two axes.
+    row, column: of each, within the picture; they broadcast to (n, k). is_outside (n, k) bool:
+    which of them have been moved to the picture's border.
     """
 
-    along: int
-    step: np.ndarray
-    line: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+    is_outside: np.ndarray
+
+    @staticmethod
+    def of(path: _Path, line: np.ndarray, shape: tuple[int, ...]) -> "_BandPixels":
+        """Return the pixels along a path in pictures of a shape (h, w); line (n, k): across it."""
+        within = np.clip(line, 0, shape[path.along] - 1)
+        step = path.step[:, None]
+        row, column = (within, step) if path.along == 0 else (step, within)
+        return _BandPixels(row, column, within != line)
 
     def values(self, picture: np.ndarray) -> np.ndarray:
         """Return the values (n, k) of a picture at the pixels; NaN outside it."""
-        line = np.clip(self.line, 0, picture.shape[self.along] - 1)
-        step = self.step[:, None]
-        at = (line, step) if self.along == 0 else (step, line)
-        values = picture[at].astype(float)
-        values[line != self.line] = np.nan
+        values = picture[self.row, self.column].astype(float)
+        values[self.is_outside] = np.nan
         return values
 
     def unhidden_values(self, picture: np.ndarray, hidden: np.ndarray | None) -> np.ndarray:

@@ -187,12 +187,25 @@ def _unexplained(pieces: Pieces, background: np.ndarray, variance_share: float) 
 
     variance_share: the part of one picture's variance that the background has.
     """
-    behind = np.stack([background, np.ones_like(background)], axis=2) * pieces.weight[..., None]
-    grey = pieces.grey * pieces.weight
-    normal = behind.transpose(0, 2, 1) @ behind + _WEAK * np.eye(2)
-    right = behind.transpose(0, 2, 1) @ grey[..., None]
-    fit = np.linalg.solve(normal, right)  # (s, 2, 1)
-    is_plain = np.abs(fit[:, :1] - 1.0) < _PLAIN_GAIN
-    fit = np.where(is_plain, fit, [[1.0], [0.0]])
-    residual = grey - (behind @ fit)[..., 0]
-    return residual / np.sqrt(1.0 + variance_share * fit[:, 0] ** 2)
+    weight = pieces.weight
+    behind = background * weight
+    grey = pieces.grey * weight
+    # normal equations of gain and offset, two unknowns a segment
+    gains = _sums_of_products(behind, behind) + _WEAK
+    mixed = _sums_of_products(behind, weight)
+    offsets = _sums_of_products(weight, weight) + _WEAK
+    gain_right = _sums_of_products(behind, grey)
+    offset_right = _sums_of_products(weight, grey)
+    determinant = gains * offsets - mixed**2
+    gain = (offsets * gain_right - mixed * offset_right) / determinant
+    offset = (gains * offset_right - mixed * gain_right) / determinant
+    is_plain = np.abs(gain - 1.0) < _PLAIN_GAIN
+    gain = np.where(is_plain, gain, 1.0)[:, None]
+    offset = np.where(is_plain, offset, 0.0)[:, None]
+    residual = grey - gain * behind - offset * weight
+    return residual / np.sqrt(1.0 + variance_share * gain**2)
+
+
+def _sums_of_products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the sums (s,) over the pixels of each segment of the products of values (s, p)."""
+    return np.einsum("sp,sp->s", one, other)

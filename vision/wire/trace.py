@@ -121,8 +121,9 @@ def clear_of_bar(
     The outline is given by its middle (m, 2) and half-width (m,), px; NaN where it passes behind the
     camera and hides nothing.
     """
-    distance = np.linalg.norm(pieces.foot_px[:, None] - middle_px[None], axis=2)
-    return np.fmin.reduce(distance - radius_px[None], axis=1, initial=np.inf) > margin_px
+    x, y = np.moveaxis(pieces.foot_px[:, None] - middle_px, 2, 0)  # (s, m) each
+    distance = np.sqrt(x * x + y * y)
+    return np.fmin.reduce(distance - radius_px, axis=1, initial=np.inf) > margin_px
 
 
 @dataclass(frozen=True)
