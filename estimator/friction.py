@@ -24,12 +24,6 @@ from estimator.reasons import NamedReason
 
 # What a fit may take as its observations: (13) and (14), or |m|² alone.
 READINGS = ("moments", "magnitude")
-# [rad] Friction angles among which the best is looked up before it is refined.
-_GRID = np.radians(np.arange(0.0, 89.95, 0.25))
-# [1] Share of its width that a golden-section step leaves of an interval.
-_GOLDEN = (np.sqrt(5) - 1) / 2
-# Golden-section steps: they take two steps of the grid below a float's resolution.
-_SECTIONS = 45
 # [1] Two sums of squares are the same but for rounding if they differ by less than this share of
 # the data's own.
 _ROUNDING = 1e-14
@@ -119,10 +113,10 @@ def fit_alpha(pushes: Pushes, *, reading: str = "moments") -> FrictionFit:
     else:
         sigma = _sigma_of_data(pushes, slopes, reading)
         freedom = np.inf
-    cost_without_slip = _cost(np.abs(beta).max(), beta, data, scale, reading)
-    rounding = _ROUNDING * (data**2).sum(axis=-1)
-    never_slipped = cost_without_slip <= (residuals**2).sum(axis=-1) + rounding
-    return _fit(alpha, sigma, freedom, residuals, never_slipped)
+    no_more = (residuals**2).sum(axis=-1) + _ROUNDING * (data**2).sum(axis=-1)
+    never_slipped = _cost(np.abs(beta).max(), beta, data, scale, reading) <= no_more
+    at_zero = _cost(0.0, beta, data, scale, reading) <= no_more
+    return _fit(alpha, sigma, freedom, residuals, never_slipped, at_zero)
 
 
 def curves(
@@ -166,7 +160,7 @@ def _model(alpha, beta, scale, reading):
 
 
 def _derivative(alpha, beta, scale, reading):
-    """Differentiate `_model` by α; 0 without slip.
+    """Differentiate `_model` by α; 0 without slip, and where a slope is α itself.
 
     With slip it is (Cθ/d_x)/cos²α times −cos²β for m_y, and times sin β cos β for m_z.
     """
@@ -188,22 +182,60 @@ def _cost(alpha, beta, data, scale, reading):
 
 
 def _least_squares(beta, data, scale, reading):
-    """Find the global minimum over α: the best of a grid, then golden sections between its
-    neighbours.
+    """Find the global minimum over α.
+
+    Points that slip are predicted linearly in u = tan α (in tan²α where |m|² is read), points that
+    hold by a constant: between two neighbouring slopes the sum of squares is a parabola of u.
     """
-    model = _model(_GRID, beta, scale, reading)
-    cost = (model**2).sum(axis=-1) - 2 * data @ model.T
+    order = np.argsort(np.abs(beta))
+    beta = beta[order]
+    scale = scale[order]
+    count = len(beta)
+    data = data.reshape(*data.shape[:-1], -1, count)[..., order]  # (..., 1 or 2, n)
+    start, rate = _when_slipping(beta, scale, reading)
+    residual = data - start
+    squares = (residual**2).sum(axis=-2)
+    cross = (residual * rate).sum(axis=-2)
+    curvature = (rate**2).sum(axis=-2)
+    held = _model(np.pi / 2, beta, scale, reading).reshape(-1, count)
+    held_squares = ((data - held) ** 2).sum(axis=-2)
+    # Of the segment below each slope, where this one and all steeper ones slip:
+    squares = _sum_from_here(squares) + np.cumsum(held_squares, axis=-1) - held_squares
+    cross = _sum_from_here(cross)
+    curvature = _sum_from_here(curvature)
+    bounds = np.concatenate([[0.0], np.abs(beta)])  # of the segments, rad
+    low = _u_of(bounds[:-1], reading)
+    high = _u_of(bounds[1:], reading)
+    vertex = np.divide(cross, curvature, out=low + np.zeros(cross.shape), where=curvature > 0)
+    u = np.clip(vertex, low, high)
+    cost = squares - 2 * u * cross + u**2 * curvature
     best = np.argmin(cost, axis=-1)
-    low = _GRID[np.maximum(best - 1, 0)]
-    high = _GRID[np.minimum(best + 1, len(_GRID) - 1)]
-    for _ in range(_SECTIONS):
-        left = high - _GOLDEN * (high - low)
-        right = low + _GOLDEN * (high - low)
-        cost_left = _cost(left, beta, data, scale, reading)
-        falls = cost_left > _cost(right, beta, data, scale, reading)
-        low = np.where(falls, left, low)
-        high = np.where(falls, high, right)
-    return (low + high) / 2
+    found = np.take_along_axis(u, best[..., None], axis=-1)[..., 0]
+    alpha = np.arctan(np.sqrt(found) if reading == "magnitude" else found)
+    # At a bound α is that slope itself: whether its point slips is then no matter of rounding.
+    alpha = np.where(found >= high[best], bounds[best + 1], alpha)
+    return np.where(found <= low[best], bounds[best], alpha)
+
+
+def _when_slipping(beta, scale, reading):
+    """Return (start, rate), each (1 or 2, n): points that slip are predicted as start + rate·u."""
+    sliding = scale * np.cos(beta)
+    if reading == "magnitude":
+        return sliding[None] ** 2, sliding[None] ** 2
+    start = np.stack([sliding * np.sin(beta), sliding * np.cos(beta)])
+    rate = np.stack([-np.sign(beta) * sliding * np.cos(beta), sliding * np.sin(np.abs(beta))])
+    return start, rate
+
+
+def _u_of(alpha, reading):
+    """Return tan α, or tan²α where |m|² is read; infinite from a right angle on."""
+    tangent = np.where(alpha < np.pi / 2, np.tan(alpha), np.inf)
+    return tangent**2 if reading == "magnitude" else tangent
+
+
+def _sum_from_here(values):
+    """Sum each of the values (..., n) and all after it."""
+    return np.cumsum(values[..., ::-1], axis=-1)[..., ::-1]
 
 
 def _sigma_of_residuals(residuals, slopes, recording):
@@ -213,21 +245,26 @@ def _sigma_of_residuals(residuals, slopes, recording):
     Σ J² / Σ J². The inner sums are over each recording, or over the single residual where none is
     given: MacKinnon & White's HC2, and Bell & McCaffrey's form of it for what is recorded together.
     """
-    count = residuals.shape[-1]
-    if recording is None:
-        member = np.eye(count)
-    else:
-        of_points = np.asarray(recording)[:, None] == np.unique(recording)
-        member = np.tile(of_points, (count // len(of_points), 1)).astype(float)
-    # member (residuals, recordings): 1 where the residual belongs to the recording
+    leverage = slopes**2
+    scores = slopes * residuals
+    if recording is not None:
+        leverage = _sum_by_recording(leverage, recording)
+        scores = _sum_by_recording(scores, recording)
     with np.errstate(all="ignore"):
         total = (slopes**2).sum(axis=-1)
-        leverage = slopes**2 @ member / total[..., None]
-        scores = (slopes * residuals) @ member
+        leverage = leverage / total[..., None]
         sigma = np.sqrt((scores**2 / (1 - leverage)).sum(axis=-1)) / total
     if recording is None:
-        return sigma, count - 1
+        return sigma, residuals.shape[-1] - 1
     return sigma, (leverage > 0).sum(axis=-1) - 1
+
+
+def _sum_by_recording(values, recording):
+    """Sum values (..., n) or (..., 2n) over the points of each recording (n,)."""
+    names = np.tile(np.asarray(recording), values.shape[-1] // len(recording))
+    order = np.argsort(names, kind="stable")
+    _, begins = np.unique(names[order], return_index=True)
+    return np.add.reduceat(values[..., order], begins, axis=-1)
 
 
 def _sigma_of_data(pushes, slopes, reading):
@@ -242,10 +279,10 @@ def _sigma_of_data(pushes, slopes, reading):
         return np.sqrt((slopes**2 * sigmas**2).sum(axis=-1)) / (slopes**2).sum(axis=-1)
 
 
-def _fit(alpha, sigma, freedom, residuals, never_slipped):
+def _fit(alpha, sigma, freedom, residuals, never_slipped, at_zero):
     """Assemble the fit: interval and status, and NaN where the data leave α open."""
     vague = ~(sigma < 1) & ~never_slipped
-    at_zero = (alpha < _GRID[1] / 100) & ~vague
+    at_zero = at_zero & ~vague
     conditions = ((NEVER_SLIPPED, ~never_slipped), (VAGUE, ~vague), (AT_ZERO, ~at_zero))
     unknown = never_slipped | vague
     alpha = np.where(unknown, np.nan, alpha)
