@@ -18,6 +18,7 @@ from bench.base.atomic import whole_file, write_whole
 
 if TYPE_CHECKING:  # matplotlib is loaded where something is drawn: tables and names go without
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 COLOURS = {
@@ -134,6 +135,15 @@ def nested_size(number: int, count: int, least: float, step: float) -> float:
     Those that are drawn first are larger, so that each shows under what lies over it.
     """
     return least + step * (count - 1 - number)
+
+
+def label_logarithmic(axis: "Axis") -> None:
+    """Label a logarithmic axis with plain numbers at 1, 2 and 5."""
+    from matplotlib.ticker import LogLocator, StrMethodFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter("")
 
 
 def whisk_url(trial: str, whisk: int) -> str:

@@ -33,14 +33,12 @@ def run(options: argparse.Namespace) -> int:
 
     begin_step(f"reading {options.session}")
     single_thread()  # before NumPy is imported
-    from bench.base.atomic import lock_output
     from bench.workflows.live_push import play_trial
 
     has_status = False
-    with lock_output(options.out):
-        for line, status in play_trial(
-            options.session, options.out, options.trial, follow_links=options.follow_links
-        ):
-            print(line)
-            has_status = has_status or bool(status)
+    for line, status in play_trial(
+        options.session, options.out, options.trial, follow_links=options.follow_links
+    ):
+        print(line)
+        has_status = has_status or bool(status)
     return WITH_WARNINGS if has_status else DONE

@@ -34,6 +34,12 @@ def add(verbs: Verbs) -> None:
         metavar="N",
         help="how often each is timed (default 2)",
     )
+    verb.add_argument(
+        "--accuracy-mm",
+        type=float,
+        metavar="X",
+        help="say which setting is the fastest whose d_x is expected to err by X or less (RMS)",
+    )
     add_workers(verb)
 
 
@@ -44,8 +50,10 @@ def run(options: argparse.Namespace) -> int:
     begin_step(f"reading {options.session}")
     single_thread()  # before NumPy is imported
     from bench.base.settings import Settings
-    from bench.workflows.seeing_trade import tradeoff, tradeoff_lines
+    from bench.workflows.seeing_trade import pick_line, tradeoff, tradeoff_lines
 
+    accuracy_mm = options.accuracy_mm
+    Settings(accuracy_mm=accuracy_mm)  # refused before anything is timed
     settings = Settings(trials=options.trials, follow_links=options.follow_links)
     rows = tradeoff(
         options.session,
@@ -55,4 +63,6 @@ def run(options: argparse.Namespace) -> int:
         workers=options.workers,
     )
     print(*tradeoff_lines(rows), sep="\n")
+    if accuracy_mm is not None:
+        print(pick_line(rows, accuracy_mm, options.out))
     return DONE

@@ -14,6 +14,14 @@ from scipy.special import chdtri
 _TAIL = 0.025
 
 
+def interval_of_rms(rms: float, count: int) -> tuple[float, float]:
+    """Return the 95 % interval of an RMS error that so many independent errors show; NaN without any."""
+    if not count:
+        return math.nan, math.nan
+    low, high = np.sqrt(count / chdtri(count, [_TAIL, 1.0 - _TAIL]))
+    return rms * float(low), rms * float(high)
+
+
 @dataclass(frozen=True)
 class ExpectedRms:
     """The expected RMS of errors, and the range of 95 % of the RMS errors of so many whisks.

@@ -7,25 +7,28 @@ with `evaluate`, which the folder can still be given to.
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
+from bench.base.atomic import lock_output
 from bench.base.drawing import save_picture
 from bench.base.errors import BadInput
 from bench.base.results import hash_of
-from bench.cameras.session_cameras import calibrate_session
+from bench.cameras.session_cameras import SessionCalibration, calibrate_session
 from bench.report.overlays import last_frame
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
+from bench.session.inside import check_outside
 from bench.session.session import Session, load_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.trials.trial_frames import stated_object
 from vision import WhiskTruth
 from vision.geometry import Reason, Rods, VisionSettings
-from vision.live import LiveBench, LiveWhisk
+from vision.live import FIRST_FRAMES, LiveBench, LiveWhisk
 
 # [s] Of a wait for the next frame where nothing is to be done: below a camera's shortest exposure.
 _WAIT_S = 5e-4
@@ -91,21 +94,31 @@ def open_push(
     between which it goes. clock_sigma_s: how well its frames' times are known against the motor's
     angles. Raises BadInput where cameras, whisker or bar are missing.
     """
-    recorded = load_session(session, trials=[trial], follow_links=follow_links)
+    recorded, own = _recorded(session, out, trial, follow_links=follow_links)
     low, high = np.radians(stroke_deg)
     stroke_rad = (float(low), float(high))
     seeing = VisionSettings(clock_sigma_s=clock_sigma_s)
-    return LivePush(LiveWhisk(_bench(recorded, recorded.trial(trial), out, stroke_rad, seeing)))
+    calibration = calibrate_session(recorded, out)
+    bench = live_bench(recorded, own, calibration, seeing)
+    return LivePush(LiveWhisk(replace(bench, stroke_rad=stroke_rad)))
 
 
-def _bench(
-    session: Session,
-    trial: Trial,
-    out: Path,
-    stroke_rad: tuple[float, float],
-    settings: VisionSettings,
+def _recorded(session: Path, out: Path, name: str, *, follow_links: bool) -> tuple[Session, Trial]:
+    """Return a session with a trial, and that trial. Raises BadInput where it has none of that name."""
+    check_outside(out, session)
+    recorded = load_session(session, trials=[name], follow_links=follow_links)
+    if not recorded.trials:
+        recorded = load_session(session, follow_links=follow_links)
+    return recorded, recorded.trial(name)
+
+
+def live_bench(
+    session: Session, trial: Trial, known: SessionCalibration, settings: VisionSettings
 ) -> LiveBench:
-    """Return what a session knows before a push. Raises BadInput where that is not enough."""
+    """Return what a session knows before a push, whose stroke is still to be set.
+
+    Raises BadInput where that is not enough.
+    """
     if session.whisker is None or not trial.bar_diameter_mm:
         raise BadInput(
             "has no whisker and bar that a push could be evaluated with", file=session.path
@@ -115,12 +128,11 @@ def _bench(
             "the object moves; while it is recorded, a push is evaluated against one that stands"
         )
         raise BadInput(found, file=trial.label("trial.toml"))
-    known = calibrate_session(session, out)
     if known.cameras is None:
         raise BadInput("has no pictures, so no camera could be calibrated", file=session.path)
     cameras = known.cameras.subset(list(trial.camera_sources) or known.cameras.names)
     rods = Rods(session.whisker.wire, stated_object(trial))
-    return LiveBench(cameras, rods, known.background, stroke_rad, settings)
+    return LiveBench(cameras, rods, known.background, (0.0, 0.0), settings)
 
 
 def play_trial(
@@ -131,66 +143,175 @@ def play_trial(
     Writes OUT/live/<trial>_<whisk>.png, the last frame with its lines, of each that is seen. Raises
     BadInput where the trial has no pictures or no push.
     """
-    recorded = load_session(session, trials=[name], follow_links=follow_links)
-    trial = recorded.trial(name)
+    recorded, trial = _recorded(session, out, name, follow_links=follow_links)
     recording = RecordedPush.read(trial)
     settings = VisionSettings(clock_sigma_s=recording.times.clock_sigma_s)
-    bench = _bench(recorded, trial, out, (0.0, 0.0), settings)
-    for number, frames in enumerate(recording.strokes):
-        first_rad, last_rad = np.radians(recording.motor_deg[frames[[0, -1]]]).tolist()
-        push = LivePush(LiveWhisk(replace(bench, stroke_rad=(first_rad, last_rad)), number))
-        truth, late_s = recording.play(push, frames)
-        if truth.overlay:
-            picture = last_frame(push.pictures, truth.overlay[max(truth.overlay)])
-            save_picture(picture, out / "live" / f"{name}_{number}.png", hash_of(picture))
-        bench = push.following().whisk.bench
-        yield (
-            f"{name}, whisk {number}: {answer(truth)}; {late_s:.2f} s after the last frame",
-            truth.status,
-        )
+    with lock_output(out):
+        bench = live_bench(recorded, trial, calibrate_session(recorded, out), settings)
+        for played in recording.play_all(bench, WallClock):
+            truth = played.truth
+            number = truth.whisk
+            if truth.overlay:
+                picture = last_frame(played.pictures, truth.overlay[max(truth.overlay)])
+                save_picture(picture, out / "live" / f"{name}_{number}.png", hash_of(picture))
+            late = f"{played.late_s:.2f} s after the last frame"
+            yield f"{name}, whisk {number}: {answer(truth)}; {late}", truth.status
+
+
+class PushClock(Protocol):
+    """The time of a push that is played, s, as `frames.csv` has it."""
+
+    def now_s(self) -> float:
+        """Return the time."""
+        ...
+
+    def run(self, call: Callable) -> object:
+        """Call a function, which takes its time; return its result."""
+        ...
+
+    def decode(self, seconds: float) -> None:
+        """Let decoding of pictures that were read before take its time."""
+        ...
+
+    def wait(self, until_s: float) -> None:
+        """Wait, no longer than until a time."""
+        ...
+
+
+class WallClock:
+    """The clock on the wall."""
+
+    def __init__(self, begin_s: float):
+        """Begin at a time, s."""
+        self._ahead_s = time.perf_counter() - begin_s
+
+    def now_s(self) -> float:
+        """Return the time."""
+        return time.perf_counter() - self._ahead_s
+
+    def run(self, call: Callable) -> object:
+        """Call a function; return its result."""
+        return call()
+
+    def decode(self, seconds: float) -> None:
+        """Do nothing: a camera's pictures come decoded."""
+
+    def wait(self, until_s: float) -> None:
+        """Wait for a moment."""
+        time.sleep(_WAIT_S)
+
+
+@dataclass
+class ProcessorClock:
+    """The clock of a machine that does nothing else: a call takes its processor time, waiting none.
+
+    busy_s: all calls so far.
+    """
+
+    time_s: float
+    busy_s: float = 0.0
+
+    def now_s(self) -> float:
+        """Return the time."""
+        return self.time_s
+
+    def run(self, call: Callable) -> object:
+        """Call a function, which takes its processor time; return its result."""
+        begin_s = time.process_time()
+        result = call()
+        self.decode(time.process_time() - begin_s)
+        return result
+
+    def decode(self, seconds: float) -> None:
+        """Let decoding, or other work, take its time."""
+        self.time_s += seconds
+        self.busy_s += seconds
+
+    def wait(self, until_s: float) -> None:
+        """Go on to a time."""
+        self.time_s = max(self.time_s, until_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """A push that was played.
+
+    late_s: from its last frame to its truth. pictures: by camera the last one. clock: as it was then.
+    """
+
+    truth: WhiskTruth
+    late_s: float
+    pictures: dict[str, np.ndarray]
+    clock: PushClock
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedPush:
     """A trial's pictures by camera and frame, with times and motor angles, deg, by frame.
 
-    strokes: of each forward stroke its frames (n,).
+    strokes: by number of the forward stroke its frames (n,), where it has any. decode_s: processor
+    seconds of reading the pictures of one frame.
     """
 
     times: FrameTimes
     pictures: dict[str, dict[int, np.ndarray]]
     motor_deg: np.ndarray
-    strokes: list[np.ndarray]
+    strokes: dict[int, np.ndarray]
+    decode_s: float
 
     @classmethod
     def read(cls, trial: Trial) -> "RecordedPush":
         """Read the pictures of a trial. Raises BadInput where there are none, or no push."""
+        if not trial.camera_sources:
+            raise BadInput("has no pictures that could be played", file=f"trials/{trial.name}")
         signals = read_signals(trial)
         times = frame_times(trial)
-        strokes = []
-        for stroke in forward_strokes(signals):
+        strokes = {}
+        for number, stroke in enumerate(forward_strokes(signals)):
             frames = np.arange(len(times))[times.frames_in(signals, stroke)]
             if len(frames):
-                strokes.append(frames)
+                strokes[number] = frames
         if not strokes:
-            raise BadInput("has no frame of a push", file=trial.label("."))
+            raise BadInput("has no frame of a push", file=f"trials/{trial.name}")
         motor_deg = np.degrees(np.interp(times.time_s, signals.time_s, signals.motor_rad))
-        return cls(times, read_trial(trial, times), motor_deg, strokes)
+        begin_s = time.process_time()
+        pictures = read_trial(trial, times)
+        decode_s = (time.process_time() - begin_s) / len(times)
+        return cls(times, pictures, motor_deg, strokes, decode_s)
 
-    def play(self, push: LivePush, frames: np.ndarray) -> tuple[WhiskTruth, float]:
-        """Feed the frames of a stroke (n,) at their times; return the truth, and how late it is, s."""
-        time_s = self.times.time_s
-        begin_s = time.perf_counter() - time_s[frames[0]]
-        for frame in frames.tolist():
-            while time.perf_counter() < begin_s + time_s[frame]:
-                if not push.work():
-                    time.sleep(_WAIT_S)
+    def play_all(
+        self, bench: LiveBench, clock_from: Callable[[float], PushClock], lead_s: float = 0.0
+    ) -> Iterator[Played]:
+        """Play each push, the bar looked for where it was before; yield it as soon as it is over.
+
+        clock_from: makes a clock that begins at a time, s. lead_s: by so much the first pictures come
+        before their times, as of a camera that runs before the motor does.
+        """
+        for number, frames in self.strokes.items():
+            first_rad, last_rad = np.radians(self.motor_deg[frames[[0, -1]]]).tolist()
+            push = LivePush(LiveWhisk(replace(bench, stroke_rad=(first_rad, last_rad)), number))
+            arrivals_s = self.times.time_s[frames].copy()
+            arrivals_s[:FIRST_FRAMES] -= lead_s
+            clock = clock_from(float(arrivals_s[0]))
+            truth = self._play(push, frames, arrivals_s, clock)
+            yield Played(truth, clock.now_s() - float(arrivals_s[-1]), push.pictures, clock)
+            bench = push.following().whisk.bench
+
+    def _play(
+        self, push: LivePush, frames: np.ndarray, arrivals_s: np.ndarray, clock: PushClock
+    ) -> WhiskTruth:
+        """Feed the frames of a stroke (n,) as they arrive (n,), s; return the truth."""
+        for frame, arrival_s in zip(frames.tolist(), arrivals_s.tolist()):
+            while clock.now_s() < arrival_s:
+                if not clock.run(push.work):
+                    clock.wait(arrival_s)
+            clock.decode(self.decode_s)
             for camera, pictures in self.pictures.items():
                 if frame in pictures:
                     motor_deg = float(self.motor_deg[frame])
-                    push.add(camera, frame, float(time_s[frame]), motor_deg, pictures[frame])
-        last_s = begin_s + time_s[frames[-1]]
-        return push.finish(), time.perf_counter() - last_s
+                    time_s = float(self.times.time_s[frame])
+                    push.add(camera, frame, time_s, motor_deg, pictures[frame])
+        return clock.run(push.finish)
 
 
 def answer(truth: WhiskTruth) -> str:

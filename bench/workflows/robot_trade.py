@@ -12,12 +12,18 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, ScalarFormatter
 
 from bench.base.atomic import lock_output
-from bench.base.drawing import colour_of, label_of, name_truth, nested_size, publish, style
+from bench.base.drawing import (
+    colour_of,
+    label_logarithmic,
+    label_of,
+    name_truth,
+    nested_size,
+    publish,
+    style,
+)
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
@@ -170,8 +176,8 @@ def _draw_against_time(
         ylabel="error of d$_x$, RMS, %",
         title="at every push",
     )
-    _label_logarithmic(axes.xaxis)
-    _label_logarithmic(axes.yaxis)
+    label_logarithmic(axes.xaxis)
+    label_logarithmic(axes.yaxis)
 
 
 def _draw_front(axes: Axes, on_front: Sequence[Point]) -> None:
@@ -210,10 +216,10 @@ def _draw_against(axes: Axes, points: Sequence[Point], column: str, names: Seque
                     own.append(point)
             _draw_line(axes, own, column, colour, rim_points)
     axes.set_yscale("log")
-    _label_logarithmic(axes.yaxis)
+    label_logarithmic(axes.yaxis)
     if column != "bits":
         axes.set_xscale("log")
-        _label_logarithmic(axes.xaxis)
+        label_logarithmic(axes.xaxis)
 
 
 def _draw_line(
@@ -232,10 +238,3 @@ def _draw_line(
     measured = [point.error_rms_percent for point in own]
     axes.plot(x, expected, lw=1.0 + rim_points, color=colour)
     axes.plot(x, measured, "x", ms=4 + 1.5 * rim_points, color=colour)
-
-
-def _label_logarithmic(axis: Axis) -> None:
-    """Label a logarithmic axis with plain numbers at 1, 2 and 5."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(ScalarFormatter())
-    axis.set_minor_formatter("")

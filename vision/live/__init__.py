@@ -7,5 +7,5 @@ May import all folders of vision but boards and calibration.
 
 from vision.geometry.lazy_names import lazy_names
 
-NAMES = {"whisk": ("LiveBench", "LiveWhisk")}
+NAMES = {"whisk": ("FIRST_FRAMES", "LiveBench", "LiveWhisk")}
 __getattr__ = lazy_names(__name__, NAMES)

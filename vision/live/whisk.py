@@ -58,7 +58,7 @@ from vision.truth.whisk_truth import (
 
 # [frames] With which work begins: two give the noise, a third what moves. In fifteen path-traced
 # scenes the bar was as near by three frames as by all. Study: tests/studies/speed/live.py.
-_FIRST_FRAMES = 3
+FIRST_FRAMES = 3
 # [rad] A motor that turns by less from frame to frame stands: a motor's step. Stated.
 _STANDING_RAD = np.radians(0.02)
 # [diameters] Of the whisker, by which its tip has moved from the first frame to the last where their median
@@ -182,7 +182,7 @@ class LiveWhisk:
 
     def _stands(self, motor_rad: float) -> bool:
         """Return whether the motor stands since the frame before, and there are frames enough to begin."""
-        if len(self.motor_rad) < _FIRST_FRAMES:
+        if len(self.motor_rad) < FIRST_FRAMES:
             return False
         *_, before_rad = self.motor_rad.values()
         return abs(motor_rad - before_rad) < _STANDING_RAD
@@ -218,7 +218,7 @@ class LiveWhisk:
         if self.refused is not None:
             return None
         if self._found is None:
-            is_due = len(self._shared_frames()) >= _FIRST_FRAMES
+            is_due = len(self._shared_frames()) >= FIRST_FRAMES
             return self._find if is_due else None
         if self._follower is None:
             return self._find_rest
@@ -259,7 +259,7 @@ class LiveWhisk:
     def _find(self) -> None:
         """Find the object in the first frames. Raises Refused where none is seen."""
         bench = self.bench
-        first = self._shared_frames()[:_FIRST_FRAMES]
+        first = self._shared_frames()[:FIRST_FRAMES]
         pictures = TrialPictures(
             {name: {f: self.frames[name][f] for f in first} for name in bench.cameras.names},
             self._by_frame(self.time_s),
@@ -368,7 +368,7 @@ class LiveWhisk:
         """Return the truth by all frames. Raises Refused where they determine none."""
         if self._wire is None:
             few = f"{counted(len(self._shared_frames()), 'frame')} seen by every camera"
-            raise Refused(f"{few}, {_FIRST_FRAMES} are needed", code="too_few_frames")
+            raise Refused(f"{few}, {FIRST_FRAMES} are needed", code="too_few_frames")
         follower = self._follower
         strategy = self._reading.strategy
         whisk = replace(self._whisk().during(self._wire.frames), light=self._wire.light)

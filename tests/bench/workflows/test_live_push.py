@@ -49,7 +49,13 @@ def test_a_recorded_push_is_played(small_session, out, capsys):
 
 def test_a_trial_that_is_not_there_is_one_line(small_session, out, capsys):
     assert main(["live", str(small_session), "b31", "--out", str(out)]) == BAD_INPUT
-    assert "b31" in capsys.readouterr().err
+    assert "no trial 'b31'; there are b30_3, b60_4" in capsys.readouterr().err
+
+
+def test_nothing_is_written_into_the_session(small_session, capsys):
+    inside = small_session / "out"
+    assert main(["live", str(small_session), "b30_3", "--out", str(inside)]) == BAD_INPUT
+    assert "lies in the session" in capsys.readouterr().err and not inside.exists()
 
 
 def test_an_object_that_gives_way_is_refused_in_one_line(small_session, tmp_path, capsys):
