@@ -23,10 +23,17 @@ def measured_place(session: Session, T_board: np.ndarray) -> Placement:
 
 def stated_place(session: Session) -> Placement:
     """Return the placement by session.toml's T_rig_board."""
-    stated = by_board(
-        session.T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad
+    return replace(by_board_of(session, session.T_rig_board), source="T_rig_board")
+
+
+def by_board_of(session: Session, T_rig_board: np.ndarray) -> Placement:
+    """Return the placement by a pose (3, 4) of the board, with the sigmas that the session states."""
+    square_sigma = 0.0
+    if session.board is not None:
+        square_sigma = session.board.square_sigma_mm / session.board.square_mm
+    return by_board(
+        T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad, square_sigma
     )
-    return replace(stated, source="T_rig_board")
 
 
 def both_places(session: Session) -> Placement:

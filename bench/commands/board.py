@@ -2,6 +2,7 @@
 
 import argparse
 
+from bench.base.progress import begin_step
 from bench.commands.options import DONE, Verbs, add_out, add_verb, parse_squares
 from bench.setup.lab import KIND_NAMES
 
@@ -52,6 +53,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the PDF, print the board's lines for session.toml; return the exit code."""
+    begin_step(f"drawing {options.out}")
     from bench.session.manifest import BoardKeys
     from bench.session.stated_board import marker_is_part, stated_board
     from bench.setup.board_pdf import MARKER_SHARE, toml_block, write_board

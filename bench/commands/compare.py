@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from bench.base.progress import begin_step
 from bench.commands.options import Verbs, add_verb
 
 
@@ -29,6 +30,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print what changed from run to run; return the exit code."""
+    begin_step(f"reading {options.runs[0]}")
     from bench.array.array_results import is_array
     from bench.array.compare_arrays import compare_arrays
     from bench.report.compare_runs import compare_runs

@@ -4,6 +4,7 @@ error of (10)."""
 import argparse
 from pathlib import Path
 
+from bench.base.progress import begin_step
 from bench.commands.options import DONE, Run, Verbs, add_out, add_verb, add_workers
 
 _MAPS = {
@@ -53,6 +54,7 @@ def _add_figure_8(what: Verbs) -> None:
 
 def _run_theory(options: argparse.Namespace) -> int:
     """Write figure 5 or 6, print the paths; return the exit code."""
+    begin_step(f"drawing into {options.out}")
     from bench.theory.slope_limits import write_figure
 
     print(*write_figure(options.number, options.out), sep="\n")
@@ -61,6 +63,7 @@ def _run_theory(options: argparse.Namespace) -> int:
 
 def _run_figure_8(options: argparse.Namespace) -> int:
     """Write figure 8 of all runs, print what it says and the paths; return the exit code."""
+    begin_step(f"drawing into {options.out}")
     from bench.report.pooled import write_figure_8
 
     paths, lines = write_figure_8(options.runs, options.out)

@@ -2,6 +2,7 @@
 
 import argparse
 
+from bench.base.progress import begin_step
 from bench.commands.options import DONE, Verbs, add_figure_format, add_run, add_verb
 
 
@@ -20,6 +21,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the report, print the paths; return the exit code."""
+    begin_step(f"reading {options.run_folder}")
     from bench.api import report
 
     print(*report(options.run_folder, options.figure_format), sep="\n")

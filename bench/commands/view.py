@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from bench.base.progress import begin_step
 from bench.commands.options import DONE, Verbs, add_run, add_verb
 
 
@@ -37,6 +38,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the film, print its path; return the exit code."""
+    begin_step(f"reading {options.run_folder}")
     from bench.report.video import write_video
 
     path = write_video(

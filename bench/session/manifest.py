@@ -122,10 +122,10 @@ class BoardKeys(GivenKeys):
     kalibr_target: str | None = None
     # how many squares [along x, along y]; circles or tags of the other kinds
     squares: Annotated[list[int], _TWO] | None = None
-    # side of a square; all lengths seen depend on it. From circle to circle or tag to tag, of
+    # side of a square as printed, over many of them; all lengths seen depend on it. From circle to circle or tag to tag, of
     # asymmetric circles from row to row
     square_mm: Width | None = None
-    square_sigma_mm: Annotated[float, Assumed(share=1e-3, origin="a print")] = 0.0
+    square_sigma_mm: Annotated[float, Assumed(share=1e-3, origin="a caliper along the print")] = 0.0
     # share by which the print may be longer along y than along x
     stretch_sigma: Annotated[
         float, Assumed(absolute=1e-3, unstated="stretch", origin="a printer's feed")

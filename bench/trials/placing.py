@@ -10,7 +10,7 @@ from bench.base.input_problems import InputProblems
 from bench.base.results import hash_of
 from bench.base.workers import Workers
 from bench.cameras.first_look import by_first_look, first_look, look_at_strokes, spread
-from bench.cameras.measured_place import both_places, contradiction, stated_place
+from bench.cameras.measured_place import both_places, by_board_of, contradiction, stated_place
 from bench.cameras.session_cameras import SessionCalibration
 from bench.session.session import Session
 from bench.trials.consistency import turn_cause
@@ -18,12 +18,12 @@ from bench.trials.lost import see_units
 from bench.trials.unit import Unit
 from vision.calibration import (
     Placement,
-    by_board,
     by_marker,
     by_strokes,
     check_swing_suffices,
     combine,
     move_rig_frame,
+    rescale,
 )
 from vision.geometry import Reason, Refused, compose, invert_transform
 
@@ -68,6 +68,8 @@ def place_rig(
         if stays:
             placement = combine(board, _placement_by_strokes(chosen, pool, problems))
             placed_here = calibration
+            if session.cameras_toml is None:
+                placed_here = _with_scale(calibration, placement)
         else:
             placed_here, placement = _converge(calibration, board, chosen, pool, problems)
     except Refused as refusal:
@@ -88,9 +90,10 @@ def _misplaced(placement: Placement, session: Session, units: Sequence[Unit]) ->
     of the whisker that would explain it.
     """
     cause = ""
-    if placement.scale_share is not None and session.board is not None:
+    scale = placement.scale
+    if scale is not None and scale.is_why and session.board is not None:
         square_mm = session.board.square_mm
-        looks_mm = square_mm / (1.0 + placement.scale_share)
+        looks_mm = square_mm / (1.0 + scale.share)
         cause = f"; a square_mm of {looks_mm:.4g} for {square_mm:g} explains it"
     elif placement.turn_share is not None:
         cause = turn_cause(placement.turn_share, [unit.trial for unit in units])
@@ -113,7 +116,7 @@ def _placed_by_file(
     both = both_places(session)
     if not board.covariance.any():
         return calibration.with_notes(*both.notes[:1], _STAYS)
-    return _moved(calibration, board, both).with_notes(*both.notes)
+    return _with_scale(_moved(calibration, board, both), both).with_notes(*both.notes)
 
 
 def measure_rig(
@@ -240,7 +243,23 @@ def _converge(
         here = _moved(here, exact, replace(both, covariance=exact.covariance))
         board = replace(board, step=board.step - both.step)
         both = replace(both, step=exact.step)
-    return _moved(here, exact, both), both
+    return _with_scale(_moved(here, exact, both), both), both
+
+
+def _with_scale(calibration: SessionCalibration, placed: Placement) -> SessionCalibration:
+    """Return the calibration with the uncertainty that a board's scale gives to cameras so placed, and
+    a note on that scale.
+    """
+    scale = placed.scale
+    if scale is None or not scale.stated_sigma or calibration.T_rig_board is None:
+        return calibration
+    cameras = rescale(calibration.cameras, calibration.T_rig_board[:, 3], placed)
+    new_hash = hash_of(cameras.covariance, calibration.hash)
+    note = (
+        f"By where the whisker turns, lengths are {1.0 + scale.share:.4f} ± {scale.sigma:.4f} times as long as they "
+        f"are: the board's square counts as known to {100.0 * np.sqrt(scale.variance):.2g} %."
+    )
+    return replace(calibration, cameras=cameras, hash=new_hash).with_notes(note)
 
 
 def _moved(
@@ -263,7 +282,7 @@ def _placement_before(session: Session) -> Placement:
         if session.cameras_toml is None:
             return by_first_look()
         T_rig_board = np.eye(3, 4)
-    return by_board(T_rig_board, session.T_rig_board_sigma_mm, session.T_rig_board_sigma_rad)
+    return by_board_of(session, T_rig_board)
 
 
 def _placement_by_strokes(

@@ -265,10 +265,33 @@ def _unsaid(fault: Fault) -> Fault:
     """Make a fault in a session that says of no given that it is exact, as a lab's does."""
 
     def spoil(session: Path) -> None:
-        _manifest("exact = true\n", "")(session)
+        file = session / "session.toml"
+        file.write_text(file.read_text().replace("exact = true\n", ""))
         fault(session)
 
     return spoil
+
+
+def square_off(share: float) -> Fault:
+    """A fault: the board's square and marker are stated too large by a share."""
+    sizes = f"square_mm = {15.0 * (1.0 + share):g}\nmarker_mm = {11.0 * (1.0 + share):g}"
+    return _unsaid(_manifest("square_mm = 15.0\nmarker_mm = 11.0", sizes))
+
+
+def _trial_named(name: bytes) -> Fault:
+    """A fault: the trial's folder has another name."""
+
+    def spoil(session: Path) -> None:
+        trial = os.fsencode(_trial(session))
+        os.rename(trial, os.path.join(os.path.dirname(trial), name))
+
+    return spoil
+
+
+def _manifest_is_a_folder(session: Path) -> None:
+    file = _trial(session) / "trial.toml"
+    file.unlink()
+    file.mkdir()
 
 
 def _board_views_exchanged(session: Path) -> None:
@@ -279,6 +302,10 @@ def _board_views_exchanged(session: Path) -> None:
     low.with_name("aside").rename(high)
 
 
+# [grey] A picture of a trial that differs by less from the empty rig's shows the rig there: noise and JPEG.
+_STILL_GREY = 12
+
+
 def print_stretched(share: float) -> Fault:
     """A fault: the board is longer along its x by a share, in every picture of it."""
 
@@ -287,13 +314,24 @@ def print_stretched(share: float) -> Fault:
         for name, camera in cameras.items():
             K = np.array(camera["K"])
             distortion = np.array(camera["dist"])
-            views = sorted((session / "boards" / name).iterdir())
-            for path in [*views, session / "boards" / "rig" / f"{name}.png"]:
-                change_picture(
-                    path, partial(stretched_board, share=share, K=K, distortion=distortion)
-                )
+            stretch = partial(stretched_board, share=share, K=K, distortion=distortion)
+            for path in (session / "boards" / name).iterdir():
+                change_picture(path, stretch)
+            on_rig = session / "boards" / "rig" / f"{name}.png"
+            before = cv2.imread(str(on_rig), cv2.IMREAD_GRAYSCALE)
+            change_picture(on_rig, stretch)
+            after = cv2.imread(str(on_rig), cv2.IMREAD_GRAYSCALE)
+            for path in session.glob(f"trials/*/{name}/*"):
+                change_picture(path, partial(_before_other_rig, before=before, after=after))
 
     return spoil
+
+
+def _before_other_rig(grey: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Return a trial's picture with another empty rig behind what moves in it."""
+    is_still = np.abs(grey.astype(int) - before) < _STILL_GREY
+    change = after.astype(int) - before
+    return np.clip(grey + np.where(is_still, change, 0), 0, 255).astype(np.uint8)
 
 
 def stretched_board(
@@ -417,19 +455,17 @@ FAULTS: dict[str, Fault] = {
     ),
     "board 3 mm higher": _manifest("-44.3509729]", "-41.3509729]"),
     "board 0.3 mm aside, unsaid": _unsaid(_manifest("4.24180287]", "4.54180287]")),
-    "square 0.3 % too large, unsaid": _unsaid(
-        _manifest("square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 15.045\nmarker_mm = 11.033")
-    ),
-    "square 0.5 % too large, unsaid": _unsaid(
-        _manifest("square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 15.075\nmarker_mm = 11.055")
-    ),
-    "board 2 % too large, unsaid": _unsaid(
-        _manifest("square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 15.3\nmarker_mm = 11.22")
-    ),
+    "square 0.3 % too large, unsaid": square_off(3e-3),
+    "square 0.5 % too large, unsaid": square_off(5e-3),
+    "square 1 % too large, unsaid": square_off(1e-2),
+    "square 2 % too large, unsaid": square_off(2e-2),
     "board 3 mm higher, unsaid": _unsaid(_manifest("-44.3509729]", "-41.3509729]")),
     "bar 6.6 mm for 6, unsaid": _unsaid(_manifest("diameter_mm = 6.0", "diameter_mm = 6.6")),
     "print stretched 0.3 %, unsaid": _unsaid(print_stretched(3e-3)),
     "lens boards exchanged, unsaid": _unsaid(_board_views_exchanged),
+    "trial's name not UTF-8": _trial_named(b"b60_\xff"),
+    "trial's name of two lines": _trial_named(b"b60\n4"),
+    "trial.toml is a folder": _manifest_is_a_folder,
     "wrong dictionary": _manifest("DICT_5X5_100", "DICT_4X4_100"),
     "wrong squares": _manifest("squares = [8, 6]", "squares = [7, 5]"),
     "whisker 90 mm for 100": _manifest("length_mm = 100.0", "length_mm = 90.0"),
@@ -454,8 +490,6 @@ FAULTS: dict[str, Fault] = {
 }
 # These need the board views: they are made on the whole session, without cameras brought along.
 WHOLE = (
-    "board 3 mm higher, unsaid",
-    "board 2 % too large, unsaid",
     "board 10 % too large",
     "board 2 % too large",
     "bar 6.6 mm for 6",
@@ -468,9 +502,33 @@ WHOLE = (
 # These need the board views, and no other trial: cameras are calibrated, gauges brought along.
 WITH_BOARDS = (
     "board 0.3 mm aside, unsaid",
+    "board 3 mm higher, unsaid",
     "square 0.3 % too large, unsaid",
     "square 0.5 % too large, unsaid",
+    "square 1 % too large, unsaid",
+    "square 2 % too large, unsaid",
     "bar 6.6 mm for 6, unsaid",
     "print stretched 0.3 %, unsaid",
     "lens boards exchanged, unsaid",
+)
+# What a lab enters wrongly or overlooks: each must be refused, named, or within the stated sigmas.
+ENTERED_WRONGLY = (
+    "board 0.3 mm aside, unsaid",
+    "square 0.3 % too large, unsaid",
+    "square 0.5 % too large, unsaid",
+    "square 1 % too large, unsaid",
+    "square 2 % too large, unsaid",
+    "print stretched 0.3 %, unsaid",
+    "lens boards exchanged, unsaid",
+    "board 3 mm higher, unsaid",
+    "bar 6.6 mm for 6, unsaid",
+    "moments in N m",
+    "volts named Nmm",
+    "frame times 1.01",
+    "exposure 1.3 from frame 6",
+    "a camera late by a frame",
+    "trial's name not UTF-8",
+    "trial's name of two lines",
+    "trial.toml is a folder",
+    "two frames damaged",
 )

@@ -11,11 +11,11 @@ The two are combined by their covariances.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtri
+from scipy.special import chdtri, expit, logit
 
-from vision.geometry.camera import Cameras
+from vision.geometry.camera import N_PARAMETERS, Cameras
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import compose, exp_rotation, log_rotation, skew
+from vision.geometry.rotation import apply, compose, exp_rotation, log_rotation, skew
 
 # [chance] By which swing and board, both right, would disagree as much as calls for an alarm.
 # Study: chosen.
@@ -34,6 +34,11 @@ _HELPED_ALONG_SIGMA_MM = 0.05
 _MOST_AXIS_SIGMA_DEG = 3.0
 # [1] Of the free strokes' width that is asked for: a fifth over what the sigma needs. Stated.
 _OVER = 1.2
+# [chance] Of a square that is not as stated within its sigma: typed from the drawing, where a printer
+# had scaled the page. Stated. Study: drawn_lines.py --square-off.
+_WRONG_SQUARE = 0.2
+# [1] By which share such a square is off, one sigma. Stated.
+_WRONG_SQUARE_SIGMA = 0.01
 # The components of a step, rad and mm, in words.
 _COMPONENTS = (
     "the axis leans about rig x",
@@ -50,6 +55,40 @@ _CLEAR_LEAN = 4.0
 
 
 @dataclass(frozen=True, eq=False)
+class Scale:
+    """The share by which all lengths are too long, as a board's square that is stated too large makes
+    them: 0 as it is stated.
+
+    stated_sigma: of the stated square, as a share. by_share (6,): how the step of a placement
+    changes with the share. share, sigma: as board and swing together show it; None and infinity by
+    the board alone. is_why: it explains why they disagree.
+    """
+
+    stated_sigma: float
+    by_share: np.ndarray
+    share: float | None = None
+    sigma: float = float("inf")
+    is_why: bool = False
+
+    @property
+    def variance(self) -> float:
+        """Return the variance of the share about 0.
+
+        A stated square is right within its sigma, or wrong (_WRONG_SQUARE). What is measured says how
+        probable that is: so much of the correction that it asks for is added. An exact one has none.
+        """
+        stated = self.stated_sigma**2
+        if self.share is None or not stated:
+            return stated
+        as_stated = stated + self.sigma**2
+        wrong = _WRONG_SQUARE_SIGMA**2 + self.sigma**2
+        log_odds = 0.5 * (np.log(as_stated / wrong) + self.share**2 * (1 / as_stated - 1 / wrong))
+        is_wrong = expit(log_odds + logit(_WRONG_SQUARE))  # its probability
+        correction = self.share * _WRONG_SQUARE_SIGMA**2 / wrong
+        return float(stated + is_wrong * correction**2)
+
+
+@dataclass(frozen=True, eq=False)
 class Placement:
     """The rig frame relative to the one that the board gives.
 
@@ -59,9 +98,8 @@ class Placement:
     disagree; None where they agree. source: what it rests on, as sentences name it; basis: how
     much of that. shared (6, 6): the part of the covariance that all free strokes share; None
     without a swing. turn_share: how many times as far as the motor the whisker would turn, were
-    that why the two disagree; None where it is not the cause. by_scale (6,): how the step of a swing
-    seen from this board changes with the share by which all lengths are too long; None without a
-    board. scale_share: that share, where it is why the two disagree; None where it is not.
+    that why the two disagree; None where it is not the cause. scale: by which share all lengths are
+    too long, as what places the rig shows; None without a board.
     """
 
     step: np.ndarray
@@ -74,8 +112,7 @@ class Placement:
     basis: str = ""
     shared: np.ndarray | None = None
     turn_share: float | None = None
-    by_scale: np.ndarray | None = None
-    scale_share: float | None = None
+    scale: Scale | None = None
 
     @staticmethod
     def of(T_board_rig: np.ndarray, covariance: np.ndarray) -> "Placement":
@@ -110,18 +147,21 @@ class Placement:
         )
 
 
-def by_board(T_rig_board: np.ndarray, sigma_mm: float, sigma_rad: float) -> Placement:
+def by_board(
+    T_rig_board: np.ndarray, sigma_mm: float, sigma_rad: float, square_sigma: float = 0.0
+) -> Placement:
     """Return the placement by the board alone: no step, and the covariance of its measured pose.
 
     T_rig_board errs by a shift and by a rotation about the board's origin, per axis; at the rig's
     origin that rotation shifts. Where all lengths are taken too long by a share, the centre of
-    rotation is seen by that share too far from the board.
+    rotation is seen by that share too far from the board. square_sigma: of the stated square, as a
+    share.
     """
     lever = np.eye(6)
     lever[3:, :3] = skew(T_rig_board[:, 3])
     variances = np.repeat([sigma_rad**2, sigma_mm**2], 3)
-    by_scale = np.append(np.zeros(3), -T_rig_board[:, 3])
-    return Placement(np.zeros(6), lever @ np.diag(variances) @ lever.T, by_scale=by_scale)
+    scale = Scale(square_sigma, np.append(np.zeros(3), -T_rig_board[:, 3]))
+    return Placement(np.zeros(6), lever @ np.diag(variances) @ lever.T, scale=scale)
 
 
 def combine(board: Placement, swing: Placement) -> Placement:
@@ -136,10 +176,11 @@ def combine(board: Placement, swing: Placement) -> Placement:
     gain = np.linalg.solve(Sigma, board.covariance).T
     covariance = board.covariance - gain @ board.covariance
     chi2 = float(difference @ np.linalg.solve(Sigma, difference))
-    scale_share = _scale_share(difference, Sigma, board.by_scale, chi2)
+    scale = _seen_scale(difference, Sigma, board.scale, chi2)
+    is_scale = scale is not None and scale.is_why
     alarm = None
     turn_share = None
-    if chi2 > chdtri(6, _CHANCE_EACH) or scale_share is not None:
+    if chi2 > chdtri(6, _CHANCE_EACH) or is_scale:
         alarm = _alarm(board, swing, Sigma)
         turn_share = _turn_share(difference, np.sqrt(np.diag(Sigma)))
     combined = replace(
@@ -149,7 +190,7 @@ def combine(board: Placement, swing: Placement) -> Placement:
         shared=None if swing.shared is None else gain @ swing.shared @ gain.T,
         alarm=alarm,
         turn_share=turn_share,
-        scale_share=scale_share,
+        scale=None if scale is None else replace(scale, by_share=gain @ scale.by_share),
     )
     return replace(combined, notes=(*swing.notes, f"With the {board.source}: {combined.spread}."))
 
@@ -209,22 +250,45 @@ def _turn_share(difference: np.ndarray, sigma: np.ndarray) -> float | None:
     return float(np.cos(difference[_LEAN_ALONG]))
 
 
-def _scale_share(
-    difference: np.ndarray, Sigma: np.ndarray, by_scale: np.ndarray | None, chi2: float
-) -> float | None:
-    """Return by which share all lengths seem too long, where that explains a difference (6,) of this
-    covariance (6, 6) that chance does not; None elsewhere. chi2: of the difference.
+def _seen_scale(
+    difference: np.ndarray, Sigma: np.ndarray, scale: Scale | None, chi2: float
+) -> Scale | None:
+    """Return the scale that explains a difference (6,) of this covariance (6, 6) best, and whether it
+    does where chance does not; None without a board, or one in the centre. chi2: of the difference.
 
     One number has the power that six have not: a board that is 2 % too large, placed to 0.2 mm and
     0.2 degrees, leaves χ² within what six let pass.
     """
-    if by_scale is None or not by_scale.any():
+    if scale is None or not scale.by_share.any():
         return None
-    weights = np.linalg.solve(Sigma, by_scale)
-    share = float(weights @ difference / (weights @ by_scale))
-    explained = float(share * (weights @ difference))
-    is_scale = explained > chdtri(1, _CHANCE_EACH) and chi2 - explained < chdtri(5, FALSE_ALARM)
-    return share if is_scale else None
+    weights = np.linalg.solve(Sigma, scale.by_share)
+    precision = float(weights @ scale.by_share)
+    share = float(weights @ difference) / precision
+    explained = precision * share**2
+    beyond_stated = share**2 / (scale.stated_sigma**2 + 1.0 / precision)
+    is_why = beyond_stated > chdtri(1, _CHANCE_EACH) and chi2 - explained < chdtri(5, FALSE_ALARM)
+    return replace(scale, share=share, sigma=precision**-0.5, is_why=is_why)
+
+
+def rescale(cameras: Cameras, board_mm: np.ndarray, placement: Placement) -> Cameras:
+    """Return cameras placed by board and swing with the uncertainty that the scale gives them.
+
+    Lengths from the board, and the rig frame between them, are longer together: calibrated by the
+    board alone, the cameras count the first, and what its square is stated to. board_mm (3,): the
+    board's origin in the rig frame.
+    """
+    scale = placement.scale
+    if scale is None or not scale.stated_sigma:
+        return cameras
+    by_share = np.zeros((len(cameras), N_PARAMETERS))
+    for camera, own in zip(cameras, by_share):
+        own[-3:] = apply(camera.T_camera_rig, board_mm)
+    about_board = by_share.ravel()
+    about_rig = about_board + cameras.by_placement @ scale.by_share
+    covariance = cameras.covariance + scale.variance * np.outer(about_rig, about_rig)
+    covariance -= scale.stated_sigma**2 * np.outer(about_board, about_board)
+    sigma = np.sqrt(np.diag(cameras.covariance))
+    return replace(cameras, covariance=_clip_eigenvalues(covariance, sigma), by_error=None)
 
 
 def move_rig_frame(cameras: Cameras, before: Placement, after: Placement) -> Cameras:
@@ -232,9 +296,8 @@ def move_rig_frame(cameras: Cameras, before: Placement, after: Placement) -> Cam
     (see `by_board`).
 
     Their covariance loses the placement error that `before` gave to all of them in common and gains
-    that of `after`. The swing is seen by the same cameras; that link is left out. Where the board's
-    origin lies between centre and bar, a wrong square's part of d_x is too small by √2 at most;
-    elsewhere it is too large.
+    that of `after`. The swing is seen by the same cameras; of that link the scale counts
+    (`rescale`).
     """
     moved = []
     for camera in cameras:

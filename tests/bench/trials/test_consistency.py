@@ -249,7 +249,7 @@ def test_a_board_two_percent_too_large_is_told_though_it_was_placed_by_hand(smal
     difference = moved.step
     chi2 = difference @ np.linalg.solve(ONE_TRIAL + by_hand.covariance, difference)
     assert chi2 < chdtri(6, FALSE_ALARM)
-    assert placed.alarm and placed.scale_share == pytest.approx(0.02)
+    assert placed.alarm and placed.scale.is_why and placed.scale.share == pytest.approx(0.02)
 
 
 def test_sound_boards_are_rarely_taken_for_another_scale(small_session, rng):
@@ -260,14 +260,14 @@ def test_sound_boards_are_rarely_taken_for_another_scale(small_session, rng):
     alarms = 0
     for draw in rng.standard_normal((1000, 6)):
         placed = combine(by_hand, Placement(root @ draw, ONE_TRIAL))
-        alarms += placed.scale_share is not None
+        alarms += placed.scale.is_why
     assert alarms <= 5
 
 
 def test_a_leaning_axis_is_no_scale(small_session, rng):
     session = load_session(small_session)
     exact = by_board(session.T_rig_board, 0.0, 0.0)
-    assert combine(exact, strokes(session, 1.1, rng, turned=0.1)).scale_share is None
+    assert not combine(exact, strokes(session, 1.1, rng, turned=0.1)).scale.is_why
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,21 @@
 """Faults of a lab made one by one, and what a run says of each: exit code, status, warnings, and errors in stated sigmas.
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/accuracy/faults.py OUT [PART OF A NAME ...]
+        [--session SESSION] [--entered]
 
 OUT keeps a sound run's cameras and gauges, by which a trial is evaluated alone (some 10 s a fault), and each fault's
-session and results. A silent wrong number is marked: a status of nothing, exit 0, and an error above 3 sigma.
+session and results. --session: another with a trial b60_4 and that board. --entered: the faults that a lab enters or
+overlooks (`ENTERED_WRONGLY`). Last comes a table: each fault is refused, told (with the codes of the run's warnings) or
+priced (worst error in its stated sigmas); a silent wrong number is marked: exit 0, and an error above 3 sigma.
 """
 
+import argparse
 import contextlib
 import csv
 import io
+import itertools
+import json
 import shutil
-import sys
 import time
 import tomllib
 from pathlib import Path
@@ -18,14 +23,22 @@ from pathlib import Path
 import numpy as np
 
 from bench.commands import cli
-from tests.scenes.faults import FAULTS, TRIAL, WHOLE, WITH_BOARDS, alone, copy_of
+from tests.scenes.faults import (
+    ENTERED_WRONGLY,
+    FAULTS,
+    TRIAL,
+    WHOLE,
+    WITH_BOARDS,
+    alone,
+    copy_of,
+)
 
-SESSION = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
+SMALL_SESSION = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
 SILENT_SIGMAS = 3.0
 AT_TOUCH = ("d_x_mm", "touch_deg", "beta_deg")
 
 
-def errors(out: Path) -> dict[str, float]:
+def errors(out: Path, truth: dict[str, float]) -> dict[str, float]:
     """By quantity (estimate − truth)/sigma of the trial's whisk; empty where nothing was written."""
     path = out / "whisks.csv"
     if not path.is_file():
@@ -34,8 +47,7 @@ def errors(out: Path) -> dict[str, float]:
         row = next((row for row in csv.DictReader(file) if row["trial"] == TRIAL), None)
     if row is None:
         return {}
-    truth = tomllib.loads((SESSION / "trials" / TRIAL / "truth.toml").read_text())
-    truth |= {"slip_mm": truth["slip_at_3deg_mm"], "touch_felt_deg": truth["touch_deg"]}
+    truth = truth | {"slip_mm": truth["slip_at_3deg_mm"], "touch_felt_deg": truth["touch_deg"]}
     known = {name: row[name] for name in (*AT_TOUCH, "slip_mm", "touch_felt_deg") if row[name]}
     return {
         name: (float(text) - truth[name]) / float(row[_sigma(name)]) for name, text in known.items()
@@ -47,12 +59,11 @@ def _sigma(name: str) -> str:
     return f"{stem}_sigma_{unit}"
 
 
-def estimate(out: Path) -> str:
+def estimate(out: Path, true_mm: float) -> str:
     """Error of (10) in per cent of the true distance, and in sigmas."""
     path = out / "estimates.csv"
     if not path.is_file():
         return ""
-    true_mm = tomllib.loads((SESSION / "trials" / TRIAL / "truth.toml").read_text())["d_x_mm"]
     with path.open(newline="") as file:
         for row in csv.DictReader(file):
             if row["trial"] == TRIAL and row["estimator"] == "with_friction" and row["d_x_est_mm"]:
@@ -69,13 +80,13 @@ def run(*arguments) -> tuple[int, str, float]:
     return code, text.getvalue(), time.perf_counter() - start
 
 
-def prepared(folder: Path) -> tuple[Path, Path]:
+def prepared(folder: Path, sound: Path) -> tuple[Path, Path]:
     """Folder of the cameras and file of the gauges that a sound run calibrates."""
     made, gauges = folder / "reference" / "calibration", folder / "gauges" / "gauges.toml"
     if not (made / "cameras.toml").is_file():
-        run("evaluate", SESSION, "--out", folder / "reference")
+        run("evaluate", sound, "--out", folder / "reference")
     if not gauges.is_file():
-        run("calibrate", "gauges", SESSION, "--out", gauges)
+        run("calibrate", "gauges", sound, "--out", gauges)
     return made, gauges
 
 
@@ -88,29 +99,44 @@ def warning_lines(printed: str) -> list[str]:
     return after[: after.index("") if "" in after else None]
 
 
-def study(folder: Path, name: str) -> None:
-    made, gauges = prepared(folder)
+def outcome(code: int, z: dict[str, float], out: Path, printed: str) -> str:
+    """What a run makes of a fault: refused, told or priced; SILENT where none of these."""
+    if code == 2:
+        return f"refused: {printed.strip().splitlines()[-1]}"
+    worst = max(z, key=lambda name: abs(z[name]), default="")
+    price = f"worst z {z[worst]:+.1f} ({worst})" if worst else "no truth"
+    if code == 1:
+        codes = json.loads((out / "run.json").read_text())["warning_codes"]
+        named = ", ".join(dict.fromkeys(itertools.chain.from_iterable(codes)))
+        return f"told: {named}; {price}"
+    if worst and abs(z[worst]) > SILENT_SIGMAS:
+        return f"SILENT: {price}"
+    return f"priced: {price}"
+
+
+def study(folder: Path, sound: Path, name: str) -> str:
+    """Print what check and evaluate say of a session with a fault; return its outcome."""
+    made, gauges = prepared(folder, sound)
     place = folder / name.replace(" ", "_").replace("%", "percent").replace("/", "")
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     session, out = place / "session", place / "out"
     cameras = [] if name in WITH_BOARDS else [made / "cameras.toml", made / "cameras.npz"]
-    copy_of(SESSION, session) if name in WHOLE else alone(SESSION, session, [*cameras, gauges])
+    copy_of(sound, session) if name in WHOLE else alone(sound, session, [*cameras, gauges])
     FAULTS[name](session)
     code, said, check_s = run("check", session)
     told = " | ".join(line.strip() for line in said.splitlines())
     print(f"== {name}\n   check {code} in {check_s:.1f} s: {told}")
     code, printed, seconds = run("evaluate", session, "--out", out)
-    z = errors(out)
-    warnings = warning_lines(printed)
-    worst = max((abs(one) for one in z.values() if np.isfinite(one)), default=0.0)
-    silent = "  SILENT" if code == 0 and worst > SILENT_SIGMAS else ""
+    truth = tomllib.loads((sound / "trials" / TRIAL / "truth.toml").read_text())
+    z = {quantity: one for quantity, one in errors(out, truth).items() if np.isfinite(one)}
     numbers = "  ".join(f"{quantity} z {one:+.1f}" for quantity, one in z.items())
-    print(f"   evaluate {code} in {seconds:.0f} s: {numbers}  {estimate(out)}{silent}")
-    for line in warnings:
+    print(f"   evaluate {code} in {seconds:.0f} s: {numbers}  {estimate(out, truth['d_x_mm'])}")
+    for line in warning_lines(printed):
         print(f"     {line.strip()}")
     head = printed.splitlines()[:2]
     print(f"   verdict: {head[1] if len(head) > 1 and code < 2 else ''}", flush=True)
+    return outcome(code, z, out, printed)
 
 
 def without_figures() -> None:
@@ -126,11 +152,22 @@ def without_figures() -> None:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path, metavar="OUT")
+    parser.add_argument("parts", nargs="*", metavar="PART")
+    parser.add_argument("--session", type=Path, default=SMALL_SESSION)
+    parser.add_argument("--entered", action="store_true")
+    options = parser.parse_args()
     without_figures()
-    folder, *parts = sys.argv[1:]
-    for name in FAULTS:
-        if not parts or any(part in name for part in parts):
-            study(Path(folder), name)
+    outcomes = {}
+    for name in ENTERED_WRONGLY if options.entered else FAULTS:
+        if not options.parts or any(part in name for part in options.parts):
+            outcomes[name] = study(options.folder, options.session, name)
+    print()
+    for name, made in outcomes.items():
+        print(f"{name:32s} {made}")
 
 
 if __name__ == "__main__":
