@@ -288,8 +288,8 @@ class TrialKeys(GivenKeys):
     # allow the difference
     beta_deg: Slope | None = None
     beta_sigma_deg: float = 0.0
-    # nominal distance; one that is seen counts before it. By `[truth]` it is the truth itself: from
-    # the base to the contact at first touch
+    # nominal distance; one that is seen counts before it. With a sigma it is measured, and `calibrate rig`
+    # places the rig by it. By `[truth]` it is the truth itself: from the base to the contact at first touch
     d_x_mm: Length | None = None
     d_x_sigma_mm: float = 0.0
     # diameter of the bar where it differs from the session's (paper wrapped round it)

@@ -1,6 +1,6 @@
 """Place of the rig, from the free strokes of the session's own trials together with T_rig_board."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from bench.base.workers import Workers
 from bench.cameras.first_look import by_first_look, first_look, look_at_strokes, spread
 from bench.cameras.measured_place import both_places, by_board_of, contradiction, stated_place
 from bench.cameras.session_cameras import SessionCalibration
+from bench.records.trial_result import SeenTrial
 from bench.session.session import Session
 from bench.trials.consistency import turn_cause
 from bench.trials.lost import see_units
@@ -24,6 +25,7 @@ from vision.calibration import (
     combine,
     move_rig_frame,
     rescale,
+    with_distance,
 )
 from vision.geometry import Reason, Refused, compose, invert_transform
 
@@ -66,12 +68,15 @@ def place_rig(
     stays = session.cameras_toml is not None or not board.covariance.any()
     try:
         if stays:
-            placement = combine(board, _placement_by_strokes(chosen, pool, problems))
+            trials = see_units(chosen, pool, "free strokes", problems)
+            placement = _by_strokes_too(board, chosen, trials)
             placed_here = calibration
             if session.cameras_toml is None:
                 placed_here = _with_scale(calibration, placement)
         else:
-            placed_here, placement = _converge(calibration, board, chosen, pool, problems)
+            placed_here, placement = _converge(
+                calibration, board, chosen, pool, problems, _by_strokes_too
+            )
     except Refused as refusal:
         if strokes_only:
             raise _without_rig_frame(refusal) from None
@@ -160,9 +165,8 @@ def _converge_on_strokes(
     problems: InputProblems,
 ) -> tuple[SessionCalibration, Placement]:
     """Return what `_converge` does of free strokes; raise BadInput where these cannot be read."""
-    chosen = spread([unit for unit in units if unit.trial.camera_sources])
     try:
-        return _converge(calibration, known, chosen, pool, problems)
+        return _converge(calibration, known, units, pool, problems, _by_touches_too)
     except Refused as refusal:
         cure = "record free strokes of some 20 degrees in view of two cameras"
         raise BadInput(
@@ -226,18 +230,20 @@ def _converge(
     chosen: Sequence[Unit],
     pool: Workers,
     problems: InputProblems,
+    place: Callable[[Placement, Sequence[Unit], Sequence[SeenTrial]], Placement],
 ) -> tuple[SessionCalibration, Placement]:
     """Return the calibration moved to the rig frame of board and strokes together, and that
     placement.
 
-    The strokes are read by cameras whose uncertainty leaves out T_rig_board's, which is in the
-    board's placement. Raises Refused where no stroke can be read.
+    place: the placement by the board, and by what is seen of the units. The strokes are read by
+    cameras whose uncertainty leaves out T_rig_board's, which is in the board's placement. Raises
+    Refused where no stroke can be read.
     """
     exact = replace(board, covariance=np.zeros((6, 6)))
     here = _moved(calibration, board, exact)
     for round_number in range(_MOST_ROUNDS):
         units = [replace(unit, calibration=here, stage=f"swing{round_number}") for unit in chosen]
-        both = combine(board, _placement_by_strokes(units, pool, problems))
+        both = place(board, units, see_units(units, pool, "free strokes", problems))
         if np.all(np.abs(both.step) < _SMALL_STEP):
             break
         here = _moved(here, exact, replace(both, covariance=exact.covariance))
@@ -256,7 +262,7 @@ def _with_scale(calibration: SessionCalibration, placed: Placement) -> SessionCa
     cameras = rescale(calibration.cameras, calibration.T_rig_board[:, 3], placed)
     new_hash = hash_of(cameras.covariance, calibration.hash)
     note = (
-        f"By where the whisker turns, lengths are {1.0 + scale.share:.4f} ± {scale.sigma:.4f} times as long as they "
+        f"By where the whisker turns, lengths are seen {1.0 + scale.share:.4f} ± {scale.sigma:.4f} times as long as they "
         f"are: the board's square counts as known to {100.0 * np.sqrt(scale.variance):.2g} %."
     )
     return replace(calibration, cameras=cameras, hash=new_hash).with_notes(note)
@@ -285,15 +291,47 @@ def _placement_before(session: Session) -> Placement:
     return by_board_of(session, T_rig_board)
 
 
-def _placement_by_strokes(
-    units: Sequence[Unit], pool: Workers, problems: InputProblems
+def _by_strokes_too(
+    known: Placement, units: Sequence[Unit], trials: Sequence[SeenTrial]
 ) -> Placement:
+    """Return the placement by what is known and by free strokes. trials: what is seen of the units."""
+    return combine(known, _placement_by_strokes(trials))
+
+
+def _by_touches_too(
+    known: Placement, units: Sequence[Unit], trials: Sequence[SeenTrial]
+) -> Placement:
+    """Return the placement by what is known, by free strokes, and by each first touch whose distance
+    was measured: d_x_mm, with a sigma.
+
+    trials: what is seen of the units, in the frame from which the placement steps.
+    """
+    placement = _by_strokes_too(known, units, trials)
+    for unit, seen in zip(units, trials):
+        stated = unit.trial
+        if stated.d_x_mm is None or not stated.d_x_sigma_mm:
+            continue
+        for whisk in seen.whisks:
+            truth = whisk.truth
+            if not np.isfinite(truth.d_x_mm.value):
+                continue
+            sigma_mm = float(np.hypot(stated.d_x_sigma_mm, truth.d_x_mm.sigma))
+            placement = with_distance(placement, truth.point_mm.value, stated.d_x_mm, sigma_mm)
+            touch = f"{stated.name} touching at {stated.d_x_mm:g} ± {sigma_mm:.2g} mm"
+            note = f"{placement.notes[0]} Besides, {touch}."
+            notes = (note, *placement.notes[1:])
+            placement = replace(placement, basis=f"{placement.basis}, {touch}", notes=notes)
+            break  # the whisks of a trial err alike
+    return placement
+
+
+def _placement_by_strokes(trials: Sequence[SeenTrial]) -> Placement:
     """Return the placement by the free strokes of these trials.
 
     It takes every whisk whose base is seen before touch. Raises Refused without any.
     """
     lines = []
-    for trial in see_units(units, pool, "free strokes", problems):
+    for trial in trials:
         for whisk in trial.whisks:
             if whisk.truth.base is not None:
                 lines.append(whisk.truth.base)

@@ -43,6 +43,10 @@ _NO_MARKER = (
     "fasten a marker of the board's dictionary to the hub, with a number that the board does not use and in view of "
     "two cameras: it shows axis and centre in all frames, bent ones included"
 )
+_NO_TOUCH = (
+    "measure how far from the motor's axis a trial's first contact is, and state d_x_mm and d_x_sigma_mm in its "
+    "trial.toml: it fixes the centre along the whisker"
+)
 
 
 @dataclass(frozen=True)
@@ -119,7 +123,8 @@ def _check_target(target: Path) -> None:
 
 
 def calibrate_rig(session: Session, problems: InputProblems, *, workers: int = 1) -> RigCalibration:
-    """Measure where the board on the rig stands, by a marker on the hub and by the free strokes.
+    """Measure where the board on the rig stands, by a marker on the hub, by the free strokes, and by
+    touches at a distance that was measured.
 
     A stated T_rig_board enters nothing. Raise BadInput where that cannot be found, saying what to
     record.
@@ -133,7 +138,8 @@ def calibrate_rig(session: Session, problems: InputProblems, *, workers: int = 1
         measured_rig=None,
     )
     recorded = [trial for trial in trials_with_whisks(alone) if trial.camera_sources]
-    trials = spread(recorded)
+    touches = [trial for trial in recorded if trial.d_x_sigma_mm]
+    trials = [*spread([trial for trial in recorded if not trial.d_x_sigma_mm]), *touches]
     with TemporaryDirectory() as folder, Workers(workers) as pool:
         units = first_units(alone, trials, Path(folder), Settings())
         calibration, sources = measure_rig(alone, units, pool, problems)
@@ -190,6 +196,8 @@ def what_would_help(found: RigCalibration) -> Iterator[str]:
     """Yield lines on what would make the place more certain."""
     if len(found.sources) == 1:
         yield _NO_MARKER
+    if not any(trial.d_x_sigma_mm for trial in found.trials):
+        yield _NO_TOUCH
     sigma = np.sqrt(np.diag(found.covariance))
     if np.degrees(max(sigma[:2])) > _HELPED_AXIS_SIGMA_DEG:
         yield "wider strokes: the axis is known as well as the motor turns far in the pictures"

@@ -15,7 +15,7 @@ from bench.report.trial_figures import TrialToDraw, draw_trial
 from bench.session.signals import forward_strokes, read_signals
 from bench.trials.seen import see_trial
 from bench.trials.unit import Unit
-from bench.workflows.live_push import ProcessorClock, Recording, live_bench
+from bench.workflows.live_push import ProcessorClock, RecordedPush, live_bench
 from vision import UNKNOWN, Value
 from vision.geometry import VisionSettings
 
@@ -84,7 +84,7 @@ def play_all(units: Sequence[Unit], lead_s: float) -> LiveTiming:
     for unit in units:
         own = [UNKNOWN] * len(forward_strokes(read_signals(unit.trial)))
         try:
-            recording = Recording.read(unit.trial)
+            recording = RecordedPush.read(unit.trial)
             settings = VisionSettings(clock_sigma_s=recording.times.clock_sigma_s)
             bench = live_bench(unit.session, unit.trial, unit.calibration, settings)
             for played in recording.play_all(bench, ProcessorClock, lead_s):

@@ -23,6 +23,7 @@ NAMES = {
     "hub_turning": ("FirstRig", "first_rig", "first_rig_about"),
     "hub_turns": ("marker_turns",),
     "kalibr_target": ("read_kalibr_target",),
+    "known_distance": ("with_distance",),
     "known_lengths": ("check_known_lengths",),
     "matlab_file": ("load_matlab",),
     "moving_line": ("MovingLines", "moving_lines"),

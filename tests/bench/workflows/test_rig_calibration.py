@@ -17,6 +17,7 @@ from bench.workflows.rig_calibration import calibrate_rig_command
 from tests.scenes.base_lines import some_lines
 from tests.scenes.model_scenes import CAMERAS
 from tests.scenes.results import seen_whisk
+from vision import Value
 from vision.calibration.place import Placement, move_rig_frame
 from vision.geometry.rotation import compose, exp_rotation, invert_transform, log_rotation
 
@@ -38,6 +39,7 @@ def measure(small_copy, monkeypatch):
 
     def run(width_deg=20.0, out=None, seen=True):
         rng = np.random.default_rng(5)
+        contact_mm = np.array([59.9, 2.0, 0.5])
 
         def see(unit):
             T_camera_now = unit.calibration.cameras["one"].T_camera_rig
@@ -46,7 +48,10 @@ def measure(small_copy, monkeypatch):
             left = np.append(log_rotation(T_now_true[:, :3]), T_now_true[:, 3])
             lines = some_lines(width_deg, left, across_mm=0.01, turn_rad=5e-4, rng=rng)
             base = drawn.setdefault((unit.stage, unit.trial.name, width_deg), lines)
-            return SeenTrial((seen_whisk(0, base=base if seen else None),))
+            point = T_now_true[:, :3] @ contact_mm + T_now_true[:, 3]
+            distance = Value(float(np.linalg.norm(point)), 0.01)
+            touch = {"d_x_mm": distance, "point_mm": Value(point, np.full(3, 0.01))}
+            return SeenTrial((seen_whisk(0, base=base if seen else None, **touch),))
 
         monkeypatch.setattr("bench.trials.lost.see_unit", see)
         return calibrate_rig_command(small_copy, out, workers=0)
@@ -109,6 +114,21 @@ def test_a_stated_pose_enters_nothing_and_is_compared(measure, small_copy, capsy
 def test_narrow_strokes_are_warned_of_with_the_width_that_would_do(measure, small_copy, capsys):
     assert measure(width_deg=3.0) == 1
     assert re.search(r"record free strokes of about \d+ degrees", capsys.readouterr().out)
+
+
+def test_a_touch_at_a_measured_distance_fixes_the_centre_along_the_whisker(measure, small_copy):
+    """Strokes of 3 degrees fix it to 0.1 mm, a distance that a caliper gives to 0.02 mm."""
+    without_stated(small_copy)
+    with (small_copy / "trials" / "b60_4" / "trial.toml").open("a") as file:
+        file.write("\nd_x_mm = 59.935\nd_x_sigma_mm = 0.02\n")
+    assert measure(width_deg=3.0) == 0
+    read = load_session(small_copy).measured_rig
+    assert np.sqrt(read.covariance[3, 3]) < 0.03
+    true = compose(invert_transform(T_FIRST_TRUE), measure.T_rig_board)
+    off = compose(read.T_rig_board, invert_transform(true))
+    error = np.append(log_rotation(off[:, :3]), off[:, 3])
+    assert error @ np.linalg.solve(read.covariance, error) < 22.5
+    assert "b60_4 touching at 59.935" in (small_copy / "rig.toml").read_text()
 
 
 def refused(arguments, capsys) -> str:

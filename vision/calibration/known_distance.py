@@ -1,0 +1,44 @@
+"""A contact whose distance from the base was measured, as a placement of the rig frame.
+
+Free strokes fix the centre of rotation badly along the whisker; a contact that stands at a known
+distance from it fixes it there, and nowhere else.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import chdtri
+
+from vision.calibration.place import FALSE_ALARM, Placement
+
+
+def with_distance(
+    placement: Placement, contact_mm: np.ndarray, distance_mm: float, sigma_mm: float
+) -> Placement:
+    """Return a placement corrected by a contact's known distance from the centre of rotation; with an
+    alarm where they disagree by more than chance allows.
+
+    contact_mm (3,): where it is seen, in the frame from which the placement steps. sigma_mm: of the
+    distance, and of where the contact is seen there, together.
+    """
+    from_centre_mm = contact_mm - placement.step[3:]
+    seen_mm = float(np.linalg.norm(from_centre_mm))
+    by_step = np.append(np.zeros(3), -from_centre_mm / seen_mm)  # of the distance
+    spread = placement.covariance @ by_step
+    variance = float(by_step @ spread) + sigma_mm**2
+    gain = spread / variance
+    farther_mm = distance_mm - seen_mm
+    kept = np.eye(6) - np.outer(gain, by_step)
+    alarm = placement.alarm
+    if alarm is None and farther_mm**2 / variance > chdtri(1, FALSE_ALARM):
+        alarm = (
+            f"{placement.source} and a stated distance disagree: d_x is stated as {distance_mm:g} mm, and seen as "
+            f"{seen_mm:.2f} ± {np.sqrt(variance):.2f} mm; check d_x_mm, which goes from the base to the contact, and square_mm"
+        )
+    return replace(
+        placement,
+        step=placement.step + gain * farther_mm,
+        covariance=kept @ placement.covariance @ kept.T + sigma_mm**2 * np.outer(gain, gain),
+        shared=None if placement.shared is None else kept @ placement.shared @ kept.T,
+        alarm=alarm,
+    )
