@@ -8,13 +8,16 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from estimator import compliance, friction, load_cell, slip
+from estimator import compliance, friction, load_cell, profile, slip
 from estimator.beam import Beam
 from estimator.both_ways import there_and_back
 from estimator.builtin import ESTIMATORS, OF_CURVED, printed_17
 from estimator.contact_state import contact_of
+from estimator.contour import TouchingLines, contour
+from estimator.longitudinal import compliance_with_rolling
 from estimator.moving import known_motion
 from estimator.onset import felt_touch
+from estimator.reorientation import next_turn_rad, reoriented
 from estimator.seen_shape import contact_of_shape
 from estimator.sensors import SENSORS
 from estimator.signal import moment_at, threshold_touch, touch_on_rate
@@ -142,15 +145,16 @@ def same(one, other, rel=SAME):
     np.testing.assert_allclose(other, one, rtol=rel, atol=rel * largest)
 
 
-@pytest.mark.parametrize("name", [*ESTIMATORS, *OF_CURVED, *SENSORS, "printed_17", "known_motion"])
-@settings(max_examples=40)
+OTHERS = (printed_17, known_motion, reoriented, compliance_with_rolling)
+NAMED = ESTIMATORS | OF_CURVED | SENSORS | {other.__name__: other for other in OTHERS}
+
+
+@pytest.mark.parametrize("name", NAMED)
+@settings(max_examples=30)
 @given(scene=scenes, unit=units)
 def test_estimates(name, scene, unit):
-    named = (
-        ESTIMATORS | OF_CURVED | SENSORS | {"printed_17": printed_17, "known_motion": known_motion}
-    )
-    one = named[name](scene.whisk(MM_N), scene.told(MM_N))
-    other = named[name](scene.whisk(unit), scene.told(unit))
+    one = NAMED[name](scene.whisk(MM_N), scene.told(MM_N))
+    other = NAMED[name](scene.whisk(unit), scene.told(unit))
     assert getattr(one.status, "code", "") == getattr(other.status, "code", "")
     same(one.d_x_mm, other.d_x_mm / unit.length)
     same(one.sigma_mm, other.sigma_mm / unit.length, SAME_SIGMA)
@@ -285,6 +289,53 @@ def test_a_load_cell_s_distance(scene, unit):
         beam = scene.beam(asked)
         found.append(load_cell.distance(theta, m_y, m_z, 0.0, m_z / d_x, -m_y / d_x, beam) / d_x)
     same(*found)
+
+
+@settings(max_examples=40)
+@given(scene=scenes, unit=units)
+def test_the_turn_of_a_reorientation(scene, unit):
+    turns = [next_turn_rad(scene.whisk(asked), scene.told(asked)) for asked in (MM_N, unit)]
+    same(*np.array(turns))
+
+
+@settings(max_examples=12)
+@given(scene=scenes, unit=units, pull=st.floats(-0.3, 0.3))
+def test_a_contact_by_the_shape_of_the_whisker(scene, unit, pull):
+    """By force and moment, with the covariance of both; pull: force along the whisker over that across it."""
+    found = []
+    for asked in (MM_N, unit):
+        _, m_y, m_z = scene.felt(asked)
+        beam = replace(scene.beam(asked), rest_mm=((0.0,), (0.0,)))
+        d_x = scene.part * beam.length_mm
+        force = np.array([pull * np.hypot(m_y, m_z), m_z, -m_y]) / d_x
+        sigma = scene.noise * np.hypot(m_y, m_z)
+        both = (sigma**2 * np.eye(2), force, (sigma / d_x) ** 2 * np.eye(3))
+        point, covariance, why_none = profile.contact(np.array([m_y, m_z]), *both, beam)
+        found.append((point / asked.length, covariance / asked.length**2, why_none))
+    (one, covariance, why_none), (other, in_units, why_not) = found
+    assert why_none == why_not
+    same(one, other)
+    same(covariance, in_units, SAME_SIGMA)
+
+
+@settings(max_examples=40)
+@given(unit=units, seed=st.integers(0, 99), size_mm=st.floats(0.5, 500.0))
+def test_a_contour(unit, seed, size_mm):
+    """Of lines that touch a disc."""
+    rng = np.random.default_rng(seed)
+    turns = np.sort(rng.uniform(0.0, 2 * np.pi, 9))
+    normal = np.stack([-np.sin(turns), np.cos(turns)], axis=1)
+    noise = 1 + 1e-3 * rng.normal(size=(9, 1))
+    found = []
+    for length in (size_mm, size_mm * unit.length):
+        sizes = np.full(9, 0.01 * length)
+        lines = TouchingLines(-length * noise * normal, turns, np.full(9, 0.01), sizes, sizes)
+        outline = contour(lines)
+        parts = [] if isinstance(outline, str) else list(vars(outline).items())
+        found.append({name: values / (length if "mm" in name else 1) for name, values in parts})
+    assert found[0].keys() == found[1].keys()
+    for name, values in found[0].items():
+        same(values, found[1][name], SAME_SIGMA)
 
 
 @settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -90,19 +90,18 @@ def test_the_answer_is_the_same_in_every_unit(
     length, taper, part, theta, sets, rigidity, length_unit, force_unit
 ):
     def asked(unit, force):
-        """Moments over the unit of force and length."""
+        """Moments and force over their units, and the tangent at the contact."""
         rest = UnloadedRod(tuple((0.0, 0.0, unit * length * tip) for tip in sets), unit * length)
         unbent = rest.point_mm(np.array([part * unit * length]))
         deflection = part * unit * length * np.array([[-0.5 * theta**2, -theta, 0.3 * theta]])
         rods = CurvedRods(
             rest, lambda share: 1.0 - taper * share, rigidity * force * unit**2, unbent + deflection
         )
-        return rods.moments_Nmm(np.array([-0.1]), deflection) / (force * unit)
+        held = rods.held(np.array([-0.1]), deflection)
+        return held.moments_Nmm / (force * unit), held.force_N / force, held.tangent
 
-    one = asked(1.0, 1.0)
-    np.testing.assert_allclose(
-        asked(length_unit, force_unit), one, rtol=1e-9, atol=1e-9 * np.abs(one).max()
-    )
+    for one, other in zip(asked(1.0, 1.0), asked(length_unit, force_unit)):
+        np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
 
 
 def test_a_contact_at_the_point_of_a_cone_has_no_moment():

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from bench.gauges.clamped_rod import moment_at_clamp
+from bench.gauges.clamped_rod import load_at_clamp, moment_at_clamp
 
 EI = 2945.2431  # N·mm²: 60 GPa, 1 mm
 
@@ -110,28 +110,32 @@ def test_a_tapering_rod_follows_its_equation_marched_from_the_contact(loss, load
 def test_the_answer_is_the_same_in_every_unit(
     length_mm, part, theta_deg, loss, friction, rigidity_Nmm2, length_unit, force_unit
 ):
-    """m goes with force · length; a rod that no force bends so is refused in every unit. Near 1 of small angles."""
+    """Moment, force and the turn of the end; a rod that no force bends so is refused in every unit. The moment is near 1
+    of small angles'."""
     theta = np.radians(theta_deg)
 
     def asked(length, rigidity):
-        """Moment over the force's and the length's unit, or None where it is refused."""
+        """Moment and force over their units, and the end's turn; None where the rod is refused."""
         x, w = part * length * np.cos(theta), part * length * np.sin(theta)
         try:
-            moment = moment_at_clamp(
+            load = load_at_clamp(
                 x, w, lambda arc: rigidity * (1 - loss * arc / length) ** 4, friction
             )
         except ArithmeticError:
             return None
-        return moment[0] * length / rigidity
+        force = load.force_N[:, 0] * length**2
+        return (
+            np.array([load.moment_Nmm[0] * length, *force, load.end_rad[0] * rigidity]) / rigidity
+        )
 
     one = asked(length_mm, rigidity_Nmm2)
     other = asked(length_mm * length_unit, rigidity_Nmm2 * force_unit * length_unit**2)
     assert (one is None) == (other is None)
     if one is not None:
-        assert other == pytest.approx(one, rel=1e-9)
+        np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
         bent = theta / (1 - loss * part)  # how far the rod's end turns, but for a factor near 1
         small = 3 * theta * (1 / part - loss)
-        assert one / small == pytest.approx(1.0, abs=bent * (0.3 + bent))
+        assert one[0] / small == pytest.approx(1.0, abs=bent * (0.3 + bent))
     else:
         assert theta_deg / (1 - loss * part) > 30.0
 
