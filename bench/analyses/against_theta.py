@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import column, grouped, known_rows, mean, rms, sound_measured_whisks
-from bench.base.drawing import blank, colour_of, label_of, nested_size
+from bench.base.drawing import blank, colour_of, label_logarithmic, label_of, nested_size
 from bench.base.tables import WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table
 from bench.records.trial_result import EstimateRow, TrialResult
 from vision import Value
@@ -160,9 +160,9 @@ def _draw(rows: Sequence[AtTheta]) -> "Figure":
         xlabel="pushing angle θ  [°]",
         ylabel="error of d$_x$, its sigma  [%]",
     )
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter("")
+    label_logarithmic(axes.yaxis)
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("")
     farthest_deg = max(row.theta_deg for row in rows)
     axes.set_xticks([tick for tick in _TICKS_DEG if tick <= farthest_deg])
     axes.grid(alpha=0.25, which="major")
