@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.analyses.direction import slip_angle
 from bench.base.combined import Measurement, Measurements
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.trial_result import (
@@ -96,12 +97,16 @@ def alphas_of(results: Iterable[TrialResult]) -> list[WhiskAlphas]:
     """Return the friction angles of every whisk, in their order."""
     found = []
     for result, seen, felt in whisks(results):
-        found.append(_alphas(result.trial, seen, felt, np.radians(result.theta_deg)))
+        left = result.whisker.left(seen.d_x_mm.value)
+        alpha_felt = felt_friction(seen, felt, np.radians(result.theta_deg), left)
+        found.append(_alphas(result.trial, seen, felt, alpha_felt))
     return found
 
 
-def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> WhiskAlphas:
-    """Return the friction angles of one whisk at a pushing angle."""
+def _alphas(
+    trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, alpha_felt: tuple[float, float]
+) -> WhiskAlphas:
+    """Return the friction angles of one whisk, of which that felt is given."""
     beta, beta_from = _slope(trial, seen)
     phases = NO_PHASES
     beta_common_rad = _common_slope(seen)
@@ -113,7 +118,7 @@ def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, theta_rad: floa
         *trial.panel,
         beta_rad=beta.value,
         seen=(seen.friction_rad.value, seen.friction_rad.sigma),
-        felt=felt_friction(seen, felt, theta_rad),
+        felt=alpha_felt,
         phases_seen=phases,
         phases_felt=felt.phases,
         shared_seen_rad=beta.sigma,
@@ -160,24 +165,43 @@ def _common_felt(felt: FeltWhisk) -> np.ndarray:
     return -np.copysign(1.0, felt.phi_felt_rad.value) * by_cause
 
 
-def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float) -> tuple[float, float]:
+def felt_friction(
+    seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: float
+) -> tuple[float, float]:
     """Return α and its sigma by |β| − |φ|: the slope as seen, the slip angle by the moments at θ.
 
-    Of a whisk that was seen to slip; NaN where the moments are not those of the seen shape, or the slope
-    at θ is not that at touch. Where the truth is a stage's a slip angle that is not 0 for sure shows the
-    slip: the force on a contact at rest points along the push.
+    left: share of the base's diameter that the whisker has at the contact. Of a whisk that was seen to
+    slip; NaN where the moments are not those of the seen shape, or the slope at θ is not that at touch.
+    Where the truth is a stage's a slip angle that is not 0 for sure shows the slip: the force on a
+    contact at rest points along the push.
     """
     beta = seen.beta_rad
     phi = felt.phi_felt_rad
+    sigma_rad = float(np.hypot(beta.sigma, phi.sigma))
+    across_rad = abs(beta.value) - abs(phi.value) + _turn_of_force(seen, felt, theta_rad, left)
     if seen.deflection is None and seen.has_truth:
         if felt.apart or not abs(phi.value) > _SURE_SIGMAS * phi.sigma:
             return UNKNOWN
-        return abs(beta.value) - abs(phi.value), float(np.hypot(beta.sigma, phi.sigma))
+        return across_rad, sigma_rad
     if not (slips(seen) and np.isfinite(phi.value)) or felt.apart or turns_with_slip(seen):
         return UNKNOWN
-    across_rad = abs(beta.value) - abs(phi.value)
     alpha = np.arctan(np.tan(across_rad) / np.cos(heading(seen.deflection, theta_rad)))
-    return float(alpha), float(np.hypot(beta.sigma, phi.sigma))
+    return float(alpha), sigma_rad
+
+
+def _turn_of_force(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: float) -> float:
+    """Return by how much |φ| has grown up to θ, rad: the bent whisker turns the bar's normal, and along a bar that
+    leans by ψ the contact moves along the whisker.
+
+    To second order in θ (`bench.analyses.direction`), and in θ ψ (docs/maps.md), each the more the thinner
+    the whisker is at the contact.
+    """
+    slope_rad = abs(seen.beta_rad.value)
+    phi_rad = abs(felt.phi_felt_rad.value)
+    across_rad = np.array([slope_rad - phi_rad])
+    turned_rad = slip_angle(np.array([theta_rad]), slope_rad, across_rad, left)[0] - phi_rad
+    lean = np.sign(seen.beta_rad.value) * np.tan(np.nan_to_num(seen.psi_rad.value))
+    return float(turned_rad + 0.5 * theta_rad * np.cos(slope_rad) * lean / left)
 
 
 def mean_alpha(alphas: Iterable[WhiskAlphas], name: str) -> tuple[float, float]:

@@ -103,6 +103,11 @@ SURFACES = Table(
 )
 
 
+# What a mean over slopes of both signs does not know (`bench.analyses.alphas.mean_alpha`).
+_WIDE = (
+    "± of seen and felt is an upper bound: what all slopes seen share may cancel between slopes of "
+    "both signs, and counts in full"
+)
 # Columns of SURFACES on the page, where any surface has a number there.
 _ON_PAGE = {
     "seen": "seen",
@@ -183,6 +188,8 @@ class FrictionAngles(Analysis):
             names = (*RECORDS, "least_squares")
             cells = "  ".join(f"{_alpha_text(one.alpha(name)):>15}" for name in names)
             yield f"{one.surface.title:<24}{len(one.whisks):>7}  {cells}"
+        if any(_has_both_signs(one.whisks) for one in found.surfaces):
+            yield _WIDE
         for one in found.surfaces:
             for line in (*_stick_slip_lines(one), *_section_vii_lines(one)):
                 yield f"{one.surface.title}: {line}"
@@ -203,6 +210,12 @@ class FrictionAngles(Analysis):
             rows.append((panel_cell(row), str(row["whisks"]), *cells))
         title = "Friction angle α of each surface, way by way"
         return PageTable(title, SURFACES.file, head, tuple(rows))
+
+
+def _has_both_signs(whisks: Sequence[WhiskAlphas]) -> bool:
+    """Return whether a truth shows slopes of both signs."""
+    slopes_rad = [whisk.beta_rad for whisk in whisks if not whisk.nominal]
+    return bool(slopes_rad) and min(slopes_rad) < 0 < max(slopes_rad)
 
 
 def friction_of(

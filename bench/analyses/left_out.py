@@ -79,7 +79,8 @@ class WhiskModel:
     def alpha_rad(self) -> float:
         """Return its friction angle, as well as it is known: as seen, as felt, as assumed."""
         seen = self.seen.friction_rad.value
-        felt, _ = felt_friction(self.seen, self.felt, self.theta_rad)
+        left = self.whisker.beam.left(self.seen.d_x_mm.value)
+        felt, _ = felt_friction(self.seen, self.felt, self.theta_rad, left)
         assumed = self.given.alpha_est_rad if self.given else NAN
         for alpha in (seen, felt):
             if np.isfinite(alpha):

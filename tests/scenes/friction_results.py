@@ -55,7 +55,7 @@ def deflection(d_x, beta):
 
 
 def result(beta_deg, d_x=60.0, *, alpha=ALPHA, name=None, nominal_mm=60.0) -> TrialResult:
-    """One whisk, (13) and (14) exactly, seen and felt."""
+    """One whisk, (13) and (14) exactly, seen and felt; the slip angle felt is the force's as the whisker bends."""
     beta = np.radians(beta_deg)
     m_y, m_z = slip.moments(d_x, THETA, beta, alpha, C)
     felt = {
@@ -66,8 +66,12 @@ def result(beta_deg, d_x=60.0, *, alpha=ALPHA, name=None, nominal_mm=60.0) -> Tr
         "touch_felt_rad": 0.0,
     }
     felt |= {"touch_felt_sigma_rad": 1e-4, "theta_sigma_rad": 1e-4}
+    phi = np.arctan2(m_y, m_z)
+    if phi != 0:
+        across = np.array([abs(beta) - abs(phi)])
+        phi = np.copysign(direction.slip_angle(np.array([THETA]), abs(beta), across)[0], phi)
     felt |= {
-        "phi_felt_rad": np.arctan2(m_y, m_z),
+        "phi_felt_rad": phi,
         "phi_felt_sigma_rad": PHI_SIGMA,
         "one_factor": [],
         "status": "",

@@ -110,7 +110,8 @@ def test_every_way_finds_the_friction_angle(tmp_path):
     FrictionAngles().write(tmp_path, of_run)
     with (tmp_path / "surfaces.csv").open(newline="") as file:
         (row,) = csv.DictReader(file)
-    assert float(row["alpha_felt_deg"]) == pytest.approx(14.0, abs=1e-6)
+    # The force's turn is known to its own square, of up to 0.3°.
+    assert float(row["alpha_felt_deg"]) == pytest.approx(14.0, abs=0.3**2 * np.pi / 180)
     assert row["alpha_static_felt_deg"] == ""  # it only slides
     assert any("tilting" in line for line in FrictionAngles().lines(of_run))
 
@@ -142,7 +143,7 @@ def test_friction_along_the_whisker_counts():
     d = seen.deflection
     fast = d.slip_mm[-1] / d.theta_rad[-1] / (2.0 * THETA)
     wandering = replace(d, past_mm=-fast * d.theta_rad**2)
-    found = felt_friction(replace(seen, deflection=wandering), felt, THETA)[0]
+    found = felt_friction(replace(seen, deflection=wandering), felt, THETA, 1.0)[0]
     assert found == pytest.approx(np.arctan(np.sqrt(2.0) * np.tan(ALPHA)), abs=1e-6)
 
 
