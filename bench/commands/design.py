@@ -32,7 +32,7 @@ _REGION = {
     "alpha_deg": ((0.0, 60.0), "its friction angles"),
     "d_x_mm": ((1.0, 5000.0), "distances of contact"),
 }
-# What the bench has, each: its default, what it is. All must be positive.
+# What the bench has, each: its default, what it is. All must be positive; a sigma may be 0.
 _EQUIPMENT = {
     "bar_diameter_mm": (6.0, "of a round object that is felt"),
     "youngs_modulus_GPa": (60.0, "of the wire"),
@@ -41,6 +41,8 @@ _EQUIPMENT = {
     "full_scale_Nmm": (110.0, "of the gauges"),
     "rate_Hz": (2000.0, "of their samples"),
     "speed_deg_s": (10.0, "of the motor"),
+    "length_sigma_mm": (0.5, "one sigma of the whisker's length, by a ruler"),
+    "diameter_sigma_mm": (0.02, "one sigma of each end's diameter, by a caliper, where it tapers"),
 }
 # [1] Lengths that are tried where none is given, over the farthest distance. Stated.
 _LENGTHS = (1.05, 3.0)
@@ -81,7 +83,8 @@ def run(options: argparse.Namespace) -> int:
     ranges = _ranges_to_search(options, region_ends["d_x_mm"][1])
     for name in _EQUIPMENT:
         value = getattr(options, name)
-        if not 0 < value < float("inf"):
+        is_exact = value == 0 and "sigma" in name
+        if not (0 < value < float("inf") or is_exact):
             raise BadInput(f"{_option(name)} {value:g}: must be positive and finite")
     begin_step("the best design over the region")
     from bench.theory.best_design import Equipment, Region
@@ -95,6 +98,8 @@ def run(options: argparse.Namespace) -> int:
         options.full_scale_Nmm,
         options.rate_Hz,
         options.speed_deg_s,
+        options.length_sigma_mm,
+        options.diameter_sigma_mm,
     )
     report = find_design(ranges, region, equipment)
     print(*report_lines(report), *write_design(options.out, report), sep="\n")

@@ -2,8 +2,9 @@
 
 The error of a design at one slope, friction angle and distance is that of (10) with the moments of
 (13), (14), and with its neglected terms to first order; its sigma is by the estimators' own
-formulas, from the noise of one sample by the weights with which touch and moments are read. Worst
-is the largest |bias| + 1.96 sigma over the region.
+formulas, from the noise of one sample by the weights with which touch and moments are read, and
+from how well the whisker's own sizes are known; its stiffness cancels, as gauges are calibrated by
+it. Worst is the largest |bias| + 1.96 sigma over the region.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -60,8 +61,8 @@ class Region:
 
 @dataclass(frozen=True)
 class Equipment:
-    """The wire's material and the strain it bears, the gauges' noise a sample and full scale, and
-    how the motor whisks."""
+    """The wire's material and the strain it bears, the gauges' noise a sample and full scale, how
+    the motor whisks, and how well the whisker's length and the diameters of its ends are known."""
 
     youngs_modulus_GPa: float = 60.0
     most_strain: float = 0.005
@@ -69,6 +70,8 @@ class Equipment:
     full_scale_Nmm: float = 110.0
     rate_Hz: float = 2000.0
     speed_deg_s: float = 10.0
+    length_sigma_mm: float = 0.5
+    diameter_sigma_mm: float = 0.02
 
 
 @dataclass(frozen=True)
@@ -126,10 +129,25 @@ def expected_error(
         by_friction = _taper_distance(design, of_cylinder) / d_x - 1.0
         lean_sigma = np.radians(region.lean_sigma_deg)
         lean = first_order.leaning(design.theta_rad, lean_sigma, np.arctan2(*moments), alpha)
+    made = _share_by_making(design, equipment, d_x)
     bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
-    errors = np.array([bias, np.hypot(noise_share, lean)])
+    errors = np.array([bias, np.linalg.norm(np.broadcast_arrays(noise_share, lean, made), axis=0)])
     has_distance = np.isfinite(bias + noise_share)
     return ExpectedError(*np.where(has_distance, 100.0 * errors, np.inf))
+
+
+def _share_by_making(design: Design, equipment: Equipment, d_x: Numbers) -> Numbers:
+    """Return the relative sigma of d_x by the whisker's length and the diameters of its two ends.
+
+    1/d_x gains the taper over the length (`Beam.distance_mm`). A wire that does not taper is drawn,
+    as thick at both ends.
+    """
+    if design.taper == 0:
+        return np.zeros_like(d_x)
+    by_length = design.taper * equipment.length_sigma_mm / design.length_mm
+    by_tip = equipment.diameter_sigma_mm / design.diameter_mm
+    by_base = (1.0 - design.taper) * by_tip
+    return d_x / design.length_mm * np.linalg.norm([by_length, by_tip, by_base])
 
 
 def _moments(design: Design, equipment: Equipment, slope, alpha, d_x) -> tuple[Numbers, Numbers]:
@@ -233,8 +251,24 @@ def best_design(
 ) -> tuple[Design, float]:
     """Find the design of least worst error within ranges (low, high) of each of NAMES.
 
-    Returns it and that error in %. Raises BadInput where no design within the ranges is one.
+    Returns it and that error in %. A drawn wire, which has no tolerance of a taper, is searched by
+    itself. Raises BadInput where no design within the ranges is one.
     """
+    lowest, highest = ranges["taper"]
+    if lowest == 0.0 < highest:
+        drawn = _best_of_one_making(ranges | {"taper": (0.0, 0.0)}, region, equipment, seed)
+        ground = _best_of_one_making(ranges, region, equipment, seed)
+        design = min(drawn, ground, key=lambda one: worst_percent(one, region, equipment))
+    else:
+        design = _best_of_one_making(ranges, region, equipment, seed)
+    _require_design(design, region, equipment)
+    return design, largest_percent(design, region, equipment)
+
+
+def _best_of_one_making(
+    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment, seed: int
+) -> Design:
+    """Find the design of least worst error within ranges over which that changes steadily."""
     design = Design(**{name: low for name, (low, _) in ranges.items()})
     free = _free(ranges)
     if free:
@@ -245,8 +279,7 @@ def best_design(
 
         limits = np.array([ranges[name] for name in free])
         design = _with_values(design, free, _least(worst, limits, seed))
-    _require_design(design, region, equipment)
-    return design, largest_percent(design, region, equipment)
+    return design
 
 
 def _free(ranges: Mapping[str, tuple[float, float]]) -> list[str]:

@@ -18,6 +18,7 @@ from bench.theory.best_design import (
 )
 from bench.theory.design_map import exact_percent, find_design, write_design
 from bench.theory.sample_noise import stroke_noise
+from estimator.beam import Beam
 
 REGION, EQUIPMENT, PAPER = Region((20.0, 60.0), (5.0, 15.0), (30.0, 80.0)), Equipment(), Design()
 HELD = {
@@ -67,6 +68,38 @@ def test_noise_of_a_stroke_goes_with_one_sample_and_the_root_of_their_number():
     )
     # a mean over 1° of 200 samples a degree, above a level of 1.4°
     assert plain.moment_Nmm == pytest.approx(0.1 * np.hypot(200**-0.5, 280**-0.5), rel=0.01)
+
+
+@pytest.mark.parametrize("length_mm, tip_mm, base_mm", [(0.5, 0, 0), (0, 0.02, 0), (0, 0, 0.02)])
+def test_sizes_entered_wrong_by_a_sigma_move_the_distance_by_its_sigma(length_mm, tip_mm, base_mm):
+    """To first order: an error of a hundredth is off by as much of itself."""
+    design = Design(taper=0.7, length_mm=110.0, diameter_mm=2.0)
+    length, base, tip = 110.0, 2.0, 0.6
+    true = Beam.from_rigidity(1.0, length, "tapered", tip / base)
+    entered = Beam.from_rigidity(
+        1.0, length + length_mm, "tapered", (tip + tip_mm) / (base + base_mm)
+    )
+    moved = entered.distance_mm(true.as_cylinder_mm(80.0)) / 80.0 - 1.0
+    exact = {"length_sigma_mm": 0.0, "diameter_sigma_mm": 0.0}
+    point = np.array([[0.0], [0.0], [80.0]])
+
+    def variance(**sigmas):
+        equipment = Equipment(**exact | sigmas)
+        return expected_error(design, REGION, equipment, point).sigma_percent[0] ** 2
+
+    if length_mm:
+        expected = variance(length_sigma_mm=length_mm) - variance()
+    else:
+        ends = variance(diameter_sigma_mm=0.02) - variance()
+        expected = ends * np.array([tip_mm, base_mm * tip / base]).max() ** 2
+        expected /= 0.02**2 * (1 + (tip / base) ** 2)
+    assert 1e-4 * expected == pytest.approx(moved**2, rel=0.03)
+
+
+def test_a_drawn_wire_has_no_tolerance_of_its_making():
+    rough = replace(EQUIPMENT, length_sigma_mm=5.0, diameter_sigma_mm=1.0)
+    errors = [expected_error(PAPER, REGION, one, REGION.corners()) for one in (EQUIPMENT, rough)]
+    np.testing.assert_array_equal(errors[0].sigma_percent, errors[1].sigma_percent)
 
 
 def test_what_a_wire_cannot_bear_is_no_design():

@@ -38,7 +38,7 @@ from bench.trials.readout import Readout, whisk_at
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings
 
-EQUIPMENT = Equipment()
+EQUIPMENT = Equipment(length_sigma_mm=0.0, diameter_sigma_mm=0.0)  # the rig's are as designed
 REGIONS = (
     Region((20.0, 60.0), (5.0, 15.0), (30.0, 80.0), lean_sigma_deg=0.0),
     Region((0.0, 75.0), (5.0, 25.0), (20.0, 90.0), lean_sigma_deg=0.0),
