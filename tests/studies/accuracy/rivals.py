@@ -264,7 +264,16 @@ def cell(said: list[Answer]) -> str:
     error = rms_percent([one.error for one in said])
     none = sum(np.isnan(one.error) for one in said)
     without = f" ({none} none)" if none else ""
-    return f"{error:.2g} ± {stated_percent(said):.2g}{without}"
+    return f"{two_digits(error)} ± {two_digits(stated_percent(said))}{without}"
+
+
+def two_digits(value: float) -> str:
+    """Return a number to two digits, without an exponent.
+
+    >>> two_digits(1234.0), two_digits(0.123)
+    ('1200', '0.12')
+    """
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def table_lines(found: dict) -> Iterator[str]:
