@@ -106,7 +106,7 @@ def _why_not_seen(seen: SeenWhisk) -> Reason:
     """Return why slip and deflection are not known."""
     if set(seen.status.codes) <= {"no_pictures"}:
         return NOT_SEEN
-    return Reason(NOT_SEEN.code, f"{NOT_SEEN}, nor do the pictures show it: {seen.status}")
+    return Reason(NOT_SEEN.codes[0], f"{NOT_SEEN}, nor do the pictures show it: {seen.status}")
 
 
 def _unlike_pictures(stated: WhiskTruth, seen: SeenWhisk) -> Reason:

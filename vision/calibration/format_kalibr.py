@@ -51,7 +51,7 @@ def _camera(path: Path, name: str, table: dict[str, Any], T_camera_world: np.nda
     lens = table.get("distortion_model")
     if projection != "pinhole" or not isinstance(lens, str) or lens not in _TERMS:
         raise Refused(
-            f"{path.name}: {name} is {projection!r} with {lens!r}, which the five-term lens here does not describe; "
+            f"{path.name}: {name} is {projection}-{lens}, which the five-term lens here does not describe; "
             "calibrate with pinhole-radtan"
         )
     fx, fy, cx, cy = numbers(table.get("intrinsics"), (4,), f"{path.name}: intrinsics of {name}")

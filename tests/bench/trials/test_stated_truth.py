@@ -19,7 +19,7 @@ from bench.records.trial_result import BY_STAGE
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.trials.differences import LEAST_CHANCE
-from bench.trials.seen import NO_PICTURES, unseen
+from bench.trials.seen import NO_PICTURES, NO_ZERO, unseen
 from bench.trials.stage_contact import Offsets, StatedBar, StatedPush, StatedRounded
 from bench.trials.stated_length import stated_in_other_unit
 from bench.trials.stated_truth import by_stage, stated_whisk
@@ -184,6 +184,14 @@ def test_a_stage_without_pictures_says_what_it_does_not_know():
     assert whisk.status.codes == ("slip_not_seen",)
     assert np.isnan([whisk.touch_rad.value, whisk.at.slip_mm.value, whisk.at.d_y_mm.value]).all()
     assert whisk.deflection is None and whisk.pictured is None
+
+
+def test_pictures_that_show_no_truth_say_why_beside_the_stage_s():
+    session = load_session(STAGE)
+    trial = session.trial(TRIAL)
+    (whisk,) = by_stage(session, trial, read_signals(trial), Settings(), unseen(1, NO_ZERO)).whisks
+    assert whisk.has_truth and whisk.status.codes == ("slip_not_seen",)
+    assert f"nor do the pictures show it: {NO_ZERO}" in whisk.status
 
 
 @pytest.mark.parametrize(("apart_sigmas", "is_named"), [(2.0, False), (6.0, True)])
