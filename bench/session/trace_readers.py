@@ -29,6 +29,18 @@ _LEAST_LIKELIHOOD = 0.6
 _DEEPLABCUT_AXES = ("x", "y", "likelihood")  # names of a joint's columns
 # [points] Along a curve of WhiskerMan, given by three or four control points. Stated.
 _CURVE_POINTS = 60
+# Errors of Python's reader of pickles on a damaged one.
+_NOT_PICKLED = (
+    pickle.UnpicklingError,
+    AttributeError,
+    EOFError,
+    IndexError,
+    KeyError,
+    MemoryError,
+    OverflowError,
+    TypeError,
+    ValueError,
+)
 # [1] Numbers of lines are whole, and no tracker knows as many again. Stated.
 _MOST_LINES = 1e6
 # [px] SLEAP before format 1.1 counts from the corner of the first pixel. Stated by SLEAP.
@@ -279,7 +291,7 @@ def _deeplabcut_table(table: Any, label: str) -> DrawnLines:
     try:
         pickled = io.BytesIO(bytes(table.attrs["values_block_0_kind"]))
         columns = [tuple(map(str, name)) for name in _NamesAlone(pickled).load()]
-    except (pickle.UnpicklingError, KeyError, TypeError, EOFError) as problem:
+    except _NOT_PICKLED as problem:
         raise BadInput(f"names no columns as DeepLabCut does ({problem})", file=label) from None
     rows = table[()]
     frame = np.array([_picture_number(index) for index in rows["index"].tolist()])

@@ -125,7 +125,9 @@ def _median_azimuth(directions: np.ndarray, motor_rad: np.ndarray) -> float:
 
 
 def _of_all(strokes: Sequence[MovingLines]) -> MovingLines:
-    """Return the lines of all strokes as one."""
+    """Return the lines of all strokes as one. Raise Refused where there is no stroke."""
+    if not strokes:
+        raise Refused(_NOTHING_TURNS.format(0))
     return MovingLines(
         np.concatenate([stroke.motor_rad for stroke in strokes]),
         np.concatenate([stroke.point_mm for stroke in strokes]),

@@ -51,7 +51,9 @@ class Camera:
         for name, shape in shapes.items():
             value = _require_finite(f"camera {self.name}: {name}", getattr(self, name), shape)
             object.__setattr__(self, name, value)
-        are_counts = all(n > 0 and n % 1 == 0 for n in self.size_px)  # NaN and infinity are not
+        are_counts = all(
+            0 < n < MOST_NUMBER and n % 1 == 0 for n in self.size_px
+        )  # NaN and infinity are not
         require(
             len(self.size_px) == 2 and are_counts,
             f"camera {self.name}: size_px = {list(self.size_px)}, must be two counts above 0",
