@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from vision.calibration import format_opencv
 from vision.calibration.foreign_camera import (
     foreign_camera,
     in_metres,
@@ -29,6 +30,8 @@ def read(path: Path) -> list[Camera]:
     """
     document = read_yaml(path)
     tables = document if isinstance(document, dict) else {}
+    if "camera_matrix" in tables:
+        return format_opencv.of_plain_yaml(path, tables)
     names = [name for name in tables if str(name).startswith("cam")]
     if not names or not all(isinstance(tables[name], dict) for name in names):
         raise Refused(f"{path.name} is no camchain of Kalibr: it has no table cam0")

@@ -4,6 +4,7 @@ its stereo sample does (M1 D1 M2 D2, and R, T of the second, in the board's unit
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -29,7 +30,20 @@ def read(path: Path) -> list[Camera]:
 
     Raises Refused where the file is none, a camera is a fisheye, or its size is missing.
     """
-    values = _values(path)
+    return _cameras(path, _values(path))
+
+
+def of_plain_yaml(path: Path, document: Mapping[str, Any]) -> list[Camera]:
+    """Return the camera of a YAML file that is no FileStorage, as scripts around OpenCV write it.
+
+    document: what the file holds. Raises Refused as `read`.
+    """
+    values = {str(key).replace("_", "").lower(): value for key, value in document.items()}
+    return _cameras(path, values)
+
+
+def _cameras(path: Path, values: Mapping[str, Any]) -> list[Camera]:
+    """Return the cameras of a file's values by name, without underscores. Raises Refused."""
     if values.get("fisheyemodel"):
         raise Refused(
             f"{path.name}: a fisheye lens, which the five-term lens here does not describe"
@@ -57,8 +71,14 @@ def _camera(path: Path, name: str, number: str, values: Mapping[str, np.ndarray]
         matrix,
         np.zeros(5) if terms is None else terms,
         _pose(path, values) if number != "1" else None,
-        float(values.get("avgreprojectionerror", np.nan)),
+        _error_px(values),
     )
+
+
+def _error_px(values: Mapping[str, Any]) -> float:
+    """Return the calibration's own error; NaN where the file states none."""
+    error = values.get("avgreprojectionerror")
+    return float(error) if isinstance(error, float | np.ndarray) and np.size(error) == 1 else np.nan
 
 
 def _size_px(path: Path, values: Mapping[str, np.ndarray]) -> np.ndarray:

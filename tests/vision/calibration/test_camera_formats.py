@@ -163,12 +163,22 @@ def test_matlab_counts_pixels_from_one_and_multiplies_rows(tmp_path):
     assert second.T_camera_rig[:, 3].tolist() == [-80.0, 0.0, 0.0]
 
 
+PLAIN = """camera_matrix:
+- [900.0, 0.0, 640.0]
+- [0.0, 901.0, 360.0]
+- [0.0, 0.0, 1.0]
+dist_coeff:
+- [-0.1, 0.05, 0.0, 0.0, 0.0]
+"""
+
+
 @pytest.mark.parametrize(
     "name, text, words",
     [
         ("c.yaml", KALIBR.format(lens="equidistant"), "cam0 is pinhole-equidistant"),
         ("c.yaml", "gyroscope: 1\n", "no camchain of Kalibr"),
         ("c.yaml", "a: [1\n", "is not YAML"),
+        ("c.yaml", PLAIN, "image_width and image_height are missing: add them"),
         ("c.yml", "%YAML:1.0\n---\nK: 1\n", "must be 3 x 3 numbers"),
         ("c.yml", "%YAML:1.0\n---\nfocus: 1\n", "no calibration of OpenCV"),
         ("c.yml", OPENCV_STEREO.replace("image_width", "wide"), "image_width and image_height"),
@@ -189,6 +199,14 @@ def test_what_is_no_camera_here_is_refused_in_a_line(name, text, words, tmp_path
     with pytest.raises(Refused, match=words) as refused:
         import_cameras(tmp_path / name)
     assert "\n" not in str(refused.value)
+
+
+def test_a_plain_yaml_of_opencv_s_numbers_is_read_with_its_size(tmp_path):
+    """As scripts around calibrateCamera dump it: its distortion a list in a list."""
+    (tmp_path / "high.yaml").write_text(f"{PLAIN}image_width: 1280\nimage_height: 720\n")
+    (camera,) = import_cameras(tmp_path / "high.yaml")
+    assert (camera.name, camera.size_px) == ("high", (1280, 720))
+    assert camera.lens.tolist() == [900.0, 901.0, 640.0, 360.0, -0.1, 0.05, 0.0, 0.0, 0.0]
 
 
 APRIL = "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 5\ntagSize: 0.03\ntagSpacing: 0.3\n"
