@@ -12,6 +12,7 @@ from bench.session.table import NumberTable, forward_in_time, read_table, requir
 STAGE = "stage.csv"
 _TIME = "time_s"
 _PLACES = ("x_mm", "y_mm", "z_mm")
+# [mm] Of a stated sigma: no more than a place may be. Stated.
 _SIGMA = PlausibleRange(0.0, PLACE.high)
 _SIGMAS = ("x_sigma_mm", "y_sigma_mm", "z_sigma_mm")
 

@@ -9,11 +9,12 @@ from scipy.io.matlab import MatReadError
 
 from vision.geometry.refusals import Refused
 
-# [bytes] Of a file of version 5: its header, at whose end version and order of bytes stand, and a tag. A layout.
+# [bytes] Of a file of version 5: its header, at whose end version and order of bytes stand. A layout.
 _HEADER = 128
-_TAG = 8
 _ORDERS = {b"\0\1IM": "<", b"\1\0MI": ">"}
-# Types of the elements that hold a variable: as it is, or compressed. A layout.
+# [bytes] Before each element: its type and its size. A layout.
+_TAG = 8
+# [—] Types of the elements that hold a variable: as it is, or compressed. A layout.
 _VARIABLES = (14, 15)
 # Errors of SciPy's reader on a damaged file.
 _NOT_MATLAB = (
