@@ -29,8 +29,8 @@ NEARER = NamedReason("only_nearer_known", "known only to be nearer than {:.1f} m
 # of (10), at turns up to 40° and 15° of push, and as much again is left to a wrong α_est.
 # Study: exact_rod_limits.py.
 _MOST_FROM_10 = 0.2
-# [1] Relative sigma of the exact rod over tan α_est: where along its way over the object friction turned
-# is not known. Study: exact_rod_limits.py.
+# [1] Relative sigma of the exact rod over tan α_est: below the friction angle a curved rod may slide in several
+# directions. Of 167 pushes 98 % lie within 1.96 of it, and all within 3.1. Study: exact_rod_limits.py.
 _ROD_BY_FRICTION = 0.0075
 
 

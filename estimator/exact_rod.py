@@ -6,7 +6,9 @@ tangents t₀: t = Q t₀, Q' = [κ]× Q, κ = (m + ν t (t·m))/EI, m = p × F,
 the contact, where p = 0, the rod is marched to its base. Five unknowns, the force there, the arc and the
 heading of the motion over the bar, satisfy five equations: both moments; friction is against the motion,
 along the rod too; the bar, whose slope follows from the force and α_est as in (9), is the one that the
-unloaded rod first touched; and the heading is that of the path since then.
+unloaded rod first touched; and the heading is that at the path's end. A curved rod is drawn along itself
+as it begins to slide, a straight one later, so that the path is known by its middle, too: force and arc
+halfway, with friction against the mean motion, touch the same bar; through three points of it goes a parabola.
 
 All is solved in the rod's own units: lengths in the whisker's, forces in EI/L², moments in EI/L.
 """
@@ -31,13 +33,13 @@ UNCONVERGED = NamedReason(
 _POISSON = 0.35
 # [steps] Of Runge and Kutta's fourth order from contact to base. Study: exact_rod.py.
 _STEPS = 12
-# [1] Unknowns: the force, the arc, and the heading of the motion from sideways. Derived.
-_COUNT = 5
-# [1] The rod is drawn along itself by the square of the push, and so at the end twice as fast as in the
-# mean. Derived.
-_LATE = 2.0
+# [1] Unknowns: force, arc, and heading of the motion from sideways; force and arc halfway. Derived.
+_COUNT = 9
+_ARCS = [3, 8]  # the arcs among them
 # [steps] Of Newton's method before it is given up. Stated.
 _MOST_ROUNDS = 25
+# [1] Shares of the friction angle by which it is let rise. Study: exact_rod_limits.py.
+_RISING = (0.0, 0.5, 1.0)
 # [1] Last step over the unknowns: the next is smaller by the error of the derivatives. Derived.
 _LAST_STEP = 1e-8
 # [1] The most that one step changes force or arc, in parts. Stated.
@@ -82,12 +84,15 @@ def contact_by_exact_rod(
     """Return the contact of θ, m_y, m_z and α_est; None where no bent rod has these.
 
     held: whether friction holds the contact sideways, and so acts along the rod; the slope is then known
-    to α_est only, and returned as that without friction.
+    to α_est only, and returned as that without friction. One that slides by no heading that is found
+    hardly slides sideways, and counts as held.
     """
     moment_unit = beam.rigidity_Nmm2 / beam.length_mm
     unit = np.array([1.0, moment_unit, moment_unit, 1.0])
     with np.errstate(all="ignore"):
         solved = _Rod(beam, reach, held).solve(np.array(felt) / unit)
+        if solved is None and not held:
+            solved = _Rod(beam, reach, True).solve(np.array(felt) / unit)
     if solved is None:
         return None
     d_x, beta, gradient = solved
@@ -122,9 +127,20 @@ class _Rod:
     def solve(self, inputs: np.ndarray) -> tuple[float, float, np.ndarray] | None:
         """Return distance, slope and the distance's gradient (4,) by the inputs θ, m_y, m_z, α_est (4,).
 
-        None where Newton's method ends nowhere.
+        Where Newton's method ends nowhere, friction is let rise from none; None where it still does not.
         """
-        unknowns = self._start(inputs)
+        for rising in ((1.0,), _RISING):
+            unknowns = self._start(inputs)
+            for share in rising:
+                unknowns = self._refined(unknowns, inputs * [1.0, 1.0, 1.0, share])
+                if unknowns is None:
+                    break
+            if unknowns is not None:
+                return self._solution(unknowns, inputs)
+        return None
+
+    def _refined(self, unknowns: np.ndarray, inputs: np.ndarray) -> np.ndarray | None:
+        """Return unknowns (9,) that satisfy the equations, by Newton's method; None where it ends nowhere."""
         for _ in range(_MOST_ROUNDS):
             sizes = _sizes(unknowns)
             values, by_unknowns = self._by_unknowns(unknowns, inputs)
@@ -133,9 +149,9 @@ class _Rod:
             if not np.isfinite(part):
                 return None
             unknowns = unknowns + step * min(1.0, _LONGEST_STEP / max(part, _LONGEST_STEP))
-            unknowns[3] = np.clip(unknowns[3], _NEAREST, _FARTHEST)
+            unknowns[_ARCS] = np.clip(unknowns[_ARCS], _NEAREST, _FARTHEST)
             if part < _LAST_STEP:
-                return self._solution(unknowns, inputs)
+                return unknowns
         return None
 
     def _solution(
@@ -154,47 +170,69 @@ class _Rod:
     def _by_unknowns(
         self, unknowns: np.ndarray, inputs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return residuals, distance and slope (7,), and their derivatives by the unknowns (7, 5)."""
+        """Return residuals, distance and slope (11,), and their derivatives by the unknowns (11, 9)."""
         steps = _steps(_sizes(unknowns))
         values = self._values(unknowns + steps, np.broadcast_to(inputs, (len(steps), 4)))
         return values[:, 0], _differences(values, steps)
 
     def _start(self, inputs: np.ndarray) -> np.ndarray:
-        """Return a guess (5,) of force, arc and heading by (10), or by its tip or middle where it has none."""
+        """Return a guess (9,) of force, arc and heading by (10), or by its tip or middle where it has none; half of
+        the force halfway.
+        """
         theta, m_y, m_z, alpha = inputs.tolist()
         as_cylinder = with_friction(theta, m_y, m_z, alpha, 3.0)
         arc = 1.0 / (1.0 / as_cylinder + self.taper) if as_cylinder > 0 else 0.5
         arc = min(arc, 0.9)
         turn = 1.5 * np.hypot(m_y, m_z) * arc / 3.0  # of the rod's end
-        return np.array([-turn * np.hypot(m_y, m_z) / arc, -m_z / arc, m_y / arc, arc, 0.0])
+        force = np.array([-turn * np.hypot(m_y, m_z), -m_z, m_y]) / arc
+        halfway = force * [0.25, 0.5, 0.5]
+        return np.array([*force, arc, 0.0, *halfway, arc])
 
     def _values(self, unknowns: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Return the five residuals, the distance and the slope (7, n) of n sets of unknowns and inputs."""
+        """Return the nine residuals, the distance and the slope (11, n) of n sets of unknowns and inputs."""
         theta, m_y, m_z, alpha = inputs.T
-        arc = unknowns[:, 3]
         heading = unknowns[:, 4]
-        point, force, tangent = self._march(unknowns[:, :3], arc)
-        felt = -np.cross(point, force)
+        now, halfway = self._bent(unknowns, theta)
         size = np.hypot(m_y, m_z)
-        point, force, tangent = (_turned(each, theta) for each in (point, force, tangent))
         sideways, lengthways = self._friction(alpha, heading)
-        beta = _slope(force, sideways)
+        beta = _slope(now.force, sideways)
         bar = np.stack([0.0 * beta, np.sin(beta), np.cos(beta)], axis=1)
-        lean = _dot(tangent, bar)
-        along = (_dot(force, tangent) - lean * _dot(force, bar)) / np.linalg.norm(force, axis=1)
-        axis = point - _normal(tangent, bar) * self._reach(arc)
-        first, first_axis, first_arc = self._first_touch(axis[:, 0], bar, arc)
         across = np.stack([0.0 * beta, -np.cos(beta), np.sin(beta)], axis=1)
-        moved = _dot(point - first, bar)
-        drawn = arc - first_arc - (_dot(point - first, tangent) - lean * moved)
+        axis = self._axis(now, bar)
+        first, first_axis, first_arc = self._first_touch(axis[:, 0], bar, now.arc)
+        side = np.copysign(1.0, m_y)
+        way_halfway = _way(halfway, first, first_arc, bar, side)
+        mean_heading, latest = _headings(way_halfway, _way(now, first, first_arc, bar, side))
+        sideways_halfway, lengthways_halfway = self._friction(alpha, mean_heading)
+        off_halfway = (self._axis(halfway, bar) - first_axis) / theta[:, None]
         residuals = [
-            (felt[:, 1] - m_y) / size,
-            (felt[:, 2] - m_z) / size,
-            along - lengthways,
+            (now.moment[:, 1] - m_y) / size,
+            (now.moment[:, 2] - m_z) / size,
+            _along(now, bar) - lengthways,
             _dot(axis - first_axis, across) / theta,
-            heading if self.held else heading - np.arctan2(_LATE * drawn, np.abs(moved)),
+            heading if self.held else _wrapped(heading - latest),
+            _slope(halfway.force, sideways_halfway) - beta,
+            _along(halfway, bar) - lengthways_halfway,
+            _dot(off_halfway, across),
+            off_halfway[:, 0],
         ]
         return np.stack([*residuals, np.linalg.norm(first, axis=1), beta])
+
+    def _bent(self, unknowns: np.ndarray, theta: np.ndarray) -> tuple["_Bent", "_Bent"]:
+        """Return the rods of n sets of unknowns at the end of the push, and halfway."""
+        count = len(theta)
+        forces = np.concatenate([unknowns[:, :3], unknowns[:, 5:8]])
+        arcs = np.concatenate([unknowns[:, 3], unknowns[:, 8]])
+        point, force, tangent = self._march(forces, arcs)
+        moment = -np.cross(point, force)
+        turns = np.concatenate([theta, 0.5 * theta])
+        vectors = [_turned(each, turns) for each in (point, force, tangent)]
+        both = [*vectors, moment, arcs]
+        return _Bent(*(each[:count] for each in both)), _Bent(*(each[count:] for each in both))
+
+    def _axis(self, bent: "_Bent", bar: np.ndarray) -> np.ndarray:
+        """Return the points (n, 3) of the bars' axes that contacts lie before."""
+        return bent.point - _normal(bent.tangent, bar) * self._reach(bent.arc)
 
     def _friction(self, alpha: np.ndarray, heading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return friction sideways and along the rod, away from the base, over the force (n,).
@@ -271,10 +309,51 @@ class _Rod:
         return at, np.broadcast_to(arc, at.shape)
 
 
+@dataclass(frozen=True, eq=False)
+class _Bent:
+    """Contacts, forces and tangents (n, 3) of bent rods in the contact frame's axes; moments (n, 3) at the base in the
+    hub's; arcs (n,).
+    """
+
+    point: np.ndarray
+    force: np.ndarray
+    tangent: np.ndarray
+    moment: np.ndarray
+    arc: np.ndarray
+
+
+def _way(
+    bent: _Bent, first: np.ndarray, first_arc: np.ndarray, bar: np.ndarray, side: np.ndarray
+) -> np.ndarray:
+    """Return how far rods have moved along bars since first touch, and have been drawn along themselves (2, n).
+
+    first (n, 3), first_arc (n,): where the unloaded rods touched. side (n,): the sign of the motion along bars (n, 3)
+    that counts as forward.
+    """
+    way = bent.point - first
+    moved = _dot(way, bar)
+    past = _dot(way, bent.tangent) - _dot(bent.tangent, bar) * moved
+    return np.stack([side * moved, bent.arc - first_arc - past])
+
+
+def _headings(halfway: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the heading (n,) of the motion halfway, and now, of the parabola through two ways (2, n) and none."""
+    latest = 3 * now - 4 * halfway
+    return np.arctan2(now[1], now[0]), np.arctan2(latest[1], latest[0])
+
+
+def _along(bent: _Bent, bar: np.ndarray) -> np.ndarray:
+    """Return the part (n,) of forces that acts along rods, across bars (n, 3)."""
+    lean = _dot(bent.tangent, bar)
+    part = _dot(bent.force, bent.tangent) - lean * _dot(bent.force, bar)
+    return part / np.linalg.norm(bent.force, axis=1)
+
+
 def _sizes(unknowns: np.ndarray) -> np.ndarray:
-    """Return the sizes (5,) of the unknowns: of the force, of the arc, and a radian."""
+    """Return the sizes (9,) of the unknowns: of the forces, of the arcs, and a radian."""
     strength = np.linalg.norm(unknowns[:3])
-    return np.array([strength, strength, strength, unknowns[3], 1.0])
+    halfway = np.linalg.norm(unknowns[5:8])
+    return np.array([*[strength] * 3, unknowns[3], 1.0, *[halfway] * 3, unknowns[8]])
 
 
 def _steps(sizes: np.ndarray) -> np.ndarray:
@@ -299,12 +378,17 @@ def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
         return np.full_like(right, nan)
 
 
+def _wrapped(angle: np.ndarray) -> np.ndarray:
+    """Return angles within half a turn of none."""
+    return np.arctan2(np.sin(angle), np.cos(angle))
+
+
 def _slope(force: np.ndarray, sideways: np.ndarray) -> np.ndarray:
     """Return the slope (n,) of bars along which friction has this part (n,) of forces (n, 3): (9)."""
     phi = np.arctan2(force[:, 2], -force[:, 1])
     share = np.linalg.norm(force, axis=1) / np.hypot(force[:, 1], force[:, 2])
-    cone = np.arcsin(np.minimum(sideways * share, 1.0))
-    return phi + np.copysign(cone, phi)
+    cone = np.arcsin(np.clip(sideways * share, -1.0, 1.0))
+    return phi + np.copysign(1.0, phi) * cone
 
 
 def _normal(tangent: np.ndarray, bar: np.ndarray) -> np.ndarray:
