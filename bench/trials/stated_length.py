@@ -5,9 +5,9 @@ import math
 # Name, and mm in each.
 _UNITS = (
     ("metres", 1e3),
-    ("inches", 25.4),
     ("centimetres", 10.0),
     ("tenths of a millimetre", 0.1),
+    ("inches", 25.4),
     ("micrometres", 1e-3),
 )
 # [1] By which an estimate of a distance may be off, either way, where another unit explains it: (10) errs by

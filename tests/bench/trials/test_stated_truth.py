@@ -262,7 +262,7 @@ FAULTS = {
     ),
     "a sigma below 0": (
         lambda s: stage_text(s, "0,60,6,0,0.1,-0.1,0.1"),
-        "y_sigma_mm: -0.1; 0 or more is allowed",
+        "y_sigma_mm: -0.1; from 0 to 5000 is allowed",
     ),
     "a place beyond any bench": (
         lambda s: stage_text(s, "0,61000,6,0,0.1,0.1,0.1"),
