@@ -120,7 +120,7 @@ def _against_stated(felt: FeltWhisk, seen: SeenWhisk) -> FeltWhisk:
 
     Nothing is concluded from such a whisk.
     """
-    (ten,) = (row for row in felt.estimates if row.estimator == _TEN)
+    ten = next(row for row in felt.estimates if row.estimator == _TEN)
     unit_name = stated_in_other_unit(seen.d_x_mm.value, ten.d_x_est_mm.value)
     if not unit_name:
         return felt
