@@ -92,12 +92,18 @@ def _strike_rate(propped, whisk, stroke, touch_s):
 
 def _periods(stroke, whisks) -> Iterator[tuple[WhiskMechanics, float, float, float]]:
     """Yield each whisk with its beginning, its turning back and its end, s; together they are the
-    whole recording."""
+    whole recording.
+
+    The motor turns back in the middle between its steady motions: it slows down and rests before.
+    """
     starts = [start for start, _ in stroke.forward]
     ends = [*starts[1:], math.inf]
     starts[0] = 0.0
-    for whisk, start, (_, turn), end in zip(whisks, starts, stroke.forward, ends):
-        yield whisk, start, turn, end
+    turns = [math.inf] * len(starts)
+    if stroke.back:
+        steady = zip(stroke.forward, stroke.back)
+        turns = [0.5 * (forward[1] + back[0]) for forward, back in steady]
+    yield from zip(whisks, starts, turns, ends)
 
 
 def _speed(stroke, time_s):

@@ -167,6 +167,15 @@ def test_moments_are_zero_before_touch_and_after_the_way_back():
     )  # the second whisk is like the first
 
 
+def test_a_motor_that_slows_down_still_pushes():
+    """Friction turns round where the motor does, not where its steady motion ends."""
+    stroke, (whisk,) = whisked(FrictionCoefficients(0.18, 0.18), back=True, ramp_s=0.1)
+    ((_, steady_end_s),) = stroke.forward
+    times = steady_end_s + np.linspace(0.0, 0.099, 12)
+    moments = quasi_static_Nmm(stroke, [whisk], times)
+    np.testing.assert_array_equal(moments, whisk.forward.moments_at(stroke.angle_rad(times)))
+
+
 def test_friction_opens_a_loop_between_the_two_ways():
     _, (whisk,) = whisked(FrictionCoefficients(0.18, 0.18), back=True)
     at = whisk.touch.motor_rad + math.radians(2)
