@@ -13,7 +13,13 @@ from vision.fit.blocks import REST_PRIOR_MM
 from vision.fit.problem import Problem, rest_shape, start
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import REST_POWERS, Curves, centrelines, unbent_curves
+from vision.geometry.centreline import (
+    REST_POWERS,
+    Curves,
+    centrelines,
+    unbent_centrelines,
+    unbent_curves,
+)
 from vision.geometry.contact import closest_arc
 from vision.geometry.newton import cauchy_weights
 from vision.geometry.refusals import Refused
@@ -303,7 +309,7 @@ def contact_arc(
 
     rest_mm (2, 4): its rest shape, mm. bend (2,): rad.
     """
-    straight = centrelines(rest_mm, np.zeros(2), wire.length_mm, motor, wire)
+    straight = unbent_centrelines(rest_mm, motor, wire)
     arc = np.clip(closest_arc(straight, axis), 1.0, wire.length_mm)
     bent = centrelines(rest_mm, bend, arc, motor, wire)
     return float(np.clip(closest_arc(bent, axis), 1.0, wire.length_mm))

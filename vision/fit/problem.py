@@ -12,7 +12,7 @@ from vision.fit.bend_onset import Onset
 from vision.fit.blocks import BAR_MODES_PX, WIRE_MODES_PX, Blocks
 from vision.fit.motion import Motion, Yielding, between
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import REST_POWERS, Curves, centrelines
+from vision.geometry.centreline import REST_POWERS, Curves, centrelines, unbent_centrelines
 from vision.geometry.contact import axis_frame, closest_arc
 from vision.geometry.rods import Rods, Wire
 from vision.geometry.touched import Axis
@@ -214,8 +214,7 @@ def curves_of(
     shape = angles.shape[:-1]
     arcs = np.broadcast_to(arcs_mm, shape)
     motor = np.broadcast_to(problem.motor_rad, shape)
-    rest = rest_shape(problem, vector)[..., None, :, :]
-    rest = np.broadcast_to(rest, (*shape, 2, REST_POWERS))
+    rest = rest_shape(problem, vector)[..., None, :, :]  # one for all frames
     friction = np.broadcast_to(vector[..., problem.blocks.friction.slice], shape)
     for _ in range(rounds):
         curves = centrelines(rest, angles, arcs, motor, problem.wire, friction)
@@ -226,9 +225,8 @@ def curves_of(
 def resting_curves(problem: Problem, vector: np.ndarray, motor_rad: np.ndarray) -> Curves:
     """Return the unbent centrelines (…) at motor angles (…), by parameters (…, size)."""
     shape = np.shape(motor_rad)
-    middle_mm = np.full(shape, 0.5 * problem.wire.length_mm)
     rest = np.broadcast_to(rest_shape(problem, vector), (*shape, 2, REST_POWERS))
-    return centrelines(rest, np.zeros((*shape, 2)), middle_mm, motor_rad, problem.wire)
+    return unbent_centrelines(rest, motor_rad, problem.wire)
 
 
 def start(problem: Problem, contact_arc_mm: float) -> State:

@@ -60,6 +60,8 @@ def first_touch(problem: Problem, vector: np.ndarray) -> FirstTouch:
     gap, arc, point = _gap(problem, vector, angle)
     for _ in range(_SECANT_STEPS):
         is_open = np.abs(gap) > _TOUCH_GAP_MM
+        if not np.any(is_open):
+            break
         change = _secant_change(gap, gap - gap_before, angle - before, is_open)
         before = np.where(is_open, angle, before)
         gap_before = np.where(is_open, gap, gap_before)

@@ -184,16 +184,46 @@ def centrelines(
     pull (…): force along the whisker at the contact over that across it, towards the tip.
     """
     rest_mm = np.asarray(rest_mm)
-    arc = np.linspace(0.0, wire.length_mm, _NODES)
-    share = arc / wire.length_mm
-    own_slope = rest_slope(np.array(wire.rest_mm), share)
-    rest_tangents = _tangents((rest_slope(rest_mm, share) + own_slope) / wire.length_mm)
+    arc = _nodes_mm(wire)
+    rest_tangents = _rest_tangents(rest_mm, arc, wire)
     bend = _Bend.of(np.asarray(bend_rad), np.asarray(pull), arc, np.asarray(contact_mm), wire)
     tangents = np.stack(np.broadcast_arrays(*bend.turned(rest_tangents)), axis=-1)
-    points = simpson() @ tangents * arc[1]
+    return _in_rig(arc, tangents, rest_mm, motor_rad)
+
+
+def unbent_centrelines(rest_mm: np.ndarray, motor_rad: np.ndarray, wire: Wire) -> Curves:
+    """Return the `centrelines` of whiskers that nothing bends, for a third of the work.
+
+    rest_mm (…, 2, k): polynomials in s/length, (y, z), beyond the wire's own; motor_rad (…).
+    """
+    rest_mm = np.asarray(rest_mm)
+    arc = _nodes_mm(wire)
+    return _in_rig(arc, _rest_tangents(rest_mm, arc, wire), rest_mm, motor_rad)
+
+
+def _nodes_mm(wire: Wire) -> np.ndarray:
+    """Return the arc lengths (m,) of a curve's nodes, mm."""
+    return np.linspace(0.0, wire.length_mm, _NODES)
+
+
+def _rest_tangents(rest_mm: np.ndarray, arc_mm: np.ndarray, wire: Wire) -> np.ndarray:
+    """Return the unit tangents (…, m, 3) of rest shapes (…, 2, k), mm, at arcs (m,)."""
+    share = arc_mm / wire.length_mm
+    own_slope = rest_slope(np.array(wire.rest_mm), share)
+    return _tangents((rest_slope(rest_mm, share) + own_slope) / wire.length_mm)
+
+
+def _in_rig(
+    arc_mm: np.ndarray, tangents: np.ndarray, rest_mm: np.ndarray, motor_rad: np.ndarray
+) -> Curves:
+    """Return the curves in the rig frame of tangents (…, m, 3) in the hub's.
+
+    rest_mm (…, 2, k): rest shapes, which say where they begin. motor_rad (…).
+    """
+    points = simpson() @ tangents * arc_mm[1]
     points[..., 1:] += rest_mm[..., None, :, 0]
     rotation = np.swapaxes(rotation_z(motor_rad), -1, -2)
-    return Curves(arc, points @ rotation, tangents @ rotation)
+    return Curves(arc_mm, points @ rotation, tangents @ rotation)
 
 
 def _tangents(lateral: np.ndarray) -> np.ndarray:
@@ -381,7 +411,7 @@ def unbent_curves(
     """Return the centrelines of an unbent wire by frame; motor_rad: motor angle by frame."""
     curves = {}
     for frame, angle in motor_rad.items():
-        curves[frame] = centrelines(rest_mm, np.zeros(2), wire.length_mm, angle, wire)
+        curves[frame] = unbent_centrelines(rest_mm, angle, wire)
     return curves
 
 

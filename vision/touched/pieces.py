@@ -106,15 +106,14 @@ def bar_knots(settings: VisionSettings) -> Knots:
 def clear_of_wire(pieces: Pieces, wires_px: Sequence[np.ndarray], margin_px: float) -> np.ndarray:
     """Return which pieces (s,) of the bar show no wire: each is a rectangle along and across the
     bar."""
+    if not len(wires_px):
+        return np.ones(len(pieces), dtype=bool)
     tangent = np.stack([pieces.normal[:, 1], -pieces.normal[:, 0]], axis=1)
-    is_clear = np.ones(len(pieces), dtype=bool)
-    for line in wires_px:
-        displacement = line[None] - pieces.foot_px[:, None]  # (s, m, 2) px
-        along = np.abs(np.einsum("smi,si->sm", displacement, tangent))
-        across = np.abs(np.einsum("smi,si->sm", displacement, pieces.normal))
-        is_inside = (along < margin_px) & (across < pieces.radius_px[:, None] + margin_px)
-        is_clear &= ~np.any(is_inside, axis=1)
-    return is_clear
+    from_feet_px = np.concatenate(wires_px) - pieces.foot_px[:, None]  # (s, all m, 2)
+    along = np.abs(np.einsum("smi,si->sm", from_feet_px, tangent))
+    across = np.abs(np.einsum("smi,si->sm", from_feet_px, pieces.normal))
+    is_inside = (along < margin_px) & (across < pieces.radius_px[:, None] + margin_px)
+    return ~np.any(is_inside, axis=1)
 
 
 def beside_wires(pieces: Pieces, wires_px: Sequence[np.ndarray]) -> Pieces:

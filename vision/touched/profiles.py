@@ -160,14 +160,14 @@ class _PatchSums:
         weight = (pieces.weight[is_used] / light_per_grey) ** 2
         patch, _ = np.nonzero(is_used)
         patch = np.argsort(np.argsort(pieces.place))[patch]  # its number along the bar
-        shared = _SharedPixels.between(position[is_used], patch, len(pieces), bins)
+        shared = _SharedPixels.between(position[is_used], patch, weight, (len(pieces), bins))
         return cls(
-            weight=shared.sums(weight),
-            light=shared.sums(weight * light),
-            background=shared.sums(weight * background),
-            background_slope=shared.sums(weight * background_slope),
-            light_per_grey=shared.sums(weight * light_per_grey),
-            variance_share=shared.sums_by_squares(weight),
+            weight=shared.sums(1.0),
+            light=shared.sums(light),
+            background=shared.sums(background),
+            background_slope=shared.sums(background_slope),
+            light_per_grey=shared.sums(light_per_grey),
+            variance_share=shared.sums(shared.share),
         )
 
     def mean(self, sums: np.ndarray) -> np.ndarray:
@@ -242,38 +242,32 @@ def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: floa
 class _SharedPixels:
     """Pixels (n,), each shared between the two bins nearest to its position.
 
-    cell (2 n,): first the nearer bin below each pixel, then that above, counted through all
-    patches. share (2, n): the interpolation weights. patches, bins: how many there are.
+    cell (2 n,): first the bin below each pixel, then that above, counted through all patches.
+    share (2, n): interpolation weights. weight (2, n): the same times the pixels' weights. shape:
+    how many patches and bins there are.
     """
 
     cell: np.ndarray
     share: np.ndarray
-    patches: int
-    bins: int
+    weight: np.ndarray
+    shape: tuple[int, int]
 
     @classmethod
     def between(
-        cls, position: np.ndarray, patch: np.ndarray, patches: int, bins: int
+        cls, position: np.ndarray, patch: np.ndarray, weight: np.ndarray, shape: tuple[int, int]
     ) -> "_SharedPixels":
-        """Return the pixels at positions (n,), in bins, of patches by their number (n,)."""
+        """Return pixels at positions (n,), in bins, of patches by their number (n,)."""
+        bins = shape[1]
         below = np.clip(np.floor(position), 0, bins - 2)
         fraction = np.clip(position - below, 0.0, 1.0)
         first = bins * patch + below.astype(int)
         share = np.stack([1.0 - fraction, fraction])
-        return cls(np.concatenate([first, first + 1]), share, patches, bins)
+        return cls(np.concatenate([first, first + 1]), share, share * weight, shape)
 
-    def sums(self, values: np.ndarray) -> np.ndarray:
-        """Return the sums (s, b) of values (n,), by the interpolation weights."""
-        return self._sums(self.share * values)
-
-    def sums_by_squares(self, values: np.ndarray) -> np.ndarray:
-        """Return the sums (s, b) of values (n,), by the squared interpolation weights."""
-        return self._sums(self.share**2 * values)
-
-    def _sums(self, shares: np.ndarray) -> np.ndarray:
-        """Return the sums (s, b) of what each pixel gives its two bins (2, n)."""
-        sums = np.bincount(self.cell, shares.ravel(), self.patches * self.bins)
-        return sums.reshape(self.patches, self.bins)
+    def sums(self, values: np.ndarray | float) -> np.ndarray:
+        """Return the weighted sums (s, b) of values of the pixels (n,), or of their shares (2, n)."""
+        weighted = np.ravel(self.weight * values)
+        return np.bincount(self.cell, weighted, self.shape[0] * self.shape[1]).reshape(self.shape)
 
 
 def _average_patches(
@@ -429,6 +423,5 @@ def light_range(light: np.ndarray) -> float:
     """Return the range of light (n,) between its 5th and 95th percentile, a grey level at least."""
     if len(light) == 0:
         return 1.0 / FULL_SCALE
-    rank = np.array([0.05, 0.95]) * (len(light) - 1)
-    low, high = np.interp(rank, np.arange(len(light)), np.sort(light))
+    low, high = np.percentile(light, [5.0, 95.0])
     return max(float(high - low), 1.0 / FULL_SCALE)

@@ -125,22 +125,32 @@ def _slopes_of_alike(
     count, terms = coefficients.shape
     rows_per_radius, table = _table(ratio, terms)
     before, part = _places(offset_px / radius_px, rows_per_radius, len(table))
-    own_column = before * count + np.arange(count)[:, None]  # of a table with a column a cylinder
+    after = before + 1
+    own = before * count + np.arange(count)[:, None]  # in a table with a column a cylinder
+    own_after = own + count
     change = table[:, :terms]
+    per_px = rows_per_radius / radius_px
     found = []
-    for _ in range(2):
+    for scale in (per_px, per_px**2):
         change = np.gradient(change, axis=0)
-        of_light = _between(change @ coefficients.T, own_column, count, part)
-        of_cover = _between(change[:, 0], before, 1, part)
-        found.append(np.stack([of_light, of_cover]))
-    rows_per_px = rows_per_radius / radius_px
-    return found[0] * rows_per_px, found[1] * rows_per_px**2
+        both = np.empty((2, *offset_px.shape))
+        both[0] = _between(change @ coefficients.T, own, own_after, part)
+        both[1] = _between(change[:, 0], before, after, part)
+        both *= scale
+        found.append(both)
+    return found[0], found[1]
 
 
-def _between(table: np.ndarray, place: np.ndarray, step: int, part: np.ndarray) -> np.ndarray:
-    """Return a flat table's values between places (…) and those a step on, `part` (…) of the way."""
-    here = table.take(place)
-    return here + part * (table.take(place + step) - here)
+def _between(
+    table: np.ndarray, before: np.ndarray, after: np.ndarray, part: np.ndarray
+) -> np.ndarray:
+    """Return a flat table's values between two places (…) each, `part` (…) of the way."""
+    here = table.take(before)
+    change = table.take(after)
+    change -= here
+    change *= part
+    change += here
+    return change
 
 
 def rim_bells(offset_px: np.ndarray, radius_px: np.ndarray | float, blur_px: float) -> np.ndarray:

@@ -9,7 +9,7 @@ Golub and Pereyra 1973, in Kaufman's form).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve
 
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import (
@@ -83,7 +83,7 @@ class Causes:
 
         sensitivity (s, size + 1): of their positions to shading and blur.
         """
-        return solve_triangular(self.root, sensitivity.T, lower=True, check_finite=False).T
+        return np.linalg.solve(self.root, sensitivity.T).T
 
     def all_shifts_px(self, sensitivity: np.ndarray, relative_radius: np.ndarray) -> np.ndarray:
         """Return by how much each of the causes and, last, a common shift moves segments, px.

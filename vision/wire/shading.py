@@ -154,10 +154,10 @@ class SegmentEquations:
 
         normal = self._columns.transpose(0, 2, 1) @ self._columns
         normal[:, -3:, -3:] += self._far
-        self._by_background = normal[:, -3:-1]  # (s, 2, terms + 3): gain and offset with all
+        self._by_background = normal[:, -3:-1].copy()  # (s, 2, terms + 3): gain and offset with all
         self._inverse = _inverse_of_two(self._by_background[:, :, -3:-1] + WEAK * np.eye(2))
         explained = self._by_background.transpose(0, 2, 1) @ (self._inverse @ self._by_background)
-        normal = normal - explained
+        normal -= explained
         self.gram = normal[:, :terms, :terms]
         self.moment = normal[:, :terms, -1]
         self.power = normal[:, -1, -1]
