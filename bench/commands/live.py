@@ -1,6 +1,7 @@
 """The verb `live`: a recorded push, evaluated as if it were being recorded (bench/workflows/live_push.py)."""
 
 import argparse
+from pathlib import Path
 
 from bench.base.progress import begin_step
 from bench.commands.options import (
@@ -25,6 +26,12 @@ def add(verbs: Verbs) -> None:
     add_recorded(verb)
     verb.add_argument("trial", metavar="TRIAL", help="name of the trial")
     add_out(verb, "OUT", "folder for OUT/live/TRIAL_WHISK.png, the last frame with its lines")
+    verb.add_argument(
+        "--film",
+        type=Path,
+        metavar="FILE",
+        help=".webm (VP9) or .avi: the push at its own speed, with what is known at each moment by one core",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -37,7 +44,11 @@ def run(options: argparse.Namespace) -> int:
 
     has_status = False
     for line, status in play_trial(
-        options.session, options.out, options.trial, follow_links=options.follow_links
+        options.session,
+        options.out,
+        options.trial,
+        film=options.film,
+        follow_links=options.follow_links,
     ):
         print(line)
         has_status = has_status or bool(status)

@@ -52,7 +52,7 @@ def write_video(
     record = read_record(out)
     result = _result(out, trial)
     path = out / "video" / f"{trial}.webm" if path is None else path
-    code = _codec(path)
+    code = codec_of(path)
     if not (math.isfinite(rate_Hz) and 0.1 <= rate_Hz <= 240.0):
         raise BadInput(f"--rate-Hz is {rate_Hz:g}; from 0.1 to 240 is allowed")
     source = _session_folder(out) if session is None else session
@@ -63,11 +63,11 @@ def write_video(
         raise BadInput("has no pictures of this trial; give --session", file=source)
     pictures = _film(recorded, cameras, result)
     with whole_file(path) as temporary:
-        _write(temporary, pictures, code, rate_Hz)
+        write_pictures(temporary, pictures, code, rate_Hz)
     return path
 
 
-def _codec(path: Path) -> str:
+def codec_of(path: Path) -> str:
     """Return the code of the film's codec by its suffix. Raises BadInput for another suffix."""
     code = FOURCC.get(path.suffix.lower())
     if code is None:
@@ -95,7 +95,7 @@ def _session_folder(out: Path) -> Path:
         raise BadInput("does not say where its session is; give --session", file=out) from None
 
 
-def _write(path: Path, pictures: Iterator[np.ndarray], code: str, rate_Hz: float) -> None:
+def write_pictures(path: Path, pictures: Iterator[np.ndarray], code: str, rate_Hz: float) -> None:
     """Write pictures as a film. Raise BadInput where there are none, or OpenCV cannot."""
     first = next(pictures, None)
     if first is None:

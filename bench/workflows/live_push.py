@@ -14,18 +14,20 @@ from typing import Protocol
 
 import numpy as np
 
-from bench.base.atomic import lock_output
+from bench.base.atomic import lock_output, whole_file
 from bench.base.drawing import save_picture
 from bench.base.errors import BadInput
 from bench.base.results import hash_of
 from bench.cameras.session_cameras import SessionCalibration, calibrate_session
 from bench.report.overlays import last_frame
+from bench.report.video import codec_of, write_pictures
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.inside import check_outside
 from bench.session.session import Session, load_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.trials.trial_frames import stated_object
+from bench.workflows.live_film import FILM_HZ, LiveFilm
 from vision import WhiskTruth
 from vision.geometry import Reason, Rods, VisionSettings
 from vision.live import FIRST_FRAMES, LiveBench, LiveWhisk
@@ -136,26 +138,35 @@ def live_bench(
 
 
 def play_trial(
-    session: Path, out: Path, name: str, *, follow_links: bool = False
+    session: Path, out: Path, name: str, *, film: Path | None = None, follow_links: bool = False
 ) -> Iterator[tuple[str, Reason]]:
     """Play a recorded trial at its own speed; yield a line on each whisk, and its status.
 
-    Writes OUT/live/<trial>_<whisk>.png, the last frame with its lines, of each that is seen. Raises
-    BadInput where the trial has no pictures or no push.
+    Writes OUT/live/<trial>_<whisk>.png, the last frame with its lines, of each that is seen. film: file
+    of a film of it, in which work takes its processor time; without one the clock is that on the wall.
+    Raises BadInput where the trial has no pictures or no push.
     """
+    code = codec_of(film) if film else ""
     recorded, trial = _recorded(session, out, name, follow_links=follow_links)
     recording = RecordedPush.read(trial)
     settings = VisionSettings(clock_sigma_s=recording.times.clock_sigma_s)
+    shown = LiveFilm()
     with lock_output(out):
         bench = live_bench(recorded, trial, calibrate_session(recorded, out), settings)
-        for played in recording.play_all(bench, WallClock):
+        clock = ProcessorClock if film else WallClock
+        for played in recording.play_all(bench, clock, watch=shown.watch if film else None):
             truth = played.truth
             number = truth.whisk
             if truth.overlay:
                 picture = last_frame(played.pictures, truth.overlay[max(truth.overlay)])
                 save_picture(picture, out / "live" / f"{name}_{number}.png", hash_of(picture))
             late = f"{played.late_s:.2f} s after the last frame"
+            if film:
+                shown.end(played.clock.now_s(), played.pictures, truth, late)
             yield f"{name}, whisk {number}: {answer(truth)}; {late}", truth.status
+        if film:
+            with whole_file(film) as temporary:
+                write_pictures(temporary, iter(shown.pictures), code, FILM_HZ)
 
 
 class PushClock(Protocol):
@@ -280,12 +291,17 @@ class RecordedPush:
         return cls(times, pictures, motor_deg, strokes, decode_s)
 
     def play_all(
-        self, bench: LiveBench, clock_from: Callable[[float], PushClock], lead_s: float = 0.0
+        self,
+        bench: LiveBench,
+        clock_from: Callable[[float], PushClock],
+        lead_s: float = 0.0,
+        watch: Callable[[float, LivePush], None] | None = None,
     ) -> Iterator[Played]:
         """Play each push, the bar looked for where it was before; yield it as soon as it is over.
 
         clock_from: makes a clock that begins at a time, s. lead_s: by so much the first pictures come
-        before their times, as of a camera that runs before the motor does.
+        before their times, as of a camera that runs before the motor does. watch: is given the time and
+        the push whenever something has changed.
         """
         for number, frames in self.strokes.items():
             first_rad, last_rad = np.radians(self.motor_deg[frames[[0, -1]]]).tolist()
@@ -293,17 +309,24 @@ class RecordedPush:
             arrivals_s = self.times.time_s[frames].copy()
             arrivals_s[:FIRST_FRAMES] -= lead_s
             clock = clock_from(float(arrivals_s[0]))
-            truth = self._play(push, frames, arrivals_s, clock)
+            truth = self._play(push, frames, arrivals_s, clock, watch or _look_away)
             yield Played(truth, clock.now_s() - float(arrivals_s[-1]), push.pictures, clock)
             bench = push.following().whisk.bench
 
     def _play(
-        self, push: LivePush, frames: np.ndarray, arrivals_s: np.ndarray, clock: PushClock
+        self,
+        push: LivePush,
+        frames: np.ndarray,
+        arrivals_s: np.ndarray,
+        clock: PushClock,
+        watch: Callable[[float, LivePush], None],
     ) -> WhiskTruth:
         """Feed the frames of a stroke (n,) as they arrive (n,), s; return the truth."""
         for frame, arrival_s in zip(frames.tolist(), arrivals_s.tolist()):
             while clock.now_s() < arrival_s:
-                if not clock.run(push.work):
+                if clock.run(push.work):
+                    watch(clock.now_s(), push)
+                else:
                     clock.wait(arrival_s)
             clock.decode(self.decode_s)
             for camera, pictures in self.pictures.items():
@@ -311,7 +334,14 @@ class RecordedPush:
                     motor_deg = float(self.motor_deg[frame])
                     time_s = float(self.times.time_s[frame])
                     push.add(camera, frame, time_s, motor_deg, pictures[frame])
+            watch(clock.now_s(), push)
+        while clock.run(push.work):
+            watch(clock.now_s(), push)
         return clock.run(push.finish)
+
+
+def _look_away(now_s: float, push: LivePush) -> None:
+    """Watch nothing."""
 
 
 def answer(truth: WhiskTruth) -> str:

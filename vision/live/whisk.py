@@ -45,7 +45,7 @@ from vision.truth.records import WhiskTruth
 from vision.truth.strategies import Strategy, strategies
 from vision.truth.traced_lines import TracedLines
 from vision.truth.trial_pictures import TrialPictures
-from vision.truth.truth_rows import to_whisk
+from vision.truth.truth_rows import DRAWN_MM, DRAWN_POINTS, to_whisk
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.whisk_truth import (
     check_scatter,
@@ -212,6 +212,28 @@ class LiveWhisk:
             except np.linalg.LinAlgError:
                 self.refused = NOT_CONVERGED
         return self._without_truth(self.refused)
+
+    def lines_px(self) -> dict[str, dict[str, np.ndarray]]:
+        """Return what is known so far, as lines (m, 2) px by camera and name.
+
+        `bar_left` and `bar_right` are the object's edges, `wire` the whisker in the last frame whose bend
+        is known; {} as long as nothing is.
+        """
+        if self._found is None:
+            return {}
+        bar = self.bench.rods.bar
+        drawn = {}
+        for view in self._found.views:
+            left, right = self._found.bar.axis.edges_px(
+                view.camera, bar.radius_mm, DRAWN_MM, DRAWN_POINTS
+            )
+            drawn[view.camera.name] = {"bar_left": left, "bar_right": right}
+        if self._follower is not None and self._follower.bends_rad:
+            whisk = self._whisk()
+            curve = self._place(whisk).curves[whisk.frames[-1]]
+            for view in self._found.views:
+                drawn[view.camera.name]["wire"] = view.camera.project(curve.points_mm)
+        return drawn
 
     def _step_due(self) -> Callable[[], None] | None:
         """Return the next step, in the order of the module's introduction; None where it waits for a frame."""

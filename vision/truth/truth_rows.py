@@ -42,9 +42,9 @@ _MOST_SLIP_SIGMA_MM = 1.0
 # [s] Between two frames, where it is divided by. Stated.
 _LEAST_STEP_S = 1e-9
 # [mm] Of the bar that overlays draw, to either side of its point: a layout. Stated.
-_DRAWN_MM = 40.0
+DRAWN_MM = 40.0
 # [points] Of each of its edges. A layout.
-_DRAWN_POINTS = 81
+DRAWN_POINTS = 81
 _VECTORS = ("x", "y", "z")
 
 
@@ -388,5 +388,5 @@ def _edges_px(axes: Axis, camera: Camera, radius_mm: float) -> list[tuple[np.nda
     edges_px = []
     for point_mm, direction in zip(axes.point_mm, axes.direction):
         axis = replace(axes, point_mm=point_mm, direction=direction)
-        edges_px.append(axis.edges_px(camera, radius_mm, _DRAWN_MM, _DRAWN_POINTS))
+        edges_px.append(axis.edges_px(camera, radius_mm, DRAWN_MM, DRAWN_POINTS))
     return edges_px

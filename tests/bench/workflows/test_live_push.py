@@ -1,6 +1,7 @@
 """A push that is fed from memory, and one that is played from its recording."""
 
 import shutil
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -10,6 +11,8 @@ from bench import api
 from bench.base.errors import BadInput
 from bench.commands.cli import main
 from bench.commands.options import BAD_INPUT, DONE
+from bench.workflows.live_film import FILM_HZ, LiveFilm
+from vision import WhiskTruth
 
 SIZE = (720, 1280)
 
@@ -56,6 +59,27 @@ def test_nothing_is_written_into_the_session(small_session, capsys):
     inside = small_session / "out"
     assert main(["live", str(small_session), "b30_3", "--out", str(inside)]) == BAD_INPUT
     assert "lies in the session" in capsys.readouterr().err and not inside.exists()
+
+
+def test_a_film_lasts_as_long_as_the_push_and_its_answer_is_held():
+    """Two pictures 0.1 s apart, the truth 0.1 s after the second, then 2 s: 25 frames a second."""
+    dark = np.tile(np.arange(128, dtype=np.uint8), (72, 1))
+    bright = dark[:, ::-1]
+    shows = SimpleNamespace(lines_px=dict)
+    film = LiveFilm()
+    film.watch(5.0, SimpleNamespace(pictures={"a": dark, "b": dark}, whisk=shows))
+    film.watch(5.1, SimpleNamespace(pictures={"a": bright, "b": dark}, whisk=shows))
+    film.end(5.2, {"a": bright, "b": bright}, WhiskTruth(0), "0.10 s after the last frame")
+    assert len(film.pictures) == pytest.approx(2.2 * FILM_HZ, abs=1)
+    assert all(picture.shape == (405, 1440, 3) for picture in film.pictures)
+    changes = [np.any(one != next_) for one, next_ in zip(film.pictures, film.pictures[1:])]
+    assert sum(changes) == 2
+
+
+def test_another_kind_of_film_is_one_line(small_session, out, capsys):
+    arguments = ["live", str(small_session), "b30_3", "--out", str(out), "--film", "push.mp4"]
+    assert main(arguments) == BAD_INPUT
+    assert "push.mp4: must end in .webm or .avi" in capsys.readouterr().err
 
 
 def test_an_object_that_gives_way_is_refused_in_one_line(small_session, tmp_path, capsys):

@@ -1,11 +1,12 @@
-"""What seeing costs against picture size, frames, whisks and cameras, and the exponents that fit.
+"""What a session costs against picture size, frames, cameras, board views, whisks and workers, and the exponents that fit.
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/speed/slopes.py [--preset standard]
 
 The rig paints a scene; one thing at a time is doubled. Pictures grow by a larger sensor behind the same lens, as more
 bench is in view, and by a longer lens, as the wire is thicker; whisks are the same one, again and again. Seconds of
 processor, pictures in memory, after a first look that fills tables. The exponent is of a straight line through the
-logarithms; what does not grow with the number flattens it.
+logarithms; what does not grow with the number flattens it. Of board views it is the adjustment of two cameras
+(`cameras.py`), of whisks together what `whisks.py` prints step by step, of workers wall time of eight scenes.
 """
 
 import argparse
@@ -20,12 +21,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
+from bench.base.workers import Workers
 from bench.rig.protocol import Protocol
 from bench.rig.protocol_tables import PicturesTable
 from bench.trials.seeing import PRESETS, STANDARD
 from tests.studies.accuracy.coverage import drawn
 from tests.studies.accuracy.scenes import Sigmas, make_scene
 from tests.studies.extremes.chain import cameras, protocol, thick, wide
+from tests.studies.speed import cameras as adjustment
+from tests.studies.speed import whisks as together
 from vision.geometry.vision_settings import VisionSettings
 from vision.truth.observe import observe_trial
 from vision.truth.trial_pictures import TrialPictures
@@ -58,6 +62,9 @@ SCENES: Mapping[str, tuple[Callable[[float], Protocol], Sequence[float]]] = {
     "cameras": (filmed_by, (2, 3, 4)),
 }
 WHISKS = 1, 2, 4
+VIEWS = (20, 40, 80)
+WORKERS = (1, 2, 4)
+SCENES_FOR_WORKERS = 8
 
 
 def repeated(pictures: TrialPictures, count: int) -> tuple[TrialPictures, list[slice]]:
@@ -95,14 +102,27 @@ def table(settings: VisionSettings) -> Iterator[str]:
     """A line a number that grows."""
     seconds(protocol(), settings)
     for name, (made, sizes) in SCENES.items():
-        yield _line(name, sizes, [seconds(made(size), settings) for size in sizes])
-    yield _line("whisks", WHISKS, [seconds(protocol(), settings, count) for count in WHISKS])
+        yield together.line(name, sizes, [seconds(made(size), settings) for size in sizes])
+    costs_s = [seconds(protocol(), settings, count) for count in WHISKS]
+    yield together.line("whisks of a trial", WHISKS, costs_s)
+    yield together.line("board views", VIEWS, [adjustment.seconds(2, count) for count in VIEWS])
+    counts, spent_s = together.measured(together.results_of_fixture())
+    yield together.line("whisks together", counts, np.sum(list(spent_s.values()), axis=0))
+    yield together.line("workers", WORKERS, [with_workers(count, settings) for count in WORKERS])
 
 
-def _line(name: str, sizes: Sequence[float], spent: Sequence[float]) -> str:
-    exponent = np.polyfit(np.log(sizes), np.log(spent), 1)[0]
-    costs = ", ".join(f"{size:g}: {cost:.2f} s" for size, cost in zip(sizes, spent))
-    return f"{name:<26}{costs}  (cost ∝ n^{exponent:.2f})"
+def with_workers(count: int, settings: VisionSettings) -> float:
+    """Wall time of scenes seen by so many processes, once these have begun."""
+    tasks = [settings] * SCENES_FOR_WORKERS
+    with Workers(count) as pool:
+        pool.run(_see, tasks[:count], "scenes")
+        begin = time.perf_counter()
+        pool.run(_see, tasks, "scenes")
+        return time.perf_counter() - begin
+
+
+def _see(settings: VisionSettings) -> float:
+    return seconds(protocol(), settings)
 
 
 def main() -> None:

@@ -1,0 +1,87 @@
+"""The film of a push that is evaluated while it is recorded: its pictures, and what is known at each moment."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from bench.report.painting import as_8_bit, polyline, put_text
+from vision import WhiskTruth
+
+if TYPE_CHECKING:
+    from bench.workflows.live_push import LivePush
+
+FILM_HZ = 25.0
+_HELD_S = 2.0  # so long the answer is shown
+_WIDTH_PX = 720  # of each camera's picture
+# Colours, BGR.
+_COLOURS = {"bar_left": (74, 175, 77), "bar_right": (74, 175, 77), "wire": (47, 217, 255)}
+_PAPER = (255, 255, 255)
+_TITLE_PLACE = (12, 24)  # of a camera's picture, px
+_ANSWER_PLACE = (12, 48)
+
+
+@dataclass(eq=False)
+class LiveFilm:
+    """A film at the push's own speed. pictures: its frames (h, w, 3), FILM_HZ a second."""
+
+    pictures: list[np.ndarray] = field(default_factory=list)
+    _shown: np.ndarray | None = None
+    _begin_s: float = 0.0
+    _count: int = 0
+
+    def watch(self, now_s: float, push: "LivePush") -> None:
+        """Show what a push shows from a time on, s."""
+        if self._shown is None:
+            self._begin_s = now_s
+            self._count = 0
+        self._show_until(now_s)
+        if push.pictures:
+            title = f"{now_s - self._begin_s:.2f} s"
+            self._shown = _drawn(push.pictures, push.whisk.lines_px(), title, "")
+
+    def end(
+        self, now_s: float, pictures: Mapping[str, np.ndarray], truth: WhiskTruth, late: str
+    ) -> None:
+        """Show the truth of a push, which came at a time, and begin anew. late: how late, in words."""
+        self._show_until(now_s)
+        lines = truth.overlay[max(truth.overlay)] if truth.overlay else {}
+        d_x = truth.d_x_mm
+        answer = f"d_x {d_x.value:.3f} +- {d_x.sigma:.3f} mm" if lines else "no distance"
+        title = f"{now_s - self._begin_s:.2f} s, {late}"
+        self._shown = _drawn(pictures, lines, title, answer)
+        self._show_until(now_s + _HELD_S)
+        self._shown = None
+
+    def _show_until(self, now_s: float) -> None:
+        """Add what is shown until a time, s."""
+        while self._shown is not None and self._count < (now_s - self._begin_s) * FILM_HZ:
+            self.pictures.append(self._shown)
+            self._count += 1
+
+
+def _drawn(
+    pictures: Mapping[str, np.ndarray],
+    lines_px: Mapping[str, Mapping[str, np.ndarray]],
+    title: str,
+    answer: str,
+) -> np.ndarray:
+    """Return the cameras' pictures (h, w, 3) side by side, with lines by camera and name, and words."""
+    drawn = []
+    for camera in sorted(pictures):
+        grey = pictures[camera]
+        scale = _WIDTH_PX / grey.shape[1]
+        size = (_WIDTH_PX, round(scale * grey.shape[0]))
+        small = cv2.resize(as_8_bit(grey), size, interpolation=cv2.INTER_AREA)
+        picture = cv2.cvtColor(small, cv2.COLOR_GRAY2BGR)
+        for name, points_px in lines_px.get(camera, {}).items():
+            if name in _COLOURS:
+                polyline(picture, scale * (points_px + 0.5) - 0.5, _COLOURS[name])
+        put_text(picture, f"{camera}, {title}", _TITLE_PLACE, _PAPER)
+        put_text(picture, answer, _ANSWER_PLACE, _PAPER)
+        drawn.append(picture)
+    height = max(len(picture) for picture in drawn)
+    filled = [np.pad(picture, ((0, height - len(picture)), (0, 0), (0, 0))) for picture in drawn]
+    return np.hstack(filled)
