@@ -120,7 +120,7 @@ def _column_names(header: str, label: str) -> list[str]:
     if all(_is_number(name) for name in names):
         raise BadInput(f"the first row must name the columns; found {header!r}", file=label, row=1)
     if len(set(names)) < len(names):
-        raise BadInput(f"a column is named twice: {header}", file=label, row=1)
+        raise BadInput(f"a column is named twice: {header!r}", file=label, row=1)
     return names
 
 
