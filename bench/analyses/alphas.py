@@ -171,10 +171,12 @@ def felt_friction(
     """Return α and its sigma by |β| − |φ|: the slope as seen, the slip angle by the moments at θ.
 
     left: share of the base's diameter that the whisker has at the contact. Of a whisk that was seen to
-    slip; NaN where the moments are not those of the seen shape, or the slope at θ is not that at touch.
-    Where the truth is a stage's a slip angle that is not 0 for sure shows the slip: the force on a
-    contact at rest points along the push.
+    slip; NaN where the moments are not those of the seen shape, the slope at θ is not that at touch, or
+    nothing is left of the whisker. Where the truth is a stage's a slip angle that is not 0 for sure
+    shows the slip: the force on a contact at rest points along the push.
     """
+    if not left > 0:
+        return UNKNOWN
     beta = seen.beta_rad
     phi = felt.phi_felt_rad
     sigma_rad = float(np.hypot(beta.sigma, phi.sigma))
