@@ -21,6 +21,7 @@ from bench.base.results import hash_of
 from bench.cameras.session_cameras import SessionCalibration, calibrate_session
 from bench.report.overlays import last_frame
 from bench.report.video import codec_of, write_pictures
+from bench.session.angle_source import angle_source
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.inside import check_outside
 from bench.session.session import Session, load_session
@@ -130,6 +131,9 @@ def live_bench(
             "the object moves; while it is recorded, a push is evaluated against one that stands"
         )
         raise BadInput(found, file=trial.label("trial.toml"))
+    if not angle_source(trial).has_zero:
+        found = "the motor's angle has no zero that pictures share; evaluate gives estimates alone"
+        raise BadInput(found, file=trial.label("trial.toml"))
     if known.cameras is None:
         raise BadInput("has no pictures, so no camera could be calibrated", file=session.path)
     cameras = known.cameras.subset(list(trial.camera_sources) or known.cameras.names)
@@ -146,7 +150,10 @@ def play_trial(
     of a film of it, in which work takes its processor time; without one the clock is that on the wall.
     Raises BadInput where the trial has no pictures or no push.
     """
-    code = codec_of(film) if film else ""
+    code = ""
+    if film:
+        check_outside(film, session, "--film")
+        code = codec_of(film)
     recorded, trial = _recorded(session, out, name, follow_links=follow_links)
     recording = RecordedPush.read(trial)
     settings = VisionSettings(clock_sigma_s=recording.times.clock_sigma_s)

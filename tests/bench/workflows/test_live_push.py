@@ -11,6 +11,7 @@ from bench import api
 from bench.base.errors import BadInput
 from bench.commands.cli import main
 from bench.commands.options import BAD_INPUT, DONE
+from bench.workflows import live_push
 from bench.workflows.live_film import FILM_HZ, LiveFilm
 from vision import WhiskTruth
 
@@ -80,6 +81,12 @@ def test_another_kind_of_film_is_one_line(small_session, out, capsys):
     arguments = ["live", str(small_session), "b30_3", "--out", str(out), "--film", "push.mp4"]
     assert main(arguments) == BAD_INPUT
     assert "push.mp4: must end in .webm or .avi" in capsys.readouterr().err
+
+
+def test_a_motor_angle_without_a_zero_is_one_line(small_session, out, monkeypatch):
+    monkeypatch.setattr(live_push, "angle_source", lambda trial: SimpleNamespace(has_zero=False))
+    with pytest.raises(BadInput, match="trial.toml: the motor's angle has no zero"):
+        api.live(small_session, out, "b30_3", (0.0, 6.0))
 
 
 def test_an_object_that_gives_way_is_refused_in_one_line(small_session, tmp_path, capsys):
