@@ -85,7 +85,7 @@ def test_another_kind_of_film_is_one_line(small_session, out, capsys):
 
 def test_a_motor_angle_without_a_zero_is_one_line(small_session, out, monkeypatch):
     monkeypatch.setattr(live_push, "angle_source", lambda trial: SimpleNamespace(has_zero=False))
-    with pytest.raises(BadInput, match="trial.toml: the motor's angle has no zero"):
+    with pytest.raises(BadInput, match=r"trial\.toml: the motor's angle has no zero"):
         api.live(small_session, out, "b30_3", (0.0, 6.0))
 
 
