@@ -189,20 +189,8 @@ def _least_squares(beta, data, scale, reading):
     """
     order = np.argsort(np.abs(beta))
     beta = beta[order]
-    scale = scale[order]
-    count = len(beta)
-    data = data.reshape(*data.shape[:-1], -1, count)[..., order]  # (..., 1 or 2, n)
-    start, rate = _when_slipping(beta, scale, reading)
-    residual = data - start
-    squares = (residual**2).sum(axis=-2)
-    cross = (residual * rate).sum(axis=-2)
-    curvature = (rate**2).sum(axis=-2)
-    held = _model(np.pi / 2, beta, scale, reading).reshape(-1, count)
-    held_squares = ((data - held) ** 2).sum(axis=-2)
-    # Of the segment below each slope, where this one and all steeper ones slip:
-    squares = _sum_from_here(squares) + np.cumsum(held_squares, axis=-1) - held_squares
-    cross = _sum_from_here(cross)
-    curvature = _sum_from_here(curvature)
+    data = data.reshape(*data.shape[:-1], -1, len(beta))[..., order]  # (..., 1 or 2, n)
+    squares, cross, curvature = _parabolas(beta, data, scale[order], reading)
     bounds = np.concatenate([[0.0], np.abs(beta)])  # of the segments, rad
     low = _u_of(bounds[:-1], reading)
     high = _u_of(bounds[1:], reading)
@@ -210,11 +198,28 @@ def _least_squares(beta, data, scale, reading):
     u = np.clip(vertex, low, high)
     cost = squares - 2 * u * cross + u**2 * curvature
     best = np.argmin(cost, axis=-1)
-    found = np.take_along_axis(u, best[..., None], axis=-1)[..., 0]
-    alpha = np.arctan(np.sqrt(found) if reading == "magnitude" else found)
+    least = np.take_along_axis(u, best[..., None], axis=-1)[..., 0]
+    alpha = np.arctan(np.sqrt(least) if reading == "magnitude" else least)
     # At a bound α is that slope itself: whether its point slips is then no matter of rounding.
-    alpha = np.where(found >= high[best], bounds[best + 1], alpha)
-    return np.where(found <= low[best], bounds[best], alpha)
+    alpha = np.where(least >= high[best], bounds[best + 1], alpha)
+    return np.where(least <= low[best], bounds[best], alpha)
+
+
+def _parabolas(beta, data, scale, reading):
+    """Return the sum of squares of each segment, squares − 2 cross·u + curvature·u².
+
+    In the segment below a slope, its point and those of all steeper ones slip; the others hold. The
+    slopes (n,) are in order, data are (..., 1 or 2, n); each of the three is (..., n).
+    """
+    start, rate = _when_slipping(beta, scale, reading)
+    residual = data - start
+    held = _model(np.pi / 2, beta, scale, reading).reshape(-1, len(beta))
+    held_squares = ((data - held) ** 2).sum(axis=-2)
+    held_before = np.cumsum(held_squares, axis=-1) - held_squares
+    squares = _sum_from_here((residual**2).sum(axis=-2)) + held_before
+    cross = _sum_from_here((residual * rate).sum(axis=-2))
+    curvature = _sum_from_here((rate**2).sum(axis=-2))
+    return squares, cross, curvature
 
 
 def _when_slipping(beta, scale, reading):
