@@ -88,7 +88,7 @@ def test_a_table_and_files_to_give_back(tmp_path, monkeypatch):
     """That of d_x is below the 0.1 mm of tests/bench/test_scenes.py."""
     monkeypatch.setattr(seeing_trade, "_CHANGES", {})
     rows = seeing_trade.tradeoff(RING, tmp_path, Settings(trials="w*"), repeats=1)
-    assert "of standard" in next(seeing_trade.tradeoff_lines(rows))
+    assert "s after push" in next(seeing_trade.tradeoff_lines(rows))
     with (tmp_path / "tradeoff.csv").open(newline="") as file:
         rows = {row["setting"]: row for row in csv.DictReader(file)}
     assert set(rows) == {"live", "live-cold", "draft", "standard", "with-figures"}
