@@ -71,17 +71,22 @@ def _drawn(
     """Return the cameras' pictures (h, w, 3) side by side, with lines by camera and name, and words."""
     drawn = []
     for camera in sorted(pictures):
-        grey = pictures[camera]
-        scale = _WIDTH_PX / grey.shape[1]
-        size = (_WIDTH_PX, round(scale * grey.shape[0]))
-        small = cv2.resize(as_8_bit(grey), size, interpolation=cv2.INTER_AREA)
-        picture = cv2.cvtColor(small, cv2.COLOR_GRAY2BGR)
-        for name, points_px in lines_px.get(camera, {}).items():
-            if name in _COLOURS:
-                polyline(picture, scale * (points_px + 0.5) - 0.5, _COLOURS[name])
+        picture = _with_lines(pictures[camera], lines_px.get(camera, {}))
         put_text(picture, f"{camera}, {title}", _TITLE_PLACE, _PAPER)
         put_text(picture, answer, _ANSWER_PLACE, _PAPER)
         drawn.append(picture)
     height = max(len(picture) for picture in drawn)
     filled = [np.pad(picture, ((0, height - len(picture)), (0, 0), (0, 0))) for picture in drawn]
     return np.hstack(filled)
+
+
+def _with_lines(grey: np.ndarray, lines_px: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return a camera's picture (h, w, 3) at the film's width, with wire and bar drawn in."""
+    scale = _WIDTH_PX / grey.shape[1]
+    size = (_WIDTH_PX, round(scale * grey.shape[0]))
+    small = cv2.resize(as_8_bit(grey), size, interpolation=cv2.INTER_AREA)
+    picture = cv2.cvtColor(small, cv2.COLOR_GRAY2BGR)
+    for name, points_px in lines_px.items():
+        if name in _COLOURS:
+            polyline(picture, scale * (points_px + 0.5) - 0.5, _COLOURS[name])
+    return picture

@@ -163,17 +163,22 @@ def play_trial(
         clock = ProcessorClock if film else WallClock
         for played in recording.play_all(bench, clock, watch=shown.watch if film else None):
             truth = played.truth
-            number = truth.whisk
-            if truth.overlay:
-                picture = last_frame(played.pictures, truth.overlay[max(truth.overlay)])
-                save_picture(picture, out / "live" / f"{name}_{number}.png", hash_of(picture))
+            _save_last_frame(played, out / "live" / f"{name}_{truth.whisk}.png")
             late = f"{played.late_s:.2f} s after the last frame"
             if film:
                 shown.end(played.clock.now_s(), played.pictures, truth, late)
-            yield f"{name}, whisk {number}: {answer(truth)}; {late}", truth.status
+            yield f"{name}, whisk {truth.whisk}: {answer(truth)}; {late}", truth.status
         if film:
             with whole_file(film) as temporary:
                 write_pictures(temporary, iter(shown.pictures), code, FILM_HZ)
+
+
+def _save_last_frame(played: "Played", path: Path) -> None:
+    """Save the last frame of a push with its lines, where these are known."""
+    overlay = played.truth.overlay
+    if overlay:
+        picture = last_frame(played.pictures, overlay[max(overlay)])
+        save_picture(picture, path, hash_of(picture))
 
 
 class PushClock(Protocol):
