@@ -83,7 +83,14 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Run the verb where its results can be trusted. Raise BadInput elsewhere."""
+    """Run the verb where its results can be trusted, with one thread of linear algebra.
+
+    Raise BadInput elsewhere. Several threads that share processors with others take many times as long, and
+    sum in another order.
+    """
+    from bench.base.workers import single_thread
+
+    single_thread()  # before NumPy is imported, which the check of the environment does first
     if options.needs_sound_environment:
         from bench.base.environment import check_environment
 

@@ -148,10 +148,7 @@ def run(options: argparse.Namespace) -> int:
 
     Raise BadInput for a time of --watch that is out of range.
     """
-    from bench.base.workers import single_thread
-
     begin_step(f"reading {options.session}")
-    single_thread()  # before NumPy is imported
     from bench.report.nwb import check_nwb, write_nwb
     from bench.workflows.live_evaluation import watch
     from bench.workflows.session_evaluation import evaluate

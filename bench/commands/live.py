@@ -36,10 +36,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Play the trial, print a line a whisk; return the exit code."""
-    from bench.base.workers import single_thread
-
     begin_step(f"reading {options.session}")
-    single_thread()  # before NumPy is imported
     from bench.workflows.live_push import play_trial
 
     has_status = False

@@ -56,9 +56,6 @@ def run(options: argparse.Namespace) -> int:
     """
     if not options.example:
         begin_step(f"reading {options.what}")
-    from bench.base.workers import single_thread
-
-    single_thread()  # before NumPy is imported
     from bench.plan.run_plan import EXAMPLE, Options, plan
 
     if options.example:

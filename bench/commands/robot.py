@@ -37,10 +37,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write table and figure, print the front; return the exit code."""
-    from bench.base.workers import single_thread
-
     begin_step(f"reading {options.session}")
-    single_thread()  # before NumPy is imported
     from bench.base.settings import Settings
     from bench.workflows.robot_points import trade_lines
     from bench.workflows.robot_trade import robot_trade

@@ -43,10 +43,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write tables and figure, print a sentence a camera; return the exit code."""
-    from bench.base.workers import single_thread
-
     begin_step(f"reading {options.session}")
-    single_thread()  # before NumPy is imported
     from bench.base.settings import Settings
     from bench.workflows.trace_scores import score_traces
 

@@ -45,10 +45,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Time all settings and print the table; return the exit code."""
-    from bench.base.workers import single_thread
-
     begin_step(f"reading {options.session}")
-    single_thread()  # before NumPy is imported
     from bench.base.settings import Settings
     from bench.workflows.seeing_trade import pick_line, tradeoff, tradeoff_lines
 

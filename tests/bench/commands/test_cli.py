@@ -1,5 +1,6 @@
 """The command line: thin, quick, one line for bad input, and the exit codes that scripts rely on."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -82,6 +83,24 @@ def test_a_look_at_a_session_imports_no_solver(small_session):
         "jinja2",
     }
     assert "nothing wrong or doubtful" in said and not heavy & set(said.split())
+
+
+def test_linear_algebra_has_one_thread_before_it_is_loaded(small_session):
+    """A number of threads that is set later counts for nothing: beside another program four times the time."""
+    code = (
+        "import os, sys\n"
+        "class Watch:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'numpy': print('loaded with', os.environ.get('OPENBLAS_NUM_THREADS'))\n"
+        "sys.meta_path.insert(0, Watch())\n"
+        "from bench.commands.cli import main\n"
+        f"main(['check', {str(small_session)!r}])"
+    )
+    environment = {name: value for name, value in os.environ.items() if "THREADS" not in name}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
+    )
+    assert done.stdout.startswith("loaded with 1\n")
 
 
 def test_a_session_is_evaluated_without_loading_what_draws():
