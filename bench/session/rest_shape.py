@@ -118,13 +118,13 @@ def _fit(table: NumberTable, name: str, length_mm: float) -> tuple[RestShape, fl
     arc_mm = _arc_along_chords(points_mm)
     for _ in range(_ROUNDS):
         lateral = [_through_base(arc_mm / length_mm, points_mm[:, k]) for k in (1, 2)]
+        y, z = (tuple(own.coef.tolist()) for own in lateral)
+        if max(steepest_slopes((y, z), length_mm)) > MOST_SLOPE:
+            found = f"the whisker turns by more than {MOST_TURN_DEG:g}° from its base"
+            raise BadInput(f"{found}; such a coil is not evaluated", file=name)
         curve_mm, tangents = _curve(lateral, arc_mm, length_mm)
         off_mm = points_mm - curve_mm
         arc_mm = arc_mm + np.sum(off_mm * tangents, axis=1)
-    y, z = (tuple(own.coef.tolist()) for own in lateral)
-    if max(steepest_slopes((y, z), length_mm)) > MOST_SLOPE:
-        found = f"the whisker turns by more than {MOST_TURN_DEG:g}° from its base"
-        raise BadInput(f"{found}; such a coil is not evaluated", file=name)
     _check_residuals(np.linalg.norm(off_mm, axis=1), table, name, length_mm)
     return (y, z), float(arc_mm[-1])
 

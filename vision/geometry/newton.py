@@ -25,12 +25,16 @@ def descend(
     steps (n,): of the differences. longest (n,): limit of a Newton step. Each step is tried whole
     and in part, by the factors `parts`. Ends when no parameter changes by more than `tolerance`, or
     no part of a step is lower. Returns the minimum (n,), the value there, and the second
-    derivatives (n, n). Raises Refused where it does not converge.
+    derivatives (n, n). Raises Refused where it does not converge, or comes to where the function
+    has no value.
     """
     point = np.asarray(begin, dtype=float)
     value = function(begin)
     for _ in range(_MOST_STEPS):
         slope, curvature = _derivatives(function, point, value, steps)
+        if not np.all(np.isfinite(curvature)):
+            sentence = "a fit to the pictures left the pixels that could determine it"
+            raise Refused(sentence, code="fit_not_converged")
         step = _downhill(slope, curvature, longest)
         trials = [(function(point + step * part), part) for part in parts]
         lower, part = min(trials, key=lambda trial: trial[0])

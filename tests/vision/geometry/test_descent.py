@@ -48,3 +48,11 @@ def test_a_fit_says_whether_it_has_converged():
         found, said = gauss_newton(residuals_of, wide, steps, rounds, 1e6)
         assert said is has_converged
         assert found == pytest.approx(0.5, abs=1e-6)
+
+
+def test_a_descent_to_where_nothing_is_defined_is_refused():
+    """As a fit of edges that shrinks a bar until no pixel is left of it."""
+    shrinking = lambda q: float(q.sum()) if np.all(q > -1.0) else np.nan  # noqa: E731
+    with pytest.raises(Refused) as refused:
+        descend(shrinking, np.zeros(2), STEPS, LONGEST, 1e-3)
+    assert refused.value.code == "fit_not_converged"
