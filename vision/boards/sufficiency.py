@@ -26,12 +26,6 @@ _LEAST_STRENGTH = 0.05
 _STRAY_SHARE = 0.04
 # [px] Or by less than this. Study: tests/vision/calibration/test_calibrate.py.
 _STRAY_PX = 3.0
-# [deg] Below, the foreshortening that separates focal length from distance, 1 − cos, is under
-# 1.5 %. Derived.
-_LEAST_TILT_DEG = 10.0
-# [1] Farthest over nearest corner. Origin not known; the lab's views have 1.76 and 1.86. Study:
-# calibrate cameras, its notes.
-_LEAST_DEPTH_RATIO = 1.15
 # [1] Share of the focal length. Origin not known; the lab's is 0.0003. Study: calibrate cameras,
 # its notes.
 _MOST_FOCAL_SIGMA = 0.02
@@ -135,20 +129,21 @@ def check_lenses(
     views: Mapping[str, Iterable[Corners]],
     pixel_aspects: Mapping[str, float],
 ) -> None:
-    """Raise Refused for what the views do not determine: no tilt, no depth, a lens that diverged.
+    """Raise Refused for a lens that the views do not determine, or one that cannot be.
 
     reports: the `CameraReport` of each camera. pixel_aspects: stated fx/fy by camera.
     """
     for camera, report in zip(cameras, reports):
-        _check_geometry(camera.name, report.tilt_deg, report.depth_ratio)
         corners_px = np.concatenate([view.px for view in views[camera.name]])
         check_lens(camera, _reach(camera, corners_px), pixel_aspects.get(camera.name))
         focal_sigma = report.intrinsics_sigma[0] / camera.lens[0]
         if focal_sigma > _MOST_FOCAL_SIGMA:
             raise Refused(
                 f"camera {camera.name}: the focal length is known to {100 * focal_sigma:.1f} %, "
-                f"{100 * _MOST_FOCAL_SIGMA:.0f} % is allowed: record more views, tilted by 20 to "
-                "45 degrees each way"
+                f"{100 * _MOST_FOCAL_SIGMA:.0f} % is allowed; the board was tilted by up to "
+                f"{report.tilt_deg:.0f} degrees, its farthest corner is {report.depth_ratio:.2f} "
+                "times as far away as its nearest: record more views, tilted by 20 to 45 degrees "
+                "each way, near and far"
             )
 
 
@@ -165,22 +160,6 @@ def check_errors(names: Iterable[str], error_px: Sequence[float]) -> None:
                 "or the focus changed between views: record a stiff board held still, with focus "
                 "and zoom locked"
             )
-
-
-def _check_geometry(name: str, tilt_deg: float, depth_ratio: float) -> None:
-    """Raise Refused for views all square to the camera, or all at one distance."""
-    if tilt_deg < _LEAST_TILT_DEG:
-        raise Refused(
-            f"camera {name}: the board was never tilted by more than {tilt_deg:.0f} degrees, so "
-            "focal length and distance cannot be told apart: record views tilted by 20 to 45 "
-            "degrees to all sides"
-        )
-    if depth_ratio < _LEAST_DEPTH_RATIO:
-        raise Refused(
-            f"camera {name}: the farthest corner is only {depth_ratio:.2f} times as far away as "
-            f"the nearest ({_LEAST_DEPTH_RATIO} is the least): record views nearer to the camera "
-            "and farther away"
-        )
 
 
 def check_lens(

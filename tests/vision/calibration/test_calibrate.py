@@ -238,16 +238,22 @@ def test_too_little_is_refused(recording, rng, spoil, words):
         calibrated(*spoil(*recording.seen(SIGMA_PX, rng)))
 
 
-@pytest.mark.parametrize(
-    "how, words",
-    [
-        ({"tilt_rad": 0.08, "depth": (0.8, 1.25)}, "tilted by"),
-        ({"tilt_rad": 0.19, "depth": (0.99, 1.01)}, "nearer to the camera and farther away"),
-    ],
-)
-def test_views_that_cannot_settle_a_lens_are_refused_with_what_to_record(rng, how, words):
+@pytest.mark.parametrize("how", [{"tilt_rad": 0.02}, {"tilt_rad": 0.19, "depth": (0.99, 1.01)}])
+def test_views_that_hardly_settle_a_lens_give_a_sigma_that_holds(rng, how):
+    recording = a_recording(views=10, **how)
+    made = calibrated(*recording.seen(SIGMA_PX, rng))
+    for camera in made.cameras:
+        own = made.cameras.parameters_of(camera.name)
+        focal_sigma = np.sqrt(made.cameras.covariance[own, own][0, 0])
+        # Nine lenses in 400 are 2.3 sigma off: two of four here are more rarely than once in 300.
+        assert abs(camera.lens[0] - recording.cameras[camera.name].lens[0]) < 2.3 * focal_sigma
+
+
+def test_views_that_do_not_settle_a_lens_are_refused_with_what_to_record(rng):
+    upright = a_recording(views=10, tilt_rad=0.0, depth=(0.99, 1.01))
+    words = "focal length is known to .* %, 2 % is allowed; the board was tilted by up to"
     with pytest.raises(Refused, match=words):
-        calibrated(*a_recording(views=10, **how).seen(SIGMA_PX, rng))
+        calibrated(*upright.seen(0.2, rng))
 
 
 def test_work_outside_all_views_is_refused(recording, rng):
