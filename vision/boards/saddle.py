@@ -34,23 +34,24 @@ _MIN_PIXELS = 40
 _LEAST_CONTRAST = 3.0
 # [grey levels] Sigma of rounding to whole levels, 1/√12. Derived.
 _ROUNDING = 0.3
-# [steps] The fit ends before. Corners are the same with 8 and with 30. Study: thresholds.py
-# boards.saddle _ITERATIONS ….
-_ITERATIONS = 15
+# [steps] The fit ends before: most corners take 8, those as sharp as a pixel up to 40. Study:
+# thresholds.py boards.saddle _ITERATIONS ….
+_ITERATIONS = 50
 # [px] A tenth of a good corner's sigma. moves nothing on the fixtures between 0.0005 and 0.01.
 # Study: thresholds.py boards.saddle _CONVERGED_PX ….
 _CONVERGED_PX = 2e-3
 # [px] Where the fit starts. moves nothing on the fixtures between 0.6 and 2. Study: thresholds.py
 # boards.saddle _FIRST_BLUR_PX ….
 _FIRST_BLUR_PX = 1.0
-# [px] Sharper is a pixel's edge, softer no edge. Origin not known; (0.4, 4) and (0.1, 12) leave
-# the fixtures as they are. Study: thresholds.py boards.saddle _BLUR_LIMITS_PX ….
-_BLUR_LIMITS_PX = (0.2, 8.0)
+# [px] Softer is no edge. Origin not known; 4 and 12 leave the fixtures as they are. Study:
+# thresholds.py boards.saddle _MOST_BLUR_PX ….
+_MOST_BLUR_PX = 8.0
 # [px] How far apart two pixels' noise is still correlated. z of rig corners 1.18, 1.13, 1.15 with
 # 1, 3, 5. Study: thresholds.py boards.saddle LAGS ….
 LAGS = 3
-# [px] Keeps a step of the fit within twice the limits above. Derived.
-_BLUR_SEARCH_PX = (0.1, 20.0)
+# [px] Blurs of the search. The least is a pixel's own aperture, 1/√12: no edge is sharper, and one
+# that were would lie between two pixels' middles at no place of its own. Derived.
+_BLUR_SEARCH_PX = (0.29, 20.0)
 
 # [columns] Of the parameters: the corner. A layout, no threshold.
 PLACE = slice(0, 2)
@@ -235,8 +236,18 @@ class _Fit(NamedTuple):
     gradient: np.ndarray
 
     def step(self, rows: np.ndarray, damping: np.ndarray) -> np.ndarray:
-        """Return Marquardt's step (rows, m) of some corners."""
-        return _solve(self.normal[rows], self.gradient[rows], damping[rows])
+        """Return Marquardt's step (rows, m) of some corners.
+
+        A blur at a limit of the search stays there where its gradient leads beyond.
+        """
+        gradient = self.gradient[rows]
+        least, most = np.log(_BLUR_SEARCH_PX)
+        log_blur = self.p[rows, BLUR]
+        is_free = np.ones(gradient.shape, dtype=bool)
+        is_free[:, BLUR] &= (log_blur > least) | (gradient[:, BLUR] > 0.0)
+        is_free[:, BLUR] &= (log_blur < most) | (gradient[:, BLUR] < 0.0)
+        normal = self.normal[rows] * (is_free[:, :, None] & is_free[:, None, :])
+        return _solve(normal, gradient * is_free, damping[rows])
 
     def accept(self, rows: np.ndarray, trial: "_Fit", is_better: np.ndarray) -> None:
         """Take over the corners that are better in a trial of some corners (rows,), in place."""
@@ -278,8 +289,7 @@ def _is_plausible(saddles: Saddles, px_guess: np.ndarray, frames: np.ndarray) ->
     plausible &= shift_px < np.minimum(_MAX_SHIFT_PX, _MAX_SHIFT_SQUARES * square_px)
     noise = np.maximum(saddles.misfit, _ROUNDING)
     plausible &= np.abs(saddles.contrast) > _LEAST_CONTRAST * noise
-    least_blur_px, most_blur_px = _BLUR_LIMITS_PX
-    return plausible & (saddles.blur_px > least_blur_px) & (saddles.blur_px < most_blur_px)
+    return plausible & (saddles.blur_px < _MOST_BLUR_PX)
 
 
 def _sigma_per_grey(windows: Windows, J: np.ndarray, unit_residual: np.ndarray) -> np.ndarray:

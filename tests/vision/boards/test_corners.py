@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.scenes.board_pictures import picture, true_px
+from tests.scenes.board_pictures import UPRIGHT_H, picture, true_px
 from tests.studies.accuracy.board_scenes import BOARD
 from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import Corners, detect, find_corners, refine_corners
@@ -41,6 +41,16 @@ def test_sigma_is_the_scatter(rng, correlated):
     # 420 values: the ratio scatters by 3.4 %; pixels' noise is taken as separable and alike all over: ± 10 % more.
     assert 0.8 < ratio < 1.2
     assert np.median(np.concatenate(sigmas)) < (0.06 if correlated else 0.03)
+
+
+def test_edges_as_sharp_as_a_pixel_along_its_rows_are_corners(rng):
+    """Between two pixels' middles such an edge has no place of its own, and webcams sharpen theirs."""
+    grey = picture(BOARD, rng, noise=2.0, blur_px=0.0, is_upright=True)
+    found = find_corners(grey, BOARD)
+    assert len(found) == len(BOARD.corners_mm)
+    # The picture looks at the print 4 times a pixel.
+    assert np.abs(found.px - true_px(BOARD, UPRIGHT_H)[found.ids]).max() < 0.125
+    assert found.sigma_px.max() < 0.125
 
 
 def test_an_inverted_print_is_found_only_as_such(rng):
