@@ -1,8 +1,7 @@
 """Felt touch: the motor angle at which the moments leave the level of the free stroke.
 
 Plain arrays over one forward stroke: motor angle (n,) in rad, moments (n,) or (n, 2) in N·mm or
-volts, time (n,) in s. The fit of the rise is here; half height of the rate and the paper's
-threshold are in `estimator.crossing`.
+volts, time (n,) in s.
 """
 
 from dataclasses import dataclass, field
@@ -70,14 +69,12 @@ class Level:
 
 @dataclass(frozen=True)
 class Rise:
-    """The fitted rise: slope (k,) per rad; gain (k,) turns moments above the level into rad past
-    the touch.
+    """The fitted rise: gain (k,) turns moments above the level into rad past the touch.
 
     weights (n,) make the line's value at the touch from the samples; memory describes the noise of
     these.
     """
 
-    slope: np.ndarray
     gain: np.ndarray
     weights: np.ndarray
     memory: noise.Memory
@@ -88,14 +85,12 @@ class FeltTouch:
     """First touch as found in the moments, with its standard deviation; both NaN where status is
     not empty.
 
-    bias_rad: systematic error of the method, not subtracted. level, rise: what the touch was found
-    from.
+    level, rise: what the touch was found from.
     """
 
     motor_rad: float
     sigma_rad: float
     status: str = ""
-    bias_rad: float = 0.0
     level: Level | None = field(default=None, repr=False)
     rise: Rise | None = field(default=None, repr=False)
 
@@ -114,14 +109,11 @@ def felt_touch(
     motor_rad: ArrayLike,
     moments: ArrayLike,
     time_s: ArrayLike | None = None,
-    *,
-    window_rad: float = WINDOW_RAD,
-    guard_rad: float = GUARD_RAD,
 ) -> FeltTouch:
     """Find the touch where a line fitted to the rise of the moments meets the level of the free
     stroke.
 
-    The rise is fitted from guard_rad to window_rad past the touch, and over 60 ms at least where
+    The rise is fitted from GUARD_RAD to WINDOW_RAD past the touch, and over 60 ms at least where
     time_s is given, so that fast strokes average over hum and vibration too. The channels share one
     touch angle, weighted by the inverse of their scatter's covariance: where the whisker sticks and
     slips, the scatter lies along the surface, so that the weight falls on the moment across it,
@@ -136,9 +128,9 @@ def felt_touch(
     status = _coarse_status(motor, samples, used, touch)
     if status:
         return FeltTouch.none(status)
-    window = max(window_rad, speed(motor, time_s) * WINDOW_S)
+    window = max(WINDOW_RAD, speed(motor, time_s) * WINDOW_S)
     for share in (2.0, 1.0, 1.0, 1.0):
-        found = _extrapolate(motor, samples, used, touch, share * window, guard_rad)
+        found = _extrapolate(motor, samples, used, touch, share * window)
         if found.status:
             return found
         touch = found.motor_rad
@@ -262,10 +254,10 @@ def _rises_already(motor, samples, before, after):
     return slope > max(size / 3, 5 * sigma)
 
 
-def _extrapolate(motor, samples, used, touch, window, guard):
+def _extrapolate(motor, samples, used, touch, window):
     """Return the touch of one pass of `felt_touch`, which starts from an earlier touch."""
-    free = used & (motor < touch - guard)
-    rising = used & (motor > touch + guard) & (motor <= touch + window)
+    free = used & (motor < touch - GUARD_RAD)
+    rising = used & (motor > touch + GUARD_RAD) & (motor <= touch + window)
     if np.count_nonzero(free) < MIN_FREE_SAMPLES:
         return FeltTouch.none(NO_FREE_STROKE)
     if np.count_nonzero(rising) < MIN_RISE_SAMPLES:
@@ -292,7 +284,7 @@ def _fit_rise(motor, samples, free, rising, touch, level):
     pull = np.linalg.pinv(covariance, hermitian=True) @ slope
     information = slope @ pull  # 1/rad²
     sigma = 1 / np.sqrt(max(information, noise.TINY))
-    return Rise(slope, pull / information, weights, memory), sigma
+    return Rise(pull / information, weights, memory), sigma
 
 
 def hidden_step_variance(motor: np.ndarray, used: np.ndarray) -> float:

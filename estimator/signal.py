@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator import noise
-from estimator.crossing import threshold_touch, touch_on_rate, zero_phase_lowpass
 from estimator.domain import require_positive
+from estimator.lowpass import zero_phase_lowpass
 from estimator.onset import FeltTouch, columns, felt_touch, speed, usable
 from estimator.reasons import NamedReason
 
@@ -20,8 +20,6 @@ __all__ = [
     "MomentAt",
     "felt_touch",
     "moment_at",
-    "threshold_touch",
-    "touch_on_rate",
     "zero_phase_lowpass",
 ]
 

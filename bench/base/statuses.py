@@ -83,12 +83,6 @@ _TABLE = (
         _PUSH_FARTHER,
     ),
     Status(
-        "threshold_not_crossed",
-        REFUSAL,
-        "never touches: the filtered moment does not cross the threshold",
-        _PUSH_FARTHER,
-    ),
-    Status(
         "starts_touching",
         REFUSAL,
         "touches from the start: fewer than two frames of free stroke",

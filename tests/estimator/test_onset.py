@@ -120,12 +120,13 @@ def test_no_number_where_there_is_no_touch_to_find(stroke, name):
         assert np.isnan([touch.motor_rad, touch.sigma_rad]).all()
 
 
-def test_a_rise_cut_short_or_lost_in_noise_is_told(stroke):
+def test_a_rise_cut_short_or_lost_in_noise_is_told(stroke, monkeypatch):
     """0.07° of a steep rise end within the guard of 0.1°; 20 samples of a faint one leave 0.1° of doubt in 0.2°."""
     s = stroke(np.random.default_rng(0), slopes=(1.0, 1.0), touch=6.93)
     assert felt_touch(*s.arrays).status == onset.SHORT_RISE
     s = stroke(np.random.default_rng(0), slopes=(0.02, 0.02))
-    assert felt_touch(*s.arrays, window_rad=np.radians(0.2)).status == onset.VAGUE
+    monkeypatch.setattr(onset, "WINDOW_RAD", np.radians(0.2))
+    assert felt_touch(*s.arrays).status == onset.VAGUE
 
 
 def test_few_samples_or_a_resting_motor_are_told():

@@ -20,7 +20,7 @@ from estimator.onset import felt_touch
 from estimator.reorientation import next_turn_rad, reoriented
 from estimator.seen_shape import contact_of_shape
 from estimator.sensors import SENSORS
-from estimator.signal import moment_at, threshold_touch, touch_on_rate
+from estimator.signal import moment_at
 from estimator.two_tilts import _Equations, shared_contact
 from estimator.whisk import EstimatorSettings, ObjectMotion, OtherSensors, Whisk
 from tests.scenes.seen_shapes import shown
@@ -347,12 +347,7 @@ def test_touch_and_moments_felt(stroke, unit, seed, vibration):
     for size in (1.0, unit.moment):
         touch = felt_touch(one.motor_rad, size * one.moments, one.time_s)
         at = moment_at(np.radians(3.0), one.motor_rad, size * one.moments, touch, time_s=one.time_s)
-        crossings = [
-            find(one.motor_rad, size * one.moments, one.time_s, 5.0)
-            for find in (threshold_touch, touch_on_rate)
-        ]
         angles = [touch.motor_rad, touch.sigma_rad]
-        angles += [angle for each in crossings for angle in (each.motor_rad, each.sigma_rad)]
         found.append((angles, at.values / size, at.covariance / size**2))
     for first, second in zip(*found):
         same(np.array(first), np.array(second))
