@@ -33,15 +33,6 @@ def gradient_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> np.ndarr
     return _stack(d_x, _inverse(theta), 0.0, -_inverse(m_z), 0.0)
 
 
-def gradient_known_slope(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike
-) -> np.ndarray:
-    """Compute ∂d_x/∂(θ, m_y, m_z, α_est) of (6), the slope taken as exact."""
-    d_x = distance.known_slope(theta, m_y, m_z, beta, C)
-    share = _inverse(np.multiply(m_z, np.cos(beta)) + np.multiply(m_y, np.sin(beta)))
-    return _stack(d_x, _inverse(theta), -np.sin(beta) * share, -np.cos(beta) * share, 0.0)
-
-
 def gradient_with_friction(
     theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, alpha_est: ArrayLike, C: ArrayLike
 ) -> np.ndarray:
@@ -72,23 +63,6 @@ def slip_angle_sigma(m_y: float, m_z: float, covariance: np.ndarray) -> float:
     gradient = np.array([m_z, -m_y]) / (m_y**2 + m_z**2)
     variance = gradient @ covariance @ gradient
     return float(np.sqrt(max(variance, 0.0)))
-
-
-def gradient_cone(
-    theta: ArrayLike,
-    m_y: ArrayLike,
-    m_z: ArrayLike,
-    alpha_est: ArrayLike,
-    C: ArrayLike,
-    length: ArrayLike,
-) -> np.ndarray:
-    """Compute ∂d_x/∂(θ, m_y, m_z, α_est) of the cone: that of (10) times (cone's d_x / cylinder's
-    d_x)².
-    """
-    cylinder = distance.with_friction(theta, m_y, m_z, alpha_est, C)
-    cone = distance.cone(theta, m_y, m_z, alpha_est, C, length)
-    shrink = (cone / cylinder) ** 2
-    return np.asarray(shrink)[..., None] * gradient_with_friction(theta, m_y, m_z, alpha_est, C)
 
 
 @elementwise
@@ -138,57 +112,6 @@ def sigma(
         mixed = np.einsum("...i,...i->...", by_moments, theta_moment_covariance)
         variance = variance + 2 * by_theta * mixed
     return _root(variance)
-
-
-def sigma_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas: ArrayLike) -> Numbers:
-    """Compute the standard deviation of (2), in mm; `sigmas` are the keywords of `sigma`."""
-    return sigma(gradient_no_slip(theta, m_z, C), **sigmas)
-
-
-def sigma_known_slope(
-    theta: ArrayLike,
-    m_y: ArrayLike,
-    m_z: ArrayLike,
-    beta: ArrayLike,
-    C: ArrayLike,
-    **sigmas: ArrayLike,
-) -> Numbers:
-    """Compute the standard deviation of (6), in mm; `sigmas` are the keywords of `sigma`."""
-    return sigma(gradient_known_slope(theta, m_y, m_z, beta, C), **sigmas)
-
-
-def sigma_with_friction(
-    theta: ArrayLike,
-    m_y: ArrayLike,
-    m_z: ArrayLike,
-    alpha_est: ArrayLike,
-    C: ArrayLike,
-    **sigmas: ArrayLike,
-) -> Numbers:
-    """Compute the standard deviation of (10), in mm; `sigmas` are the keywords of `sigma`."""
-    return sigma(gradient_with_friction(theta, m_y, m_z, alpha_est, C), **sigmas)
-
-
-def sigma_frictionless(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, **sigmas: ArrayLike
-) -> Numbers:
-    """Compute the standard deviation of (11), (12), in mm; `sigmas` are the keywords of `sigma`."""
-    return sigma(gradient_frictionless(theta, m_y, m_z, C), **sigmas)
-
-
-def sigma_cone(
-    theta: ArrayLike,
-    m_y: ArrayLike,
-    m_z: ArrayLike,
-    alpha_est: ArrayLike,
-    C: ArrayLike,
-    length: ArrayLike,
-    **sigmas: ArrayLike,
-) -> Numbers:
-    """Compute the standard deviation of the cone's distance, in mm; `sigmas` are the keywords of
-    `sigma`.
-    """
-    return sigma(gradient_cone(theta, m_y, m_z, alpha_est, C, length), **sigmas)
 
 
 def interval_with_friction(

@@ -9,7 +9,7 @@ from estimator import distance, slip, uncertainty
 
 pytestmark = pytest.mark.filterwarnings("error")
 
-C, LENGTH = 8835.7, 100.0
+C = 8835.7
 THETA, ALPHA = np.radians(3.0), np.radians(10.5)
 STEP = 1e-6
 
@@ -21,10 +21,6 @@ def cases():
             lambda t, y, z, a: distance.no_slip(t, z, C),
             lambda t, y, z, a: uncertainty.gradient_no_slip(t, z, C),
         ),
-        "known_slope": (
-            lambda t, y, z, a: distance.known_slope(t, y, z, 0.7, C),
-            lambda t, y, z, a: uncertainty.gradient_known_slope(t, y, z, 0.7, C),
-        ),
         "with_friction": (
             lambda t, y, z, a: distance.with_friction(t, y, z, a, C),
             lambda t, y, z, a: uncertainty.gradient_with_friction(t, y, z, a, C),
@@ -32,10 +28,6 @@ def cases():
         "frictionless": (
             lambda t, y, z, a: distance.frictionless(t, y, z, C),
             lambda t, y, z, a: uncertainty.gradient_frictionless(t, y, z, C),
-        ),
-        "cone": (
-            lambda t, y, z, a: distance.cone(t, y, z, a, C, LENGTH),
-            lambda t, y, z, a: uncertainty.gradient_cone(t, y, z, a, C, LENGTH),
         ),
     }
 
@@ -70,15 +62,13 @@ def test_sensitivities_of_10_in_the_closed_forms(theta, phi, alpha_est):
 
 
 @pytest.mark.parametrize("beta_deg", [0.0, 20.0, 45.0, 70.0])
-@pytest.mark.parametrize(
-    "equation", ["no_slip", "known_slope", "with_friction", "frictionless", "cone"]
-)
+@pytest.mark.parametrize("equation", ["no_slip", "with_friction", "frictionless"])
 def test_predicted_sigma_is_the_sampled_scatter(equation, beta_deg):
     """20000 draws give a scatter good to 1/√40000 = 0.5 %; 0.3 % noise leaves curvature below 1 %; 4 · 0.5 % is 2 %.
 
     Near m_y = 0 the kink of |m_y| is no line, so β is 0 only where the equation has none.
     """
-    if beta_deg == 0 and equation in ("with_friction", "cone"):
+    if beta_deg == 0 and equation == "with_friction":
         beta_deg = 15.0
     rng = np.random.default_rng(42)
     m_y, m_z = slip.moments(60.0, THETA, np.radians(beta_deg), ALPHA, C)
@@ -107,9 +97,10 @@ def test_error_shared_by_angle_and_moment_cancels():
         "covariance": np.diag([0.0, offset_sigma**2]),
         "theta_moment_covariance": [0.0, offset_sigma**2 / rise],
     }
-    assert uncertainty.sigma_no_slip(THETA, m_z, C, **sigmas) == pytest.approx(0.0, abs=1e-6)
+    gradient = uncertainty.gradient_no_slip(THETA, m_z, C)
+    assert uncertainty.sigma(gradient, **sigmas) == pytest.approx(0.0, abs=1e-6)
     del sigmas["theta_moment_covariance"]
-    assert uncertainty.sigma_no_slip(THETA, m_z, C, **sigmas) == pytest.approx(
+    assert uncertainty.sigma(gradient, **sigmas) == pytest.approx(
         np.sqrt(2) * offset_sigma / m_z * distance.no_slip(THETA, m_z, C), rel=1e-12
     )
 
@@ -122,35 +113,13 @@ def test_wrong_modulus_changes_no_distance_where_the_gauges_were_found_with_it()
         factor = stiffness * THETA / 50.0 / volts_at_gauge
         m_y, m_z = factor * volts_y, factor * volts_z
         d_x = distance.with_friction(THETA, m_y, m_z, ALPHA, stiffness)
-        sigma = uncertainty.sigma_with_friction(
-            THETA,
-            m_y,
-            m_z,
-            ALPHA,
-            stiffness,
+        sigma = uncertainty.sigma(
+            uncertainty.gradient_with_friction(THETA, m_y, m_z, ALPHA, stiffness),
             touch_sigma=1e-4,
             covariance=(0.002 * factor) ** 2 * np.eye(2),
         )
         found.append((d_x, sigma))
     np.testing.assert_allclose(found[1], found[0], rtol=16 * 2.0**-52)
-
-
-def test_sigma_functions_are_the_gradients_put_to_use():
-    sigmas = {"touch_sigma": 1e-4, "covariance": 1e-4 * np.eye(2), "alpha_est_sigma": 0.01}
-    pairs = [
-        (
-            uncertainty.sigma_known_slope(THETA, 2.0, 7.0, 0.7, C, **sigmas),
-            cases()["known_slope"][1],
-        ),
-        (
-            uncertainty.sigma_with_friction(THETA, 2.0, 7.0, ALPHA, C, **sigmas),
-            cases()["with_friction"][1],
-        ),
-        (uncertainty.sigma_frictionless(THETA, 2.0, 7.0, C, **sigmas), cases()["frictionless"][1]),
-        (uncertainty.sigma_cone(THETA, 2.0, 7.0, ALPHA, C, LENGTH, **sigmas), cases()["cone"][1]),
-    ]
-    for sigma, gradient in pairs:
-        assert sigma == uncertainty.sigma(gradient(THETA, 2.0, 7.0, ALPHA), **sigmas) > 0
 
 
 def test_friction_doubt_counts_even_where_no_slip_was_felt():
@@ -162,23 +131,22 @@ def test_friction_doubt_counts_even_where_no_slip_was_felt():
 
 
 def test_no_distance_has_no_sigma():
-    assert np.isnan(uncertainty.sigma_with_friction(THETA, 9.0, 1.0, ALPHA, C, touch_sigma=1e-4))
+    gradient = uncertainty.gradient_with_friction(THETA, 9.0, 1.0, ALPHA, C)
+    assert np.isnan(uncertainty.sigma(gradient, touch_sigma=1e-4))
 
 
 def test_arrays_broadcast():
-    m_y = np.array([0.0, 1.0, 2.0])
-    found = uncertainty.sigma_with_friction(
-        THETA, m_y, 7.0, ALPHA, C, touch_sigma=1e-4, covariance=np.eye(2) * 1e-4
-    )
+    sigmas = {"touch_sigma": 1e-4, "covariance": np.eye(2) * 1e-4}
+    gradient = uncertainty.gradient_with_friction(THETA, np.array([0.0, 1.0, 2.0]), 7.0, ALPHA, C)
+    found = uncertainty.sigma(gradient, **sigmas)
     assert found.shape == (3,)
-    assert found[1] == uncertainty.sigma_with_friction(
-        THETA, 1.0, 7.0, ALPHA, C, touch_sigma=1e-4, covariance=np.eye(2) * 1e-4
-    )
+    alone = uncertainty.gradient_with_friction(THETA, 1.0, 7.0, ALPHA, C)
+    assert found[1] == uncertainty.sigma(alone, **sigmas)
 
 
 def test_negative_sigma_is_refused_with_its_name():
     with pytest.raises(ValueError, match="touch_sigma = -1"):
-        uncertainty.sigma_no_slip(THETA, 7.0, C, touch_sigma=-1.0)
+        uncertainty.sigma(uncertainty.gradient_no_slip(THETA, 7.0, C), touch_sigma=-1.0)
 
 
 @pytest.mark.parametrize("alpha_deg", [0.0, 2.0, 10.5])
