@@ -36,24 +36,6 @@ def flexural_rigidity(youngs_modulus_GPa: ArrayLike, diameter_mm: ArrayLike) -> 
     return NMM2_PER_GPA_MM4 * youngs_modulus_GPa * second_moment_of_area(diameter_mm)
 
 
-def diameter_at(
-    arc_mm: ArrayLike, base_diameter_mm: ArrayLike, length_mm: ArrayLike, taper: ArrayLike
-) -> Numbers:
-    """Return the diameter in mm at the arc length `arc_mm` from the base.
-
-    `taper` is the share of the base diameter that is lost up to the tip: 0 for a cylinder, 1 for a
-    cone.
-    """
-    return base_diameter_mm * (1 - taper * arc_mm / length_mm)
-
-
-def rigidity_at(
-    arc_mm: ArrayLike, base_rigidity_Nmm2: ArrayLike, length_mm: ArrayLike, taper: ArrayLike
-) -> Numbers:
-    """Return EI in N·mm² at the arc length `arc_mm`: it goes with the diameter's fourth power."""
-    return base_rigidity_Nmm2 * (1 - taper * arc_mm / length_mm) ** 4
-
-
 def moment_in_EI_per_metre(moment_Nmm: ArrayLike, rigidity_Nmm2: ArrayLike) -> Numbers:
     """Convert a moment to the paper's unit EI/metre: the curvature at the base in 1/m (Fig. 8).
 

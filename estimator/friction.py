@@ -36,6 +36,8 @@ VAGUE = NamedReason(
     "friction_vague", "the data hardly hold the friction angle: its sigma is above 1 rad"
 )
 AT_ZERO = NamedReason("friction_at_zero", "at the bound: the best friction angle is 0")
+# [1] Sigma of a distance by all but friction, as a share of it, in the weight of way 3. Stated.
+_OWN_SHARE = 0.01
 ONE_SIDED = NamedReason(
     "tilts_one_sided",
     "the slip angle does not leave zero on both sides of the tilts: tilt further",
@@ -309,26 +311,25 @@ def _float_or_array(value):
     return float(value) if np.ndim(value) == 0 else value
 
 
-def alpha_from_tilts(tilt: ArrayLike, phi: ArrayLike, *, phi_sigma: ArrayLike = 0.0) -> FrictionFit:
+def alpha_from_tilts(tilt: ArrayLike, phi: ArrayLike) -> FrictionFit:
     """Estimate the friction cone angle from tilts of the whole array about the whisker's x axis.
 
     This is way 1 of section VII. tilt (n,) and the felt slip angles φ (n,), rad. φ follows the tilt
     less α beyond the range of tilts in which it is zero, and that range is 2α wide: two lines of
-    slope one are fitted, and α is half their distance. phi_sigma: standard deviation of one slip
-    angle; 0 takes the scatter about the lines, with Student's t for the interval, which is NaN with
-    two slip angles on the lines. NaN with a status where φ does not leave zero on both sides.
+    slope one are fitted, and α is half their distance. Its sigma is that of the scatter about the
+    lines, with Student's t for the interval, which is NaN with two slip angles on the lines. NaN
+    with a status where φ does not leave zero on both sides.
     """
-    require_sigma("phi_sigma", phi_sigma)
     tilt = np.asarray(tilt, dtype=float)
     phi = np.asarray(phi, dtype=float)
     known = np.isfinite(tilt) & np.isfinite(phi)
     tilt = tilt[known]
     phi = phi[known]
-    band = _dead_band(tilt, phi, phi_sigma)
+    band = _dead_band(tilt, phi)
     if not band.has_both_sides:
         return FrictionFit(np.nan, np.nan, np.nan, np.nan, np.nan, ONE_SIDED)
     squares = (phi - band.slip_angle(tilt)) ** 2
-    sigma, freedom = _sigma_of_band(band, squares, phi_sigma)
+    sigma, freedom = _sigma_of_band(band, squares)
     half_width = stdtrit(freedom, 0.975) * sigma
     return FrictionFit(
         alpha_rad=float(band.alpha),
@@ -374,26 +375,20 @@ class _DeadBand:
         return np.maximum(np.abs(from_middle) - self.alpha, 0.0) * np.sign(from_middle)
 
 
-def _sigma_of_band(band: _DeadBand, squares: np.ndarray, phi_sigma) -> tuple[float, float]:
-    """Return (sigma of α in rad, degrees of freedom) from the squared residuals (n,), or from
-    phi_sigma where it is above 0.
-    """
-    if phi_sigma > 0:
-        freedom = np.inf
-        scatter = phi_sigma
-    else:
-        # Two were fitted: the middle and α.
-        freedom = float(band.below_count + band.above_count - 2)
-        outside = squares[band.below | band.above]
-        scatter = np.sqrt(np.sum(outside) / freedom) if freedom else np.nan
+def _sigma_of_band(band: _DeadBand, squares: np.ndarray) -> tuple[float, float]:
+    """Return (sigma of α in rad, degrees of freedom) from the squared residuals (n,)."""
+    # Two were fitted: the middle and α.
+    freedom = float(band.below_count + band.above_count - 2)
+    outside = squares[band.below | band.above]
+    scatter = np.sqrt(np.sum(outside) / freedom) if freedom else np.nan
     return scatter / 2 * np.sqrt(1 / band.below_count + 1 / band.above_count), freedom
 
 
-def _dead_band(tilt, phi, phi_sigma) -> _DeadBand:
+def _dead_band(tilt, phi) -> _DeadBand:
     """Fit the lines φ = tilt − middle ∓ α to the slip angles on both sides of the range without
     slip.
     """
-    threshold = max(3 * phi_sigma, 0.1 * np.abs(phi).max(initial=0.0))
+    threshold = 0.1 * np.abs(phi).max(initial=0.0)
     below = phi < -threshold
     above = phi > threshold
     middle = np.nan
@@ -411,16 +406,12 @@ def _dead_band(tilt, phi, phi_sigma) -> _DeadBand:
 
 
 @elementwise
-def confidence(
-    phi: ArrayLike,
-    alpha_est: ArrayLike,
-    alpha_est_sigma: ArrayLike,
-    relative_sigma: ArrayLike = 0.01,
-) -> Numbers:
+def confidence(phi: ArrayLike, alpha_est: ArrayLike, alpha_est_sigma: ArrayLike) -> Numbers:
     """Return the weight in (0, 1] of a contact with slip angle φ: less where α matters more.
 
     This is way 3 of section VII: the variance that would be left with α known, over the whole,
-    s² / (s² + (σ_α ∂ln d_x/∂α_est)²), with the distance's own relative sigma s and
+    s² / (s² + (σ_α ∂ln d_x/∂α_est)²), with the distance's own relative sigma s
+    (`_OWN_SHARE`) and
     ∂ln d_x/∂α_est = tan α_est − tan(|φ| + α_est). 0 where φ + α_est ≥ 90°.
 
     >>> confidence(0.0, 0.2, 0.05)
@@ -428,8 +419,7 @@ def confidence(
     """
     require_friction_angle("alpha_est", alpha_est)
     require_sigma("alpha_est_sigma", alpha_est_sigma)
-    require_positive("relative_sigma", relative_sigma, "(a share)")
     slope = np.abs(phi) + alpha_est
-    ratio = alpha_est_sigma * (np.tan(slope) - np.tan(alpha_est)) / relative_sigma
+    ratio = alpha_est_sigma * (np.tan(slope) - np.tan(alpha_est)) / _OWN_SHARE
     weight = np.where(slope < np.pi / 2, 1 / (1 + ratio * ratio), 0.0)
     return np.where(np.isfinite(phi), weight, np.nan)

@@ -40,6 +40,8 @@ AGAINST_THETA = Table(
 )
 # [share] Of an estimator's whisks: a θ that fewer reach is one of other whisks.
 _FEWEST_SHARE = 0.9
+# Lines that the legend explains by what they stand for: see `_explain_lines`.
+_STYLES = 3
 # [°] Labels of the logarithmic axis, as many as stand apart.
 _TICKS_DEG = (0.2, 0.5, 1, 2, 3, 5, 10, 20)
 
@@ -166,7 +168,7 @@ def _draw(rows: Sequence[AtTheta]) -> "Figure":
     farthest_deg = max(row.theta_deg for row in rows)
     axes.set_xticks([tick for tick in _TICKS_DEG if tick <= farthest_deg])
     axes.grid(alpha=0.25, which="major")
-    _add_legend(drawing, axes, 3)
+    _add_legend(drawing, axes)
     return drawing
 
 
@@ -200,15 +202,15 @@ def _draw_estimator(
         axes.plot(least.theta_deg, least.error_rms_percent, "o", ms=size, mfc="none", mec=colour)
 
 
-def _add_legend(drawing: "Figure", axes: "Axes", styles: int) -> None:
-    """Add a column of estimators, and one of what the last lines, `styles` of them, stand for.
+def _add_legend(drawing: "Figure", axes: "Axes") -> None:
+    """Add a column of estimators, and one of what the last lines, `_STYLES` of them, stand for.
 
     The shorter column is filled up with empty entries.
     """
     entries = list(zip(*axes.get_legend_handles_labels()))
     empty = (axes.plot([], [], " ")[0], "")
-    estimators = entries[:-styles]
-    meanings = entries[-styles:]
+    estimators = entries[:-_STYLES]
+    meanings = entries[-_STYLES:]
     missing = len(estimators) - len(meanings)
     filled = [*estimators, *[empty] * -missing, *meanings, *[empty] * missing]
     drawing.legend(*zip(*filled), loc="outside lower center", ncols=2)

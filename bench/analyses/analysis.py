@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from bench.analyses.estimator_accuracy import RunAccuracy
-from bench.base.drawing import is_drawn, name_truth, save, style
+from bench.base.drawing import is_drawn, name_stage, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.settings import Settings
 from bench.base.tables import Table
@@ -123,7 +123,7 @@ class Analysis(ABC):
         """Draw its figure of a run, by a stage's truth with that word; None where it has nothing."""
         figure = self.figure(run.found(self))
         if figure is not None and run.is_by_stage:
-            name_truth(figure, BY_STAGE)
+            name_stage(figure)
         return figure
 
     def caption_of(self, run: EvaluatedRun) -> str:

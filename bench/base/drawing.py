@@ -65,7 +65,6 @@ _PAPER = {
     **{"xtick.labelsize": 7, "ytick.labelsize": 7, "lines.markersize": 4},
     **{"pdf.fonttype": 42, "svg.fonttype": "path"},  # fonts stand in the file, whole or as outlines
 }
-FORMATS = ("png", "pdf", "svg")
 _UNDATED = {
     "png": {"Software": None},
     "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
@@ -183,9 +182,9 @@ def draw_whisks(
     points.set_urls(list(urls))
 
 
-def name_truth(figure: "Figure", source: str) -> None:
-    """Write above a figure where the truth that it shows comes from."""
-    figure.suptitle(f"truth: {source}", x=0.99, ha="right", fontsize=7, color="0.35")
+def name_stage(figure: "Figure") -> None:
+    """Write above a figure that the truth that it shows comes from a stage."""
+    figure.suptitle("truth: stage", x=0.99, ha="right", fontsize=7, color="0.35")
 
 
 def save(figure: "Figure", path: Path, stamp: str, dpi: int = 160) -> None:

@@ -50,16 +50,6 @@ class ClampLoad:
     end_rad: np.ndarray
 
 
-def moment_at_clamp(
-    along_mm: float | np.ndarray,
-    across_mm: float | np.ndarray,
-    rigidity_Nmm2: Callable,
-    friction: float | np.ndarray = 0.0,
-) -> np.ndarray:
-    """Return the size (n,) of the moment at the clamp of rods, N·mm; arguments and errors as of `load_at_clamp`."""
-    return load_at_clamp(along_mm, across_mm, rigidity_Nmm2, friction).moment_Nmm
-
-
 def load_at_clamp(
     along_mm: float | np.ndarray,
     across_mm: float | np.ndarray,

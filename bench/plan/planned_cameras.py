@@ -17,7 +17,7 @@ from vision.geometry import Board, Camera, Cameras, apply, compose
 
 # [px] A corner nearer to the picture's edge is not found. Stated.
 _RIM_PX = 8.0
-_VIEWS, _NOISE = range(2)  # words of the random streams
+_SEED, _VIEWS, _NOISE = 0, 0, 1  # words of the random streams
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class BoardWork:
         return max(self.corner_px.values())
 
 
-def expected_cameras(cameras: Sequence[Camera], work: BoardWork, seed: int = 0) -> Cameras:
+def expected_cameras(cameras: Sequence[Camera], work: BoardWork) -> Cameras:
     """Return the cameras where they are, with the covariance that a calibration states.
 
     Corners of a camera that is not there yet are as uncertain as the worst. Raises Refused where
@@ -59,9 +59,9 @@ def expected_cameras(cameras: Sequence[Camera], work: BoardWork, seed: int = 0) 
     standing = {}
     sizes_px = {}
     for number, camera in enumerate(cameras):
-        rng = np.random.default_rng([seed, _NOISE, number])
+        rng = np.random.default_rng([_SEED, _NOISE, number])
         sigma_px = work.corner_px.get(camera.name, work.largest_corner_px)
-        views = _draw_views(camera, work, np.random.default_rng([seed, _VIEWS, number]))
+        views = _draw_views(camera, work, np.random.default_rng([_SEED, _VIEWS, number]))
         held[camera.name] = [_corners(camera, work.board, pose, sigma_px, rng) for pose in views]
         on_rig = work.on_rig.T_rig_board
         standing[camera.name] = _corners(camera, work.board, on_rig, sigma_px, rng)

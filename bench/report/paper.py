@@ -45,7 +45,7 @@ def session_figures(run: EvaluatedRun) -> list[SessionFigure]:
 def write_paper_figures(out: Path, run: EvaluatedRun, formats: Sequence[str]) -> list[Path]:
     """Write the figures into out/figures, as wide as one column or both of a journal.
 
-    formats: of `drawing.FORMATS`. Returns the paths written.
+    formats: "png", "pdf", "svg". Returns the paths written.
     """
     if not formats:
         return []

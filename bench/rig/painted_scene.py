@@ -33,7 +33,6 @@ _BAR_DOWN_MM = 20.0, 75.0  # least and most of a bar below where it is touched
 _AWAY = np.array([0.0, 1.0, 0.0])  # (3,): from whiskers and cameras
 _ROD_MM, _ROD_RADIUS_MM = 150.0, 2.5  # that holds an object which is no bar, from behind
 _HUB_MARKER, _BLOCK_MARKER = -2, -1  # from the end of the dictionary, where no board's markers are
-_MARKER_MM = 10.0  # side of a marker on hub or block
 _SHADE_MM2 = 9e5  # the floor darkens by half at the root of this from _LIT_X_MM
 _LIT_X_MM = 40.0  # along the rig's x: where the floor is brightest
 _CREASE_MM = 1.5  # over which floor turns into wall
@@ -181,7 +180,7 @@ class Scene:
     def _marker(self, from_end) -> Print:
         """Return the print of a marker by its place from the end of the board's dictionary."""
         number = marker_count(self.board.dictionary) + from_end
-        return marker_print(self.board.dictionary, number, _MARKER_MM, self.appearance.ink)
+        return marker_print(self.board.dictionary, number, self.appearance.ink)
 
     def draw_moving(
         self,

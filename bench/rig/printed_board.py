@@ -8,6 +8,8 @@ import numpy as np
 
 from bench.rig.plate import Print
 
+_MARKER_MM = 10.0  # side of a marker on hub or block
+
 
 @dataclass(frozen=True)
 class Ink:
@@ -89,12 +91,12 @@ def marker_count(dictionary: str) -> int:
     return len(_dictionary(dictionary).bytesList)
 
 
-def marker_print(dictionary: str, number: int, side_mm: float, ink: Ink) -> Print:
+def marker_print(dictionary: str, number: int, ink: Ink) -> Print:
     """Print one marker in a white frame of a seventh of its side, centred on the plate's origin."""
     is_black = _is_black(dictionary, number)
-    edges = np.linspace(-side_mm / 2, side_mm / 2, len(is_black) + 1)
+    edges = np.linspace(-_MARKER_MM / 2, _MARKER_MM / 2, len(is_black) + 1)
     marker = Print(np.where(is_black, ink.black, ink.white), edges, edges)
-    return marker.frame(side_mm / 7, ink.white)
+    return marker.frame(_MARKER_MM / 7, ink.white)
 
 
 def _dictionary(name):

@@ -42,7 +42,6 @@ _STRAIGHT_ENOUGH = 0.002
 def checked_session(
     path: Path | str,
     problems: InputProblems | None = None,
-    trials: Collection[str] | None = None,
     *,
     follow_links: bool = False,
 ) -> Session:
@@ -52,7 +51,7 @@ def checked_session(
     session.toml is.
     """
     problems = problems or InputProblems()
-    session = load_session(path, problems, trials=trials, follow_links=follow_links)
+    session = load_session(path, problems, follow_links=follow_links)
     _check((session,), problems)
     return session
 

@@ -247,7 +247,7 @@ def faults(design: Design, region: Region, equipment: Equipment) -> dict[str, fl
 
 
 def best_design(
-    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment, seed: int = 0
+    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment
 ) -> tuple[Design, float]:
     """Find the design of least worst error within ranges (low, high) of each of NAMES.
 
@@ -256,17 +256,17 @@ def best_design(
     """
     lowest, highest = ranges["taper"]
     if lowest == 0.0 < highest:
-        drawn = _best_of_one_making(ranges | {"taper": (0.0, 0.0)}, region, equipment, seed)
-        ground = _best_of_one_making(ranges, region, equipment, seed)
+        drawn = _best_of_one_making(ranges | {"taper": (0.0, 0.0)}, region, equipment)
+        ground = _best_of_one_making(ranges, region, equipment)
         design = min(drawn, ground, key=lambda one: worst_percent(one, region, equipment))
     else:
-        design = _best_of_one_making(ranges, region, equipment, seed)
+        design = _best_of_one_making(ranges, region, equipment)
     _require_design(design, region, equipment)
     return design, largest_percent(design, region, equipment)
 
 
 def _best_of_one_making(
-    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment, seed: int
+    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment
 ) -> Design:
     """Find the design of least worst error within ranges over which that changes steadily."""
     design = Design(**{name: low for name, (low, _) in ranges.items()})
@@ -278,7 +278,7 @@ def _best_of_one_making(
             return worst_percent(_with_values(design, free, values), region, equipment)
 
         limits = np.array([ranges[name] for name in free])
-        design = _with_values(design, free, _least(worst, limits, seed))
+        design = _with_values(design, free, _least(worst, limits))
     return design
 
 
@@ -292,7 +292,7 @@ def _free(ranges: Mapping[str, tuple[float, float]]) -> list[str]:
     return free
 
 
-def _least(function: Callable, limits: np.ndarray, seed: int) -> np.ndarray:
+def _least(function: Callable, limits: np.ndarray) -> np.ndarray:
     """Return the arguments (n,) of the least value of a function within limits (n, 2).
 
     By differential evolution (Storn & Price, Journal of Global Optimization 11, 1997), then Nelder
@@ -305,7 +305,7 @@ def _least(function: Callable, limits: np.ndarray, seed: int) -> np.ndarray:
     found = differential_evolution(
         function,
         bounds,
-        rng=np.random.default_rng(seed),
+        rng=np.random.default_rng(0),
         maxiter=_GENERATIONS,
         popsize=_POPULATION,
         tol=_TOLERANCE,
@@ -334,7 +334,7 @@ def _require_design(design: Design, region: Region, equipment: Equipment) -> Non
 
 
 def costs_of_paper_values(
-    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment, seed: int = 0
+    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment
 ) -> dict[str, float]:
     """Return the worst error of the best design with the paper's value of each free choice, %.
 
@@ -345,7 +345,7 @@ def costs_of_paper_values(
     for name in count_parts(free, "searches with one value of the paper's", len(free)):
         value = getattr(Design(), name)
         try:
-            _, costs[name] = best_design(ranges | {name: (value, value)}, region, equipment, seed)
+            _, costs[name] = best_design(ranges | {name: (value, value)}, region, equipment)
         except BadInput:
             costs[name] = np.inf
     return costs

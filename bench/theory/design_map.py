@@ -80,18 +80,18 @@ class DesignReport:
 
 
 def find_design(
-    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment, seed: int = 0
+    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment
 ) -> DesignReport:
     """Find the best design within ranges (low, high) of each choice.
 
     Raises BadInput where no design within the ranges serves the region.
     """
-    design, worst = best_design(ranges, region, equipment, seed)
+    design, worst = best_design(ranges, region, equipment)
     corners = region.corners().T
     exact = []
     for corner in count_parts(corners, "corners by exact mechanics", len(corners)):
         exact.append(exact_percent(design, region, equipment, corner))
-    costs = costs_of_paper_values(ranges, region, equipment, seed)
+    costs = costs_of_paper_values(ranges, region, equipment)
     paper = Design()
     is_paper_sound = not faults(paper, region, equipment)
     paper_percent = largest_percent(paper, region, equipment) if is_paper_sound else math.inf

@@ -19,7 +19,7 @@ from bench.base.drawing import (
     colour_of,
     label_logarithmic,
     label_of,
-    name_truth,
+    name_stage,
     nested_size,
     publish,
     style,
@@ -73,7 +73,7 @@ def robot_trade(
     with style():
         figure = draw(points, on_front)
         if points[0].truth_source == BY_STAGE:
-            name_truth(figure, BY_STAGE)
+            name_stage(figure)
         publish(figure, out / FIGURE)
     return points
 

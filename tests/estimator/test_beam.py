@@ -6,10 +6,8 @@ from scipy.integrate import quad
 
 from estimator.beam import (
     Beam,
-    diameter_at,
     flexural_rigidity,
     moment_in_EI_per_metre,
-    rigidity_at,
     second_moment_of_area,
 )
 
@@ -33,20 +31,6 @@ def test_rigidity_and_modulus_make_the_same_beam():
         60.0, 1.0, 100.0, "cone"
     )
     assert Beam.from_rigidity(rigidity, 100.0).rigidity_Nmm2 == pytest.approx(rigidity, rel=1e-15)
-
-
-@pytest.mark.parametrize("taper, tip", [(0.0, 1.0), (0.5, 0.5), (1.0, 0.0)])
-def test_taper_runs_from_base_to_tip(taper, tip):
-    assert diameter_at(0.0, 1.0, 100.0, taper) == 1.0
-    assert diameter_at(100.0, 1.0, 100.0, taper) == tip
-
-
-def test_rigidity_follows_the_local_diameter():
-    arc = np.linspace(0, 90, 7)
-    local = flexural_rigidity(60.0, diameter_at(arc, 1.0, 100.0, 0.8))
-    np.testing.assert_allclose(
-        rigidity_at(arc, flexural_rigidity(60.0, 1.0), 100.0, 0.8), local, rtol=1e-13
-    )
 
 
 def test_unit_of_figure_8():

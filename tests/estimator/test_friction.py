@@ -210,10 +210,7 @@ def test_sigma_from_tilts_is_the_sampled_scatter():
     tilt = np.radians(np.arange(-60, 61, 2.0))
     phi = slip.slip_angle(np.radians(7) + tilt, np.radians(18))
     sigma = np.radians(0.7)
-    fits = [
-        alpha_from_tilts(tilt, phi + sigma * rng.normal(size=tilt.size), phi_sigma=sigma)
-        for _ in range(400)
-    ]
+    fits = [alpha_from_tilts(tilt, phi + sigma * rng.normal(size=tilt.size)) for _ in range(400)]
     scores = [(fit.alpha_rad - np.radians(18)) / fit.sigma_rad for fit in fits]
     assert np.std(scores) == pytest.approx(1.0, abs=0.14)
     assert abs(np.mean(scores)) < 4 / np.sqrt(400)
@@ -247,9 +244,10 @@ def test_weight_is_the_share_of_variance_not_due_to_friction():
     """By its definition, with (10)'s derivative taken by difference."""
     from estimator.distance import with_friction
 
-    phi, alpha, alpha_sigma, own = 0.5, 0.2, 0.03, 0.01
+    phi, alpha, alpha_sigma = 0.5, 0.2, 0.03
+    own = friction._OWN_SHARE
     d_x = [with_friction(0.05, np.sin(phi), np.cos(phi), alpha + step, C) for step in (-1e-6, 1e-6)]
     relative = alpha_sigma * (np.log(d_x[1]) - np.log(d_x[0])) / 2e-6
-    assert confidence(phi, alpha, alpha_sigma, own) == pytest.approx(
+    assert confidence(phi, alpha, alpha_sigma) == pytest.approx(
         own**2 / (own**2 + relative**2), rel=1e-6
     )

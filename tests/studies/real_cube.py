@@ -77,7 +77,7 @@ def by_faces(
         """Return the value at terms (B,) of the body."""
         return of_pair(made.placed_board.faces_at(terms), a, b)
 
-    steps = np.maximum(1e-3 * made.board_sigma, 1e-12)
+    steps = np.maximum(1e-3 * np.sqrt(np.diag(made.board_covariance)), 1e-12)
     gradient = np.empty(len(steps))
     for k, step in enumerate(np.diag(steps)):
         gradient[k] = (value(made.board + step) - value(made.board - step)) / (2.0 * steps[k])

@@ -103,7 +103,7 @@ def _normalise(points: np.ndarray) -> np.ndarray:
     return centred / max(np.sqrt(np.mean(np.sum(centred**2, axis=1))), 1e-12)
 
 
-def check_views(name: str, views: Collection[Corners], board: Board) -> None:
+def check_views(name: str, views: Collection[Corners]) -> None:
     """Raise Refused for a camera with too few views."""
     if len(views) < MIN_VIEWS:
         raise Refused(

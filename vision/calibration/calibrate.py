@@ -115,11 +115,6 @@ class Calibration:
         """Return a state with the board as adjusted."""
         return replace(state, board=self.board, points_mm=self.points_mm)
 
-    @property
-    def board_sigma(self) -> np.ndarray:
-        """Return the standard deviations of the board's terms, (B,), 0 of what is held."""
-        return np.sqrt(np.maximum(np.diag(self.board_covariance), 0.0))
-
 
 def calibrate_cameras(
     views: BoardViews,
@@ -281,7 +276,7 @@ def _alone_of_picture(
     lenses = first_lenses([list(own.values()) for own in usable], board, crops)
     for own, lens in zip(usable, lenses):
         _drop_without_pose(own, board, lens)
-    check_views(" and ".join(names), [view for own in usable for view in own.values()], board)
+    check_views(" and ".join(names), [view for own in usable for view in own.values()])
     for name, own in zip(names, usable):
         _check_sees_board(name, len(own), views.rig.get(name), board, with_rig)
     by_camera = [list(own.values()) for own in usable]

@@ -50,6 +50,8 @@ _MEDIAN_OF = 11
 # [rad] A round that moves bends by less is the last: a hundredth of a millimetre at the tip.
 # Derived.
 _STILL_RAD = 1e-4
+# [rounds] Of the fit at most; it ends where the bend is still. Stated.
+_ROUNDS = 8
 # [rad] Prior sigma of a frame's bend. Set by eye. Study: coverage.py alone.
 _PULL_RAD = 0.2
 # [rad] Prior sigma of its part along the bar where one camera sees it: only friction pushes there.
@@ -272,13 +274,12 @@ def _fit_bend(
     bend: np.ndarray,
     seen: Sequence[LinePoints],
     prior: np.ndarray,
-    rounds: int = 8,
 ) -> np.ndarray:
     """Fit the two components of the bend with Cauchy weights; prior (2, 2): information that it is
     none.
     """
     information = np.concatenate([points.sigma_px for points in seen]) ** -2.0
-    for _ in range(rounds):
+    for _ in range(_ROUNDS):
         residual, jacobian = model.linearise(bend, seen)
         weight = information * cauchy_weights(residual, _CAUCHY_PX)
         normal = jacobian.T @ (weight[:, None] * jacobian) + prior

@@ -44,10 +44,7 @@ class CameraPictures:
 
 
 def line_noise_in_pictures(
-    known: KnownWhisk,
-    pictures: Sequence[CameraPictures],
-    cameras: Cameras,
-    settings: VisionSettings = _USUAL,
+    known: KnownWhisk, pictures: Sequence[CameraPictures], cameras: Cameras
 ) -> dict[str, LineNoise]:
     """Return by camera the noise that is stated of lines in such pictures, their scatter about the
     fit included.
@@ -55,10 +52,10 @@ def line_noise_in_pictures(
     pictures: of each of the cameras, in their order, with frames `known.frames_to_fit`.
     """
     views = [own.view(own.frames) for own in pictures]
-    traced = TracedLines(known.pictured(views, cameras, settings))
+    traced = TracedLines(known.pictured(views, cameras, _USUAL))
     on_wire = traced.wire_points(known.place, last=True)
     noise = {}
-    for name, sigmas_px in _bar_sigmas_px(known, pictures, settings).items():
+    for name, sigmas_px in _bar_sigmas_px(known, pictures).items():
         noise[name] = LineNoise(float("nan"), 0.0, sigmas_px)
     on_bar = PredictedLines(known, cameras, {}, noise).object_points(known.place, last=True)
     seen = []
@@ -68,9 +65,7 @@ def line_noise_in_pictures(
     return line_noise(_with_scatter(known, cameras, seen))
 
 
-def _bar_sigmas_px(
-    known: KnownWhisk, pictures: Sequence[CameraPictures], settings: VisionSettings
-) -> dict[str, np.ndarray]:
+def _bar_sigmas_px(known: KnownWhisk, pictures: Sequence[CameraPictures]) -> dict[str, np.ndarray]:
     """Return by camera side and sigmas (k, 3) of its lines of the bar, as `LineNoise.bar_px`.
 
     The edges take the place of the middle where they locate the bar along the line of sight.
@@ -78,11 +73,11 @@ def _bar_sigmas_px(
     place = known.place
     views = [own.view(dict.fromkeys(place.curves, own.with_bar)) for own in pictures]
     wires_px = {view.camera.name: place.wire_px(view.camera) for view in views}
-    lines = _bar_middles(known, views, wires_px, settings)
+    lines = _bar_middles(known, views, wires_px, _USUAL)
     edges = {}
     if _needs_edges(known, views, lines):
         shown = [view for view in views if view.camera.name in lines]
-        edges = _bar_edges(known, shown, wires_px, settings)
+        edges = _bar_edges(known, shown, wires_px, _USUAL)
     found = {}
     for name in wires_px:
         points = edges.get(name) or {}  # by side of the bar

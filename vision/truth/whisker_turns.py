@@ -47,18 +47,14 @@ class WhiskerAngles:
 
 
 def whisker_angles(
-    pictures: TrialPictures,
-    stroke: slice,
-    cameras: Cameras,
-    rods: Rods,
-    settings: VisionSettings = _USUAL,
+    pictures: TrialPictures, stroke: slice, cameras: Cameras, rods: Rods
 ) -> WhiskerAngles:
     """Return the angles of the whisker's base in the frames of one stroke.
 
     pictures: with coarse motor angles. stroke: of frame indices. Raises Refused where no pass sees
     the wire from free to bent, or the angles do not converge.
     """
-    observe = partial(observe_trial, whisks=[stroke], cameras=cameras, rods=rods, settings=settings)
+    observe = partial(observe_trial, whisks=[stroke], cameras=cameras, rods=rods, settings=_USUAL)
     pictures, truth = _first_seen(pictures, stroke, observe)
     for _ in range(_PASSES):
         turns = truth.turns

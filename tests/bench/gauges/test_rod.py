@@ -10,13 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from bench.gauges.clamped_rod import load_at_clamp, moment_at_clamp
+from bench.gauges.clamped_rod import load_at_clamp
 
 EI = 2945.2431  # N·mm²: 60 GPa, 1 mm
 
 
 def uniform(arc):
     return EI + 0.0 * arc
+
+
+def moment_at_clamp(*rod):
+    return load_at_clamp(*rod).moment_Nmm
 
 
 def elastica(end_angle: float, friction: float) -> tuple[float, float]:

@@ -19,7 +19,7 @@ import tomli_w
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench import api
-from bench.gauges.clamped_rod import moment_at_clamp
+from bench.gauges.clamped_rod import load_at_clamp
 from bench.rig import protocol
 from bench.rig.simulation import simulate
 from bench.session.session import load_session
@@ -74,8 +74,8 @@ def clamp(_folder: Path) -> Iterator[str]:
     theta = np.radians(8.0)
     at = 60.0 * np.array([np.cos(theta), np.sin(theta)])
     for rigidity in (100.0, 50.0, 10.0, 0.26):
-        moment = moment_at_clamp(*at, lambda arc, EI=rigidity: EI + 0.0 * arc)[0]
-        yield f"EI {rigidity:g}: {moment * 60.0 / (3 * rigidity * theta):.9f}"
+        load = load_at_clamp(*at, lambda arc, EI=rigidity: EI + 0.0 * arc)
+        yield f"EI {rigidity:g}: {load.moment_Nmm[0] * 60.0 / (3 * rigidity * theta):.9f}"
 
 
 def entered(folder: Path) -> Iterator[str]:

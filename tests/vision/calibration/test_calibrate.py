@@ -164,7 +164,7 @@ def test_a_stretched_print_is_found_within_its_sigma_and_named(stretched, rng):
     z = []
     for _ in range(6):
         made = calibrated(*stretched.seen(SIGMA_PX, rng), board=unsure)
-        z.append((made.board[1] - STRETCH) / made.board_sigma[1])
+        z.append((made.board[1] - STRETCH) / np.sqrt(made.board_covariance[1, 1]))
         assert made.warnings[0].codes == ("board_stretched",)
         assert any("longer along y than along x by +0." in note for note in made.notes)
     # chi² of six Gaussian draws lies between these in 99.8 of 100 cases.
@@ -207,7 +207,7 @@ def test_an_upright_board_leaves_its_stretch_as_unsure_as_stated(rng):
     upright = a_recording(views=10, tilt_rad=0.2, spin_rad=0.0, printed_mm=STRETCHED_MM)
     boards, rig = upright.seen(SIGMA_PX, rng)
     made = calibrated(boards, rig, board=replace(BOARD, stretch_sigma=0.001))
-    assert made.board_sigma[1] > 0.0008 and not made.warnings
+    assert np.sqrt(made.board_covariance[1, 1]) > 0.0008 and not made.warnings
 
 
 def test_a_camera_that_stands_still_before_a_stretched_board_has_not_moved(stretched, rng):
