@@ -60,7 +60,7 @@ def _with_zero_of_forces(touch, motor, samples, free, drift):
         level = replace(level, drift=drift)
     no_gain = np.zeros(samples.shape[1])  # the forces have no part in the touch
     memory = noise.Memory.of(motor, samples, free)
-    return replace(touch, level=level, rise=Rise(no_gain, no_gain, np.zeros(len(motor)), memory))
+    return replace(touch, level=level, rise=Rise(no_gain, np.zeros(len(motor)), memory))
 
 
 def rate_at(
