@@ -25,7 +25,6 @@ from vision import Value
 _SURE_SIGMAS = 3.0
 UNKNOWN = (np.nan, np.nan)
 BY_MANIFEST = "manifest"
-BETA_BY_HAND_RAD = np.radians(1.0)  # one sigma of a slope set by hand, where no picture shows it
 
 
 @dataclass(frozen=True)
@@ -134,7 +133,7 @@ def _slope(trial: TrialFacts, seen: SeenWhisk) -> tuple[Value, str]:
     if np.isfinite(seen.beta_rad.value):
         return seen.beta_rad, seen.source
     stated_rad = float(np.radians(trial.beta_nominal_deg))
-    return Value(stated_rad, BETA_BY_HAND_RAD), BY_MANIFEST
+    return Value(stated_rad, trial.beta_nominal_sigma_rad), BY_MANIFEST
 
 
 def _common_slope(seen: SeenWhisk) -> float:

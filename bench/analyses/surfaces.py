@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bench.analyses.alphas import BETA_BY_HAND_RAD
 from bench.analyses.pooling import by_slope, column, measured, panel_title
 from bench.analyses.theory_left import as_theory_has_them
 from bench.base.combined import add_common, student_factor
@@ -173,7 +172,7 @@ def _felt(recording: int, result: TrialResult, seen: SeenWhisk, felt: FeltWhisk)
         trial=trial.name,
         whisk=seen.whisk,
         shared_Nmm=felt.shared_Nmm,
-        beta_sigma_rad=BETA_BY_HAND_RAD if nominal else seen.beta_rad.sigma,
+        beta_sigma_rad=trial.beta_nominal_sigma_rad if nominal else seen.beta_rad.sigma,
         reach_mm=0.5
         * (trial.bar_diameter_mm + result.whisker.diameter_mm * result.whisker.left(d_x_mm)),
     )

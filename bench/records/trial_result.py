@@ -20,7 +20,10 @@ BY_STAGE = "stage"
 
 @dataclass(frozen=True)
 class TrialFacts:
-    """Facts of a trial from its manifest."""
+    """Facts of a trial from its manifest.
+
+    beta_nominal_sigma_rad: as stated, else that of a slope set by hand (`nominal_slope`).
+    """
 
     name: str
     purpose: str
@@ -29,6 +32,7 @@ class TrialFacts:
     d_x_nominal_mm: float = NAN
     beta_nominal_deg: float = NAN
     bar_diameter_mm: float = NAN
+    beta_nominal_sigma_rad: float = NAN
     angle_from: str = "log"
 
     @property

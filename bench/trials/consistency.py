@@ -22,7 +22,7 @@ from bench.trials.differences import (
 from vision import UNKNOWN, Turns, Value, combine_widths
 from vision.geometry import NO_REASON, Board, Reason, counted
 
-# Of a nominal slope that states no sigma: a bar set by eye and a protractor, written in steps of 5°.
+# [rad] Of a nominal slope that states no sigma: a bar set by eye and a protractor, written in steps of 5°. Stated.
 _NOMINAL_SLOPE_SIGMA_RAD = np.radians(3.0)
 # A whisker leans on a bar within its friction angle of the bar's normal. μ = 1 is more than rubber or coarse sandpaper
 # does to metal or plastic; the paper's is 0.43 (Fig. 8, sandpaper).

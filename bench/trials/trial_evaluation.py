@@ -8,6 +8,7 @@ from bench.base.results import read_result, write_result
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import SeenTrial, TrialFacts, TrialResult, WhiskerFacts
 from bench.session.signals import Signals, read_signals
+from bench.trials.consistency import nominal_slope
 from bench.trials.contradictions import contradicted
 from bench.trials.felt_trial import feel_trial
 from bench.trials.object_motion import MOVING
@@ -74,13 +75,22 @@ def trial_result(unit: Unit) -> TrialResult:
 def trial_facts(unit: Unit) -> TrialFacts:
     """Return the facts of the trial; numbers that the manifest does not state are NaN."""
     trial = unit.trial
-    numbers = []
-    for stated in (trial.d_x_mm, trial.beta_deg, trial.bar_diameter_mm):
-        numbers.append(NAN if stated is None else float(stated))
-    purpose = trial.purpose if trial.object_velocity_mm_s is None else MOVING
     return TrialFacts(
-        trial.name, purpose, trial.surface, trial.speed_deg_s, *numbers, trial.angle_from
+        trial.name,
+        trial.purpose if trial.object_velocity_mm_s is None else MOVING,
+        trial.surface,
+        trial.speed_deg_s,
+        d_x_nominal_mm=_or_nan(trial.d_x_mm),
+        beta_nominal_deg=_or_nan(trial.beta_deg),
+        bar_diameter_mm=_or_nan(trial.bar_diameter_mm),
+        beta_nominal_sigma_rad=nominal_slope(trial).sigma,
+        angle_from=trial.angle_from,
     )
+
+
+def _or_nan(stated: float | None) -> float:
+    """Return a stated number; NaN of one that is not stated."""
+    return NAN if stated is None else float(stated)
 
 
 def whisker_facts(unit: Unit) -> WhiskerFacts:

@@ -105,7 +105,8 @@ def result(beta_deg, d_x=60.0, *, alpha=ALPHA, name=None, nominal_mm=60.0) -> Tr
         "speed_deg_s": 10.0,
         "purpose": "measure",
     }
-    trial |= {"beta_nominal_deg": beta_deg, "d_x_nominal_mm": nominal_mm}
+    trial |= {"beta_nominal_deg": beta_deg, "beta_nominal_sigma_rad": np.radians(3.0)}
+    trial |= {"d_x_nominal_mm": nominal_mm}
     whole = {
         "trial": trial,
         "whisker": vars(WHISKER_FACTS),

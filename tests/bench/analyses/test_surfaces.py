@@ -49,6 +49,7 @@ def result(
         "speed_deg_s": speed,
         "purpose": purpose,
         "beta_nominal_deg": beta_deg,
+        "beta_nominal_sigma_rad": np.radians(3.0),
         "d_x_nominal_mm": d_x,
     }
     whisker = {"shape": "cylinder", "length_mm": 100.0, "diameter_mm": 1.0, "EI_Nmm2": C / 3}

@@ -46,6 +46,7 @@ def run(tmp_path):
                 "speed_deg_s": 10.0,
             }
             trial |= {"d_x_nominal_mm": d_x_mm, "beta_nominal_deg": float(beta)}
+            trial["beta_nominal_sigma_rad"] = np.radians(3.0)
             codes = [["no_pictures", "no pictures"]]
             seen = {"status": "no pictures", "status_codes": codes}
             result = {

@@ -129,6 +129,7 @@ class DrawnSession:
                     None,
                     d_x_nominal_mm=nominal_mm,
                     beta_nominal_deg=float(beta_deg),
+                    beta_nominal_sigma_rad=SLOPE_RAD,
                     bar_diameter_mm=2 * BAR_RADIUS_MM,
                 )
                 yield self._result(facts, np.radians(speed))
