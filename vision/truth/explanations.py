@@ -82,8 +82,6 @@ def best_explanation(first: Explanation) -> Explanation:
 
     Raises Refused where both explain them equally well.
     """
-    if not _may_be_asked(first.whisk):
-        return first
     best = first
     for _ in range(_MOST_FITS):
         other = _better(best)
@@ -106,35 +104,46 @@ def unexplained(fit: Explanation) -> Reason:
 
     Another place explains the pictures better, or the fit ended far from its beginning.
     """
-    if not _may_be_asked(fit.whisk):
+    question = _question(fit)
+    if question is None:
         return NO_REASON
-    question = fit.question()
-    if len(question.bands) < len(fit.whisk.views):
-        return NO_REASON
-    place = question.best()
-    if _is_better(question, place, fit.axis, _SURE_SIGMAS):
+    place = _better_place(question, fit)
+    if place is not None:
         return _unexplained(question, place, fit.axis)
     return _unconverged(question, fit)
 
 
-def _may_be_asked(whisk: WhiskPictures) -> bool:
-    """Return whether the bar is straight, stands, and is seen before a known background."""
+def _question(fit: Explanation) -> BarQuestion | None:
+    """Return the question about a fit; None where pictures cannot answer it.
+
+    They can where the bar is straight, stands, and every camera sees it before a known background:
+    a fit that reads a bar where a camera sees none could be worse.
+    """
+    whisk = fit.whisk
     is_straight = isinstance(whisk.bar.axis, BarAxis)
     is_known = all(np.any(view.background) for view in whisk.views)
-    return is_straight and is_known and whisk.motion is None
+    if not (is_straight and is_known and whisk.motion is None):
+        return None
+    question = fit.question()
+    return question if len(question.bands) == len(whisk.views) else None
+
+
+def _better_place(question: BarQuestion, fit: Explanation) -> BarAxis | None:
+    """Return the place that surely explains the pictures better than a fit does; None without one."""
+    place = question.best()
+    return place if _is_better(question, place, fit.axis, _SURE_SIGMAS) else None
 
 
 def _better(fit: Explanation) -> Explanation:
     """Return the fit from a better place where that explains the pictures better, else this one.
 
-    Where a camera does not see the bar, the fit stays: one that reads a bar there could be worse.
     Raises Refused where both explain them equally well.
     """
-    question = fit.question()
-    if len(question.bands) < len(fit.whisk.views):
+    question = _question(fit)
+    if question is None:
         return fit
-    place = question.best()
-    if _is_better(question, place, fit.axis, _SURE_SIGMAS):
+    place = _better_place(question, fit)
+    if place is not None:
         return _better_from(place, fit, question)
     if question.apart_px(fit.whisk.bar.axis, fit.axis) > _APART_PX:
         return _converged(fit, question)
