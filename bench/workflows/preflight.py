@@ -1,6 +1,6 @@
 """`whisker-bench check`: all that `evaluate` would refuse or warn of and that is found within seconds.
 
-Files are read whole; of pictures a few are evaluated: two of each board series, five of each trial.
+Files are read whole; of pictures some are evaluated: those of the board that calibrate the cameras, five of each trial.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,16 +10,16 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
-from bench.base.progress import begin_step, count_parts
+from bench.base.progress import count_parts
 from bench.base.settings import Settings
-from bench.base.threads import in_threads
+from bench.cameras.calibration_check import check_calibration
 from bench.cameras.measured_place import contradiction, place_line
 from bench.gauges.felt import FeltStroke, strokes_of
 from bench.gauges.fit import RECORD, in_two_directions
 from bench.gauges.gauge_faults import check_alive
 from bench.gauges.gauges_file import given_gauges
 from bench.session.abilities import ability_lines
-from bench.session.footage import frame_count, read_frames, rig_picture
+from bench.session.footage import rig_picture
 from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
 from bench.session.given_lines import assumed_line
 from bench.session.session import Session
@@ -30,18 +30,10 @@ from bench.session.whisker import Whisker
 from bench.trials.moment_size import check_moment_size
 from bench.trials.still_scene import evenly_exposed, other_scene
 from vision import FEWEST_FREE
-from vision.boards import (
-    MIN_CORNERS,
-    MIN_VIEWS,
-    estimate_optics,
-    find_corners,
-    fixes_pose,
-)
+from vision.boards import estimate_optics
 from vision.geometry import Board, counted
 from vision.pictures import PicturePart
 
-# [1] Pictures of a board series that are searched: a board that is in none of them is in few. Stated.
-_BOARD_PICTURES = 2
 # [1] Frames of a trial whose exposure and scene are compared. Stated.
 _SCENE_FRAMES = 5
 # [px] Largest blur (sigma) of a board's edges: lenses in focus have 0.6 to 1.2; from 2 on the small
@@ -63,6 +55,7 @@ def check(path: Path, *, follow_links: bool = False) -> int:
         views = checked_views(path, problems, follow_links=follow_links)
         session = views[0]
         find_damage(session, problems)
+        check_cameras(session.whole or session, problems)
         for view in views:
             check_contents(view, problems)
         assumed = assumed_line(views)
@@ -96,16 +89,13 @@ def _print_problems(problems: InputProblems) -> None:
 
 
 def check_contents(session: Session, problems: InputProblems) -> None:
-    """Check boards, gauges, strokes, frames and scene of a session whose files are sound.
+    """Check gauges, strokes, frames and scene of a session whose files are sound.
 
     What is found is added to `problems`.
     """
     disagreement = contradiction(session)
     if disagreement is not None:
         problems.warn(disagreement)
-    if session.cameras_toml is None and session.board is not None:
-        with problems.guard():  # one board for all cameras: its first fault is enough
-            _check_boards(session, session.board, problems)
     if session.whisker is not None:
         with problems.guard():
             given_gauges(session)
@@ -121,14 +111,20 @@ def check_contents(session: Session, problems: InputProblems) -> None:
         )
 
 
-def _check_boards(session: Session, board: Board, problems: InputProblems) -> None:
-    """Check each camera's pictures of the board, and of the board on the rig. Raise BadInput."""
-    for name, source in session.board_sources.items():
-        begin_step(f"board of camera {name}")
-        _check_board_views(source, board, session.board_place(name), session.mirrored(name))
-        picture = session.rig_pictures.get(name)
-        if picture is not None:
-            _check_rig_board(picture, board, problems)
+def check_cameras(session: Session, problems: InputProblems) -> None:
+    """Calibrate the cameras by pictures of the board, where the session brings no cameras along.
+
+    What is found is added to `problems`.
+    """
+    has_pictures = session.has_pictures or bool(session.board_sources)
+    if session.cameras_toml is not None or not has_pictures:
+        return
+    with problems.guard():
+        for warning in check_calibration(session):
+            problems.warn(warning)
+    for picture in session.rig_pictures.values():
+        with problems.guard():
+            _check_rig_board(picture, session.board, problems)
 
 
 def _check_trials(
@@ -215,43 +211,13 @@ def _spread(count: int, wanted: int) -> list[int]:
     return np.unique(np.linspace(0, count - 1, wanted).astype(int)).tolist()
 
 
-def _check_board_views(
-    source: Path | PicturePart, board: Board, place: str, mirrored: bool
-) -> None:
-    """Raise BadInput where a camera has too few views, or its board is not found as entered.
-
-    place: how messages name them. mirrored: whether it is seen in a mirror.
-    """
-    count = frame_count(source)
-    if count < MIN_VIEWS:
-        few = f"has {counted(count, 'view')}, {MIN_VIEWS} are the least and 15 are good"
-        raise BadInput(few, file=place)
-    frames = read_frames(source, _spread(count, _BOARD_PICTURES))
-    greys = [grey for grey in frames.values() if grey is not None]
-    if not any(in_threads(lambda grey: _shows_board(grey, board), greys)):
-        none = f"the board is found in none of {counted(len(greys), 'picture')}"
-        raise BadInput(board.why_not_found(greys, mirrored=mirrored) or none, file=place)
-
-
 def _check_rig_board(picture: Path | PicturePart, board: Board, problems: InputProblems) -> None:
-    """Add a warning where a camera's picture of the board on the rig is blurred.
-
-    Raise BadInput where the board is not in it.
-    """
-    place = f"boards/rig/{picture.name}"
-    grey = rig_picture(picture)
-    if len(find_corners(grey, board)) < MIN_CORNERS:
-        hint = "the board must stand in view of every camera"
-        raise BadInput(f"the board on the rig is not seen; {hint}", file=place)
-    blur_px = estimate_optics(grey, board).blur_px
+    """Add a warning where a camera's picture of the board on the rig is blurred. Raise BadInput."""
+    blur_px = estimate_optics(rig_picture(picture), board).blur_px
     if blur_px > _LARGEST_BLUR_PX:
         blurred = f"edges are blurred by {blur_px:.1f} px, {_LARGEST_BLUR_PX:g} is a lot"
-        problems.warn(f"{place}: {blurred}: focus on the whisker, or let the camera rest")
-
-
-def _shows_board(grey: np.ndarray, board: Board) -> bool:
-    """Return whether a picture shows enough corners of the board for its pose."""
-    return fixes_pose(find_corners(grey, board), board)
+        cure = "focus on the whisker, or let the camera rest"
+        problems.warn(f"boards/rig/{picture.name}: {blurred}: {cure}")
 
 
 def _gauge_warnings(strokes: Sequence[FeltStroke]) -> Iterator[str]:

@@ -14,7 +14,7 @@ NAMES = {
     "charuco": ("CharucoBoard",),
     "checkerboard": ("Checkerboard",),
     "circle_grid": ("AsymmetricCircles", "CircleGrid"),
-    "corners": ("Corners", "MIN_CORNERS", "find_corners", "refine_corners"),
+    "corners": ("Corners", "find_corners", "refine_corners"),
     "other_markers": ("find_other_markers",),
     "static_board": ("camera_moved",),
     "sufficiency": ("MIN_VIEWS", "fixes_pose"),

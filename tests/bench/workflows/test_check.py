@@ -8,18 +8,22 @@ import numpy as np
 import pytest
 
 from bench.base.input_problems import InputProblems
+from bench.cameras import calibration_check
+from bench.cameras.board_views import ALL_VIEWS
+from bench.cameras.calibration_check import check_calibration
 from bench.session.frame_times import FrameTimes
+from bench.session.session import load_session
 from bench.session.session_check import checked_session
-from bench.workflows.preflight import check_contents
+from bench.workflows.preflight import check_cameras, check_contents
 from tests.scenes.faults import FAULTS, TRIAL, change_picture
 
 
 def found(folder, *, boards=False) -> InputProblems:
-    """What a look ahead says of a session; boards only where asked, which takes a second."""
+    """What a look ahead says of a session; of its boards only where asked, which takes some seconds."""
     problems = InputProblems(stop_at_first=False)
     session = checked_session(folder, problems)
-    if not boards:
-        session.board_sources.clear()
+    if boards:
+        check_cameras(session, problems)
     check_contents(session, problems)
     return problems
 
@@ -92,30 +96,27 @@ def test_signals_of_another_trial(small_copy):
     assert said in found(small_copy).warnings
 
 
-DICTIONARY = 'is not found, but one with dictionary = "DICT_5X5_50" is'
-
-
 @pytest.mark.parametrize(
     ("fault", "expected"),
     [
-        pytest.param("wrong dictionary", DICTIONARY, marks=pytest.mark.slow),
-        ("wrong squares", "not laid out as on a board of 7 x 5 squares"),
+        ("lens boards exchanged, unsaid", "boards/high and boards/low are exchanged"),
+        ("rig board hidden", "camera low: 0 corners of the board on the rig are seen"),
     ],
 )
-def test_a_board_that_is_not_the_one_entered(small_copy, fault, expected):
+def test_boards_that_calibrate_no_cameras(small_copy, fault, expected):
     FAULTS[fault](small_copy)
-    refusals = found(small_copy, boards=True).refusals
-    assert len(refusals) == 1
-    assert refusals[0].startswith("boards/high: ") and expected in refusals[0]
+    (refusal,) = found(small_copy, boards=True).refusals
+    assert refusal.startswith(f"boards: {expected}")
 
 
-def test_too_few_views_of_the_board(small_copy):
-    for picture in sorted((small_copy / "boards" / "low").iterdir())[3:]:
-        picture.unlink()
-    assert (
-        "boards/low: has 3 views, 5 are the least and 15 are good"
-        in found(small_copy, boards=True).refusals
-    )
+@pytest.mark.parametrize("of_all", [[], ["a warning"]])
+def test_what_some_frames_of_a_board_tell_is_asked_of_all(small_session, monkeypatch, of_all):
+    def warnings(session, counts):
+        return of_all if counts.board_frames == ALL_VIEWS.board_frames else ["another"]
+
+    monkeypatch.setattr(calibration_check, "_warnings", warnings)
+    monkeypatch.setattr(calibration_check, "frame_count", lambda source: 100)
+    assert check_calibration(load_session(small_session)) == of_all
 
 
 def test_gauge_trials_that_push_in_one_direction(small_copy):
@@ -124,13 +125,6 @@ def test_gauge_trials_that_push_in_one_direction(small_copy):
     assert note.startswith(
         "trials: the gauge trials push in one direction, which does not fix both channels; record"
     )
-
-
-def test_a_rig_board_that_is_hidden(small_copy):
-    FAULTS["rig board hidden"](small_copy)
-    assert found(small_copy, boards=True).refusals == [
-        "boards/rig/low.png: the board on the rig is not seen; the board must stand in view of every camera"
-    ]
 
 
 @pytest.mark.parametrize("boards", [True, False])  # without, as where cameras are brought along
