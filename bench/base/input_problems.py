@@ -27,12 +27,14 @@ def in_one_status(*said: str | None) -> Reason:
 class InputProblems:
     """Refusals (bad input) and warnings (usable, but to be checked), in the order in which they were found.
 
-    trials_of: names of the trials that a warning is about, where it is not about the whole session.
+    notes: what was found and does no harm. trials_of: names of the trials that a warning is about, where it is not
+    about the whole session.
     """
 
     stop_at_first: bool = True
     refusals: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     trials_of: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     @contextmanager

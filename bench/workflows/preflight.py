@@ -28,6 +28,7 @@ from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.moment_size import check_moment_size
+from bench.trials.of_session import trials_with_whisks
 from bench.trials.still_scene import evenly_exposed, other_scene
 from vision import FEWEST_FREE
 from vision.boards import estimate_optics
@@ -58,6 +59,9 @@ def check(path: Path, *, follow_links: bool = False) -> int:
         check_cameras(session.whole or session, problems)
         for view in views:
             check_contents(view, problems)
+            if view.trials:
+                with problems.guard():
+                    trials_with_whisks(view)
         assumed = assumed_line(views)
         if session.has_pictures:
             placed = place_line(session)
@@ -81,11 +85,13 @@ def check(path: Path, *, follow_links: bool = False) -> int:
 
 
 def _print_problems(problems: InputProblems) -> None:
-    """Print each refusal, then each warning, once."""
+    """Print each refusal, then each warning and note, once."""
     for line in dict.fromkeys(problems.refusals):
         print(f"bad: {line}")
     for line in dict.fromkeys(problems.warnings):
         print(f"doubtful: {line}")
+    for line in problems.notes:
+        print(f"note: {line}")
 
 
 def check_contents(session: Session, problems: InputProblems) -> None:
@@ -183,12 +189,14 @@ def _check_trial(
     rig: dict[str, np.ndarray],
     problems: InputProblems,
 ) -> None:
-    """Add the warnings of a trial to `problems`. rig: pictures of the rig, by camera. Raise
+    """Add warnings and notes of a trial to `problems`. rig: pictures of the rig, by camera. Raise
     BadInput."""
     times = frame_times(trial)
+    frames = [times.frames_in(signals, where) for where in forward_strokes(signals)]
+    problems.notes += [f"{trial.place}: {line}" for line in dropped(times, frames)]
     lines = [
         *_gauge_warnings(strokes),
-        *_stroke_warnings(signals, strokes, times),
+        *_stroke_warnings(signals, strokes, times, frames),
         *_scene_warnings(trial, times, rig),
     ]
     for line in lines:
@@ -236,14 +244,15 @@ def _gauge_warnings(strokes: Sequence[FeltStroke]) -> Iterator[str]:
 
 
 def _stroke_warnings(
-    signals: Signals, strokes: Sequence[FeltStroke], times: FrameTimes
+    signals: Signals,
+    strokes: Sequence[FeltStroke],
+    times: FrameTimes,
+    frames: Sequence[slice],
 ) -> Iterator[str]:
-    """Yield a line for each dropped frame, and for each stroke that cannot be evaluated.
+    """Yield a line for each stroke that cannot be evaluated. frames: those of each stroke.
 
     A stroke needs a free part, a felt touch, and the usual pushing angle.
     """
-    frames = [times.frames_in(signals, where) for where in forward_strokes(signals)]
-    yield from dropped(times, frames)
     usual_deg = Settings().theta_deg
     for number, stroke in enumerate(strokes):
         touch = stroke.touch()
