@@ -20,8 +20,9 @@ from vision.geometry.rotation import apply, compose, exp_rotation, log_rotation,
 # [chance] By which swing and board, both right, would disagree as much as calls for an alarm.
 # Study: chosen.
 FALSE_ALARM = 1e-3
-# [chance] Of each of the two tests that may call for it: of six numbers, and of the scale. Derived.
-_CHANCE_EACH = FALSE_ALARM / 2
+# [sigma] From here on a square is named that explains why they disagree: of squares that far off four in five are wrong, as
+# _WRONG_SQUARE has it. Derived. Study: wrong_squares.py.
+_CLEAR_SCALE = 3.0
 # [mm] Where the swing alone places the rig it must fix the centre along the whisker as well as a
 # ruler would, for d_x has it whole (`_BY_RULER_MM` of `bench/trials/placing.py`). Study: chosen.
 _MOST_ALONG_SIGMA_MM = 1.0
@@ -180,7 +181,7 @@ def combine(board: Placement, swing: Placement) -> Placement:
     is_scale = scale is not None and scale.is_why
     alarm = None
     turn_share = None
-    if chi2 > chdtri(6, _CHANCE_EACH) or is_scale:
+    if chi2 > chdtri(6, FALSE_ALARM) or is_scale:
         alarm = _alarm(board, swing, Sigma)
         turn_share = _turn_share(difference, np.sqrt(np.diag(Sigma)))
     combined = replace(
@@ -265,9 +266,9 @@ def _seen_scale(
     precision = float(weights @ scale.by_share)
     share = float(weights @ difference) / precision
     explained = precision * share**2
-    beyond_stated = share**2 / (scale.stated_sigma**2 + 1.0 / precision)
-    is_why = beyond_stated > chdtri(1, _CHANCE_EACH) and chi2 - explained < chdtri(5, FALSE_ALARM)
-    return replace(scale, share=share, sigma=precision**-0.5, is_why=is_why)
+    sigma = np.sqrt(scale.stated_sigma**2 + 1.0 / precision)
+    is_why = abs(share) > _CLEAR_SCALE * sigma and chi2 - explained < chdtri(5, FALSE_ALARM)
+    return replace(scale, share=share, sigma=precision**-0.5, is_why=bool(is_why))
 
 
 def rescale(cameras: Cameras, board_mm: np.ndarray, placement: Placement) -> Cameras:

@@ -240,7 +240,7 @@ def test_a_board_at_another_scale_is_told_by_where_the_whisker_turns(small_sessi
 def test_a_board_two_percent_too_large_is_told_though_it_was_placed_by_hand(small_session):
     """The default sigmas of T_rig_board leave χ² of six numbers where chance does; one number tells it.
 
-    What the strokes are off by is left out: 1.02 is 4.4 sigma from 1 here, and 3.3 are asked for.
+    What the strokes are off by is left out: 1.02 is 4.4 sigma from 1 here, and 3 are asked for.
     """
     session = load_session(small_session)
     by_hand = by_board(session.T_rig_board, 0.2, np.radians(0.2))
@@ -253,7 +253,7 @@ def test_a_board_two_percent_too_large_is_told_though_it_was_placed_by_hand(smal
 
 
 def test_sound_boards_are_rarely_taken_for_another_scale(small_session, rng):
-    """One in a thousand: of 1000 draws more than five are by chance with a probability of 6e-4."""
+    """One in 370: of 1000 draws more than nine are by chance with a probability of 5e-4."""
     session = load_session(small_session)
     by_hand = by_board(session.T_rig_board, 0.2, np.radians(0.2))
     root = np.linalg.cholesky(ONE_TRIAL + by_hand.covariance)
@@ -261,7 +261,7 @@ def test_sound_boards_are_rarely_taken_for_another_scale(small_session, rng):
     for draw in rng.standard_normal((1000, 6)):
         placed = combine(by_hand, Placement(root @ draw, ONE_TRIAL))
         alarms += placed.scale.is_why
-    assert alarms <= 5
+    assert alarms <= 9
 
 
 def test_a_leaning_axis_is_no_scale(small_session, rng):
