@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
+from bench.base.progress import count_parts
 from bench.base.threads import in_threads
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.session import Session
@@ -134,7 +135,8 @@ def _series(frames: Frames, board: Board, most: int, place: str, mirrored: bool)
             return index, grey, Corners.none()
         return index, grey, find_corners(grey, board)
 
-    for index, grey, view in in_threads(find, frames.read()):
+    searched = in_threads(find, frames.read())
+    for index, grey, view in count_parts(searched, f"pictures in {place}", frames.count):
         views.append(view)
         samples.add(index, grey, view)
     if sum(fixes_pose(view, board) for view in views) < MIN_VIEWS:
@@ -192,7 +194,8 @@ def _trial_views(
     if not trials or len(rig_view) == 0:
         return kept, notes
     each = max(1, most // len(trials))
-    for trial in trials[:: max(1, len(trials) // most)]:
+    chosen = trials[:: max(1, len(trials) // most)]
+    for trial in count_parts(chosen, f"trials of camera {name} with the board", len(chosen)):
         views = list(_views_of(trial.camera_sources[name], each, rig_view, session.board))
         shift_px = np.median([_shift_px(view, rig_view) for view in views]) if views else np.inf
         if shift_px < _MOVED_PX:

@@ -14,6 +14,8 @@ from bench.commands.options import (
     add_workers,
 )
 
+EXAMPLE = Path(__file__).resolve().parents[1] / "plan" / "example.toml"
+
 
 def add(verbs: Verbs) -> None:
     """Add the verb."""
@@ -54,13 +56,12 @@ def run(options: argparse.Namespace) -> int:
 
     Raise BadInput where RIG.toml, SESSION or --out is missing.
     """
-    if not options.example:
-        begin_step(f"reading {options.what}")
-    from bench.plan.run_plan import EXAMPLE, Options, plan
-
     if options.example:
         print(EXAMPLE.read_text(encoding="utf-8").rstrip())
         return DONE
+    begin_step(f"reading {options.what}")
+    from bench.plan.run_plan import Options, plan
+
     if options.what is None or options.out is None:
         raise BadInput("plan needs RIG.toml or SESSION, and --out OUT; --example prints a RIG.toml")
     made = plan(

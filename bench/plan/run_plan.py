@@ -44,7 +44,6 @@ _AS_RECORDED = (
     "Expected: rods and cameras where they were seen, the frames as recorded, an exact beam, and each "
     "camera's lines as sure as they were in that whisk."
 )
-EXAMPLE = Path(__file__).with_name("example.toml")
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,12 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.statuses import reason
 from bench.commands import cli
+from bench.commands.plan import EXAMPLE
 from bench.plan.outlook import QUANTITIES
 from bench.plan.plan_rows import Plan
 from bench.plan.plan_text import lines_of
 from bench.plan.recorded_whisk import SeenTask, plan_seen
-from bench.plan.run_plan import EXAMPLE, Options, plan
+from bench.plan.run_plan import Options, plan
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import Clock, SeenTrial
 from bench.rig.protocol import load
