@@ -98,6 +98,10 @@ class Beam:
         """Return the diameter over the base's at a share of the length."""
         return 1.0 - self.taper * share
 
+    def width_by_share(self, share: ArrayLike) -> Numbers:
+        """Return the derivative of the width by the share of the length."""
+        return -self.taper + 0.0 * np.asarray(share)
+
     def other_rests_mm(self) -> tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]:
         """Return the unloaded shapes that are one sigma of the tip's place off: in y, and in z.
 

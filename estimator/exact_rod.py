@@ -106,6 +106,7 @@ class _Rod:
         """Take the whisker and what lies between it and the bar's axis."""
         self.taper = beam.taper
         self.width = beam.width
+        self.width_by_share = beam.width_by_share
         self.held = held
         self.radius = reach.radius_mm / beam.length_mm
         self.rod_radius = reach.rod_radius_mm / beam.length_mm
@@ -208,11 +209,11 @@ class _Rod:
         residuals = [
             (now.moment[:, 1] - m_y) / size,
             (now.moment[:, 2] - m_z) / size,
-            _along(now, bar) - lengthways,
+            _along(now, bar) - lengthways - np.cos(alpha) * self._growth(now.arc),
             _dot(axis - first_axis, across) / theta,
             heading if self.held else _wrapped(heading - latest),
             _slope(halfway.force, sideways_halfway) - beta,
-            _along(halfway, bar) - lengthways_halfway,
+            _along(halfway, bar) - lengthways_halfway - np.cos(alpha) * self._growth(halfway.arc),
             _dot(off_halfway, across),
             off_halfway[:, 0],
         ]
@@ -232,7 +233,7 @@ class _Rod:
 
     def _axis(self, bent: "_Bent", bar: np.ndarray) -> np.ndarray:
         """Return the points (n, 3) of the bars' axes that contacts lie before."""
-        return bent.point - _normal(bent.tangent, bar) * self._reach(bent.arc)
+        return bent.point - self._normal(bent.tangent, bar, bent.arc) * self._reach(bent.arc)
 
     def _friction(self, alpha: np.ndarray, heading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return friction sideways and along the rod, away from the base, over the force (n,).
@@ -253,13 +254,26 @@ class _Rod:
         for _ in range(_TOUCH_ROUNDS):
             point = self.point(arc)
             tangent = self.tangent(arc)
-            axis = point - _normal(tangent, bar) * self._reach(arc)
+            axis = point - self._normal(tangent, bar, arc) * self._reach(arc)
             arc = arc + (x - axis[:, 0]) / tangent[:, 0]
         return point, axis, arc
 
     def _reach(self, arc: np.ndarray) -> np.ndarray:
         """Return the distance (n, 1) between centreline and the bar's axis."""
         return (self.radius + self.rod_radius * self.width(arc))[:, None]
+
+    def _growth(self, arc: np.ndarray) -> np.ndarray:
+        """Return the change (n,) of the rod's radius per arc, which its surface's normals have along it."""
+        return self.rod_radius * self.width_by_share(arc)
+
+    def _normal(self, tangent: np.ndarray, bar: np.ndarray, arc: np.ndarray) -> np.ndarray:
+        """Return the unit normals (n, 3) of rods where they touch bars, towards the base's side of the push."""
+        across = (_cross_matrices(tangent) @ bar[..., None])[..., 0]
+        size = np.linalg.norm(across, axis=1, keepdims=True)
+        square = across / size
+        along = (_cross_matrices(bar) @ square[..., None])[..., 0]
+        part = self._growth(arc)[:, None] / size
+        return np.sqrt(1.0 - part**2) * square + part * along
 
     def _march(
         self, force: np.ndarray, arc: np.ndarray
@@ -389,12 +403,6 @@ def _slope(force: np.ndarray, sideways: np.ndarray) -> np.ndarray:
     share = np.linalg.norm(force, axis=1) / np.hypot(force[:, 1], force[:, 2])
     cone = np.arcsin(np.clip(sideways * share, -1.0, 1.0))
     return phi + np.copysign(1.0, phi) * cone
-
-
-def _normal(tangent: np.ndarray, bar: np.ndarray) -> np.ndarray:
-    """Return the unit normals (n, 3) across rods and bars, towards the base's side of the push."""
-    normal = (_cross_matrices(tangent) @ bar[..., None])[..., 0]
-    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
 def _turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:

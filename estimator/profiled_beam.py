@@ -60,6 +60,10 @@ class ProfiledBeam(Beam):
         """Return the diameter over the base's at a share of the length."""
         return np.maximum(polynomial.polyval(np.asarray(share), self.widths), _LEAST_WIDTH)
 
+    def width_by_share(self, share: ArrayLike) -> Numbers:
+        """Return the derivative of the width by the share of the length."""
+        return polynomial.polyval(np.asarray(share), polynomial.polyder(self.widths))
+
     def as_cylinder_mm(self, d_x_mm: ArrayLike) -> Numbers:
         """Return the distance at which the base's cylinder is as stiff as this whisker at d_x.
 

@@ -52,6 +52,13 @@ class WhiskerRod(ABC):
         """
 
 
+def _pull(whisker: Whisker, contacts: SeenContacts, friction: float | np.ndarray) -> np.ndarray:
+    """Return the force (n,) towards the clamp over that across the rod: friction, and what the normal of a surface that
+    tapers has along the rod."""
+    of_taper = whisker.wire.radius_by_arc(contacts.along_mm)
+    return np.broadcast_to(friction - of_taper, contacts.along_mm.shape)
+
+
 @dataclass(frozen=True)
 class StraightRod(WhiskerRod):
     """A whisker that is straight without load: it bends in the plane of clamp and force."""
@@ -61,7 +68,8 @@ class StraightRod(WhiskerRod):
     def held(self, contacts: SeenContacts, friction: float | np.ndarray) -> HeldRod:
         """Return what holds the rod at its contacts."""
         size = np.linalg.norm(contacts.across_mm, axis=1)
-        load = load_at_clamp(contacts.along_mm, size, self._rigidity_Nmm2, friction)
+        pull = _pull(self.whisker, contacts, friction)
+        load = load_at_clamp(contacts.along_mm, size, self._rigidity_Nmm2, pull)
         across = contacts.across_mm / size[:, None]
         return HeldRod(
             load.moment_Nmm[:, None] * across,
@@ -96,8 +104,7 @@ class CurvedRod(WhiskerRod):
         rest = UnloadedRod(whisker.unloaded_mm, whisker.length_mm)
         unbent, deflection = _in_hub(rest, contacts)
         rods = CurvedRods(rest, whisker.beam.width, whisker.EI_Nmm2, unbent + deflection)
-        friction = np.broadcast_to(np.asarray(friction, float), contacts.along_mm.shape)
-        return rods.held(friction, deflection)
+        return rods.held(_pull(whisker, contacts, friction), deflection)
 
 
 def _in_hub(rest: UnloadedRod, contacts: SeenContacts) -> tuple[np.ndarray, np.ndarray]:

@@ -98,8 +98,8 @@ def unloaded_curve(
 def find_first_touch(
     rod: Rod, bar: TouchedObject, motor_rad: float, arc_mm: float
 ) -> UnloadedTouch:
-    """Find the first touch near a guess: the centreline's nearest point at a distance of both
-    radii.
+    """Find the first touch near a guess: where the whisker's surface is nearest, the centreline at a
+    distance of both radii.
 
     Where the nearest point lies beyond the end, the tip touches and the arc is the length. Raises
     ArithmeticError where the whisker never touches, or only as it leaves the object on its far side.
@@ -124,7 +124,8 @@ def _touch_residual(rod, bar, motor_rad, arc_mm):
     """Return the gap between the surfaces and the distance from the nearest point, (2,) mm."""
     point, tangent = unloaded_curve(rod, motor_rad, arc_mm)
     gap_mm = bar.outside_mm(point) - rod.radius_mm(arc_mm)
-    return np.array([gap_mm, (point - bar.foot_mm(point)) @ tangent])
+    away = point - bar.foot_mm(point)
+    return np.array([gap_mm, away @ tangent - rod.taper_at(arc_mm) * np.linalg.norm(away)])
 
 
 def _find_tip_touch(rod, bar, motor_rad):

@@ -163,6 +163,10 @@ class Rod:
         """Return the change of the radius per arc length at an arc length."""
         return 0.5 * self.diameter_mm * float(self.width_by_arc(arc_mm))
 
+    def taper_by_arc(self, arc_mm: float) -> float:
+        """Return the change of the taper per arc length at an arc length, 1/mm."""
+        return 0.0
+
 
 @dataclass(frozen=True)
 class ProfiledRod(Rod):
@@ -192,3 +196,9 @@ class ProfiledRod(Rod):
         """Return the derivative of the width by arc length at arc lengths, 1/mm."""
         share = np.asarray(arc_mm, float) / self.length_mm
         return polynomial.polyval(share, polynomial.polyder(self.widths)) / self.length_mm
+
+    def taper_by_arc(self, arc_mm: float) -> float:
+        """Return the change of the taper per arc length at an arc length, 1/mm."""
+        share = arc_mm / self.length_mm
+        twice = polynomial.polyval(share, polynomial.polyder(self.widths, 2))
+        return 0.5 * self.diameter_mm * float(twice) / self.length_mm**2

@@ -1,9 +1,10 @@
 """A bent whisker on a round object: the equations of one contact, solved by Newton's method.
 
 Unknowns: the object's force on the whisker (hub frame, N), the arc length of the contact (mm), and
-where it slides, in which direction. Two equations say where the contact is: the centreline's point
-nearest to the object's axis, at a distance of both radii (for the tip, the arc is the length
-instead of nearest). The others say what friction does in the plane that touches the object:
+where it slides, in which direction. Two equations say where the contact is: where the whisker's
+surface is nearest to the object's axis, the centreline at a distance of both radii (for the tip, the
+arc is the length instead of nearest). The distance falls along a whisker there as its radius does.
+The other equations say what friction does in the plane that touches the object:
 
 - sliding: the force lies on the edge of the friction cone, against the motion of the whisker's
   material there, whatever its direction (along the object or along the whisker);
@@ -90,8 +91,9 @@ class RodContact:
 
     def is_past_foot(self, state: ContactState) -> bool:
         """Return whether the object's nearest point lies behind the contact along the whisker."""
-        foot = self.bar.at(state.motor_rad).foot_mm(state.point_mm)
-        return bool((state.point_mm - foot) @ state.tangent > 0)
+        away = state.point_mm - self.bar.at(state.motor_rad).foot_mm(state.point_mm)
+        taper = self.rod.taper_at(state.arc_mm)
+        return bool(away @ state.tangent > taper * np.linalg.norm(away))
 
     def solve(
         self,
@@ -183,18 +185,29 @@ class _Problem:
         load = self._load(unknowns, loaded, frame, frame_by)
         residual = np.empty_like(unknowns)
         jacobian = np.zeros((len(unknowns), len(unknowns)))
-        residual[0], jacobian[0, :4] = self._off_nearest(unknowns, loaded, local, offset_by)
+        residual[0], jacobian[0, :4] = self._off_nearest(
+            unknowns, loaded, local, offset_by, distance
+        )
         residual[1], jacobian[1, :4] = self._gap_mm(unknowns, loaded, frame[0], distance, load)
         residual[2:], jacobian[2:] = self.law.equations(load, unknowns[4:])
         return _Equations(loaded, residual, jacobian, load)
 
-    def _off_nearest(self, unknowns, loaded, local, offset_by) -> tuple[float, np.ndarray]:
+    def _off_nearest(
+        self, unknowns, loaded, local, offset_by, distance
+    ) -> tuple[float, np.ndarray]:
         """Return how far the contact is along the whisker from where it belongs, and the
-        derivatives (4,) of that: the point nearest to the object's axis, or the tip."""
+        derivatives (4,) of that: where its surface is nearest to the object's axis, or the tip.
+
+        distance: between centreline and the object's axis, mm.
+        """
+        rod = self.contact.rod
         if self.tip:
-            return unknowns[3] - self.contact.rod.length_mm, np.array([0.0, 0.0, 0.0, 1.0])
+            return unknowns[3] - rod.length_mm, np.array([0.0, 0.0, 0.0, 1.0])
+        taper = rod.taper_at(unknowns[3])
         off_by = loaded.tangent @ offset_by + local.offset_mm @ loaded.tangent_by
-        return local.offset_mm @ loaded.tangent, off_by
+        off_by = off_by - taper / distance * (local.offset_mm @ offset_by)
+        off_by[3] -= distance * rod.taper_by_arc(unknowns[3])
+        return local.offset_mm @ loaded.tangent - distance * taper, off_by
 
     def _gap_mm(self, unknowns, loaded, normal, distance, load) -> tuple[float, np.ndarray]:
         """Return the gap between the surfaces, as the force presses them, and its derivatives (4,).

@@ -215,7 +215,8 @@ class StatedPush:
             np.broadcast_to(one.points_mm, shape),
             np.broadcast_to(one.tangents, shape),
         )
-        distance_mm, arc_mm, points_mm = clearance(curves, self._standing(motor_rad, offsets))
+        there = self._standing(motor_rad, offsets)
+        distance_mm, arc_mm, points_mm = clearance(curves, there, self.wire)
         reach_mm = self.object.radius_mm + self.wire.radius_mm(arc_mm) + offsets.reach_mm
         return distance_mm - reach_mm, points_mm
 

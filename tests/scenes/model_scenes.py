@@ -62,9 +62,10 @@ def _bent_until_touching(problem, state, slope=0.35):
         vector = state.vector.copy()
         vector[problem.first_bend :] = np.stack([middle, -slope * middle], axis=1).ravel()
         curves, arcs = curves_of(problem, vector, state.arcs_mm, rounds=6)
-        gap = (clearance(curves, bar_axes(problem, vector))[0] - problem.rods.reach_mm(arcs))[
-            problem.bent
-        ]
+        gap = (
+            clearance(curves, bar_axes(problem, vector), problem.wire)[0]
+            - problem.rods.reach_mm(arcs)
+        )[problem.bent]
         low, high = np.where(gap < 0, middle, low), np.where(gap < 0, high, middle)
     return State(vector, arcs)
 

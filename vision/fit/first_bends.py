@@ -311,6 +311,6 @@ def contact_arc(
     rest_mm (2, 4): its rest shape, mm. bend (2,): rad.
     """
     straight = unbent_centrelines(rest_mm, motor, wire)
-    arc = np.clip(closest_arc(straight, axis), 1.0, wire.length_mm)
+    arc = np.clip(closest_arc(straight, axis, wire), 1.0, wire.length_mm)
     bent = centrelines(rest_mm, bend, arc, motor, wire)
-    return float(np.clip(closest_arc(bent, axis), 1.0, wire.length_mm))
+    return float(np.clip(closest_arc(bent, axis, wire), 1.0, wire.length_mm))

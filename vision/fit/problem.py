@@ -218,7 +218,7 @@ def curves_of(
     friction = np.broadcast_to(vector[..., problem.blocks.friction.slice], shape)
     for _ in range(rounds):
         curves = centrelines(rest, angles, arcs, motor, problem.wire, friction)
-        arcs = np.clip(closest_arc(curves, axis, arcs), 1.0, problem.wire.length_mm)
+        arcs = np.clip(closest_arc(curves, axis, problem.wire, arcs), 1.0, problem.wire.length_mm)
     return centrelines(rest, angles, arcs, motor, problem.wire, friction), arcs
 
 

@@ -49,7 +49,7 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     touch = first_touch(problem, vector)
     each = bar_axes(problem, vector)
     curves, _ = curves_of(problem, vector, arcs_mm)
-    _, arc, point = clearance(curves, each)
+    _, arc, point = clearance(curves, each, problem.wire)
     touched = bar_axis(problem, vector).bar_at(touch.point_mm)
     beta, psi = contact_frame_angles(touched.direction, touch.motor_rad)
     contact_moved = _contact_moved_mm(problem, vector, touch, point)

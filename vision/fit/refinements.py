@@ -172,7 +172,7 @@ def _contacts_of_small_angles(
     points = curves.points_mm + moves.points_mm[0]
     tangents = curves.tangents + moves.tangents[0]
     axis = bar_axes(problem, state.vector)
-    return closest_arc(Curves(curves.arc_mm, points, tangents), axis, arcs_mm)
+    return closest_arc(Curves(curves.arc_mm, points, tangents), axis, problem.wire, arcs_mm)
 
 
 def _taper(fit: Fit) -> LeftOut:

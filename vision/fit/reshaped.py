@@ -45,7 +45,8 @@ def by_contacts(
     points = _with_moves(curves.points_mm, step * moves.points_mm)
     tangents = _with_moves(curves.tangents, step * moves.tangents)
     axis = bar_axes(problem, state.vector)
-    distance, _, contact = clearance(Curves(curves.arc_mm, points, tangents), axis)
+    moved = Curves(curves.arc_mm, points, tangents)
+    distance, _, contact = clearance(moved, axis, problem.wire)
     by_change = (distance[1:] - distance[0]) / step / CONTACT_SIGMA_MM
     along = axis.bar_at(contact[0, frame]).direction[0]
     slip = (contact[1:, frame] - contact[0, frame]) @ along / step

@@ -149,7 +149,9 @@ def _contact_part(
     """Return residuals and Jacobian rows of touching frames: distance from axis to centreline is
     reach + its error.
     """
-    distance, arc, _ = clearance(curves, bar_axes(problem, perturbed.vectors), arcs_mm)
+    distance, arc, _ = clearance(
+        curves, bar_axes(problem, perturbed.vectors), problem.wire, arcs_mm
+    )
     gap = (distance - problem.rods.reach_mm(arc))[:, problem.touching]  # (copies, touching) mm
     reach = problem.blocks.reach.start
     jacobian = perturbed.jacobian(gap[1:] - gap[0], np.flatnonzero(problem.touching))
@@ -165,7 +167,7 @@ def _onset_part(problem: Problem, onset: Onset, perturbed: Perturbed) -> Part:
     vectors = perturbed.vectors
     motor_rad = np.full(len(vectors), onset.motor_rad) + _later_rad(problem, vectors)
     curves = resting_curves(problem, vectors, motor_rad)
-    distance, arc, _ = clearance(curves, bar_axis(problem, vectors))
+    distance, arc, _ = clearance(curves, bar_axis(problem, vectors), problem.wire)
     gap = distance - problem.rods.reach_mm(arc)  # (copies,) mm
     sigma_mm = onset.sigma_rad * arc[0]
     reach = problem.blocks.reach.start

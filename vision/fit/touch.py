@@ -123,7 +123,8 @@ def _gap(
     axis = bar_axis(problem, vector)
     shift_mm = shift_at_mm(problem, vector, motor_rad)
     there = replace(axis, point_mm=axis.point_mm + shift_mm)
-    distance, arc, point = clearance(resting_curves(problem, vector, motor_rad), there)
+    curves = resting_curves(problem, vector, motor_rad)
+    distance, arc, point = clearance(curves, there, problem.wire)
     wider_mm = vector[..., problem.blocks.reach.start]
     return distance - problem.rods.reach_mm(arc) - wider_mm, arc, point
 

@@ -1,8 +1,9 @@
-"""Where a centreline is nearest to the touched object's axis: conventions of contact and slip.
+"""Where a wire is nearest to the touched object: conventions of contact and slip.
 
 A bar is a straight axis; any other object acts on a contact like the bar that lies along its
-surface there (`Axis.bar_at`). Contact is the arc length at which the wire's centreline is nearest
-to the axis, found by Newton's method. Clearance is the signed distance there. Directions are unit
+surface there (`Axis.bar_at`). Contact is the arc length at which the wire's surface is nearest to
+the axis, found by Newton's method: of a wire that tapers the centreline's distance there falls along
+the wire as its radius does. Clearance is the centreline's signed distance there. Directions are unit
 vectors with positive z, along which slope and slip are counted.
 """
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
+from vision.geometry.rods import Wire
 from vision.geometry.rotation import cross
 from vision.geometry.silhouette import normals, outline
 from vision.geometry.touched import Axis
@@ -60,11 +62,15 @@ class BarAxis(Axis):
         """Return which (...) of points (..., k, 3) is nearest to the axis."""
         return np.argmin(np.sum(self._from_axis(points_mm) ** 2, axis=-1), axis=-1)
 
-    def newton_step(self, points_mm: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Return Newton's steps (..., k), mm, along curves to where they are nearest."""
+    def newton_step(
+        self, points_mm: np.ndarray, tangents: np.ndarray, growth: np.ndarray | float = 0.0
+    ) -> np.ndarray:
+        """Return Newton's steps (..., k), mm, along curves to where their surface is nearest."""
         across = self._across(tangents)
         across2 = np.maximum(np.sum(across**2, axis=-1), _LEAST_ACROSS)
-        return -np.sum(self._from_axis(points_mm) * across, axis=-1) / across2
+        away = self._from_axis(points_mm)
+        grown = growth * np.linalg.norm(away, axis=-1)
+        return (grown - np.sum(away * across, axis=-1)) / across2
 
     def distance_mm(self, points_mm: np.ndarray, tangents: np.ndarray) -> np.ndarray:
         """Return the signed distances (...) of curves at their nearest points (..., 3).
@@ -120,8 +126,10 @@ def contact_frame_angles(direction: np.ndarray, touch_rad: float) -> tuple[float
     return np.arctan2(a_y, direction[..., 2]), np.arcsin(np.clip(a_x, -1.0, 1.0))
 
 
-def closest_arc(curves: Curves, axis: Axis, near_mm: np.ndarray | None = None) -> np.ndarray:
-    """Find the arc length (...) where each centreline is nearest to the object.
+def closest_arc(
+    curves: Curves, axis: Axis, wire: Wire, near_mm: np.ndarray | None = None
+) -> np.ndarray:
+    """Find the arc length (...) where the wire about each centreline is nearest to the object.
 
     It lies within the whisker's length. near_mm (...): where it was when curve and object were
     nearly as they are; None searches the whole curve.
@@ -133,21 +141,22 @@ def closest_arc(curves: Curves, axis: Axis, near_mm: np.ndarray | None = None) -
         steps += _MORE_FROM_NODE
     for _ in range(steps):
         points, tangents = curves.at(arc[..., None])
-        step = axis.newton_step(points, tangents)[..., 0]
+        growth = wire.radius_by_arc(arc[..., None])
+        step = axis.newton_step(points, tangents, growth)[..., 0]
         arc = np.clip(arc + step, 0.0, curves.arc_mm[-1])
     return arc
 
 
 def clearance(
-    curves: Curves, axis: Axis, near_mm: np.ndarray | None = None
+    curves: Curves, axis: Axis, wire: Wire, near_mm: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute the distance (...) from axis to centreline where they are nearest.
+    """Compute the distance (...) from axis to centreline where the wire is nearest.
 
-    Returns with it the contact arc (...) and the closest point (..., 3). near_mm: see
+    Returns with it the contact arc (...) and the centreline's point (..., 3) there. near_mm: see
     `closest_arc`. The distance from a bar has a sign; that from another object is positive, and
     less by what its middle is farther from its surface than its own radius.
     """
-    arc = closest_arc(curves, axis, near_mm)
+    arc = closest_arc(curves, axis, wire, near_mm)
     points, tangents = curves.at(arc[..., None])
     point = points[..., 0, :]
     return axis.distance_mm(point, tangents[..., 0, :]), arc, point

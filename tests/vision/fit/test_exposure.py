@@ -44,7 +44,7 @@ def slipped_px(problem, state, slip, frame):
             for one in problem.seen
             if one.frame == frame
         ]
-        return clearance(curves, BarAxis(axis.point_mm, axis.direction), arcs)[0][
+        return clearance(curves, BarAxis(axis.point_mm, axis.direction), problem.wire, arcs)[0][
             frame
         ], np.concatenate(lines)
 

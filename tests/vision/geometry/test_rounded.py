@@ -14,10 +14,12 @@ from vision.geometry.forms import FORMS, touched_object
 from vision.geometry.grazing import sights_beside
 from vision.geometry.refusals import Refused
 from vision.geometry.ring import Ring as SeenRing
+from vision.geometry.rods import Wire
 from vision.geometry.rounded import RoundedAxis
 from vision.geometry.sphere import Sphere as SeenSphere
 from vision.geometry.touched import StatedSizes
 
+WIRE = Wire("cone", 100.0, 3.0)
 SPOT = rotate_about_z(np.array([60.0, 0.0, 0.0]), 0.04)
 
 
@@ -70,16 +72,17 @@ def test_sights_graze_the_outline_and_nothing_else_is_as_near(thing, axis, radiu
 
 @each
 def test_a_wire_is_nearest_where_none_of_its_points_is_nearer(thing, axis, radius_mm):
-    """A straight wire that passes by, slanting; 20 001 points of it are 5 µm apart."""
+    """A straight cone that passes by, slanting; 20 001 points of it are 5 µm apart."""
     ways = np.array([0.98, 0.1, 0.17]) / np.linalg.norm([0.98, 0.1, 0.17])
     base = SPOT - 60.0 * ways - np.array([0.0, 2.0, -1.0])
     arc = np.linspace(0.0, 100.0, 41)
     wire = Curves(arc, base + arc[:, None] * ways, np.tile(ways, (41, 1)))
-    dense = thing.outside_mm(base + np.linspace(0.0, 100.0, 20001)[:, None] * ways)
-    distance, at, _ = clearance(wire, axis)
-    assert distance - radius_mm == pytest.approx(dense.min(), abs=1e-6)
+    along = np.linspace(0.0, 100.0, 20001)
+    dense = thing.outside_mm(base + along[:, None] * ways) - WIRE.radius_mm(along)
+    distance, at, _ = clearance(wire, axis, WIRE)
+    assert distance - radius_mm - WIRE.radius_mm(at) == pytest.approx(dense.min(), abs=1e-6)
     assert at == pytest.approx(0.005 * np.argmin(dense), abs=0.02)
-    assert closest_arc(wire, axis, at) == pytest.approx(at, abs=1e-4)
+    assert closest_arc(wire, axis, WIRE, at) == pytest.approx(at, abs=1e-4)
 
 
 def test_a_ring_hides_its_far_side_and_a_sphere_nothing():
