@@ -121,7 +121,7 @@ def by_tilting(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
 
 
 def by_consistency(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
-    """Return α by way 2: that under which distances scatter least as shares of themselves."""
+    """Return α by way 2: that under which distances scatter least in parts of their mean."""
     nominal = {contact.d_x_nominal_mm for contact in of_surface}
     if len(of_surface) < _FEWEST or len(nominal) != 1 or not np.isfinite(list(nominal)).all():
         return _unknown("consistency", reason("whisks_few", least=_FEWEST))
@@ -231,12 +231,14 @@ def _distances(some: Sequence[FeltContact], alphas_rad: np.ndarray, whisker: Whi
 def _residuals(distances: np.ndarray, heights: np.ndarray, degree: int) -> np.ndarray:
     """Return how far contacts (n,) lie from the polynomial in height that fits them best.
 
-    As shares of their distances.
+    In parts of their mean distance: of their own, near bars would err by more, for a hand sets all
+    of them wrong by as many millimetres; in millimetres the largest α would scatter least.
     """
-    design = np.vander(heights, degree + 1) / distances[:, None]
-    if not np.isfinite(design).all():
+    if not np.isfinite(distances).all():
         return np.full(len(distances), np.nan)
-    return 1.0 - design @ np.linalg.lstsq(design, np.ones(len(distances)), rcond=None)[0]
+    design = np.vander(heights, degree + 1)
+    on_object = design @ np.linalg.lstsq(design, distances, rcond=None)[0]
+    return (distances - on_object) / np.mean(distances)
 
 
 def _least_scatter(some: Sequence[FeltContact], whisker: Whisker, degree: int) -> _AlphaFit:
