@@ -55,7 +55,9 @@ def seen_friction(seen: SeenWhisk, whisker: Whisker) -> Value:
     if turns_with_slip(seen):
         return _UNKNOWN if seen.at is None else seen.at.alpha_rad
     d = _near_touch(seen.deflection)
-    sliding = _Sliding(seen.deflection, d, seen.beta_rad.value, np.nan_to_num(seen.psi_rad.value))
+    growth = whisker.wire.radius_by_arc(d.along_mm)
+    psi_rad = np.nan_to_num(seen.psi_rad.value)
+    sliding = _Sliding(seen.deflection, d, growth, seen.beta_rad.value, psi_rad)
     try:
         return _of_sliding(sliding, seen, whisker)
     except ArithmeticError:
@@ -152,12 +154,13 @@ def _by_direction(sliding: "_Sliding", held: HeldRod) -> tuple[float, float]:
 class _Sliding:
     """n frames of a contact that slides along a straight object.
 
-    whole: the deflection of all touching frames; deflection: that of the n frames. beta_rad, psi_rad: slope and
-    tilt of the object.
+    whole: the deflection of all touching frames; deflection: that of the n frames. growth (n,): change of the whisker's
+    radius per arc length. beta_rad, psi_rad: slope and tilt of the object.
     """
 
     whole: Deflection
     deflection: Deflection
+    growth: np.ndarray | float
     beta_rad: float
     psi_rad: float
 
@@ -198,11 +201,15 @@ class _Sliding:
         normal = unit(np.cross(bar, held.tangent))
         across = np.cross(normal, held.tangent)
         slip = np.sign(self.deflection.slip_mm.sum())
-        friction = -slip * _dot(held.force_N, across) / _dot(held.force_N, normal)
+        press = _dot(held.force_N, normal)
         share = _dot(bar, across)
-        friction = np.sign(share) * np.sign(_dot(held.force_N, normal)) * friction
+        leans = _dot(bar, held.tangent)
+        # Where the whisker tapers and the bar leans along it, the normal has a part across the whisker.
+        of_normal = -np.sign(press) * self.growth * leans * share / (1.0 - leans**2)
+        friction = -slip * (_dot(held.force_N, across) / press - of_normal)
+        friction = np.sign(share) * np.sign(press) * friction
         past = np.tan(heading(self.whole, self.deflection.theta_rad))
-        past = past + _dot(bar, held.tangent) - np.sin(self.psi_rad)
+        past = past + leans - np.sin(self.psi_rad)
         return friction, np.abs(share) / np.hypot(share, past)
 
     def _bar_directions(self) -> np.ndarray:

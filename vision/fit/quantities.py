@@ -23,6 +23,7 @@ from vision.fit.problem import (
 from vision.fit.touch import FirstTouch, first_touch
 from vision.geometry.centreline import Curves, rotation_z
 from vision.geometry.contact import BarAxis, clearance, contact_frame_angles
+from vision.geometry.rods import Wire
 from vision.geometry.rotation import unit
 
 # [rounds] Of Newton's method for the virtual point: the resting whisker is nearly straight.
@@ -55,7 +56,7 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     contact_moved = _contact_moved_mm(problem, vector, touch, point)
     d_y, d_z = _deflection(problem, vector, touch, point)
     along, across_y = _in_hub(problem, touch, point, d_y)
-    force = _force_direction(curves, touch, arc, d_y, d_z)
+    force = _force_direction(curves, problem.wire, touch, arc, d_y, d_z)
     frame = {
         "slip": np.sum(contact_moved * touched.direction[..., None, :], axis=-1),
         "longitudinal_slip": arc - touch.arc_mm[..., None],
@@ -143,18 +144,25 @@ def _virtual_point(unbent: Curves, touch: FirstTouch, x: np.ndarray) -> np.ndarr
 
 
 def _force_direction(
-    curves: Curves, touch: FirstTouch, arc_mm: np.ndarray, d_y: np.ndarray, d_z: np.ndarray
+    curves: Curves,
+    wire: Wire,
+    touch: FirstTouch,
+    arc_mm: np.ndarray,
+    d_y: np.ndarray,
+    d_z: np.ndarray,
 ) -> np.ndarray:
-    """Return the direction (…, f, 3) of the contact's force on the whisker, across it, of any
-    length.
+    """Return the direction (…, f, 3) of the contact's force on the whisker, of any length.
 
-    It is that in which the whisker was bent: from the virtual point to the contact.
+    Across the whisker it is that in which it was bent: from the virtual point to the contact. Along
+    it the normal of a surface that tapers has a part.
     """
     _, tangent = curves.at(arc_mm[..., None])
     along = unit(tangent[..., 0, :])
     to_rig = rotation_z(touch.motor_rad)[..., None, :, :]  # from the contact frame
     deflection = d_z[..., None] * to_rig[..., 2] - d_y[..., None] * to_rig[..., 1]
-    return deflection - np.sum(deflection * along, axis=-1, keepdims=True) * along
+    across = deflection - np.sum(deflection * along, axis=-1, keepdims=True) * along
+    size = np.linalg.norm(across, axis=-1) * wire.radius_by_arc(arc_mm)
+    return across + size[..., None] * along
 
 
 def _angle_to_normal(

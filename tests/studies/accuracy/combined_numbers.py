@@ -15,6 +15,7 @@ import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -114,7 +115,11 @@ class DrawnSession:
         )
         self.alpha_rad = np.radians(rng.uniform(5.0, 20.0))
         self.shared = Shared.draw(rng)
-        self.results = tuple(self._results())
+
+    @cached_property
+    def results(self) -> tuple[TrialResult, ...]:
+        """Return the result of every bar."""
+        return tuple(self._results())
 
     def _results(self) -> Iterator[TrialResult]:
         """Yield the result of every bar."""
@@ -143,7 +148,7 @@ class DrawnSession:
         seen = []
         felt = []
         for number in range(WHISKS):
-            seen.append(self._seen(number, mechanics, speed_rad_s))
+            seen.append(self.seen(number, mechanics, speed_rad_s))
             felt.append(self._felt(number, mechanics))
         of_whisker = WhiskerFacts(self.whisker.shape, LENGTH_MM, DIAMETER_MM, self.whisker.EI_Nmm2)
         clock = Clock("drawn", CLOCK_S, recorded=True)
@@ -185,7 +190,7 @@ class DrawnSession:
             delay_s=Value(0.0, 0.0),
         )
 
-    def _seen(self, number: int, mechanics: WhiskMechanics, speed_rad_s: float) -> SeenWhisk:
+    def seen(self, number: int, mechanics: WhiskMechanics, speed_rad_s: float) -> SeenWhisk:
         """Draw what cameras see of a push."""
         beta, psi = mechanics.slope
         touch_rad = mechanics.touch.motor_rad
