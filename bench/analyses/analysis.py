@@ -6,11 +6,11 @@ summary, the page and docs/formats.md ask each of `bench.analyses.catalogue.ANAL
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -70,6 +70,35 @@ class Heading:
 
     code: str
     title: str
+
+
+Row = dict[str, str]  # of a CSV file
+
+
+class TrueRun(Protocol):
+    """The tables of a synthetic session's run, beside its truth files: what a score is made from."""
+
+    def rows(self, table: Table) -> list[Row]:
+        """Return the rows of a table; none where the run does not have it."""
+
+    def whisk(self, row: Row) -> dict | None:
+        """Return the true values of the whisk that a row names; None where they are not known."""
+
+    def contacts(self, trial: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return motor angles (n,), degrees, and contacts (n, 3) of the frames that touch."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A column of a table against the truth.
+
+    pairs: of a row and its true value, None where that is not known. name: of the quantity, where
+    that is not the column's.
+    """
+
+    column: str
+    pairs: Sequence[tuple[Row, float | None]]
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -138,6 +167,10 @@ class Analysis(ABC):
         None where there is nothing to show. Raises BadInput where a table is damaged.
         """
         return None
+
+    def scored(self, run: TrueRun) -> Iterable[Scored]:
+        """Return which columns of its tables a synthetic session has true values of, and these."""
+        return ()
 
     def write(self, out: Path, found: Any) -> None:
         """Write its tables into a folder, each whole."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, Scored, TrueRun
 from bench.analyses.pooling import column, degrees, grouped, rms, sound_measured_whisks, value_cells
 from bench.base.drawing import blank
 from bench.base.tables import TRIAL, WHISK, Table, alike, status, with_sigma
@@ -122,6 +122,20 @@ class ContinuousProfile(Analysis):
         if len(of_whisks) <= _MOST_NAMED:
             drawing.legend(loc="outside lower center", ncols=2)
         return drawing
+
+    def scored(self, run: TrueRun) -> Iterator[Scored]:
+        """Yield the contacts, by coordinate, of trials with one whisk."""
+        pairs: dict[str, list] = {"x_est_mm": [], "y_est_mm": [], "z_est_mm": []}
+        for trial, mine in grouped(run.rows(PROFILE), lambda row: row["trial"]).items():
+            motor_deg, points_mm = run.contacts(trial)
+            if not len(motor_deg) or np.any(np.diff(motor_deg) < 0):
+                continue
+            for row in mine:
+                true_mm = interpolated_mm(float(row["motor_deg"]), motor_deg, points_mm)
+                for name, true in zip(pairs, true_mm.tolist()):
+                    pairs[name].append((row, true))
+        for name, mine in pairs.items():
+            yield Scored(name, mine, f"{name}, profile")
 
 
 def _by_whisk(found: Sequence[ProfilePoint]) -> dict[tuple[str, int], list[ProfilePoint]]:

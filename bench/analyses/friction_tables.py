@@ -7,7 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from bench.analyses.alphas import UNKNOWN, WhiskAlphas, alphas_of, mean_alpha
-from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, PageTable, read_rows
+from bench.analyses.analysis import (
+    Analysis,
+    EvaluatedRun,
+    Heading,
+    PageTable,
+    Scored,
+    TrueRun,
+    read_rows,
+)
 from bench.analyses.page_cells import cell_with_sigma, panel_cell
 from bench.analyses.pooling import angle_cells, column, degrees, measured
 from bench.analyses.section_vii import (
@@ -210,6 +218,27 @@ class FrictionAngles(Analysis):
             rows.append((panel_cell(row), str(row["whisks"]), *cells))
         title = "Friction angle α of each surface, way by way"
         return PageTable(title, SURFACES.file, head, tuple(rows))
+
+    def scored(self, run: TrueRun) -> Iterator[Scored]:
+        """Yield the friction angles.
+
+        There is one angle where the coefficient at rest is that in motion, else there are two.
+        """
+        one_angle: list[tuple] = []
+        two_angles: dict[str, list[tuple]] = {"static": [], "kinetic": []}
+        for row in run.rows(FRICTION):
+            truth = run.whisk(row)
+            if truth is None or "mu_kinetic" not in truth:
+                continue
+            if truth["mu_static"] == truth["mu_kinetic"]:
+                one_angle.append((row, degrees(np.arctan(truth["mu_kinetic"]))))
+                continue
+            for kind, pairs in two_angles.items():
+                pairs.append((row, degrees(np.arctan(truth[f"mu_{kind}"]))))
+        for source in RECORDS:
+            yield Scored(f"alpha_{source}_deg", one_angle)
+            for kind, pairs in two_angles.items():
+                yield Scored(f"alpha_{kind}_{source}_deg", pairs)
 
 
 def _has_both_signs(whisks: Sequence[WhiskAlphas]) -> bool:

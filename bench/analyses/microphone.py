@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
+from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, Scored, TrueRun
 from bench.analyses.pooling import angle_cells, grouped, sound_measured_whisks, value_cells
 from bench.base.tables import SPEED, TRIAL, WHISK, Column, Table, status, with_sigma
 from bench.records.trial_result import SeenWhisk, TrialResult
@@ -86,6 +86,14 @@ class Microphone(Analysis):
                 late += f", scatter {1e3 * np.std(delays_s, ddof=1):.2g} ms"
             at = "" if speed is None else f"at {speed:g}°/s "
             yield f"{at}{len(sigmas_s)} of {len(mine)} touches are heard{stated}{late}"
+
+    def scored(self, run: TrueRun) -> Iterator[Scored]:
+        """Yield the touches that are heard."""
+        pairs = []
+        for row in run.rows(MICROPHONE):
+            truth = run.whisk(row)
+            pairs.append((row, truth and truth["touch_deg"]))
+        yield Scored("touch_heard_deg", pairs)
 
 
 def heard_whisks(

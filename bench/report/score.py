@@ -6,7 +6,6 @@ changes nothing.
 
 import csv
 import json
-import math
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.continuous_profile import PROFILE, interpolated_mm
-from bench.analyses.microphone import MICROPHONE
+from bench.analyses.analysis import Row
+from bench.analyses.catalogue import ANALYSES
 from bench.analyses.pooling import grouped, rms
-from bench.base.tables import sigma_name
+from bench.base.tables import Table, sigma_name
 from bench.gauges.matrix import GaugeCalibration
 from bench.session.session import Session
 from estimator.uncertainty import Z_95
@@ -33,7 +32,6 @@ _AT_TOUCH = (
 _IN_TRACK = ("x_mm", "y_mm", "z_mm", "slip_mm")  # columns of track/<trial>.csv and of truth.csv
 _SLIP_THETA_DEG = 3.0  # the pushing angle at which truth files give the slip (slip_at_3deg_mm)
 
-Row = dict[str, str]  # of a CSV file
 Pair = tuple[Row, float | None]  # of a result and the true value; None where that is not known
 
 
@@ -59,6 +57,34 @@ class Score:
             f"{self.name:<28}{len(self.errors):5d}  {bias:+9.4f}  {rms(self.errors):8.4f} {self.unit:<4}"
             f"{coverage}"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _TrueRun:
+    """A run's folder and its synthetic session, as `bench.analyses.analysis.TrueRun`."""
+
+    session: Session
+    out: Path
+
+    def rows(self, table: Table) -> list[Row]:
+        """Return the rows of a table; none where the run does not have it."""
+        path = self.out / table.file
+        return _read_rows(path) if path.is_file() else []
+
+    def whisk(self, row: Row) -> dict | None:
+        """Return truth.toml of the whisk that a row names, as `truth_of`."""
+        return truth_of(self.session, row["trial"], int(row["whisk"]))
+
+    def contacts(self, trial: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return motor angles (n,), degrees, and contacts (n, 3) of the frames that touch."""
+        path = self.session.trial(trial).own("truth.csv")
+        motor_deg = []
+        contacts_mm = []
+        for row in _read_rows(path) if path.is_file() else ():
+            if row["contact"] == "1":
+                motor_deg.append(float(row["motor_deg"]))
+                contacts_mm.append([float(row["x_mm"]), float(row["y_mm"]), float(row["z_mm"])])
+        return np.array(motor_deg), np.array(contacts_mm).reshape(-1, 3)
 
 
 def score(session: Session, out: Path, gauges: GaugeCalibration | None = None) -> list[str]:
@@ -113,10 +139,11 @@ def scores_of(session: Session, out: Path) -> Iterator[Score]:
     yield from _compare("slip_mm", slips, "slip_mm at 3 deg")
     for column in _IN_TRACK:
         yield from _compare(column, _frames(session, out, column), f"{column}, touching frames")
-    yield from _friction(session, out)
     yield from _estimates(session, out, truths)
-    yield from _profile(session, out)
-    yield from _heard(session, out)
+    run = _TrueRun(session, out)
+    for analysis in ANALYSES:
+        for one in analysis.scored(run):
+            yield from _compare(one.column, one.pairs, one.name)
 
 
 def _estimates(session: Session, out: Path, truths: Sequence[tuple[Row, dict]]) -> Iterator[Score]:
@@ -130,34 +157,6 @@ def _estimates(session: Session, out: Path, truths: Sequence[tuple[Row, dict]]) 
     for estimator, mine in estimates.items():
         pairs = [(row, true_mm.get((row["trial"], row["whisk"]))) for row in mine]
         yield from _compare("d_x_est_mm", pairs, f"d_x by {estimator}")
-
-
-def _friction(session: Session, out: Path) -> Iterator[Score]:
-    """Yield the scores of friction angles.
-
-    There is one angle where the coefficient at rest is that in motion, else there are two.
-    """
-    path = out / "friction.csv"
-    one_angle: list[Pair] = []
-    two_angles: dict[str, list[Pair]] = {"static": [], "kinetic": []}
-    for row in _read_rows(path) if path.is_file() else ():
-        truth = truth_of(session, row["trial"], int(row["whisk"]))
-        if truth is None or "mu_kinetic" not in truth:
-            continue
-        if truth["mu_static"] == truth["mu_kinetic"]:
-            one_angle.append((row, _friction_deg(truth["mu_kinetic"])))
-        else:
-            for kind, pairs in two_angles.items():
-                pairs.append((row, _friction_deg(truth[f"mu_{kind}"])))
-    for source in ("seen", "felt"):
-        yield from _compare(f"alpha_{source}_deg", one_angle)
-        for kind, pairs in two_angles.items():
-            yield from _compare(f"alpha_{kind}_{source}_deg", pairs)
-
-
-def _friction_deg(mu: float) -> float:
-    """Return the friction angle of a coefficient, deg."""
-    return math.degrees(math.atan(mu))
 
 
 def _compare(column: str, pairs: Iterable[Pair], name: str = "") -> Iterator[Score]:
@@ -201,44 +200,6 @@ def _frames(session: Session, out: Path, column: str) -> Iterator[Pair]:
             true = truth.get(int(row["frame"]))
             if true is not None and float(true["contact"]) == 1 and row["touching"] == "1":
                 yield row, float(true[column])
-
-
-def _profile(session: Session, out: Path) -> Iterator[Score]:
-    """Yield the scores of contacts through sweeps, of trials with one whisk."""
-    path = out / PROFILE.file
-    rows = _read_rows(path) if path.is_file() else ()
-    pairs: dict[str, list[Pair]] = {"x_est_mm": [], "y_est_mm": [], "z_est_mm": []}
-    for trial, mine in grouped(rows, lambda row: row["trial"]).items():
-        motor_deg, points_mm = _true_contacts(session.trial(trial).own("truth.csv"))
-        if not len(motor_deg) or np.any(np.diff(motor_deg) < 0):
-            continue
-        for row in mine:
-            true_mm = interpolated_mm(float(row["motor_deg"]), motor_deg, points_mm)
-            for column, true in zip(pairs, true_mm.tolist()):
-                pairs[column].append((row, true))
-    for column, mine in pairs.items():
-        yield from _compare(column, mine, f"{column}, profile")
-
-
-def _heard(session: Session, out: Path) -> Iterator[Score]:
-    """Yield the score of touches that a microphone hears."""
-    path = out / MICROPHONE.file
-    pairs = []
-    for row in _read_rows(path) if path.is_file() else ():
-        truth = truth_of(session, row["trial"], int(row["whisk"]))
-        pairs.append((row, truth and truth["touch_deg"]))
-    yield from _compare("touch_heard_deg", pairs)
-
-
-def _true_contacts(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return motor angles (n,), degrees, and contacts (n, 3) of the frames that touch."""
-    motor_deg = []
-    contacts_mm = []
-    for row in _read_rows(path) if path.is_file() else ():
-        if row["contact"] == "1":
-            motor_deg.append(float(row["motor_deg"]))
-            contacts_mm.append([float(row["x_mm"]), float(row["y_mm"]), float(row["z_mm"])])
-    return np.array(motor_deg), np.array(contacts_mm).reshape(-1, 3)
 
 
 def _gauge_lines(session: Session, gauges: GaugeCalibration | None) -> Iterator[str]:
