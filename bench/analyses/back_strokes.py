@@ -148,9 +148,9 @@ def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
     found = []
     for result in results:
         felt_back = result.felt.ways_back
-        seen_back = result.seen.ways_back or tuple(
-            SeenWhisk(WhiskTruth(felt.whisk)) for felt in felt_back
-        )
+        seen_back = result.seen.ways_back
+        if not seen_back:
+            seen_back = [SeenWhisk(WhiskTruth(felt.whisk)) for felt in felt_back]
         for seen, seen_there, felt, felt_there in zip(
             seen_back, result.seen.whisks, felt_back, result.felt.whisks
         ):

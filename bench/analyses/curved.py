@@ -142,11 +142,10 @@ class Curvature(Analysis):
         """Yield the mean radius less the bar's own, and trials whose object is curved sideways."""
         yield from _radius_lines(found)
         for trial, mean in sideways(found).items():
-            printed = [
-                one.curved.lateral_printed_per_mm
-                for one in found
-                if one.result.trial.name == trial and one.curved.lateral.is_known
-            ]
+            printed = []
+            for one in found:
+                if one.result.trial.name == trial and one.curved.lateral.is_known:
+                    printed.append(one.curved.lateral_printed_per_mm)
             yield (
                 f"{trial}, {counted(len(printed), 'whisk')}: curved to the side by "
                 f"{mean.value:.4f} ± {mean.sigma:.4f} 1/mm (Appendix B; {np.mean(printed):.4f} by (24) "

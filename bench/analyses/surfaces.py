@@ -132,9 +132,10 @@ def surfaces(results: Iterable[TrialResult], beam: Beam) -> list[FittedSurface]:
             one = _felt(recording, result, seen, felt)
             if one is not None:
                 groups.setdefault(result.trial.panel, []).append(one)
-    return [
-        FittedSurface(*panel, tuple(felt), _fit(felt, beam), beam) for panel, felt in groups.items()
-    ]
+    fitted = []
+    for panel, felt in groups.items():
+        fitted.append(FittedSurface(*panel, tuple(felt), _fit(felt, beam), beam))
+    return fitted
 
 
 def friction_lines(fitted: Iterable[FittedSurface]) -> Iterator[str]:

@@ -43,13 +43,29 @@ def as_theory_has_them(
     left = beam.left(np.asarray(d_x_mm, dtype=float))
     bent = theta * np.cos(slope) / np.cos(alpha_rad)
     along = _share_along(phi, bent, alpha_rad)
-    share = first_order.rolling_at(theta, reach, slope, d_x_mm, left)
-    share = share + along * first_order.dragging(theta, alpha_rad) + bent**2 / (6 * left)
+    rolling = first_order.rolling_at(theta, reach, slope, d_x_mm, left)
+    large_angles = bent**2 / (6 * left)
+    share = rolling + along * first_order.dragging(theta, alpha_rad) + large_angles
     size = np.hypot(m_y, m_z) * (1.0 + np.nan_to_num(share * left))
+    return size[:, None] * _direction(theta, phi, slope, along, alpha_rad, left)
+
+
+def _direction(
+    theta: np.ndarray,
+    phi: np.ndarray,
+    slope: np.ndarray,
+    along: np.ndarray,
+    alpha_rad: float,
+    left: np.ndarray,
+) -> np.ndarray:
+    """Return the directions (n, 2), m_y and m_z, that the theory gives forces at φ (n,).
+
+    along, left (n,): shares of friction along the whisker, and of its diameter at the contact.
+    """
     known_left = np.where(np.isfinite(left), left, 1.0)
     turned = _turn_of_force(theta, slope, along, alpha_rad, known_left)
-    phi = np.copysign(np.maximum(np.abs(phi) - turned, 0.0), phi)
-    return size[:, None] * np.stack([np.sin(phi), np.cos(phi)], axis=1)
+    unturned = np.copysign(np.maximum(np.abs(phi) - turned, 0.0), phi)
+    return np.stack([np.sin(unturned), np.cos(unturned)], axis=1)
 
 
 def _share_along(phi: np.ndarray, bent: np.ndarray, alpha_rad: float) -> np.ndarray:

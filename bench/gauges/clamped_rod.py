@@ -219,12 +219,15 @@ class _Rods:
 
     def _softness(self, arc: np.ndarray, nodes: _Nodes) -> tuple[np.ndarray, np.ndarray]:
         """Return EI at the clamp over EI (n, nodes) at the points of arcs (n, 1), and its derivative by these."""
-        at_mm = self.chord_mm[:, None] * nodes.at
-        softness = [
-            self.clamp_rigidity_Nmm2[:, None] / self.rigidity_Nmm2(at_mm * arc * share)
-            for share in (1.0 - _ARC_STEP, 1.0, 1.0 + _ARC_STEP)
-        ]
-        return softness[1], (softness[2] - softness[0]) / (2.0 * _ARC_STEP * arc)
+        at_mm = self.chord_mm[:, None] * nodes.at * arc
+        shorter = self._softness_at(at_mm * (1.0 - _ARC_STEP))
+        longer = self._softness_at(at_mm * (1.0 + _ARC_STEP))
+        by_arc = (longer - shorter) / (2.0 * _ARC_STEP * arc)
+        return self._softness_at(at_mm), by_arc
+
+    def _softness_at(self, at_mm: np.ndarray) -> np.ndarray:
+        """Return EI at the clamp over EI at arc lengths (n, nodes)."""
+        return self.clamp_rigidity_Nmm2[:, None] / self.rigidity_Nmm2(at_mm)
 
     def _lever(self, c: np.ndarray, s: np.ndarray, nodes: _Nodes) -> tuple[np.ndarray, np.ndarray]:
         """Return the force's lever (n, nodes) about each point, in arcs, and its derivatives (n, nodes, nodes).

@@ -58,9 +58,10 @@ def session_toml(
         session.pop("whisker")
         several_motors = len({whisker.column.name for whisker in whiskers}) > 1
         states_gauges = protocol.gauges.known or not _has_gauge_trials(protocol)
-        session["whiskers"] = [
-            base_keys(whisker, several_motors, states_gauges=states_gauges) for whisker in whiskers
-        ]
+        session["whiskers"] = []
+        for whisker in whiskers:
+            keys = base_keys(whisker, several_motors, states_gauges=states_gauges)
+            session["whiskers"].append(keys)
     elif protocol.gauges.known:
         session["gauges"] = _fields(protocol.gauges, "offset_V matrix_Nmm_per_V")
     return tomli_w.dumps(session)

@@ -48,16 +48,7 @@ def lines_in_space(path: Path, cameras: Sequence[str], label: str) -> dict[str, 
 
 def _joints(path: Path, label: str) -> tuple[np.ndarray, np.ndarray]:
     """Return frames (n,) and points (n, joints, 3) in the cameras' frame."""
-    table = list(csv.reader(io.StringIO(read_text(path, "export it as CSV, UTF-8", label))))
-    if not table:
-        raise BadInput("is empty", file=label)
-    names, *rows = table
-    joints = [name.removesuffix("_x") for name in names if name.endswith("_x")]
-    wanted = [f"{joint}_{axis}" for joint in joints for axis in _AXES]
-    if not joints or not set(wanted) <= set(names):
-        found = "has no columns <joint>_x,<joint>_y,<joint>_z, as Anipose writes them"
-        raise BadInput(found, file=label, row=1)
-    columns = _numbers_by_name(names, rows, label)
+    wanted, columns = _coordinates(path, label)
     count = len(columns[wanted[0]])
     points = np.stack([columns[name] for name in wanted], axis=1).reshape(count, -1, 3)
     largest_mm = np.max(np.abs(points[np.isfinite(points)]), initial=0.0)
@@ -65,6 +56,25 @@ def _joints(path: Path, label: str) -> tuple[np.ndarray, np.ndarray]:
         raise BadInput(f"holds {largest_mm:g}, which is no place in mm", file=label)
     frame = columns.get("fnum", np.arange(float(count)))
     return frame, _in_cameras_frame(points, columns, label)
+
+
+def _coordinates(path: Path, label: str) -> tuple[list[str], dict[str, np.ndarray]]:
+    """Return the names of the joints' coordinates, three a joint, and all columns (n,) by name.
+
+    Raises BadInput where no joint has all three.
+    """
+    table = list(csv.reader(io.StringIO(read_text(path, "export it as CSV, UTF-8", label))))
+    if not table:
+        raise BadInput("is empty", file=label)
+    names, *rows = table
+    wanted = []
+    for name in names:
+        if name.endswith("_x"):
+            wanted += [f"{name.removesuffix('_x')}_{axis}" for axis in _AXES]
+    if not wanted or not set(wanted) <= set(names):
+        found = "has no columns <joint>_x,<joint>_y,<joint>_z, as Anipose writes them"
+        raise BadInput(found, file=label, row=1)
+    return wanted, _numbers_by_name(names, rows, label)
 
 
 def _numbers_by_name(

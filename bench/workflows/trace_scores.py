@@ -190,9 +190,11 @@ def _read_all(
 ) -> dict[str, dict[str, Traced]]:
     """Return by trial the traces of the folder, of the trials that the settings take. Raises BadInput."""
     files = _files_by_trial(traces, [trial for trial in recorded if settings.takes(trial.name)])
-    return {
-        trial.name: _read(trial, files[trial.name]) for trial in recorded if trial.name in files
-    }
+    read = {}
+    for trial in recorded:
+        if trial.name in files:
+            read[trial.name] = _read(trial, files[trial.name])
+    return read
 
 
 def _score_trials(
