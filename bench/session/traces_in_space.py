@@ -103,13 +103,16 @@ def _in_cameras_frame(
         raise BadInput(f"column {missing[0]} is missing beside the others", file=label, row=1)
     turn = np.array([columns[name][0] for name in _TURN]).reshape(3, 3)
     centre = np.array([columns[name][0] for name in _CENTRE])
-    is_turn = np.all(np.abs(turn) < 1.0 + _ROUNDING) and np.allclose(
-        turn @ turn.T, np.eye(3), atol=_ROUNDING
-    )
-    if not is_turn or not np.all(np.abs(centre) < _MOST_MM):
+    if not _is_turn(turn) or not np.all(np.abs(centre) < _MOST_MM):
         found = "columns M_00 to M_22 and center are no turn and place of axes"
         raise BadInput(found, file=label, row=2)
     return (points + centre) @ turn
+
+
+def _is_turn(matrix: np.ndarray) -> bool:
+    """Return whether a matrix (3, 3) turns axes, within a table's rounding."""
+    has_unit_size = bool(np.all(np.abs(matrix) < 1.0 + _ROUNDING))
+    return has_unit_size and np.allclose(matrix @ matrix.T, np.eye(3), atol=_ROUNDING)
 
 
 def _as_seen(camera: Camera, frame: np.ndarray, points: np.ndarray) -> DrawnLines:
