@@ -28,9 +28,9 @@ from bench.rig import build
 from bench.rig.protocol import Protocol, load
 from bench.session.inside import check_outside
 from bench.session.session import MANIFEST, Session
-from bench.session.session_check import checked_session
+from bench.session.session_check import checked_session, trials_with_whisks
 from bench.session.trial import Trial
-from bench.trials.of_session import placed_units, trials_with_whisks
+from bench.trials.of_session import placed_units
 from bench.trials.trial_evaluation import see_unit
 from bench.trials.unit import Unit
 from vision.calibration import MeasuredPose

@@ -165,6 +165,19 @@ def _check_clock(
         problems.warn(Reason("frames_without_signals", f"trials/{trial.name}: {taken}"))
 
 
+def trials_with_whisks(session: Session) -> list[Trial]:
+    """Return all trials but those with a weight. Raise BadInput where there is none, or no whisk
+    in any.
+    """
+    trials = [trial for trial in session.trials if trial.purpose != "weight"]
+    if not trials:
+        raise BadInput("there is no trial to evaluate", file="trials")
+    if not any(forward_strokes(read_signals(trial)) for trial in trials):
+        found = "the motor goes forward in none of them; motor_deg grows as the whisker goes towards the bar"
+        raise BadInput(f"there is no whisk: {found}", file="trials")
+    return trials
+
+
 def check_sizes(session: Session, problems: InputProblems) -> None:
     """Check that each camera has one picture size: in its boards, on the rig, in every trial."""
     calibrated: dict[str, Size] = {}

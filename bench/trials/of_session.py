@@ -29,7 +29,7 @@ from bench.gauges.matrix import FROM_ALL, GaugeCalibration
 from bench.gauges.reversal import reversals
 from bench.records.trial_result import SeenTrial
 from bench.session.session import Session
-from bench.session.signals import forward_strokes, read_signals
+from bench.session.signals import read_signals
 from bench.session.trial import Trial
 from bench.trials.contradictions import contradictions_of
 from bench.trials.free_strokes import free_strokes
@@ -42,19 +42,6 @@ from vision.geometry import Reason
 _MORE = "or let the other trials serve: --gauges-from-all"
 _MOST_NAMED = 8  # trials in one line
 _MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
-
-
-def trials_with_whisks(session: Session) -> list[Trial]:
-    """Return all trials but those with a weight. Raise BadInput where there is none, or no whisk
-    in any.
-    """
-    trials = [trial for trial in session.trials if trial.purpose != "weight"]
-    if not trials:
-        raise BadInput("there is no trial to evaluate", file="trials")
-    if not any(forward_strokes(read_signals(trial)) for trial in trials):
-        found = "the motor goes forward in none of them; motor_deg grows as the whisker goes towards the bar"
-        raise BadInput(f"there is no whisk: {found}", file="trials")
-    return trials
 
 
 def require_some(trials: Sequence[Trial], settings: Settings) -> None:

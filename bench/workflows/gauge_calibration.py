@@ -16,10 +16,10 @@ from bench.gauges.felt import FeltStroke
 from bench.gauges.gauges_file import write_gauges
 from bench.gauges.weights import scale_by_weights
 from bench.session.session import Session
-from bench.session.session_check import checked_session
+from bench.session.session_check import checked_session, trials_with_whisks
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
-from bench.trials.of_session import fit_certificate, placed_units, session_drift, trials_with_whisks
+from bench.trials.of_session import fit_certificate, placed_units, session_drift
 
 
 def calibrate_gauges_command(

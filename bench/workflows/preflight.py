@@ -12,7 +12,6 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.progress import count_parts
 from bench.base.settings import Settings
-from bench.cameras.calibration_check import check_calibration
 from bench.cameras.measured_place import contradiction, place_line
 from bench.gauges.felt import FeltStroke, strokes_of
 from bench.gauges.fit import RECORD, in_two_directions
@@ -23,12 +22,11 @@ from bench.session.footage import rig_picture
 from bench.session.frame_times import FrameTimes, dropped, frame_times, read_trial
 from bench.session.given_lines import assumed_line
 from bench.session.session import Session
-from bench.session.session_check import checked_views, find_damage
+from bench.session.session_check import checked_views, find_damage, trials_with_whisks
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.moment_size import check_moment_size
-from bench.trials.of_session import trials_with_whisks
 from bench.trials.still_scene import evenly_exposed, other_scene
 from vision import FEWEST_FREE
 from vision.boards import estimate_optics
@@ -125,6 +123,8 @@ def check_cameras(session: Session, problems: InputProblems) -> None:
     has_pictures = session.has_pictures or bool(session.board_sources)
     if session.cameras_toml is not None or not has_pictures:
         return
+    from bench.cameras.calibration_check import check_calibration  # it loads solvers
+
     with problems.guard():
         for warning in check_calibration(session):
             problems.warn(warning)

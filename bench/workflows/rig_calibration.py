@@ -25,9 +25,9 @@ from bench.session.rig_file import (
     write_rig,
 )
 from bench.session.session import Session
-from bench.session.session_check import checked_session
+from bench.session.session_check import checked_session, trials_with_whisks
 from bench.session.trial import Trial
-from bench.trials.of_session import first_units, trials_with_whisks
+from bench.trials.of_session import first_units
 from bench.trials.placing import measure_rig, require_swing
 from bench.workflows.rig_picture import draw_rig
 from vision.calibration import Placement

@@ -31,10 +31,10 @@ from bench.base.workers import Workers
 from bench.records.trial_result import BY_STAGE, TrialResult
 from bench.report.evaluation import finished
 from bench.session.inside import check_outside
-from bench.session.session_check import checked_session
+from bench.session.session_check import checked_session, trials_with_whisks
 from bench.session.signals import read_signals
 from bench.trials.lost import evaluate_units
-from bench.trials.of_session import placed_units, require_some, trials_with_whisks, with_gauges
+from bench.trials.of_session import placed_units, require_some, with_gauges
 from bench.trials.unit import Unit
 from bench.workflows.robot_answers import Answer, Converter, Task, answers_of_trial, range_of
 from bench.workflows.robot_points import ROBOT_TRADE, Point, front, pool_answers

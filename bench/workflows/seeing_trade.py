@@ -28,10 +28,10 @@ from bench.base.workers import Workers
 from bench.report.score import truth_of
 from bench.session.inside import check_outside
 from bench.session.session import Session
-from bench.session.session_check import checked_session
+from bench.session.session_check import checked_session, trials_with_whisks
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import Trial
-from bench.trials.of_session import placed_units, trials_with_whisks, with_gauges
+from bench.trials.of_session import placed_units, with_gauges
 from bench.trials.seeing import PRESETS, STANDARD, as_toml, by_preset
 from bench.trials.trial_evaluation import trial_result
 from bench.trials.unit import Unit

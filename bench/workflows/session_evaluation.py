@@ -14,19 +14,13 @@ from bench.report.evaluation import Evaluation, finished
 from bench.report.summary.compose import Summary
 from bench.session.inside import check_outside
 from bench.session.session import Session
-from bench.session.session_check import checked_views
+from bench.session.session_check import checked_views, trials_with_whisks
 from bench.session.trial import Trial
 from bench.trials.contradictions import contradictions_alone
 from bench.trials.estimates import own_estimators
 from bench.trials.exchanged_signals import exchanged_pictures, exchanged_signals
 from bench.trials.lost import evaluate_units
-from bench.trials.of_session import (
-    first_units,
-    require_some,
-    trials_with_whisks,
-    units_in_rig,
-    with_gauges,
-)
+from bench.trials.of_session import first_units, require_some, units_in_rig, with_gauges
 from bench.trials.one_camera import require_camera
 from bench.trials.side_by_side import array_units
 from bench.trials.unit import Unit

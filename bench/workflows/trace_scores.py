@@ -29,12 +29,12 @@ from bench.session.footage import visible
 from bench.session.frame_times import frame_times
 from bench.session.inside import check_outside
 from bench.session.session import Session
-from bench.session.session_check import checked_session
+from bench.session.session_check import checked_session, trials_with_whisks
 from bench.session.trace_files import trace_files
 from bench.session.traces import Traced, read_traces
 from bench.session.trial import Trial
 from bench.trials.lost import see_units
-from bench.trials.of_session import placed_units, require_some, trials_with_whisks
+from bench.trials.of_session import placed_units, require_some
 from bench.trials.unit import Unit
 from vision import (
     NEAR_CLAMP_MM,

@@ -67,9 +67,9 @@ def test_options_that_are_not_given_are_the_settings_own():
     assert parser.parse_args(["robot", "s", "--out", "o"]).alpha_est_deg == Settings().alpha_est_deg
 
 
-def test_a_look_at_a_session_imports_no_solver(small_session):
+def test_a_check_without_boards_imports_no_solver(steel_signals):
     """Of the second that `check` takes to start, half was scipy.optimize and what imports it."""
-    code = f"import sys; from bench.commands.cli import main; main(['check', {str(small_session)!r}]); print(*sys.modules)"
+    code = f"import sys; from bench.commands.cli import main; main(['check', {str(steel_signals)!r}]); print(*sys.modules)"
     said = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout
