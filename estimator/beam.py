@@ -71,8 +71,9 @@ class Beam:
     C_Nmm2 is 3EI at the base (the C of equation (1)); tip_share, of "tapered" alone, is the tip's
     diameter over the base's. rest_mm: the unloaded whisker, polynomials in the share of the length of
     y and z, lowest power first; all equations but the exact rod's take it as straight. rest_sigma_mm: how far
-    its tip may lie from there in each. Raises ValueError
-    for anything but a positive C and length, and as `taper_of` does.
+    its tip may lie from there in each. taper_sigma_per_mm: one sigma of τ/L below, by length and diameters of
+    the ends. length_sigma_mm: of the length, where a contact may be at the tip.
+    Raises ValueError for anything but a positive C and length, and as `taper_of` does.
 
     All of them have one compliance: θ/m = d/C with 1/d = 1/d_x − τ/L, τ being the share of the
     diameter that is lost up to the tip, since ∫(d_x − s)²/(1 − τs/L)⁴ ds = d_x²·d/3. So every
@@ -86,6 +87,8 @@ class Beam:
     tip_share: float | None = None
     rest_mm: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,), (0.0,))
     rest_sigma_mm: float = 0.0
+    taper_sigma_per_mm: float = 0.0
+    length_sigma_mm: float = 0.0
 
     def __post_init__(self):
         """Raise ValueError unless C and length are positive and the shape is a known one."""
@@ -101,6 +104,10 @@ class Beam:
     def width_by_share(self, share: ArrayLike) -> Numbers:
         """Return the derivative of the width by the share of the length."""
         return -self.taper + 0.0 * np.asarray(share)
+
+    def share_by_taper(self, d_x_mm: ArrayLike) -> Numbers:
+        """Return the relative sigma of d_x by that of the taper: 1/d_x is off by as much as τ/L."""
+        return self.taper_sigma_per_mm * d_x_mm
 
     def other_rests_mm(self) -> tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]:
         """Return the unloaded shapes that are one sigma of the tip's place off: in y, and in z.

@@ -200,7 +200,7 @@ def _model_share(
     whisk: Whisk, settings: EstimatorSettings, d_x: float, beta: float, alpha: float
 ) -> float:
     """Return the model's own relative sigma of d_x: thickness and lean of the object, large
-    angles.
+    angles, and the taper.
     """
     theta = whisk.theta_at_rad
     left = whisk.beam.left(d_x)
@@ -209,4 +209,5 @@ def _model_share(
     alpha = min(alpha, _STEEPEST_FRICTION_RAD)
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, phi, alpha)
     large_angle = theta**2 / (6 * left)
-    return float(np.sqrt(rolling**2 + leaning**2 + large_angle**2))
+    by_taper = whisk.beam.share_by_taper(d_x)
+    return float(np.sqrt(rolling**2 + leaning**2 + large_angle**2 + by_taper**2))

@@ -109,6 +109,7 @@ def _as_of_rod(
     low, high = _wider(ten.low_mm * factor, d_x, ten.high_mm * factor, of_rest)
     high = min(high, whisk.beam.length_mm)
     model = _share_of_rod(whisk, settings, d_x, whisk.beam.left(d_x))
+    model = hypot(model, whisk.beam.share_by_taper(d_x))
     of_inputs = uncertainty.sigma(contact.gradient, **_errors(whisk, settings))
     sigma = hypot(of_inputs, model * d_x, of_rest)
     return replace(
@@ -262,15 +263,15 @@ def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
     # the distance there.
     left = beam.left(tapered)
     by_cylinder = left * tapered / d_x
-    model = model_share(whisk, settings, tapered, left)
-    low, high = _interval(whisk, settings, m_y, model / left if model else 0.0)
+    model = hypot(model_share(whisk, settings, tapered, left), beam.share_by_taper(tapered))
+    low, high = _interval(whisk, settings, m_y, model / left if model > 0 else 0.0)
     if isnan(d_x):
         return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
     of_inputs = uncertainty.sigma(gradient, **_errors(whisk, settings))
     sigma = hypot(of_inputs * by_cylinder, model * tapered)
     sigma = max(sigma, _sigma_by_friction(whisk, settings, tapered, low, high))
     estimate = Estimate(tapered, sigma, "", low, high, gradient=gradient * by_cylinder)
-    return _up_to_tip(estimate, beam.length_mm, clamp)
+    return _up_to_tip(estimate, beam, clamp)
 
 
 def _sigma_by_friction(whisk, settings, d_x, low, high):
@@ -315,25 +316,27 @@ def _interval(whisk, settings, m_y, model_sigma):
     return low, min(high, whisk.beam.length_mm) if high > 0 else high
 
 
-def _up_to_tip(estimate, length_mm, clamp):
+def _up_to_tip(estimate, beam, clamp):
     """Return the estimate with its status: clamped at the tip, or flagged there and without an
     interval.
 
-    At the tip sigma and interval are the same shares of the length as they were of the distance.
+    At the tip sigma and interval are the same shares of the length as they were of the distance, and
+    the length's own sigma comes on top.
     """
     d_x = estimate.d_x_mm
-    clamped, at_tip = distance.clamp_to_length(d_x, length_mm)
+    clamped, at_tip = distance.clamp_to_length(d_x, beam.length_mm)
     if at_tip and not clamp:
         return replace(estimate, status=BEYOND, low_mm=nan, high_mm=nan)
     if at_tip:
-        share = length_mm / d_x
-        low = estimate.low_mm * share
+        share = beam.length_mm / d_x
+        low, high = _wider(estimate.low_mm * share, clamped, clamped, beam.length_sigma_mm)
         return replace(
             estimate,
             d_x_mm=clamped,
-            sigma_mm=estimate.sigma_mm * share,
+            sigma_mm=hypot(estimate.sigma_mm * share, beam.length_sigma_mm),
             status=TIP.format(d_x, low),
             low_mm=low,
+            high_mm=high,
             gradient=None,
         )
     status = NEARER.format(estimate.high_mm) if estimate.low_mm == 0 else ""

@@ -297,7 +297,7 @@ def _d_x_at(solve, inputs, beam, alpha) -> float:
 
 
 def _model_share(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float:
-    """Return the relative sigma of d_x by what (10) leaves out.
+    """Return the relative sigma of d_x by what (10) leaves out, and by the taper.
 
     That is thickness and lean of the object, friction along the whisker, large angles.
     """
@@ -311,4 +311,4 @@ def _model_share(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float
         tilt_sigma=settings.tilt_sigma_rad,
         left=whisk.beam.left(d_x),
     )
-    return float(share)
+    return float(np.hypot(share, whisk.beam.share_by_taper(d_x)))

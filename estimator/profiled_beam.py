@@ -48,13 +48,25 @@ class ProfiledBeam(Beam):
         widths: tuple[float, ...],
         rest_mm: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,), (0.0,)),
         rest_sigma_mm: float = 0.0,
+        taper_sigma_per_mm: float = 0.0,
+        length_sigma_mm: float = 0.0,
     ) -> Self:
         """Make the beam, with the closest taper."""
         distances = _as_cylinder(widths)[0]
         touched = (_TOUCHED[0] <= _SHARES) & (_TOUCHED[1] >= _SHARES)
         loss = np.mean((1.0 / _SHARES - 1.0 / distances)[touched])
         tip_share = float(np.clip(1.0 - loss, *_TIPS))
-        return cls(C_Nmm2, length_mm, "tapered", tip_share, rest_mm, rest_sigma_mm, widths)
+        return cls(
+            C_Nmm2,
+            length_mm,
+            "tapered",
+            tip_share,
+            rest_mm,
+            rest_sigma_mm,
+            taper_sigma_per_mm,
+            length_sigma_mm,
+            widths,
+        )
 
     def width(self, share: ArrayLike) -> Numbers:
         """Return the diameter over the base's at a share of the length."""

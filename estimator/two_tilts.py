@@ -273,7 +273,8 @@ def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _
     rolling, rolling_sigma = _rolling(theta, bending.phi, alpha, d_x, left, settings)
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, bending.phi, alpha)
     error = bending.dragging + large + rolling
-    shared = np.array([leaning, rolling_sigma, _LARGE_LEFT * large])
+    by_taper = whisk.beam.share_by_taper(d_x)
+    shared = np.array([leaning, rolling_sigma, _LARGE_LEFT * large, by_taper])
     return _TiltModel(held, error / left, shared / left, bending.dragging_sigma / left)
 
 

@@ -87,6 +87,35 @@ def test_an_interval_at_the_tip_is_as_wide_as_its_sigma(beyond):
     assert 100.0 - estimate.low_mm == pytest.approx(Z_95 * estimate.sigma_mm, rel=1e-6)
 
 
+def test_at_the_tip_the_length_s_own_sigma_comes_on_top():
+    beam = dataclasses.replace(BEAM, length_sigma_mm=0.5)
+    sharp, wide = (
+        ESTIMATORS["with_friction"](dataclasses.replace(whisk_at(110.0, 0.0), beam=one), SETTINGS)
+        for one in (BEAM, beam)
+    )
+    assert wide.sigma_mm == pytest.approx(np.hypot(sharp.sigma_mm, 0.5))
+    assert wide.high_mm == pytest.approx(100.0 + Z_95 * 0.5)
+    assert 100.0 - wide.low_mm == pytest.approx(Z_95 * wide.sigma_mm, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS | builtin.OF_CURVED)
+def test_a_taper_that_is_not_known_moves_the_distance_by_its_sigma(name):
+    """A cone that is 0.5 mm longer than stated, asked with the true length and with the stated one."""
+    cone = dataclasses.replace(BEAM, shape="cone")
+    per_mm = 0.5 / 100.0**2
+    doubtful = dataclasses.replace(cone, taper_sigma_per_mm=per_mm)
+    longer = dataclasses.replace(cone, length_mm=100.5)
+    m_y, m_z = slip.moments(cone.as_cylinder_mm(60.0), THETA, 0.6, ALPHA, BEAM.C_Nmm2)
+    estimates = []
+    for beam in (cone, longer, doubtful):
+        whisk = whisk_of(m_y, m_z, beam=beam)
+        estimates.append((ESTIMATORS | builtin.OF_CURVED)[name](whisk, SETTINGS))
+    known, moved, wide = estimates
+    by_taper = np.sqrt(wide.sigma_mm**2 - known.sigma_mm**2)
+    assert by_taper == pytest.approx(abs(moved.d_x_mm - known.d_x_mm), rel=0.02)
+    assert wide.high_mm - wide.low_mm > known.high_mm - known.low_mm
+
+
 def test_no_slip_beyond_the_length_is_left_and_flagged():
     """d_x cos α/(cos β cos φ), the slip that (2) ignores: nothing touched the tip."""
     beta = np.radians(75)

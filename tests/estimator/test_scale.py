@@ -72,7 +72,8 @@ class Scene:
         length = self.length_mm * unit.length
         tip = 0.5 * self.turn * length
         beam = Beam.from_rigidity(self.rigidity_Nmm2 * unit.rigidity, length, *shape)
-        return replace(beam, rest_mm=((0.0, 0.0, tip), (0.0, 0.0, -0.5 * tip)))
+        rest = ((0.0, 0.0, tip), (0.0, 0.0, -0.5 * tip))
+        return replace(beam, rest_mm=rest, taper_sigma_per_mm=self.noise * self.loss / length)
 
     def felt(self, unit: Units, *, alpha=None, beta=None, theta=None) -> np.ndarray:
         """Return θ, m_y, m_z."""

@@ -7,6 +7,7 @@ from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.rig.simulation import simulate
 from bench.session.session import load_session
+from bench.session.whisker import Whisker
 from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import table
 
@@ -98,3 +99,27 @@ def test_a_cone_and_a_cylinder_are_the_ends_of_a_tapered_whisker():
         assert beam.distance_mm(beam.as_cylinder_mm(d_x)) == pytest.approx(d_x, rel=1e-12)
     assert Beam(C, 100.0, "tapered", 1 - 1e-9).as_cylinder_mm(d_x) == pytest.approx(60.0, rel=1e-8)
     assert Beam(C, 100.0, "cone").as_cylinder_mm(d_x) == pytest.approx(150.0)
+
+
+def test_length_and_both_diameters_are_in_the_taper_s_sigma():
+    """Each by what the taper per mm changes by at one sigma of it."""
+    sizes = {"length_mm": 80.0, "diameter_mm": 1.5, "tip_diameter_mm": 0.6}
+    whisker = Whisker(
+        shape="tapered",
+        youngs_modulus_GPa=3.0,
+        length_sigma_mm=0.5,
+        diameter_sigma_mm=0.02,
+        **sizes,
+    )
+
+    def taper_per_mm(**changed):
+        of = sizes | changed
+        return (1.0 - of["tip_diameter_mm"] / of["diameter_mm"]) / of["length_mm"]
+
+    moved = [
+        taper_per_mm(length_mm=80.5) - taper_per_mm(),
+        taper_per_mm(diameter_mm=1.52) - taper_per_mm(),
+        taper_per_mm(tip_diameter_mm=0.62) - taper_per_mm(),
+    ]
+    assert whisker.beam.taper_sigma_per_mm == pytest.approx(np.linalg.norm(moved), rel=0.02)
+    assert whisker.beam.length_sigma_mm == 0.5
