@@ -22,6 +22,7 @@ NAMES = {
     "truth.known_whisk": ("KnownWhisk",),
     "truth.noise_in_pictures": ("CameraPictures", "line_noise_in_pictures"),
     "truth.observe": ("observe_trial", "wire_lines"),
+    "truth.observe_traces": ("TrialTraces",),
     "truth.predicted_truth": ("PredictedTruth", "predict_truth"),
     "truth.records": ("FrameTruth", "SharedSigmas", "TrialTruth", "WhiskTruth"),
     "truth.sight_lines": ("sights_of",),

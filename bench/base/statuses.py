@@ -251,6 +251,12 @@ _TABLE = (
         reaches=(TRUTH,),
     ),
     Status(
+        "object_points_not_read",
+        WARNING,
+        "{label} is not read: the object is found in the pictures, or there are no traces",
+        _LOOK_AT_FILE,
+    ),
+    Status(
         "stage_not_read",
         WARNING,
         "{label} is not read; where it is the truth, {cure}",
@@ -537,8 +543,14 @@ _TABLE = (
     Status(
         "trace_elsewhere",
         REFUSAL,
-        "another program's trace is nowhere near the wire in the pictures",
+        "another program's trace is of something else than the wire",
         "look whether the trace is of this trial and camera, and neither mirrored nor turned",
+    ),
+    Status(
+        "object_points_elsewhere",
+        REFUSAL,
+        "points or place of the object, given beside traces, are not where the whisker touches",
+        "look whether both are of this trial, and points on the object's middle or on both its edges",
     ),
     Status("no_object_seen", REFUSAL, "no object of the stated form is seen near the whisker"),
     Status("object_in_two_places", REFUSAL, "the object may be in either of two places"),

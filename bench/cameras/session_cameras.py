@@ -60,7 +60,7 @@ _EXACT = Placement(np.zeros(6), np.zeros((6, 6)))
 class SessionCalibration:
     """The cameras of a session and the scenes without whisker and bar.
 
-    cameras: None where the session has no pictures. background: the scene by camera, None where
+    cameras: None where the session has neither pictures nor traces. background: the scene by camera, None where
     there is no such picture. hash: of both. notes: lines on what they rest on. T_rig_board: where
     the board on the rig stands in the cameras' frame, (3, 4) mm, None where not known. board_mm:
     the board's points as calibrated, (m, 3), None where they are as stated. warnings: where the board's views or the bars' widths
@@ -85,7 +85,7 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
 
     Raises BadInput where the session cannot be calibrated, saying what to record.
     """
-    if not session.has_pictures:
+    if not session.is_seen:
         return SessionCalibration(None, {}, hash_of("no pictures"))
     if session.cameras_toml:
         with refused_as_bad_input("cameras.toml"):

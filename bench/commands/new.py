@@ -23,6 +23,7 @@ _NUMBERS = {
 _SHORT = (
     ("--mirror", "cameras", "mirror"),
     ("--traces", "truth", "traces"),
+    ("--traces-only", "truth", "traces-only"),
     ("--no-motor-log", "motor_log", "no"),
 )
 

@@ -102,13 +102,13 @@ def ability_lines(session: Session) -> Iterator[str]:
 
 def _lacks_of_pictures(trial: Trial, session: Session) -> str:
     """Return the one thing more that pictures need to give a trial's truth; '' where they suffice."""
-    if not trial.camera_sources:
+    if not trial.is_seen:
         return f"{_FEWEST_CAMERAS} cameras with a board"
     if not angle_source(trial).has_zero:
         return 'a motor log (motor_deg), or angle_from = "marker" or "whisker"'
     if angle_source(trial).lacks(trial):
         return angle_source(trial).lacks(trial)
-    if len(trial.camera_sources) < _FEWEST_CAMERAS and not trial.is_bar:
+    if len(trial.cameras) < _FEWEST_CAMERAS and not trial.is_bar:
         return "a second camera, or a mirror ([[cameras]] of, crop, mirrored)"
     if session.cameras_toml is None and not session.board_sources:
         return "views of a board (boards/), or cameras.toml"

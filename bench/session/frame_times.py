@@ -92,6 +92,9 @@ def frame_times(trial: Trial) -> FrameTimes:
             found = f"is missing, and camera {with_own[0]} has its own"
             raise BadInput(found, file=trial.label(_own_file(trial, missing[0])))
         return _in_own_files(trial)
+    if trial.is_traced_alone:
+        found = "is missing; traces without pictures need the times of their frames: frame,time_s"
+        raise BadInput(found, file=trial.label("frames.csv"))
     if not cameras:
         return FrameTimes(np.array([]), "none", {})
     if trial.daq is not None and "frame_V" in trial.daq.channels:

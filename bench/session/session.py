@@ -116,6 +116,11 @@ class Session:
         """Return whether any trial has frames."""
         return any(trial.camera_sources for trial in self.trials)
 
+    @property
+    def is_seen(self) -> bool:
+        """Return whether there are pictures or traces of any trial."""
+        return any(trial.is_seen for trial in self.trials)
+
     def mirrored(self, camera: str) -> bool:
         """Return whether a camera is what another one sees in a mirror."""
         return camera in self.crops and self.crops[camera].mirrored
@@ -438,8 +443,8 @@ def _one_source_each(board_sources: Mapping[str, Path], trials: Iterable[Trial])
 def _camera_names(
     board_sources: Mapping[str, Path | PicturePart], trials: Iterable[Trial]
 ) -> tuple[str, ...]:
-    """Return the names of all cameras with pictures of the board or of a trial, in natural order."""
-    names = set(board_sources).union(*(trial.camera_sources for trial in trials))
+    """Return the names of all cameras with pictures of the board or of a trial, or traces, in natural order."""
+    names = set(board_sources).union(*(trial.cameras for trial in trials))
     return tuple(sorted(names, key=lambda name: natural_order(Path(name))))
 
 
@@ -459,7 +464,7 @@ def _check_cameras(session: Session, problems: InputProblems, lenses_known: bool
     for trial in session.trials:
         with problems.guard():
             _check_trial_cameras(trial, session.camera_names)
-    if session.has_pictures and session.cameras_toml is None and not lenses_known:
+    if session.is_seen and session.cameras_toml is None and not lenses_known:
         for name in session.camera_names:
             with problems.guard():
                 _check_camera_boards(session, name)

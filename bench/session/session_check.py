@@ -16,7 +16,7 @@ from bench.session.array_view import load_views
 from bench.session.frame_times import frame_times
 from bench.session.session import Session, load_session
 from bench.session.signals import Signals, forward_strokes, read_signals
-from bench.session.traces import read_traces
+from bench.session.traces import read_traces, read_traces_alone
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from vision.calibration import read_cameras
@@ -79,6 +79,7 @@ def _check(views: Sequence[Session], problems: InputProblems) -> None:
         if view.whisker is not None:
             _warn_of_curvature(view.whisker, problems)
     check_sizes(views[0], problems)
+    check_traces(views[0], problems)
     for names, line in _copies(views[0]):
         problems.warn(line, names)
 
@@ -125,7 +126,7 @@ def check_recording(trial: Trial, problems: InputProblems) -> None:
         times = frame_times(trial)
         for warning in times.warnings:
             problems.warn(warning)
-    if times is not None and trial.trace_files:
+    if times is not None and trial.trace_files and trial.camera_sources:
         with problems.guard():
             read_traces(trial.trace_files, trial.camera_sources, times.picture, trial.place)
     if signals is not None and times is not None and len(times):
@@ -186,6 +187,33 @@ def check_sizes(session: Session, problems: InputProblems) -> None:
     for camera in session.camera_names:
         with problems.guard():
             _check_camera_sizes(session, camera, calibrated.get(camera))
+
+
+def check_traces(session: Session, problems: InputProblems) -> None:
+    """Check the traces of each trial that has no pictures."""
+    alone = [trial for trial in session.trials if trial.is_traced_alone]
+    if not alone:
+        return
+    sizes_px: dict[str, Size] = {}
+    with problems.guard():
+        sizes_px = _known_sizes(session)
+    for trial in alone:
+        with problems.guard():
+            count = len(frame_times(trial))
+            for files in (trial.trace_files, trial.object_files):
+                read_traces_alone(files, count, sizes_px, trial.place)
+
+
+def _known_sizes(session: Session) -> dict[str, Size]:
+    """Return the picture sizes of cameras.toml, or else of the cameras' boards. Raise BadInput."""
+    if session.cameras_toml is not None:
+        return _calibrated_sizes(session)
+    found = {}
+    for camera in session.camera_names:
+        size = next(filter(None, map(_size, _files_of_camera(session, camera))), None)
+        if size is not None:
+            found[camera] = size
+    return found
 
 
 def _calibrated_sizes(session: Session) -> dict[str, Size]:

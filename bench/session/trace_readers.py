@@ -20,6 +20,7 @@ from bench.base.input_problems import refused_as_bad_input
 from bench.session.daq import NOT_HDF5, optional_library
 from bench.session.table import read_table, require_columns
 from bench.session.text_files import check_size, read_text
+from bench.session.trace_files import KINDS
 from vision.calibration import load_matlab
 
 # [bytes] No larger file is read at once.
@@ -81,7 +82,7 @@ class DrawnLines:
 def read_lines(path: Path, label: str) -> DrawnLines:
     """Read a tracker's file by its suffix. Raises BadInput where it cannot be read."""
     check_size(path, _MOST_BYTES, "track in several trials", label)
-    return READERS[path.suffix.lower()](path, label)
+    return _READERS[KINDS[path.suffix.lower()]](path, label)
 
 
 def _own_or_deeplabcut(path: Path, label: str) -> DrawnLines:
@@ -415,12 +416,9 @@ def _bezier_curves(whisker: Mapping, number: int) -> tuple[np.ndarray, np.ndarra
     return np.repeat(frames, len(t)), px, np.full(len(px), number)
 
 
-READERS: dict[str, Callable[[Path, str], DrawnLines]] = {
-    ".csv": _own_or_deeplabcut,
-    ".h5": _hdf5,
-    ".hdf5": _hdf5,
-    ".slp": _hdf5,
-    ".whiskers": _whisk,
-    ".tr4": _whiskerman,
-    ".tr4_2d": _whiskerman,
+_READERS: dict[str, Callable[[Path, str], DrawnLines]] = {
+    "csv": _own_or_deeplabcut,
+    "hdf5": _hdf5,
+    "whisk": _whisk,
+    "whiskerman": _whiskerman,
 }

@@ -1,13 +1,15 @@
 """The lines that another program has traced in a trial's pictures: which files, and whether they are
 of these pictures.
 
-A trial's folder holds `trace_<camera>` with the suffix of the tracker (`trace_readers.READERS`), or
-Anipose's points in space, `trace_3d.csv`, with its cameras, `trace_3d.toml`.
+A trial's folder holds `trace_<camera>` with the suffix of the tracker (`trace_files.KINDS`), or
+Anipose's points in space, `trace_3d.csv`, with its cameras, `trace_3d.toml`. Points of the object are in
+`object_<camera>`, where there are no pictures to find it in.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -24,6 +26,27 @@ from vision.pictures import Frames
 _MOST_OUTSIDE = 0.05
 # [px] Of all points of a trace together, across and down: a line of a wire is longer. Stated.
 _LEAST_SPAN_PX = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class TracedCamera:
+    """What a camera's trace is of.
+
+    count: of its pictures, in words `pictures`. size_px: width, height; None where no file says it. picture (n,): index of its
+    picture in each frame, −1 where it dropped that.
+    """
+
+    count: int
+    size_px: tuple[int, int] | None
+    picture: np.ndarray
+    pictures: str
+
+    @classmethod
+    def of_pictures(cls, source: Path, picture: np.ndarray, camera: str) -> Self:
+        """Return what a trace in a folder of pictures or a video is of."""
+        count = frame_count(source)
+        has = f"camera {camera} has {counted(count, 'picture')}"
+        return cls(count, Frames.open(source).size_px, picture, has)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,43 +69,63 @@ def read_traces(
     picture in each frame (n,), −1 where it dropped that. Raises BadInput where a file cannot be read
     or is not of these pictures, or there are none.
     """
-    _require_pictures(files, sources, label)
-    drawn: dict[str, tuple[DrawnLines, str]] = {}
-    for name, path in files.items():
-        of_file = f"{label}/{path.name}"
-        if name == IN_SPACE:
-            from bench.session.traces_in_space import lines_in_space  # with calibration's solvers
-
-            for camera, lines in lines_in_space(path, list(sources), of_file).items():
-                drawn.setdefault(camera, (lines, of_file))
-            continue
+    traces = {}
+    for name, (lines, of_file) in _drawn(files, list(sources), label).items():
         if name not in sources:
             found = f"there are no pictures of camera {name}; there are those of"
             raise BadInput(f"{found} {', '.join(sources)}", file=of_file)
-        drawn[name] = read_lines(path, of_file), of_file
-    traces = {}
-    for name, (lines, of_file) in drawn.items():
-        traces[name] = _checked(lines, name, sources[name], pictures[name], of_file)
+        camera = TracedCamera.of_pictures(sources[name], pictures[name], name)
+        traces[name] = _checked(lines, name, camera, of_file)
     return traces
 
 
-def _require_pictures(files: Mapping[str, Path], sources: Mapping[str, Path], label: str) -> None:
-    """Raise BadInput for the first of some files of traces where no camera has pictures."""
-    if sources or not files:
-        return
-    first = next(iter(files.values())).name
-    found = "the trial has no pictures, in which the object is found beside its traces"
-    cure = 'add them, or take the traces out: the truth of a stage ([truth] source = "stage")'
-    raise BadInput(f"{found}; {cure} needs neither", file=f"{label}/{first}")
+def read_traces_alone(
+    files: Mapping[str, Path],
+    count: int,
+    sizes_px: Mapping[str, tuple[int, int]],
+    label: str,
+) -> dict[str, Traced]:
+    """Return the traces by camera of a trial that has no pictures.
+
+    files: as of `bench.session.trace_files`. count: of the trial's frames. sizes_px: of the pictures of the cameras
+    that are calibrated. Raises BadInput where a file cannot be read or is not of these frames.
+    """
+    traces = {}
+    for name, (lines, of_file) in _drawn(files, list(sizes_px), label).items():
+        has = f"frames.csv has {counted(count, 'row')}"
+        camera = TracedCamera(count, sizes_px.get(name), np.arange(count), has)
+        traces[name] = _checked(lines, name, camera, of_file)
+    return traces
 
 
-def _checked(
-    drawn: DrawnLines, camera: str, source: Path, picture: np.ndarray, label: str
-) -> Traced:
+def _drawn(
+    files: Mapping[str, Path], cameras: Sequence[str], label: str
+) -> dict[str, tuple[DrawnLines, str]]:
+    """Return by camera the lines of its file, and how messages name that. Raise BadInput.
+
+    cameras: names of those that see points in space.
+    """
+    drawn: dict[str, tuple[DrawnLines, str]] = {}
+    for name, path in files.items():
+        of_file = f"{label}/{path.name}"
+        if name != IN_SPACE:
+            drawn[name] = read_lines(path, of_file), of_file
+            continue
+        from bench.session.traces_in_space import lines_in_space  # with calibration's solvers
+
+        for camera, lines in lines_in_space(path, cameras, of_file).items():
+            drawn.setdefault(camera, (lines, of_file))
+    return drawn
+
+
+def _checked(drawn: DrawnLines, name: str, camera: TracedCamera, label: str) -> Traced:
     """Return a camera's lines as a trace. Raise BadInput where they are not of its pictures."""
-    _require_frames(drawn.frame, camera, frame_count(source), label)
-    is_inside = _inside(drawn.px, camera, Frames.open(source).size_px, label)
+    _require_frames(drawn.frame, camera, label)
+    is_inside = np.ones(len(drawn.px), dtype=bool)
+    if camera.size_px is not None:
+        is_inside = _inside(drawn.px, name, camera.size_px, label)
     _require_span(drawn.px, label)
+    picture = camera.picture
     frame_of = np.full(int(np.max(picture, initial=0)) + 1, -1)
     recorded = np.flatnonzero(picture >= 0)
     frame_of[picture[recorded]] = recorded
@@ -92,7 +135,7 @@ def _checked(
     return Traced(trace.select(is_inside & (frame >= 0)), drawn.has_identity)
 
 
-def _require_frames(frame: np.ndarray, camera: str, count: int, label: str) -> None:
+def _require_frames(frame: np.ndarray, camera: TracedCamera, label: str) -> None:
     """Raise BadInput where frames (n,) are no numbers of the camera's pictures."""
     if len(frame) == 0:
         raise BadInput("holds no point", file=label)
@@ -100,9 +143,9 @@ def _require_frames(frame: np.ndarray, camera: str, count: int, label: str) -> N
     if len(broken):
         rule = "pictures are counted from 0; are these times in seconds?"
         raise BadInput(f"frame {broken[0]:g} is no whole number; {rule}", file=label)
-    absent = frame[(frame < 0) | (frame >= count)]
+    absent = frame[(frame < 0) | (frame >= camera.count)]
     if len(absent):
-        there = f"camera {camera} has {counted(count, 'picture')}, counted from 0"
+        there = f"{camera.pictures}, counted from 0"
         other = "is it of another trial?"
         raise BadInput(f"frame {absent[0]:g} is not there; {there}; {other}", file=label)
 

@@ -14,7 +14,7 @@ from bench.session.givens import Given, with_sigmas
 from bench.session.stage import STAGE, StageLog, read_stage
 from bench.session.stated import StatedSession
 from bench.session.strict_toml import as_keys, convert, read_toml, values
-from bench.session.trace_files import trace_files
+from bench.session.trace_files import IN_SPACE, OBJECT, trace_files
 from vision.pictures import PicturePart
 
 MANIFEST = "trial.toml"
@@ -29,7 +29,8 @@ class Trial(manifest.TrialKeys):
     the frames say it. bar_diameter_mm: the session's where the trial has no own. camera_sources: camera
     to folder of pictures or video, empty where the trial has none. whisker: of an array, whose
     channels `daq` names; '' where it is the only one. givens: what trial.toml and [trial] state.
-    trace_files: the wire's lines by another program, see `bench.session.traces`.
+    trace_files, object_files: the wire's lines and points of the object by another program, see
+    `bench.session.traces`.
     stage: what stage.csv says, where the session's truth is a stage's; None elsewhere.
     """
 
@@ -41,7 +42,24 @@ class Trial(manifest.TrialKeys):
     whisker: str = ""
     givens: tuple[Given, ...] = ()
     trace_files: dict[str, Path] = field(default_factory=dict)
+    object_files: dict[str, Path] = field(default_factory=dict)
     stage: StageLog | None = None
+
+    @property
+    def is_traced_alone(self) -> bool:
+        """Return whether another program's traces are all that is seen of it: they came without pictures."""
+        return bool(self.trace_files) and not self.camera_sources
+
+    @property
+    def is_seen(self) -> bool:
+        """Return whether there are pictures or traces of it."""
+        return bool(self.trace_files or self.camera_sources)
+
+    @property
+    def cameras(self) -> list[str]:
+        """Return the names of the cameras that have pictures or traces of it."""
+        traced = [name for name in self.trace_files if name != IN_SPACE]
+        return list(self.camera_sources) or traced
 
     @property
     def states_place(self) -> bool:
@@ -105,12 +123,39 @@ def load_trial(
         daq=daq,
         givens=givens,
         trace_files=trace_files(folder, place),
+        object_files=trace_files(folder, place, OBJECT),
         **settings,
     )
     if session.keys.truth is None:
         _warn_of_unread_stage(trial, problems)
-        return trial
-    return _with_stage(trial, table, place)
+    else:
+        trial = _with_stage(trial, table, place)
+    if trial.is_traced_alone:
+        _check_traced_alone(trial, is_stated=session.keys.truth is not None)
+    elif trial.object_files:
+        file = trial.label(next(iter(trial.object_files.values())).name)
+        problems.warn(reason("object_points_not_read", label=file))
+    return trial
+
+
+def _check_traced_alone(trial: Trial, *, is_stated: bool) -> None:
+    """Raise BadInput where nothing places the object of a trial that has traces and no pictures.
+
+    is_stated: whether the session's truth is a stage's.
+    """
+    label = trial.label(next(iter(trial.trace_files.values())).name)
+    if not trial.object_files and not (is_stated and trial.states_place):
+        found = (
+            "there are no pictures, in which the object is found, and nothing else says where it is"
+        )
+        cure = f'add its points ({OBJECT}<camera>.csv), or its place by a stage ([truth] source = "stage")'
+        raise BadInput(f"{found}; {cure}", file=label)
+    moves = trial.object_gives_way or trial.object_velocity_mm_s is not None
+    if moves or (trial.stage is not None and trial.stage.moves):
+        raise BadInput("traces without pictures need an object that stands", file=label)
+    if not trial.is_bar:
+        found = f"traces without pictures need a straight bar; [object] is a {trial.object.shape}"
+        raise BadInput(found, file=label)
 
 
 def _signals_path(folder: Path, daq: DaqFile | None, place: str) -> Path:

@@ -27,7 +27,11 @@ class Choice:
 
 CHOICES = (
     Choice("cameras", "cameras: two or more, one and a mirror, or none", ("two", "mirror", "none")),
-    Choice("truth", "where the truth comes from", ("pictures", "traces", "stage")),
+    Choice(
+        "truth",
+        "where the truth comes from: pictures, pictures with traces, traces without pictures, or a stage",
+        ("pictures", "traces", "traces-only", "stage"),
+    ),
     Choice("board_kind", "kind of board", KIND_NAMES),
     Choice("motor_log", "is the motor's angle recorded", ("yes", "no")),
     Choice(
@@ -52,6 +56,16 @@ class Lab:
     def has_cameras(self) -> bool:
         """Return whether anything is seen."""
         return self.cameras != "none"
+
+    @property
+    def has_traces(self) -> bool:
+        """Return whether another program traces the wire."""
+        return self.truth in ("traces", "traces-only")
+
+    @property
+    def has_frames(self) -> bool:
+        """Return whether there are pictures of the trials."""
+        return self.has_cameras and self.truth != "traces-only"
 
     @classmethod
     def of(cls, given: Mapping[str, str], ask: Ask | None = None) -> "Lab":

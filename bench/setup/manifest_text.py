@@ -37,7 +37,7 @@ def manifest_text(
         tables.append(_GAUGES)
     speed = "# speed_deg_s = 10.0            # nominal" if lab.motor_log == "yes" else _BY_SPEED
     tables.append(_TRIAL.format(speed=speed.format(**lines)))
-    tables.append(_FRAMES if lab.has_cameras else "")
+    tables.append(_FRAMES if lab.has_frames else "")
     tables.append("\n# What to record:\n")
     tables += [f"#   {file.ljust(27)} {what}\n" for file, what in _to_record(lab)]
     return "".join(tables)
@@ -69,8 +69,13 @@ def _to_record(lab: Lab) -> Iterator[tuple[str, str]]:
     """Yield the files that are to be recorded, and what is in each."""
     if lab.has_cameras:
         yield from _pictures_to_record(lab)
-    if lab.truth == "traces":
+    if lab.has_traces:
         yield "trials/<trial>/trace_<camera>.csv", "frame,u_px,v_px, or your tracker's own file"
+    if lab.truth == "traces-only":
+        yield (
+            "trials/<trial>/object_<camera>.csv",
+            "likewise, two places or more of the bar's middle",
+        )
     motor = "motor_deg," if lab.motor_log == "yes" else ""
     channels = "m_y_Nmm,m_z_Nmm" if lab.gauges == "moments" else "y_V,z_V"
     yield "trials/<trial>/signals.csv", f"time_s,{motor}{channels}"
@@ -97,7 +102,8 @@ def _pictures_to_record(lab: Lab) -> Iterator[tuple[str, str]]:
     yield f"boards/{name}/*.png", f"10 or more views of the board a camera{both}:"
     yield "", "tilted, near and far, into the corners"
     yield f"boards/rig/{name}.png", "the empty rig with the board standing on it"
-    yield f"trials/<trial>/{name}/*", f"the frames, or {name}.mp4, .avi, .mkv"
+    if lab.has_frames:
+        yield f"trials/<trial>/{name}/*", f"the frames, or {name}.mp4, .avi, .mkv"
     yield "trials/<trial>/frames.csv", "frame,time_s"
 
 

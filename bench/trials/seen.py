@@ -37,8 +37,9 @@ from bench.trials.consistency import (
 from bench.trials.one_camera import by_one_camera
 from bench.trials.seeing import presets_for
 from bench.trials.seen_friction import seen_friction
+from bench.trials.trace_frames import traced_frames
 from bench.trials.trial_frames import TrialFrames
-from vision import Smooth, TrialTruth, Value, WhiskTruth, observe_trial
+from vision import Smooth, TrialTruth, Value, WhiskTruth
 from vision.geometry import Reason, Refused, joined
 from vision.pictures import Others
 
@@ -70,12 +71,15 @@ def see_trial(
     has whisks whose status says why.
     """
     count = len(forward_strokes(signals))
-    if not trial.camera_sources or calibration.cameras is None:
+    if not trial.is_seen or calibration.cameras is None:
         return unseen(count, NO_PICTURES)
     if not angle_source(trial).has_zero:
         return unseen(count, NO_ZERO)
     try:
-        frames = TrialFrames.read(session, trial, signals, calibration, settings, wires or {})
+        if trial.is_traced_alone:
+            frames = traced_frames(session, trial, signals, calibration)
+        else:
+            frames = TrialFrames.read(session, trial, signals, calibration, settings, wires or {})
         return _see(session, trial, frames, calibration, settings)
     except Refused as refusal:
         return unseen(count, refusal.reason)
@@ -166,7 +170,8 @@ def _notes(frames: TrialFrames) -> tuple[str, ...]:
     missing = _missing_frames(frames.by_camera, frames.times)
     lost = dropped(frames.times, frames.places)
     traced = ", ".join(frames.pictures.traces)
-    others = [f"the wire's lines are another program's ({traced})"] if traced else []
+    alone = "" if frames.by_camera else ", and no picture was read"
+    others = [f"the wire's lines are another program's ({traced}){alone}"] if traced else []
     return (*missing, *lost, *frames.scene.notes, *others)
 
 
@@ -179,7 +184,9 @@ def _observe(
     """Return the truth of the trial by the first preset, and its forward whisks, each by the first
     preset that reaches the accuracy.
     """
-    observe = partial(observe_trial, frames.pictures, cameras=calibration.cameras, rods=frames.rods)
+    observe = partial(
+        frames.observe, frames.pictures, cameras=calibration.cameras, rods=frames.rods
+    )
     first, *finer = presets
     truth = observe(whisks=[*frames.places, *frames.back.values()], settings=first.vision)
     whisks = [(first.name, whisk) for whisk in truth.whisks[: len(frames.places)]]

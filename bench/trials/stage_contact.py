@@ -6,7 +6,7 @@ stated place decide. A bar is a `StatedBar`, any other object a `StatedRounded`.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -195,6 +195,14 @@ class StatedPush:
     def from_base_mm(self) -> float:
         """Return how far the object's middle is from the whisker's base where the stroke begins."""
         return self.object.from_base_mm(self._standing(self.motor_rad[:1], Offsets.none()))
+
+    def standing_in_rig(self, motor_rad: float) -> Axis:
+        """Return where the object stands in the base's frame at a motor angle."""
+        standing = self._standing(np.array([motor_rad]), Offsets.none())
+        turn = rotation_z(motor_rad)
+        return replace(
+            standing, point_mm=turn @ standing.point_mm[0], direction=turn @ standing.direction[0]
+        )
 
     def _standing(self, motor_rad: np.ndarray, offsets: Offsets) -> Axis:
         """Return where the object stands in the hub's axes at motor angles (n,)."""

@@ -33,7 +33,7 @@ from bench.trials.stage_contact import (
 from bench.trials.stated_length import unit_within
 from bench.trials.trial_frames import stated_object
 from vision import NAN, UNKNOWN, SharedSigmas, TruthAtAngle, Value, WhiskTruth
-from vision.geometry import NO_REASON, Reason, Rounded, apply, joined
+from vision.geometry import NO_REASON, Axis, Reason, Refused, Rounded, apply, joined
 
 NOT_SEEN = reason("slip_not_seen")
 # [mm] One sigma of where the clamp holds the whisker's axis beside the hub's: a collet's runout.
@@ -44,6 +44,10 @@ _CLAMP_MM = 0.3
 _SET_SHARE = 0.01
 # [mm] One sigma of a stated distance without one: a ruler's. Stated.
 _RULER_MM = 0.5
+# [mm] Least sigma of a place that is stated as exact. Derived.
+_EXACT_MM = 1e-3
+# [rad] Likewise of a direction. Derived.
+_EXACT_RAD = 1e-4
 # Steps of derivatives: mm, rad, mm, mm. What is left out is 1e-6 of them. Derived.
 _STEPS = Offsets(np.full(3, 1e-3), 1e-4, 1e-4, 1e-3, np.full((2, REST_TERMS), 1e-3)).vector
 _HOW = {
@@ -216,6 +220,26 @@ def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -
     return replace(
         truth, status=joined(_unlike_stated(values[0], trial), _other_slope(values[1], trial))
     )
+
+
+def stated_place(session: Session, trial: Trial, signals: Signals) -> tuple[Axis, np.ndarray]:
+    """Return where the stage has the bar, in the base's frame, and sigmas (4,): of two shifts, mm, and two tilts, rad.
+
+    Raises BadInput where no such place can be, Refused where no stroke comes to touch it there.
+    """
+    for stroke in forward_strokes(signals):
+        push = _push(session, trial, signals, stroke)
+        touch = push.touch(Offsets.none())
+        if touch is None:
+            _check_place(push, trial)
+            continue
+        own = Offsets.from_vector(_own_sigmas(trial, signals, stroke, touch))
+        shared = Offsets.from_vector(_shared_sigmas(session, trial, touch))
+        shift_mm = np.hypot(own.place_mm, shared.place_mm).max()
+        turn_rad = np.hypot(own.slope_rad, shared.slope_rad)
+        sigma = np.repeat([max(shift_mm, _EXACT_MM), max(turn_rad, _EXACT_RAD)], 2)
+        return push.standing_in_rig(touch.motor_rad).upward(), sigma
+    raise Refused("by the stage no stroke comes to touch the object", code="never_touches")
 
 
 def _without_touch(push: StatedPush, trial: Trial) -> WhiskTruth:

@@ -2,7 +2,7 @@
 by whisks.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from bench.session.signals import Signals, forward_strokes, ways_back
 from bench.session.traces import read_traces
 from bench.session.trial import Trial
 from bench.trials.still_scene import StillScene, still_scene
-from vision import Trace, TrialPictures
+from vision import Trace, TrialPictures, TrialTraces, TrialTruth, observe_trial
 from vision.geometry import Bar, Rods, StatedSizes, Touched, touched_object
 from vision.pictures import Others, RodLines
 
@@ -27,8 +27,8 @@ class TrialFrames:
     """The frames of a trial.
 
     by_camera: pictures by frame, as read. places: frames of each forward stroke. back: frames of
-    ways back by the number of the whisk, last frame first. pictures: what vision evaluates.
-    motor_sigma_rad (n,): of each frame's own motor angle.
+    ways back by the number of the whisk, last frame first. pictures: what vision evaluates, or traces alone;
+    observe: evaluates it. motor_sigma_rad (n,): of each frame's own motor angle.
     """
 
     times: FrameTimes
@@ -36,9 +36,10 @@ class TrialFrames:
     scene: StillScene
     places: list[slice]
     back: dict[int, slice]
-    pictures: TrialPictures
+    pictures: TrialPictures | TrialTraces
     rods: Rods
     motor_sigma_rad: np.ndarray
+    observe: Callable[..., TrialTruth] = observe_trial
 
     @classmethod
     def read(
@@ -75,7 +76,7 @@ class TrialFrames:
             picture_of={name: crop.of for name, crop in session.crops.items()},
         )
         places = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
-        back = _back_frames(trial, signals, times)
+        back = back_frames(trial, signals, times)
         rods = Rods(session.whisker.wire, stated_object(trial))
         motor_sigma_rad = signals.motor_sigma_at(times.time_s)
         return cls(times, by_camera, scene, places, back, pictures, rods, motor_sigma_rad)
@@ -120,7 +121,7 @@ def stated_object(trial: Trial) -> Touched:
     return touched_object(given.shape, replace(thickness, **given.sizes))
 
 
-def _back_frames(trial: Trial, signals: Signals, times: FrameTimes) -> dict[int, slice]:
+def back_frames(trial: Trial, signals: Signals, times: FrameTimes) -> dict[int, slice]:
     """Return the frames of ways back by whisk, last to first, so that the whisker comes to the bar.
 
     The first way back alone is taken unless the trial asks for all. A way back of few frames is

@@ -13,7 +13,8 @@ import numpy as np
 from vision.geometry.touched import Touched
 from vision.wire.points import SHARED
 
-# [mm, rad] Of the bar from where it was found: nothing is believed of it. Stated.
+# [mm, rad] Of the bar from where it was found: nothing is believed of it, where nobody states its
+# place. Stated.
 BAR_PRIOR = np.array([50.0, 50.0, 1.0, 1.0])
 # [mm] One sigma of what a lab's whisker may have at its tip: clamped off centre; encoder zero and
 # clamp angle; set and sag; change of curvature. Wide: they only keep what no picture shows from
@@ -116,13 +117,14 @@ class Blocks:
         motion_sigma: Sequence[float],
         touched: Touched,
         bent_frames: int,
+        axis_sigma: np.ndarray = BAR_PRIOR,
     ) -> "Blocks":
         """Return the blocks one behind the other. offset_sigma_px (cameras, 12): see
-        `WIRE_MODES_PX`, `BAR_MODES_PX`.
+        `WIRE_MODES_PX`, `BAR_MODES_PX`. axis_sigma (4,): of the object's axis, mm and rad.
         """
         layout = _Layout()
         axis_step = np.repeat([_STEP_MM, _STEP_TILT_RAD], 2)
-        bar_axis = layout.add(BAR_PRIOR, axis_step)
+        bar_axis = layout.add(axis_sigma, axis_step)
         rest_shape = layout.add(np.tile(REST_PRIOR_MM, 2), _STEP_MM)
         reach = layout.add([max(reach_sigma_mm, _LEAST_REACH_MM)], _STEP_MM)
         wire_offsets, bar_offsets = _add_line_offsets(layout, offset_sigma_px)

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.ndimage import correlate1d
 
+from vision.fit.blocks import columns_of
 from vision.fit.object_rows import object_rows
 from vision.fit.problem import Problem, State, curves_of, point_rows
 from vision.fit.solve import LAST_SCALE, linear_at, robust_weights, weighted_jacobian
@@ -90,12 +91,12 @@ def by_lens(problem: Problem, state: State, inverse_normal: np.ndarray) -> np.nd
 
 def shared_covariance(problem: Problem, state: State, fitted: Uncertainty) -> np.ndarray:
     """Return the part (size, size) of a fit's covariance that all whisks of a session have in
-    common: by diameters, light, cameras and placement.
+    common: by the object's stated place, diameters, light, cameras and placement.
     """
-    own_priors = problem.prior_rows.start
-    first = own_priors + problem.blocks.reach.start
-    behind = own_priors + problem.blocks.motion.start
-    rows = weighted_jacobian(problem, state)[first:behind]
+    blocks = problem.blocks
+    in_common = [blocks.bar_axis, blocks.reach, *blocks.wire_offsets, *blocks.bar_offsets]
+    priors = weighted_jacobian(problem, state)[problem.prior_rows]
+    rows = priors[columns_of(*in_common)]
     by_row = fitted.inverse_normal @ rows.T
     return by_row @ by_row.T + fitted.lens
 
@@ -106,7 +107,7 @@ def variance_by_cause(
     """Return the variance that each cause adds to a quantity with this gradient (size,); the parts
     add up to it.
 
-    wire, bar: scatter of their line points; touch: roundness of bar and wire; diameters: their
+    wire, bar: scatter of their line points, and of the bar its stated place; touch: roundness of bar and wire; diameters: their
     sigmas; light: lines off as a whole; priors: those of rest shape and bend; cameras: lenses, and
     poses towards the rig board; placement: where the rig frame is, by rig board and free strokes
     (NaN where the cameras do not distinguish it: it is in `cameras` then). An observation's part is
@@ -135,11 +136,11 @@ def _sum_by_cause(problem: Problem, parts: np.ndarray) -> dict[str, float]:
     behind_light = blocks.motion.start
     return {
         "wire": np.sum(by_point[is_wire]),
-        "bar": np.sum(by_point[~is_wire]),
+        "bar": np.sum(by_point[~is_wire]) + np.sum(priors[blocks.bar_axis.slice]),
         "touch": np.sum(parts[problem.contact_rows]),
         "diameters": priors[reach],
         "light": np.sum(priors[reach + 1 : behind_light]),
-        "priors": np.sum(priors[:reach]) + np.sum(priors[behind_light:]),
+        "priors": np.sum(priors[blocks.rest_shape.slice]) + np.sum(priors[behind_light:]),
     }
 
 

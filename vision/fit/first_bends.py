@@ -12,7 +12,7 @@ import numpy as np
 from vision.fit.blocks import REST_PRIOR_MM
 from vision.fit.problem import Problem, rest_shape, start
 from vision.fit.solve import solve
-from vision.geometry.camera import Cameras
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import (
     REST_POWERS,
     Curves,
@@ -130,6 +130,17 @@ def find_rest(
         raise Refused(
             "no whisker is seen where the motor angle says it should be", code="no_whisker_seen"
         )
+    return fit_rest(seen, cameras, rods, axis, motor_rad)
+
+
+def fit_rest(
+    seen: Sequence[Observed],
+    cameras: Cameras,
+    rods: Rods,
+    axis: Axis,
+    motor_rad: Mapping[int, float],
+) -> np.ndarray:
+    """Return the rest shape (2, 4) in mm by coarse points of the wire in frames in which nothing touches."""
     motor = np.array(list(motor_rad.values()))
     none = np.zeros(len(motor), dtype=bool)
     problem = Problem(cameras, rods, axis, motor, none, none, seen)
@@ -192,22 +203,22 @@ def find_bend(
 ) -> np.ndarray:
     """Return the bend (2,) in rad of one frame, searched for near a guess (2,)."""
     wire = sights[0].rods.wire
-    views = [sight.view for sight in sights]
+    cameras = [sight.view.camera for sight in sights]
     arc = contact_arc(rest_mm, guess_rad, motor_rad, axis, wire)
     curve = centrelines(rest_mm, guess_rad, arc, motor_rad, wire)
     seen = [sight.votes({frame: curve}) for sight in sights]
-    model = _BendModel(views, rest_mm, arc, motor_rad, wire)
+    model = BendModel(cameras, rest_mm, arc, motor_rad, wire)
     bend, points = _bend_by_votes(model, seen, guess_rad)
-    return _fit_bend(model, bend, points, _prior_information(axis, len(sights)))
+    return fit_bend(model, bend, points, axis)
 
 
 @dataclass(frozen=True, eq=False)
-class _BendModel:
-    """Where one frame's wire is expected, by its bend: views, rest shape, contact arc, motor angle,
+class BendModel:
+    """Where one frame's wire is expected, by its bend: cameras, rest shape, contact arc, motor angle,
     wire.
     """
 
-    views: Sequence[View]
+    cameras: Sequence[Camera]
     rest_mm: np.ndarray
     arc_mm: float
     motor_rad: float
@@ -222,9 +233,9 @@ class _BendModel:
         arc = np.full(shape, self.arc_mm)
         curves = centrelines(rest, bend, arc, np.full(shape, self.motor_rad), self.wire)
         distances = []
-        for view, points in zip(self.views, seen):
+        for camera, points in zip(self.cameras, seen):
             points_mm, _ = curves.at(points.place)
-            offset_px = view.camera.project(points_mm) - points.px
+            offset_px = camera.project(points_mm) - points.px
             distances.append(np.sum(points.normal * offset_px, axis=-1))
         return np.concatenate(distances, axis=-1)
 
@@ -240,7 +251,7 @@ class _BendModel:
 
 
 def _bend_by_votes(
-    model: _BendModel, seen: Sequence[Votes], guess: np.ndarray
+    model: BendModel, seen: Sequence[Votes], guess: np.ndarray
 ) -> tuple[np.ndarray, list[LinePoints]]:
     """Return the bend with most votes of all cameras, or the guess where none surely has more than
     noise; and points near it."""
@@ -269,15 +280,17 @@ def _points_of(seen: Sequence[Votes], shift_px: np.ndarray) -> list[LinePoints]:
     return [one.points(shift) for one, shift in zip(seen, np.split(shift_px, ends))]
 
 
-def _fit_bend(
-    model: _BendModel,
+def fit_bend(
+    model: BendModel,
     bend: np.ndarray,
     seen: Sequence[LinePoints],
-    prior: np.ndarray,
+    axis: Axis,
 ) -> np.ndarray:
-    """Fit the two components of the bend with Cauchy weights; prior (2, 2): information that it is
-    none.
+    """Fit the two components of the bend with Cauchy weights to coarse points by camera.
+
+    bend (2,): to begin from, rad. axis: of the object.
     """
+    prior = _prior_information(axis, len(model.cameras))
     information = np.concatenate([points.sigma_px for points in seen]) ** -2.0
     for _ in range(_ROUNDS):
         residual, jacobian = model.linearise(bend, seen)

@@ -3,13 +3,13 @@ that they mean.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from vision.fit.bend_onset import Onset
-from vision.fit.blocks import BAR_MODES_PX, WIRE_MODES_PX, Blocks
+from vision.fit.blocks import BAR_MODES_PX, BAR_PRIOR, WIRE_MODES_PX, Blocks
 from vision.fit.motion import Motion, Yielding, between
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines, unbent_centrelines
@@ -40,7 +40,8 @@ class Problem:
     the distance of whisker and bar in space. Of a bar that gives way it is when that begins, and touch
     is later by the motion's first parameter. neighbour_correlation: by camera, the share of its error that a
     point of the wire has in common with the next one; 0 where empty (see `vision.fit.scatter`).
-    motion: of a bar that does not stand still.
+    motion: of a bar that does not stand still. axis_sigma (4,): by how much the object may be off its axis:
+    two shifts, mm, and two tilts, rad, across it.
 
     Residuals are ordered by line points, touching frames, priors, onset.
     """
@@ -55,6 +56,7 @@ class Problem:
     onset: Onset | None = None
     neighbour_correlation: Sequence[float] = ()
     motion: Motion | Yielding | None = None
+    axis_sigma: np.ndarray = field(default_factory=BAR_PRIOR.copy)
 
     @property
     def wire(self) -> Wire:
@@ -70,6 +72,7 @@ class Problem:
             motion_sigma=() if self.motion is None else self.motion.sigma,
             touched=self.rods.bar,
             bent_frames=int(np.sum(self.bent)),
+            axis_sigma=self.axis_sigma,
         )
 
     @property

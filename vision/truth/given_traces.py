@@ -8,7 +8,7 @@ is their scatter about the curve of the pass before. What neighbours share is me
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,22 +18,22 @@ from vision.geometry.refusals import Refused
 from vision.geometry.robust import robust_sigma
 from vision.pictures.view import View
 from vision.truth.line_source import WhiskPlace
+from vision.truth.misread_traces import misreadings
+from vision.truth.object_places import ObjectPlace
 from vision.truth.trace_points import (
+    LEAST_NEAR,
     NEAR_PX,
     BesideWire,
     Trace,
     averaged,
     beside_wire,
-    nearest_lines,
     points_of_wire,
+    share_near,
 )
 from vision.truth.traced_lines import BESIDE_BAR_PX, TracedLines
 from vision.wire.points import SHARED, LinePoints, Observed
 from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, observed
 
-# [1] Of the frames with a trace: where fewer have one near the wire, the trace is of something
-# else. Stated.
-_LEAST_NEAR = 0.5
 # [px] About the fit, at most: a tracker that scatters by more draws no line of one wire. Stated.
 _MOST_SCATTER_PX = 3.0
 # [px] Least sigma of a point: files have their numbers to a hundredth. Stated.
@@ -72,7 +72,7 @@ class GivenTraces(TracedLines):
         """Return the points of one camera's trace."""
         camera = view.camera
         beside = beside_wire(trace, camera, place.curves)
-        _require_near(beside, trace, camera, place.curves)
+        _require_near(trace, camera, place.curves)
         near = points_of_wire(beside)
         if not len(near.frame):
             return []
@@ -85,6 +85,17 @@ class GivenTraces(TracedLines):
         points = _line_points(segments, self.whisk.rods.wire.length_mm)
         number = self.whisk.cameras.names.index(camera.name)
         return observed(points, segments.frame, number, list(place.curves))
+
+
+@dataclass
+class TracesAlone(GivenTraces):
+    """The wire's lines as another program has drawn them; the object where `place` has it."""
+
+    place: ObjectPlace | None = None
+
+    def require_rods(self, seen: Sequence[Observed]) -> None:
+        """Raise Refused where wire or object is determined by no line."""
+        self.place.require_rods(seen)
 
 
 def traces_as_lines(traces: Mapping[str, Trace]) -> Callable[..., TracedLines]:
@@ -102,12 +113,16 @@ def traces_as_lines(traces: Mapping[str, Trace]) -> Callable[..., TracedLines]:
 
 
 def _line_points(segments: BesideWire, length_mm: float) -> LinePoints:
-    """Return segments as line points, with a sigma by their scatter where none is stated."""
-    scatter_px = max(robust_sigma(segments.offset_px), _LEAST_SIGMA_PX)
-    is_stated = np.isfinite(segments.sigma_px)
-    sigma_px = np.where(is_stated, np.maximum(segments.sigma_px, _LEAST_SIGMA_PX), scatter_px)
+    """Return segments as line points, with a sigma by their scatter where none is stated.
+
+    What all frames share is no scatter: a curve that is elsewhere is no reason to let the line be there.
+    """
     share = 2.0 * segments.place_mm / length_mm - 1.0
     shapes = np.polynomial.legendre.legvander(share, SHARED - 1)  # (n, SHARED)
+    shared = np.linalg.lstsq(shapes, segments.offset_px, rcond=None)[0]
+    scatter_px = max(robust_sigma(segments.offset_px - shapes @ shared), _LEAST_SIGMA_PX)
+    is_stated = np.isfinite(segments.sigma_px)
+    sigma_px = np.where(is_stated, np.maximum(segments.sigma_px, _LEAST_SIGMA_PX), scatter_px)
     return LinePoints(
         px=segments.foot_px + segments.offset_px[:, None] * segments.normal,
         normal=segments.normal,
@@ -117,12 +132,10 @@ def _line_points(segments: BesideWire, length_mm: float) -> LinePoints:
     )
 
 
-def _require_near(
-    beside: BesideWire, trace: Trace, camera: Camera, curves: Mapping[int, Curves]
-) -> None:
+def _require_near(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> None:
     """Raise Refused where few of the frames with a trace have a line near the wire."""
-    share = _share_near(beside, trace, list(curves))
-    if share >= _LEAST_NEAR:
+    share = share_near(trace, camera, curves)
+    if share >= LEAST_NEAR:
         return
     raise Refused(
         f"camera {camera.name}: in {1.0 - share:.0%} of its frames the trace is nowhere within "
@@ -131,36 +144,9 @@ def _require_near(
     )
 
 
-def _share_near(beside: BesideWire, trace: Trace, frames: Sequence[int]) -> float:
-    """Return the share of the frames with a trace that have a line near the wire; 1 of none.
-
-    The line nearest to the wire is near where half of its points at the wire's arcs are.
-    """
-    with_trace = np.intersect1d(trace.frame, frames)
-    nearest = nearest_lines(beside)
-    near = 0
-    for frame in with_trace.tolist():
-        own = (beside.frame == frame) & (beside.line == nearest.get(frame))
-        is_near = np.abs(beside.offset_px[own]) < NEAR_PX
-        near += len(is_near) > 0 and np.mean(is_near) >= _LEAST_NEAR
-    return near / len(with_trace) if len(with_trace) else 1.0
-
-
 def _hint(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> str:
     """Return what makes a trace that is elsewhere lie near the wire, in words."""
-    width, height = camera.size_px
-    u, v = trace.px.T
-    changed = {
-        "mirrored left to right it is: give it as the pictures are": (width - 1.0 - u, v),
-        "mirrored top to bottom it is: give it as the pictures are": (u, height - 1.0 - v),
-        "turned by half a turn it is: give it as the pictures are": (
-            width - 1.0 - u,
-            height - 1.0 - v,
-        ),
-        "with u and v exchanged it is: u_px goes to the right, v_px down": (v, u),
-    }
-    for said, columns in changed.items():
-        other = replace(trace, px=np.stack(columns, axis=1))
-        if _share_near(beside_wire(other, camera, curves), other, list(curves)) >= _LEAST_NEAR:
+    for said, meant in misreadings(trace, camera):
+        if share_near(meant, camera, curves) >= LEAST_NEAR:
             return said
     return "is it of another trial or another camera?"

@@ -21,6 +21,7 @@ from vision.wire.points import Observed
 # points lie on one line to a tenth of a pixel. Study: thresholds.py
 # truth.line_source _MOST_SCATTER_PX ….
 _MOST_SCATTER_PX = 0.7
+_HIDDEN = "no camera shows enough of the {}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +77,17 @@ class LineSource(ABC):
         for name, on_wire in self.wire_points(place, last=last).items():
             seen += on_wire
             seen += on_object.get(name, [])
-        _require_both_rods(seen)
+        self.require_rods(seen)
         return seen
 
+    def require_rods(self, seen: Sequence[Observed]) -> None:
+        """Raise Refused where wire or bar is seen in no camera."""
+        require_wire(seen)
+        if not any(one.frame < 0 for one in seen):
+            raise Refused(_HIDDEN.format("bar clear of the wire"), code="rod_hidden")
 
-def _require_both_rods(seen: Sequence[Observed]) -> None:
-    """Raise Refused where wire or bar is seen in no camera."""
-    for rod, is_seen in (
-        ("wire clear of the bar", any(one.frame >= 0 for one in seen)),
-        ("bar clear of the wire", any(one.frame < 0 for one in seen)),
-    ):
-        if not is_seen:
-            raise Refused(f"no camera shows enough of the {rod}", code="rod_hidden")
+
+def require_wire(seen: Sequence[Observed]) -> None:
+    """Raise Refused where no camera has a point of the wire."""
+    if not any(one.frame >= 0 for one in seen):
+        raise Refused(_HIDDEN.format("wire clear of the bar"), code="rod_hidden")

@@ -7,7 +7,7 @@
 Nothing here knows of a gauge.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,11 +73,11 @@ def observe_trial(
     try:
         scene = _whisks_of(pictures, whisks, cameras, rods, settings)
     except Refused as reason:
-        return _nothing(whisks, reason.reason)
+        return nothing_seen(whisks, reason.reason)
     rows = []
     found = scene.found
     for whisk in scene.whisks:
-        row, found = _see_whisk(replace(whisk, bar=found))
+        row, found = see_whisk(replace(whisk, bar=found), explain, _truth)
         rows.append(row)
     axis = found.axis.as_bar()
     light = [whisk.light for whisk in scene.whisks]
@@ -176,7 +176,7 @@ def views_facing(
 
     Raises Refused where none has.
     """
-    facing, left_out = _facing(cameras, wire, motor_rad)
+    facing, left_out = cameras_facing(cameras, wire, motor_rad)
     views = pictures.views(facing)
     return views, facing.subset([view.camera.name for view in views]), left_out
 
@@ -232,13 +232,15 @@ def _at_first(views: Sequence[View], strokes: Sequence[Sequence[int]]) -> list[V
     raise Refused("no stroke's first frame is seen by every camera", code="no_shared_first_frame")
 
 
-def _nothing(whisks: Sequence[slice], reason: Reason) -> TrialTruth:
+def nothing_seen(whisks: Sequence[slice], reason: Reason) -> TrialTruth:
     """Return the truth of a trial that is not seen, with the reason as each whisk's status."""
     rows = tuple(WhiskTruth(number, None, status=reason) for number in range(len(whisks)))
     return TrialTruth(np.full(3, np.nan), np.full(3, np.nan), rows)
 
 
-def _facing(cameras: Cameras, wire: Wire, motor_rad: np.ndarray) -> tuple[Cameras, list[Reason]]:
+def cameras_facing(
+    cameras: Cameras, wire: Wire, motor_rad: np.ndarray
+) -> tuple[Cameras, list[Reason]]:
     """Return the cameras that have the whisker before them, and a reason for each of the others.
 
     Raises Refused where none has.
@@ -259,12 +261,16 @@ def _facing(cameras: Cameras, wire: Wire, motor_rad: np.ndarray) -> tuple[Camera
     return cameras.subset(facing), left_out
 
 
-def _see_whisk(whisk: WhiskPictures) -> tuple[WhiskTruth, SeenBar]:
+def see_whisk(
+    whisk: WhiskPictures,
+    explain_by: Callable[[WhiskPictures], Explanation],
+    truth_of: Callable[[Explanation], WhiskTruth],
+) -> tuple[WhiskTruth, SeenBar]:
     """Return the truth of one whisk, or its status where there is none, and the bar to begin the
     next whisk from: another one where the pictures showed it elsewhere.
 
-    A camera that shows something else than the others is left out, and the others are evaluated
-    again.
+    explain_by: fits a whisk. truth_of: makes the row of the fit. A camera that shows something else
+    than the others is left out, and the others are evaluated again.
     """
     while True:
         whisk = whisk.without_gaps()
@@ -276,7 +282,7 @@ def _see_whisk(whisk: WhiskPictures) -> tuple[WhiskTruth, SeenBar]:
             status = joined(Reason("too_few_frames", few), *whisk.left_out)
             return WhiskTruth(whisk.number, None, status=status), whisk.bar
         try:
-            explained = explain(whisk)
+            explained = explain_by(whisk)
             break
         except Misled as reason:
             if len(whisk.views) == 1:
@@ -288,7 +294,7 @@ def _see_whisk(whisk: WhiskPictures) -> tuple[WhiskTruth, SeenBar]:
             whisk = whisk.with_all_frames()
         except np.linalg.LinAlgError:
             return _refused(whisk, NOT_CONVERGED), whisk.bar
-    return _truth(explained), explained.whisk.bar
+    return truth_of(explained), explained.whisk.bar
 
 
 def _refused(whisk: WhiskPictures, status: Reason) -> WhiskTruth:
@@ -303,12 +309,23 @@ def _refused(whisk: WhiskPictures, status: Reason) -> WhiskTruth:
 
 
 def _truth(explained: Explanation) -> WhiskTruth:
+    """Return the truth of a whisk fitted to pictures, with what they show of the wire's end and width."""
+    truth = fitted_truth(explained)
+    whisk = explained.whisk
+    checks_width = whisk.settings.check_beam and whisk.number == 0
+    return replace(
+        truth,
+        ends=wire_ends(whisk, explained.fitted),
+        widths=wire_widths(whisk, explained.fitted) if checks_width else {},
+    )
+
+
+def fitted_truth(explained: Explanation) -> WhiskTruth:
     """Return the truth of a fitted whisk, with its checks and the whisker's base before touch."""
     fitted = explained.fitted
     whisk = explained.whisk.yielding_as(fitted.problem, fitted.state)
     truth = to_whisk(whisk, fitted)
-    checks_beam = whisk.settings.check_beam
-    beam = _check_beam(fitted) if checks_beam else None
+    beam = _check_beam(fitted) if whisk.settings.check_beam else None
     status = joined(truth.status, explained.warning, *warnings_of(whisk, fitted, beam))
     # Before the free stroke is traced, which changes whisk.light.
     refinements = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
@@ -322,8 +339,6 @@ def _truth(explained: Explanation) -> WhiskTruth:
         turns=frame_turns(fitted.problem, fitted.state, fitted.frames),
         delays=_delays(fitted, whisk.picture_of),
         base=base_lines(*free),
-        ends=wire_ends(whisk, fitted),
-        widths=wire_widths(whisk, fitted) if checks_beam and whisk.number == 0 else {},
         beam=beam,
     )
 

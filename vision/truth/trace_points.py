@@ -16,6 +16,9 @@ from vision.pictures.pyramid import shrunk_px
 # [px] From the wire, at most, of a point that is taken to be the wire's: the first of the passes is
 # off by a pixel or two, trackers by less than three. Another whisker is farther away. Stated.
 NEAR_PX = 6.0
+# [1] Of the frames with a trace: where fewer have one near the wire, the trace is of something
+# else. Stated.
+LEAST_NEAR = 0.5
 # [mm] Of the wire, straight between two nodes to a hundredth of a pixel. Derived.
 _NODE_MM = 1.0
 
@@ -71,11 +74,11 @@ def beside_wire(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> B
         own = trace.select(trace.frame == frame)
         arc_mm = np.arange(0.0, curve.arc_mm[-1] + 0.5 * _NODE_MM, _NODE_MM)
         points_mm, _ = curve.at(np.minimum(arc_mm, curve.arc_mm[-1]))
-        frames.append(_beside_curve(own, camera.project(points_mm), arc_mm))
+        frames.append(beside_curve(own, camera.project(points_mm), arc_mm))
     return BesideWire.join(frames)
 
 
-def _beside_curve(trace: Trace, curve_px: np.ndarray, arc_mm: np.ndarray) -> BesideWire:
+def beside_curve(trace: Trace, curve_px: np.ndarray, arc_mm: np.ndarray) -> BesideWire:
     """Return how far points of one frame are off a curve of nodes (m, 2) px at arcs (m,) mm."""
     node = _nearest_nodes(trace.px, curve_px)
     from_node = trace.px - curve_px[node]
@@ -126,6 +129,22 @@ def points_of_wire(beside: BesideWire) -> BesideWire:
     is_near = np.abs(beside.offset_px) < NEAR_PX
     has_line = np.isin(beside.frame, list(nearest))
     return beside.select(has_line & is_near & (beside.line == line))
+
+
+def share_near(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> float:
+    """Return the share of the frames with a trace that have a line near the wire; 1 of none.
+
+    The line nearest to the wire is near where LEAST_NEAR of its points at the wire's arcs are.
+    """
+    beside = beside_wire(trace, camera, curves)
+    with_trace = np.intersect1d(trace.frame, list(curves))
+    nearest = nearest_lines(beside)
+    near = 0
+    for frame in with_trace.tolist():
+        own = (beside.frame == frame) & (beside.line == nearest.get(frame))
+        is_near = np.abs(beside.offset_px[own]) < NEAR_PX
+        near += len(is_near) > 0 and np.mean(is_near) >= LEAST_NEAR
+    return near / len(with_trace) if len(with_trace) else 1.0
 
 
 def averaged(beside: BesideWire, segment_px: float) -> BesideWire:

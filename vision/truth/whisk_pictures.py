@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from vision.fit.bend_onset import Onset
+from vision.fit.blocks import BAR_PRIOR
 from vision.fit.covariance import Uncertainty, uncertainty
 from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding
@@ -19,6 +20,7 @@ from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
 from vision.geometry.reasons import Reason
 from vision.geometry.rods import Rods
+from vision.geometry.touched import Axis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.search import SeenBar
@@ -37,6 +39,17 @@ _FEWEST_SHARE = 0.7
 
 
 @dataclass(frozen=True, eq=False)
+class AxisPrior:
+    """Where the touched object is believed to stand, before a line of it is seen.
+
+    axis: counted from there. sigma (4,): two shifts, mm, and two tilts, rad, across it.
+    """
+
+    axis: Axis
+    sigma: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class WhiskPictures:
     """One whisk in the pictures of a trial.
 
@@ -44,7 +57,7 @@ class WhiskPictures:
     filled with how each camera sees the wire. left_out: a line on each camera that is not used.
     stated_velocity: of a bar that moves. gives: of one that gives way. lines: makes the source of the
     whisk's lines (`vision.truth.traced_lines.TracedLines` or one made as that is). picture_of: as of
-    `TrialPictures`.
+    `TrialPictures`. stated_place: of an object whose place is known without its lines.
     """
 
     number: int
@@ -62,6 +75,11 @@ class WhiskPictures:
     gives: Gives | None = None
     lines: Callable[..., LineSource] | None = None
     picture_of: Mapping[str, str] = field(default_factory=dict)
+    stated_place: AxisPrior | None = None
+
+    def axis_prior(self, axis: Axis) -> AxisPrior:
+        """Return what is believed of the object's place: what is stated, or that it is about the axis of the pass before."""
+        return self.stated_place or AxisPrior(axis, BAR_PRIOR)
 
     @property
     def motion(self) -> Motion | Yielding | None:

@@ -199,16 +199,18 @@ def _fit(
 
     Returns problem, state, and the parameters' covariance by noise and priors.
     """
+    prior = whisk.axis_prior(expected.place.axis)
     problem = Problem(
         whisk.cameras,
         whisk.rods,
-        expected.place.axis,
+        prior.axis,
         whisk.angles_rad,
         expected.touching,
         ~expected.free,
         seen,
         motion=whisk.motion,
         onset=whisk.onset,
+        axis_sigma=prior.sigma,
     )
     state, covariance = solve(problem, _begin(problem, expected))
     problem, state = touch.with_touch(problem, state, covariance)

@@ -10,14 +10,10 @@ import pytest
 import scipy.io
 
 from bench.base.errors import BadInput
-from bench.session.abilities import abilities
 from bench.session.session_check import checked_session
-from bench.session.signals import forward_strokes, read_signals
-from bench.session.strict_toml import read_toml
-from bench.session.trace_files import IN_SPACE, SUFFIXES, trace_files
-from bench.session.trace_readers import READERS, read_lines
+from bench.session.trace_files import trace_files
+from bench.session.trace_readers import read_lines
 from bench.session.traces_in_space import lines_in_space
-from bench.trials.stated_truth import stated_whisk
 from tests.scenes.refusals import refusal
 from vision.geometry import Camera
 
@@ -67,10 +63,6 @@ def measurements(identities):
         content += struct.pack("<10ic", row, frame, number, identity, 0, 0, 0, 0, 0, 2, b"x")
         content += struct.pack("<4d", 0, 0, 0, 0)
     return content
-
-
-def test_every_suffix_has_a_reader():
-    assert tuple(READERS) == SUFFIXES
 
 
 def test_the_table_of_ours_may_state_sigmas_and_lines(tmp_path):
@@ -238,14 +230,14 @@ def anipose(folder):
             cells[4:7] = ["", "", ""]
         cells += [str(v) for v in (*turn.ravel(), *centre, frame)]
         rows.append(",".join(cells))
-    (folder / IN_SPACE).write_text("\n".join(rows) + "\n")
+    (folder / "trace_3d.csv").write_text("\n".join(rows) + "\n")
     (folder / "trace_3d.toml").write_text(CALIBRATION)
     return points
 
 
 def test_anipose_points_are_seen_by_its_own_cameras(tmp_path):
     points = anipose(tmp_path)
-    lines = lines_in_space(tmp_path / IN_SPACE, ["high"], "trials/w/trace_3d.csv")["high"]
+    lines = lines_in_space(tmp_path / "trace_3d.csv", ["high"], "trials/w/trace_3d.csv")["high"]
     matrix = [[800.0, 0.0, 320.0], [0.0, 800.0, 240.0], [0.0, 0.0, 1.0]]
     pose = np.column_stack([np.eye(3), [0.0, 0.0, 500.0]])
     camera = Camera("high", (640, 480), matrix, np.zeros(5), pose)
@@ -258,10 +250,10 @@ def test_anipose_points_need_its_cameras(tmp_path):
     anipose(tmp_path)
     (tmp_path / "trace_3d.toml").unlink()
     with pytest.raises(BadInput, match=r"calibration.toml as trace_3d.toml"):
-        lines_in_space(tmp_path / IN_SPACE, ["high"], "trials/w/trace_3d.csv")
+        lines_in_space(tmp_path / "trace_3d.csv", ["high"], "trials/w/trace_3d.csv")
     anipose(tmp_path)
     with pytest.raises(BadInput, match="has no camera low; it has high"):
-        lines_in_space(tmp_path / IN_SPACE, ["low"], "trials/w/trace_3d.csv")
+        lines_in_space(tmp_path / "trace_3d.csv", ["low"], "trials/w/trace_3d.csv")
 
 
 def test_a_camera_has_one_trace(tmp_path):
@@ -357,52 +349,3 @@ def test_a_trace_of_no_camera_or_no_kind_is_refused(traced):
     assert "no pictures of camera hihg; there are those of high, low" in refusal(traced)
     (folder / "trace_hihg.csv").rename(folder / "trace_hihg.txt")
     assert "trace_hihg.txt: is of no kind that is read" in refusal(traced)
-
-
-def without_pictures(session):
-    """A session's one trial, which has its pictures no longer."""
-    trial = next((session / "trials").iterdir())
-    for camera in ("high", "low"):
-        shutil.rmtree(trial / camera)
-    return trial
-
-
-def state_place(session, trial):
-    """Let a stage say where the object of a trial stands: a bar's and a wire's radius beyond the contact."""
-    with (session / "session.toml").open("a") as manifest:
-        manifest.write('\n[truth]\nsource = "stage"\n')
-    with (trial / "trial.toml").open("a") as manifest:
-        manifest.write("\n[object]\npoint_mm = [57.61, 5.93, 0.0]\npoint_sigma_mm = 0.02\n")
-
-
-@pytest.mark.parametrize("is_stated", [False, True])
-def test_traces_without_pictures_are_refused_with_what_to_do(traced, is_stated):
-    trial = without_pictures(traced)
-    if is_stated:
-        state_place(traced, trial)
-    line = refusal(traced)
-    assert line.startswith(f"trials/{trial.name}/trace_high.csv: the trial has no pictures")
-    assert "add them, or take the traces out" in line and '[truth] source = "stage"' in line
-
-
-def test_points_in_space_without_pictures_are_refused_too(traced):
-    trial = without_pictures(traced)
-    for camera in ("high", "low"):
-        (trial / f"trace_{camera}.csv").unlink()
-    anipose(trial)
-    assert f"{IN_SPACE}: the trial has no pictures" in refusal(traced)
-
-
-def test_a_stage_gives_the_truth_once_the_traces_are_taken_out(traced):
-    trial = without_pictures(traced)
-    state_place(traced, trial)
-    for path in trace_files(trial, trial.name).values():
-        path.unlink()
-    session = checked_session(traced)
-    distance, slope, seen, *_ = abilities(session)
-    assert (distance.count, slope.count, seen.count) == (1, 1, 0)
-    signals = read_signals(session.trials[0])
-    stroke = forward_strokes(signals)[0]
-    d_x_mm = stated_whisk(session, session.trials[0], signals, stroke).d_x_mm
-    true_mm = read_toml(trial / "truth.toml", "truth.toml")["d_x_mm"]
-    assert abs(d_x_mm.value - true_mm) < 2.0 * d_x_mm.sigma < 1.0, (d_x_mm, true_mm)

@@ -131,7 +131,7 @@ LABS = [
     dict(zip((choice.option for choice in CHOICES), answers))
     for answers in product(
         ("two", "mirror", "none"),
-        ("pictures", "traces", "stage"),
+        ("pictures", "traces-only", "stage"),
         ("charuco", "checkerboard"),
         ("yes", "no"),
         ("trials", "known", "moments"),

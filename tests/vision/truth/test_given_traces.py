@@ -1,25 +1,15 @@
 """The wire's lines by another program: beside the wire, in the fit, and where they are of another thing."""
 
-import csv
-import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import CAMERAS, WIRE
-from vision.calibration.cameras_file import read_cameras
+from tests.scenes.traced_example import Example
 from vision.geometry.centreline import REST_POWERS, unbent_curves
-from vision.geometry.rods import Bar, Rods
-from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.files import read_picture
-from vision.pictures.frames import Frames
-from vision.truth.observe import observe_trial
 from vision.truth.trace_points import Trace, averaged, beside_wire, nearest_lines, points_of_wire
-from vision.truth.trial_pictures import TrialPictures
 
-BRING = Path(__file__).resolve().parents[3] / "fixtures" / "bring" / "traces"
 CAMERA = CAMERAS.cameras[0]
 CURVES = unbent_curves(np.zeros((2, REST_POWERS)), {3: 0.05, 4: 0.1}, WIRE)
 
@@ -62,46 +52,6 @@ def test_points_are_averaged_over_segments_with_the_sigma_of_their_mean():
     count = np.bincount(np.floor(beside.along_px / 20.0).astype(int))
     np.testing.assert_allclose(segments.sigma_px, 0.4 / np.sqrt(count[count > 0]))
     np.testing.assert_allclose(segments.offset_px, 0.5, atol=0.01)
-
-
-class Example:
-    """Pictures, traces and truth of the worked example."""
-
-    def __init__(self):
-        trial = next((BRING / "trials").iterdir())
-        self.cameras = read_cameras(BRING / "cameras.toml")
-        self.truth = tomllib.loads((trial / "truth.toml").read_text())
-        rows = list(csv.DictReader((trial / "truth.csv").open()))
-        self.time_s = np.array([float(row["time_s"]) for row in rows])
-        self.motor_rad = np.radians([float(row["motor_deg"]) for row in rows])
-        self.frames = {c.name: dict(Frames.open(trial / c.name).read()) for c in self.cameras}
-        self.background = {
-            c.name: read_picture(BRING / "boards" / "rig" / f"{c.name}.jpg").astype(float)
-            for c in self.cameras
-        }
-        high = np.loadtxt(trial / "trace_high.csv", delimiter=",", skiprows=1)
-        low = np.loadtxt(trial / "trace_low.csv", delimiter=",", skiprows=3)
-        joints = low[:, 1:].reshape(len(low), -1, 3)[:, :, :2]
-        frame = np.repeat(low[:, 0], joints.shape[1])
-        self.traces = {
-            "high": as_trace(high[:, 0], high[:, 1:]),
-            "low": as_trace(frame, joints.reshape(-1, 2)),
-        }
-
-    def see(self, traces):
-        pictures = TrialPictures(
-            self.frames, self.time_s, self.motor_rad, self.background, traces=traces
-        )
-        whole = [slice(0, len(self.motor_rad))]
-        rods = Rods(WIRE, Bar(6.0))
-        settings = VisionSettings(check_beam=False)
-        (whisk,) = observe_trial(pictures, whole, self.cameras, rods, settings).whisks
-        return whisk
-
-
-def as_trace(frame, px):
-    n = len(frame)
-    return Trace(frame.astype(int), px, np.zeros(n, dtype=int), np.full(n, np.nan))
 
 
 @pytest.fixture(scope="module")

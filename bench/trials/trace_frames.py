@@ -1,0 +1,54 @@
+"""A trial's frames where another program's traces are all that came: no picture is read."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from bench.cameras.session_cameras import SessionCalibration
+from bench.session.frame_times import frame_times
+from bench.session.session import Session
+from bench.session.signals import Signals, forward_strokes
+from bench.session.traces import read_traces_alone
+from bench.session.trial import Trial
+from bench.trials.stated_truth import stated_place
+from bench.trials.still_scene import StillScene
+from bench.trials.trial_frames import TrialFrames, back_frames, stated_object
+from vision import Trace, TrialTraces
+from vision.geometry import Cameras, Rods
+
+
+def traced_frames(
+    session: Session, trial: Trial, signals: Signals, calibration: SessionCalibration
+) -> TrialFrames:
+    """Return the frames of a trial of traces alone.
+
+    Raises BadInput where traces and times do not match, Refused where nothing places the object.
+    """
+    times = frame_times(trial)
+    traces = _read(trial.trace_files, len(times), calibration.cameras, trial.place)
+    motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
+    if trial.object_files:
+        points = _read(trial.object_files, len(times), calibration.cameras, trial.place)
+        recording = TrialTraces.with_points(traces, times.time_s, motor_rad, points)
+    else:
+        axis, sigma = stated_place(session, trial, signals)
+        recording = TrialTraces.with_place(traces, times.time_s, motor_rad, axis, sigma)
+    return TrialFrames(
+        times=times,
+        by_camera={},
+        scene=StillScene({}, {}, ()),
+        places=[times.frames_in(signals, stroke) for stroke in forward_strokes(signals)],
+        back=back_frames(trial, signals, times),
+        pictures=recording,
+        rods=Rods(session.whisker.wire, stated_object(trial)),
+        motor_sigma_rad=signals.motor_sigma_at(times.time_s),
+        observe=TrialTraces.observe,
+    )
+
+
+def _read(files: Mapping[str, Path], count: int, cameras: Cameras, label: str) -> dict[str, Trace]:
+    """Return lines or points by camera. Raise BadInput."""
+    sizes_px = {camera.name: tuple(camera.size_px) for camera in cameras}
+    read = read_traces_alone(files, count, sizes_px, label)
+    return {name: traced.trace for name, traced in read.items()}

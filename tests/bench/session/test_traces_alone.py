@@ -1,0 +1,133 @@
+"""A session of traces without pictures: what places the object, and what is wrong with its files."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from bench.base.settings import Settings
+from bench.cameras.session_cameras import calibrate_session
+from bench.session.abilities import abilities
+from bench.session.session_check import checked_session
+from bench.session.signals import forward_strokes, read_signals
+from bench.session.strict_toml import read_toml
+from bench.trials.seen import see_trial
+from bench.trials.stated_truth import stated_whisk
+from tests.scenes.refusals import refusal
+from tests.scenes.traced_example import BRING, Example, csv_of_points, tracked_bar
+
+PLACES_MM = (-15.0, 20.0)
+
+
+@pytest.fixture(scope="module")
+def points():
+    """By camera, the text of object_<camera>.csv."""
+    tracked = tracked_bar(Example(), PLACES_MM)
+    return {camera: csv_of_points(trace) for camera, trace in tracked.items()}
+
+
+@pytest.fixture
+def alone(tmp_path):
+    """A copy of the worked example without pictures of its trial."""
+    session = shutil.copytree(BRING, tmp_path / "traces")
+    for camera in ("high", "low"):
+        shutil.rmtree(trial_of(session) / camera)
+    return session
+
+
+def trial_of(session):
+    return next((session / "trials").iterdir())
+
+
+def add_points(session, points):
+    for camera, text in points.items():
+        (trial_of(session) / f"object_{camera}.csv").write_text(text)
+
+
+def state_place(session):
+    """Let a stage say where the object of a trial stands: a bar's and a wire's radius beyond the contact."""
+    with (session / "session.toml").open("a") as manifest:
+        manifest.write('\n[truth]\nsource = "stage"\n')
+    with (trial_of(session) / "trial.toml").open("a") as manifest:
+        manifest.write("\n[object]\npoint_mm = [57.61, 5.93, 0.0]\npoint_sigma_mm = 0.02\n")
+
+
+@pytest.mark.parametrize("is_stated", [False, True])
+def test_traces_alone_give_the_truth(alone, points, is_stated, tmp_path):
+    """With points of the object, or with its place by a stage."""
+    if is_stated:
+        state_place(alone)
+    else:
+        add_points(alone, points)
+    session = checked_session(alone)
+    assert [ability.count for ability in abilities(session)[:3]] == [1, 1, 1]
+    (trial,) = session.trials
+    calibration = calibrate_session(session, tmp_path / "out")
+    seen = see_trial(session, trial, read_signals(trial), calibration, Settings())
+    assert seen.notes == (
+        "the wire's lines are another program's (high, low), and no picture was read",
+    )
+    truth = read_toml(trial.folder / "truth.toml", "truth.toml")
+    (whisk,) = seen.whisks
+    assert not whisk.overlay
+    assert abs(whisk.d_x_mm.value - truth["d_x_mm"]) < 2.0 * whisk.d_x_mm.sigma < 0.5
+    at = whisk.at
+    assert abs(at.slip_mm.value - truth["slip_at_3deg_mm"]) < 3.0 * at.slip_mm.sigma
+
+
+def test_nothing_that_places_the_object_is_refused_with_what_to_do(alone):
+    line = refusal(alone)
+    assert line.startswith(f"trials/{trial_of(alone).name}/trace_high.csv: there are no pictures")
+    assert "object_<camera>.csv" in line and '[truth] source = "stage"' in line
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda t: (t / "frames.csv").unlink(), "frames.csv: is missing; traces without pictures"),
+        (
+            lambda t: (t / "object_low.csv").write_text("frame,u_px,v_px\n13,1,1\n"),
+            "object_low.csv: frame 13 is not there; frames.csv has 13 rows, counted from 0",
+        ),
+        (
+            lambda t: (t / "object_low.csv").write_text("frame,x,y\n0,1,1\n"),
+            "object_low.csv, row 1: column u_px is missing",
+        ),
+        (
+            lambda t: (t / "object_low.csv").write_text("frame,u_px,v_px\n0,900,1\n1,1,900\n"),
+            "100% of its points are outside the picture of camera low",
+        ),
+        (lambda t: (t / "object_low.csv").rename(t / "object_low.txt"), "of no kind that is read"),
+        (
+            lambda t: (t / "trace_low.csv").rename(t / "trace_lwo.csv"),
+            "cameras.toml: has no camera lwo; it has high, low",
+        ),
+        (
+            lambda t: (t / "trial.toml").open("a").write("object_gives_way = true\n"),
+            "traces without pictures need an object that stands",
+        ),
+        (
+            lambda t: (t / "trial.toml").open("a").write('[object]\nshape = "sphere"\n'),
+            "traces without pictures need a straight bar",
+        ),
+    ],
+)
+def test_faults_are_named(alone, points, change, said):
+    add_points(alone, points)
+    change(trial_of(alone))
+    assert said in refusal(alone)
+
+
+def test_a_stage_gives_the_truth_once_the_traces_are_taken_out(alone):
+    state_place(alone)
+    for path in trial_of(alone).glob("trace_*"):
+        path.unlink()
+    session = checked_session(alone)
+    distance, slope, seen, *_ = abilities(session)
+    assert (distance.count, slope.count, seen.count) == (1, 1, 0)
+    signals = read_signals(session.trials[0])
+    stroke = forward_strokes(signals)[0]
+    d_x_mm = stated_whisk(session, session.trials[0], signals, stroke).d_x_mm
+    true_mm = read_toml(trial_of(alone) / "truth.toml", "truth.toml")["d_x_mm"]
+    assert abs(d_x_mm.value - true_mm) < 2.0 * d_x_mm.sigma < 1.0, (d_x_mm, true_mm)
+    assert np.isfinite(d_x_mm.sigma)
