@@ -28,7 +28,7 @@ from bench.gauges.gauges_file import given_gauges
 from bench.session.given_lines import assumed_line
 from bench.session.rig_file import hash_of_rig
 from bench.session.session import load_session
-from tests.faults.fuzz import BYTES, GAUGES, TEXT, TRIAL, flipped, small_base
+from tests.faults.fuzz import BYTES, GAUGES, TEXT, TRIAL, small_base
 
 # Reads a session; returns how that ended and a line on it.
 Read = Callable[[Path], tuple[str, str]]
@@ -36,10 +36,8 @@ Read = Callable[[Path], tuple[str, str]]
 _MOST_S = 5
 # Of the mutations, those that put a value or a key in place of another; the rest change bytes.
 _OF_VALUES = 0.6
-# SciPy's reader of these dies of single bytes that are others within a variable that is not compressed.
-_MATLAB = (".mat", ".tr4")
 # Files whose bytes are no text.
-_BINARY = (".h5", ".slp", *_MATLAB, ".whiskers", ".measurements")
+_BINARY = (".h5", ".slp", ".mat", ".tr4", ".whiskers", ".measurements")
 _FIRST_LINE = "format = 1\nexact = true\n"
 _REST_OF_WHISKER = {
     "curvature": "rest_curvature_per_mm = [1e-3, -2e-4]\n",
@@ -178,8 +176,6 @@ def mutate(session: Path, files: list[Path], rng: np.random.Generator) -> list[s
             ways = (another_value, another_key)
         else:
             ways = BYTES + TEXT if path.suffix not in _BINARY else BYTES
-            if path.suffix in _MATLAB:
-                ways = tuple(way for way in ways if way is not flipped)
         way = ways[int(rng.integers(len(ways)))]
         path.write_bytes(way(path.read_bytes(), rng))
         done.append(f"{way.__name__} {path.relative_to(session).as_posix()}")
