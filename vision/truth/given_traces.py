@@ -21,19 +21,25 @@ from vision.truth.line_source import WhiskPlace
 from vision.truth.misread_traces import misreadings
 from vision.truth.object_places import ObjectPlace
 from vision.truth.trace_points import (
-    LEAST_NEAR,
     NEAR_PX,
     BesideWire,
     Trace,
     averaged,
     beside_wire,
+    distances_px,
     points_of_wire,
-    share_near,
 )
 from vision.truth.traced_lines import BESIDE_BAR_PX, TracedLines
 from vision.wire.points import SHARED, LinePoints, Observed
 from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, observed
 
+# [1] Of the frames with a trace: where fewer have one near the wire, the trace is of something
+# else. Stated.
+_LEAST_NEAR = 0.5
+# [px] From the wire, of a trace that may be of something else: the first pass is off by a pixel or two. Stated.
+_FIRST_PASS_PX = 1.0
+# [1] Of a trace's distance from the wire, that of one that is meant otherwise. Stated.
+_NEARER = 0.5
 # [px] About the fit, at most: a tracker that scatters by more draws no line of one wire. Stated.
 _MOST_SCATTER_PX = 3.0
 # [px] Least sigma of a point: files have their numbers to a hundredth. Stated.
@@ -133,20 +139,33 @@ def _line_points(segments: BesideWire, length_mm: float) -> LinePoints:
 
 
 def _require_near(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> None:
-    """Raise Refused where few of the frames with a trace have a line near the wire."""
-    share = share_near(trace, camera, curves)
-    if share >= LEAST_NEAR:
+    """Raise Refused where few of the frames with a trace have a line near the wire, or where the trace
+    is nearer once it is meant otherwise.
+    """
+    apart_px = distances_px(trace, camera, curves)
+    if not len(apart_px):
         return
-    raise Refused(
-        f"camera {camera.name}: in {1.0 - share:.0%} of its frames the trace is nowhere within "
-        f"{NEAR_PX:g} px of the wire in the pictures; {_hint(trace, camera, curves)}",
-        code="trace_elsewhere",
+    near = float(np.mean(apart_px < NEAR_PX))
+    cause = _misread_as(trace, camera, curves, float(np.median(apart_px)))
+    if near >= _LEAST_NEAR and not cause:
+        return
+    found = (
+        f"in {1.0 - near:.0%} of its frames the trace is nowhere within {NEAR_PX:g} px of the wire"
     )
+    if near >= _LEAST_NEAR:
+        found = f"the trace is {np.median(apart_px):.1f} px from the wire"
+    cause = cause or "is it of another trial or another camera?"
+    raise Refused(f"camera {camera.name}: {found} in the pictures; {cause}", code="trace_elsewhere")
 
 
-def _hint(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> str:
-    """Return what makes a trace that is elsewhere lie near the wire, in words."""
+def _misread_as(trace: Trace, camera: Camera, curves: Mapping[int, Curves], apart_px: float) -> str:
+    """Return what makes a trace lie surely nearer to the wire, in words; '' where nothing does.
+
+    apart_px: how far it is from the wire as it is read.
+    """
+    if apart_px < _FIRST_PASS_PX:
+        return ""
     for said, meant in misreadings(trace, camera):
-        if share_near(meant, camera, curves) >= LEAST_NEAR:
+        if np.median(distances_px(meant, camera, curves)) < _NEARER * min(apart_px, NEAR_PX):
             return said
-    return "is it of another trial or another camera?"
+    return ""

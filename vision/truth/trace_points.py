@@ -16,9 +16,6 @@ from vision.pictures.pyramid import shrunk_px
 # [px] From the wire, at most, of a point that is taken to be the wire's: the first of the passes is
 # off by a pixel or two, trackers by less than three. Another whisker is farther away. Stated.
 NEAR_PX = 6.0
-# [1] Of the frames with a trace: where fewer have one near the wire, the trace is of something
-# else. Stated.
-LEAST_NEAR = 0.5
 # [mm] Of the wire, straight between two nodes to a hundredth of a pixel. Derived.
 _NODE_MM = 1.0
 
@@ -131,20 +128,20 @@ def points_of_wire(beside: BesideWire) -> BesideWire:
     return beside.select(has_line & is_near & (beside.line == line))
 
 
-def share_near(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> float:
-    """Return the share of the frames with a trace that have a line near the wire; 1 of none.
-
-    The line nearest to the wire is near where LEAST_NEAR of its points at the wire's arcs are.
+def distances_px(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> np.ndarray:
+    """Return for each of the frames with a trace, (n,), the median distance of its points from the
+    wire, of the line with the least; infinite where none has a point beside the wire.
     """
     beside = beside_wire(trace, camera, curves)
-    with_trace = np.intersect1d(trace.frame, list(curves))
-    nearest = nearest_lines(beside)
-    near = 0
-    for frame in with_trace.tolist():
-        own = (beside.frame == frame) & (beside.line == nearest.get(frame))
-        is_near = np.abs(beside.offset_px[own]) < NEAR_PX
-        near += len(is_near) > 0 and np.mean(is_near) >= LEAST_NEAR
-    return near / len(with_trace) if len(with_trace) else 1.0
+    found = []
+    for frame in np.intersect1d(trace.frame, list(curves)).tolist():
+        in_frame = beside.frame == frame
+        of_lines = [np.inf]
+        for line in np.unique(beside.line[in_frame]):
+            own = in_frame & (beside.line == line)
+            of_lines.append(float(np.median(np.abs(beside.offset_px[own]))))
+        found.append(min(of_lines))
+    return np.array(found)
 
 
 def averaged(beside: BesideWire, segment_px: float) -> BesideWire:

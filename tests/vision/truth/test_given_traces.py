@@ -105,6 +105,16 @@ def test_a_trace_of_another_thing_is_named(example, change, said):
     assert np.isnan(seen.d_x_mm.value)
 
 
+def test_a_mirrored_trace_that_crosses_the_wire_is_named(example):
+    """The wire is near the middle of `low`: mirrored it is 2.7 px away, and gave d_x 2.9 sigma off."""
+    low = example.traces["low"]
+    mirrored = replace(low, px=low.px * [-1, 1] + [640.0, 0])
+    seen = example.see({**example.traces, "low": mirrored})
+    assert seen.status.codes == ("trace_elsewhere",)
+    assert seen.status.startswith("camera low: the trace is 2.7 px from the wire in the pictures")
+    assert "; mirrored left to right it is" in seen.status
+
+
 def test_a_camera_whose_tracker_lost_all_frames_gives_no_line(example):
     """One line does not determine the wire in space: its slip is vague, and there is no distance."""
     lost = example.traces["low"].select(slice(0, 0))
