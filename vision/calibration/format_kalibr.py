@@ -58,9 +58,13 @@ def _camera(path: Path, name: str, table: dict[str, Any], T_camera_world: np.nda
             "calibrate with pinhole-radtan"
         )
     fx, fy, cx, cy = numbers(table.get("intrinsics"), (4,), f"{path.name}: intrinsics of {name}")
-    terms = table.get("distortion_coeffs", [])[: _TERMS[lens]]
+    terms = table.get("distortion_coeffs", [])
+    if not isinstance(terms, list):
+        raise Refused(f"{path.name}: distortion_coeffs of {name} is no list of numbers")
     size_px = numbers(table.get("resolution"), (2,), f"{path.name}: resolution of {name}")
-    return foreign_camera(name, size_px, matrix_of(fx, fy, cx, cy), terms, T_camera_world)
+    return foreign_camera(
+        name, size_px, matrix_of(fx, fy, cx, cy), terms[: _TERMS[lens]], T_camera_world
+    )
 
 
 def write(cameras: Cameras, stem: str) -> dict[str, bytes]:

@@ -29,6 +29,7 @@ _UNITS_MM = {
 }
 # [px] MATLAB's coordinate of the first pixel's middle. A layout.
 _FIRST_PIXEL = 1.0
+_BOTH = ("CameraParameters1", "CameraParameters2")
 
 
 def read(path: Path) -> list[Camera]:
@@ -52,6 +53,8 @@ def read(path: Path) -> list[Camera]:
 
 def _stereo(path: Path, stereo: dict[str, Any]) -> list[Camera]:
     """Return both cameras, the first one's frame being the world."""
+    if not all(isinstance(stereo.get(name), dict) for name in _BOTH):
+        raise Refused(f"{path.name} has no structures {' and '.join(_BOTH)}")
     first = _camera(path, "camera1", stereo["CameraParameters1"], None)
     units = stereo.get("WorldUnits") or stereo["CameraParameters1"].get("WorldUnits", "mm")
     if units not in _UNITS_MM:
@@ -67,6 +70,8 @@ def _camera(path: Path, name: str, lens: dict[str, Any], T: np.ndarray | None) -
     matrix = _matrix(path, name, lens)
     if matrix[0, 1]:
         raise Refused(f"{path.name}: {name} has skew {matrix[0, 1]:.3g} px, which no lens here has")
+    if "RadialDistortion" not in lens:
+        raise Refused(f"{path.name}: {name} has no RadialDistortion")
     matrix[:2, 2] -= _FIRST_PIXEL
     radial = np.append(np.ravel(lens["RadialDistortion"]), [0.0, 0.0])[:3]
     tangential = np.append(np.ravel(lens.get("TangentialDistortion", [])), [0.0, 0.0])[:2]
