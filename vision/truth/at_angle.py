@@ -25,11 +25,11 @@ _JUMP_MM = 0.025
 # [rad] Past the last frame a value is still given. Set by eye. Study: thresholds.py
 # truth.at_angle _BEYOND_RAD ….
 _BEYOND_RAD = np.radians(0.3)
-# [sigma] Of touch: which frames surely come before a wanted angle; one in 30 000 does not.
+# [sigma] Of touch, by which a frame lies before or past the wanted angle beyond doubt: 1 in 30 000 errs.
 # Derived.
 _SURE_SIGMAS = 4.0
-# [share] Of frames that scatter so far about the local fit as their sigmas let them; beyond it is
-# small jumps, by Student's t. Derived.
+# [1] Probability by chance alone of a scatter about the local fit that is taken for small jumps; their
+# size then enters by Student's t. Derived.
 _CHANCE = 1e-3
 # [sigma] Half an interval of 95 %. Derived.
 Z_95 = 1.959964
@@ -214,10 +214,11 @@ def _local_fit(theta, at):
 
 
 def _between_frames_sigma(smooth: Smooth, name: str, theta_rad: float) -> float:
-    """Return the standard deviation of a value between the frames about the local fit.
+    """Return by how much a quantity between two frames may be off the local fit, one sigma.
 
-    It is that of the frames. Where chance hardly leaves them that far, small jumps do: each frame's
-    own jump moves the fit as well, and so few frames give their size by Student's t only.
+    It is the scatter of the frames about the fit. A scatter larger than their sigmas explain is of small
+    jumps. Then each frame's jump moves the fit, too, and Student's t allows for how few frames it
+    is estimated from.
     """
     found = scatter(smooth, name, theta_rad)
     chi2_limit = chdtri(found.freedom, _CHANCE) * found.expected**2 if found.freedom else np.inf
@@ -243,11 +244,11 @@ class Scatter:
 
 
 def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
-    """Return the scatter of frames near theta, wider than the local fit where those are few: small
-    jumps are in no frame's sigma, but between the frames.
+    """Return the scatter of frames near theta, by twelve frames at least where there are as many.
 
-    Teeth go from one friction angle to another: the force's angle jumps by as much in all of them,
-    and lengths by as much for their pushing angle. Frames are weighted by their precision.
+    Small jumps are in no frame's sigma. Stick and slip goes from one friction angle to another, so
+    that the force's angle jumps by the same amount everywhere and lengths in proportion to the
+    pushing angle: these are compared as shares of it. Frames are weighted by their precision.
     """
     near = _near(smooth.theta_rad - theta_rad, _FEWEST_FOR_SCATTER) & (smooth.theta_rad > 0)
     degree = _degree(int(np.sum(near)))

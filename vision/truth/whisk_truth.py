@@ -19,8 +19,8 @@ from vision.truth.traced_lines import blurs_px
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.wire.points import Observed
 
-# [1] Least that a variance grows by, of the free stroke that places the rig: what changes slowly
-# over a wide stroke passes for the whisker's turn, which takes up what would show it as scatter.
+# [1] Least factor on the variances of the free stroke that places the rig. An error that changes
+# slowly over a wide stroke is fitted as part of the whisker's turn, so that residuals do not show it.
 # Study: tests/bench/trials/test_placing_pictures.py.
 FREE_SHARED = 4.0
 
@@ -133,7 +133,7 @@ def expect_by_bends(
 
 
 def _expected_to_come_mm(whisk: WhiskPictures) -> np.ndarray:
-    """Return how far (f, 3) the bar is expected to come, mm, (1, 3) where it stands."""
+    """Return the bar's expected displacement (f, 3), mm, (1, 3) where it stands."""
     return np.zeros((1, 3)) if whisk.motion is None else whisk.motion.expected_mm
 
 
@@ -180,7 +180,7 @@ def coarse_curves(
 
 
 def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndarray) -> np.ndarray:
-    """Return how far (f, 3) the bar has come where it touches curves that have passed its place."""
+    """Return the displacement (f, 3) of a bar that gives way, mm: by how far curves pass its place."""
     axis = whisk.bar.axis
     came = np.zeros((len(curves), 3))
     for k in np.flatnonzero(touching).tolist():

@@ -20,16 +20,17 @@ from vision.wire.bands import Pieces
 from vision.wire.binned import sums
 from vision.wire.points import LinePoints
 
-# [px] A wire bends no farther than this out of the curves that are tried: twice their step.
+# [px] Largest distance of the wire from the nearest curve that is tried: twice their step.
 # Derived.
 _NEAR_PX = 4
 # [px] Sigma of a point that has all votes of its segment: segments are placed to a pixel. Stated.
 _SIGMA_PX = 1.0
-# [1] Keeps the sigma of a point without votes finite, and its weight nothing: 32 m of pixels.
+# [1] Votes of a point that has none: its sigma is finite then, and so large that it has no weight.
 # Derived.
 _LEAST_VOTE = 1e-9
-# [sigma] The best of all curves through noise has 3.4, one in 100 has 6, one in ten less each
-# sigma on; a wire as bright as the noise has 18. Study: tests/vision/wire/test_coarse.py.
+# [sigma] Votes of a curve above the mean by which it is surely a wire. In noise alone the best of
+# all curves has 3.4, one in 100 times 6, and ten times more rarely each sigma more; a wire as bright
+# as the noise has 18. Study: tests/vision/wire/test_coarse.py.
 _SURE_SIGMAS = 8.0
 # [widths] Of the rod, over which the mean is subtracted: shade on what is behind changes over
 # more. Derived.
@@ -46,10 +47,11 @@ _WEAK = 1e-3
 class Votes:
     """Hold the votes of segments of a predicted curve for where a rod is.
 
-    share (s, 2 reach + 1): the part of what neither picture explains near each segment that a rod at a
-    shift of -reach, …, reach px would account for.
-    changed: the same part of what the picture without rods does not explain. A wire that moves by
-    less than its width is partly in what stands still, and by `share` seems to lie to one side.
+    share (s, 2 reach + 1): of the contrast near each segment that neither picture explains, the part
+    that a rod at a shift of -reach, …, reach px would explain.
+    changed (s, 2 reach + 1): the same part of the contrast that the picture without rods does not
+    explain. A wire that moves by less than its width is partly in the picture of what stands still,
+    so that `share` would put it to one side.
     """
 
     pieces: Pieces
@@ -65,8 +67,8 @@ class Votes:
         """Return the middle of each segment's votes near a curve, shift_px (s,) off the predicted
         one.
 
-        A segment that what stands still explains has no votes: a lens cap differs from the picture
-        without rods everywhere.
+        A segment that the picture of what stands still explains has no votes, however much it differs
+        from the picture without rods: before a lens cap that is so everywhere.
         """
         near = np.rint(shift_px).astype(int)[:, None] + np.arange(-_NEAR_PX, _NEAR_PX + 1)
         share = self._squared_votes(near)

@@ -1,19 +1,16 @@
 """Positions of all of a rod's segments in one camera, its shading and the lens blur, solved
 together.
 
-What all segments share, shading and blur, can stand in for a shift that they share too. Solved in
-turns, the two creep along the valley between them and stop where they began. Here they are one
-damped Gauss–Newton problem. Its normal matrix has the form of an arrow: one position for each
-segment, and one block of what all share, some hundred unknowns, to which it is reduced (Schur's
-complement). The shading is linear, so that at each step it is the most probable one at these
-positions and this blur (variable projection: Golub and Pereyra 1973, in Kaufman's form).
+Shading and blur, which all segments share, can stand in for a shift of all segments to one side.
+Solved in turns, positions and shading would therefore move slowly along the valley between them and
+end near where they began. Here they are one least-squares problem (`descent.py`).
 
-Two things can go wrong with what all share. A shift of all segments to one side, under another blur
-and shading, can be a minimum of its own, or as good as the best: several starts are followed, the
-descent is begun again where the probable shifts lie elsewhere, and the sigma of such a shift holds
-all that are probable (`common_shift.py`). And no model of light is right to a hundredth of the
-contrast, in all segments alike: what is shared is found with the weights of pixels bounded by that
-error.
+Two things can go wrong with what is shared. A shift of all segments, under another blur and
+shading, can be a local minimum, or as probable as the best: several starts are followed
+(`starts.py`), the descent begins again where the posterior of such a shift lies elsewhere, and its
+sigma holds all shifts that are probable (`common_shift.py`). And no model of light is right to a
+hundredth of the contrast: that error, which all segments have alike, bounds the weights of pixels by
+which the shared unknowns are found (`ShadedSegments.tempered`).
 """
 
 from dataclasses import dataclass, replace
@@ -26,8 +23,8 @@ from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import LEAST_POWER, PositionEquations, SegmentEquations
 from vision.wire.starts import find_start
 
-# [segments] By so many the probability of a common shift is found: pixels at one distance together
-# determine no more than the model is good for. Set by eye. Study: wire_scenes.py.
+# [segments] By which the posterior of a common shift is computed, at most: more pixels at one
+# distance from the axis determine it no better, for the model errs alike in all of them. Set by eye. Study: wire_scenes.py.
 _SPREAD_SEGMENTS = 120
 
 
@@ -36,7 +33,7 @@ class Solved(Shared):
     """Besides what `Shared` has, for each segment (s,): own_sigma_px by its own noise, chi2 per
     pixel, contrast.
 
-    widened_px2 (s, 2): by how much its blur² is above that of all, and sigma.
+    widened_px2 (s, 2): excess of its blur² over the common one, and its sigma.
     """
 
     own_sigma_px: np.ndarray
@@ -56,14 +53,15 @@ def solve_jointly(task: ShadedSegments, *, last: bool = True) -> Solved:
     shared = descend(Point.at_common_shift(tempered, shift_px, log_blur).weighted())
     if last:
         shared = _with_all_shifts(tempered, shared)
-    return settle(task, shared)
+    return place_each_segment(task, shared)
 
 
 def _with_all_shifts(task: ShadedSegments, shared: Shared) -> Shared:
     """Return the solution with a sigma for its common shift that holds all probable shifts.
 
-    Where these lie elsewhere, the descent has ended in the wrong minimum: it is begun again from
-    their mean, and its end is taken where that lies nearer to what is probable about it.
+    Where the posterior of that shift lies elsewhere, the descent has ended in a wrong minimum. It
+    begins again from the posterior's mean, and the solution about which the probable shifts lie
+    closer is returned.
     """
     here = _weighted_point(task, shared)
     shift = _common_shift(task, here)
@@ -118,10 +116,10 @@ def _common_shift(task: ShadedSegments, here: Point) -> CommonShift:
     return common_shift(moved, here.robust[some], float(np.exp(here.log_blur)))
 
 
-def settle(task: ShadedSegments, shared: Shared) -> Solved:
-    """Find each segment's own position by all of its pixels, what all share known.
+def place_each_segment(task: ShadedSegments, shared: Shared) -> Solved:
+    """Find each segment's position by its own pixels, with shading and blur held.
 
-    Their common shift stays as it is.
+    The common shift of all segments stays as it is.
     """
     here = SegmentEquations(task.pieces.moved(shared.shift_px), shared.blur_px, task.terms)
     linear = here.linearised(shared.coefficients)
@@ -145,9 +143,9 @@ def settle(task: ShadedSegments, shared: Shared) -> Solved:
 
 
 def widened_blurs(linear: PositionEquations, blur_px: float, chi2: np.ndarray) -> np.ndarray:
-    """Return by how much each segment's blur² is above that of all, and sigma, (s, 2).
+    """Return the excess of each segment's blur² over the common one, px², and its sigma, (s, 2).
 
-    The segment's position is free as well.
+    The segment's position is estimated with it.
     """
     position_by_blur = linear.gram[:, 0, 1] / linear.power
     information = linear.gram[:, 1, 1] - position_by_blur * linear.gram[:, 0, 1] + LEAST_POWER

@@ -19,7 +19,7 @@ from vision.pictures.others import RodLines, mask_rods
 from vision.pictures.view import View
 from vision.wire.bands import Pieces, cut_pieces, read_band
 from vision.wire.binned import binned, without
-from vision.wire.joint import Solved, settle, solve_jointly
+from vision.wire.joint import Solved, place_each_segment, solve_jointly
 from vision.wire.points import SHARED, LinePoints, Observed
 from vision.wire.shaded_segments import BLUR_SIGMA, ShadedSegments
 from vision.wire.shading import Knots
@@ -29,18 +29,18 @@ NEAR_CLAMP_MM = 6.0
 # [terms] Of the Fourier series round a wire: with eight, a highlight moves it by 0.17 px, for what
 # they lack of a highlight passes for blur and for position. Study: lines.py.
 WIRE_WAVES = 11
-# [px] Blur believed before anything is seen. Narrow: one too wide can be the best nearby. Study:
-# starts.py.
+# [px] Prior mean of the lens blur. Narrow: from one too wide the descent can end in a local
+# minimum. Study: starts.py.
 _BLUR_PX = 0.8
 # [px] Bins of the first pass: a third of a lens blur. Study: thresholds.py wire.trace BIN_PX ….
 BIN_PX = 0.3
 # [nodes] Of a curve, a millimetre apart: in between it is straight to a thousandth of a pixel.
 # Derived.
 _NODES = 81
-# [px] A segment that is known less well is left out. Set by eye. Study: thresholds.py wire.trace
+# [px] Largest sigma of a segment's position that is used. Set by eye. Study: thresholds.py wire.trace
 # _WORST_SIGMA_PX ….
 _WORST_SIGMA_PX = 0.5
-# [1] A segment whose misfit is this many times the median one's is no picture of the rod alone.
+# [1] Largest misfit of a segment, over the median: beyond, it shows something besides the rod.
 # Set by eye. Study: thresholds.py wire.trace _WORST_MISFIT ….
 _WORST_MISFIT = 6.0
 # [1] The median misfit counts as this at least. Set by eye.
@@ -128,7 +128,7 @@ def clear_of_bar(
 
 @dataclass(frozen=True)
 class Traced:
-    """Hold segments brought to where the rod is, what is known of each, and the lens blur in px."""
+    """Hold segments moved to where the rod is, what is known of each, and the lens blur in px."""
 
     pieces: Pieces
     solved: Solved
@@ -164,13 +164,13 @@ def trace(
     blur_px = without(solved.blur_px, variance_px2)
     if last:
         task = ShadedSegments(pieces, WIRE_WAVES, knots, blur_px)
-        solved = settle(task, replace(solved, blur_px=blur_px))
+        solved = place_each_segment(task, replace(solved, blur_px=blur_px))
     return Traced(pieces.moved(solved.shift_px), solved, blur_px)
 
 
 @dataclass(frozen=True)
 class Placed(Rows):
-    """Hold segments where the rod is in them, without their pixels.
+    """Hold traced segments without their pixels.
 
     px, normal (s, 2), place (s,): as of `LinePoints`. source (s,): the band of each. own_sigma_px,
     chi2 (s,), shared_px (s, k), widened_px2 (s, 2): as of `vision.wire.joint.Solved`.
