@@ -211,6 +211,9 @@ def compared(before: dict[str, dict], after: dict[str, dict]) -> str:
 def put(module, constant: str, value) -> None:
     """Set the constant in its module and in all of vision that took it by name. What was made of it on import stays."""
     usual = getattr(module, constant)
+    if constant.startswith("_"):  # others' of that name, the same small number, are not this one
+        setattr(module, constant, value)
+        return
     for name, other in list(sys.modules.items()):
         if name.startswith("vision.") and getattr(other, constant, None) is usual:
             setattr(other, constant, value)
