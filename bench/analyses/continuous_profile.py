@@ -23,7 +23,7 @@ from vision.geometry import counted
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# [whisks] Most whose names fit below the figure. Set by eye.
+# [whisks] Whose names fit below the figure, in two columns. A layout.
 _MOST_NAMED = 12
 _CONTACT = "contact of the whisker's middle, rig frame"
 PROFILE = Table(

@@ -16,9 +16,9 @@ from vision import SIGMA_SHARE, bar_diameter_mm
 from vision.calibration import check_known_lengths
 from vision.geometry import Bar, Cameras, Reason, Refused
 
-# [trials] A median is taken over them. Set by eye.
+# [trials] Of which a median is taken, at most: a bound on time. Stated.
 _MOST_TRIALS = 3
-# [pictures] Of each camera and trial. Set by eye.
+# [pictures] Of each camera and trial, at most: a bound on time. Stated.
 _MOST_PICTURES = 11
 # Scatter of the share, of one trial alone.
 _UNCONFIRMED = 0.05

@@ -31,7 +31,7 @@ from vision.geometry import Reason, Refused, compose, invert_transform
 
 # A step beyond this is taken once more from where it led: lines far from where they were expected are read less well.
 _SMALL_STEP = np.repeat([2e-3, 0.2], 3)
-_MOST_ROUNDS = 3  # ends before, where a step is small. Set by eye
+_MOST_ROUNDS = 3  # it ends before, where a step is small. Stated.
 # A first look finds the centre across the whisker to half a millimetre (docs/cameras.md).
 _ELSEWHERE_MM = 2.0
 # A T_rig_board known no better is a first guess: the strokes alone must then do.

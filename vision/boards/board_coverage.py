@@ -9,10 +9,11 @@ from vision.boards.corners import Corners
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
 
-# [1] Share of the picture's width beyond all corners from which a lens is extrapolated. Origin
-# not known.
+# [1] Share of the picture's width beyond all corners from which a lens is extrapolated. Stated: it
+# makes a note, and enters no number. Study: calibrate cameras, its notes.
 _HULL_MARGIN = 0.05
-# [1] Share of where whisker and bar will be that may lie outside. Origin not known.
+# [1] Share of where whisker and bar will be that may lie outside. Stated: it makes a refusal, and
+# enters no number. Study: calibrate cameras, its notes.
 _MOST_UNCOVERED = 0.2
 
 

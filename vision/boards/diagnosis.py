@@ -21,13 +21,16 @@ _LEAST_SHARE = 0.3
 # tests/vision/boards/test_board_settings.py.
 _CLEARLY_MORE = 2.0
 # [1] A dictionary may be the one entered wrongly where it shows so large a part of the most
-# markers. Set by eye.
+# markers. Set by eye: names a cause in a refusal, enters no number. Study:
+# tests/vision/boards/test_board_settings.py.
 _NEARLY_MOST = 0.7
-# [markers] And that part is more than so many. Set by eye.
+# [markers] And that part is more than so many. Set by eye, as above. Study:
+# tests/vision/boards/test_board_settings.py.
 _SEVERAL = 2
-# [dictionaries] As many are tried with all prints. Set by eye.
+# [dictionaries] As many are tried with all prints: a bound on time. Stated.
 _MOST_DICTIONARIES = 3
-# [px] A corner farther from the homography is another thing. Set by eye.
+# [px] A corner farther from the homography is another thing. Set by eye, as above. Study:
+# tests/vision/boards/test_board_settings.py.
 _NEAR_PX = 3.0
 
 

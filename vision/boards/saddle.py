@@ -29,8 +29,8 @@ _MAX_SHIFT_SQUARES = 1.0 / 3.0
 # [pixels] Over four times the nine parameters. moves nothing on the fixtures between 10 and 160.
 # Study: thresholds.py boards.saddle _MIN_PIXELS ….
 _MIN_PIXELS = 40
-# [1] Against what the model leaves over, and against rounding. Origin not known; moves nothing on
-# the fixtures between 1.5 and 6. Study: thresholds.py boards.saddle _LEAST_CONTRAST ….
+# [1] Against what the model leaves over, and against rounding. Moves nothing on the fixtures
+# between 1.5 and 6. Study: thresholds.py boards.saddle _LEAST_CONTRAST ….
 _LEAST_CONTRAST = 3.0
 # [grey levels] Sigma of rounding to whole levels, 1/√12. Derived.
 _ROUNDING = 0.3
@@ -43,7 +43,7 @@ _CONVERGED_PX = 2e-3
 # [px] Where the fit starts. moves nothing on the fixtures between 0.6 and 2. Study: thresholds.py
 # boards.saddle _FIRST_BLUR_PX ….
 _FIRST_BLUR_PX = 1.0
-# [px] Softer is no edge. Origin not known; 4 and 12 leave the fixtures as they are. Study:
+# [px] Softer is no edge. 4 and 12 leave the fixtures as they are. Study:
 # thresholds.py boards.saddle _MOST_BLUR_PX ….
 _MOST_BLUR_PX = 8.0
 # [px] How far apart two pixels' noise is still correlated. z of rig corners 1.18, 1.13, 1.15 with

@@ -40,7 +40,8 @@ SQUASHED = (3.0 / 4.0, 4.0 / 3.0)
 # [1] Decentring shifts the picture's rim by p r² f, some 1e-3 f at most; fifty times that.
 # Stated.
 _MOST_DECENTRING = 0.05
-# [1] The rim of the picture against its middle. Origin not known.
+# [1] The rim of the picture against its middle. Stated: it makes a refusal, and enters no number.
+# Study: calibrate cameras, its notes.
 _MOST_MAGNIFICATION = 2.0
 # [px] Model error an axis beyond the corners' own sigma: webcams that nobody triggered leave 0.18
 # once instants are fitted (multi4_b), cameras by themselves 0.0 to 0.06; twice that. Study:

@@ -14,8 +14,8 @@ import numpy as np
 
 from vision.geometry.rotation import log_rotation
 
-# [frame intervals] Neighbours farther away say nothing of the motion now. Origin not known; it
-# reaches two neighbours to either side. Study: cameras.py.
+# [frame intervals] Neighbours farther away say nothing of the motion now: two to either side count, with
+# their times' jitter, and no third. Derived. Study: cameras.py.
 _REACH_INTERVALS = 2.6
 
 

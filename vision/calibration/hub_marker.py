@@ -25,8 +25,8 @@ _FEWEST_INSTANTS = 4
 # [rad] Of the motor, over all pictures of a marker. Half the smallest stroke that is evaluated.
 # Stated.
 _LEAST_TURN_RAD = np.radians(2.0)
-# [1] A marker on the hub turns as the motor does, to so much; one at rest turns by 0. Set by eye;
-# 0.996 on steel-sample.
+# [1] How far a marker's turn may be from the motor's, over it, to be on the hub: one at rest is off by
+# 1, that of steel-sample by 0.004. Stated.
 _TURNS_AS_MOTOR = 0.2
 # [px] What print, blur and light displace a marker's corner by in all pictures of a camera alike.
 # Painted hubs' are 0.01 to 0.02 px RMS, and the fit raises this where its residuals show more.

@@ -41,7 +41,7 @@ _FEWEST_LINES = 4
 _MOST_RISE = 0.25
 # [mm] From the axis; a line that passes farther from it is not the whisker. Stated.
 _FARTHEST_MM = 5.0
-# [rounds] Of leaving strays out. Not measured. Study: tests/vision/calibration/test_turning.py.
+# [rounds] Of leaving strays out, at most. Stated. Study: tests/vision/calibration/test_turning.py.
 _REJECTIONS = 5
 
 

@@ -37,7 +37,7 @@ _BIN_PX = 6.0
 _NEAR_PX = 8.0
 # [px] Beside a line: what noise scatters. Study: tests/bench/trials/test_placing_pictures.py.
 _SCATTER_PX = 1.0
-# [rounds] Of reweighting; converges in fewer. Not measured.
+# [rounds] Of reweighting, at most; it converges in fewer. Stated.
 _ROUNDS = 12
 # [px] Of a line's pixels; shorter gives no direction. Set by eye. Study:
 # tests/bench/trials/test_placing_pictures.py.

@@ -39,8 +39,8 @@ LENS_PRIOR = {"k1": 0.5, "k2": 0.5, "p1": 0.005, "p2": 0.005, "k3": 0.3}
 # than each with itself. Origin not known; webcams without a trigger disagree by several times.
 # Study: cameras.py.
 _DISAGREE = 1.5
-# [frame intervals] A prior. Origin not known: twice the 0.29 of cameras that start at random
-# within an interval. Study: cameras.py.
+# [frame intervals] A prior: twice 1/√12, that of cameras that start at random within an interval.
+# Derived. Study: cameras.py.
 _CLOCK_SIGMA = 0.6
 # [frame intervals] Where the fit of instants starts; learnt anew from the residuals. Study:
 # cameras.py.

@@ -62,9 +62,9 @@ _ALONG_BAR_RAD = 0.02
 _BESIDE_BAR_PX = 8.0
 # [sigmas] Of the Cauchy weights of the rest shape's coarse points, round by round. Set by eye.
 _REST_SCALES = (20.0, 10.0, 5.0, 3.0, 2.0, 2.0)
-# [px] Scale of the Cauchy weights of a frame's coarse points: half a wire's width. Set by eye.
+# [px] Scale of the Cauchy weights of a frame's coarse points: half a wire's width. Stated.
 _CAUCHY_PX = 2.0
-# [rad] The largest bend: a whisker that is pushed by 45° bends by 1.5 times the push. Set by eye.
+# [rad] The largest bend: by a push of 45° a clamped rod bends by 3/2 of it, 1.18. Derived.
 _MOST_BEND_RAD = 1.2
 # [rad] Step of differences of a bend: far above rounding, far below what curves. Derived.
 _STEP_RAD = 1e-5

@@ -52,7 +52,8 @@ _BEYOND = 1.5
 _LEAST_SHARE = 0.6
 # [px] Gaps that are closed in what differs. Set by eye. Study: rounded_seen.py.
 _CLOSED_PX = 5
-# [places] Evaluated together: arrays that stay in the processor's cache. Not measured.
+# [places] Evaluated together: arrays stay in the processor's cache. No result depends on it.
+# Derived.
 _BATCH = 2000
 
 

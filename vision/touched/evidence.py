@@ -50,8 +50,8 @@ _UNSEEN_RANGE = 10.0
 # [px] Margin inside each edge without which the range of light on the bar is measured: two lens
 # blurs, where the background contributes. Derived.
 _RIM_BLURRED_PX = 2.0
-# [1] Sigma of the background's change over `OUTSIDE_PX`, over the contrast. Set by eye. Study:
-# thresholds.py touched.evidence _SLOPE_SHARE ….
+# [1] Sigma of the background's change over `OUTSIDE_PX`, over the contrast. Half or twice it
+# moves touch by 0.35 sigma at most. Study: thresholds.py touched.evidence _SLOPE_SHARE ….
 _SLOPE_SHARE = 0.3
 # [rad] Angles at which the splines are integrated: five a spline, 0.5 px apart at most on a bar
 # of 56 px, less than a blur. Derived.

@@ -22,31 +22,35 @@ from vision.wire.shading import Knots, fit_shading
 
 # [mm] The line is handed on as two points, this far to either side: a layout.
 ARM_MM = 20.0
-# [radii] Pixels nearer to the axis are no rim, where edges are measured. Origin not known. Study:
-# thresholds.py touched.pieces _INNER_SHARE ….
+# [radii] Pixels nearer to the axis are no rim, where edges are measured. By 0.6 touch moves
+# by 0.08 sigma, by 0.8 by 0.8. Study: thresholds.py touched.pieces _INNER_SHARE ….
 _INNER_SHARE = 0.72
 # [points] Along the bar's predicted outline. A layout.
 _STATIONS = 200
-# [1] Least share of a piece's pixels in the picture. Set by eye. Study: bar_scenes.py.
+# [1] Least share of a piece's pixels in the picture. 0.25 to 0.75 move nothing on the fixtures.
+# Study: thresholds.py touched.pieces _LEAST_IN_PICTURE ….
 _LEAST_IN_PICTURE = 0.5
 # [pieces] Four: two for a line, two left over. Derived.
 FEWEST_PIECES = 4
 # [1] Largest misfit of a piece over the median piece's, or over that of noise alone where this is
-# more: beyond, the piece shows something else than the bar. Set by eye. Study: coverage.py alone.
+# more: beyond, the piece shows something else than the bar. 2 to 4.5 move nothing on the fixtures.
+# Study: thresholds.py touched.pieces _WORST_MISFIT ….
 _WORST_MISFIT = 3.0
 # [px] To either side of a wire's middle its pixels, and those that the lens spreads it to: half a
 # wire of 4 px and four blurs of a pixel. Derived.
 _WIRE_PX = 6.0
-# [1] Least share of a piece's pixels that no wire hides: with fewer the piece constrains little.
-# Set by eye. Study: bar_scenes.py.
+# [1] Least share of a piece's pixels that no wire hides: with fewer the piece constrains little. By
+# 0.15 a whisk of five has no truth, by 0.6 a slope moves by 0.3 sigma. Study: thresholds.py
+# touched.pieces _LEAST_CLEAR_SHARE ….
 _LEAST_CLEAR_SHARE = 0.3
-# [mm] Between knots of the rims' shading, where edges are measured. Origin not known. Study:
-# thresholds.py touched.pieces _KNOT_MM ….
+# [mm] Between knots of the rims' shading, where edges are measured. By 9 touch moves by 0.07 sigma,
+# by 20 a slope by 2.2. Study: thresholds.py touched.pieces _KNOT_MM ….
 _KNOT_MM = 14.0
 # [1] Chi² per pixel of the edges' model: a bar before its background leaves 0.1 to 2. Study:
 # coverage.py alone.
 NO_BAR = 3.5
-# [passes] Of excluding pieces by their misfit. Origin not known.
+# [passes] Of excluding pieces by their misfit. Two move nothing on the fixtures. Study:
+# thresholds.py touched.pieces _PASSES ….
 _PASSES = 3
 
 

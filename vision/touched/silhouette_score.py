@@ -38,7 +38,8 @@ _BETA_RAD = np.radians(np.arange(-78.0, 79.0, 6.0))
 _X_MM = 2.4
 # [mm] Step of the grid along the arc of the whisker's middle: less than the blur. Stated.
 _TOUCH_MM = 2.4
-# [places] Evaluated together: arrays that stay in the processor's cache. Not measured.
+# [places] Evaluated together: arrays stay in the processor's cache. No result depends on it.
+# Derived.
 _BATCH = 4000
 
 

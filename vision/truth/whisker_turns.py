@@ -30,6 +30,7 @@ _STILL = 0.2
 
 # [1] Of the coarse angles from the stroke's start, tried one after the other: where frames before touch
 # turn by more or less than said, they look bent. Set by eye.
+# Study: tests/bench/workflows/test_seen_angles.py.
 _SCALES = (1.0, 1.04, 0.96, 1.08, 0.92)
 
 _USUAL = VisionSettings()

@@ -59,7 +59,7 @@ _KNOT_PX = 30.0
 _KNOT_WIDTHS = 4.0
 # [px] No round moves a line by more: segments move by 4, and ends by thrice that. Derived.
 _FARTHEST_PX = 12.0
-# [px] Sigma of a point, at least, when a curve is laid through. Set by eye.
+# [px] Sigma of a point, at least, when a curve is laid through. Set by eye. Study: real_wires.py.
 _LEAST_SIGMA_PX = 0.03
 # [segments] An object too short for so many is cut into shorter ones. Stated.
 _FEWEST_SEGMENTS = 12

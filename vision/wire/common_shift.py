@@ -44,7 +44,7 @@ _ROUNDS = 12
 _FIRST_ROUNDS = 2
 # [1] A shift is dropped where after the first rounds minus twice its log evidence exceeds the best
 # by this. In seven scenes every shift that ended within 80 of the best (a weight of e⁻²⁰) was at most
-# 125 above it at that stage. Not measured by a script.
+# 125 above it at that stage. Study: thresholds.py wire.common_shift NO_CHANCE ….
 NO_CHANCE = 200.0
 # [1] Of the evidence: strengths are fitted to the pixels that they explain, and what the model
 # lacks is alike in all segments. In 65 views of 30 path-traced scenes the log probability of the

@@ -21,7 +21,7 @@ from vision.wire.shading import (
     wave_prior,
 )
 
-# [steps] Gauss–Newton takes 4 to 10. Set by eye. Study: starts.py.
+# [steps] At most: Gauss–Newton takes 4 to 10. Stated. Study: starts.py.
 _MOST_STEPS = 40
 # [1] Longest step of the blur's logarithm. Set by eye. Study: starts.py.
 _LONGEST_LOG = 0.3

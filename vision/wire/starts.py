@@ -24,8 +24,8 @@ _MOST_STARTS = 3
 # [px] No two starts that are followed have common shifts so near. Study: wire_scenes.py.
 _START_SEPARATION_PX = 0.3
 # [1] Factor on both for a start's descent, from whose end another begins: half a sigma by what all
-# share. With it d_x, touch, slope and slip move by 0.006 sigma at most in twelve scenes. Not
-# measured by a script.
+# share. With it d_x, touch, slope and slip move by 0.006 sigma at most in twelve scenes. Study:
+# thresholds.py wire.starts _COARSE ….
 _COARSE = 25.0
 
 

@@ -43,7 +43,7 @@ _WORST_SIGMA_PX = 0.5
 # [1] Largest misfit of a segment, over the median: beyond, it shows something besides the rod.
 # Set by eye. Study: thresholds.py wire.trace _WORST_MISFIT ….
 _WORST_MISFIT = 6.0
-# [1] The median misfit counts as this at least. Set by eye.
+# [1] Least that the median misfit counts as: pictures without noise leave none, and noise leaves 1. Derived.
 _LEAST_MEDIAN_MISFIT = 0.5
 
 
