@@ -37,6 +37,18 @@ whisks = 3
 speed_deg_s = 90.0
 """
 
+# The two cameras of the protocol `quick`, without distortion.
+CAMERAS_OF_QUICK = """[[cameras]]
+name = "high"
+position_mm = [38.0, -175.0, 335.0]
+focal_px = 2010.0
+[[cameras]]
+name = "low"
+position_mm = [98.0, -325.0, 120.0]
+target_mm = [53.0, 7.0, 0.0]
+focal_px = 1932.0
+"""
+
 
 def protocol_file(folder: Path, text: str) -> Path:
     path = folder / "protocol.toml"

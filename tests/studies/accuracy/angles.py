@@ -28,20 +28,12 @@ from bench.session.session import load_session
 from bench.session.strict_toml import read_toml
 from tests.scenes.no_motor_log import without_log
 from tests.scenes.recorded import exact_cameras
+from tests.scenes.rig_sessions import CAMERAS_OF_QUICK
 from tests.studies.accuracy.rows import HALF_WIDTH_95
 
-PROTOCOL = """
+PROTOCOL = f"""
 name = "angles"
-[[cameras]]
-name = "high"
-position_mm = [38.0, -175.0, 335.0]
-focal_px = 2010.0
-[[cameras]]
-name = "low"
-position_mm = [98.0, -325.0, 120.0]
-target_mm = [53.0, 7.0, 0.0]
-focal_px = 1932.0
-[board]
+{CAMERAS_OF_QUICK}[board]
 views = 1
 [gauges]
 known = true

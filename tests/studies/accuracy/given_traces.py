@@ -21,21 +21,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from bench.rig.simulation import simulate
 from tests.scenes.drawn_traces import exact_lines, rows_of, with_errors
 from tests.scenes.recorded import Recorded
+from tests.scenes.rig_sessions import CAMERAS_OF_QUICK
 from vision import Trace, TrialPictures
 from vision.geometry import VisionSettings
 
-PROTOCOL = """
+PROTOCOL = f"""
 name = "traces"
-[[cameras]]
-name = "high"
-position_mm = [38.0, -175.0, 335.0]
-focal_px = 2010.0
-[[cameras]]
-name = "low"
-position_mm = [98.0, -325.0, 120.0]
-target_mm = [53.0, 7.0, 0.0]
-focal_px = 1932.0
-[board]
+{CAMERAS_OF_QUICK}[board]
 views = 1
 [[trials]]
 beta_deg = [0, 25, 45, 65]
