@@ -106,16 +106,8 @@ def _see(
     truth, whisks = _observe(frames, calibration, presets, settings.accuracy_mm)
     back = dict(zip(frames.back, truth.whisks[len(whisks) :]))
     of_trial = _trial_contradictions(truth, session, trial)
-    warnings = frames.scene.left_out.values()
-    seen = []
-    for name, whisk in whisks:
-        whisk = _with_angles_sigma(whisk, frames.motor_sigma_rad)
-        if whisk.status:  # what the missing frames may have cost comes with their cause
-            whisk = replace(whisk, status=joined(*frames.scene.unusable, whisk.status))
-        record = _whisk_of_trial(session, trial, whisk, settings, warnings, of_trial)
-        seen.append(replace(record, looked=name))
     return SeenTrial(
-        tuple(seen),
+        tuple(_records(session, trial, frames, settings, whisks, of_trial)),
         notes=_notes(frames),
         damaged=in_one_status(
             *_damaged_frames(frames.by_camera, frames.times), *frames.scene.unusable
@@ -129,6 +121,24 @@ def _see(
         back=_back_stroke(back.get(0)),
         ways_back=_ways_back(back, len(whisks), settings) if trial.both_ways else (),
     )
+
+
+def _records(
+    session: Session,
+    trial: Trial,
+    frames: TrialFrames,
+    settings: Settings,
+    whisks: Iterable[Evaluated],
+    of_trial: Sequence[Reason],
+) -> Iterator[SeenWhisk]:
+    """Yield the records of whisks. of_trial: contradictions of the trial as a whole."""
+    warnings = frames.scene.left_out.values()
+    for name, whisk in whisks:
+        whisk = _with_angles_sigma(whisk, frames.motor_sigma_rad)
+        if whisk.status:  # what the missing frames may have cost comes with their cause
+            whisk = replace(whisk, status=joined(*frames.scene.unusable, whisk.status))
+        record = _whisk_of_trial(session, trial, whisk, settings, warnings, of_trial)
+        yield replace(record, looked=name)
 
 
 def _with_angles_sigma(whisk: WhiskTruth, sigma_rad: np.ndarray) -> WhiskTruth:
