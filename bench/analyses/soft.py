@@ -280,18 +280,15 @@ def softness(
     beam = whisker.beam
     taper = beam.taper / whisker.length_mm
     shift_mm = far.nominal_mm - near.nominal_mm
-    k_theta = []  # of near and far place, rad/(N·mm)
-    shared = []  # (k,) of each place
-    for place in (near, far):
-        corrected = _corrected(place, whisker, trial.bar_diameter_mm, theta_rad, alpha_est.value)
-        k_theta.append(corrected)
-        of_model = _model_sigma(place, beam, theta_rad, alpha_est)
-        shared.append(np.append(place.shared, of_model))
-    d_x, _ = compliance.two_distances(*k_theta, shift_mm, beam.C_Nmm2, taper)
+    bar_mm = trial.bar_diameter_mm
+    k_near = _corrected(near, whisker, bar_mm, theta_rad, alpha_est.value)
+    k_far = _corrected(far, whisker, bar_mm, theta_rad, alpha_est.value)
+    d_x, _ = compliance.two_distances(k_near, k_far, shift_mm, beam.C_Nmm2, taper)
     soft = Soft(*trial.panel, near, far)
     if not np.isfinite(d_x):
         return replace(soft, status=NO_PUSH)
-    give = compliance.give(d_x, k_theta[0], beam.C_Nmm2, taper)
+    give = compliance.give(d_x, k_near, beam.C_Nmm2, taper)
+    shared = [_shared(place, beam, theta_rad, alpha_est) for place in (near, far)]
     d_x_sigma, give_sigma = _sigmas(soft, d_x, give, beam.C_Nmm2, taper, shared)
     return replace(
         soft,
@@ -299,6 +296,11 @@ def softness(
         give_mm_N=Value(float(give), give_sigma),
         status=NOT_SOFT if give <= Z_95 * give_sigma else "",
     )
+
+
+def _shared(place: Place, beam: Beam, theta_rad: float, alpha_est: Value) -> np.ndarray:
+    """Return how a place's compliance errs (k,) by each cause that all places share, rad/(N·mm)."""
+    return np.append(place.shared, _model_sigma(place, beam, theta_rad, alpha_est))
 
 
 def _sigmas(

@@ -56,15 +56,20 @@ def session_toml(
         session["truth"] = {"source": "stage", "origin_sigma_mm": 0.0}
     if whiskers:
         session.pop("whisker")
-        several_motors = len({whisker.column.name for whisker in whiskers}) > 1
-        states_gauges = protocol.gauges.known or not _has_gauge_trials(protocol)
-        session["whiskers"] = []
-        for whisker in whiskers:
-            keys = base_keys(whisker, several_motors, states_gauges=states_gauges)
-            session["whiskers"].append(keys)
+        session["whiskers"] = _whiskers_keys(protocol, whiskers)
     elif protocol.gauges.known:
         session["gauges"] = _fields(protocol.gauges, "offset_V matrix_Nmm_per_V")
     return tomli_w.dumps(session)
+
+
+def _whiskers_keys(protocol: Protocol, whiskers: Sequence[MountedWhisker]) -> list[dict]:
+    """Return the tables [[whiskers]] of an array."""
+    several_motors = len({whisker.column.name for whisker in whiskers}) > 1
+    states_gauges = protocol.gauges.known or not _has_gauge_trials(protocol)
+    tables = []
+    for whisker in whiskers:
+        tables.append(base_keys(whisker, several_motors, states_gauges=states_gauges))
+    return tables
 
 
 def _camera_keys(protocol: Protocol) -> list[dict]:
