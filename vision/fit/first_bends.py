@@ -31,8 +31,8 @@ from vision.wire.coarse import Votes, likely_curve, votes
 from vision.wire.points import LinePoints, Observed
 from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
 
-# [px] Length of a piece of the wire in this first pass. Set by eye. Study: thresholds.py
-# fit.first_bends _PIECE_PX ….
+# [px] Length of a piece of the wire in this first pass. 12 or 24 move touch by 0.1 sigma.
+# Study: thresholds.py fit.first_bends _PIECE_PX ….
 _PIECE_PX = 16
 # [px] How far to either side of the place predicted by the last two frames a wire is searched for.
 # Set by eye. Study: thresholds.py fit.first_bends _REACH_PX ….
@@ -57,8 +57,8 @@ _PULL_RAD = 0.2
 # [rad] Prior sigma of its part along the bar where one camera sees it: only friction pushes there.
 # Set by eye. Study: coverage.py alone.
 _ALONG_BAR_RAD = 0.02
-# [px] Pieces nearer to the bar's outline show its edge. Set by eye. Study: thresholds.py
-# fit.first_bends _BESIDE_BAR_PX ….
+# [px] Pieces nearer to the bar's outline show its edge. 4 or 16 move d_x by 0.15 sigma. Study:
+# thresholds.py fit.first_bends _BESIDE_BAR_PX ….
 _BESIDE_BAR_PX = 8.0
 # [sigmas] Of the Cauchy weights of the rest shape's coarse points, round by round. Set by eye.
 _REST_SCALES = (20.0, 10.0, 5.0, 3.0, 2.0, 2.0)

@@ -12,8 +12,8 @@ from vision.geometry.contact import clearance
 
 # [frames] Before touch: one gives the rest shape, two show that it swings with the motor. Derived.
 FEWEST_FREE = 2
-# [rad] A frame that bends by more surely touches; where no two in a row do, none does. Set by
-# eye. Study: thresholds.py fit.touch _SURE_BEND_RAD ….
+# [rad] A frame that bends by more surely touches; where no two in a row do, none does.
+# 0.12° to 0.5° move nothing on the fixtures. Study: thresholds.py fit.touch _SURE_BEND_RAD ….
 _SURE_BEND_RAD = np.radians(0.25)
 # [mm, rad] Of differences, of the sigma of touch: far above rounding (1e-10 mm), far below what
 # curves. Derived.

@@ -19,8 +19,8 @@ from vision.truth.value import FIELDS, NAN, Value, WhileTouching, propagated_sig
 # [rad] To either side of the wanted angle, of the local fit. Set by eye. Study: thresholds.py
 # truth.at_angle _WINDOW_RAD ….
 _WINDOW_RAD = np.radians(1.6)
-# [mm] A slip record that leaves its local fit by more is not smooth: stick and slip. Set by eye.
-# Study: thresholds.py truth.at_angle _JUMP_MM ….
+# [mm] A slip record that leaves its local fit by more is not smooth: stick and slip. Half or
+# twice it moves nothing on the fixtures. Study: thresholds.py truth.at_angle _JUMP_MM ….
 _JUMP_MM = 0.025
 # [rad] Past the last frame a value is still given. Set by eye. Study: thresholds.py
 # truth.at_angle _BEYOND_RAD ….

@@ -17,7 +17,8 @@ from vision.wire.summed_segments import ShadingEquations, SummedSegments
 # [px] Pixels farther than this from the rod's edges show the background alone. Derived.
 _BACKGROUND_MARGIN_PX = 2.0
 # [1] Share of a segment's pixels that must show the background alone, else it is not summed:
-# without such pixels cubic interpolation leaves negative eigenvalues. Set by eye.
+# without such pixels cubic interpolation leaves negative eigenvalues. Half or twice it moves
+# nothing on the fixtures. Study: thresholds.py wire.gathered _LEAST_BACKGROUND_SHARE ….
 _LEAST_BACKGROUND_SHARE = 0.2
 
 

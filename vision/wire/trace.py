@@ -37,13 +37,14 @@ BIN_PX = 0.3
 # [nodes] Of a curve, a millimetre apart: in between it is straight to a thousandth of a pixel.
 # Derived.
 _NODES = 81
-# [px] Largest sigma of a segment's position that is used. Set by eye. Study: thresholds.py wire.trace
-# _WORST_SIGMA_PX ….
+# [px] Largest sigma of a segment's position that is used. Half or twice it moves nothing on the
+# fixtures. Study: thresholds.py wire.trace _WORST_SIGMA_PX ….
 _WORST_SIGMA_PX = 0.5
 # [1] Largest misfit of a segment, over the median: beyond, it shows something besides the rod.
 # Set by eye. Study: thresholds.py wire.trace _WORST_MISFIT ….
 _WORST_MISFIT = 6.0
-# [1] Least that the median misfit counts as: pictures without noise leave none, and noise leaves 1. Derived.
+# [1] Least that the median misfit counts as: pictures without noise leave none, and noise leaves 1.
+# 0.25 to 0.8 move nothing on the fixtures. Study: thresholds.py wire.trace _LEAST_MEDIAN_MISFIT ….
 _LEAST_MEDIAN_MISFIT = 0.5
 
 
