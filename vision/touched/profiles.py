@@ -38,7 +38,8 @@ STEP_PX = 0.25
 # is seldom as near. Study: bar_scenes.py.
 OUTSIDE_PX = 6.0
 # [px] The profile's length inside either edge of a thick bar: pixels farther in do not constrain
-# the edge, and cost time. Set by eye. Study: bar_scenes.py.
+# the edge, and cost time. By 5 or 12 a slope moves by 1.0 or 1.2 sigma. Study: thresholds.py
+# touched.profiles _INSIDE_PX ….
 _INSIDE_PX = 8.0
 # [1] Least sigma of what the model does not explain, over the contrast; larger model errors show
 # in the misfit. Study: bar_starts.py.
