@@ -15,6 +15,7 @@ import numpy as np
 
 from bench.analyses.surfaces import FittedSurface, surfaces
 from bench.analyses.turning_phi import sure_turns, turn, with_turn
+from bench.base.progress import count_parts
 from bench.base.settings import Settings
 from bench.records.trial_result import (
     EstimateRow,
@@ -137,7 +138,7 @@ def with_runs(
     alpha_est = AlphaUncertainty.of_session(found, settings)
     turns = _turns(results, settings.alpha_est_rad)
     finished = []
-    for result in results:
+    for result in count_parts(results, "trials by the friction of all", len(results)):
         again = AskedAgain(np.radians(result.theta_deg), whisker.beam, _radii_mm(result), alpha_est)
         surface = surface_of.get(result.trial.panel)
         felt = []

@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from bench.base.input_problems import refused_as_bad_input
+from bench.base.progress import count_parts
 from bench.base.threads import in_threads
 from bench.session.angle_source import angle_source
 from bench.session.frame_times import frame_times, read_trial
@@ -82,7 +83,8 @@ def look_at_strokes(session: Session, cameras: Cameras) -> Look:
     trials = spread([trial for trial in session.trials if _shows_motor(trial)])
     lines: list[MovingLines] = []
     markers: list[MarkerSighting] = []
-    for seen in in_threads(lambda trial: _look(trial, session.board, cameras), trials):
+    looks = in_threads(lambda trial: _look(trial, session.board, cameras), trials)
+    for seen in count_parts(looks, "trials searched for what turns with the motor", len(trials)):
         lines += seen.lines
         markers += seen.markers
     return Look(tuple(lines), tuple(markers))

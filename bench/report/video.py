@@ -11,6 +11,7 @@ import numpy as np
 
 from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
+from bench.base.progress import count_parts
 from bench.records.trial_result import SeenTrial, SeenWhisk, TrialResult, WhiskerFacts
 from bench.report.film_curves import with_curves
 from bench.report.painting import as_8_bit, polyline, put_text
@@ -135,7 +136,9 @@ def _film(
     for whisk in result.seen.whisks:
         if whisk.frames is None:
             continue
-        for k, greys in enumerate(_frames_of(trial, times, cameras, whisk)):
+        frames = enumerate(_frames_of(trial, times, cameras, whisk))
+        count = len(whisk.frames.index)
+        for k, greys in count_parts(frames, f"frames of whisk {whisk.whisk}", count):
             pictures = []
             for camera in cameras:
                 pictures.append(_camera_picture(greys[camera.name], camera, result, whisk, k))

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from bench.base.errors import BadInput
+from bench.base.progress import count_parts
 from bench.base.settings import Settings
 from bench.records.trial_result import SeenTrial, TrialResult
 from bench.report.trial_figures import TrialToDraw, draw_trial
@@ -44,7 +45,7 @@ def time_work(work: Callable[[], list | None], repeats: int) -> tuple[list | Non
 def see_all(units: Sequence[Unit], settings: Settings) -> list[SeenTrial]:
     """Evaluate the pictures of all trials."""
     seen = []
-    for unit in units:
+    for unit in count_parts(units, f"{settings.seeing.name}, trials", len(units)):
         signals = read_signals(unit.trial)
         seen.append(see_trial(unit.session, unit.trial, signals, unit.calibration, settings))
     return seen
@@ -53,7 +54,7 @@ def see_all(units: Sequence[Unit], settings: Settings) -> list[SeenTrial]:
 def draw_all(results: Sequence[tuple[Unit, TrialResult]]) -> None:
     """Draw sensing planes and overlays into a folder that is removed."""
     with TemporaryDirectory() as folder:
-        for unit, result in results:
+        for unit, result in count_parts(results, "trials drawn", len(results)):
             alpha = (unit.settings.alpha_est_rad, "assumed")
             whisker = unit.session.whisker
             draw_trial(TrialToDraw(unit.trial, result, whisker, alpha, Path(folder)))
@@ -81,7 +82,7 @@ def play_all(units: Sequence[Unit], lead_s: float) -> LiveTiming:
     d_x_mm = []
     late_s = []
     busy_s = []
-    for unit in units:
+    for unit in count_parts(units, "trials played", len(units)):
         own = [UNKNOWN] * len(forward_strokes(read_signals(unit.trial)))
         try:
             recording = RecordedPush.read(unit.trial)
