@@ -57,9 +57,8 @@ def check(path: Path, *, follow_links: bool = False) -> int:
         check_cameras(session.whole or session, problems)
         for view in views:
             check_contents(view, problems)
-            if view.trials:
-                with problems.guard():
-                    trials_with_whisks(view)
+            with problems.guard():
+                trials_with_whisks(view)
         assumed = assumed_line(views)
         if session.has_pictures:
             placed = place_line(session)
@@ -77,8 +76,7 @@ def check(path: Path, *, follow_links: bool = False) -> int:
     whiskers = f", {counted(len(views), 'whisker')}" if session.base else ""
     trials = counted(len(session.trials), "trial")
     print(f"{session.whole_name}{whiskers}: {trials}, nothing wrong or doubtful")
-    if session.trials:
-        print(f"then run: whisker-bench evaluate {path} --out OUT")
+    print(f"then run: whisker-bench evaluate {path} --out OUT")
     return 0
 
 

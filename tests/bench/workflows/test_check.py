@@ -14,7 +14,7 @@ from bench.cameras.calibration_check import check_calibration
 from bench.session.frame_times import FrameTimes
 from bench.session.session import load_session
 from bench.session.session_check import checked_session
-from bench.workflows.preflight import check_cameras, check_contents
+from bench.workflows.preflight import check, check_cameras, check_contents
 from tests.scenes.faults import FAULTS, TRIAL, change_picture
 
 
@@ -95,6 +95,14 @@ def test_a_rig_picture_out_of_focus(small_copy):
     assert float(line.split("blurred by ")[1].split(" px")[0]) == pytest.approx(
         np.hypot(1.5, 0.8), abs=0.1
     )
+
+
+def test_a_session_without_trials(steel_signals, tmp_path, capsys):
+    """evaluate refuses it in the same words."""
+    shutil.copyfile(steel_signals / "session.toml", tmp_path / "session.toml")
+    (tmp_path / "trials").mkdir()
+    assert check(tmp_path) == 2
+    assert capsys.readouterr().out.splitlines()[0] == "bad: trials: there is no trial to evaluate"
 
 
 def test_signals_of_another_trial(small_copy):
