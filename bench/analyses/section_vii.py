@@ -229,16 +229,15 @@ def _distances(some: Sequence[FeltContact], alphas_rad: np.ndarray, whisker: Whi
 
 
 def _residuals(distances: np.ndarray, heights: np.ndarray, degree: int) -> np.ndarray:
-    """Return how far contacts (n,) lie from the polynomial in height that fits them best.
+    """Return how far contacts (contacts, α) lie from the polynomial in height that fits them best.
 
     In parts of their mean distance: of their own, near bars would err by more, for a hand sets all
-    of them wrong by as many millimetres; in millimetres the largest α would scatter least.
+    of them wrong by as many millimetres; in millimetres the largest α would scatter least. NaN of an
+    α at which a contact has no distance.
     """
-    if not np.isfinite(distances).all():
-        return np.full(len(distances), np.nan)
     design = np.vander(heights, degree + 1)
-    on_object = design @ np.linalg.lstsq(design, distances, rcond=None)[0]
-    return (distances - on_object) / np.mean(distances)
+    on_object = design @ np.linalg.pinv(design) @ distances
+    return (distances - on_object) / np.mean(distances, axis=0)
 
 
 def _least_scatter(some: Sequence[FeltContact], whisker: Whisker, degree: int) -> _AlphaFit:
@@ -250,13 +249,12 @@ def _least_scatter(some: Sequence[FeltContact], whisker: Whisker, degree: int) -
     heights = column(some, "d_x_nominal_mm")
 
     def residuals(alphas_rad: np.ndarray) -> np.ndarray:
-        """Return residuals (α, contacts)."""
-        distances = _distances(some, alphas_rad, whisker)  # (contacts, α)
-        return np.array([_residuals(of_alpha, heights, degree) for of_alpha in distances.T])
+        """Return residuals (contacts, α)."""
+        return _residuals(_distances(some, alphas_rad, whisker), heights, degree)
 
     def squares(alphas_rad: np.ndarray) -> np.ndarray:
         """Return the sums (α,) of squared residuals."""
-        return np.sum(residuals(alphas_rad) ** 2, axis=1)
+        return np.sum(residuals(alphas_rad) ** 2, axis=0)
 
     on_grid = squares(_GRID_RAD)
     last = int(np.flatnonzero(np.isfinite(on_grid))[-1])
@@ -290,7 +288,7 @@ def _fit_sigma(
     residuals: Callable[[np.ndarray], np.ndarray], alpha_rad: float, variance: float
 ) -> float:
     """Return the standard deviation of a least-squares fit of α by the variance of its residuals."""
-    high, low = residuals(alpha_rad + _STEP_RAD * np.array([1.0, -1.0]))
+    high, low = residuals(alpha_rad + _STEP_RAD * np.array([1.0, -1.0])).T
     slope = (high - low) / (2.0 * _STEP_RAD)
     return float(np.sqrt(variance / np.sum(slope**2)))
 
