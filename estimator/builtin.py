@@ -25,7 +25,7 @@ TIP = NamedReason(
 )
 NEARER = NamedReason("only_nearer_known", "known only to be nearer than {:.1f} mm (95 %)")
 
-# [1] Of (10): the exact rod's equations have other roots, which are no push; right ones are within 0.103
+# [1] Of (10): the exact rod's equations have other roots, which are no push; right ones are within 0.108
 # of (10), at turns up to 40° and 15° of push, and as much again is left to a wrong α_est.
 # Study: exact_rod_limits.py.
 _MOST_FROM_10 = 0.2
@@ -33,6 +33,9 @@ _MOST_FROM_10 = 0.2
 # directions (0.6 % RMS of 31 pushes, 2.1 % at most); one that turns by 30° turns its direction while it is pushed by 14°
 # (1.5 and 2.4 % of two); elsewhere 0.2 % RMS. Study: exact_rod_limits.py.
 _ROD_BY_FRICTION = 0.011
+# [1] Relative sigma of the exact rod where there is hardly any friction: 1.3e-4 off at most of 480 pushes.
+# Study: exact_rod_limits.py.
+_ROD_WITHOUT_FRICTION = 1e-4
 
 
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
@@ -392,7 +395,7 @@ def _share_of_rod(whisk, settings, d_x, left):
     rolling = first_order.rolling(theta, unknown_reach, _phi(whisk), alpha, d_x, left)
     by_friction = _ROD_BY_FRICTION * tan(alpha)
     held = first_order.HELD_SPREAD * first_order.dragging(theta, alpha) if is_held(whisk) else 0.0
-    return hypot(leaning, rolling, by_friction, held)
+    return hypot(leaning, rolling, by_friction, _ROD_WITHOUT_FRICTION, held)
 
 
 def _reason(whisk, alpha_est, high):
