@@ -32,8 +32,8 @@ _LEAST_SPAN_PX = 10.0
 class TracedCamera:
     """What a camera's trace is of.
 
-    count: of its pictures, in words `pictures`. size_px: width, height; None where no file says it. picture (n,): index of its
-    picture in each frame, −1 where it dropped that.
+    count: of its pictures, in words `pictures`. size_px: width, height; None where no file says it.
+    picture (n,): index of its picture in each frame, −1 where it dropped that.
     """
 
     count: int
@@ -67,13 +67,13 @@ def read_traces(
 
     files: as of `bench.session.trace_files`. sources: pictures of each camera. pictures: by camera the index of its
     picture in each frame (n,), −1 where it dropped that. Raises BadInput where a file cannot be read
-    or is not of these pictures, or there are none.
+    or is not of these pictures.
     """
     traces = {}
     for name, (lines, of_file) in _drawn(files, list(sources), label).items():
         if name not in sources:
             found = f"there are no pictures of camera {name}; there are those of"
-            raise BadInput(f"{found} {', '.join(sources)}", file=of_file)
+            raise BadInput(f"{found} {', '.join(sources) or 'none'}", file=of_file)
         camera = TracedCamera.of_pictures(sources[name], pictures[name], name)
         traces[name] = _checked(lines, name, camera, of_file)
     return traces
@@ -87,11 +87,16 @@ def read_traces_alone(
 ) -> dict[str, Traced]:
     """Return the traces by camera of a trial that has no pictures.
 
-    files: as of `bench.session.trace_files`. count: of the trial's frames. sizes_px: of the pictures of the cameras
-    that are calibrated. Raises BadInput where a file cannot be read or is not of these frames.
+    files: as of `bench.session.trace_files`. count: of the trial's frames. sizes_px: of the pictures of
+    the cameras that are calibrated, empty where none is known. Raises BadInput where a file cannot be
+    read or is not of these frames.
     """
     traces = {}
     for name, (lines, of_file) in _drawn(files, list(sizes_px), label).items():
+        if sizes_px and name not in sizes_px:
+            raise BadInput(
+                f"there is no camera {name}; there are {', '.join(sizes_px)}", file=of_file
+            )
         has = f"frames.csv has {counted(count, 'row')}"
         camera = TracedCamera(count, sizes_px.get(name), np.arange(count), has)
         traces[name] = _checked(lines, name, camera, of_file)

@@ -49,7 +49,7 @@ def require_some(trials: Sequence[Trial], settings: Settings) -> None:
     if not any(settings.takes(trial.name) for trial in trials):
         names = _first_names(trial.name for trial in trials)
         raise BadInput(f"--trials {settings.trials}: no trial has such a name; there are {names}")
-    cameras = dict.fromkeys(name for trial in trials for name in trial.camera_sources)
+    cameras = dict.fromkeys(name for trial in trials for name in trial.cameras)
     for name in settings.seeing.cameras:
         if name not in cameras:
             found = f"there is no camera {name}; there are {_first_names(cameras)}"

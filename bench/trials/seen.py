@@ -77,7 +77,7 @@ def see_trial(
         return unseen(count, NO_ZERO)
     try:
         if trial.is_traced_alone:
-            frames = traced_frames(session, trial, signals, calibration)
+            frames = traced_frames(session, trial, signals, calibration, settings)
         else:
             frames = TrialFrames.read(session, trial, signals, calibration, settings, wires or {})
         return _see(session, trial, frames, calibration, settings)

@@ -1,10 +1,12 @@
 """A trial's frames where another program's traces are all that came: no picture is read."""
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from bench.base.settings import Settings
 from bench.cameras.session_cameras import SessionCalibration
 from bench.session.frame_times import frame_times
 from bench.session.session import Session
@@ -19,17 +21,22 @@ from vision.geometry import Cameras, Rods
 
 
 def traced_frames(
-    session: Session, trial: Trial, signals: Signals, calibration: SessionCalibration
+    session: Session,
+    trial: Trial,
+    signals: Signals,
+    calibration: SessionCalibration,
+    settings: Settings,
 ) -> TrialFrames:
     """Return the frames of a trial of traces alone.
 
     Raises BadInput where traces and times do not match, Refused where nothing places the object.
     """
     times = frame_times(trial)
-    traces = _read(trial.trace_files, len(times), calibration.cameras, trial.place)
+    read = partial(_read, count=len(times), cameras=calibration.cameras, settings=settings)
+    traces = read(trial.trace_files, label=trial.place)
     motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
     if trial.object_files:
-        points = _read(trial.object_files, len(times), calibration.cameras, trial.place)
+        points = read(trial.object_files, label=trial.place)
         recording = TrialTraces.with_points(traces, times.time_s, motor_rad, points)
     else:
         axis, sigma = stated_place(session, trial, signals)
@@ -47,8 +54,13 @@ def traced_frames(
     )
 
 
-def _read(files: Mapping[str, Path], count: int, cameras: Cameras, label: str) -> dict[str, Trace]:
-    """Return lines or points by camera. Raise BadInput."""
+def _read(
+    files: Mapping[str, Path], *, count: int, cameras: Cameras, settings: Settings, label: str
+) -> dict[str, Trace]:
+    """Return lines or points by camera, of those that the settings name. Raise BadInput."""
     sizes_px = {camera.name: tuple(camera.size_px) for camera in cameras}
-    read = read_traces_alone(files, count, sizes_px, label)
-    return {name: traced.trace for name, traced in read.items()}
+    found = {}
+    for name, traced in read_traces_alone(files, count, sizes_px, label).items():
+        if settings.seeing.asks(name):
+            found[name] = traced.trace
+    return found

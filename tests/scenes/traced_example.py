@@ -8,6 +8,7 @@ import numpy as np
 
 from tests.scenes.model_scenes import WIRE
 from vision.calibration.cameras_file import read_cameras
+from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis
 from vision.geometry.rods import Bar, Rods
 from vision.geometry.silhouette import edges
@@ -65,9 +66,8 @@ def as_trace(frame, px):
     return Trace(frame.astype(int), px, np.zeros(n, dtype=int), np.full(n, np.nan))
 
 
-def true_axis(example: Example) -> BarAxis:
-    """The bar's axis, its point opposite the first contact."""
-    truth = example.truth
+def true_axis(truth: dict) -> BarAxis:
+    """The bar's axis by truth.toml, its point opposite the first contact."""
     angles = [np.radians([truth[name]]) for name in ("touch_deg", "beta_deg", "psi_deg")]
     reach_mm = BAR.radius_mm + 0.5 * WIRE.diameter_mm
     axis = axis_from_angles([truth["d_x_mm"]], *angles, [reach_mm])
@@ -76,12 +76,17 @@ def true_axis(example: Example) -> BarAxis:
 
 def tracked_bar(example: Example, places_mm, *, on_edges=False) -> dict[str, Trace]:
     """By camera, points of the bar in all frames at places along it, on its middle or on both edges."""
-    axis = true_axis(example)
-    rng = np.random.default_rng(2)
-    middle_mm = axis.point_mm + np.array(places_mm)[:, None] * axis.direction
+    axis = true_axis(example.truth)
     frames = len(example.motor_rad)
+    rng = np.random.default_rng(2)
+    return tracked_points(axis, example.cameras, frames, places_mm, rng, on_edges=on_edges)
+
+
+def tracked_points(axis: BarAxis, cameras: Cameras, frames: int, places_mm, rng, *, on_edges=False):
+    """By camera, points of a bar in so many frames, each SCATTER_PX off."""
+    middle_mm = axis.point_mm + np.array(places_mm)[:, None] * axis.direction
     found = {}
-    for camera in example.cameras:
+    for camera in cameras:
         sides = [camera.project(middle_mm)]
         if on_edges:
             directions = np.broadcast_to(axis.direction, middle_mm.shape)

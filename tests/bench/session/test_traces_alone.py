@@ -99,6 +99,10 @@ def test_nothing_that_places_the_object_is_refused_with_what_to_do(alone):
         ),
         (lambda t: (t / "object_low.csv").rename(t / "object_low.txt"), "of no kind that is read"),
         (
+            lambda t: (t / "object_low.csv").rename(t / "object_lwo.csv"),
+            "object_lwo.csv: there is no camera lwo; there are high, low",
+        ),
+        (
             lambda t: (t / "trace_low.csv").rename(t / "trace_lwo.csv"),
             "cameras.toml: has no camera lwo; it has high, low",
         ),
@@ -116,6 +120,13 @@ def test_faults_are_named(alone, points, change, said):
     add_points(alone, points)
     change(trial_of(alone))
     assert said in refusal(alone)
+
+
+def test_points_of_one_camera_place_no_bar(alone, points):
+    add_points(alone, points)
+    (trial_of(alone) / "object_low.csv").unlink()
+    distance, *_ = abilities(checked_session(alone))
+    assert distance.count == 0 and "in a second camera" in distance.missing
 
 
 def test_a_stage_gives_the_truth_once_the_traces_are_taken_out(alone):

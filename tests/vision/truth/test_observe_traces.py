@@ -33,7 +33,7 @@ def see(example, place, traces=None):
 
 
 def placed(example, aside_mm=0.0):
-    axis = true_axis(example)
+    axis = true_axis(example.truth)
     aside = replace(axis, point_mm=axis.point_mm + np.array([0.0, aside_mm, 0.0]))
     return PlacedObject(AxisPrior(aside, np.array([0.1, 0.1, 0.01, 0.01])))
 
