@@ -36,18 +36,20 @@ def camera_sources(folder: Path, label: str) -> dict[str, Path]:
     return sources
 
 
-def single_pictures(folder: Path, label: str) -> dict[str, Path]:
+def single_pictures(folder: Path, label: str, prefix: str = "") -> dict[str, Path]:
     """Return the one picture of each camera in `folder` (boards/rig), by the camera's name.
 
-    Raises BadInput where a camera has two.
+    prefix: of the files' names, before the camera's. Raises BadInput where a camera has two.
     """
     pictures: dict[str, Path] = {}
     for entry in visible(folder):
-        if entry.suffix.lower() not in PICTURE_SUFFIXES:
+        is_picture = entry.suffix.lower() in PICTURE_SUFFIXES and not entry.is_dir()
+        if not is_picture or not entry.name.startswith(prefix):
             continue
-        if entry.stem in pictures:
-            raise BadInput(f"camera {entry.stem} has two pictures here; keep one", file=label)
-        pictures[entry.stem] = entry
+        camera = entry.stem.removeprefix(prefix)
+        if camera in pictures:
+            raise BadInput(f"camera {camera} has two pictures here; keep one", file=label)
+        pictures[camera] = entry
     return pictures
 
 

@@ -244,6 +244,15 @@ class ObjectKeys(GivenKeys):
     # with `point_mm`: the bar's direction, the normal of the ring's plane, or where the cone points
     # ([0, 0, 1]; by `[truth]` that of `beta_deg`)
     axis: Annotated[list[float], _THREE] | None = None
+    # [x, y, z] of the bar's axis anywhere in the frame of a board that is fixed to it, of which
+    # `trials/<trial>/board_<camera>.png` are pictures; of trials that have traces and no pictures
+    board_point_mm: Place | None = None
+    board_point_sigma_mm: LengthSigma = 0.0
+    # and the bar's direction in that frame
+    board_axis: Annotated[list[float], _THREE] | None = None
+    board_axis_sigma_deg: Annotated[
+        float, Assumed(absolute=1.0, of="board_axis", origin=_BY_HAND)
+    ] = 0.0
     # diameter of the circle that the ring's axis is
     ring_diameter_mm: RingDiameter | None = None
     # angle of the cone between its axis and its surface; with it `bar_diameter_mm` is twice the radius

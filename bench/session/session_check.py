@@ -14,6 +14,7 @@ from bench.base.results import hash_of_files
 from bench.base.statuses import reason
 from bench.session.array_view import load_views
 from bench.session.frame_times import frame_times
+from bench.session.object_board import board_on_object
 from bench.session.session import Session, load_session
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.traces import read_traces, read_traces_alone
@@ -202,6 +203,8 @@ def check_traces(session: Session, problems: InputProblems) -> None:
             count = len(frame_times(trial))
             for files in (trial.trace_files, trial.object_files):
                 read_traces_alone(files, count, sizes_px, trial.place)
+            if trial.shows_board:
+                board_on_object(trial, session.board)
 
 
 def _known_sizes(session: Session) -> dict[str, Size]:

@@ -9,7 +9,7 @@ from bench.base.input_problems import InputProblems
 from bench.base.statuses import reason
 from bench.session import manifest
 from bench.session.daq import DaqFile
-from bench.session.footage import camera_sources
+from bench.session.footage import camera_sources, single_pictures
 from bench.session.givens import Given, with_sigmas
 from bench.session.stage import STAGE, StageLog, read_stage
 from bench.session.stated import StatedSession
@@ -19,6 +19,7 @@ from vision.pictures import PicturePart
 
 MANIFEST = "trial.toml"
 SIGNALS = "signals.csv"
+BOARD = "board_"  # before a camera's name, of a picture of the board on the object
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +31,7 @@ class Trial(manifest.TrialKeys):
     to folder of pictures or video, empty where the trial has none. whisker: of an array, whose
     channels `daq` names; '' where it is the only one. givens: what trial.toml and [trial] state.
     trace_files, object_files: the wire's lines and points of the object by another program, see
-    `bench.session.traces`.
+    `bench.session.traces`. board_pictures: of a board on the object, by camera.
     stage: what stage.csv says, where the session's truth is a stage's; None elsewhere.
     """
 
@@ -43,6 +44,7 @@ class Trial(manifest.TrialKeys):
     givens: tuple[Given, ...] = ()
     trace_files: dict[str, Path] = field(default_factory=dict)
     object_files: dict[str, Path] = field(default_factory=dict)
+    board_pictures: dict[str, Path] = field(default_factory=dict)
     stage: StageLog | None = None
 
     @property
@@ -60,6 +62,12 @@ class Trial(manifest.TrialKeys):
         """Return the names of the cameras that have pictures or traces of it."""
         traced = [name for name in self.trace_files if name != IN_SPACE]
         return list(self.camera_sources) or traced
+
+    @property
+    def shows_board(self) -> bool:
+        """Return whether there are pictures of a board on the object, and where it is in that board's frame."""
+        is_stated = self.object is not None and self.object.board_point_mm is not None
+        return bool(self.board_pictures) and is_stated
 
     @property
     def states_place(self) -> bool:
@@ -124,6 +132,7 @@ def load_trial(
         givens=givens,
         trace_files=trace_files(folder, place),
         object_files=trace_files(folder, place, OBJECT),
+        board_pictures=single_pictures(folder, place, BOARD),
         **settings,
     )
     if session.keys.truth is None:
@@ -132,9 +141,9 @@ def load_trial(
         trial = _with_stage(trial, table, place)
     if trial.is_traced_alone:
         _check_traced_alone(trial, is_stated=session.keys.truth is not None)
-    elif trial.object_files:
-        file = trial.label(next(iter(trial.object_files.values())).name)
-        problems.warn(reason("object_points_not_read", label=file))
+        return trial
+    for path in (*trial.object_files.values(), *trial.board_pictures.values()):
+        problems.warn(reason("object_points_not_read", label=trial.label(path.name)))
     return trial
 
 
@@ -144,11 +153,15 @@ def _check_traced_alone(trial: Trial, *, is_stated: bool) -> None:
     is_stated: whether the session's truth is a stage's.
     """
     label = trial.label(next(iter(trial.trace_files.values())).name)
-    if not trial.object_files and not (is_stated and trial.states_place):
+    has_place = (is_stated and trial.states_place) or trial.shows_board
+    if not trial.object_files and not has_place:
         found = (
             "there are no pictures, in which the object is found, and nothing else says where it is"
         )
-        cure = f'add its points ({OBJECT}<camera>.csv), or its place by a stage ([truth] source = "stage")'
+        cure = (
+            f"add its points ({OBJECT}<camera>.csv), pictures of a board on it ({BOARD}<camera>.png, board_point_mm), "
+            'or its place by a stage ([truth] source = "stage")'
+        )
         raise BadInput(f"{found}; {cure}", file=label)
     moves = trial.object_gives_way or trial.object_velocity_mm_s is not None
     if moves or (trial.stage is not None and trial.stage.moves):
@@ -248,6 +261,10 @@ def _check_object(keys: manifest.ObjectKeys, thickness_mm: float | None, label: 
     if keys.point_mm is None and (keys.axis is not None or keys.point_sigma_mm):
         found = "says how it stands, and not where; point_mm is missing"
         raise BadInput(f"[object] {found}", file=label)
+    if (keys.board_point_mm is None) != (keys.board_axis is None):
+        raise BadInput("[object] board_point_mm and board_axis go together", file=label)
+    if keys.board_axis is not None and not any(keys.board_axis):
+        raise BadInput("[object] board_axis is a direction, not zero", file=label)
     ring_mm = keys.ring_diameter_mm
     if ring_mm is not None and thickness_mm is not None and ring_mm <= thickness_mm:
         found = (

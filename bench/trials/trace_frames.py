@@ -13,11 +13,12 @@ from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
 from bench.session.traces import read_traces_alone
 from bench.session.trial import Trial
+from bench.trials.object_board import place_by_board
 from bench.trials.stated_truth import stated_place
 from bench.trials.still_scene import StillScene
 from bench.trials.trial_frames import TrialFrames, back_frames, stated_object
 from vision import Trace, TrialTraces
-from vision.geometry import Cameras, Rods
+from vision.geometry import Axis, Cameras, Rods
 
 
 def traced_frames(
@@ -39,7 +40,7 @@ def traced_frames(
         points = read(trial.object_files, label=trial.place)
         recording = TrialTraces.with_points(traces, times.time_s, motor_rad, points)
     else:
-        axis, sigma = stated_place(session, trial, signals)
+        axis, sigma = _place(session, trial, signals, calibration.cameras)
         recording = TrialTraces.with_place(traces, times.time_s, motor_rad, axis, sigma)
     return TrialFrames(
         times=times,
@@ -52,6 +53,15 @@ def traced_frames(
         motor_sigma_rad=signals.motor_sigma_at(times.time_s),
         observe=TrialTraces.observe,
     )
+
+
+def _place(
+    session: Session, trial: Trial, signals: Signals, cameras: Cameras
+) -> tuple[Axis, np.ndarray]:
+    """Return the bar's axis and sigmas (4,): by a board on it where there is one, or else by the stage."""
+    if trial.shows_board:
+        return place_by_board(session, trial, cameras)
+    return stated_place(session, trial, signals)
 
 
 def _read(

@@ -9,6 +9,7 @@ May import geometry, pictures, boards.
 from vision.geometry.lazy_names import lazy_names
 
 NAMES = {
+    "board_place": ("place_board",),
     "calibrate": ("Calibration", "CameraReport", "calibrate_cameras"),
     "cameras_file": ("cameras_as_files", "read_cameras"),
     "cameras_import": (

@@ -2,6 +2,7 @@
 
 import shutil
 
+import cv2
 import numpy as np
 import pytest
 
@@ -14,7 +15,8 @@ from bench.session.strict_toml import read_toml
 from bench.trials.seen import see_trial
 from bench.trials.stated_truth import stated_whisk
 from tests.scenes.refusals import refusal
-from tests.scenes.traced_example import BRING, Example, csv_of_points, tracked_bar
+from tests.scenes.traced_example import BRING, Example, csv_of_points, tracked_bar, true_axis
+from vision.geometry.rotation import apply, invert_transform
 
 PLACES_MM = (-15.0, 20.0)
 
@@ -52,13 +54,27 @@ def state_place(session):
         manifest.write("\n[object]\npoint_mm = [57.58, 6.69, 0.0]\npoint_sigma_mm = 0.02\n")
 
 
-@pytest.mark.parametrize("is_stated", [False, True])
-def test_traces_alone_give_the_truth(alone, points, is_stated, tmp_path):
-    """With points of the object, or with its place by a stage."""
-    if is_stated:
-        state_place(alone)
-    else:
-        add_points(alone, points)
+def show_board(session):
+    """Let pictures of the board on the rig be those of a board that is fixed to the bar."""
+    manifest = read_toml(session / "session.toml", "session.toml")
+    T_board_rig = invert_transform(np.array(manifest["rig"]["T_rig_board"]))
+    truth = read_toml(trial_of(session) / "truth.toml", "truth.toml")
+    axis = true_axis(truth)
+    (point_mm,) = apply(T_board_rig, axis.point_mm[None])
+    direction = T_board_rig[:, :3] @ axis.direction
+    for camera in ("high", "low"):
+        picture = session / "boards" / "rig" / f"{camera}.jpg"
+        shutil.copy(picture, trial_of(session) / f"board_{camera}.jpg")
+    with (trial_of(session) / "trial.toml").open("a") as file:
+        file.write(f"\n[object]\nboard_point_mm = {point_mm.tolist()}\n")
+        file.write(f"board_point_sigma_mm = 0.05\nboard_axis = {direction.tolist()}\n")
+
+
+@pytest.mark.parametrize("way", ["points", "stage", "board"])
+def test_traces_alone_give_the_truth(alone, points, way, tmp_path):
+    """With points of the object, its place by a stage, or pictures of a board on it."""
+    ways = {"points": lambda s: add_points(s, points), "stage": state_place, "board": show_board}
+    ways[way](alone)
     session = checked_session(alone)
     assert [ability.count for ability in abilities(session)[:3]] == [1, 1, 1]
     (trial,) = session.trials
@@ -73,6 +89,15 @@ def test_traces_alone_give_the_truth(alone, points, is_stated, tmp_path):
     assert abs(whisk.d_x_mm.value - truth["d_x_mm"]) < 2.0 * whisk.d_x_mm.sigma < 0.5
     at = whisk.at
     assert abs(at.slip_mm.value - truth["slip_at_3deg_mm"]) < 3.0 * at.slip_mm.sigma
+
+
+def test_pictures_that_show_no_board_are_refused(alone):
+    show_board(alone)
+    picture = trial_of(alone) / "board_low.jpg"
+    cv2.imwrite(str(picture), np.full((360, 640), 120, np.uint8))
+    assert "board_low.jpg: shows no board of session.toml" in refusal(alone)
+    picture.write_bytes(b"no picture")
+    assert "board_low.jpg: cannot be read as a picture" in refusal(alone)
 
 
 def test_nothing_that_places_the_object_is_refused_with_what_to_do(alone):

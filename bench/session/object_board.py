@@ -1,0 +1,26 @@
+"""Pictures of a board that is fixed to the touched object."""
+
+from bench.base.errors import BadInput
+from bench.session.trial import Trial
+from vision.boards import Corners, find_corners
+from vision.geometry import Board
+from vision.pictures import read_picture
+
+
+def board_on_object(trial: Trial, board: Board | None) -> dict[str, Corners]:
+    """Return by camera the corners of the board on a trial's object. board: of session.toml.
+
+    Raises BadInput for a picture that cannot be read or shows no board.
+    """
+    found = {}
+    for camera, path in trial.board_pictures.items():
+        label = trial.label(path.name)
+        if board is None:
+            raise BadInput("shows a board, and session.toml has no [board]", file=label)
+        grey = read_picture(path)
+        if grey is None:
+            raise BadInput("cannot be read as a picture", file=label)
+        found[camera] = find_corners(grey, board)
+        if not len(found[camera]):
+            raise BadInput("shows no board of session.toml", file=label)
+    return found

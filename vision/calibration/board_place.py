@@ -1,0 +1,57 @@
+"""Where a board stands before calibrated cameras, by one picture of each that sees it."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from vision.boards.corners import Corners
+from vision.calibration.first_guess import board_pose
+from vision.geometry.board import Board
+from vision.geometry.camera import Cameras
+from vision.geometry.refusals import Refused
+from vision.geometry.rotation import apply, compose, exp_rotation, invert_transform
+
+# [sigmas] RMS of corners about the board: more is no board that stands still before these cameras. Stated.
+_MOST_SIGMAS = 8.0
+
+
+def place_board(
+    cameras: Cameras, views: Mapping[str, Corners], board: Board
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return T_rig_board (3, 4) and its covariance (6, 6), of turns and shifts in the rig frame.
+
+    views: by camera. The cameras count as exact. Raises Refused where none shows a pose, or the
+    corners are not those of one board.
+    """
+    seen = {name: view for name, view in views.items() if name in cameras and len(view)}
+    if not seen:
+        raise Refused("no camera sees the board", code="object_points_elsewhere")
+    first = max(seen, key=lambda name: len(seen[name]))
+    camera = cameras[first]
+    T_camera_board = board_pose(seen[first], board.corners_mm, camera.lens)
+    T_first = compose(invert_transform(camera.T_camera_rig), T_camera_board)
+
+    def moved(step: np.ndarray) -> np.ndarray:
+        """Return the first pose, turned and shifted by a step (6,)."""
+        turned = exp_rotation(step[:3]) @ T_first[:, :3]
+        return np.column_stack([turned, T_first[:, 3] + step[3:]])
+
+    def residuals(step: np.ndarray) -> np.ndarray:
+        """Return how far (n,) corners are off, over their sigma."""
+        off = []
+        for name, view in seen.items():
+            px = cameras[name].project(apply(moved(step), board.corners_mm[view.ids]))
+            off.append(((px - view.px) / view.sigma_px[:, None]).ravel())
+        return np.concatenate(off)
+
+    found = least_squares(residuals, np.zeros(6), x_scale=[1e-3] * 3 + [0.1] * 3)
+    rms = float(np.sqrt(np.mean(found.fun**2)))
+    if rms > _MOST_SIGMAS:
+        raise Refused(
+            f"corners of the board on the object are {rms:.0f} sigmas off those of one board: "
+            "does it stand still, and are the cameras where they were calibrated?",
+            code="object_points_elsewhere",
+        )
+    covariance = max(rms, 1.0) ** 2 * np.linalg.inv(found.jac.T @ found.jac)
+    return moved(found.x), covariance
