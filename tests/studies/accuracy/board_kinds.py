@@ -158,24 +158,25 @@ beta_deg = [0, 25, 50]
 d_x_mm = 58.0
 """
 QUANTITIES = {"d_x": "d_x_mm", "beta": "beta_deg"}
-OF_EACH = ("n", "rms", "rms_z", "most_z")
+OF_EACH = ("n", "rms", "rms_z", "most_z", "rms_sigma")
 WHISK_COLUMNS = ("look", *(f"{name}_{what}" for name in QUANTITIES for what in OF_EACH), "status")
 
 
-def whisks_of(folder: Path, name: str) -> dict:
+def whisks_of(folder: Path, name: str, workers: int = 2) -> dict:
     """A session by one kind of board, evaluated and reduced."""
     path = folder / name
     out = folder / f"{name}_out"
     protocol = folder / f"{name}.toml"
     folder.mkdir(parents=True, exist_ok=True)
     protocol.write_text(PROTOCOL.format(name=name, board=ON_RIG[name]))
-    simulate(path, protocol=protocol, seed=5, workers=2)
-    run = api.evaluate(path, out, figures=False, workers=2)
+    simulate(path, protocol=protocol, seed=5, workers=workers)
+    run = api.evaluate(path, out, figures=False, workers=workers)
     row: dict = {"look": name, "status": " ".join(filter(None, run.whisks["status"]))}
     for quantity, column in QUANTITIES.items():
         error, sigma, _ = errors(load_session(path), out, run.whisks, column).T
         z = error / sigma
-        values = (len(z), np.sqrt(np.mean(error**2)), np.sqrt(np.mean(z**2)), np.abs(z).max())
+        rms, rms_z, rms_sigma = (np.sqrt(np.mean(column**2)) for column in (error, z, sigma))
+        values = (len(z), rms, rms_z, np.abs(z).max(), rms_sigma)
         row |= {f"{quantity}_{what}": float(value) for what, value in zip(OF_EACH, values)}
     return row
 
@@ -187,7 +188,7 @@ def print_whisks(folder: Path, only: str) -> None:
     for row in rows:
         print(f"{row['look']}: {row['d_x_n']:.0f} whisks {row['status']}")
         for name in QUANTITIES:
-            rms, rms_z, most_z = (row[f"{name}_{what}"] for what in OF_EACH[1:])
+            rms, rms_z, most_z = (row[f"{name}_{what}"] for what in OF_EACH[1:4])
             print(f"  {name} off by {rms:.4f} RMS, z {rms_z:.2f} RMS, {most_z:.1f} at most")
 
 

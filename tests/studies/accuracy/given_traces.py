@@ -1,11 +1,11 @@
 """Truth by traces of another program against the exact one, in simulated sessions.
 
-    python tests/studies/accuracy/given_traces.py FOLDER [--seeds 3] [--lasting-px 0.1]
+    python tests/studies/accuracy/given_traces.py FOLDER [--seeds 3] [--lasting-px 0.1] [--too alone pictures]
 
 FOLDER keeps the sessions. In each, four whisks before the cameras of `quick` are seen by their
 pictures, and by exact lines of the wire moved by 0.3 px in all: 0.2 px a point, 0.2 px over 60 px of
-the wire, and --lasting-px in all frames alike; the bar is found in the pictures in both. Printed: of
-d_x, touch and slope the errors, their RMS, and the errors over their sigmas.
+the wire, and --lasting-px in all frames alike; the bar is found in the pictures in both, and without pictures placed by two
+tracked points. Printed: of d_x, touch and slope the errors, their RMS, and the errors over their sigmas.
 """
 
 import argparse
@@ -20,9 +20,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.rig.simulation import simulate
 from tests.scenes.drawn_traces import exact_lines, rows_of, with_errors
+from tests.scenes.model_scenes import RODS
 from tests.scenes.recorded import Recorded
 from tests.scenes.rig_sessions import CAMERAS_OF_QUICK
-from vision import Trace, TrialPictures
+from tests.scenes.traced_example import tracked_points, true_axis
+from vision import Trace, TrialPictures, TrialTraces
 from vision.geometry import VisionSettings
 
 PROTOCOL = f"""
@@ -33,6 +35,8 @@ views = 1
 beta_deg = [0, 25, 45, 65]
 d_x_mm = 58.0
 """
+TOO = ("alone", "pictures")
+PLACES_MM = (-15.0, 20.0)
 QUANTITIES = {"d_x_mm": 1.0, "touch_rad": np.degrees(1.0), "beta_rad": np.degrees(1.0)}
 
 
@@ -41,14 +45,12 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--lasting-px", type=float, default=0.1)
-    parser.add_argument("--pictures-too", action="store_true")
+    parser.add_argument("--too", nargs="*", default=[], choices=TOO, help="ways besides traces")
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)
     errors = {}
     for seed in range(arguments.seeds):
-        for name, *row in whisks(
-            arguments.folder, seed, arguments.lasting_px, arguments.pictures_too
-        ):
+        for name, *row in whisks(arguments.folder, seed, arguments.lasting_px, arguments.too):
             errors.setdefault(name, []).append(row)
             print(seed, name, " ".join(f"{e:+.4f} ± {s:.4f}" for e, s in row), flush=True)
     for name, rows in errors.items():
@@ -62,8 +64,8 @@ def main() -> None:
             )
 
 
-def whisks(folder, seed, lasting_px, pictures_too):
-    """Yield by what a whisk was seen, and error and sigma of each quantity."""
+def whisks(folder, seed, lasting_px, too):
+    """Yield by what a whisk was seen, and error and sigma of each quantity. too: ways besides traces, of TOO."""
     protocol = folder / "protocol.toml"
     protocol.write_text(PROTOCOL)
     session = simulate(folder / f"s{seed}", protocol=protocol, seed=seed)
@@ -86,8 +88,21 @@ def whisks(folder, seed, lasting_px, pictures_too):
         settings = VisionSettings(check_beam=False)
         given = recorded.see_frames(replace(pictures, traces=traces), settings)
         yield "traces", *errors_of(given, truth)
-        if pictures_too:
+        if "alone" in too:
+            yield "alone", *errors_of(alone(recorded, traces, settings, rng), truth)
+        if "pictures" in too:
             yield "pictures", *errors_of(recorded.see_frames(pictures, settings), truth)
+
+
+def alone(recorded, traces, settings, rng):
+    """The truth of traces without pictures, the bar by two points of its middle, 35 mm apart, 0.3 px off."""
+    motor_rad = np.radians(recorded.rows["motor_deg"])
+    axis = true_axis(recorded.truth)
+    points = tracked_points(axis, recorded.cameras, len(motor_rad), PLACES_MM, rng)
+    recording = TrialTraces.with_points(traces, recorded.rows["time_s"], motor_rad, points)
+    whole = [slice(0, len(motor_rad))]
+    (whisk,) = recording.observe(whole, recorded.cameras, RODS, settings).whisks
+    return whisk
 
 
 def errors_of(whisk, truth):

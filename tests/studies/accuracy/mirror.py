@@ -29,7 +29,7 @@ from tests.studies.accuracy.rows import all_rows
 from tests.studies.accuracy.sessions import errors, figures
 
 NAMES = ("d_x_mm", "touch_deg", "beta_deg")
-OF_EACH = ("n", "held", "rms_z", "rms")
+OF_EACH = ("n", "held", "rms_z", "rms", "rms_sigma")
 COLUMNS = ("seed", *(f"{name}_{what}" for name in NAMES for what in OF_EACH), "status")
 AXIS_MM = 350.0  # of a point on a camera's axis, near the whisker
 
@@ -64,18 +64,18 @@ def camera_table(camera: PinholeCamera) -> dict:
     raise ArithmeticError(f"camera {camera.name} is no camera that is aimed at a point")
 
 
-def row_of(folder: Path, kind: str, protocol: Path, seed: int) -> dict:
+def row_of(folder: Path, kind: str, protocol: Path, seed: int, workers: int = 2) -> dict:
     """A session recorded, evaluated and reduced."""
     path = folder / f"{kind}{seed}"
     out = folder / f"{kind}{seed}_out"
-    simulate(path, protocol=protocol, seed=seed, workers=2)
-    whisks = api.evaluate(path, out, figures=False, workers=2).whisks
+    simulate(path, protocol=protocol, seed=seed, workers=workers)
+    whisks = api.evaluate(path, out, figures=False, workers=workers).whisks
     session = load_session(path)
     row: dict = {"seed": seed, "status": ""}
     for name in NAMES:
         found = errors(session, out, whisks, name)
         n, held, _, rms_z, *_ = figures(found)
-        values = (n, held, rms_z, np.sqrt(np.mean(found[:, 0] ** 2)))
+        values = (n, held, rms_z, *np.sqrt(np.mean(found[:, :2] ** 2, axis=0)))
         row |= {f"{name}_{what}": float(value) for what, value in zip(OF_EACH, values)}
     shutil.rmtree(path)
     return row
@@ -84,28 +84,34 @@ def row_of(folder: Path, kind: str, protocol: Path, seed: int) -> dict:
 def pooled(rows: list[dict], name: str) -> np.ndarray:
     """OF_EACH of a quantity over sessions."""
     each = np.array([[row[f"{name}_{what}"] for what in OF_EACH] for row in rows])
-    n, held, rms_z, rms = each.T
-    mean_squares = [n @ rms_z**2, n @ rms**2] / n.sum()
+    n, held, *roots = each.T
+    mean_squares = [n @ root**2 / n.sum() for root in roots]
     return np.array([n.sum(), n @ held / n.sum(), *np.sqrt(mean_squares)])
 
 
-def main() -> None:
-    folder = Path(sys.argv[1])
-    seeds = range(int(sys.argv[2]))
+def rows_of(folder: Path, seeds: range, workers: int = 2) -> dict[str, list[dict]]:
+    """The rows of all sessions with the mirror, and of those with two cameras."""
     folder.mkdir(parents=True, exist_ok=True)
     protocols = {"mirror": folder / "mirror.toml", "two": folder / "two.toml"}
     shutil.copyfile(FOLDER / "mirror.toml", protocols["mirror"])
     protocols["two"].write_text(tomli_w.dumps(two_cameras(protocols["mirror"])))
     rows = {}
     for kind, protocol in protocols.items():
-        table = folder / f"{kind}.csv"
         rows[kind] = all_rows(
-            table, COLUMNS, seeds, lambda seed, k=kind, p=protocol: row_of(folder, k, p, seed)
+            folder / f"{kind}.csv",
+            COLUMNS,
+            seeds,
+            lambda seed, k=kind, p=protocol: row_of(folder, k, p, seed, workers),
         )
+    return rows
+
+
+def main() -> None:
+    rows = rows_of(Path(sys.argv[1]), range(int(sys.argv[2])))
     for name in NAMES:
         rms = {}
-        for kind in protocols:
-            n, held, rms_z, rms[kind] = pooled(rows[kind], name)
+        for kind in rows:
+            n, held, rms_z, rms[kind], _ = pooled(rows[kind], name)
             print(
                 f"{name} {kind:6s}: {n:.0f} whisks, RMS {rms[kind]:.4f}, {held:.0%} hold, z {rms_z:.2f} RMS"
             )

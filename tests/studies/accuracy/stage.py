@@ -29,8 +29,7 @@ def main() -> None:
     arguments = parser.parse_args()
     session = load_session(SESSION)
     for shape in OBJECTS:
-        rng = np.random.default_rng(arguments.seed)
-        drawn = [drawn_whisk(session, TRIAL, rng, shape) for _ in range(arguments.count)]
+        drawn = drawn_whisks(session, shape, arguments.count, arguments.seed)
         d_x = np.array([(w.d_x_error_mm, w.d_x_sigma_mm) for w in drawn])
         beta = np.degrees([(w.beta_error_rad, w.beta_sigma_rad) for w in drawn])
         for name, column in (("d_x_mm", d_x), ("beta_deg", beta)):
@@ -43,6 +42,12 @@ def main() -> None:
                 f"held {held:.1%}",
                 flush=True,
             )
+
+
+def drawn_whisks(session, shape, count, seed):
+    """So many whisks drawn before an object of a shape."""
+    rng = np.random.default_rng(seed)
+    return [drawn_whisk(session, TRIAL, rng, shape) for _ in range(count)]
 
 
 if __name__ == "__main__":
