@@ -30,9 +30,13 @@ from scipy.special import ndtr
 
 from vision.touched.profiles import OUTSIDE_PX, STEP_PX, Profiles, light_range
 
-# [splines] Of the angle round the rod: finer than the blur, so that a highlight is explained at
-# any position of the axis. Study: bar_scenes.py.
-_SPLINES = 36
+# [splines] Of the angle round the rod, at least. Study: bar_scenes.py.
+_FEWEST_SPLINES = 36
+# [px] Largest distance of their knots where the bar has pixels: sharper light than that the lens
+# blurs, and a highlight is explained at any position of the axis. On a shaft of 130 px, 36 splines
+# were 2.7 px apart: positions whose knots lay on a highlight's borders were preferred by 5 to 30 in
+# deviance. With 1.5 and 0.9 it is alike to within 2. Study: real_shaft.py.
+_KNOT_PX = 1.5
 # [1] Sigma of the difference between neighbouring spline coefficients, over the range of light
 # inside the bar. Smaller shares take a bright bar's shaded rim for its edge. Study: bar_scenes.py.
 _STEP_SHARE = 0.3
@@ -53,9 +57,6 @@ _RIM_BLURRED_PX = 2.0
 # [1] Sigma of the background's change over `OUTSIDE_PX`, over the contrast. Half or twice it
 # moves touch by 0.35 sigma at most. Study: thresholds.py touched.evidence _SLOPE_SHARE ….
 _SLOPE_SHARE = 0.3
-# [rad] Angles at which the splines are integrated: five a spline, 0.5 px apart at most on a bar
-# of 56 px, less than a blur. Derived.
-_ANGLES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 171)
 # [columns] Level and slope beyond both edges: a layout.
 _SIDES = 4
 # [1] Information of the pixels on a mode of the light, over its prior precision, below which the
@@ -93,6 +94,16 @@ class LitRod:
         return float(np.median(ranges)) if ranges else profiles.contrast
 
     @cached_property
+    def splines(self) -> int:
+        """Return how many splines have knots at most _KNOT_PX apart on the pixels of the bar."""
+        profiles = self.profiles
+        is_used = np.any(profiles.is_observed, axis=0)
+        radius_px = profiles.radius_px
+        innermost_px = np.min(np.abs(profiles.offset_px[is_used]), initial=radius_px)
+        px_per_rad = np.sqrt(radius_px**2 - innermost_px**2)
+        return max(_FEWEST_SPLINES, int(np.ceil(np.pi * px_per_rad / _KNOT_PX)))
+
+    @cached_property
     def _outside_precision(self) -> np.ndarray:
         """Return the prior precisions (6,) of level and slope beyond either edge, and of the
         background's two shares."""
@@ -107,8 +118,8 @@ class LitRod:
         The last is that of light with a saturated highlight, if there is one.
         """
         scale = np.hypot(self._inner_range, _RIM_SHARE * self.profiles.contrast)
-        level = self._level_sigma**-2.0 * np.eye(_SPLINES)
-        penalties = _roughness_penalties()
+        level = self._level_sigma**-2.0 * np.eye(self.splines)
+        penalties = _roughness_penalties(self.splines)
         precisions = [level + roughness / scale**2 for roughness in penalties]
         if self.profiles.is_saturated:
             precisions.append(level + penalties[-1] / (_UNSEEN_RANGE * scale) ** 2)
@@ -313,7 +324,7 @@ class _Design:
         cls, offset_px: np.ndarray, modes: np.ndarray, radius_px: float, blur_px: float
     ) -> "_Design":
         """Return the design at offset_px (n,), with modes (splines, r) of the light on the rod."""
-        rod_light = _blur_splines(offset_px, radius_px, blur_px) @ modes
+        rod_light = _blur_splines(offset_px, radius_px, blur_px, len(modes)) @ modes
         beyond_px = np.stack([-offset_px, offset_px], axis=1) - radius_px  # left and right edge
         cover = ndtr(beyond_px / blur_px)
         density = np.exp(-0.5 * (beyond_px / blur_px) ** 2) / np.sqrt(2.0 * np.pi)
@@ -367,7 +378,7 @@ def compute_evidence(
     profiles = rod.profiles
     radius_px = width_factor * profiles.radius_px
     tried = _Positions.within(profiles, reach_px, every, positions)
-    picture = _blur_splines(tried.offset_px(0.0), radius_px, blur_px)
+    picture = _blur_splines(tried.offset_px(0.0), radius_px, blur_px, rod.splines)
     root_weight = _largest_root_weight(profiles, tried)
     modes, precisions = rod.observable_modes(
         root_weight[:, None] * picture, with_smooth_priors=with_smooth_priors
@@ -452,7 +463,7 @@ def _shifted_moments(profiles: Profiles, tried: _Positions) -> np.ndarray:
     return padded.take(bins, axis=2).reshape(len(padded), -1, len(tried.steps))
 
 
-@lru_cache(maxsize=_SPLINES)
+@lru_cache(maxsize=_FEWEST_SPLINES)
 def _element_layout(columns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return which element of `_normal_matrices` is which of its sums.
 
@@ -472,29 +483,42 @@ def _element_layout(columns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return row, column, element
 
 
-def _blur_splines(offset_px, radius_px: float, blur_px: float) -> np.ndarray:
-    """Return blurred pictures (n, splines) of rods whose radiance is one spline of the angle
+def _blur_splines(offset_px, radius_px: float, blur_px: float, number: int) -> np.ndarray:
+    """Return blurred pictures (n, number) of rods whose radiance is one spline of the angle
     each."""
-    z = (offset_px[:, None] - radius_px * np.sin(_ANGLES)) / blur_px
-    step_rad = _ANGLES[1] - _ANGLES[0]
-    area = radius_px * np.cos(_ANGLES) * step_rad / (blur_px * np.sqrt(2.0 * np.pi))
-    return (np.exp(-0.5 * z * z) * area) @ _splines()
+    angles = _angles(number)
+    z = (offset_px[:, None] - radius_px * np.sin(angles)) / blur_px
+    step_rad = angles[1] - angles[0]
+    area = radius_px * np.cos(angles) * step_rad / (blur_px * np.sqrt(2.0 * np.pi))
+    return (np.exp(-0.5 * z * z) * area) @ _splines(number)
 
 
-@lru_cache(maxsize=1)
-def _roughness_penalties() -> list[np.ndarray]:
-    """Return DᵀD / sigma² (splines, splines) of first and second differences of the light, from
-    smooth to rough."""
-    steps = np.diff(np.eye(_SPLINES), 1, axis=0)
-    curvatures = np.diff(np.eye(_SPLINES), 2, axis=0)
-    of_steps = steps.T @ steps / _STEP_SHARE**2
-    return [of_steps + curvatures.T @ curvatures / share**2 for share in _CURVATURE_SHARES]
+@lru_cache(maxsize=8)
+def _roughness_penalties(number: int) -> list[np.ndarray]:
+    """Return DᵀD / sigma² (number, number) of first and second differences of the light, from
+    smooth to rough.
+
+    Shares are those between _FEWEST_SPLINES. The light is a random walk, and a random walk's
+    integral: between knots n times as near, variances of differences are n and n³ times less.
+    """
+    nearer = number / _FEWEST_SPLINES
+    steps = np.diff(np.eye(number), 1, axis=0)
+    curvatures = np.diff(np.eye(number), 2, axis=0)
+    of_steps = nearer / _STEP_SHARE**2 * steps.T @ steps
+    of_curvatures = nearer**3 * curvatures.T @ curvatures
+    return [of_steps + of_curvatures / share**2 for share in _CURVATURE_SHARES]
 
 
-@lru_cache(maxsize=1)
-def _splines() -> np.ndarray:
-    """Return the cubic B-splines (angles, splines) of the angle from edge to edge."""
+@lru_cache(maxsize=8)
+def _angles(number: int) -> np.ndarray:
+    """Return the angles at which splines are integrated, rad: five for each."""
+    return np.linspace(-0.5 * np.pi, 0.5 * np.pi, 5 * (number - 2) + 1)
+
+
+@lru_cache(maxsize=8)
+def _splines(number: int) -> np.ndarray:
+    """Return so many cubic B-splines (angles, number) of the angle from edge to edge."""
     end = 0.5 * np.pi
-    inner = np.linspace(-end, end, _SPLINES - 2)
+    inner = np.linspace(-end, end, number - 2)
     knots = np.concatenate([[-end] * 3, inner, [end] * 3])
-    return BSpline.design_matrix(np.clip(_ANGLES, -end, end - 1e-9), knots, 3).toarray()
+    return BSpline.design_matrix(np.clip(_angles(number), -end, end - 1e-9), knots, 3).toarray()
