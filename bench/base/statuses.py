@@ -142,7 +142,7 @@ _TABLE = (
     Status(
         "bar_elsewhere",
         WARNING,
-        "another place of the bar explains more of the pictures",
+        "another place of the bar explains more of the pictures, or as much",
         _LOOK_AT_BAR,
     ),
     Status(

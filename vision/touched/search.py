@@ -15,7 +15,7 @@ searches, in `vision.touched.rounded_search`. Which search a form of object has 
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, singledispatch
 from itertools import combinations, product
 from operator import itemgetter
@@ -44,8 +44,8 @@ from vision.touched.search_scene import SearchScene, still_picture
 _CONVERGED_PX = 0.5
 # [px] Lines nearer to each other than this are one: half the reach of a quick measurement. Derived.
 _SAME_LINE_PX = 1.5
-# [log] A pair of lines whose highest score is so much less than that of a bar is not measured: two
-# measurements about the same axis differ by 0.5. Study: bar_scenes.py.
+# [log] A bar whose score is so much less than another's is none: two measurements about the same
+# axis differ by 0.5. Study: bar_scenes.py.
 _CLEARER = 1.0
 # [passes] Most measurements of one axis: each moves a line by up to 3 px, so all of them by 36 px, more
 # than the width of most bars. Derived.
@@ -56,11 +56,13 @@ _MOST_PASSES = 12
 class SeenBar:
     """The axis of the touched object, and by camera the bar's lines that it passes through.
 
-    Of a rounded object there are no lines.
+    Of a rounded object there are no lines. rivals: axes of other bars that are as clear, as far as
+    detection scores tell.
     """
 
     axis: Axis
     lines: Mapping[str, BarLineEstimate]
+    rivals: tuple[BarAxis, ...] = ()
 
     @property
     def seen_by(self) -> list[str]:
@@ -218,7 +220,10 @@ class BarSearch:
                     one.axis = other.axis = self._converge(axis, found).axis
         if not found:
             return self._converge(axes[0], found)
-        return max(found, key=_detection_score)
+        best = max(found, key=_detection_score)
+        least = best.detection_score - _CLEARER
+        rivals = [bar.axis for bar in found if bar is not best and bar.detection_score > least]
+        return replace(best, rivals=tuple(rivals))
 
     def _candidates(self, axes: Sequence[BarAxis]) -> list["LineCandidate"]:
         """Measure the bar's line about each axis, once where a camera sees two axes as one."""

@@ -3,11 +3,13 @@
 A fit ends near the place from which it began. Where the pictures say that another one explains them
 better (`vision.truth.last_question`), the whisk is fitted from there as well, and the fit whose
 silhouettes explain more is the truth. Where two fits explain the pictures equally well and their
-distances differ, there is no number. A fit that ended far from its beginning may not have
+distances differ, there is no number; that holds for a second bar that the search found as clear,
+too, such as the shadow beside a bar. A fit that ended far from its beginning may not have
 converged, and begins again from its end; one that has not converged at last says so. So a false
 alarm costs the time of a fit.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -74,7 +76,8 @@ def explain(whisk: WhiskPictures) -> Explanation:
     Fills whisk.light with how each camera sees the wire. Raises Refused where there is no touch to
     fit, or two places explain the pictures equally well.
     """
-    return best_explanation(Explanation(whisk, fit_whisk(whisk)))
+    best = best_explanation(Explanation(whisk, fit_whisk(whisk)))
+    return _weigh_rivals(best, whisk.bar.rivals)
 
 
 def best_explanation(first: Explanation) -> Explanation:
@@ -97,6 +100,30 @@ def best_explanation(first: Explanation) -> Explanation:
     light.clear()
     light.update(best.whisk.light)
     return replace(best, whisk=replace(best.whisk, bar=SeenBar(best.axis, {}), light=light))
+
+
+def _weigh_rivals(best: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
+    """Return a fit, with a warning where one from another bar explains the pictures as well.
+
+    rivals: axes that the search found as clear. Raises Refused where their distances differ.
+    """
+    question = _question(best) if rivals else None
+    if question is None:
+        return best
+    for axis in rivals:
+        if question.apart_px(axis, best.axis) <= _APART_PX:
+            continue
+        try:
+            other = best.from_place(SeenBar(axis, {}))
+        except Refused:
+            continue
+        away_px = question.apart_px(other.axis, best.axis)
+        if away_px <= _APART_PX or _is_better(question, best.axis, other.axis, _LIKELY_SIGMAS):
+            continue
+        _require_one(best, other)
+        sentence = f"the bar may be elsewhere: a place up to {away_px:.0f} px away explains the pictures as well"
+        return replace(best, warning=Reason("bar_elsewhere", sentence))
+    return best
 
 
 def unexplained(fit: Explanation) -> Reason:

@@ -1,23 +1,28 @@
 """Whether painted pictures contradict a bar that is drawn elsewhere; and what follows from that."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
 from tests.scenes.recorded import RODS, Recorded
+from tests.studies.accuracy.bar_scenes import read_scene
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis, axis_frame
 from vision.geometry.reasons import NO_REASON
 from vision.geometry.refusals import Refused
+from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
 from vision.touched.search import SeenBar, find_object
 from vision.truth import observe
 from vision.truth.explanations import Explanation, best_explanation
 from vision.truth.last_question import BarQuestion
+from vision.truth.observe import observe_trial
+from vision.truth.trial_pictures import TrialPictures
 from vision.truth.value import Value
 
 SIZE_PX = (420, 360)
@@ -295,3 +300,17 @@ def test_a_whisk_fitted_from_a_wrong_place_has_the_truth(small_session, monkeypa
     seen = steep.see()
     assert abs(seen.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * seen.d_x_mm.sigma
     assert seen.status == ""
+
+
+def test_a_bar_and_its_shadow_that_are_equally_clear_are_told():
+    """In one camera the shadow is darker than the polished bar, and both are as wide: the slope was false by 18 sigma."""
+    scene = Path(__file__).parents[3] / "fixtures" / "scenes" / "sun"
+    views, cameras, rods, motor_rad, _ = read_scene(scene)
+    frames = {view.camera.name: view.frames for view in views}
+    background = {view.camera.name: view.background for view in views}
+    time_s = 0.05 * np.arange(len(motor_rad))
+    pictures = TrialPictures(frames, time_s, motor_rad, background)
+    whole = [slice(0, len(motor_rad))]
+    (whisk,) = observe_trial(pictures, whole, cameras, rods, VisionSettings()).whisks
+    assert "bar_elsewhere" in whisk.status.codes
+    assert abs(whisk.d_x_mm.value - 49.704) < 2.0 * whisk.d_x_mm.sigma  # truth.toml
