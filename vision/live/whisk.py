@@ -7,6 +7,7 @@ as soon as its frames are there:
                        the object's lines finely; the wire's shading and the lens blur
     each frame         the wire's bend, by votes near the extrapolation of the last two; its line, by
                        the shading of the first frames
+    frame 4            where else the bar may be
     the last frame     its bend, its line, one fit, and whether another place explains the bar better
 
 The first step is the costly one; best is a camera that runs before the motor does. `LiveWhisk.add`
@@ -38,7 +39,8 @@ from vision.live.wire_lines import CarriedLines, WireLines, frames_lit_alike
 from vision.pictures.view import View
 from vision.touched.search import SeenBar, find_object, find_object_again
 from vision.touched.search_scene import SearchScene
-from vision.truth.explanations import Explanation, unexplained
+from vision.truth.explanations import Explanation, ask_early, unexplained
+from vision.truth.last_question import FRAMES, BarQuestion
 from vision.truth.line_source import WhiskPlace
 from vision.truth.observe import NOT_CONVERGED, views_facing, warnings_of
 from vision.truth.records import WhiskTruth
@@ -163,6 +165,8 @@ class LiveWhisk:
     _reading: _LineReading | None = None
     _is_bar_fine: bool = False
     _wire: WireLines | None = None
+    _question: BarQuestion | None = None
+    _is_asked: bool = False
 
     def add(
         self, camera: str, frame: int, time_s: float, motor_rad: float, picture: np.ndarray
@@ -253,7 +257,10 @@ class LiveWhisk:
         last = list(self._follower.bends_rad)[-1]
         if self._wire is None or not self._wire.is_lit_alike(self.motor_rad[last]):
             return self._trace_wire
-        return self._carry_on if last not in self._wire.frames else None
+        if last not in self._wire.frames:
+            return self._carry_on
+        is_due = len(self._wire.frames) >= FRAMES and not self._is_asked
+        return self._ask if is_due else None
 
     def _shared_frames(self) -> list[int]:
         """Return the frames that every camera has."""
@@ -386,6 +393,12 @@ class LiveWhisk:
         whisk = whisk.during([frame for frame in whisk.frames if frame > known[-1]])
         self._wire.carry_on(whisk, self._place(whisk))
 
+    def _ask(self) -> None:
+        """Ask where else the bar may be, about where the free frames have it."""
+        whisk = self._whisk()
+        self._question = ask_early(whisk, self._place(whisk).curves)
+        self._is_asked = True
+
     def _truth(self) -> WhiskTruth:
         """Return the truth by all frames. Raises Refused where they determine none."""
         if self._wire is None:
@@ -405,7 +418,7 @@ class LiveWhisk:
     def _unless_elsewhere(self, whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
         """Return the truth that was fitted; none where another place explains the object better."""
         explanation = Explanation(whisk, fitted)
-        elsewhere = unexplained(explanation)
+        elsewhere = unexplained(explanation, self._question)
         if elsewhere:
             return self._without_truth(elsewhere)
         truth = to_whisk(whisk, fitted)

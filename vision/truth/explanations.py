@@ -9,13 +9,14 @@ converged, and begins again from its end; one that has not converged at last say
 alarm costs the time of a fit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from vision.fit.problem import bar_axis
+from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.geometry.refusals import Refused
@@ -126,13 +127,31 @@ def _weigh_rivals(best: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
     return best
 
 
-def unexplained(fit: Explanation) -> Reason:
+def ask_early(whisk: WhiskPictures, curves: Mapping[int, Curves]) -> BarQuestion | None:
+    """Return the question about the bar where a whisk's search has it, its best place known already.
+
+    curves: by frame, of the wire, to a pixel or two. None where the bar may not be asked about.
+    """
+    if not _may_be_asked(whisk):
+        return None
+    chosen = np.unique(np.linspace(0, len(curves) - 1, FRAMES).astype(int))
+    frames = [list(curves)[k] for k in chosen.tolist()]
+    some_curves = {frame: curves[frame] for frame in frames}
+    question = BarQuestion(whisk.views, some_curves, whisk.bar.axis, whisk.rods)
+    _ = question.best  # the costly part, kept
+    return question
+
+
+def unexplained(fit: Explanation, asked: BarQuestion | None) -> Reason:
     """Return why a fit may not be the truth, without another fit; no reason where nothing says so.
 
-    Another place explains the pictures better, or the fit ended far from its beginning.
+    Another place explains the pictures better, or the fit ended far from its beginning. asked: the
+    question about the fit's bar, as asked before it was known; None where it is still to be asked.
     """
-    question = _question(fit)
-    if question is None:
+    if not _may_be_asked(fit.whisk):
+        return NO_REASON
+    question = asked or fit.question()
+    if len(question.bands) < len(fit.whisk.views):
         return NO_REASON
     place = _better_place(question, fit)
     if place is not None:
@@ -140,24 +159,28 @@ def unexplained(fit: Explanation) -> Reason:
     return _unconverged(question, fit)
 
 
+def _may_be_asked(whisk: WhiskPictures) -> bool:
+    """Return whether the bar is straight, stands, and is seen before a known background."""
+    is_straight = isinstance(whisk.bar.axis, BarAxis)
+    is_known = all(np.any(view.background) for view in whisk.views)
+    return is_straight and is_known and whisk.motion is None
+
+
 def _question(fit: Explanation) -> BarQuestion | None:
     """Return the question about a fit; None where pictures cannot answer it.
 
-    They can where the bar is straight, stands, and every camera sees it before a known background:
-    a fit that reads a bar where a camera sees none could be worse.
+    They can where the bar may be asked about and every camera sees it: a fit that reads a bar where a
+    camera sees none could be worse.
     """
-    whisk = fit.whisk
-    is_straight = isinstance(whisk.bar.axis, BarAxis)
-    is_known = all(np.any(view.background) for view in whisk.views)
-    if not (is_straight and is_known and whisk.motion is None):
+    if not _may_be_asked(fit.whisk):
         return None
     question = fit.question()
-    return question if len(question.bands) == len(whisk.views) else None
+    return question if len(question.bands) == len(fit.whisk.views) else None
 
 
 def _better_place(question: BarQuestion, fit: Explanation) -> BarAxis | None:
     """Return the place that surely explains the pictures better than a fit does; None without one."""
-    place = question.best()
+    place = question.best
     return place if _is_better(question, place, fit.axis, _SURE_SIGMAS) else None
 
 

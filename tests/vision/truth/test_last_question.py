@@ -103,8 +103,8 @@ def ask(drawn: BarAxis, shadow: float = 1.0) -> BarQuestion:
 
 def test_no_other_place_explains_more_than_the_true_one():
     question = ask(TRUE)
-    gain, _ = question.gain(question.best(), TRUE)
-    assert gain < 0.02 and question.apart_px(question.best(), TRUE) < 2.0
+    gain, _ = question.gain(question.best, TRUE)
+    assert gain < 0.02 and question.apart_px(question.best, TRUE) < 2.0
 
 
 @pytest.mark.parametrize(
@@ -113,15 +113,15 @@ def test_no_other_place_explains_more_than_the_true_one():
 )
 def test_the_place_that_explains_more_is_the_true_one(drawn):
     question = ask(drawn)
-    gain, sigma = question.gain(question.best(), drawn)
+    gain, sigma = question.gain(question.best, drawn)
     assert gain > 0.02 and gain > 2.5 * sigma
-    assert question.apart_px(question.best(), TRUE) < 2.0
+    assert question.apart_px(question.best, TRUE) < 2.0
 
 
 def test_a_shadow_beside_the_bar_makes_no_other_place_better():
     question = ask(TRUE, shadow=0.7)
-    gain, sigma = question.gain(question.best(), TRUE)
-    assert gain < max(0.02, 2.5 * sigma) or question.apart_px(question.best(), TRUE) < 2.0
+    gain, sigma = question.gain(question.best, TRUE)
+    assert gain < max(0.02, 2.5 * sigma) or question.apart_px(question.best, TRUE) < 2.0
 
 
 @pytest.mark.parametrize("degrees, asked", [(8.0, 0), (25.0, 1)])
@@ -182,6 +182,7 @@ class AskedPlaces:
 
     bands = (None,)  # a camera
 
+    @property
     def best(self) -> BarAxis:
         return at(BEST[0])
 
