@@ -261,10 +261,7 @@ def _check_object(keys: manifest.ObjectKeys, thickness_mm: float | None, label: 
     if keys.point_mm is None and (keys.axis is not None or keys.point_sigma_mm):
         found = "says how it stands, and not where; point_mm is missing"
         raise BadInput(f"[object] {found}", file=label)
-    if (keys.board_point_mm is None) != (keys.board_axis is None):
-        raise BadInput("[object] board_point_mm and board_axis go together", file=label)
-    if keys.board_axis is not None and not any(keys.board_axis):
-        raise BadInput("[object] board_axis is a direction, not zero", file=label)
+    _check_board_on_object(keys, label)
     ring_mm = keys.ring_diameter_mm
     if ring_mm is not None and thickness_mm is not None and ring_mm <= thickness_mm:
         found = (
@@ -272,6 +269,14 @@ def _check_object(keys: manifest.ObjectKeys, thickness_mm: float | None, label: 
         )
         meant = "it is the diameter along the bar's middle, and larger"
         raise BadInput(f"[object] {found}; {meant}", file=label)
+
+
+def _check_board_on_object(keys: manifest.ObjectKeys, label: str) -> None:
+    """Raise BadInput for a board on the object that does not say how the object stands."""
+    if (keys.board_point_mm is None) != (keys.board_axis is None):
+        raise BadInput("[object] board_point_mm and board_axis go together", file=label)
+    if keys.board_axis is not None and not any(keys.board_axis):
+        raise BadInput("[object] board_axis is a direction, not zero", file=label)
 
 
 def _bar_diameter(keys: manifest.TrialKeys, bar: manifest.BarKeys | None) -> dict[str, float]:

@@ -32,9 +32,7 @@ def descend(
     value = function(begin)
     for _ in range(_MOST_STEPS):
         slope, curvature = _derivatives(function, point, value, steps)
-        if not np.all(np.isfinite(curvature)):
-            sentence = "a fit to the pictures left the pixels that could determine it"
-            raise Refused(sentence, code="fit_not_converged")
+        _require_finite(curvature)
         step = _downhill(slope, curvature, longest)
         trials = [(function(point + step * part), part) for part in parts]
         lower, part = min(trials, key=lambda trial: trial[0])
@@ -45,6 +43,13 @@ def descend(
         if np.max(np.abs(step * part)) < tolerance:
             return point, value, curvature
     raise not_converged(_MOST_STEPS)
+
+
+def _require_finite(curvature: np.ndarray) -> None:
+    """Raise Refused where a function has no value about a point."""
+    if not np.all(np.isfinite(curvature)):
+        sentence = "a fit to the pictures left the pixels that could determine it"
+        raise Refused(sentence, code="fit_not_converged")
 
 
 def not_converged(steps: int) -> Refused:

@@ -220,10 +220,7 @@ class BarSearch:
                     one.axis = other.axis = self._converge(axis, found).axis
         if not found:
             return self._converge(axes[0], found)
-        best = max(found, key=_detection_score)
-        least = best.detection_score - _CLEARER
-        rivals = [bar.axis for bar in found if bar is not best and bar.detection_score > least]
-        return replace(best, rivals=tuple(rivals))
+        return _clearest_of(found)
 
     def _candidates(self, axes: Sequence[BarAxis]) -> list["LineCandidate"]:
         """Measure the bar's line about each axis, once where a camera sees two axes as one."""
@@ -309,6 +306,14 @@ class BarSearch:
 def _detection_score(bar: SeenBar) -> float:
     """Return a bar's detection score, as a key to compare bars by."""
     return bar.detection_score
+
+
+def _clearest_of(bars: Sequence[SeenBar]) -> SeenBar:
+    """Return the bar with the highest detection score, with those that are as clear as its rivals."""
+    clearest = max(bars, key=_detection_score)
+    least = clearest.detection_score - _CLEARER
+    rivals = [bar.axis for bar in bars if bar is not clearest and bar.detection_score > least]
+    return replace(clearest, rivals=tuple(rivals))
 
 
 def _pairs_of(

@@ -106,12 +106,7 @@ class TrackedObject(ObjectPlace):
 
         Raises Refused where the points are of no bar, at one spot, or seen from one side.
         """
-        if not isinstance(rods.bar, Bar):
-            raise Refused(
-                f"points place a straight bar, and the object is a {rods.bar.name}: "
-                'state its place ([truth] source = "stage")',
-                code="object_points_elsewhere",
-            )
+        _require_straight_bar(rods)
         seeing = [camera for camera in cameras if camera.name in self.points]
         if len(seeing) < 2:
             raise _from_one_side()
@@ -288,6 +283,16 @@ def _half_width_px(camera: Camera, axis: BarAxis, bar: Bar) -> float:
     directions = np.broadcast_to(axis.direction, near_mm.shape)
     _, half_px = outline(camera, near_mm, directions, bar.radius_mm)
     return float(half_px[1])
+
+
+def _require_straight_bar(rods: Rods) -> None:
+    """Raise Refused where the touched object is no straight bar."""
+    if not isinstance(rods.bar, Bar):
+        raise Refused(
+            f"points place a straight bar, and the object is a {rods.bar.name}: "
+            'state its place ([truth] source = "stage")',
+            code="object_points_elsewhere",
+        )
 
 
 def _elsewhere(camera: Camera, found: str) -> Refused:
