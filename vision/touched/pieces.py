@@ -78,12 +78,15 @@ def bar_pieces(
 
 
 def _read_bar_band(view: View, axis: BarAxis, radius_mm: float, settings: VisionSettings) -> Band:
-    """Read the band along the bar; raise Refused where no part of it lies before the camera."""
+    """Read the band along the bar.
+
+    Raises Refused where no part of it lies before the camera, or the bar would pass through that.
+    """
     reach_mm = settings.bar_reach_mm
     middle, radius = axis.outline(view.camera, radius_mm, reach_mm, _STATIONS)
-    if not np.any(np.isfinite(radius)):
+    if not np.any(radius > 0.0):  # inside the bar 0, behind the camera NaN
         raise Refused(
-            f"camera {view.camera.name} would have the bar behind it: check T_camera_rig",
+            f"camera {view.camera.name} would have the bar behind or about it: check T_camera_rig",
             code="bar_behind_camera",
         )
     half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px

@@ -40,7 +40,7 @@ def webcam(real, tmp_path):
 def test_one_camera_is_calibrated_and_measured(webcam, tmp_path, capsys):
     assert calibrate_cameras_command(webcam(), tmp_path / "out" / "cameras.toml") in (0, 1)
     said = capsys.readouterr().out
-    assert "camera cam_0: 44 views" in said and "held out, views with index % 4 == 3" in said
+    assert "camera cam_0: 45 views" in said and "held out, views with index % 4 == 3" in said
     made = read_cameras(tmp_path / "out" / "cameras.toml")
     assert made["cam_0"].lens[0] == pytest.approx(891, abs=6)
     assert made.covariance.any()

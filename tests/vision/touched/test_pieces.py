@@ -3,8 +3,15 @@
 from dataclasses import fields
 
 import numpy as np
+import pytest
 
-from vision.touched.pieces import beside_wires
+from tests.studies.accuracy.board_scenes import two_cameras
+from vision.geometry.contact import BarAxis
+from vision.geometry.refusals import Refused
+from vision.geometry.vision_settings import VisionSettings
+from vision.pictures.pixel_noise import Noise
+from vision.pictures.view import View
+from vision.touched.pieces import bar_pieces, beside_wires
 from vision.wire.bands import Pieces
 
 
@@ -24,3 +31,15 @@ def test_pixels_near_a_wire_weigh_nothing_and_hidden_pieces_are_left_out():
     kept = beside_wires(pieces, [along, beside])
     assert np.array_equal(kept.foot_px[:, 1], [0.0, 60.0])
     assert np.array_equal(kept.weight > 0, np.abs(across[:2] - 15.0) >= 6.0)
+
+
+def test_a_bar_about_a_camera_is_refused():
+    """A search that tries such an axis goes on with the others."""
+    camera = two_cameras()["high"]
+    width, height = camera.size_px
+    grey = np.full((height, width), 100.0)
+    view = View(camera, {0: grey}, grey, Noise(1.0, 0.0))
+    about = BarAxis(camera.centre_mm + [0.5, 0.0, 0.0], np.array([0.0, 0.0, 1.0]))
+    with pytest.raises(Refused) as refused:
+        bar_pieces(view, view.noise, about, 3.0, [], VisionSettings())
+    assert refused.value.code == "bar_behind_camera"
