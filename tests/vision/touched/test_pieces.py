@@ -39,7 +39,8 @@ def test_a_bar_about_a_camera_is_refused():
     width, height = camera.size_px
     grey = np.full((height, width), 100.0)
     view = View(camera, {0: grey}, grey, Noise(1.0, 0.0))
-    about = BarAxis(camera.centre_mm + [0.5, 0.0, 0.0], np.array([0.0, 0.0, 1.0]))
+    beside_mm = np.array([0.5, 0.0, 0.0])
+    about = BarAxis(camera.centre_mm + beside_mm, np.array([0.0, 0.0, 1.0]))
     with pytest.raises(Refused) as refused:
         bar_pieces(view, view.noise, about, 3.0, [], VisionSettings())
     assert refused.value.code == "bar_behind_camera"
