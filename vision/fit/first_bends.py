@@ -4,7 +4,7 @@ frame.
 Coarse: to a pixel or two, enough for the strips that `trace` reads.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -186,10 +186,26 @@ def follow_bends(
     """Return the bend (2,) in rad of every frame in order, each searched for near the extrapolation
     of the last two.
     """
+
+    def find(frame: int, motor: float, guess_rad: np.ndarray) -> np.ndarray:
+        """Return the bend of one frame."""
+        return find_bend(sights, axis, rest_mm, frame, motor, guess_rad)
+
+    return bends_in_order(motor_rad, find)
+
+
+def bends_in_order(
+    motor_rad: Mapping[int, float], find: Callable[[int, float, np.ndarray], np.ndarray]
+) -> dict[int, np.ndarray]:
+    """Return the bend (2,) in rad of every frame in order.
+
+    find: finds that of a frame at a motor angle near a guess (2,), the extrapolation of the last two
+    frames.
+    """
     bends_rad = [np.zeros(2), np.zeros(2)]  # before the first frame
     for frame, motor in motor_rad.items():
-        guess = 2 * bends_rad[-1] - bends_rad[-2]
-        bends_rad.append(find_bend(sights, axis, rest_mm, frame, motor, guess))
+        guess_rad = 2 * bends_rad[-1] - bends_rad[-2]
+        bends_rad.append(find(frame, motor, guess_rad))
     return dict(zip(motor_rad, bends_rad[2:]))
 
 

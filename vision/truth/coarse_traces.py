@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.fit.blocks import REST_PRIOR_MM
-from vision.fit.first_bends import BendModel, contact_arc, fit_bend, fit_rest
+from vision.fit.first_bends import BendModel, bends_in_order, contact_arc, fit_bend, fit_rest
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines, unbent_curves
 from vision.geometry.contact import BarAxis
@@ -93,9 +93,9 @@ def follow_traced_bends(
     """Return the bend (2,) in rad of every frame in order, each searched for near the extrapolation
     of the last two.
     """
-    bends_rad = [np.zeros(2), np.zeros(2)]  # before the first frame
-    for frame, motor in motor_rad.items():
-        bend_rad = 2 * bends_rad[-1] - bends_rad[-2]
+
+    def find(frame: int, motor: float, bend_rad: np.ndarray) -> np.ndarray:
+        """Return the bend of one frame, beginning near a guess."""
         for _ in range(_BEND_PASSES):
             arc_mm = contact_arc(rest_mm, bend_rad, motor, axis, rods.wire)
             curve = centrelines(rest_mm, bend_rad, arc_mm, motor, rods.wire)
@@ -104,8 +104,9 @@ def follow_traced_bends(
                 points.append(_as_points(_beside(traces[camera.name], camera, {frame: curve})))
             model = BendModel(cameras.cameras, rest_mm, arc_mm, motor, rods.wire)
             bend_rad = fit_bend(model, bend_rad, points, axis)
-        bends_rad.append(bend_rad)
-    return dict(zip(motor_rad, bends_rad[2:]))
+        return bend_rad
+
+    return bends_in_order(motor_rad, find)
 
 
 def _fit_traced_rest(

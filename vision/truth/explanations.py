@@ -22,7 +22,7 @@ from vision.geometry.reasons import NO_REASON, Reason
 from vision.geometry.refusals import Refused
 from vision.touched.search import SeenBar
 from vision.truth.last_question import FRAMES, BarQuestion
-from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures, spread_indices
 from vision.truth.whisk_truth import fit_whisk
 
 # [1] Of the bar's width, all cameras together: so much more must have changed under another place.
@@ -134,9 +134,8 @@ def ask_early(whisk: WhiskPictures, curves: Mapping[int, Curves]) -> BarQuestion
     """
     if not _may_be_asked(whisk):
         return None
-    chosen = np.unique(np.linspace(0, len(curves) - 1, FRAMES).astype(int))
-    frames = [list(curves)[k] for k in chosen.tolist()]
-    some_curves = {frame: curves[frame] for frame in frames}
+    frames = list(curves)
+    some_curves = {frames[k]: curves[frames[k]] for k in spread_indices(len(frames), FRAMES)}
     question = BarQuestion(whisk.views, some_curves, whisk.bar.axis, whisk.rods)
     _ = question.best  # the costly part, kept
     return question
@@ -148,10 +147,8 @@ def unexplained(fit: Explanation, asked: BarQuestion | None) -> Reason:
     Another place explains the pictures better, or the fit ended far from its beginning. asked: the
     question about the fit's bar, as asked before it was known; None where it is still to be asked.
     """
-    if not _may_be_asked(fit.whisk):
-        return NO_REASON
-    question = asked or fit.question()
-    if len(question.bands) < len(fit.whisk.views):
+    question = _question(fit, asked)
+    if question is None:
         return NO_REASON
     place = _better_place(question, fit)
     if place is not None:
@@ -166,15 +163,15 @@ def _may_be_asked(whisk: WhiskPictures) -> bool:
     return is_straight and is_known and whisk.motion is None
 
 
-def _question(fit: Explanation) -> BarQuestion | None:
-    """Return the question about a fit; None where pictures cannot answer it.
+def _question(fit: Explanation, asked: BarQuestion | None = None) -> BarQuestion | None:
+    """Return the question about a fit, as asked before or now; None where pictures cannot answer it.
 
     They can where the bar may be asked about and every camera sees it: a fit that reads a bar where a
     camera sees none could be worse.
     """
     if not _may_be_asked(fit.whisk):
         return None
-    question = fit.question()
+    question = asked or fit.question()
     return question if len(question.bands) == len(fit.whisk.views) else None
 
 

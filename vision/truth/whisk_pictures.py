@@ -221,9 +221,8 @@ class FittedWhisk:
 
     def some_curves(self, count: int) -> dict[int, Curves]:
         """Return the centrelines of so many frames spread over the whisk, by frame."""
-        chosen = np.unique(np.linspace(0, len(self.frames) - 1, count).astype(int))
         curves, _ = curves_of(self.problem, self.state.vector, self.state.arcs_mm)
-        return {self.frames[k]: curves.one(k) for k in chosen.tolist()}
+        return {self.frames[k]: curves.one(k) for k in spread_indices(len(self.frames), count)}
 
     def of_whisk(self, name: str) -> Value:
         """Return a quantity of the whole whisk by its name."""
@@ -234,3 +233,8 @@ class FittedWhisk:
         """Return a quantity of each frame (f,) by its name."""
         sigma = propagated_sigma(self.by_parameter.frame[name], self.covariance)
         return Value(self.measured.frame[name], sigma)
+
+
+def spread_indices(length: int, count: int) -> list[int]:
+    """Return so many indices at most, spread evenly over a sequence from its first to its last."""
+    return np.unique(np.linspace(0, length - 1, count).astype(int)).tolist()
