@@ -29,7 +29,7 @@ SEEING = (
         "bench/trials/placing.py",
         "bench/trials/still_scene.py",
         "bench/trials/trace_frames.py",
-        "bench/trials/object_board.py",
+        "bench/trials/placed_by_board.py",
         "bench/trials/seeing.py",
         "bench/trials/truth_source.py",
         "bench/trials/stated_truth.py",

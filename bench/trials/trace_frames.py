@@ -13,7 +13,7 @@ from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
 from bench.session.traces import read_traces_alone
 from bench.session.trial import Trial
-from bench.trials.object_board import place_by_board
+from bench.trials.placed_by_board import place_by_board
 from bench.trials.stated_truth import stated_place
 from bench.trials.still_scene import StillScene
 from bench.trials.trial_frames import TrialFrames, back_frames, stated_object
