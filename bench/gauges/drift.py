@@ -11,12 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.gauges.felt import FeltStroke
+from bench.gauges.felt import FeltStroke, is_free
 from estimator import noise
 from estimator.signal import FeltTouch
 
-# [rad] Before felt touch, beyond what that is uncertain by. Set by eye.
-_GUARD_RAD = np.radians(0.1)
 # [rounds] Of weights and excess; after five nothing changes that matters.
 _ROUNDS = 10
 
@@ -45,7 +43,7 @@ def _slope_of(stroke: FeltStroke, samples: np.ndarray) -> FreeSlope | None:
     if touch.status:
         return None
     time_s = stroke.time_s
-    free = (stroke.motor_rad < touch.motor_rad - _GUARD_RAD) & np.isfinite(samples).all(axis=1)
+    free = is_free(stroke.motor_rad, touch) & np.isfinite(samples).all(axis=1)
     samples = np.where(free[:, None], samples, 0.0)
     after_a_second = noise.line_weights(time_s, free, time_s[0] + 1.0)
     per_second = after_a_second - noise.line_weights(time_s, free, time_s[0])

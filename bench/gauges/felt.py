@@ -14,12 +14,10 @@ from bench.session.angle_source import EXACT, AngleSigma
 from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, back_stroke, forward_strokes, stroke_ends, ways_back
 from bench.session.trial import Trial
-from estimator.onset import usable
+from estimator.onset import GUARD_RAD, usable
 from estimator.signal import FeltTouch, MomentAt, felt_touch, moment_at, zero_phase_lowpass
 from vision import UNKNOWN, FrameTruth, Value
 
-# [rad] Before felt touch, beyond what that is uncertain by. Set by eye.
-_GUARD_RAD = np.radians(0.2)
 # [samples] Of a free stroke, for its mean.
 _LEAST_FREE = 50
 # [Hz] Ahead of the converter, by the paper.
@@ -222,6 +220,11 @@ def _cutoff_Hz(signals: Signals, where: slice, trial: Trial, settings: Settings)
     return settings.cutoff_for(float(np.degrees(speed_rad_s)))
 
 
+def is_free(motor_rad: np.ndarray, touch: FeltTouch) -> np.ndarray:
+    """Return which samples (n,) are of the free stroke: those that felt touch takes for it."""
+    return motor_rad < touch.motor_rad - GUARD_RAD
+
+
 def _levelled(
     stroke: FeltStroke, signals: Signals, channels: np.ndarray, back: slice
 ) -> FeltStroke:
@@ -236,9 +239,8 @@ def _levelled(
     touch = stroke.touch()
     if touch.status:
         return stroke
-    free_rad = touch.motor_rad - _GUARD_RAD
-    before = stroke.motor_rad < free_rad
-    after = motor_rad < free_rad
+    before = is_free(stroke.motor_rad, touch)
+    after = is_free(motor_rad, touch)
     if min(before.sum(), after.sum()) < _LEAST_FREE:
         return stroke
     start_s = stroke.time_s[before].mean()

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.base.settings import Settings
-from bench.gauges.felt import FeltStroke, strokes_of
+from bench.gauges.felt import FeltStroke, is_free, strokes_of
 from bench.session.signals import Signals, forward_strokes, stroke_ends
 from bench.session.strokes import without_spikes
 from bench.session.trial import Trial
 
-# [rad] Before felt touch, beyond what that is uncertain by. Set by eye.
-_GUARD_RAD = np.radians(0.2)
 # [samples] Of a mean or a way back: fewer have no level beyond the noise. Set by eye.
 _LEAST_SAMPLES = 20
 # [angles] Between a tenth and nine tenths of the push: the largest of so many is the hysteresis.
@@ -60,7 +58,7 @@ def _reversal(
     angles = touch.motor_rad + push * np.linspace(0.1, 0.9, _ANGLES)
     forward = _volts_at(stroke.motor_rad, stroke.channels, angles)
     back = _volts_at(motor, channels, angles)
-    free = motor < touch.motor_rad - _GUARD_RAD
+    free = is_free(motor, touch)
     level_after = np.full(2, np.nan)
     if free.sum() >= _LEAST_SAMPLES:
         level_after = np.nanmean(channels[free], axis=0)
