@@ -28,24 +28,13 @@ from vision.pictures import Frames
 _RUN = 3
 # [px] A camera whose rig board stands this far elsewhere in a trial was knocked in between.
 _MOVED_PX = 0.5
+# [pictures] Of a camera, most that are searched for the board held before it. A longer series is sampled.
+_MOST_OF_BOARD = 120
+# [frames] Of a camera's trials, most in which the rig board is measured: more change its mean corner by less
+# than 0.01 px.
+_MOST_OF_TRIALS = 40
 # [pictures] From which a wrong setting is diagnosed.
 _SAMPLES = 4
-
-
-@dataclass(frozen=True)
-class ViewCounts:
-    """Say how many pictures of a camera are searched for the board.
-
-    board_frames: of the board held before it; a longer series is sampled in runs of neighbours, which determine
-    how the board moved. trial_frames: of the trials, in which the board on the rig stands.
-    """
-
-    board_frames: int
-    trial_frames: int
-
-
-# Beyond 40 frames of the trials the rig board's mean corner gains nothing (0.01 px).
-ALL_VIEWS = ViewCounts(board_frames=120, trial_frames=40)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +44,7 @@ class SessionViews(BoardViews):
     notes: tuple[str, ...] = ()
 
 
-def read_board_views(session: Session, counts: ViewCounts = ALL_VIEWS) -> SessionViews:
+def read_board_views(session: Session) -> SessionViews:
     """Find the board everywhere.
 
     Raises BadInput where it is not found, naming the setting that would find it.
@@ -71,12 +60,10 @@ def read_board_views(session: Session, counts: ViewCounts = ALL_VIEWS) -> Sessio
             frames = Frames.open(source)
         sizes_px[name] = frames.size_px
         place = session.board_place(name)
-        boards[name] = _series(
-            frames, session.board, counts.board_frames, place, session.mirrored(name)
-        )
+        boards[name] = _series(frames, session.board, place, session.mirrored(name))
         if name in session.rig_pictures:
             rig[name] = rig_view(session, name, frames.size_px)
-            trials[name], left_out = _trial_views(session, name, rig[name], counts.trial_frames)
+            trials[name], left_out = _trial_views(session, name, rig[name])
             notes += left_out
     found = SessionViews(
         boards,
@@ -119,13 +106,13 @@ class _Samples:
             self.without_board.append(grey)
 
 
-def _series(frames: Frames, board: Board, most: int, place: str, mirrored: bool) -> list[Corners]:
+def _series(frames: Frames, board: Board, place: str, mirrored: bool) -> list[Corners]:
     """Return a view a frame; frames that are not sampled or damaged count as without a board.
 
-    most: frames that are sampled. place: how messages name them. mirrored: whether they are flipped left to right.
+    place: how messages name them. mirrored: whether they are flipped left to right.
     """
     views = []
-    chosen = sampled_frames(frames.count, most)
+    chosen = sampled_frames(frames.count)
     samples = _Samples(every=max(1, len(chosen) // _SAMPLES))
 
     def find(frame: tuple[int, np.ndarray | None]) -> tuple[int, np.ndarray | None, Corners]:
@@ -155,14 +142,14 @@ def _require_no_reason(
         raise BadInput(reason, file=place)
 
 
-def sampled_frames(count: int, most: int = ALL_VIEWS.board_frames) -> set[int]:
-    """Return the frames of a series to search for the board, at most so many.
+def sampled_frames(count: int) -> set[int]:
+    """Return the frames of a series to search for the board.
 
-    All of a short one, runs of neighbours spread over a long one.
+    All of a short one; of a long one runs of neighbours, which determine how the board moved.
     """
-    if count <= most:
+    if count <= _MOST_OF_BOARD:
         return set(range(count))
-    firsts = np.linspace(0, count - _RUN, most // _RUN).astype(int)
+    firsts = np.linspace(0, count - _RUN, _MOST_OF_BOARD // _RUN).astype(int)
     return set((firsts[:, None] + np.arange(_RUN)).ravel().tolist())
 
 
@@ -181,10 +168,8 @@ def rig_view(session: Session, name: str, size_px: tuple[int, int]) -> Corners:
     return find_corners(grey, session.board)
 
 
-def _trial_views(
-    session: Session, name: str, rig_view: Corners, most: int
-) -> tuple[list[Corners], list[str]]:
-    """Find the rig board in some frames spread over the trials, at most so many; return its views, and notes.
+def _trial_views(session: Session, name: str, rig_view: Corners) -> tuple[list[Corners], list[str]]:
+    """Find the rig board in some frames spread over the trials; return its views, and notes.
 
     Trials in which the camera stands elsewhere than in the rig picture are left out, with a note.
     """
@@ -193,8 +178,8 @@ def _trial_views(
     notes: list[str] = []
     if not trials or len(rig_view) == 0:
         return kept, notes
-    each = max(1, most // len(trials))
-    chosen = trials[:: max(1, len(trials) // most)]
+    each = max(1, _MOST_OF_TRIALS // len(trials))
+    chosen = trials[:: max(1, len(trials) // _MOST_OF_TRIALS)]
     for trial in count_parts(chosen, f"trials of camera {name} with the board", len(chosen)):
         views = list(_views_of(trial.camera_sources[name], each, rig_view, session.board))
         shift_px = np.median([_shift_px(view, rig_view) for view in views]) if views else np.inf

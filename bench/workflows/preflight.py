@@ -1,4 +1,4 @@
-"""`whisker-bench check`: all that `evaluate` would refuse or warn of and that is found within seconds.
+"""`whisker-bench check`: all that `evaluate` would refuse or warn of.
 
 Files are read whole; of pictures some are evaluated: those of the board that calibrate the cameras, five of each trial.
 """

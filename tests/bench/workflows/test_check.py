@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 
 from bench.base.input_problems import InputProblems
-from bench.cameras import calibration_check
-from bench.cameras.board_views import ALL_VIEWS
-from bench.cameras.calibration_check import check_calibration
 from bench.session.frame_times import FrameTimes
-from bench.session.session import load_session
 from bench.session.session_check import checked_session
 from bench.workflows.preflight import check, check_cameras, check_contents
 from tests.scenes.faults import FAULTS, TRIAL, change_picture
@@ -122,15 +118,6 @@ def test_boards_that_calibrate_no_cameras(small_copy, fault, expected):
     FAULTS[fault](small_copy)
     (refusal,) = found(small_copy, boards=True).refusals
     assert refusal.startswith(f"boards: {expected}")
-
-
-@pytest.mark.parametrize("of_all", [[], ["a warning"]])
-def test_what_some_pictures_of_a_board_tell_is_asked_of_all(small_session, monkeypatch, of_all):
-    def warnings(session, counts):
-        return of_all if counts.board_frames == ALL_VIEWS.board_frames else ["another"]
-
-    monkeypatch.setattr(calibration_check, "_warnings", warnings)
-    assert check_calibration(load_session(small_session)) == of_all
 
 
 def test_gauge_trials_that_push_in_one_direction(small_copy):
