@@ -17,6 +17,7 @@ from bench.session.session import Session
 from bench.trials.consistency import turn_cause
 from bench.trials.lost import see_units
 from bench.trials.unit import Unit
+from vision import WhiskTruth
 from vision.calibration import (
     Placement,
     by_marker,
@@ -62,32 +63,32 @@ def place_rig(
         return calibration
     if session.measured_rig is not None:
         return _placed_by_file(session, calibration, problems)
-    board = _placement_before(session)
+    before = _placement_before(session)
     chosen = spread([unit for unit in units if unit.trial.camera_sources])
-    strokes_only = session.T_rig_board is None and session.cameras_toml is None
-    stays = session.cameras_toml is not None or not board.covariance.any()
+    has_own_frame = session.T_rig_board is not None or session.cameras_toml is not None
+    may_move = session.cameras_toml is None and before.covariance.any()
     try:
-        if stays:
-            trials = see_units(chosen, pool, "free strokes", problems)
-            placement = _by_strokes_too(board, chosen, trials)
-            placed_here = calibration
-            if session.cameras_toml is None:
-                placed_here = _with_scale(calibration, placement)
-        else:
-            placed_here, placement = _converge(
-                calibration, board, chosen, pool, problems, _by_strokes_too
+        if may_move:
+            placed, placement = _converge(
+                calibration, before, chosen, pool, problems, _by_strokes_too
             )
+        else:
+            trials = see_units(chosen, pool, "free strokes", problems)
+            placement = _by_strokes_too(before, chosen, trials)
+            is_by_board = session.cameras_toml is None
+            placed = _with_scale(calibration, placement) if is_by_board else calibration
     except Refused as refusal:
-        if strokes_only:
+        if not has_own_frame:
             raise _without_rig_frame(refusal) from None
         return _placed_by_board_alone(session, calibration, refusal, problems)
-    is_by_ruler = not stays and session.T_rig_board_sigma_mm >= _BY_RULER_MM
-    if strokes_only or is_by_ruler:
+    if not has_own_frame or (may_move and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
         require_swing(placement, problems)
-    if placement.alarm and not strokes_only:
+    if placement.alarm and has_own_frame:
         problems.warn(_misplaced(placement, session, chosen))
-    notes = placement.notes[:1] if stays or strokes_only else placement.notes
-    return placed_here.with_notes(*notes, *[_STAYS] * stays)
+    if not may_move:
+        return placed.with_notes(placement.notes[0], _STAYS)
+    notes = placement.notes if has_own_frame else placement.notes[:1]
+    return placed.with_notes(*notes)
 
 
 def _misplaced(placement: Placement, session: Session, units: Sequence[Unit]) -> Reason:
@@ -307,22 +308,27 @@ def _by_touches_too(
     trials: what is seen of the units, in the frame from which the placement steps.
     """
     placement = _by_strokes_too(known, units, trials)
+    touches = []
     for unit, seen in zip(units, trials):
         stated = unit.trial
-        if stated.d_x_mm is None or not stated.d_x_sigma_mm:
+        truth = _first_known(seen)
+        if truth is None or stated.d_x_mm is None or not stated.d_x_sigma_mm:
             continue
-        for whisk in seen.whisks:
-            truth = whisk.truth
-            if not np.isfinite(truth.d_x_mm.value):
-                continue
-            sigma_mm = float(np.hypot(stated.d_x_sigma_mm, truth.d_x_mm.sigma))
-            placement = with_distance(placement, truth.point_mm.value, stated.d_x_mm, sigma_mm)
-            touch = f"{stated.name} touching at {stated.d_x_mm:g} ± {sigma_mm:.2g} mm"
-            note = f"{placement.notes[0]} Besides, {touch}."
-            notes = (note, *placement.notes[1:])
-            placement = replace(placement, basis=f"{placement.basis}, {touch}", notes=notes)
-            break  # the whisks of a trial err alike
-    return placement
+        sigma_mm = float(np.hypot(stated.d_x_sigma_mm, truth.d_x_mm.sigma))
+        placement = with_distance(placement, truth.point_mm.value, stated.d_x_mm, sigma_mm)
+        touches.append(f"{stated.name} touching at {stated.d_x_mm:g} ± {sigma_mm:.2g} mm")
+    if not touches:
+        return placement
+    basis = ", ".join([placement.basis, *touches])
+    by_strokes, *others = placement.notes
+    by_both = f"{by_strokes} Measured distances count, too: {', '.join(touches)}."
+    return replace(placement, basis=basis, notes=(by_both, *others))
+
+
+def _first_known(seen: SeenTrial) -> WhiskTruth | None:
+    """Return the first truth of a trial with a distance; the whisks of a trial err alike."""
+    known = (whisk.truth for whisk in seen.whisks if np.isfinite(whisk.truth.d_x_mm.value))
+    return next(known, None)
 
 
 def _placement_by_strokes(trials: Sequence[SeenTrial]) -> Placement:
