@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
@@ -129,11 +130,10 @@ def beside_wires(pieces: Pieces, wires_px: Sequence[np.ndarray]) -> Pieces:
     For a bar that a wire sweeps along, where hardly a piece is clear of it.
     """
     px = pieces.foot_px[:, None] + pieces.offset_px[..., None] * pieces.normal[:, None]
-    is_hidden = np.zeros(pieces.weight.shape, dtype=bool)
-    for line in wires_px:
-        for row, pixels in zip(is_hidden, px):
-            distance = np.linalg.norm(pixels[:, None] - line, axis=-1)
-            row |= np.min(distance, axis=1, initial=np.inf) < _WIRE_PX
+    nodes_px = np.concatenate([np.empty((0, 2)), *wires_px])
+    nodes_px = nodes_px[np.isfinite(nodes_px).all(axis=1)]  # those before the camera
+    distance_px, _ = KDTree(nodes_px).query(px, distance_upper_bound=_WIRE_PX)
+    is_hidden = np.isfinite(distance_px)
     pieces = replace(pieces, weight=np.where(is_hidden, 0.0, pieces.weight))
     return pieces.select(np.mean(pieces.weight > 0, axis=1) > _LEAST_CLEAR_SHARE)
 
