@@ -222,7 +222,7 @@ def _converged(fit: Explanation, question: BarQuestion) -> Explanation:
     """
     unconverged = replace(fit, warning=_unconverged(question, fit))
     try:
-        again = fit.from_place(replace(fit.whisk.bar, axis=fit.axis))
+        again = fit.from_place(SeenBar(fit.axis, {}))
     except Refused:
         return unconverged
     is_worse = _is_better(question, fit.axis, again.axis, _LIKELY_SIGMAS)
