@@ -128,10 +128,9 @@ def against_theta(results: Sequence[TrialResult]) -> list[AtTheta]:
 
 def _errors_percent(row: EstimateRow, truth: Value) -> np.ndarray:
     """Return error, its sigma, and that as if α_est were right (3,), percent of the truth."""
-    error_mm = row.d_x_est_mm.value - truth.value
-    sigma_mm = np.hypot(row.d_x_est_mm.sigma, truth.sigma)
+    error = row.error_percent(truth)
     exact_mm = np.hypot(row.d_x_est_sigma_alpha_exact_mm, truth.sigma)
-    return 100.0 / truth.value * np.array([error_mm, sigma_mm, exact_mm])
+    return np.array([error.value, error.sigma, 100.0 * exact_mm / truth.value])
 
 
 def _pooled(estimator: str, theta_deg: float, percent: Sequence[np.ndarray]) -> AtTheta:

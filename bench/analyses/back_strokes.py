@@ -10,14 +10,14 @@ import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import (
-    angle_cells,
-    as_cell,
     column,
     coverage,
     degrees,
+    estimate_cells,
     grouped,
     rms,
     value_cells,
+    whisk_cells,
 )
 from bench.base.drawing import label_of
 from bench.base.input_problems import in_one_status
@@ -77,14 +77,9 @@ class WayBack:
     answer: EstimateRow
 
     @property
-    def error_mm(self) -> float:
-        """Return estimate less truth."""
-        return self.answer.d_x_est_mm.value - float(self.d_x_mm.value)
-
-    @property
     def error_percent(self) -> float:
         """Return estimate less truth, percent of the truth."""
-        return 100.0 * self.error_mm / float(self.d_x_mm.value)
+        return self.answer.error_percent(self.d_x_mm).value
 
     @property
     def inside(self) -> bool | None:
@@ -110,33 +105,22 @@ class BothWays(Analysis):
         answer = one.answer
         phi_seen_rad = np.nan if seen.at is None else seen.at.phi_rad.value
         return {
-            "trial": one.result.trial.name,
-            "whisk": seen.whisk,
-            "surface": one.result.trial.surface,
-            **angle_cells("touch_deg", seen.touch_rad),
-            **angle_cells("touch_felt_deg", felt.touch_felt_rad),
-            **value_cells("d_x_mm", one.d_x_mm),
-            **angle_cells("beta_deg", seen.beta_rad),
+            **whisk_cells(one.result, seen.whisk),
+            **estimate_cells(answer, one.d_x_mm),
+            **value_cells("touch_deg", seen.touch_rad),
+            **value_cells("touch_felt_deg", felt.touch_felt_rad),
+            **value_cells("beta_deg", seen.beta_rad),
             "phi_seen_deg": degrees(phi_seen_rad),
             "phi_felt_deg": degrees(felt.phi_felt_rad.value),
             "phi_there_deg": degrees(one.felt_there.phi_felt_rad.value),
             "m_y_Nmm": felt.m_y_Nmm.value,
             "m_z_Nmm": felt.m_z_Nmm.value,
-            "estimator": answer.estimator,
-            **value_cells("d_x_est_mm", answer.d_x_est_mm),
-            "d_x_est_low_mm": answer.d_x_est_low_mm,
-            "d_x_est_high_mm": answer.d_x_est_high_mm,
-            "beta_est_deg": degrees(answer.beta_est_rad),
-            "alpha_est_deg": degrees(answer.alpha_est_rad),
-            "error_mm": one.error_mm,
-            "error_percent": one.error_percent,
-            "inside": as_cell(one.inside),
             "status": in_one_status(seen.status, felt.status, answer.status),
         }
 
     def lines(self, found: Sequence[WayBack]) -> Iterator[str]:
         """Yield a line an estimator, over the ways back whose truth is known."""
-        known = [one for one in found if np.isfinite(one.error_mm)]
+        known = [one for one in found if np.isfinite(one.error_percent)]
         for name, mine in grouped(known, lambda one: one.answer.estimator).items():
             error_percent = rms(column(mine, "error_percent"))
             held = coverage(mine, "way")

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
+from bench.analyses.pooling import whisk_cells
 from bench.base.tables import TRIAL, WHISK, Column, Kind, Table, shared_name, sigma_name, with_sigma
 from bench.gauges.gauge_readings import frames_with_moments, loads_from_pictures
 from bench.records.trial_result import Deflection, FeltWhisk, SeenWhisk, TrialResult, whisks
@@ -193,8 +194,7 @@ def _frame_rows(one: WhiskLoads) -> Iterator[dict]:
     frames = one.seen.truth.frames
     for k, row in enumerate(loads.rows):
         cells = {
-            "trial": one.result.trial.name,
-            "whisk": one.seen.whisk,
+            **whisk_cells(one.result, one.seen.whisk),
             "frame": int(frames.index[row]),
             "time_s": float(frames.time_s[row]),
             "theta_deg": float(np.degrees(frames.theta_rad.value[row])),
@@ -225,8 +225,7 @@ def felt_beside(one: WhiskLoads) -> dict | None:
     felt_moment = _felt_along(felt, along)
     sigma = float(np.hypot(seen_sigma, felt_moment.sigma))
     return {
-        "trial": one.result.trial.name,
-        "whisk": one.seen.whisk,
+        **whisk_cells(one.result, one.seen.whisk),
         "theta_deg": one.result.theta_deg,
         "m_seen_Nmm": size,
         "m_seen_sigma_Nmm": seen_sigma,

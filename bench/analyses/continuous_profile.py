@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, Scored, TrueRun
-from bench.analyses.pooling import column, degrees, grouped, rms, sound_measured_whisks, value_cells
+from bench.analyses.pooling import (
+    column,
+    degrees,
+    grouped,
+    rms,
+    sound_measured_whisks,
+    value_cells,
+    whisk_cells,
+)
 from bench.base.drawing import blank
 from bench.base.tables import TRIAL, WHISK, Table, alike, status, with_sigma
 from bench.records.trial_result import FeltAt, FeltWhisk, SeenWhisk, TrialResult
@@ -79,8 +87,7 @@ class ContinuousProfile(Analysis):
     def row(self, one: ProfilePoint) -> dict:
         """Return the row of a point."""
         cells = {
-            "trial": one.result.trial.name,
-            "whisk": one.whisk,
+            **whisk_cells(one.result, one.whisk),
             "theta_deg": degrees(one.theta_rad),
             "motor_deg": degrees(one.motor_rad),
             "status": one.status,

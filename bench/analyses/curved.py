@@ -13,12 +13,7 @@ import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.gave import OBJECT
-from bench.analyses.pooling import (
-    angle_cells,
-    column,
-    sound_measured_whisks,
-    value_cells,
-)
+from bench.analyses.pooling import column, sound_measured_whisks, value_cells, whisk_cells
 from bench.base.combined import Combined, Measurement, Measurements, holm
 from bench.base.settings import TILT_SIGMA_RAD
 from bench.base.statuses import reason
@@ -126,12 +121,11 @@ class Curvature(Analysis):
         """Return the row of a whisk."""
         by_whisk = one.curved
         return {
-            "trial": one.result.trial.name,
-            "whisk": one.felt.whisk,
+            **whisk_cells(one.result, one.felt.whisk),
             "angles": by_whisk.angles,
             **value_cells("radius_mm", by_whisk.radius_mm),
             "bar_radius_mm": one.bar_radius_mm,
-            **angle_cells("phi_0_deg", by_whisk.phi_0_rad),
+            **value_cells("phi_0_deg", by_whisk.phi_0_rad),
             "lateral_per_mm": by_whisk.lateral_per_mm.value,
             "lateral_sigma_per_mm": by_whisk.lateral_per_mm.sigma,
             "lateral_printed_per_mm": by_whisk.lateral_printed_per_mm,

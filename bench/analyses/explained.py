@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun
-from bench.analyses.pooling import angle_cells, known_rows
+from bench.analyses.pooling import known_rows, value_cells
 from bench.analyses.runs import FITTED
 from bench.base.drawing import blank
 from bench.base.tables import TRIAL, WHISK, Column, Table, with_sigma
@@ -130,7 +130,7 @@ def explained_rows(results: Iterable[TrialResult], whisker: Whisker) -> Iterator
         yield {
             "trial": result.trial.name,
             "whisk": seen.whisk,
-            **angle_cells("alpha_seen_deg", seen.friction_rad),
+            **value_cells("alpha_seen_deg", seen.friction_rad),
             **shares,
         }
 

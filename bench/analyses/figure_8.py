@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun
-from bench.analyses.pooling import angle_cells, column, degrees
+from bench.analyses.pooling import column, degrees, value_cells
 from bench.analyses.surfaces import FittedSurface, SlopePoint
 from bench.base.drawing import SLOPES_DEG, add_legend, blank, colour_of, whisk_url
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma
@@ -119,7 +119,7 @@ def rows(fitted: Sequence[FittedSurface]) -> Iterator[dict]:
                 "speed_deg_s": surface.speed_deg_s,
                 "theta_deg": degrees(surface.theta_rad),
                 "d_x_mm": surface.common_d_x_mm,
-                **angle_cells("alpha_deg", alpha),
+                **value_cells("alpha_deg", alpha),
                 "beta_deg": point.beta_deg,
                 "whisks": point.whisks,
                 "m_EI_per_metre": moment_in_EI_per_metre(point.m_Nmm, EI),

@@ -17,7 +17,7 @@ from bench.analyses.analysis import (
     read_rows,
 )
 from bench.analyses.page_cells import cell_with_sigma, panel_cell
-from bench.analyses.pooling import angle_cells, column, degrees, measured
+from bench.analyses.pooling import column, degrees, measured, value_cells
 from bench.analyses.section_vii import (
     Way,
     by_consistency,
@@ -325,7 +325,7 @@ def _phase_rows(whisks: Iterable[WhiskAlphas]) -> Iterator[dict]:
                     "record": record,
                     "kind": angle.kind,
                     "theta_deg": degrees(angle.theta_rad),
-                    **angle_cells("alpha_deg", Value(angle.alpha_rad, angle.sigma_rad)),
+                    **value_cells("alpha_deg", Value(angle.alpha_rad, angle.sigma_rad)),
                 }
 
 
@@ -347,7 +347,7 @@ def _surface_row(one: SurfaceFriction) -> dict:
 
 def _alpha_cells(name: str, alpha: tuple[float, float]) -> dict:
     """Return the cells of a friction angle (value, sigma) in rad."""
-    return angle_cells(f"alpha_{name}_deg", Value(*alpha))
+    return value_cells(f"alpha_{name}_deg", Value(*alpha))
 
 
 def _stick_slip_lines(one: SurfaceFriction) -> Iterator[str]:

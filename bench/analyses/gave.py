@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import grouped, panel_title
+from bench.analyses.pooling import grouped, panel_title, whisk_cells
 from bench.base.combined import Measurement, Measurements
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
@@ -73,9 +73,7 @@ def _rows(results: Sequence[TrialResult]) -> Iterator[dict]:
             continue
         for k, frame in enumerate(gave.index):
             yield {
-                "trial": result.trial.name,
-                "whisk": seen.whisk,
-                "surface": result.trial.surface,
+                **whisk_cells(result, seen.whisk),
                 "frame": int(frame),
                 "theta_deg": float(np.degrees(gave.theta_rad[k])),
                 "gave_mm": float(gave.normal_mm.value[k]),

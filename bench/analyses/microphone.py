@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, Scored, TrueRun
-from bench.analyses.pooling import angle_cells, grouped, sound_measured_whisks, value_cells
+from bench.analyses.pooling import grouped, sound_measured_whisks, value_cells, whisk_cells
 from bench.base.tables import SPEED, TRIAL, WHISK, Column, Table, status, with_sigma
 from bench.records.trial_result import SeenWhisk, TrialResult
 from bench.session.session import Session
@@ -64,10 +64,8 @@ class Microphone(Analysis):
     def row(self, one: Heard) -> dict:
         """Return the row of a whisk."""
         return {
-            "trial": one.result.trial.name,
-            "whisk": one.whisk,
-            "speed_deg_s": one.result.trial.speed_deg_s,
-            **angle_cells("touch_heard_deg", one.touch_rad),
+            **whisk_cells(one.result, one.whisk),
+            **value_cells("touch_heard_deg", one.touch_rad),
             **value_cells("delay_s", one.delay_s),
             "signal_to_noise": one.heard.signal_to_noise,
             "status": one.heard.status,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import as_cell, column, coverage, degrees, grouped, rms, value_cells
+from bench.analyses.pooling import column, coverage, degrees, estimate_cells, grouped, rms
 from bench.base.drawing import add_legend, blank, colour_of, label_of
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, status, with_sigma
 from bench.gauges.felt import motor_speed
@@ -74,7 +74,7 @@ class Moved:
     @property
     def error_percent(self) -> float:
         """Return estimate less truth, percent of the truth."""
-        return 100.0 * (self.answer.d_x_est_mm.value / self.seen.d_x_mm.value - 1.0)
+        return self.answer.error_percent(self.seen.d_x_mm).value
 
     @property
     def inside(self) -> bool | None:
@@ -114,15 +114,10 @@ class MovingObjects(Analysis):
             "trial": trial.name,
             "whisk": seen.whisk,
             "surface": trial.surface,
+            **estimate_cells(answer, seen.d_x_mm),
             "beta_deg": degrees(seen.beta_rad.value),
             "velocity_share_percent": one.share_percent,
             "velocity_sigma_mm_s": trial.object_velocity_sigma_mm_s,
-            "estimator": answer.estimator,
-            **value_cells("d_x_mm", seen.d_x_mm),
-            **value_cells("d_x_est_mm", answer.d_x_est_mm),
-            "error_mm": answer.d_x_est_mm.value - seen.d_x_mm.value,
-            "error_percent": one.error_percent,
-            "inside": as_cell(one.inside),
             "status": answer.status,
         }
         for k, axis in enumerate(_AXES):

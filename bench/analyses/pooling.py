@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from bench.base.tables import sigma_name
-from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.trials.estimate_errors import is_sound
 from vision import Value
 from vision.geometry import counted
@@ -81,13 +81,36 @@ def known_rows(rows: Iterable[Iterable[float]], columns: int) -> tuple[np.ndarra
 
 
 def value_cells(column: str, value: Value) -> dict[str, float]:
-    """Return the cells of a number and of its standard deviation."""
-    return {column: float(value.value), sigma_name(column): float(value.sigma)}
+    """Return the cells of a value and of its standard deviation; of an angle, in rad, the degrees."""
+    in_unit = degrees if column.endswith("_deg") else float
+    return {column: in_unit(value.value), sigma_name(column): in_unit(value.sigma)}
 
 
-def angle_cells(column: str, angle: Value) -> dict[str, float]:
-    """Return the cells, in degrees, of an angle in rad and of its standard deviation."""
-    return value_cells(column, Value(np.degrees(angle.value), np.degrees(angle.sigma)))
+def whisk_cells(result: TrialResult, whisk: int) -> dict:
+    """Return the cells by which tables name a whisk; a table takes those that it has columns for."""
+    trial = result.trial
+    return {
+        "trial": trial.name,
+        "whisk": whisk,
+        "surface": trial.surface,
+        "speed_deg_s": trial.speed_deg_s,
+    }
+
+
+def estimate_cells(estimate: EstimateRow, truth: Value) -> dict:
+    """Return the cells of an estimate, of the true distance and of their difference."""
+    return {
+        "estimator": estimate.estimator,
+        "alpha_est_deg": degrees(estimate.alpha_est_rad),
+        "beta_est_deg": degrees(estimate.beta_est_rad),
+        **value_cells("d_x_est_mm", estimate.d_x_est_mm),
+        "d_x_est_low_mm": estimate.d_x_est_low_mm,
+        "d_x_est_high_mm": estimate.d_x_est_high_mm,
+        **value_cells("d_x_mm", truth),
+        "error_mm": estimate.error_mm(truth).value,
+        "error_percent": estimate.error_percent(truth).value,
+        "inside": as_cell(estimate.holds(truth.value)),
+    }
 
 
 def degrees(angle_rad: float) -> float:

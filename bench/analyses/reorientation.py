@@ -14,6 +14,7 @@ from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.pooling import (
     as_cell,
     degrees,
+    estimate_cells,
     grouped,
     rms,
     sound_measured_whisks,
@@ -79,14 +80,6 @@ class Rotation:
     answer: EstimateRow
     one_push: EstimateRow
 
-    def error_mm(self, answer: EstimateRow) -> float:
-        """Return an estimate less the truth."""
-        return answer.d_x_est_mm.value - float(self.d_x_mm.value)
-
-    def error_percent(self, answer: EstimateRow) -> float:
-        """Return an estimate less the truth, percent of the truth."""
-        return 100.0 * self.error_mm(answer) / float(self.d_x_mm.value)
-
 
 class Reorientation(Analysis):
     """What is known of a contact after each rotation, its plane turned so that it slips less."""
@@ -104,32 +97,25 @@ class Reorientation(Analysis):
         """Return the row of a rotation."""
         answer = one.answer
         return {
-            "contact": one.contact,
             "trial": one.result.trial.name,
             "surface": one.result.trial.surface,
+            **estimate_cells(answer, one.d_x_mm),
+            "contact": one.contact,
             "rotation": one.rotation,
             "plane_turn_deg": one.plane_turn_deg,
-            "phi_felt_deg": degrees(one.phi_felt_rad.value),
-            "phi_felt_sigma_deg": degrees(one.phi_felt_rad.sigma),
+            **value_cells("phi_felt_deg", one.phi_felt_rad),
             "next_turn_deg": degrees(one.next_turn_rad),
-            **value_cells("d_x_est_mm", answer.d_x_est_mm),
-            "d_x_est_low_mm": answer.d_x_est_low_mm,
-            "d_x_est_high_mm": answer.d_x_est_high_mm,
-            **value_cells("d_x_mm", one.d_x_mm),
-            "error_mm": one.error_mm(answer),
-            "error_percent": one.error_percent(answer),
-            "inside": as_cell(answer.holds(one.d_x_mm.value)),
-            "error_with_friction_mm": one.error_mm(one.one_push),
+            "error_with_friction_mm": one.one_push.error_mm(one.d_x_mm).value,
             "inside_with_friction": as_cell(one.one_push.holds(one.d_x_mm.value)),
             "status": answer.status,
         }
 
     def lines(self, found: Sequence[Rotation]) -> Iterator[str]:
         """Yield a line a number of rotations, over the contacts whose distance is known."""
-        known = [one for one in found if np.isfinite(one.error_mm(one.answer))]
+        known = [one for one in found if np.isfinite(one.answer.error_mm(one.d_x_mm).value)]
         for rotation, mine in sorted(grouped(known, lambda one: one.rotation).items()):
-            by_2 = rms(one.error_percent(one.answer) for one in mine)
-            by_10 = rms(one.error_percent(one.one_push) for one in mine)
+            by_2 = rms(one.answer.error_percent(one.d_x_mm).value for one in mine)
+            by_10 = rms(one.one_push.error_percent(one.d_x_mm).value for one in mine)
             held = sum(bool(one.answer.holds(one.d_x_mm.value)) for one in mine)
             settled = sum(one.next_turn_rad == 0.0 for one in mine)
             yield (

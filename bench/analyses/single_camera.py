@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import angle_cells, as_cell, column, coverage, grouped, rms, value_cells
+from bench.analyses.pooling import as_cell, column, coverage, grouped, rms, value_cells, whisk_cells
 from bench.base.input_problems import in_one_status
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, status, with_sigma
 from bench.records.trial_result import ByOneCamera, SeenWhisk, TrialResult, whisks
@@ -113,12 +113,10 @@ class OneCamera(Analysis):
         seen = one.seen
         by_one = one.by_one
         return {
-            "trial": one.result.trial.name,
-            "whisk": seen.whisk,
-            "surface": one.result.trial.surface,
+            **whisk_cells(one.result, seen.whisk),
             "camera": by_one.camera,
-            **angle_cells("touch_deg", seen.touch_rad),
-            **angle_cells("touch_est_deg", by_one.touch_rad),
+            **value_cells("touch_deg", seen.touch_rad),
+            **value_cells("touch_est_deg", by_one.touch_rad),
             **value_cells("d_x_mm", seen.d_x_mm),
             **value_cells("d_x_est_mm", by_one.d_x_mm),
             "error_mm": one.error_mm,

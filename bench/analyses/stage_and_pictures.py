@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import angle_cells, value_cells
+from bench.analyses.pooling import value_cells
 from bench.base.tables import TRIAL, WHISK, Column, Table, status, with_sigma
 from bench.records.trial_result import PicturedContact, SeenWhisk, whisks
 from vision import Value
@@ -75,8 +75,8 @@ class StageAndPictures(Analysis):
             **value_cells("d_x_pictures_mm", one.pictured.d_x_mm),
             **value_cells("d_x_difference_mm", one.difference_mm),
             "z": one.z,
-            **angle_cells("beta_stage_deg", one.seen.beta_rad),
-            **angle_cells("beta_pictures_deg", one.pictured.beta_rad),
+            **value_cells("beta_stage_deg", one.seen.beta_rad),
+            **value_cells("beta_pictures_deg", one.pictured.beta_rad),
             "status": one.seen.status,
         }
 

@@ -180,10 +180,8 @@ def _pooled(
 
 def _error_percent(row: EstimateRow, truth: Value) -> tuple[float, float, float]:
     """Return error and its stated sigma, percent of the truth; 100 where the interval holds it."""
-    error_mm = row.d_x_est_mm.value - truth.value
-    sigma_mm = np.hypot(row.d_x_est_mm.sigma, truth.sigma)
-    inside = 100.0 * bool(row.holds(truth.value))
-    return 100.0 * (error_mm / truth.value), 100.0 * (sigma_mm / truth.value), inside
+    error = row.error_percent(truth)
+    return error.value, error.sigma, 100.0 * bool(row.holds(truth.value))
 
 
 def _alphas_deg(friction: Iterable[SurfaceFriction]) -> dict[str, float]:

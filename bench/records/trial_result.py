@@ -293,6 +293,18 @@ class EstimateRow:
     slip_est_mm: Value = UNKNOWN
     touch_covariance_mm_rad: float = NAN
 
+    def error_mm(self, truth: Value) -> Value:
+        """Return the estimate less a true distance, with the sigma of both together."""
+        estimate = self.d_x_est_mm
+        sigma = math.hypot(estimate.sigma, truth.sigma)
+        return Value(estimate.value - float(truth.value), sigma)
+
+    def error_percent(self, truth: Value) -> Value:
+        """Return the error in per cent of the true distance."""
+        error = self.error_mm(truth)
+        true_mm = float(truth.value)
+        return Value(100.0 * error.value / true_mm, 100.0 * error.sigma / true_mm)
+
     def holds(self, d_x_mm: float) -> bool | None:
         """Return whether the 95 % interval contains a distance; None where either is unknown."""
         low, high = self.d_x_est_low_mm, self.d_x_est_high_mm

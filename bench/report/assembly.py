@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.pooling import angle_cells, degrees, value_cells
+from bench.analyses.pooling import degrees, estimate_cells, value_cells, whisk_cells
 from bench.base.input_problems import in_one_status
 from bench.base.tables import shared_name
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
@@ -55,14 +55,13 @@ def write_tables(out: Path, results: Sequence[TrialResult]) -> None:
 def whisk_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
     """Yield a row a whisk, by column."""
     for result, seen, felt in whisks(results):
-        row = _whisk_cells(result, seen)
+        row = whisk_cells(result, seen.whisk)
         row["theta_deg"] = result.theta_deg
         row["status"] = status_of(seen, felt)
-        for name in ("surface", "speed_deg_s", "beta_nominal_deg"):
-            row[name] = getattr(result.trial, name)
+        row["beta_nominal_deg"] = result.trial.beta_nominal_deg
         for source, fields in ((seen, _SEEN), (felt, _FELT), (seen.at, _AT_ANGLE)):
             for column, field in fields.items():
-                row |= _cells(column, getattr(source, field, UNKNOWN))
+                row |= value_cells(column, getattr(source, field, UNKNOWN))
         row |= _point_cells(seen.point_mm) | _shared_cells(seen)
         row["cameras"] = seen.truth.cameras
         row["frames_used"] = seen.truth.frames_used
@@ -77,7 +76,7 @@ def budget_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
     for result, seen, _ in whisks(results):
         if not (seen.has_truth and seen.truth.budget):
             continue
-        row = _whisk_cells(result, seen)
+        row = whisk_cells(result, seen.whisk)
         row["d_x_sigma_mm"] = seen.d_x_mm.sigma
         for cause in CAUSES:
             row[f"{cause}_percent"] = 100.0 * seen.truth.budget.get(cause, NAN)
@@ -93,7 +92,7 @@ def beam_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
         beam = seen.truth.beam
         if not (seen.has_truth and beam):
             continue
-        row = _whisk_cells(result, seen)
+        row = whisk_cells(result, seen.whisk)
         row["chance"] = beam.chance
         row["theta_deg"] = degrees(beam.theta_rad)
         for quantity, unit in BEAM_UNITS.items():
@@ -107,16 +106,6 @@ def beam_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
 def status_of(seen: SeenWhisk, felt: FeltWhisk) -> Reason:
     """Return all warnings of a whisk, seen and felt, each once."""
     return in_one_status(seen.status, felt.status)
-
-
-def _whisk_cells(result: TrialResult, seen: SeenWhisk) -> dict:
-    """Return the cells that name a whisk."""
-    return {"trial": result.trial.name, "whisk": seen.whisk}
-
-
-def _cells(column: str, value: Value) -> dict[str, float]:
-    """Return the cells of a value and of its sigma, in the unit of the column."""
-    return angle_cells(column, value) if column.endswith("_deg") else value_cells(column, value)
 
 
 def _point_cells(point_mm: Value) -> dict[str, float]:
@@ -145,24 +134,16 @@ def _shared_cells(seen: SeenWhisk) -> dict[str, float]:
 def estimate_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
     """Yield a row a whisk and estimator, by column; errors are empty where there is no truth."""
     for result, seen, felt in whisks(results):
-        true_mm = seen.d_x_mm.value
         for estimate in (*felt.estimates, *felt.sensors):
-            error_mm = estimate.d_x_est_mm.value - true_mm
-            row = _whisk_cells(result, seen) | {
-                "estimator": estimate.estimator,
-                "alpha_est_deg": degrees(estimate.alpha_est_rad),
+            yield {
+                **whisk_cells(result, seen.whisk),
+                **estimate_cells(estimate, seen.d_x_mm),
+                **_contact_cells(seen, felt, estimate),
                 "d_x_est_sigma_alpha_exact_mm": estimate.d_x_est_sigma_alpha_exact_mm,
-                "d_x_est_low_mm": estimate.d_x_est_low_mm,
-                "d_x_est_high_mm": estimate.d_x_est_high_mm,
-                "beta_est_deg": degrees(estimate.beta_est_rad),
-                "error_mm": error_mm,
-                "error_percent": 100.0 * error_mm / true_mm,
                 "truth_source": seen.truth_source,
                 "angle_from": result.trial.angle_from,
                 "status": estimate.status,
             }
-            row |= _cells("d_x_est_mm", estimate.d_x_est_mm)
-            yield row | _contact_cells(seen, felt, estimate)
 
 
 def _contact_cells(seen: SeenWhisk, felt: FeltWhisk, estimate: EstimateRow) -> dict[str, float]:
@@ -171,14 +152,14 @@ def _contact_cells(seen: SeenWhisk, felt: FeltWhisk, estimate: EstimateRow) -> d
     They have its distance from the contact seen, and the errors of deflection and slip.
     """
     touch = felt.touch_felt_rad
-    cells = _cells("theta_c_deg", touch) | _cells("z_c_mm", Z_C_MM)
+    cells = value_cells("theta_c_deg", touch) | value_cells("z_c_mm", Z_C_MM)
     scale = estimate.d_x_est_mm.sigma * touch.sigma
     cells["r_theta_correlation"] = estimate.touch_covariance_mm_rad / scale
     cells["point_error_mm"] = point_error_mm(seen, felt, estimate)
     for quantity in ("d_y", "d_z", "slip"):
         found = getattr(estimate, f"{quantity}_est_mm")
         truth = getattr(seen.at, f"{quantity}_mm", UNKNOWN)
-        cells |= _cells(f"{quantity}_est_mm", found)
+        cells |= value_cells(f"{quantity}_est_mm", found)
         cells[f"{quantity}_error_mm"] = found.value - truth.value
     return cells
 

@@ -10,14 +10,7 @@ from bench.gauges.felt import lateness
 from bench.records.trial_result import BY_STAGE, EstimateRow, SeenWhisk
 from bench.report.assembly import status_of
 from bench.report.page.thumbnails import picture_source
-from bench.report.page.words import (
-    MISSING,
-    WhiskRow,
-    distance_text,
-    number,
-    value_text,
-    with_sigma,
-)
+from bench.report.page.words import MISSING, WhiskRow, distance_text, number, value_text, with_sigma
 from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
 from vision import UNKNOWN, BeamCheck, TruthAtAngle, Value
@@ -171,22 +164,16 @@ def _estimate(row: WhiskRow, estimate: EstimateRow) -> tuple[str, ...]:
     interval = MISSING
     if math.isfinite(low) and math.isfinite(high):
         interval = f"{number(low, 1)} to {number(high, 1)}"
-    error = _less_truth(estimate, truth)
-    percent = 100.0 / truth.value
+    error = estimate.error_mm(truth)
+    percent = estimate.error_percent(truth)
     return (
         label_of(estimate.estimator),
         value_text(estimate.d_x_est_mm),
         interval,
         with_sigma(error.value, error.sigma, sign=True),
-        with_sigma(percent * error.value, percent * error.sigma, sign=True),
+        with_sigma(percent.value, percent.sigma, sign=True),
         estimate.status,
     )
-
-
-def _less_truth(estimate: EstimateRow, truth: Value) -> Value:
-    """Return estimate less truth, mm."""
-    sigma = math.hypot(estimate.d_x_est_mm.sigma, truth.sigma)
-    return Value(estimate.d_x_est_mm.value - truth.value, sigma)
 
 
 def columns(estimators: list[str]) -> list[Cell]:
@@ -238,11 +225,10 @@ def _error(row: WhiskRow, estimator: str) -> Cell:
     """Return the error of one estimator, per cent of the true distance."""
     truth = row.seen.d_x_mm
     for estimate in row.felt.estimates:
-        error = _less_truth(estimate, truth)
-        if estimate.estimator == estimator and math.isfinite(error.value):
-            percent = 100.0 / truth.value
-            text = with_sigma(percent * error.value, percent * error.sigma, sign=True)
-            return Cell(text, percent * error.value)
+        percent = estimate.error_percent(truth)
+        if estimate.estimator == estimator and math.isfinite(percent.value):
+            text = with_sigma(percent.value, percent.sigma, sign=True)
+            return Cell(text, percent.value)
     return Cell(MISSING, math.nan)
 
 

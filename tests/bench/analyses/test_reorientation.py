@@ -39,9 +39,9 @@ def test_trials_of_a_contact_are_its_rotations(found):
 
 def test_the_second_is_right_and_the_first_says_that_it_slips(found, tmp_path):
     first, second = found
-    assert abs(first.error_percent(first.answer)) > 10 and first.answer.status
+    assert abs(first.answer.error_percent(first.d_x_mm).value) > 10 and first.answer.status
     sigma_mm = second.answer.d_x_est_mm.sigma
-    assert second.error_mm(second.answer) == pytest.approx(0.0, abs=2 * sigma_mm)
+    assert second.answer.error_mm(second.d_x_mm).value == pytest.approx(0.0, abs=2 * sigma_mm)
     assert first.next_turn_rad > 0 and second.next_turn_rad == 0
     Reorientation().write(tmp_path, found)
     rows = list(csv.DictReader((tmp_path / REORIENTATION.file).read_text().splitlines()))
