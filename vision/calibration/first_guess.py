@@ -13,7 +13,7 @@ import numpy as np
 from vision.boards.corners import Corners
 from vision.geometry import lens as lens_model
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import apply, compose, invert_transform, log_rotation
+from vision.geometry.rotation import angle_between, apply, compose, invert_transform
 
 # [picture widths] 150° to 3° across: where a camera on a bench lies. Derived.
 _FOCAL_LIMITS = (0.15, 20.0)
@@ -166,12 +166,19 @@ def relative_poses(
 def most_central(transforms: Sequence[np.ndarray]) -> np.ndarray:
     """Return the transform that is nearest to the others: a mirrored pose is far from all of them.
 
-    Distances are angles, and shifts over the median distance.
+    transforms: (3, 4) each.
     """
-    stacked = np.array(transforms)  # (n, 3, 4)
-    turns = stacked[:, :, :3]
-    shifts = stacked[:, :, 3]
-    angle = np.linalg.norm(log_rotation(turns[:, None] @ turns.swapaxes(1, 2)), axis=2)
-    size = max(np.median(np.linalg.norm(shifts, axis=1)), 1e-9)
-    distance = angle + np.linalg.norm(shifts[:, None] - shifts, axis=2) / size
+    stacked = np.array(transforms)
+    distance = transform_distances(stacked, stacked)
     return transforms[int(np.argmin(np.median(distance, axis=1)))]
+
+
+def transform_distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return how far transforms a (n, 3, 4) are from transforms b (m, 3, 4), (n, m).
+
+    It is the angle between both, rad, and the difference of their shifts over the median shift of b.
+    """
+    angle = angle_between(a[:, None, :, :3], b[:, :, :3])
+    shift_mm = np.linalg.norm(a[:, None, :, 3] - b[:, :, 3], axis=-1)
+    usual_mm = max(float(np.median(np.linalg.norm(b[:, :, 3], axis=-1))), 1e-9)
+    return angle + shift_mm / usual_mm

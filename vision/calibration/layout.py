@@ -22,7 +22,7 @@ from vision.calibration.first_guess import (
 )
 from vision.geometry.board import Board
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import compose, invert_transform, log_rotation
+from vision.geometry.rotation import angle_between, compose, invert_transform
 
 # [rad] Views that have nothing to do with each other agree as loosely as this and the next once
 # in a hundred. Derived.
@@ -98,7 +98,7 @@ def _share_in_agreement(relative: np.ndarray, distance_mm: float) -> float:
     distance_mm: of the boards, to which shifts are compared.
     """
     centre = most_central(relative)
-    turn = np.linalg.norm(log_rotation(relative[:, :, :3] @ centre[:, :3].T), axis=1)
+    turn = angle_between(relative[:, :, :3], centre[:, :3])
     shift_mm = np.linalg.norm(relative[:, :, 3] - centre[:, 3], axis=1)
     return float(np.mean((turn < _SAME_TURN_RAD) & (shift_mm < _SAME_SHIFT * distance_mm)))
 

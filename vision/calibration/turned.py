@@ -14,12 +14,12 @@ import numpy as np
 
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import MIN_VIEWS, fixes_pose, without_strays
-from vision.calibration.first_guess import board_pose, first_lens, has_pose
+from vision.calibration.first_guess import board_pose, first_lens, has_pose, transform_distances
 from vision.calibration.one_picture import calibrate_alone
 from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import compose, invert_transform, log_rotation
+from vision.geometry.rotation import compose, invert_transform
 
 # [rad] Median over the views by which a place of one camera before another may differ between views
 # of one instant: half of what `layout` takes for one instant. Stated.
@@ -142,7 +142,7 @@ def _choose(first: _Sight, other: _Sight, name: str) -> tuple[np.ndarray, dict[i
         return None
     candidates = _candidates(first, other, shared)  # (views, turns, 3, 4)
     flat = candidates.reshape(-1, 3, 4)
-    distance = _distances(flat, flat).reshape(len(flat), *candidates.shape[:2])
+    distance = transform_distances(flat, flat).reshape(len(flat), *candidates.shape[:2])
     score = np.median(distance.min(axis=2), axis=1)  # (views * turns,)
     best = int(np.argmin(score))
     if score[best] > _SAME:
@@ -152,21 +152,9 @@ def _choose(first: _Sight, other: _Sight, name: str) -> tuple[np.ndarray, dict[i
     return flat[best], turn_of
 
 
-def _distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return how transforms a (n, 3, 4) and b (m, 3, 4) differ, (n, m): angle, and shift over its
-    size.
-    """
-    angle = np.linalg.norm(
-        log_rotation(a[:, None, :, :3] @ b[None, :, :, :3].swapaxes(-1, -2)), axis=-1
-    )
-    shift = np.linalg.norm(a[:, None, :, 3] - b[None, :, :, 3], axis=-1)
-    size = max(float(np.median(np.linalg.norm(b[:, :, 3], axis=-1))), 1e-9)
-    return angle + shift / size
-
-
 def _nearest(first: np.ndarray | None, other: np.ndarray | None, T_other_first: np.ndarray) -> int:
     """Return the turn by which another camera's board on the rig stands as the first one's does."""
     if first is None or other is None:
         return 0
     expected = compose(T_other_first, first[0])
-    return int(_distances(expected[None], other)[0].argmin())
+    return int(transform_distances(expected[None], other)[0].argmin())

@@ -63,6 +63,11 @@ def log_rotation(R: np.ndarray) -> np.ndarray:
     return w
 
 
+def angle_between(R: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the angles (...), rad, by which rotations (..., 3, 3) differ."""
+    return np.linalg.norm(log_rotation(R @ np.swapaxes(other, -1, -2)), axis=-1)
+
+
 def left_jacobian(w: np.ndarray) -> np.ndarray:
     """Return J (..., 3, 3) with Exp(w + d) = Exp(J d) Exp(w) to first order in d, at w (..., 3)."""
     angle = np.linalg.norm(w, axis=-1)[..., None, None]
