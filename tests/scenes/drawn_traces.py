@@ -9,7 +9,7 @@ from bench.rig.parts import Job
 from bench.rig.protocol import load
 from bench.rig.recording import Recording
 from vision.geometry.camera import Camera
-from vision.geometry.silhouette import normals
+from vision.geometry.polyline import normals
 
 STEP_PX = 4.0
 """Between a tracker's points."""

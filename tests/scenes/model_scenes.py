@@ -8,9 +8,10 @@ from vision.fit.problem import Problem, State, bar_axes, bar_axis, curves_of, sh
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import Curves, rotation_z
 from vision.geometry.contact import BarAxis, clearance
+from vision.geometry.polyline import normals
 from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.rounded import RoundedAxis
-from vision.geometry.silhouette import normals, outline
+from vision.geometry.silhouette import outline
 from vision.wire.points import LinePoints, Observed
 
 WIRE = Wire("cylinder", 100.0, 1.0)

@@ -16,7 +16,7 @@ from vision.calibration.place import FALSE_ALARM, Placement
 from vision.geometry.base_lines import BaseLines
 from vision.geometry.camera import symmetric_root
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import exp_rotation
+from vision.geometry.rotation import exp_rotation, unit
 
 # [frames] Six unknowns, four numbers a frame, and something left over. Derived.
 _MIN_FRAMES = 4
@@ -165,8 +165,7 @@ def _across(along: np.ndarray) -> np.ndarray:
     """Return two unit vectors across each direction (n, 3), as rows (n, 2, 3). Whiskers are not
     along z.
     """
-    first = np.cross([0.0, 0.0, 1.0], along)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    first = unit(np.cross([0.0, 0.0, 1.0], along))
     return np.stack([first, np.cross(along, first)], axis=1)
 
 

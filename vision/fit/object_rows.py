@@ -128,7 +128,7 @@ class BarRows(ObjectRows):
         problem = self.problem
         axis = bar_axis(problem, vector)
         direction = axis.direction[..., None, :]
-        middle_mm = axis.point_mm[..., None, :] + seen.points.place[:, None] * direction
+        middle_mm = axis.points_at(seen.points.place)
         if problem.motion is not None:
             middle_mm = middle_mm + shifts_mm(problem, vector)[..., seen.bar_in, :]
         wider_mm = vector[..., problem.blocks.reach.slice] * (seen.side != 0)  # (…, n)
@@ -143,8 +143,7 @@ class BarRows(ObjectRows):
         problem = self.problem
         axis = bar_axis(problem, vector)
         camera = self.camera(seen.camera)
-        middle_mm = axis.point_mm + seen.points.place[:, None] * axis.direction
-        middle_mm = middle_mm + shifts_mm(problem, vector)[seen.bar_in]
+        middle_mm = axis.points_at(seen.points.place) + shifts_mm(problem, vector)[seen.bar_in]
         both_mm = grazed(camera, middle_mm, axis.direction, problem.rods.bar.radius_mm)
         if not seen.side:
             return list(both_mm)

@@ -13,7 +13,7 @@ import numpy as np
 from vision.geometry import lens as lens_model
 from vision.geometry.checks import require
 from vision.geometry.optics import UNKNOWN, Optics
-from vision.geometry.rotation import apply, exp_rotation, nearest_rotation, skew
+from vision.geometry.rotation import apply, exp_rotation, nearest_rotation, skew, unit
 
 # [parameters] A layout, no threshold: nine of the lens, six of the pose.
 N_PARAMETERS = 15
@@ -114,7 +114,12 @@ class Camera:
         """
         ab = lens_model.unproject(np.asarray(px, dtype=float), self.lens)
         directions = np.column_stack([ab, np.ones(len(ab))]) @ self.T_camera_rig[:, :3]
-        return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        return unit(directions)
+
+    def has_in_picture(self, px: np.ndarray) -> np.ndarray:
+        """Return which (...) of points (..., 2) px lie in the picture."""
+        last_px = np.array(self.size_px) - 1.0
+        return np.all((px >= 0.0) & (px <= last_px), axis=-1)
 
     def moved(self, step: np.ndarray) -> "Camera":
         """Return the camera whose 15 parameters differ by `step` (15,): a draw from a covariance,

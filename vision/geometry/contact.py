@@ -14,9 +14,10 @@ import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
+from vision.geometry.polyline import normals
 from vision.geometry.rods import Wire
-from vision.geometry.rotation import cross
-from vision.geometry.silhouette import normals, outline
+from vision.geometry.rotation import cross, unit
+from vision.geometry.silhouette import outline
 from vision.geometry.touched import Axis
 
 # [steps] Newton's more than from nearly there: from 1.25 mm to rounding. Study: exactness.py.
@@ -78,8 +79,7 @@ class BarAxis(Axis):
         They are positive on the side that the whisker comes from (lower y), negative once the
         unbent whisker has passed.
         """
-        normal = cross(np.asarray(self.direction), tangents)
-        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        normal = unit(cross(np.asarray(self.direction), tangents))
         side = np.where(normal[..., 1] > 0, -1.0, 1.0)
         away = self._from_axis(points_mm[..., None, :])[..., 0, :]
         return np.sum(away * normal, axis=-1) * side
@@ -101,8 +101,7 @@ class BarAxis(Axis):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return middle (stations, 2) and half-width (stations,) px of the outline near its point."""
         place = np.linspace(-reach_mm, reach_mm, stations)
-        points = self.point_mm + place[:, None] * self.direction
-        return outline(camera, points, self.direction, radius_mm)
+        return outline(camera, self.points_at(place), self.direction, radius_mm)
 
     def _from_axis(self, points: np.ndarray) -> np.ndarray:
         """Return the vectors (..., k, 3) straight from the axis to points (..., k, 3)."""
@@ -166,6 +165,5 @@ def axis_frame(direction: np.ndarray) -> np.ndarray:
     """Return two unit vectors (2, 3) at right angles to a direction and to each other."""
     is_along_x = abs(direction[0]) >= _ALONG_X
     other = np.array([0.0, 0.0, 1.0] if is_along_x else [1.0, 0.0, 0.0])
-    e1 = cross(direction, other)
-    e1 = e1 / np.linalg.norm(e1)
+    e1 = unit(cross(direction, other))
     return np.stack([e1, cross(direction, e1)])

@@ -8,10 +8,8 @@ so that perspective and lens count.
 import numpy as np
 
 from vision.geometry.camera import Camera
+from vision.geometry.polyline import normals
 from vision.geometry.rotation import cross
-
-# [px] Least length of a tangent that is divided by. Stated.
-_TINY = 1e-12
 
 
 def outline(
@@ -58,15 +56,3 @@ def grazed(
     cosine = np.sqrt(np.maximum(1.0 - radius**2 / distance**2, 0.0))
     offset = radius * cosine * sideways
     return near + offset, near - offset
-
-
-def normals(curve_px: np.ndarray) -> np.ndarray:
-    """Return the unit normals (..., n, 2) of curves (..., n, 2) given point by point.
-
-    Of a single point it is (0, 1).
-    """
-    if curve_px.shape[-2] < 2:
-        return np.broadcast_to([0.0, 1.0], curve_px.shape)
-    tangent = np.gradient(curve_px, axis=-2)
-    normal = np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1)
-    return normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), _TINY)

@@ -15,9 +15,11 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from vision.geometry.camera import Camera
 from vision.geometry.checks import require_length, require_sigma
+from vision.geometry.rotation import unit
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,11 @@ class Axis(ABC):
         reach_mm: how far to either side of where the object is touched.
         """
 
+    def points_at(self, place_mm: ArrayLike) -> np.ndarray:
+        """Return the points (..., k, 3), mm, at places (k,) along the axis, counted from its point."""
+        steps_mm = np.asarray(place_mm)[..., None] * self.direction[..., None, :]
+        return self.point_mm[..., None, :] + steps_mm
+
     def shifted(self, across: np.ndarray, vector: np.ndarray) -> Self:
         """Return the object moved by two shifts in mm and two tilts across its axis.
 
@@ -158,5 +165,5 @@ class Axis(ABC):
         return replace(
             self,
             point_mm=self.point_mm + vector[..., 0:2] @ across,
-            direction=direction / np.linalg.norm(direction, axis=-1, keepdims=True),
+            direction=unit(direction),
         )

@@ -75,9 +75,9 @@ def offset_px(camera: Camera, axis: BarAxis, other: BarAxis) -> float:
     Without distortion, which is alike for two axes that are near to each other.
     """
     (normal,) = sight_planes([camera], other)
-    ends_mm = axis.point_mm + np.array([[-ARM_MM], [ARM_MM]]) * axis.direction
-    focal_px = float(np.mean(np.diag(camera.matrix)[:2]))
-    return focal_px * float(np.max(np.abs(unit(ends_mm - camera.centre_mm) @ normal)))
+    sights = unit(axis.points_at([-ARM_MM, ARM_MM]) - camera.centre_mm)
+    focal_px = float(np.mean(camera.lens[:2]))
+    return focal_px * float(np.max(np.abs(sights @ normal)))
 
 
 def meeting_axis(camera: Camera, axis: BarAxis, other_camera: Camera, other: BarAxis) -> BarAxis:
@@ -102,7 +102,7 @@ def _residuals(axes: BarAxis, camera: Camera, points: LinePoints, radius_mm: flo
 
     Returns (m, n) of a batch of axes (m, 3).
     """
-    directions = axes.direction[:, None]
-    on_axis = axes.point_mm[:, None] + points.place[:, None] * directions  # (m, n, 3) mm
-    one, other = edges(camera, on_axis, directions, radius_mm)
-    return np.sum(points.normal * (points.px - 0.5 * (one + other)), axis=-1) / points.sigma_px
+    points_mm = axes.points_at(points.place)  # (m, n, 3)
+    one, other = edges(camera, points_mm, axes.direction[:, None], radius_mm)
+    middle_px = 0.5 * (one + other)
+    return np.sum(points.normal * (points.px - middle_px), axis=-1) / points.sigma_px

@@ -23,6 +23,7 @@ from vision.geometry.camera import Camera
 from vision.geometry.centreline import rotation_z
 from vision.geometry.contact import BarAxis
 from vision.geometry.rods import Rods
+from vision.geometry.rotation import unit
 from vision.pictures.change import HALF
 from vision.touched.edge_map import EdgeMap
 from vision.touched.grid_search import (
@@ -191,10 +192,10 @@ def _bar_in_picture(
     Both are in pixels of an edge map. Perspective makes the two edges differ by less than a coarse
     search resolves.
     """
-    points = axes.point_mm[:, None] + along_mm[:, None] * axes.direction[:, None]  # (n, t, 3)
-    sideways = np.cross(axes.direction, axes.point_mm - camera.centre_mm)
-    sideways = radius_mm * sideways / np.linalg.norm(sideways, axis=-1, keepdims=True)
-    middle, edge = camera.project(np.stack([points, points + sideways[:, None]]))  # (n, t, 2)
+    points_mm = axes.points_at(along_mm)  # (n, t, 3)
+    sideways = unit(np.cross(axes.direction, axes.point_mm - camera.centre_mm))
+    edge_mm = points_mm + radius_mm * sideways[:, None]
+    middle, edge = camera.project(np.stack([points_mm, edge_mm]))  # (n, t, 2) each
     both = np.moveaxis([middle, edge - middle], -1, 1)  # (2, x and y, n, t)
     middle, half_width = both.astype(np.float32) / HALF
     return middle, half_width

@@ -18,6 +18,7 @@ from scipy.special import softmax
 
 from vision.geometry.contact import BarAxis
 from vision.geometry.optics import LEAST_PROBABILITY, Optics, probable_gammas
+from vision.geometry.rotation import unit
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
 from vision.touched.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces, beside_wires
@@ -354,7 +355,7 @@ def _points_of_line(pieces: Pieces, line, covariance, shared_px) -> LinePoints:
     most = _MOST_CORRELATED * own
     correlated = np.clip(covariance[0, 1], -most, most)
     sigma = np.sqrt(2.0 * (own + correlated * lever))
-    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = unit(normal)
     jacobian = np.stack([np.ones(2), lever], axis=1)  # of the points' offsets by shift and tilt
     in_common_px = np.sqrt(variance - own + shared_px**2)
     shared = np.hstack([jacobian * in_common_px, np.zeros((2, SHARED - 2))])

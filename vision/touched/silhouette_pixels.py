@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vision.geometry.camera import Camera
+from vision.geometry.polyline import at_lengths, lengths_px, tangents_by
 from vision.geometry.rounded import RoundedAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
@@ -53,8 +54,14 @@ class OutlineSide:
     @property
     def arc_px(self) -> np.ndarray:
         """Return the length (n,) along the side up to each station."""
-        steps = np.linalg.norm(np.diff(self.px, axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
+        return lengths_px(self.px)
+
+    @property
+    def tangent(self) -> np.ndarray:
+        """Return unit tangents (n, 2) at right angles to the normals, in the stations' order."""
+        tangent = tangents_by(self.normal)
+        to_next = np.gradient(self.px, axis=0)
+        return tangent * np.sign(np.sum(tangent * to_next, axis=1, keepdims=True))
 
     @property
     def model_half_px(self) -> float:
@@ -126,11 +133,8 @@ class _SidePixels:
         _, nearest = cKDTree(side.px).query(pixels)
         displacement = pixels - side.px[nearest]
         offset_px = np.sum(displacement * side.normal[nearest], axis=1)
-        tangent = np.stack([-side.normal[:, 1], side.normal[:, 0]], axis=1)
-        forward = np.sum(np.gradient(side.px, axis=0) * tangent, axis=1)
-        tangent *= np.sign(forward)[:, None]
-        along_px = side.arc_px[nearest] + np.sum(displacement * tangent[nearest], axis=1)
-        return cls(pixels, nearest, offset_px, along_px)
+        past_station_px = np.sum(displacement * side.tangent[nearest], axis=1)
+        return cls(pixels, nearest, offset_px, side.arc_px[nearest] + past_station_px)
 
     def select(self, keep: np.ndarray) -> "_SidePixels":
         """Return the pixels where keep (n,) holds."""
@@ -175,10 +179,8 @@ def _dense(line: np.ndarray) -> np.ndarray:
     line = line[np.all(np.isfinite(line), axis=1)]
     if len(line) < 2:
         return line
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    arc_px = np.concatenate([[0.0], np.cumsum(steps)])
-    at = np.arange(0.0, arc_px[-1], _DENSE_PX)
-    return np.stack([np.interp(at, arc_px, line[:, k]) for k in range(2)], axis=1)
+    length_px = lengths_px(line)
+    return at_lengths(np.arange(0.0, length_px[-1], _DENSE_PX), length_px, line)
 
 
 def _pixels_near(

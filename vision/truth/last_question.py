@@ -28,8 +28,9 @@ from scipy.ndimage import map_coordinates
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis, axis_frame
+from vision.geometry.polyline import at_lengths, lengths_px, normals, tangents_by
 from vision.geometry.rods import Rods
-from vision.geometry.silhouette import normals, outline
+from vision.geometry.silhouette import outline
 from vision.pictures.others import mask_rods
 from vision.pictures.view import View
 
@@ -97,12 +98,11 @@ class _Line:
     def of(cls, camera: Camera, axis: BarAxis, radius_mm: float) -> Self:
         """Return the line of a bar in a camera, in equal steps of a pixel or more."""
         middle_px, half_px = axis.outline(camera, radius_mm, _REACH_MM, _ALONG)
-        steps_px = np.linalg.norm(np.diff(middle_px, axis=0), axis=1)
-        arc_px = np.concatenate([[0.0], np.cumsum(steps_px)])
-        count = int(np.clip(arc_px[-1], _SEGMENTS, _ALONG))
-        at_px = np.linspace(0.0, arc_px[-1], count)
-        foot_px = np.stack([np.interp(at_px, arc_px, line) for line in middle_px.T], axis=1)
-        return cls(foot_px, normals(foot_px), np.interp(at_px, arc_px, half_px))
+        length_px = lengths_px(middle_px)
+        count = int(np.clip(length_px[-1], _SEGMENTS, _ALONG))
+        place_px = np.linspace(0.0, length_px[-1], count)
+        foot_px = at_lengths(place_px, length_px, middle_px)
+        return cls(foot_px, normals(foot_px), np.interp(place_px, length_px, half_px))
 
     @property
     def width_radius_px(self) -> float:
@@ -126,7 +126,7 @@ class _Line:
         """
         middle = len(self.foot_px) // 2
         normal = self.normal[middle]
-        tangent = np.array([normal[1], -normal[0]])
+        tangent = tangents_by(normal)
         away_px = px - self.foot_px[middle]
         along = away_px @ tangent  # (..., 2)
         across = away_px @ normal
@@ -188,8 +188,7 @@ class _Band:
 
 def _projected(camera: Camera, axes: BarAxis) -> np.ndarray:
     """Return two points (..., 2, 2) px of axes (..., 3) in a camera, as far apart as a band is long."""
-    to_ends = np.array([-_REACH_MM, _REACH_MM])[:, None] * axes.direction[..., None, :]
-    return camera.project(axes.point_mm[..., None, :] + to_ends)
+    return camera.project(axes.points_at([-_REACH_MM, _REACH_MM]))
 
 
 class BarQuestion:
@@ -301,9 +300,11 @@ def _samples_px(line: _Line) -> np.ndarray:
     """Return points (m, k, 2), px, in a strip along the line, k across it."""
     per_radius = min(_PER_RADIUS, line.width_radius_px)
     count = 2 * int(np.ceil(_BAND_RADII * per_radius))
-    across = (np.arange(count) + 0.5) / count * 2.0 * _BAND_RADII - _BAND_RADII
-    offset_px = across[:, None] * line.radius_px[:, None, None]
-    return (line.foot_px[:, None] + offset_px * line.normal[:, None]).astype(np.float32)
+    share = (np.arange(count) + 0.5) / count  # of the band's width
+    lateral_radii = _BAND_RADII * (2.0 * share - 1.0)
+    offset_px = np.outer(line.radius_px, lateral_radii)  # (m, k)
+    px = line.foot_px[:, None] + offset_px[..., None] * line.normal[:, None]
+    return px.astype(np.float32)
 
 
 def _grey_at(px: np.ndarray, picture: np.ndarray) -> np.ndarray:

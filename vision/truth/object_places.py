@@ -14,11 +14,12 @@ import numpy as np
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import BarAxis
 from vision.geometry.newton import cauchy_weights
+from vision.geometry.polyline import normals
 from vision.geometry.refusals import Refused
 from vision.geometry.robust import robust_sigma
 from vision.geometry.rods import Bar, Rods
 from vision.geometry.rotation import unit
-from vision.geometry.silhouette import normals, outline
+from vision.geometry.silhouette import outline
 from vision.geometry.touched import Axis
 from vision.touched.one_view import seen_from_one_side
 from vision.truth.line_source import require_wire
@@ -37,6 +38,8 @@ _SCATTER_PX = 2.0
 _ROUNDS = 5
 # [1] By how much the distance of two tracked edges may differ from the object's width. Stated.
 _MOST_UNLIKE_WIDTH = 0.3
+# [mm] From a place of an axis: itself and to either side, for the normal there. A layout.
+_NEAR_MM = np.array([-1.0, 0.0, 1.0])
 # [lines] Of a bar of which both edges are tracked. Derived.
 _EDGES = 2
 
@@ -171,8 +174,7 @@ class _BesideAxis:
 def _beside_axis(points: Trace, camera: Camera, axis: BarAxis) -> _BesideAxis:
     """Return how far tracked points are off the picture of an axis; those beyond its reach are left out."""
     along_mm = np.arange(0.0, 2.0 * _REACH_MM + 1.0)
-    first_mm = axis.point_mm - _REACH_MM * axis.direction
-    curve_px = camera.project(first_mm + along_mm[:, None] * axis.direction)
+    curve_px = camera.project(axis.points_at(along_mm - _REACH_MM))
     is_before = np.all(np.isfinite(curve_px), axis=1)
     beside = beside_curve(points, curve_px[is_before], along_mm[is_before])
     return _BesideAxis(beside.place_mm - _REACH_MM, beside.offset_px, beside.line, beside.sigma_px)
@@ -221,9 +223,8 @@ def _at_places(
     camera: Camera, axis: BarAxis, place_mm: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the picture (n, 2) of an axis at places (n,), and its unit normals (n, 2) there."""
-    near_mm = place_mm[:, None] + np.array([-1.0, 0.0, 1.0])  # (n, 3)
-    px = camera.project(axis.point_mm + near_mm[..., None] * axis.direction)  # (n, 3, 2)
-    return px[:, 1], normals(px)[:, 1]
+    near_px = camera.project(axis.points_at(place_mm[:, None] + _NEAR_MM))  # (n, 3, 2)
+    return near_px[:, 1], normals(near_px)[:, 1]
 
 
 def _plane(points: Trace, camera: Camera) -> np.ndarray:
@@ -279,9 +280,7 @@ def _require_bar(points: Trace, camera: Camera, axis: BarAxis, bar: Bar) -> None
 
 def _half_width_px(camera: Camera, axis: BarAxis, bar: Bar) -> float:
     """Return half the width of a bar's outline at the axis's point."""
-    near_mm = axis.point_mm + np.array([[-1.0], [0.0], [1.0]]) * axis.direction
-    directions = np.broadcast_to(axis.direction, near_mm.shape)
-    _, half_px = outline(camera, near_mm, directions, bar.radius_mm)
+    _, half_px = outline(camera, axis.points_at(_NEAR_MM), axis.direction, bar.radius_mm)
     return float(half_px[1])
 
 

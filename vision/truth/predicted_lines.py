@@ -7,7 +7,8 @@ import numpy as np
 
 from vision.fit.line_noise import LineNoise
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.silhouette import normals, outline
+from vision.geometry.polyline import normals
+from vision.geometry.silhouette import outline
 from vision.touched.pieces import ARM_MM
 from vision.truth.known_whisk import KnownWhisk
 from vision.truth.line_source import LineSource, WhiskPlace
@@ -69,9 +70,8 @@ def _bar_lines(
     """Return one camera's lines of the bar. sigmas_px (k, 3): see `LineNoise.bar_px`."""
     axis = known.axis
     place_mm = np.array([-ARM_MM, 0.0, ARM_MM])
-    along_mm = axis.point_mm + place_mm[:, None] * axis.direction
-    directions = np.broadcast_to(axis.direction, along_mm.shape)
-    middle_px, half_px = outline(camera, along_mm, directions, known.rods.bar.radius_mm)
+    radius_mm = known.rods.bar.radius_mm
+    middle_px, half_px = outline(camera, axis.points_at(place_mm), axis.direction, radius_mm)
     is_end = np.array([True, False, True])
     points = LinePoints(middle_px, normals(middle_px), np.ones(3), place_mm)
     ends = points.select(is_end)

@@ -159,9 +159,8 @@ def _pieces_in_large_picture(
 def _bar_share(known: KnownWhisk, camera: Camera) -> float:
     """Return the share of the bar's middle that is in a camera's picture."""
     place_mm = np.linspace(-ARM_MM, ARM_MM, _BAR_POINTS)
-    px = camera.project(known.axis.point_mm + place_mm[:, None] * known.axis.direction)
-    is_inside = np.all((px > 0) & (px < np.array(camera.size_px) - 1), axis=1)
-    return float(np.mean(is_inside))
+    px = camera.project(known.axis.points_at(place_mm))
+    return float(np.mean(camera.has_in_picture(px)))
 
 
 def _points_mm(pieces: Pieces, curves: Mapping[int, Curves]) -> np.ndarray:

@@ -13,6 +13,8 @@ from vision.fit.blocks import WIRE_MODES_PX
 from vision.fit.problem import Problem, wire_modes
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import rotation_z
+from vision.geometry.polyline import tangents_by
+from vision.geometry.rotation import unit
 from vision.wire.points import LinePoints
 
 
@@ -46,9 +48,8 @@ def sights_of(problem: Problem, name: str) -> Sights | None:
         return None
     camera = problem.cameras[name]
     sight = camera.rays(points.px)
-    along = points.normal @ [[0.0, 1.0], [-1.0, 0.0]]  # the normals turned by 90 degrees
-    across = np.cross(sight, camera.rays(points.px + along))
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    further_along = camera.rays(points.px - tangents_by(points.normal))
+    across = unit(np.cross(sight, further_along))
     rad_per_px = np.einsum("ni,ni->n", across, camera.rays(points.px + points.normal) - sight)
     shared_px = _shared_px(problem, name, points, problem.motor_rad[frame])
     return Sights(

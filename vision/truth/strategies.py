@@ -27,6 +27,7 @@ from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
+from vision.geometry.rotation import unit
 from vision.geometry.rounded import RoundedAxis
 from vision.geometry.touched import Axis
 from vision.touched.one_view import seen_from_one_side
@@ -254,8 +255,7 @@ def _strategies_of_bar(axis: BarAxis, whisk: WhiskPictures) -> list[Strategy]:
 
 def widest_sights_rad(cameras: Cameras, point_mm: np.ndarray) -> float:
     """Return the angle between the most different sights of a point (3,) by two cameras, rad."""
-    sights = np.array([point_mm - camera.centre_mm for camera in cameras])
-    sights /= np.linalg.norm(sights, axis=1, keepdims=True)
+    sights = unit(np.array([point_mm - camera.centre_mm for camera in cameras]))
     return float(np.arccos(np.clip(np.min(sights @ sights.T), -1.0, 1.0)))
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
+from vision.geometry.polyline import lengths_px, normals, tangents_by
 from vision.geometry.rotation import unit
 from vision.geometry.rows import Rows
-from vision.geometry.silhouette import normals
 from vision.pictures.pyramid import shrunk_px
 
 # [px] From the wire, at most, of a point that is taken to be the wire's: the first of the passes is
@@ -80,7 +80,7 @@ def beside_curve(trace: Trace, curve_px: np.ndarray, arc_mm: np.ndarray) -> Besi
     node = _nearest_nodes(trace.px, curve_px)
     from_node = trace.px - curve_px[node]
     normal = normals(curve_px)  # (m, 2)
-    tangent = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
+    tangent = tangents_by(normal)
     on_px = np.sum(from_node * tangent[node], axis=1)
     step_px = np.linalg.norm(np.gradient(curve_px, axis=0), axis=1)
     found = BesideWire(
@@ -90,7 +90,7 @@ def beside_curve(trace: Trace, curve_px: np.ndarray, arc_mm: np.ndarray) -> Besi
         offset_px=np.sum(from_node * normal[node], axis=1),
         foot_px=curve_px[node] + on_px[:, None] * tangent[node],
         normal=normal[node],
-        along_px=_lengths_px(curve_px)[node] + on_px,
+        along_px=lengths_px(curve_px)[node] + on_px,
         sigma_px=trace.sigma_px,
     )
     return found.select((found.place_mm > 0.0) & (found.place_mm < arc_mm[-1]))
@@ -100,12 +100,6 @@ def _nearest_nodes(px: np.ndarray, curve_px: np.ndarray) -> np.ndarray:
     """Return for points (n, 2) which of a curve's nodes (m, 2) is the nearest, (n,)."""
     apart = px[:, None] - curve_px  # (n, m, 2)
     return np.argmin(np.sum(apart**2, axis=2), axis=1)
-
-
-def _lengths_px(curve_px: np.ndarray) -> np.ndarray:
-    """Return the length of a curve of nodes (m, 2) px from its first to each node (m,)."""
-    pieces_px = np.linalg.norm(np.diff(curve_px, axis=0), axis=1)
-    return np.append(0.0, np.cumsum(pieces_px))
 
 
 def nearest_lines(beside: BesideWire) -> dict[int, int]:

@@ -12,6 +12,7 @@ from vision.fit.problem import bar_axes, bar_axis, bends, curves_of, rest_shape,
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import whole_rest_mm
 from vision.geometry.reasons import Reason, joined
+from vision.geometry.rotation import unit
 from vision.geometry.rounded import Rounded
 from vision.geometry.touched import Axis, Touched
 from vision.pictures.pyramid import full_px
@@ -171,8 +172,8 @@ def _gave(fitted: FittedWhisk) -> GaveWay:
     touching = fitted.problem.touching
     axis = bar_axes(fitted.problem, fitted.state.vector)
     direction = axis.direction[0]
-    normal = (axis.point_mm - _contacts_mm(fitted)) @ (np.eye(3) - np.outer(direction, direction))
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    across_bar = np.eye(3) - np.outer(direction, direction)
+    normal = unit((axis.point_mm - _contacts_mm(fitted)) @ across_bar)
     return GaveWay(
         index=np.array(fitted.frames)[touching],
         theta_rad=fitted.problem.motor_rad[touching] - float(fitted.measured.whisk["touch"]),

@@ -85,8 +85,8 @@ def _in_picture_mm(camera: Camera, curves: Mapping[int, Curves], least_mm: float
     """
     arc_mm = next(iter(curves.values())).arc_mm
     px = np.stack([camera.project(curve.points_mm) for curve in curves.values()])
-    is_inside = np.all((px >= 0.0) & (px <= np.array(camera.size_px) - 1.0), axis=(0, 2))
-    outside = np.flatnonzero((arc_mm > least_mm) & ~is_inside)
+    are_inside = np.all(camera.has_in_picture(px), axis=0)
+    outside = np.flatnonzero((arc_mm > least_mm) & ~are_inside)
     return float(arc_mm[outside[0] - 1] if len(outside) else arc_mm[-1])
 
 

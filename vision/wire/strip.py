@@ -6,12 +6,15 @@ behind the object is not known: it is fitted to both of its sides.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
+from vision.geometry.polyline import at_lengths, lengths_px, normals, tangents_by
 from vision.geometry.robust import robust_sigma
+from vision.geometry.rotation import unit
 from vision.pictures.pixel_noise import Noise
 from vision.wire.bands import Pieces
 
@@ -43,33 +46,26 @@ class Curve:
     @staticmethod
     def through(px: np.ndarray, radius_px: np.ndarray) -> "Curve":
         """Return the curve of nodes (n, 2) and half-widths (n,), at steps of _NODE_PX."""
-        arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(px, axis=0), axis=1)))
-        count = max(int(np.ceil(arc[-1] / _NODE_PX)), 2)
-        places = np.linspace(0.0, arc[-1], count + 1)
-        nodes = np.stack([np.interp(places, arc, px[:, k]) for k in (0, 1)], axis=1)
-        return Curve(nodes, places, np.interp(places, arc, radius_px))
+        length_px = lengths_px(px)
+        steps = max(int(np.ceil(length_px[-1] / _NODE_PX)), 2)
+        place_px = np.linspace(0.0, length_px[-1], steps + 1)
+        nodes = at_lengths(place_px, length_px, px)
+        return Curve(nodes, place_px, np.interp(place_px, length_px, radius_px))
 
     @property
     def length_px(self) -> float:
         """Return the length."""
         return float(self.arc_px[-1])
 
-    @property
-    def tangents(self) -> np.ndarray:
-        """Return unit tangents (m, 2)."""
-        along = np.gradient(self.px, axis=0)
-        return along / np.linalg.norm(along, axis=1, keepdims=True)
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Return the unit normals (m, 2) at the nodes, as `vision.geometry.polyline` has them."""
+        return normals(self.px)
 
     def at(self, place_px: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return points (s, 2), unit normals (s, 2) and half-widths (s,) at arc lengths (s,).
-
-        A normal points to the right of the way along the curve in a picture whose y goes down.
-        """
-        point = np.stack([np.interp(place_px, self.arc_px, self.px[:, k]) for k in (0, 1)], axis=1)
-        tangents = self.tangents
-        along = np.stack([np.interp(place_px, self.arc_px, tangents[:, k]) for k in (0, 1)], axis=1)
-        along = along / np.linalg.norm(along, axis=1, keepdims=True)
-        normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        """Return points (s, 2), unit normals (s, 2) and half-widths (s,) at arc lengths (s,)."""
+        point = at_lengths(place_px, self.arc_px, self.px)
+        normal = unit(at_lengths(place_px, self.arc_px, self.normals))
         return point, normal, np.interp(place_px, self.arc_px, self.radius_px)
 
 
@@ -152,16 +148,17 @@ class _Pixels:
 
 def _pixels_near(grey: np.ndarray, curve: Curve, margin_px: float) -> _Pixels:
     """Return the pixels whose foot is on a curve, within margin_px of the object's edge there."""
-    px, node = _nearest_nodes(grey.shape, curve, float(np.max(curve.radius_px)) + margin_px)
-    tangent = curve.tangents[node]
-    apart = px - curve.px[node]
-    along = np.sum(apart * tangent, axis=1)
-    offset = tangent[:, 0] * apart[:, 1] - tangent[:, 1] * apart[:, 0]
-    place = curve.arc_px[node] + along
-    within = (place >= 0.0) & (place <= curve.length_px)
-    within &= np.abs(offset) <= curve.radius_px[node] + margin_px
-    column, row = px[within].T
-    return _Pixels(offset[within], place[within], grey[row, column].astype(float))
+    widest_px = float(np.max(curve.radius_px)) + margin_px
+    px, node = _nearest_nodes(grey.shape, curve, widest_px)
+    from_node = px - curve.px[node]
+    normal = curve.normals[node]
+    offset_px = np.sum(from_node * normal, axis=1)
+    past_node_px = np.sum(from_node * tangents_by(normal), axis=1)
+    place_px = curve.arc_px[node] + past_node_px
+    is_near = (place_px >= 0.0) & (place_px <= curve.length_px)
+    is_near &= np.abs(offset_px) <= curve.radius_px[node] + margin_px
+    column, row = px[is_near].T
+    return _Pixels(offset_px[is_near], place_px[is_near], grey[row, column].astype(float))
 
 
 def _nearest_nodes(

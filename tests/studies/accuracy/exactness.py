@@ -33,7 +33,7 @@ from vision.fit.problem import Problem, State, curves_of
 from vision.fit.quantities import Measured, measure
 from vision.fit.solve import solve
 from vision.geometry.centreline import Curves
-from vision.geometry.silhouette import normals
+from vision.geometry.polyline import normals
 from vision.wire.points import LinePoints, Observed
 
 QUANTITIES = ("d_x_mm", "touch_mm", "slip_mm", "beta_deg")

@@ -34,8 +34,9 @@ from vision.fit import problem as model
 from vision.fit.problem import Problem, State
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import BarAxis
+from vision.geometry.polyline import normals
 from vision.geometry.rods import Bar, Rods, Wire
-from vision.geometry.silhouette import normals, outline
+from vision.geometry.silhouette import outline
 from vision.touched.edges import EDGE_PX
 from vision.wire.points import LinePoints, Observed
 

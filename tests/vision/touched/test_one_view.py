@@ -23,7 +23,8 @@ from vision.fit.solve import linearise, solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
 from vision.geometry.contact import BarAxis
-from vision.geometry.silhouette import grazed, normals
+from vision.geometry.polyline import normals
+from vision.geometry.silhouette import grazed
 from vision.geometry.vision_settings import VisionSettings
 from vision.touched.axis import settle_axis
 from vision.touched.edges import measure_edges
