@@ -85,12 +85,14 @@ class Sensors(Analysis):
 
     def lines(self, found: Sequence[SensorErrors]) -> Iterator[str]:
         """Yield a line a surface and range of slopes."""
-        for (surface, slope), mine in grouped(found, lambda one: one.group).items():
+        for (surface, from_deg), mine in grouped(found, lambda one: one.group).items():
             first = mine[0]
-            alpha = f", α {first.alpha_deg:.1f}°" if np.isfinite(first.alpha_deg) else ""
+            where = f"{surface or 'whisks'}, β {from_deg:g} to {first.beta_to_deg:g}°"
+            if np.isfinite(first.alpha_deg):
+                where += f", α {first.alpha_deg:.1f}°"
+            count = max(one.whisks + one.none for one in mine)
             errors = ", ".join(f"{label_of(one.estimator)} {one.text}" for one in mine)
-            count = counted(max(one.whisks + one.none for one in mine), "whisk")
-            yield f"{surface or 'whisks'}, β {slope:g} to {first.beta_to_deg:g}°{alpha} ({count}): {errors}"
+            yield f"{where} ({counted(count, 'whisk')}): {errors}"
 
     def page_table(self, out: Path) -> PageTable:
         """Return a row a surface and range of slopes, a column a sensor."""

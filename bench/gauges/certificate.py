@@ -219,8 +219,9 @@ def _curvature(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     """Return b of y = a x + b x |x| over points (n,), and its sigma by their scatter."""
     design = np.stack([x, x * np.abs(x)], axis=1)
     coefficients, squares, *_ = np.linalg.lstsq(design, y, rcond=None)
-    scatter = np.sqrt(squares[0] / (len(y) - 2)) if len(squares) else 0.0
-    return coefficients[1], scatter * np.sqrt(np.linalg.inv(design.T @ design)[1, 1])
+    variance = squares[0] / (len(y) - 2) if len(squares) else 0.0  # of a point
+    covariance = variance * np.linalg.inv(design.T @ design)
+    return coefficients[1], np.sqrt(covariance[1, 1])
 
 
 def _of_full_scale(percent: np.ndarray | None) -> str:

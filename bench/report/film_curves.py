@@ -73,18 +73,19 @@ def _curves_of(whisk: SeenWhisk) -> dict[str, np.ndarray]:
 
 
 def _plot(panel: np.ndarray, name: str, theta_deg: np.ndarray, values: np.ndarray, k: int) -> None:
-    """Draw values over the pushing angle (frames,) into their panel (h, w, 3)."""
+    """Draw values over the pushing angle (frames,) into their panel (h, w, 3), up to now, frame k, in ink."""
     height, width, _ = panel.shape
-    x_axis = Limits.around(theta_deg, 56, width - 14)
     known = values[np.isfinite(values)]
+    x_axis = Limits.around(theta_deg, 56, width - 14)
     y_axis = Limits.around(np.append(known, 0.0), height - 26, 30)
     _draw_grid(panel, x_axis, y_axis)
     points = np.stack([x_axis.to_px(theta_deg), y_axis.to_px(values)], axis=1)
     polyline(panel, points, _GREY)
     polyline(panel, points[: k + 1], _INK)
-    now = round(points[k, 0])
-    cv2.line(panel, (now, y_axis.high_px), (now, y_axis.low_px), _NOW, 1)
-    put_text(panel, _title(name, theta_deg[k], values[k]), (x_axis.low_px, 18), _INK)
+    now_px = round(points[k, 0])
+    cv2.line(panel, (now_px, y_axis.high_px), (now_px, y_axis.low_px), _NOW, 1)
+    title = _title(name, theta_deg[k], values[k])
+    put_text(panel, title, (x_axis.low_px, 18), _INK)
 
 
 def _title(name: str, theta_deg: float, value: float) -> str:

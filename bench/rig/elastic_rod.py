@@ -45,9 +45,11 @@ class RestShape:
         """Return the points (..., 3) at arc lengths."""
         arc = np.asarray(arc_mm, float)
         u = arc / self.length_mm
-        lateral = self._lateral(u**2, (u**4 - 4 * u**3 + 6 * u**2) / 3)
+        sag = (u**4 - 4 * u**3 + 6 * u**2) / 3
+        lateral = self._lateral(u**2, sag)
         at, weights = _GAUSS
-        forward = 0.5 * arc * (self._forward(0.5 * arc[..., None] * (1 + at)) @ weights)
+        arcs = 0.5 * arc[..., None] * (1 + at)  # (..., points) of the quadrature
+        forward = 0.5 * arc * (self._forward(arcs) @ weights)
         return np.concatenate([forward[..., None], lateral], axis=-1)
 
     def arc_at_mm(self, distance_mm: float) -> float:
@@ -70,9 +72,11 @@ class RestShape:
         """Return the derivative (..., 3) of the tangent along the arc, 1/mm."""
         arc = np.asarray(arc_mm, float)
         u = arc / self.length_mm
-        slopes = self._slopes(arc)
-        curvature = self._lateral(2 + 0 * u, 4 * (u**2 - 2 * u + 1)) / self.length_mm**2
-        forward_by = -(slopes * curvature).sum(-1) / self._forward(arc)
+        spool = np.full_like(u, 2.0)
+        sag = 4 * (u**2 - 2 * u + 1)
+        curvature = self._lateral(spool, sag) / self.length_mm**2
+        turning = (self._slopes(arc) * curvature).sum(-1)
+        forward_by = -turning / self._forward(arc)
         return np.concatenate([forward_by[..., None], curvature], axis=-1)
 
     def _forward(self, arc):

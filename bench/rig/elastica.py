@@ -140,13 +140,14 @@ class Elastica:
     def curve_mm(self, bent: Bent, arc_mm: np.ndarray) -> np.ndarray:
         """Return points (n, 2) of the bent rod at arc lengths (n,), straight beyond the load."""
         arc = np.asarray(arc_mm, float)
-        within = np.clip(arc / bent.arc_mm, 0, 1)
         directions = np.stack([np.cos(bent.angle), np.sin(bent.angle)], -1)
-        points = bent.arc_mm * self.nodes.from_base @ directions  # (nodes, 2)
-        coefficients = np.linalg.solve(self.nodes.values, points)
-        curve = chebyshev.chebval(2 * within - 1, coefficients).T
-        beyond = np.maximum(arc - bent.arc_mm, 0)[:, None]
-        return curve + beyond * np.array([np.cos(bent.slope), np.sin(bent.slope)])
+        at_nodes_mm = bent.arc_mm * self.nodes.from_base @ directions  # (nodes, 2)
+        coefficients = np.linalg.solve(self.nodes.values, at_nodes_mm)
+        share = np.clip(arc / bent.arc_mm, 0, 1)
+        curve_mm = chebyshev.chebval(2 * share - 1, coefficients).T
+        beyond_mm = np.maximum(arc - bent.arc_mm, 0)
+        end = np.array([np.cos(bent.slope), np.sin(bent.slope)])
+        return curve_mm + beyond_mm[:, None] * end
 
     def _double_integral(self, arc_mm):
         """Return K (n, n) for a load at arc length, and its derivative by the arc."""

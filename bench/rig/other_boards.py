@@ -37,9 +37,10 @@ class PrintedCheckerboard:
 
     def to_print(self, ink: Ink, margin_mm: float) -> Print:
         """Print the board within a white margin."""
-        columns, rows = (np.arange(count) for count in self.squares)
-        is_dark = np.add.outer(rows, columns) % 2 == 0
-        x_mm, y_mm = (self.square_mm * np.arange(count + 1) for count in self.squares)
+        columns, rows = self.squares
+        is_dark = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 0
+        x_mm = self.square_mm * np.arange(columns + 1)
+        y_mm = self.square_mm * np.arange(rows + 1)
         tones = np.where(is_dark, ink.black, ink.white)
         return Print(tones, x_mm, y_mm).frame(margin_mm, ink.white)
 

@@ -236,21 +236,28 @@ def draw_floor_and_wall(window: Window, appearance: Appearance) -> np.ndarray:
     (rows, columns) of the window's samples, the same for all of a pixel."""
     point, floor_share = _floor_and_wall_points(window, appearance)
     x, y, z = np.moveaxis(point, -1, 0)
-    brightness = 1 / (1 + (x - _LIT_X_MM) ** 2 / _SHADE_MM2 + y**2 / _SHADE_MM2)
+    from_rig_mm2 = (x - _LIT_X_MM) ** 2 + y**2
+    brightness = 1 / (1 + from_rig_mm2 / _SHADE_MM2)
     grain = 1 + _GRAIN * np.sin(0.11 * x + 0.3) * np.sin(0.13 * y + 0.7 * z)
-    floor = appearance.floor * appearance.light.shade_flat([0, 0, 1.0])
-    wall = appearance.wall * appearance.light.shade_flat([0, -1.0, 0])
-    tone = (floor * floor_share + wall * (1 - floor_share)) * brightness * grain
-    return tone.astype(np.float32).repeat(window.fine, 0).repeat(window.fine, 1)
+    light = appearance.light
+    floor = appearance.floor * light.shade_flat([0, 0, 1.0])
+    wall = appearance.wall * light.shade_flat([0, -1.0, 0])
+    surface = floor * floor_share + wall * (1 - floor_share)
+    radiance = (surface * brightness * grain).astype(np.float32)
+    return radiance.repeat(window.fine, 0).repeat(window.fine, 1)
 
 
 def _floor_and_wall_points(window, appearance):
     """Return the points (rows, columns, 3) of floor or wall that the window's pixels show, mm, and
     the share (rows, columns) of the floor."""
     x, y = replace(window, fine=1).rays()
-    rays = np.stack([x, y, np.ones_like(x)], -1) @ window.camera.rotation.astype(np.float32)
+    in_camera = np.stack([x, y, np.ones_like(x)], -1)
+    rays = in_camera @ window.camera.rotation.astype(np.float32)
     centre = window.camera.centre_mm
-    to_floor = (appearance.floor_z_mm - centre[2]) / np.minimum(rays[..., 2], -1e-3)
-    to_wall = (appearance.wall_y_mm - centre[1]) / np.maximum(rays[..., 1], 1e-3)
+    downwards = np.minimum(rays[..., 2], -1e-3)
+    backwards = np.maximum(rays[..., 1], 1e-3)
+    to_floor = (appearance.floor_z_mm - centre[2]) / downwards
+    to_wall = (appearance.wall_y_mm - centre[1]) / backwards
+    nearer = np.minimum(to_floor, to_wall)[..., None]
     floor_share = expit((to_wall - to_floor) / _CREASE_MM)
-    return rays * np.minimum(to_floor, to_wall)[..., None] + centre, floor_share
+    return rays * nearer + centre, floor_share

@@ -95,13 +95,16 @@ class PinholeCamera:
     @cached_property
     def _inverse_lens(self):
         """Return the Chebyshev coefficients (k, k) of x/z and of y/z by row and column."""
-        nodes = np.cos(np.pi * (np.arange(2 * _DEGREE) + 0.5) / (2 * _DEGREE))
-        u, v = (0.5 * side * (1 + _SPAN * nodes) for side in self.size_px)
-        rays = self._undistort(np.stack(np.meshgrid(u, v), -1).reshape(-1, 2))
-        columns = np.linalg.pinv(self._chebyshev(u, 0))
-        rows = np.linalg.pinv(self._chebyshev(v, 1))
-        grids = rays.T.reshape(2, len(v), len(u))
-        return [rows @ grid @ columns.T for grid in grids]
+        count = 2 * _DEGREE
+        nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
+        width, height = self.size_px
+        u = 0.5 * width * (1 + _SPAN * nodes)
+        v = 0.5 * height * (1 + _SPAN * nodes)
+        px = np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)
+        x, y = self._undistort(px).T.reshape(2, count, count)  # (rows, columns) each
+        of_columns = np.linalg.pinv(self._chebyshev(u, 0)).T
+        of_rows = np.linalg.pinv(self._chebyshev(v, 1))
+        return [of_rows @ x @ of_columns, of_rows @ y @ of_columns]
 
     def _undistort(self, px):
         """Return x/z and y/z (n, 2) that OpenCV projects to pixels (n, 2).

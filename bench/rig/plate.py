@@ -145,15 +145,16 @@ class Plate:
     def _footprints(self, window, x, y):
         """Return the footprints of a window's rays x, y on the print's two axes."""
         camera = window.camera
-        inverse = self._rays_to_print(camera)
-        inverse_depth = inverse[2, 0] * x + inverse[2, 1] * y + inverse[2, 2]
-        depth = 1 / np.maximum(inverse_depth, _LEAST_INVERSE_DEPTH)
-        soft = np.float32(window.soft_px) / np.diag(camera.matrix)[:2].astype(np.float32)  # of rays
+        across, down, depth = self._rays_to_print(camera)  # rows of the homography
+        inverse_depth = depth[0] * x + depth[1] * y + depth[2]
+        scale = 1 / np.maximum(inverse_depth, _LEAST_INVERSE_DEPTH)
+        focal_px = np.diag(camera.matrix)[:2].astype(np.float32)
+        soft = np.float32(window.soft_px) / focal_px  # of rays
         footprints = []
-        for row in inverse[:2]:
-            mm = (row[0] * x + row[1] * y + row[2]) * depth
-            by_x = (row[0] - mm * inverse[2, 0]) * depth * soft[0]
-            by_y = (row[1] - mm * inverse[2, 1]) * depth * soft[1]
+        for row in (across, down):
+            mm = (row[0] * x + row[1] * y + row[2]) * scale
+            by_x = (row[0] - mm * depth[0]) * scale * soft[0]
+            by_y = (row[1] - mm * depth[1]) * scale * soft[1]
             footprints.append(_Footprint(mm, by_x, by_y))
         return footprints
 

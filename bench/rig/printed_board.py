@@ -71,11 +71,15 @@ class PrintedBoard:
         """Print the board within a white margin; the print's coordinates are the board frame's."""
         modules = _dictionary(self.dictionary).markerSize + 2
         cells = modules + 2  # of a square, each way: a marker's modules, and a gap on either side
-        size = self.squares[0] * cells, self.squares[1] * cells
-        is_white = self._charuco(cells, modules).generateImage(size) > 0
-        x_mm, y_mm = (self._cell_edges_mm(count, modules) for count in self.squares)
-        paper, printed = (ink.black, ink.white) if self.inverted else (ink.white, ink.black)
-        return Print(np.where(is_white, paper, printed), x_mm, y_mm).frame(margin_mm, paper)
+        columns, rows = self.squares
+        picture = self._charuco(cells, modules).generateImage((columns * cells, rows * cells))
+        x_mm = self._cell_edges_mm(columns, modules)
+        y_mm = self._cell_edges_mm(rows, modules)
+        paper, printed = ink.white, ink.black
+        if self.inverted:
+            paper, printed = printed, paper
+        tones = np.where(picture > 0, paper, printed)
+        return Print(tones, x_mm, y_mm).frame(margin_mm, paper)
 
     def _cell_edges_mm(self, count, modules):
         """Return the edges (n,) of the cells of `count` squares in a row, markers of `modules`."""

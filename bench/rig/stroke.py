@@ -58,12 +58,15 @@ class Stroke:
 
     def angle_rad(self, time_s: float | np.ndarray) -> np.ndarray:
         """Return the motor angle at times within the recording."""
-        following = np.searchsorted(self.times_s, time_s, side="right")
-        i = np.clip(following - 1, 0, len(self.times_s) - 2)
-        since_s = np.asarray(time_s) - self.times_s[i]
-        lengths_s = np.diff(self.times_s)
-        gains = np.diff(self.speeds_rad_s) / np.where(lengths_s > 0, lengths_s, 1)
-        return self.angles_rad[i] + self.speeds_rad_s[i] * since_s + 0.5 * gains[i] * since_s**2
+        last = len(self.times_s) - 2
+        part = np.clip(np.searchsorted(self.times_s, time_s, side="right") - 1, 0, last)
+        durations_s = np.diff(self.times_s)
+        gained_rad_s = np.diff(self.speeds_rad_s)
+        # Without a ramp the speed changes in an instant, in which nothing is gained.
+        accelerations = gained_rad_s / np.where(durations_s > 0, durations_s, 1)
+        since_s = np.asarray(time_s) - self.times_s[part]
+        at_speed_rad = self.speeds_rad_s[part] * since_s
+        return self.angles_rad[part] + at_speed_rad + 0.5 * accelerations[part] * since_s**2
 
     def time_s(self, whisk: int, angle_rad: float | np.ndarray, back: bool = False) -> np.ndarray:
         """Return when a whisk's forward (or back) stroke passes angles, at constant speed."""

@@ -52,11 +52,14 @@ class VisibleRing:
         point, to_circle = self._nearest(x.ravel(), y.ravel())
         right = np.abs(np.diff(rays.x, axis=1)).max(initial=0)
         down = np.abs(np.diff(rays.y, axis=0)).max(initial=0)
-        margin = 2 * _COARSE * max(right, down) + 10 * rays.soft_px / rays.focal_px.min()
-        reach = self.thing.radius_mm + margin * point[:, 2]
-        is_near = (np.linalg.norm(to_circle, axis=1) < reach).reshape(x.shape)
+        grid_margin = 2 * _COARSE * max(right, down)
+        blur_margin = 10 * rays.soft_px / rays.focal_px.min()
+        depth_mm = point[:, 2]
+        reach_mm = self.thing.radius_mm + (grid_margin + blur_margin) * depth_mm
+        is_near = np.linalg.norm(to_circle, axis=1) < reach_mm
+        of_samples = is_near.reshape(x.shape).repeat(_COARSE, 0).repeat(_COARSE, 1)
         rows, columns = rays.x.shape
-        return is_near.repeat(_COARSE, 0).repeat(_COARSE, 1)[:rows, :columns]
+        return of_samples[:rows, :columns]
 
     def _nearest(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the points (n, 3) of rays x, y (n,) nearest to the circle, and the ways (n, 3)

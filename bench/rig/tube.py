@@ -183,20 +183,22 @@ class _Strip:
 
     def find_samples(self, window, margin):
         """Find the samples of a window within a margin, px, of the tube; return rows and columns."""
-        gap = np.hypot(self.along[0] - self.along[1], self.side[0] - self.side[1])
-        half = 0.5 * gap.max() + margin
+        width = np.hypot(self.along[0] - self.along[1], self.side[0] - self.side[1])
+        reach = 0.5 * width.max() + margin
         middle = self.side.mean(0)
         u = window.u_px.astype(np.float32) - np.float32(self.start[0])
         v = window.v_px.astype(np.float32) - np.float32(self.start[1])
         sin, cos = self.turn[1].astype(np.float32)
-        side = np.add.outer(cos * v, sin * u)
-        return np.nonzero((side > middle.min() - half) & (side < middle.max() + half))
+        side = np.add.outer(cos * v, sin * u)  # (rows, columns): place to the strip's side
+        is_inside = (side > middle.min() - reach) & (side < middle.max() + reach)
+        return np.nonzero(is_inside)
 
 
 def _extrapolate(x, at, values):
     """Interpolate values (n,) at places (n,) linearly, and straight on beyond both ends."""
-    result = np.interp(x, at, values)
-    for end, inner, is_beyond in ((0, 1, x < at[0]), (-1, -2, x > at[-1])):
-        slope = (values[end] - values[inner]) / (at[end] - at[inner])
-        result = np.where(is_beyond, values[end] + slope * (x - at[end]), result)
-    return result
+    first_slope = (values[1] - values[0]) / (at[1] - at[0])
+    last_slope = (values[-1] - values[-2]) / (at[-1] - at[-2])
+    before = values[0] + first_slope * (x - at[0])
+    beyond = values[-1] + last_slope * (x - at[-1])
+    within = np.interp(x, at, values)
+    return np.where(x < at[0], before, np.where(x > at[-1], beyond, within))

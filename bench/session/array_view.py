@@ -203,8 +203,10 @@ def _check_motors(bases: Sequence[Base], channels: Mapping[str, DaqFile]) -> Non
     """Raise BadInput where whiskers on one motor turn about axes that are not parallel."""
     for one, other in combinations(bases, 2):
         motor = channels[one.name].channels[MOTOR]
+        if motor != channels[other.name].channels[MOTOR]:
+            continue
         cosine = one.T_rig_base[:, 2] @ other.T_rig_base[:, 2]
-        if motor == channels[other.name].channels[MOTOR] and abs(cosine) < 1 - _PARALLEL:
+        if abs(cosine) < 1 - _PARALLEL:
             angle = f"their axes {np.degrees(np.arccos(cosine)):.3g}° apart"
             found = f"{one.name} and {other.name} are on one motor ({motor.channel}), {angle}"
             fix = "name each one's own motor_deg in [whiskers.channels]"

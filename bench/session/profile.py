@@ -99,10 +99,13 @@ def _check_places(table: NumberTable, name: str, length_mm: float) -> None:
 def _check_ends(arc_mm: np.ndarray, name: str, length_mm: float) -> None:
     """Raise BadInput where places (n,) lack one near the base or the tip, or have one beyond the tip."""
     first, last = arc_mm[[0, -1]] / length_mm
-    if not (0.0 <= first <= _SHORT and 1.0 - _SHORT <= last <= 1.0 + _LONG):
-        found = f"goes from {arc_mm[0]:g} to {arc_mm[-1]:g} mm, length_mm is {length_mm:g}"
-        needed = f"the first and the last {100 * _SHORT:g} % of the whisker need a place each"
-        raise BadInput(f"{found}; {needed}, and none is beyond the tip", file=name)
+    has_base = 0.0 <= first <= _SHORT
+    has_tip = 1.0 - _SHORT <= last <= 1.0 + _LONG
+    if has_base and has_tip:
+        return
+    found = f"goes from {arc_mm[0]:g} to {arc_mm[-1]:g} mm, length_mm is {length_mm:g}"
+    needed = f"the first and the last {100 * _SHORT:g} % of the whisker need a place each"
+    raise BadInput(f"{found}; {needed}, and none is beyond the tip", file=name)
 
 
 def _check_diameters(table: NumberTable, name: str) -> None:

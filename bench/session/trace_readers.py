@@ -407,12 +407,14 @@ def _bezier_curves(whisker: Mapping, number: int) -> tuple[np.ndarray, np.ndarra
     from scipy.special import comb
 
     control = np.asarray(whisker["r3all"], dtype=float)[:, :2]  # (frames, 2, points)
-    frames = np.flatnonzero(np.atleast_1d(whisker["tracked"])[: len(control)])
+    is_tracked = np.atleast_1d(whisker["tracked"])[: len(control)]
+    frames = np.flatnonzero(is_tracked)
     order = control.shape[2] - 1
-    t = np.linspace(0.0, 1.0, _CURVE_POINTS)
     k = np.arange(order + 1)[:, None]
-    basis = comb(order, k) * t**k * (1.0 - t) ** (order - k)  # (points, samples)
-    px = np.swapaxes(control[frames] @ basis, 1, 2).reshape(-1, 2)
+    t = np.linspace(0.0, 1.0, _CURVE_POINTS)
+    bernstein = comb(order, k) * t**k * (1.0 - t) ** (order - k)  # (points, samples)
+    curves = np.swapaxes(control[frames] @ bernstein, 1, 2)  # (tracked frames, samples, 2)
+    px = curves.reshape(-1, 2)
     return np.repeat(frames, len(t)), px, np.full(len(px), number)
 
 

@@ -12,9 +12,14 @@ def is_covariance(written: np.ndarray) -> bool:
     """Return whether a matrix (n, n) is finite, symmetric and without negative variance, but for rounding."""
     if not np.all(np.isfinite(written)):
         return False
-    sigma = np.sqrt(np.maximum(np.diag(written), 0.0))
-    slack = _ROUNDING * np.outer(sigma, sigma) + np.finfo(float).tiny
-    if np.any(np.diag(written) < 0) or np.any(np.abs(written - written.T) > slack):
+    variances = np.diag(written)
+    if np.any(variances < 0):
         return False
-    scale = np.where(sigma > math.sqrt(np.finfo(float).tiny), sigma, 1.0)
-    return bool(np.linalg.eigvalsh(written / np.outer(scale, scale))[0] >= -_ROUNDING)
+    sigmas = np.sqrt(variances)
+    smallest = np.finfo(float).tiny
+    slack = _ROUNDING * np.outer(sigmas, sigmas) + smallest
+    if np.any(np.abs(written - written.T) > slack):
+        return False
+    scale = np.where(sigmas > math.sqrt(smallest), sigmas, 1.0)
+    correlation = written / np.outer(scale, scale)
+    return bool(np.linalg.eigvalsh(correlation)[0] >= -_ROUNDING)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import singledispatch
 from pathlib import Path
 
-import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
@@ -13,7 +12,9 @@ from matplotlib.figure import Figure
 
 from bench.base.drawing import paper_style, publish
 from bench.base.errors import BadInput
-from bench.rig import printed_board as rig
+from bench.rig.other_boards import PrintedAprilGrid, PrintedCheckerboard
+from bench.rig.plate import Print
+from bench.rig.printed_board import Ink, PrintedBoard
 from bench.session.plausible import WIDTH
 from vision.boards import AprilGrid, CharucoBoard, Checkerboard, CircleGrid
 from vision.geometry import Board
@@ -27,9 +28,9 @@ _BELOW_MM = 34.0
 _RULER_MM = 8.0  # from the board's edge: the white around a board helps to find it
 _A4_MM = (210.0, 297.0)  # mm: ISO 216
 _LARGEST = 4  # formats beyond A4: A3, A2, A1, A0
-_INK = rig.Ink(white=1.0, black=0.0)
+_INK = Ink(white=1.0, black=0.0)
 _CIRCLE_SIDES = 180  # of a printed circle: it errs by 0.02 % of its radius
-_MODULES = 10  # of an AprilTag 36h11 with its rim of two: across
+_NO_MARKERS = ""  # dictionary of markers beside the board: a page has none
 MARKER_SHARE = 11.0 / 15.0  # of the square: the marker's white frame is then as wide as its modules
 
 
@@ -136,7 +137,7 @@ def dark_shapes(board: Board) -> Iterator[np.ndarray]:
 @dark_shapes.register
 def _of_charuco(board: CharucoBoard) -> Iterator[np.ndarray]:
     """Yield the dark rectangles of a ChArUco board, with its margin where it is white on black."""
-    made = rig.PrintedBoard(
+    made = PrintedBoard(
         board.squares,
         board.square_mm,
         board.marker_mm,
@@ -144,17 +145,15 @@ def _of_charuco(board: CharucoBoard) -> Iterator[np.ndarray]:
         board.legacy,
         board.inverted,
     )
-    printed = made.to_print(_INK, board.square_mm / 2 if board.inverted else 0.0)
-    return _rectangles(printed.reflectance < 0.5, printed.x_mm, printed.y_mm)
+    margin_mm = board.square_mm / 2 if board.inverted else 0.0
+    return _dark_rectangles(made.to_print(_INK, margin_mm))
 
 
 @dark_shapes.register
 def _of_checkerboard(board: Checkerboard) -> Iterator[np.ndarray]:
     """Yield the dark squares of a checkerboard."""
-    columns, rows = [np.arange(count) for count in board.squares]
-    is_dark = np.add.outer(rows, columns) % 2 == 0
-    edges = [np.arange(count + 1) * board.square_mm for count in board.squares]
-    return _rectangles(is_dark, *edges)
+    made = PrintedCheckerboard(board.squares, board.square_mm, _NO_MARKERS)
+    return _dark_rectangles(made.to_print(_INK, 0.0))
 
 
 @dark_shapes.register
@@ -169,40 +168,28 @@ def _of_circles(board: CircleGrid) -> Iterator[np.ndarray]:
 @dark_shapes.register
 def _of_april_grid(board: AprilGrid) -> Iterator[np.ndarray]:
     """Yield the tags of an AprilGrid as Kalibr prints them, and the dark squares between them."""
-    yield from _april_tags(board)
-    gap_mm = board.square_mm - board.marker_mm
-    columns, rows = board.squares
-    for row in range(rows + 1):
-        for column in range(columns + 1):
-            right_mm = column * board.square_mm
-            bottom_mm = -row * board.square_mm + gap_mm
-            yield _box(right_mm - gap_mm, right_mm, bottom_mm - gap_mm, bottom_mm)
+    made = PrintedAprilGrid(board.squares, board.square_mm, board.marker_mm, _NO_MARKERS)
+    return _dark_rectangles(made.to_print(_INK, 0.0))
 
 
-def _april_tags(board: AprilGrid) -> Iterator[np.ndarray]:
-    """Yield the dark modules of an AprilGrid's tags."""
-    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
-    columns, rows = board.squares
-    for row in range(rows):
-        for column in range(columns):
-            number = row * columns + column
-            tag = cv2.aruco.generateImageMarker(dictionary, number, _MODULES, borderBits=2)
-            left_mm = column * board.square_mm
-            top_mm = -row * board.square_mm - board.marker_mm
-            edges = np.linspace(0.0, board.marker_mm, _MODULES + 1)
-            yield from _rectangles(tag[::-1, ::-1] == 0, left_mm + edges, top_mm + edges)
+def _dark_rectangles(printed: Print) -> Iterator[np.ndarray]:
+    """Yield rectangles (4, 2) that cover the dark cells of a print.
 
-
-def _rectangles(dark: np.ndarray, x: np.ndarray, y: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield rectangles (4, 2) of the dark ones of cells (rows, columns) between edges x and y."""
+    They overlap, so that there is no seam between them: runs along rows, runs along columns, and squares
+    of four cells.
+    """
+    x = printed.x_mm
+    y = printed.y_mm
+    dark = printed.reflectance < 0.5
     for row, cells in enumerate(dark):
-        for a, b in _runs(cells):
-            yield _box(x[a], x[b], y[row], y[row + 1])
+        for left, right in _runs(cells):
+            yield _box(x[left], x[right], y[row], y[row + 1])
     for column, cells in enumerate(dark.T):
-        for a, b in _runs(cells):
-            yield _box(x[column], x[column + 1], y[a], y[b])
-    all_four = dark[1:, 1:] & dark[:-1, 1:] & dark[1:, :-1] & dark[:-1, :-1]
-    for row, column in np.argwhere(all_four):
+        for top, bottom in _runs(cells):
+            yield _box(x[column], x[column + 1], y[top], y[bottom])
+    upper = dark[:-1, 1:] & dark[:-1, :-1]
+    lower = dark[1:, 1:] & dark[1:, :-1]
+    for row, column in np.argwhere(upper & lower):
         yield _box(x[column], x[column + 2], y[row], y[row + 2])
 
 
@@ -219,16 +206,23 @@ def _box(x0: float, x1: float, y0: float, y1: float) -> np.ndarray:
 
 def _ruler(axes: Axes, origin: tuple[float, float], length: float, *, down: bool) -> None:
     """Draw a ruler from the board's corner outwards: a tick each millimetre, a number each ten."""
-    along = np.array([0.0, 1.0]) if down else np.array([1.0, 0.0])
-    outwards = np.array([-1.0, 0.0]) if down else np.array([0.0, 1.0])
-    alignment = {"ha": "right", "va": "center"} if down else {"ha": "center", "va": "top"}
+    along = np.array([1.0, 0.0])
+    outwards = np.array([0.0, 1.0])
+    alignment = {"ha": "center", "va": "top"}
+    if down:
+        along = np.array([0.0, 1.0])
+        outwards = np.array([-1.0, 0.0])
+        alignment = {"ha": "right", "va": "center"}
     for mm in range(int(length + 1e-6) + 1):
         at = origin + mm * along
-        tick_mm = 4.5 if mm % 10 == 0 else 3.0 if mm % 5 == 0 else 2.0
-        _draw_line(axes, at, at + tick_mm * outwards)
+        tick_mm = 2.0
+        if mm % 5 == 0:
+            tick_mm = 3.0
         if mm % 10 == 0:
+            tick_mm = 4.5
             x, y = at + 5.2 * outwards
             axes.text(x, y, str(mm), fontsize=6, **alignment)
+        _draw_line(axes, at, at + tick_mm * outwards)
     _draw_line(axes, np.array(origin), origin + length * along)
 
 

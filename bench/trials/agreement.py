@@ -165,12 +165,13 @@ def _exchanges(volts: np.ndarray, matrix: np.ndarray) -> Iterator[Cause]:
 
 def _turns(felt: np.ndarray, seen: np.ndarray) -> Iterator[Cause]:
     """Yield the fault of a follicle that is turned otherwise than stated."""
-    turn = np.arctan2(felt[0] * seen[1] - felt[1] * seen[0], felt @ seen)
+    cross = felt[0] * seen[1] - felt[1] * seen[0]
+    turn = np.arctan2(cross, felt @ seen)
     cos = np.cos(turn)
     sin = np.sin(turn)
     turned = np.array([[cos, -sin], [sin, cos]]) @ felt
-    by = f"{np.degrees(turn):+.1f}° more than stated"
-    yield Cause(constant_message(f"the follicle looks turned by {by}"), felt - turned, None, 1)
+    message = f"the follicle looks turned by {np.degrees(turn):+.1f}° more than stated"
+    yield Cause(constant_message(message), felt - turned, None, 1)
 
 
 def _possible_scales(

@@ -149,11 +149,10 @@ class _Stroke:
 
 def _covariance(strokes: Sequence[_Stroke]) -> np.ndarray:
     """Return the covariance (n, n) of felt − seen, by what strokes have of their own and share."""
-    felt = np.array([stroke.felt_rad for stroke in strokes])
-    own = np.array([stroke.seen_own_rad for stroke in strokes])
-    shared = np.array([stroke.seen_shared_rad for stroke in strokes])
-    late = np.array([stroke.delay_s * stroke.speed_rad_s for stroke in strokes])
-    return np.diag(felt**2 + own**2) + np.outer(shared, shared) + np.outer(late, late)
+    own_rad2 = np.array([stroke.felt_rad**2 + stroke.seen_own_rad**2 for stroke in strokes])
+    shared_rad = np.array([stroke.seen_shared_rad for stroke in strokes])
+    late_rad = np.array([stroke.delay_s * stroke.speed_rad_s for stroke in strokes])
+    return np.diag(own_rad2) + np.outer(shared_rad, shared_rad) + np.outer(late_rad, late_rad)
 
 
 def _strokes(results: Iterable[TrialResult]) -> Iterator[_Stroke]:
