@@ -95,16 +95,16 @@ def error_against_slope(
     lanes = _lanes(judged)
     figure = blank(9.6, 1.0 + 3.2 * len(panels))
     rows = figure.subplots(len(panels), 2, squeeze=False)
-    for (whole, near), (panel, of_panel) in zip(rows, panels.items()):
+    for (left, right), (panel, of_panel) in zip(rows, panels.items()):
         surface = surface_of.get(panel)
         title = panel_title(*panel)
-        _draw_estimators(whole, of_panel, lanes, surface, settings)
-        whole.set(ylabel="error of d$_x$  [%]", title=f"{title}: every estimator")
-        whole.set_ylim(*_limits([j for j in of_panel if not j.one_factor]))
         without_2 = [j for j in of_panel if j.estimator != "no_slip"]
-        _draw_estimators(near, without_2, lanes, surface, settings)
-        near.set(title=f"{title}: without (2)")
-        near.set_ylim(*_limits(without_2))
+        _draw_estimators(left, of_panel, lanes, surface, settings)
+        _draw_estimators(right, without_2, lanes, surface, settings)
+        left.set_ylim(*_limits([j for j in of_panel if not j.one_factor]))
+        right.set_ylim(*_limits(without_2))
+        left.set(ylabel="error of d$_x$  [%]", title=f"{title}: every estimator")
+        right.set_title(f"{title}: without (2)")
     for axes in rows[-1]:
         axes.set_xlabel("slope β  [°]")
     add_legend(figure, 3)

@@ -13,13 +13,7 @@ from bench.base.threads import in_threads
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.session import Session
 from bench.session.table import forward_in_time, read_table, require_columns
-from vision.boards import (
-    MIN_VIEWS,
-    Corners,
-    find_corners,
-    fixes_pose,
-    refine_corners,
-)
+from vision.boards import MIN_VIEWS, Corners, find_corners, fixes_pose, refine_corners
 from vision.calibration import BoardViews, with_turns_resolved
 from vision.geometry import Board
 from vision.pictures import Frames
@@ -173,24 +167,28 @@ def _trial_views(session: Session, name: str, rig_view: Corners) -> tuple[list[C
 
     Trials in which the camera stands elsewhere than in the rig picture are left out, with a note.
     """
-    trials = [trial for trial in session.trials if name in trial.camera_sources]
     kept: list[Corners] = []
     notes: list[str] = []
+    trials = [trial for trial in session.trials if name in trial.camera_sources]
     if not trials or len(rig_view) == 0:
         return kept, notes
-    each = max(1, _MOST_OF_TRIALS // len(trials))
+    frames_of_each = max(1, _MOST_OF_TRIALS // len(trials))
     chosen = trials[:: max(1, len(trials) // _MOST_OF_TRIALS)]
     for trial in count_parts(chosen, f"trials of camera {name} with the board", len(chosen)):
-        views = list(_views_of(trial.camera_sources[name], each, rig_view, session.board))
-        shift_px = np.median([_shift_px(view, rig_view) for view in views]) if views else np.inf
+        source = trial.camera_sources[name]
+        views = list(_views_of(source, frames_of_each, rig_view, session.board))
+        shift_px = _median_shift_px(views, rig_view)
         if shift_px < _MOVED_PX:
             kept += views
         elif np.isfinite(shift_px):
-            notes.append(
-                f"camera {name} stands {shift_px:.1f} px elsewhere in trial {trial.name} than in "
-                "boards/rig; that trial was not used for calibration"
-            )
+            notes.append(_moved_note(name, shift_px, trial.name))
     return kept, notes
+
+
+def _moved_note(camera: str, shift_px: float, trial: str) -> str:
+    """Return the note on a trial that was recorded with a camera moved."""
+    where = f"stands {shift_px:.1f} px elsewhere in trial {trial} than in boards/rig"
+    return f"camera {camera} {where}; that trial was not used for calibration"
 
 
 def _views_of(source: Path, most: int, rig_view: Corners, board: Board) -> Iterator[Corners]:
@@ -204,10 +202,14 @@ def _views_of(source: Path, most: int, rig_view: Corners, board: Board) -> Itera
     yield from filter(len, views)
 
 
-def _shift_px(view: Corners, rig_view: Corners) -> float:
-    """Return the median distance of a view's corners from the rig picture's."""
-    _, here, there = np.intersect1d(view.ids, rig_view.ids, return_indices=True)
-    return float(np.median(np.linalg.norm(view.px[here] - rig_view.px[there], axis=1)))
+def _median_shift_px(views: Sequence[Corners], rig_view: Corners) -> float:
+    """Return the median distance of the views' corners from the rig picture's; NaN without a view."""
+    shifts_px = []
+    for view in views:
+        _, here, there = np.intersect1d(view.ids, rig_view.ids, return_indices=True)
+        distances_px = np.linalg.norm(view.px[here] - rig_view.px[there], axis=1)
+        shifts_px.append(np.median(distances_px))
+    return float(np.median(shifts_px)) if shifts_px else np.nan
 
 
 def _times(session: Session, boards: Mapping[str, list[Corners]]) -> dict[str, np.ndarray] | None:

@@ -254,18 +254,16 @@ def _seen_loads(
     values, by_friction = _with_friction(contacts, share.value, loads)
     by_place = _by_place(contacts, share.value, loads)
     by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
-    by_camera_error_mm, of_places = _errors_of_places(d, good)
-    by_arc, covariance = _common_and_own(by_place, of_places)
+    causes = [_FRICTION_SIGMA * by_friction, by_share]
     for rest_mm in whisker.beam.other_rests_mm():
         other = loads_of(rod_of(whisker.with_rest(rest_mm)))
         moved, _ = _with_friction(contacts, share.value, other)
-        covariance = covariance + _common_cause(moved - values)
-    return _SeenLoads(
-        values,
-        by_arc,
-        covariance + _common_cause(_FRICTION_SIGMA * by_friction) + _common_cause(by_share),
-        by_place @ by_camera_error_mm,
-    )
+        causes.append(moved - values)
+    by_camera_error_mm, of_places = _errors_of_places(d, good)
+    by_arc, own_covariance = _common_and_own(by_place, of_places)
+    for cause in causes:
+        own_covariance = own_covariance + _common_cause(cause)
+    return _SeenLoads(values, by_arc, own_covariance, by_place @ by_camera_error_mm)
 
 
 def _errors_of_places(d: Deflection, good: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -50,12 +50,7 @@ class VisibleRing:
         x = rays.x[::_COARSE, ::_COARSE]
         y = rays.y[::_COARSE, ::_COARSE]
         point, to_circle = self._nearest(x.ravel(), y.ravel())
-        right = np.abs(np.diff(rays.x, axis=1)).max(initial=0)
-        down = np.abs(np.diff(rays.y, axis=0)).max(initial=0)
-        grid_margin = 2 * _COARSE * max(right, down)
-        blur_margin = 10 * rays.soft_px / rays.focal_px.min()
-        depth_mm = point[:, 2]
-        reach_mm = self.thing.radius_mm + (grid_margin + blur_margin) * depth_mm
+        reach_mm = self.thing.radius_mm + _margin(rays) * point[:, 2]
         is_near = np.linalg.norm(to_circle, axis=1) < reach_mm
         of_samples = is_near.reshape(x.shape).repeat(_COARSE, 0).repeat(_COARSE, 1)
         rows, columns = rays.x.shape
@@ -166,3 +161,11 @@ class _Distance:
             step = np.where(is_convex, slope / np.where(is_convex, curvature, 1), downhill)
             angles = angles - np.clip(step, -_STATION_RAD, _STATION_RAD)
         return angles
+
+
+def _margin(rays: Rays) -> float:
+    """Return how far from a ray a ring may be that its pixel shows, over its depth: two steps of the
+    coarse grid, and the blur."""
+    right = np.abs(np.diff(rays.x, axis=1)).max(initial=0)
+    down = np.abs(np.diff(rays.y, axis=0)).max(initial=0)
+    return 2 * _COARSE * max(right, down) + 10 * rays.soft_px / rays.focal_px.min()

@@ -38,27 +38,38 @@ class Ability:
 def abilities(session: Session) -> tuple[Ability, ...]:
     """Return what the measured trials of a session can give."""
     measured = [trial for trial in session.trials if trial.purpose != "weight"]
-    seen = [trial for trial in measured if _lacks_of_pictures(trial, session) == ""]
-    true = seen if session.truth is None else [trial for trial in measured if _is_stated(trial)]
+    seen = [trial for trial in measured if not _lacks_of_pictures(trial, session)]
     felt = [trial for trial in measured if has_moments(trial) or _has_gauges(session)]
     to_see = _first(_lacks_of_pictures(trial, session) for trial in measured)
-    to_know = _TO_STATE if session.truth else f'{to_see}; or a stage: [truth] source = "stage"'
+    true = seen
+    to_know = f'{to_see}; or a stage: [truth] source = "stage"'
+    if session.truth is not None:
+        true = [trial for trial in measured if _is_stated(trial)]
+        to_know = _TO_STATE
     both = [trial for trial in true if trial in felt]
-    slopes = {trial.beta_deg for trial in both}
-    is_sloped = len(slopes) >= _FEWEST_SLOPES or (session.truth is None and len(both) > 1)
-    rows = (
-        ("truth of d_x", len(true), to_know),
-        ("truth of β", len(true), to_know),
-        ("slip, deflection", len(seen), to_see),
-        ("estimates of d_x", len(felt), _TO_FEEL),
-        ("errors", len(both), _TO_COMPARE),
-        ("Fig. 8", len(both) if is_sloped else 0, _TO_DRAW),
+    drawn = both if _has_slopes(both, session) else []
+    of = len(measured)
+    return (
+        _ability("truth of d_x", true, of, to_know),
+        _ability("truth of β", true, of, to_know),
+        _ability("slip, deflection", seen, of, to_see),
+        _ability("estimates of d_x", felt, of, _TO_FEEL),
+        _ability("errors", both, of, _TO_COMPARE),
+        _ability("Fig. 8", drawn, of, _TO_DRAW),
+        *_of_gauges(session),
     )
-    found = []
-    for quantity, count, missing in rows:
-        is_whole = count == len(measured)
-        found.append(Ability(quantity, count, len(measured), "" if is_whole else missing))
-    return (*found, *_of_gauges(session))
+
+
+def _ability(quantity: str, able: Sequence[Trial], of: int, missing: str) -> Ability:
+    """Return the row of a quantity. missing: what gives it to the trials that are not able to."""
+    return Ability(quantity, len(able), of, "" if len(able) == of else missing)
+
+
+def _has_slopes(trials: Sequence[Trial], session: Session) -> bool:
+    """Return whether trials may differ in slope: by what they state, or by what pictures will show."""
+    stated = {trial.beta_deg for trial in trials}
+    is_seen = session.truth is None
+    return len(stated) >= _FEWEST_SLOPES or (is_seen and len(trials) >= _FEWEST_SLOPES)
 
 
 def _of_gauges(session: Session) -> Iterator[Ability]:

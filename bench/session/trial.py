@@ -119,7 +119,6 @@ def load_trial(
     table, givens = with_sigmas(table, manifest.TrialKeys, "[trial]", exact=session.keys.exact)
     keys = convert(table, manifest.TrialKeys)
     _check_keys(keys, label)
-    signals_path = _signals_path(folder, daq, place)
     settings = values(keys) | _bar_diameter(keys, session.keys.bar)
     if keys.object is not None:
         _check_object(keys.object, settings["bar_diameter_mm"], label)
@@ -127,7 +126,7 @@ def load_trial(
         name=folder.name,
         folder=folder,
         camera_sources=camera_sources(folder, place),
-        signals_path=signals_path,
+        signals_path=_signals_path(folder, daq, place),
         daq=daq,
         givens=givens,
         trace_files=trace_files(folder, place),
@@ -141,9 +140,8 @@ def load_trial(
         trial = _with_stage(trial, table, place)
     if trial.is_traced_alone:
         _check_traced_alone(trial, is_stated=session.keys.truth is not None)
-        return trial
-    for path in (*trial.object_files.values(), *trial.board_pictures.values()):
-        problems.warn(reason("object_points_not_read", label=trial.label(path.name)))
+    else:
+        _warn_of_unread_object(trial, problems)
     return trial
 
 
@@ -191,6 +189,12 @@ def _warn_of_unread_stage(trial: Trial, problems: InputProblems) -> None:
     if (trial.folder / STAGE).is_file():
         cure = 'write [truth] source = "stage" in session.toml'
         problems.warn(reason("stage_not_read", label=trial.label(STAGE), cure=cure))
+
+
+def _warn_of_unread_object(trial: Trial, problems: InputProblems) -> None:
+    """Warn of files on where the object is, of a trial whose pictures show it."""
+    for path in (*trial.object_files.values(), *trial.board_pictures.values()):
+        problems.warn(reason("object_points_not_read", label=trial.label(path.name)))
 
 
 def _check_stated_truth(trial: Trial, table: dict[str, Any]) -> None:

@@ -178,19 +178,24 @@ def _dark_rectangles(printed: Print) -> Iterator[np.ndarray]:
     They overlap, so that there is no seam between them: runs along rows, runs along columns, and squares
     of four cells.
     """
+    dark = printed.reflectance < 0.5
     x = printed.x_mm
     y = printed.y_mm
-    dark = printed.reflectance < 0.5
     for row, cells in enumerate(dark):
         for left, right in _runs(cells):
             yield _box(x[left], x[right], y[row], y[row + 1])
     for column, cells in enumerate(dark.T):
         for top, bottom in _runs(cells):
             yield _box(x[column], x[column + 1], y[top], y[bottom])
+    for row, column in _corners_of_four(dark):
+        yield _box(x[column], x[column + 2], y[row], y[row + 2])
+
+
+def _corners_of_four(dark: np.ndarray) -> np.ndarray:
+    """Return row and column (n, 2) of the first of every four dark cells about one corner."""
     upper = dark[:-1, 1:] & dark[:-1, :-1]
     lower = dark[1:, 1:] & dark[1:, :-1]
-    for row, column in np.argwhere(upper & lower):
-        yield _box(x[column], x[column + 2], y[row], y[row + 2])
+    return np.argwhere(upper & lower)
 
 
 def _runs(cells: np.ndarray) -> np.ndarray:

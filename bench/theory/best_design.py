@@ -125,15 +125,17 @@ def expected_error(
     with np.errstate(all="ignore"):
         moments = _moments(design, equipment, slope, alpha, d_x)
         of_cylinder, noise_mm = _cylinder_distance(design, equipment, *moments)
-        noise_share = noise_mm / of_cylinder * design.thickness(d_x)
         by_friction = _taper_distance(design, of_cylinder) / d_x - 1.0
+        by_noise = noise_mm / of_cylinder * design.thickness(d_x)
         lean_sigma = np.radians(region.lean_sigma_deg)
-        lean = first_order.leaning(design.theta_rad, lean_sigma, np.arctan2(*moments), alpha)
-    made = _share_by_making(design, equipment, d_x)
+        by_lean = first_order.leaning(design.theta_rad, lean_sigma, np.arctan2(*moments), alpha)
+    by_making = _share_by_making(design, equipment, d_x)
     bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
-    errors = np.array([bias, np.linalg.norm(np.broadcast_arrays(noise_share, lean, made), axis=0)])
-    has_distance = np.isfinite(bias + noise_share)
-    return ExpectedError(*np.where(has_distance, 100.0 * errors, np.inf))
+    sigma = np.linalg.norm(np.broadcast_arrays(by_noise, by_lean, by_making), axis=0)
+    has_distance = np.isfinite(bias + by_noise)
+    return ExpectedError(
+        np.where(has_distance, 100.0 * bias, np.inf), np.where(has_distance, 100.0 * sigma, np.inf)
+    )
 
 
 def _share_by_making(design: Design, equipment: Equipment, d_x: Numbers) -> Numbers:

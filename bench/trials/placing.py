@@ -65,7 +65,6 @@ def place_rig(
         return _placed_by_file(session, calibration, problems)
     before = _placement_before(session)
     chosen = spread([unit for unit in units if unit.trial.camera_sources])
-    has_own_frame = session.T_rig_board is not None or session.cameras_toml is not None
     may_move = session.cameras_toml is None and before.covariance.any()
     try:
         if may_move:
@@ -78,17 +77,33 @@ def place_rig(
             is_by_board = session.cameras_toml is None
             placed = _with_scale(calibration, placement) if is_by_board else calibration
     except Refused as refusal:
-        if not has_own_frame:
+        if not _has_rig_frame(session):
             raise _without_rig_frame(refusal) from None
         return _placed_by_board_alone(session, calibration, refusal, problems)
-    if not has_own_frame or (may_move and session.T_rig_board_sigma_mm >= _BY_RULER_MM):
-        require_swing(placement, problems)
-    if placement.alarm and has_own_frame:
-        problems.warn(_misplaced(placement, session, chosen))
+    _check_strokes(session, placement, chosen, problems)
     if not may_move:
         return placed.with_notes(placement.notes[0], _STAYS)
-    notes = placement.notes if has_own_frame else placement.notes[:1]
+    notes = placement.notes if _has_rig_frame(session) else placement.notes[:1]
     return placed.with_notes(*notes)
+
+
+def _has_rig_frame(session: Session) -> bool:
+    """Return whether the session states the rig frame: by its board, or by cameras that are in it."""
+    return session.T_rig_board is not None or session.cameras_toml is not None
+
+
+def _check_strokes(
+    session: Session, placement: Placement, units: Sequence[Unit], problems: InputProblems
+) -> None:
+    """Warn where free strokes contradict the stated rig frame.
+
+    Raise BadInput where they must place the rig, and are too short for it.
+    """
+    is_by_ruler = session.T_rig_board_sigma_mm >= _BY_RULER_MM and session.cameras_toml is None
+    if is_by_ruler or not _has_rig_frame(session):
+        require_swing(placement, problems)
+    if placement.alarm and _has_rig_frame(session):
+        problems.warn(_misplaced(placement, session, units))
 
 
 def _misplaced(placement: Placement, session: Session, units: Sequence[Unit]) -> Reason:

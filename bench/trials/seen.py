@@ -39,7 +39,7 @@ from bench.trials.seeing import presets_for
 from bench.trials.seen_friction import seen_friction
 from bench.trials.trace_frames import traced_frames
 from bench.trials.trial_frames import TrialFrames
-from vision import Smooth, TrialTruth, Value, WhiskTruth
+from vision import FrameTruth, Smooth, TrialTruth, Value, WhiskTruth
 from vision.geometry import Reason, Refused, joined
 from vision.pictures import Others
 
@@ -347,7 +347,6 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
     motor = frames.motor_rad[shown]
     theta = smooth.theta_rad[chosen]
     touch = float(motor[0] - theta[0])
-    x, y, _ = frames.point_mm.value[shown].T
     rows = _by_parameter(smooth, chosen)
     return Deflection(
         theta_rad=theta,
@@ -357,12 +356,18 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
         along_mm=smooth.values["along"][chosen],
         across_y_mm=smooth.values["across_y"][chosen],
         across_z_mm=smooth.values["d_z"][chosen],
-        past_mm=np.cos(touch) * x + np.sin(touch) * y - smooth.d_x_mm - frames.arc_mm[shown],
+        past_mm=_along_unbent(frames, shown, touch) - smooth.d_x_mm - frames.arc_mm[shown],
         covariance=rows @ smooth.covariance @ rows.T,
         by_camera_error_mm=rows @ smooth.by_camera_error,
         touch_rad=Value(touch, float(frames.theta_rad.sigma[shown[0]])),
         d_x_mm=smooth.d_x_mm,
     )
+
+
+def _along_unbent(frames: FrameTruth, shown: np.ndarray, touch_rad: float) -> np.ndarray:
+    """Return how far along the whisker at first touch the contacts of the frames `shown` (n,) are, mm."""
+    x, y, _ = frames.point_mm.value[shown].T
+    return np.cos(touch_rad) * x + np.sin(touch_rad) * y
 
 
 def _by_parameter(smooth: Smooth, chosen: np.ndarray) -> np.ndarray:

@@ -89,11 +89,9 @@ def _seen_angles(
     contact at rest has them, and the other half goes into their sigma.
     """
     theta = frames.theta_rad.value[index]
-    d_y = frames.d_y_mm.value[index]
-    d_z = frames.d_z_mm.value[index]
-    turning = np.abs(d_z) * d_x_mm / (d_y**2 + d_z**2)  # dα/dθ of a contact at rest
     alpha = frames.alpha_rad.value[index]
     sigma = frames.alpha_rad.sigma[index]
+    turning = _turning_at_rest(frames, index, d_x_mm)
     angles = []
     for first, last in jumps:
         middle = float(0.5 * (theta[first] + theta[last]))
@@ -101,9 +99,15 @@ def _seen_angles(
         for kind, k, half in ((STATIC, first, 0.5), (KINETIC, last, -0.5)):
             carried = alpha[k] + half * width * turning[k]
             by_width = turning[k] * width / np.sqrt(12.0)
-            spread = np.hypot(sigma[k], by_width)
-            angles.append(Angle(kind, middle, float(carried), float(spread)))
+            angles.append(Angle(kind, middle, float(carried), float(np.hypot(sigma[k], by_width))))
     return angles
+
+
+def _turning_at_rest(frames: FrameTruth, index: np.ndarray, d_x_mm: float) -> np.ndarray:
+    """Return dα/dθ (n,) of a contact at rest in the frames `index` (n,)."""
+    d_y = frames.d_y_mm.value[index]
+    d_z = frames.d_z_mm.value[index]
+    return np.abs(d_z) * d_x_mm / (d_y**2 + d_z**2)
 
 
 def _touching(frames: FrameTruth) -> np.ndarray:

@@ -201,21 +201,25 @@ def tradeoff(
     problems = InputProblems()
     session = checked_session(path, problems, follow_links=settings.follow_links)
     recorded = trials_with_whisks(session)
-    wanted = _trials_to_time(recorded, settings)
-    names = {trial.name for trial in wanted}
+    wanted = {trial.name for trial in _trials_to_time(recorded, settings)}
     with lock_output(out), Workers(workers) as pool:
         _, units = placed_units(session, recorded, out, settings, pool, problems)
         *_, units = with_gauges(units, pool, problems)
-        chosen = [unit for unit in units if unit.trial.name in names]
-        ladder = list(settings_to_try(tuple(wanted[0].camera_sources)))
-        trades = pool.run(partial(_time_seeing, chosen, repeats), ladder, "settings")
-        begin_step("while recorded")
-        for name, lead_s in ((LIVE, _LEAD_S), (LIVE_COLD, 0.0)):
-            trades.append(_time_live(chosen, repeats, name, lead_s))
-        begin_step("figures")
-        trades.append(_time_drawing(chosen, _standard(trades), repeats))
-        trades = _with_errors(session, chosen, trades)
+        chosen = [unit for unit in units if unit.trial.name in wanted]
+        trades = _with_errors(session, chosen, _time_all(chosen, repeats, pool))
     return _write(out, trades)
+
+
+def _time_all(units: Sequence[Unit], repeats: int, pool: Workers) -> list[Trade]:
+    """Time every setting, the evaluation while pushes are recorded, and the figures."""
+    ladder = list(settings_to_try(tuple(units[0].trial.camera_sources)))
+    trades = pool.run(partial(_time_seeing, units, repeats), ladder, "settings")
+    begin_step("while recorded")
+    trades.append(_time_live(units, repeats, LIVE, _LEAD_S))
+    trades.append(_time_live(units, repeats, LIVE_COLD, 0.0))
+    begin_step("figures")
+    trades.append(_time_drawing(units, _standard(trades), repeats))
+    return trades
 
 
 def _trials_to_time(recorded: Sequence[Trial], settings: Settings) -> list[Trial]:

@@ -276,21 +276,22 @@ def _score_whisk(
     rows = []
     for frame, curve in curves.items():
         own = near.select(near.frame == frame)
-        if not len(own.offset_px):
+        if len(own.offset_px):
+            scored = _offsets_in_frame(own, camera, curve)
+            rows.append(of_frame(frame, NEAR, line=float(line[frame]), **scored))
+        else:
             rows.append(of_frame(frame, ELSEWHERE if frame in with_trace else ABSENT))
-            continue
-        rows.append(
-            of_frame(
-                frame,
-                NEAR,
-                line=float(line[frame]),
-                points=len(own.offset_px),
-                coverage_percent=_coverage_percent(own, camera, curve),
-                bias_px=float(np.mean(own.offset_px)),
-                scatter_px=float(np.std(own.offset_px)),
-            )
-        )
     return near, rows
+
+
+def _offsets_in_frame(own: BesideWire, camera: Camera, curve: np.ndarray) -> dict[str, float]:
+    """Return the fields of a FrameScore that a frame's points on the wire give."""
+    return {
+        "points": len(own.offset_px),
+        "coverage_percent": _coverage_percent(own, camera, curve),
+        "bias_px": float(np.mean(own.offset_px)),
+        "scatter_px": float(np.std(own.offset_px)),
+    }
 
 
 def _coverage_percent(own: BesideWire, camera: Camera, curve) -> float:
