@@ -12,6 +12,7 @@ from bench.analyses.runs import FITTED
 from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import (
     SLOPES_DEG,
+    PointStyle,
     add_legend,
     blank,
     colour_of,
@@ -95,16 +96,16 @@ def error_against_slope(
     lanes = _lanes(judged)
     figure = blank(9.6, 1.0 + 3.2 * len(panels))
     rows = figure.subplots(len(panels), 2, squeeze=False)
-    for (left, right), (panel, of_panel) in zip(rows, panels.items()):
+    for (left, right), (panel, every) in zip(rows, panels.items()):
         surface = surface_of.get(panel)
-        title = panel_title(*panel)
-        without_2 = [j for j in of_panel if j.estimator != "no_slip"]
-        _draw_estimators(left, of_panel, lanes, surface, settings)
+        without_2 = [j for j in every if j.estimator != "no_slip"]
+        _draw_estimators(left, every, lanes, surface, settings)
         _draw_estimators(right, without_2, lanes, surface, settings)
-        left.set_ylim(*_limits([j for j in of_panel if not j.one_factor]))
+        left.set_title(f"{panel_title(*panel)}: every estimator")
+        right.set_title(f"{panel_title(*panel)}: without (2)")
+        left.set_ylabel("error of d$_x$  [%]")
+        left.set_ylim(*_limits([j for j in every if not j.one_factor]))
         right.set_ylim(*_limits(without_2))
-        left.set(ylabel="error of d$_x$  [%]", title=f"{title}: every estimator")
-        right.set_title(f"{title}: without (2)")
     for axes in rows[-1]:
         axes.set_xlabel("slope β  [°]")
     add_legend(figure, 3)
@@ -250,10 +251,6 @@ def _draw_group(
                 [j.error_percent for _, j in drawn],
                 [j.error_sigma_percent for _, j in drawn],
                 [whisk_url(j.trial, j.whisk) for _, j in drawn],
-                marker="o",
-                colour=colour,
-                is_filled=is_filled,
-                size_points=4.0,
-                label=label,
+                PointStyle(colour, label, is_filled=is_filled),
             )
             label = None

@@ -257,18 +257,21 @@ def _least_scatter(some: Sequence[FeltContact], whisker: Whisker, degree: int) -
         return np.sum(residuals(alphas_rad) ** 2, axis=0)
 
     on_grid = squares(_GRID_RAD)
-    last = int(np.flatnonzero(np.isfinite(on_grid))[-1])
     best = int(np.nanargmin(on_grid))
-    if best in (0, last):
+    if best in (0, _last_known(on_grid)):
         status = reason("friction_at_bound", bound_deg=np.degrees(_GRID_RAD[best]))
         return _AlphaFit(np.nan, status=status)
-    bounds = (_GRID_RAD[best - 1], _GRID_RAD[best + 1])
-    alpha_rad, least = _bounded_minimum(squares, bounds)
+    alpha_rad, least = _bounded_minimum(squares, (_GRID_RAD[best - 1], _GRID_RAD[best + 1]))
     freedom = len(some) - degree - 2  # the object's coefficients, and α
     if freedom < 1:
         return _AlphaFit(alpha_rad)
     sigma = _fit_sigma(residuals, alpha_rad, least / freedom)
     return _AlphaFit(alpha_rad, sigma, freedom)
+
+
+def _last_known(values: np.ndarray) -> int:
+    """Return the place of the last finite value (n,)."""
+    return int(np.flatnonzero(np.isfinite(values))[-1])
 
 
 def _bounded_minimum(

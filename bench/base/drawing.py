@@ -6,6 +6,7 @@ import struct
 import zlib
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
@@ -81,6 +82,7 @@ _PNG = (
     cv2.IMWRITE_PNG_FILTER,
     cv2.IMWRITE_PNG_FILTER_NONE,
 )
+_POINT_SIZE = 4.0  # points: of a whisk in a figure
 _HEADER_BYTES = 33  # of a PNG: its signature and what says the size
 SLOPES_DEG = np.linspace(0.0, 82.0, 329)  # at which curves over the slope are drawn
 
@@ -150,33 +152,38 @@ def whisk_url(trial: str, whisk: int) -> str:
     return f"whisk:{quote(trial, safe='')}/{whisk}"
 
 
+@dataclass(frozen=True)
+class PointStyle:
+    """How points are drawn, and what the legend says of them."""
+
+    colour: str
+    label: str | None = None
+    marker: str = "o"
+    is_filled: bool = True
+
+
 def draw_whisks(
     axes: "Axes",
     x: Sequence[float],
     y: Sequence[float],
     sigma: Sequence[float],
     urls: Iterable[str],
-    *,
-    marker: str,
-    colour: str,
-    is_filled: bool = True,
-    size_points: float = 5.0,
-    label: str | None = None,
+    point_style: PointStyle,
 ) -> None:
     """Draw a point with its error bar for each whisk; each point links to its whisk.
 
     x, y, sigma (n,): in the units of the axes. urls (n,): see `whisk_url`.
     """
-    axes.errorbar(x, y, sigma, fmt="none", ecolor=colour, elinewidth=1.0, capsize=2.5)
+    axes.errorbar(x, y, sigma, fmt="none", ecolor=point_style.colour, elinewidth=1.0, capsize=2.5)
     points = axes.scatter(
         x,
         y,
-        s=size_points**2,
-        marker=marker,
-        facecolors=colour if is_filled else "white",
-        edgecolors=colour,
+        s=_POINT_SIZE**2,
+        marker=point_style.marker,
+        facecolors=point_style.colour if point_style.is_filled else "white",
+        edgecolors=point_style.colour,
         linewidths=0.8,
-        label=label,
+        label=point_style.label,
         zorder=3,
     )
     points.set_urls(list(urls))

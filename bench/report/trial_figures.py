@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bench.analyses.surfaces import FittedSurface
-from bench.base.drawing import blank, draw_whisks, style, whisk_url
+from bench.base.drawing import PointStyle, blank, draw_whisks, style, whisk_url
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.settings import Settings
 from bench.base.workers import Workers
@@ -171,14 +171,12 @@ def _draw_residuals(
         urls = []
         for p in mine:
             urls += [whisk_url(p.trial, p.whisk)] * len(p.moments_Nmm)
+        label = trial if len(by_trial) <= _MOST_NAMED else None
         draw_whisks(
             axes,
             np.concatenate([p.moments_Nmm[:, channel] for p in mine])[::every],
             np.concatenate([p.residuals_Nmm[:, channel] for p in mine])[::every],
             np.concatenate([p.moments_sigma_Nmm[:, channel] for p in mine])[::every],
             urls[::every],
-            marker=_MARKERS[number % len(_MARKERS)],
-            colour=f"C{number % 10}",
-            size_points=4.0,
-            label=trial if len(by_trial) <= _MOST_NAMED else None,
+            PointStyle(f"C{number % 10}", label, _MARKERS[number % len(_MARKERS)]),
         )

@@ -96,14 +96,14 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
     touch, whisk = _felt_whisk(unit, stroke, readout or Readout.bare())
     status = _missing(unit, stroke, touch, whisk, missing)
     usable = None if status else whisk
-    doubt = against_estimates(unit.contradictions, unit.gauges, seen)
     felt = as_felt(number, touch, usable, stroke.speed_rad_s, _delay_s(unit))
     felt = replace(felt, status=status, saturated=stroke.saturated)
     if usable is None:
         return felt
+    of_seen = against_estimates(unit.contradictions, unit.gauges, seen)
     felt = replace(
         felt,
-        status=joined(doubt, _beyond_calibration(unit, readout, usable)),
+        status=joined(of_seen, _beyond_calibration(unit, readout, usable)),
         shared_Nmm=readout.shared_Nmm(usable),
         by_camera_error_Nmm=readout.by_camera_error_Nmm(usable),
         phases=phases_of(unit.trial, stroke, touch, readout, seen, usable.beam),
@@ -111,7 +111,7 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
         with_drift=_with_drift(unit, stroke, readout),
     )
     felt = _against_pictures(felt, unit, stroke, readout, seen)
-    felt = _FeltStroke(unit, stroke, readout, touch).with_estimates(felt, usable)
+    felt = _EstimatedStroke(unit, stroke, readout, touch).with_estimates(felt, usable)
     return felt if seen.source != BY_STAGE else _against_stated(felt, seen)
 
 
@@ -162,7 +162,7 @@ def _delay_s(unit: Unit) -> Value:
 
 
 @dataclass(frozen=True, eq=False)
-class _FeltStroke:
+class _EstimatedStroke:
     """A stroke with its felt touch, to be given to estimators at any pushing angle."""
 
     unit: Unit

@@ -151,9 +151,23 @@ def measure_rig(
 
     session: without T_rig_board. Raises BadInput where the free strokes cannot be read.
     """
-    calibration = units[0].calibration
+    here, known, sources = _by_hub_marker(session, units[0].calibration)
+    exact = _as_exact(by_first_look())
+    known = replace(known, step=exact.step)
+    placed, both = _converge_on_strokes(_moved(here, exact, known), known, units, pool, problems)
+    return placed, (*sources, both)
+
+
+def _by_hub_marker(
+    session: Session, calibration: SessionCalibration
+) -> tuple[SessionCalibration, Placement, tuple[Placement, ...]]:
+    """Return the calibration moved to where a marker on the hub has the rig, taken as exact, the placement
+    by marker and first look, and that by the marker alone.
+
+    Without a marker it is placed by a first look at what turns.
+    """
     coarse = by_first_look()
-    exact = replace(coarse, covariance=np.zeros((6, 6)))
+    exact = _as_exact(coarse)
     known = coarse
     here = _moved(calibration, coarse, exact)
     markers = look_at_strokes(session, here.cameras).markers
@@ -164,13 +178,16 @@ def measure_rig(
         except Refused:
             break
         known = combine(coarse, hub)
-        here = _moved(here, exact, replace(known, covariance=exact.covariance))
+        here = _moved(here, exact, _as_exact(known))
         sources = (hub,)
         if np.all(np.abs(known.step) < _SMALL_STEP):
             break
-    known = replace(known, step=exact.step)
-    placed, both = _converge_on_strokes(_moved(here, exact, known), known, units, pool, problems)
-    return placed, (*sources, both)
+    return here, known, sources
+
+
+def _as_exact(placement: Placement) -> Placement:
+    """Return a placement without uncertainty."""
+    return replace(placement, covariance=np.zeros((6, 6)))
 
 
 def _converge_on_strokes(
@@ -255,14 +272,14 @@ def _converge(
     cameras whose uncertainty leaves out T_rig_board's, which is in the board's placement. Raises
     Refused where no stroke can be read.
     """
-    exact = replace(board, covariance=np.zeros((6, 6)))
+    exact = _as_exact(board)
     here = _moved(calibration, board, exact)
     for round_number in range(_MOST_ROUNDS):
         units = [replace(unit, calibration=here, stage=f"swing{round_number}") for unit in chosen]
         both = place(board, units, see_units(units, pool, "free strokes", problems))
         if np.all(np.abs(both.step) < _SMALL_STEP):
             break
-        here = _moved(here, exact, replace(both, covariance=exact.covariance))
+        here = _moved(here, exact, _as_exact(both))
         board = replace(board, step=board.step - both.step)
         both = replace(both, step=exact.step)
     return _with_scale(_moved(here, exact, both), both), both
