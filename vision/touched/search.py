@@ -231,7 +231,10 @@ class BarSearch:
             others = [one.axis for one in candidates if one.camera is camera]
             if any(offset_px(camera, axis, other) < _SAME_LINE_PX for other in others):
                 continue
-            for line in self._lines([view], axis).values():
+            lines: dict[str, BarLineEstimate] = {}
+            with suppress(Refused):  # a camera that looks along an axis has no line of it
+                lines = self._lines([view], axis)
+            for line in lines.values():
                 if line.is_bar:
                     through = self._axis_through(axis, {camera.name: line})
                     candidates.append(LineCandidate(camera, through, line.joint_score))

@@ -75,6 +75,17 @@ def test_lines_that_no_axis_fits_end_their_hypothesis_and_not_the_search(lamp, m
     assert max(offset_px(camera, found.axis, true) for camera in scene.cameras) < FOUND_PX
 
 
+def test_a_camera_that_looks_along_a_hypothesis_ends_it_and_not_the_search(lamp, monkeypatch):
+    scene, true = lamp
+    one = scene.cameras.cameras[0]
+    sight = true.point_mm - one.centre_mm
+    beside = true.point_mm + np.array([0.5, 0.0, 0.0])
+    along = BarAxis(beside, sight / np.linalg.norm(sight))
+    monkeypatch.setattr(search, "find_bars", lambda *_: [along, true])
+    found = search.BarSearch(scene).best_by_all_cameras()
+    assert max(offset_px(camera, found.axis, true) for camera in scene.cameras) < FOUND_PX
+
+
 def test_planes_of_two_cameras_meet_in_the_axis_that_both_see(lamp):
     scene, true = lamp
     one, other = scene.cameras
