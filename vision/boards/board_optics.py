@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.boards.corners import find_corners, to_8_bit
+from vision.boards.corners import Corners, by_face, find_corners, to_8_bit
 from vision.boards.edge_pixels import Windows
 from vision.boards.saddle import BLUR, fit_windows, predict_saddles, start_parameters
 from vision.geometry.board import Board
@@ -52,7 +52,8 @@ def estimate_optics(grey: np.ndarray, board: Board) -> Optics:
     makes.
     """
     picture = to_8_bit(grey)
-    corners = find_corners(picture, board)
+    faces = by_face(find_corners(picture, board), board)
+    corners = max(faces, key=len, default=Corners.none())
     cut = board.cut(picture, corners.px, corners.ids)
     if cut is None:
         return UNKNOWN

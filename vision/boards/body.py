@@ -131,15 +131,14 @@ class Body(Board):
         return Corners.join(found)
 
     def cut(self, grey: np.ndarray, px: np.ndarray, ids: np.ndarray) -> tuple | None:
-        """Return the pixels about corners of the face that shows most of them, and a frame at each;
-        None where too few are seen.
+        """Return the pixels about corners of one face, and a frame at each; None where too few are
+        seen.
         """
         if not len(ids):
             return None
-        number = np.bincount(self.face_of[ids]).argmax()
-        own = self.face_of[ids] == number
+        number = self.face_of[ids[0]]
         face = self.faces[number]
-        return face.cut(grey, px[own], ids[own] - number * len(face.corners_mm))
+        return face.cut(grey, px, ids - number * len(face.corners_mm))
 
     def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:
         """Return a sentence naming the setting that would find the first face; None if any face is

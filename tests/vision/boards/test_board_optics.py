@@ -7,6 +7,7 @@ import pytest
 from tests.scenes.board_pictures import BLUR_PX, clean_picture
 from tests.studies.accuracy.board_scenes import BOARD
 from vision.boards.board_optics import estimate_optics
+from vision.boards.body import Body
 from vision.boards.corners import find_corners
 from vision.geometry.optics import Optics, known_gamma, probable_gammas
 
@@ -34,6 +35,15 @@ def test_a_lens_out_of_focus_shows_by_its_blur(rng):
     light = cv2.GaussianBlur(clean_picture(BOARD), (0, 0), 1.7)
     optics = estimate_optics(through_curve(light, 2.2, rng), BOARD)
     assert abs(np.log(optics.blur_px / np.hypot(BLUR_WITH_PIXEL_PX, 1.7))) < 0.05
+
+
+def test_a_body_shows_curve_and_blur_by_its_fullest_face(rng):
+    """Two faces in one picture, one of them in part: each corner is that of its own face."""
+    body = Body((8, 6), 15.0, marker_mm=11.0, dictionary="DICT_5X5_100", first_ids=(0, 24))
+    whole, part = (clean_picture(face) for face in body.faces)
+    optics = estimate_optics(through_curve(np.vstack([whole, part[:320]]), 1.6, rng), body)
+    assert abs(np.log(optics.gamma / 1.6)) < 0.03
+    assert abs(np.log(optics.blur_px / BLUR_WITH_PIXEL_PX)) < 0.01
 
 
 def test_pixels_that_are_cut_off_show_no_curve(rng):
