@@ -125,7 +125,7 @@ def evidences_of(
     def compute(each_pixel: bool) -> np.ndarray:
         """Return the evidences (m w b,), from summed pixels or from each pixel."""
         gathered = GatheredEquations(pieces, knot_weights, robust, each_pixel=each_pixel)
-        normal = gathered.normal(shifts_px, models, task.terms).flattened()
+        normal = gathered.normal(shifts_px, models, task.terms)
         return _evidences(normal, own, contrast, no_chance)
 
     evidences = exactly_if_needed(compute)

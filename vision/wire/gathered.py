@@ -6,6 +6,7 @@ others are evaluated pixel by pixel.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -19,7 +20,7 @@ _BACKGROUND_MARGIN_PX = 2.0
 # [1] Share of a segment's pixels that must show the background alone, else it is not summed:
 # without such pixels cubic interpolation leaves negative eigenvalues. Half or twice it moves
 # nothing on the fixtures. Study: thresholds.py wire.gathered _LEAST_BACKGROUND_SHARE ….
-_LEAST_BACKGROUND_SHARE = 0.2
+_LEAST_BACKGROUND_SHARE = 0.15
 
 
 class GatheredEquations:
@@ -64,23 +65,21 @@ class GatheredEquations:
     def normal(
         self, shifts_px: Sequence[float], models: Sequence[tuple[float, float]], terms: int
     ) -> ShadingEquations:
-        """Return the normal equations (shifts, models, …) of segments moved by each common shift,
+        """Return the normal equations (shifts · models, …) of segments moved by each common shift,
         px at their mean half-width.
 
         models: of each how many times as thick the rod is, and the blur, px.
         terms: number of shading functions; size = knots × terms.
         """
-        lefts = []
-        rights = []
-        powers = []
-        for shift_px in shifts_px:
-            groups = []
-            for group, relative_radius in zip(self._groups, self._relative_radii):
-                groups.append(group.normal_at(shift_px * relative_radius, models, terms))
-            lefts.append(sum(group.left for group in groups))
-            rights.append(sum(group.right for group in groups))
-            powers.append(sum(group.power for group in groups))
-        return ShadingEquations(np.array(lefts), np.array(rights), np.array(powers))
+        parts = []
+        for group, relative_radius in zip(self._groups, self._relative_radii):
+            moved_px = np.multiply.outer(shifts_px, relative_radius)
+            parts.append(group.normal_at(moved_px, models, terms))
+        return ShadingEquations(
+            left=sum(part.left for part in parts),
+            right=sum(part.right for part in parts),
+            power=sum(part.power for part in parts),
+        )
 
 
 def exactly_if_needed(compute: Callable[[bool], np.ndarray]) -> np.ndarray:
@@ -111,14 +110,14 @@ class _PixelSegments:
         self._robust = robust
 
     def normal_at(
-        self, shift_px: np.ndarray, models: Sequence[tuple[float, float]], terms: int
+        self, shifts_px: np.ndarray, models: Sequence[tuple[float, float]], terms: int
     ) -> ShadingEquations:
-        """Return the normal equations (models, …) of the segments, each moved by its shift (s,)."""
-        moved = self._pieces.moved(shift_px)
+        """Return the normal equations (shifts · models, …) of the segments, moved by shifts (n, s)."""
         lefts = []
         rights = []
         powers = []
-        for wider, blur_px in models:
+        for shift_px, (wider, blur_px) in product(shifts_px, models):
+            moved = self._pieces.moved(shift_px)
             thick = replace(moved, radius_px=wider * moved.radius_px)
             equations = SegmentEquations(thick, blur_px, terms)
             left, right = equations.shared(self._knot_weights, self._robust)

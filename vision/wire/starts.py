@@ -75,13 +75,14 @@ def _evidences(task: ShadedSegments, log_blurs: np.ndarray, each_pixel: bool) ->
     models = [(1.0, float(blur)) for blur in np.exp(log_blurs)]
     gathered = GatheredEquations(task.pieces, task.knot_weights, every, each_pixel=each_pixel)
     normal = gathered.normal(_START_SHIFTS_PX, models, task.terms)
-    evidences = normal.power + task.blur_deviation(log_blurs) ** 2
+    evidences = normal.power.reshape(-1, len(models)) + task.blur_deviation(log_blurs) ** 2
+    equations = zip(normal.left, normal.right)
     for k, shift in enumerate(_START_SHIFTS_PX):
         moved = task.pieces.moved(shift * task.pieces.relative_radius)
         prior = wave_prior(moved, task.terms)
         stiff = stiffness(prior, task.knots)
-        for b in range(len(log_blurs)):
-            evidences[k, b] += _evidence_of_shading(normal.left[k, b], normal.right[k, b], stiff)
+        for b in range(len(models)):
+            evidences[k, b] += _evidence_of_shading(*next(equations), stiff)
     return evidences
 
 

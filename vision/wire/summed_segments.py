@@ -45,12 +45,6 @@ class ShadingEquations(NamedTuple):
     right: np.ndarray
     power: np.ndarray
 
-    def flattened(self) -> "ShadingEquations":
-        """Return the normal equations with all models along one axis."""
-        size = self.right.shape[-1]
-        left = self.left.reshape(-1, size, size)
-        return ShadingEquations(left, self.right.reshape(-1, size), self.power.ravel())
-
     def select(self, some: np.ndarray) -> "ShadingEquations":
         """Return the normal equations of some models, by their indices along the first axis."""
         return ShadingEquations(self.left[some], self.right[some], self.power[some])
@@ -80,15 +74,16 @@ class SummedSegments:
         self._one_by_knot_pair = knot_pairs.reshape(len(pieces), -1).T @ self._one
 
     def normal_at(
-        self, shift_px: float, models: Sequence[tuple[float, float]], terms: int
+        self, shifts_px: np.ndarray, models: Sequence[tuple[float, float]], terms: int
     ) -> ShadingEquations:
-        """Return the normal equations (models, …) of the segments moved by one shift.
+        """Return the normal equations (shifts · models, …) of the segments moved by each shift.
 
         A pixel's grey level is modelled as Σ cᵢ lightᵢ + gain · background + offset · uncovered.
         The coefficients c are wanted; gain and offset of each segment are eliminated, by taking
         from the normal equations what each of the two explains.
         """
-        shapes = _Shapes.of(self._distance_px - shift_px, self._radius_px, models, terms)
+        distance_px = self._distance_px[:, None] - shifts_px
+        shapes = _Shapes.of(distance_px, self._radius_px, models, terms)
         by_grey = self._sum(self._grey, shapes.columns)  # (s, models, terms + 1)
         by_gain = self._explained_by_gain(shapes)
         by_offset = self._explained_by_offset(shapes, by_grey[..., -1:], by_gain)
@@ -182,7 +177,8 @@ class SummedSegments:
 
 @dataclass(frozen=True)
 class _Shapes:
-    """Blurred pictures of a rod under several models, at distances (d,) from its axis.
+    """Blurred pictures of a rod under several models, each shift with each width and blur, at d
+    distances from its axis.
 
     light (d, models, terms): of the shading functions. uncovered (d, models, 1): share that the rod
     leaves open. background (d, models, 3): factors of the background, its slope and its curvature.
@@ -201,14 +197,15 @@ class _Shapes:
         models: Sequence[tuple[float, float]],
         terms: int,
     ) -> "_Shapes":
-        """Return the pictures of a rod of a half-width, times as much and blurred as each model
-        says.
+        """Return the pictures at distances (d, shifts) of a rod of a half-width, times as much and
+        blurred as each model says.
         """
-        shapes = []
-        for wider, blur_px in models:
-            shapes.append(profiles(distance_px, wider * radius_px, blur_px, terms))
-        shapes = np.stack(shapes, axis=1)
-        blurs_px = np.array([[blur_px] for _, blur_px in models])
+        count, shifts = distance_px.shape
+        shapes = np.empty((count, shifts, len(models), terms + 2))
+        for k, (wider, blur_px) in enumerate(models):
+            shapes[:, :, k] = profiles(distance_px, wider * radius_px, blur_px, terms)
+        shapes = shapes.reshape(count, shifts * len(models), -1)
+        blurs_px = np.tile([[blur_px] for _, blur_px in models], (shifts, 1))
         uncovered = 1.0 - shapes[..., :1]
         by_slope = blurs_px * shapes[..., -2:-1]
         by_curvature = -0.5 * blurs_px**2 * shapes[..., -1:]

@@ -34,7 +34,7 @@ def both(pieces, **how):
     """Normal matrix, right side and squares as gathered, and pixel by pixel."""
     hats, robust = KNOTS.weights(pieces), 1.0 / (1.0 + np.arange(len(pieces)) % 4)
     told = [
-        part[0, 0]
+        part[0]
         for part in GatheredEquations(pieces, hats, robust, **how).normal(
             [SHIFT_PX], [(WIDER, BLUR_PX)], 11
         )
