@@ -7,7 +7,7 @@ import pytest
 
 from tests.scenes.model_scenes import CAMERAS, scene, with_points
 from vision.calibration.swing import by_swing
-from vision.fit.base_line import base_lines
+from vision.fit.base_line import base_lines, drift_sigma_px
 from vision.fit.problem import State, wire_modes
 from vision.geometry.camera import Cameras
 from vision.geometry.rotation import compose, exp_rotation, invert_transform
@@ -67,16 +67,16 @@ def test_cameras_that_err_together_shift_and_turn_the_swing_as_much():
     np.testing.assert_allclose((moved - still) / scale, np.eye(6), atol=0.02)
 
 
-def drifting(problem, camera, mode, share):
-    """The problem with a camera's lines of the wire off by a share of the sigma of one of its modes."""
-    sigma_px = problem.blocks.wire_offsets[camera].sigma[mode]
+def drifting(problem, camera, drift, share):
+    """The problem with a camera's lines of the wire off by a share of the sigma of one of their drifts."""
+    sigma_px = drift_sigma_px(problem, camera)[drift]
     seen = []
     for one in problem.seen:
         if one.frame >= 0 and one.camera == camera:
             points = one.points
             motor = np.full(len(points), problem.motor_rad[one.frame])
             modes = wire_modes(problem.wire.length_mm, points.place, motor, problem.motor_rad)
-            off_px = share * sigma_px * modes[:, mode]
+            off_px = share * sigma_px * modes[:, 2 + drift]
             one = replace(
                 one, points=replace(points, px=points.px + off_px[:, None] * points.normal)
             )
@@ -92,8 +92,8 @@ def test_what_drifts_as_the_whisker_turns_is_in_the_sigma_of_the_axis_s_lean_and
     share = 0.01
     steps = []
     for camera in range(len(problem.cameras)):
-        for mode in range(2, 6):
-            moved = by_swing(base_lines(drifting(problem, camera, mode, share), state))
+        for drift in range(4):
+            moved = by_swing(base_lines(drifting(problem, camera, drift, share), state))
             steps.append((moved.step - placement.step) / share)
     sigma = np.sqrt(np.diag(placement.shared - lines.shared_covariance))
     leans_and_along = [0, 1, 3]
