@@ -13,6 +13,7 @@ N·mm, lengths in mm.
 """
 
 from dataclasses import dataclass
+from functools import partial
 from math import atan2, cos, hypot, nan, sin
 
 import numpy as np
@@ -20,6 +21,7 @@ import numpy as np
 from estimator import distance, first_order
 from estimator.beam import Beam
 from estimator.contact_state import felt_covariance
+from estimator.numerics import central_differences
 from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
@@ -142,21 +144,12 @@ def _solution(felt: np.ndarray, beam: Beam) -> np.ndarray:
     return np.array([float(beam.distance_mm(as_cylinder)), beta, beta - atan2(*there)])
 
 
-def _gradient(felt: np.ndarray, beam: Beam) -> np.ndarray:
-    """Differentiate `_solution` (3,) by the six felt values: (6, 3), by central differences."""
-    moment = hypot(felt[1], felt[2])
-    steps = _STEP * np.array([felt[0], moment, moment, felt[3], moment, moment])
-    rows = []
-    for step in np.diag(steps):
-        change = _solution(felt + step, beam) - _solution(felt - step, beam)
-        rows.append(change / (2 * step.max()))
-    return np.array(rows)
-
-
 def _sigmas(felt: np.ndarray, covariance: np.ndarray, beam: Beam) -> np.ndarray:
     """Return one sigma (3,) of `_solution` where the felt values have a covariance (6, 6)."""
-    gradient = _gradient(felt, beam)
-    return np.sqrt(np.einsum("ik,ij,jk->k", gradient, covariance, gradient))
+    moment = hypot(felt[1], felt[2])
+    sizes = np.array([felt[0], moment, moment, felt[3], moment, moment])
+    jacobian = central_differences(partial(_solution, beam=beam), felt, _STEP * sizes)  # (3, 6)
+    return np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))
 
 
 def _covariance(there: Whisk, back: Whisk, shared) -> np.ndarray:

@@ -355,21 +355,17 @@ def _model_share(whisk, settings, d_x, left):
     """Return the relative sigma of (10) itself; 0 without a distance or without a thickness to
     allow for.
     """
-    if isnan(d_x) or settings.object_reach_mm == 0:
-        return 0.0
-    return uncertainty.model_share(
-        whisk.theta_at_rad,
-        _phi(whisk),
-        settings.alpha_est_rad,
-        d_x,
-        reach=settings.object_reach_mm,
-        tilt_sigma=settings.tilt_sigma_rad,
-        left=left,
-    )
+    return _share(whisk, settings, d_x, left, settings.object_reach_mm, 1.0)
 
 
 def _share_left(whisk, settings, d_x, left):
     """Return the relative sigma that is left of (10) when its first order has been subtracted."""
+    held_spread = first_order.HELD_SPREAD if is_held(whisk) else 1.0
+    return _share(whisk, settings, d_x, left, _unknown_reach_mm(settings), held_spread)
+
+
+def _share(whisk, settings, d_x, left, reach_mm, held_spread):
+    """Return the relative sigma of (10) by what a reach and a held contact leave open."""
     if isnan(d_x) or settings.object_reach_mm == 0:
         return 0.0
     return uncertainty.model_share(
@@ -377,11 +373,16 @@ def _share_left(whisk, settings, d_x, left):
         _phi(whisk),
         settings.alpha_est_rad,
         d_x,
-        reach=settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0,
+        reach=reach_mm,
         tilt_sigma=settings.tilt_sigma_rad,
         left=left,
-        held_spread=first_order.HELD_SPREAD if is_held(whisk) else 1.0,
+        held_spread=held_spread,
     )
+
+
+def _unknown_reach_mm(settings):
+    """Return the most that the object's radius may be, 0 where it is known."""
+    return settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0
 
 
 def _share_of_rod(whisk, settings, d_x, left):
@@ -390,9 +391,9 @@ def _share_of_rod(whisk, settings, d_x, left):
         return 0.0
     theta = whisk.theta_at_rad
     alpha = settings.alpha_est_rad
-    unknown_reach = settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, _phi(whisk), alpha)
-    rolling = first_order.rolling(theta, unknown_reach, _phi(whisk), alpha, d_x, left)
+    reach_mm = _unknown_reach_mm(settings)
+    rolling = first_order.rolling(theta, reach_mm, _phi(whisk), alpha, d_x, left)
     by_friction = _ROD_BY_FRICTION * tan(alpha)
     held = first_order.HELD_SPREAD * first_order.dragging(theta, alpha) if is_held(whisk) else 0.0
     return hypot(leaning, rolling, by_friction, _ROD_WITHOUT_FRICTION, held)

@@ -10,6 +10,7 @@ from math import cos, nan, sqrt
 import numpy as np
 
 from estimator.beam import Beam
+from estimator.numerics import central_differences
 from estimator.whisk import Estimate, Whisk
 
 # [1] Step of central differences, relative.
@@ -139,10 +140,11 @@ def _quantities(d_x: float, inputs: np.ndarray, beam: Beam) -> np.ndarray:
 def _derivatives(d_x: float, inputs: np.ndarray, beam: Beam) -> tuple[np.ndarray, np.ndarray]:
     """Differentiate `_quantities` by d_x (3,) and by θ, m_y, m_z and α_est (3, 4)."""
     moment = np.hypot(inputs[1], inputs[2])
-    steps = _STEP * np.array([d_x, inputs[0], moment, moment, 1.0])
-    columns = []
-    for step in np.diag(steps):
-        above = _quantities(d_x + step[0], inputs + step[1:], beam)
-        below = _quantities(d_x - step[0], inputs - step[1:], beam)
-        columns.append((above - below) / (2 * step.sum()))
-    return columns[0], np.stack(columns[1:], axis=1)
+    sizes = np.array([d_x, inputs[0], moment, moment, 1.0])
+
+    def quantities(d_x_and_inputs: np.ndarray) -> np.ndarray:
+        """Compute the quantities (3,) from the distance and the inputs (5,)."""
+        return _quantities(d_x_and_inputs[0], d_x_and_inputs[1:], beam)
+
+    derivatives = central_differences(quantities, np.append(d_x, inputs), _STEP * sizes)
+    return derivatives[:, 0], derivatives[:, 1:]

@@ -89,11 +89,12 @@ def contour(touches: TouchingLines) -> Contour | NamedReason:
 
 
 def _crossings(touches: TouchingLines, line: np.ndarray, following: np.ndarray) -> np.ndarray:
-    """Return where (k, 2) lines cross those that follow."""
-    normal = touches.normal
-    reach = np.sum(normal * touches.base_mm, axis=-1) + touches.radius_mm
-    sides = np.stack([normal[line], normal[following]], axis=1)  # (k, 2, 2)
-    return np.linalg.solve(sides, np.stack([reach[line], reach[following]], -1)[..., None])[..., 0]
+    """Return where (k, 2) lines cross those that follow: the points x of n·x = c of both."""
+    normal = touches.normal  # n
+    reach_mm = np.sum(normal * touches.base_mm, axis=-1) + touches.radius_mm  # c
+    both = np.stack([line, following], axis=1)  # (k, 2)
+    crossing = np.linalg.solve(normal[both], reach_mm[both][..., None])
+    return crossing[..., 0]
 
 
 def _outward_sigma_mm(

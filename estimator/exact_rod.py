@@ -13,7 +13,7 @@ halfway, with friction against the mean motion, touch the same bar; through thre
 All is solved in the rod's own units: lengths in the whisker's, forces in EI/L², moments in EI/L.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from math import nan
 
@@ -23,7 +23,9 @@ from numpy.polynomial import polynomial
 from estimator import first_order
 from estimator.beam import Beam
 from estimator.distance import with_friction
+from estimator.numerics import runge_kutta
 from estimator.reasons import NamedReason
+from estimator.vectors import cross, cross_matrices, dot, turned_about_z
 
 UNCONVERGED = NamedReason(
     "rod_unconverged",
@@ -194,30 +196,30 @@ class _Rod:
         theta, m_y, m_z, alpha = inputs.T
         heading = unknowns[:, 4]
         now, halfway = self._bent(unknowns, theta)
-        size = np.hypot(m_y, m_z)
-        sideways, lengthways = self._friction(alpha, heading)
-        beta = _slope(now.force, sideways)
+        friction = self._friction(alpha, heading)
+        beta = _slope(now.force, friction.sideways)
         bar = np.stack([0.0 * beta, np.sin(beta), np.cos(beta)], axis=1)
         across = np.stack([0.0 * beta, -np.cos(beta), np.sin(beta)], axis=1)
         axis = self._axis(now, bar)
-        first, first_axis, first_arc = self._first_touch(axis[:, 0], bar, now.arc)
+        first = self._first_touch(axis[:, 0], bar, now.arc)
         side = np.copysign(1.0, m_y)
-        way_halfway = _way(halfway, first, first_arc, bar, side)
-        mean_heading, latest = _headings(way_halfway, _way(now, first, first_arc, bar, side))
-        sideways_halfway, lengthways_halfway = self._friction(alpha, mean_heading)
-        off_halfway = (self._axis(halfway, bar) - first_axis) / theta[:, None]
+        way_halfway = _way(halfway, first, bar, side)
+        mean_heading, latest = _headings(way_halfway, _way(now, first, bar, side))
+        friction_halfway = self._friction(alpha, mean_heading)
+        off_halfway = (self._axis(halfway, bar) - first.axis) / theta[:, None]
+        moment = np.hypot(m_y, m_z)
         residuals = [
-            (now.moment[:, 1] - m_y) / size,
-            (now.moment[:, 2] - m_z) / size,
-            _along(now, bar) - lengthways - np.cos(alpha) * self._growth(now.arc),
-            _dot(axis - first_axis, across) / theta,
+            (now.moment[:, 1] - m_y) / moment,
+            (now.moment[:, 2] - m_z) / moment,
+            self._unexplained_along(now, bar, alpha, friction),
+            dot(axis - first.axis, across) / theta,
             heading if self.held else _wrapped(heading - latest),
-            _slope(halfway.force, sideways_halfway) - beta,
-            _along(halfway, bar) - lengthways_halfway - np.cos(alpha) * self._growth(halfway.arc),
-            _dot(off_halfway, across),
+            _slope(halfway.force, friction_halfway.sideways) - beta,
+            self._unexplained_along(halfway, bar, alpha, friction_halfway),
+            dot(off_halfway, across),
             off_halfway[:, 0],
         ]
-        return np.stack([*residuals, np.linalg.norm(first, axis=1), beta])
+        return np.stack([*residuals, np.linalg.norm(first.point, axis=1), beta])
 
     def _bent(self, unknowns: np.ndarray, theta: np.ndarray) -> tuple["_Bent", "_Bent"]:
         """Return the rods of n sets of unknowns at the end of the push, and halfway."""
@@ -225,38 +227,47 @@ class _Rod:
         forces = np.concatenate([unknowns[:, :3], unknowns[:, 5:8]])
         arcs = np.concatenate([unknowns[:, 3], unknowns[:, 8]])
         point, force, tangent = self._march(forces, arcs)
-        moment = -np.cross(point, force)
-        turns = np.concatenate([theta, 0.5 * theta])
-        vectors = [_turned(each, turns) for each in (point, force, tangent)]
-        both = [*vectors, moment, arcs]
-        return _Bent(*(each[:count] for each in both)), _Bent(*(each[count:] for each in both))
+        turns = np.concatenate([theta, 0.5 * theta])  # from the hub's axes to the contact frame's
+        both = _Bent(
+            point=turned_about_z(point, turns),
+            force=turned_about_z(force, turns),
+            tangent=turned_about_z(tangent, turns),
+            moment=cross(force, point),
+            arc=arcs,
+        )
+        return both.select(slice(count)), both.select(slice(count, None))
 
     def _axis(self, bent: "_Bent", bar: np.ndarray) -> np.ndarray:
         """Return the points (n, 3) of the bars' axes that contacts lie before."""
         return bent.point - self._normal(bent.tangent, bar, bent.arc) * self._reach(bent.arc)
 
-    def _friction(self, alpha: np.ndarray, heading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return friction sideways and along the rod, away from the base, over the force (n,).
+    def _unexplained_along(
+        self, bent: "_Bent", bar: np.ndarray, alpha: np.ndarray, friction: "_Friction"
+    ) -> np.ndarray:
+        """Return the part (n,) of forces along rods that neither friction nor their taper explains."""
+        by_taper = np.cos(alpha) * self._growth(bent.arc)
+        return _along(bent, bar) - friction.lengthways - by_taper
+
+    def _friction(self, alpha: np.ndarray, heading: np.ndarray) -> "_Friction":
+        """Return the friction of contacts that move with these headings (n,) from sideways, rad.
 
         A contact that slides has it against its motion, of so large a heading from sideways; one that
         is held sideways has along the rod what holding it leaves, in the mean of slopes.
         """
         if self.held:
-            return 0.0 * alpha, first_order.HELD_SHARE * np.sin(alpha)
-        return np.sin(alpha) * np.cos(heading), np.sin(alpha) * np.sin(heading)
+            return _Friction(0.0 * alpha, first_order.HELD_SHARE * np.sin(alpha))
+        return _Friction(np.sin(alpha) * np.cos(heading), np.sin(alpha) * np.sin(heading))
 
-    def _first_touch(
-        self, x: np.ndarray, bar: np.ndarray, arc: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return points (n, 3) of the unloaded rod that touch bars (n, 3) whose axes are at x (n,), points
-        of these axes, and arcs (n,).
+    def _first_touch(self, x: np.ndarray, bar: np.ndarray, arc: np.ndarray) -> "_FirstTouch":
+        """Return where the unloaded rod touches bars (n, 3) whose axes are at x (n,), from arcs (n,)
+        nearby.
         """
         for _ in range(_TOUCH_ROUNDS):
             point = self.point(arc)
             tangent = self.tangent(arc)
             axis = point - self._normal(tangent, bar, arc) * self._reach(arc)
             arc = arc + (x - axis[:, 0]) / tangent[:, 0]
-        return point, axis, arc
+        return _FirstTouch(point, axis, arc)
 
     def _reach(self, arc: np.ndarray) -> np.ndarray:
         """Return the distance (n, 1) between centreline and the bar's axis."""
@@ -268,12 +279,12 @@ class _Rod:
 
     def _normal(self, tangent: np.ndarray, bar: np.ndarray, arc: np.ndarray) -> np.ndarray:
         """Return the unit normals (n, 3) of rods where they touch bars, towards the base's side of the push."""
-        across = (_cross_matrices(tangent) @ bar[..., None])[..., 0]
-        size = np.linalg.norm(across, axis=1, keepdims=True)
-        square = across / size
-        along = (_cross_matrices(bar) @ square[..., None])[..., 0]
-        part = self._growth(arc)[:, None] / size
-        return np.sqrt(1.0 - part**2) * square + part * along
+        across_both = cross(tangent, bar)
+        sine = np.linalg.norm(across_both, axis=1, keepdims=True)  # of the angle between both
+        square = across_both / sine
+        along = cross(bar, square)
+        lean = self._growth(arc)[:, None] / sine  # of a tapered rod's surface
+        return np.sqrt(1.0 - lean**2) * square + lean * along
 
     def _march(
         self, force: np.ndarray, arc: np.ndarray
@@ -287,27 +298,24 @@ class _Rod:
         rest = self.tangent(at)[..., None]
         rate = rate[..., None] / _STEPS
         softness = rate / self.width(at[..., None]) ** 4
-        force = force[..., None]
 
-        def change(k, turn, way):
-            """Return what turns and ways gain in a step towards the base, by the slopes at node k."""
-            tangent = turn @ rest[k]
-            moment = (_cross_matrices(way) @ force)[..., 0]
-            twist = _POISSON * _dot(tangent[..., 0], moment)[:, None]
-            curvature = softness[k] * (moment + twist * tangent[..., 0])
-            return -_cross_matrices(curvature) @ turn, rate[k] * tangent[..., 0]
+        def gain(place: float, pose: np.ndarray) -> np.ndarray:
+            """Return what turns and ways (n, 3, 4) gain in a step towards the base."""
+            node = int(2 * place)
+            turn = pose[..., :3]
+            tangent = (turn @ rest[node])[..., 0]
+            moment = cross(pose[..., 3], force)
+            twist = _POISSON * dot(tangent, moment)[:, None] * tangent
+            curvature = softness[node] * (moment + twist)
+            by_turn = -cross_matrices(curvature) @ turn
+            return np.concatenate([by_turn, (rate[node] * tangent)[..., None]], axis=2)
 
-        turn = np.broadcast_to(np.eye(3), (len(arc), 3, 3))
-        way = np.zeros((len(arc), 3))
-        for k in range(0, 2 * _STEPS, 2):
-            turn_1, way_1 = change(k, turn, way)
-            turn_2, way_2 = change(k + 1, turn + 0.5 * turn_1, way + 0.5 * way_1)
-            turn_3, way_3 = change(k + 1, turn + 0.5 * turn_2, way + 0.5 * way_2)
-            turn_4, way_4 = change(k + 2, turn + turn_3, way + way_3)
-            turn = turn + (turn_1 + 2 * turn_2 + 2 * turn_3 + turn_4) / 6
-            way = way + (way_1 + 2 * way_2 + 2 * way_3 + way_4) / 6
-        to_hub = np.swapaxes(turn, 1, 2)
-        found = to_hub @ np.stack([way, force[..., 0], rest[0, :, :, 0]], axis=2)
+        pose = np.broadcast_to(
+            np.eye(3, 4), (len(arc), 3, 4)
+        )  # not turned, no way from the contact
+        pose = runge_kutta(gain, pose, _STEPS)[-1]
+        to_hub = np.swapaxes(pose[..., :3], 1, 2)
+        found = to_hub @ np.stack([pose[..., 3], force, rest[0, :, :, 0]], axis=2)
         return found[..., 0], found[..., 1], found[..., 2]
 
     def _nodes(self, arc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -335,19 +343,37 @@ class _Bent:
     moment: np.ndarray
     arc: np.ndarray
 
+    def select(self, which: slice) -> "_Bent":
+        """Return some of the rods."""
+        return _Bent(*(getattr(self, field.name)[which] for field in fields(self)))
 
-def _way(
-    bent: _Bent, first: np.ndarray, first_arc: np.ndarray, bar: np.ndarray, side: np.ndarray
-) -> np.ndarray:
+
+@dataclass(frozen=True, eq=False)
+class _FirstTouch:
+    """Where n unloaded rods touch: points of the rods and of the bars' axes (n, 3), arcs (n,)."""
+
+    point: np.ndarray
+    axis: np.ndarray
+    arc: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _Friction:
+    """Friction over the force (n,): sideways, and along the rod away from its base."""
+
+    sideways: np.ndarray
+    lengthways: np.ndarray
+
+
+def _way(bent: _Bent, first: _FirstTouch, bar: np.ndarray, side: np.ndarray) -> np.ndarray:
     """Return how far rods have moved along bars since first touch, and have been drawn along themselves (2, n).
 
-    first (n, 3), first_arc (n,): where the unloaded rods touched. side (n,): the sign of the motion along bars (n, 3)
-    that counts as forward.
+    side (n,): the sign of the motion along bars (n, 3) that counts as forward.
     """
-    way = bent.point - first
-    moved = _dot(way, bar)
-    past = _dot(way, bent.tangent) - _dot(bent.tangent, bar) * moved
-    return np.stack([side * moved, bent.arc - first_arc - past])
+    way = bent.point - first.point
+    moved = dot(way, bar)
+    past = dot(way, bent.tangent) - dot(bent.tangent, bar) * moved
+    return np.stack([side * moved, bent.arc - first.arc - past])
 
 
 def _headings(halfway: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -358,8 +384,8 @@ def _headings(halfway: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def _along(bent: _Bent, bar: np.ndarray) -> np.ndarray:
     """Return the part (n,) of forces that acts along rods, across bars (n, 3)."""
-    lean = _dot(bent.tangent, bar)
-    part = _dot(bent.force, bent.tangent) - lean * _dot(bent.force, bar)
+    lean = dot(bent.tangent, bar)
+    part = dot(bent.force, bent.tangent) - lean * dot(bent.force, bar)
     return part / np.linalg.norm(bent.force, axis=1)
 
 
@@ -400,32 +426,7 @@ def _wrapped(angle: np.ndarray) -> np.ndarray:
 def _slope(force: np.ndarray, sideways: np.ndarray) -> np.ndarray:
     """Return the slope (n,) of bars along which friction has this part (n,) of forces (n, 3): (9)."""
     phi = np.arctan2(force[:, 2], -force[:, 1])
-    share = np.linalg.norm(force, axis=1) / np.hypot(force[:, 1], force[:, 2])
-    cone = np.arcsin(np.clip(sideways * share, -1.0, 1.0))
-    return phi + np.copysign(1.0, phi) * cone
-
-
-def _turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Return vectors (n, 3) turned about z by angles (n,): from the hub's axes to the contact frame's."""
-    x, y, z = vectors.T
-    c = np.cos(angle)
-    s = np.sin(angle)
-    return np.stack([c * x - s * y, s * x + c * y, z], axis=1)
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the products (n,) of vectors (n, 3)."""
-    return np.sum(a * b, axis=1)
-
-
-def _cross_matrices(vectors: np.ndarray) -> np.ndarray:
-    """Return the matrices (n, 3, 3) that map b to a × b, for vectors a (n, 3)."""
-    matrices = np.zeros((len(vectors), 3, 3))
-    x, y, z = vectors.T
-    matrices[:, 0, 1] = -z
-    matrices[:, 0, 2] = y
-    matrices[:, 1, 0] = z
-    matrices[:, 1, 2] = -x
-    matrices[:, 2, 0] = -y
-    matrices[:, 2, 1] = x
-    return matrices
+    in_plane = np.hypot(force[:, 1], force[:, 2])
+    sine = sideways * np.linalg.norm(force, axis=1) / in_plane
+    cone = np.arcsin(np.clip(sine, -1.0, 1.0))
+    return phi + np.copysign(cone, phi)

@@ -22,6 +22,7 @@ import numpy as np
 
 from estimator import distance, first_order, uncertainty
 from estimator.beam import Beam
+from estimator.numerics import central_differences
 from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
@@ -259,13 +260,9 @@ def _is_held(whisk: Whisk, contact: MovingContact) -> bool:
 def _gradient(solve: Callable, inputs: np.ndarray, beam: Beam) -> np.ndarray:
     """Compute the derivative (7,) of d_x by θ, m_y, m_z, α and u, by differences on both sides."""
     moment = hypot(inputs[1], inputs[2])
-    length = solve(inputs, beam).d_x_mm
-    steps = _STEP * np.array([inputs[0], moment, moment, 1.0, length, length, length])
-    gradient = np.zeros(len(steps))
-    for place, change in enumerate(np.diag(steps)):
-        after = solve(inputs + change, beam).d_x_mm
-        before = solve(inputs - change, beam).d_x_mm
-        gradient[place] = (after - before) / (2 * steps[place])
+    d_x_mm = solve(inputs, beam).d_x_mm
+    sizes = np.array([inputs[0], moment, moment, 1.0, d_x_mm, d_x_mm, d_x_mm])
+    gradient = central_differences(lambda at: solve(at, beam).d_x_mm, inputs, _STEP * sizes)
     return np.nan_to_num(gradient)
 
 

@@ -11,13 +11,11 @@ M falls all along the whisker, so that the integral is over M, from |m| at the b
 slope nor friction nor the angle of touch enters. Angles in rad, lengths in mm.
 """
 
-from functools import partial
-from itertools import pairwise
-
 import numpy as np
 
 from estimator import load_cell
 from estimator.beam import Beam
+from estimator.numerics import runge_kutta
 from estimator.reasons import NamedReason
 
 # [1] Steps of Runge and Kutta's fourth order from base to contact: twice as many move a contact at 20° by less than
@@ -38,13 +36,16 @@ def whisker_shape(
     ψ, rad, where the moment has fallen by equal steps; the last is the contact. NaN where it does not fall, or
     not within the length.
     """
-    levels = moment_Nmm * np.linspace(1.0, 0.0, _STEPS + 1)[:, None]
-    rates = partial(_rates, across_N=across_N, along_N=along_N, beam=beam)
-    shapes = [np.zeros((4, len(moment_Nmm)))]
+    fall = moment_Nmm / _STEPS
+
+    def gain(place: float, shape: np.ndarray) -> np.ndarray:
+        """Return what a shape (4, n) gains while the moment falls by a step."""
+        moment = moment_Nmm - place * fall
+        rates = _rates(moment, shape, across_N=across_N, along_N=along_N, beam=beam)
+        return -fall * rates
+
     with np.errstate(all="ignore"):
-        for start, end in pairwise(levels):
-            shapes.append(_step(rates, start, end, shapes[-1]))
-    return np.stack(shapes)
+        return runge_kutta(gain, np.zeros((4, len(moment_Nmm))), _STEPS)
 
 
 def _rates(
@@ -63,24 +64,16 @@ def _rates(
     return -np.stack([np.ones_like(arc), np.cos(slope), np.sin(slope), bend]) / per_arc
 
 
-def _step(rates, start: np.ndarray, end: np.ndarray, shape: np.ndarray) -> np.ndarray:
-    """Return the shape (4, n) at the moment `end` from that at `start`, by Runge and Kutta."""
-    step = end - start
-    middle = 0.5 * (start + end)
-    first = rates(start, shape)
-    second = rates(middle, shape + 0.5 * step * first)
-    third = rates(middle, shape + 0.5 * step * second)
-    last = rates(end, shape + step * third)
-    return shape + step / 6 * (first + 2 * second + 2 * third + last)
-
-
 def contact_in_hub(felt: np.ndarray, beam: Beam) -> np.ndarray:
     """Compute the contact (n, 3) in the hub's axes, mm, from m_y, m_z, f_x, f_y, f_z (n, 5); NaN where none is."""
     m_y, m_z, f_x, f_y, f_z = felt.T
     moment = np.hypot(m_y, m_z)
     across = load_cell.across(m_y, m_z, f_y, f_z)
-    _, x, back, _ = whisker_shape(moment, across, f_x, beam)[-1]
-    return np.stack([x, -back * m_z / moment, back * m_y / moment], axis=-1)
+    at_contact = whisker_shape(moment, across, f_x, beam)[-1]
+    _, x, back, _ = at_contact
+    y = -back * m_z / moment
+    z = back * m_y / moment
+    return np.stack([x, y, z], axis=-1)
 
 
 def contact(
@@ -107,8 +100,9 @@ def contact(
 
 def _gradient(felt: np.ndarray, beam: Beam) -> np.ndarray:
     """Compute the derivatives (3, 5) of the contact by m_y, m_z, f_x, f_y and f_z."""
-    sizes = np.repeat([np.hypot(*felt[:2]), np.linalg.norm(felt[2:])], [2, 3])
-    steps = _DIFFERENCE * sizes
+    moment = np.hypot(felt[0], felt[1])
+    force = np.linalg.norm(felt[2:])
+    steps = _DIFFERENCE * np.array([moment, moment, force, force, force])
     above = contact_in_hub(felt + np.diag(steps), beam)
     below = contact_in_hub(felt - np.diag(steps), beam)
     return ((above - below) / (2 * steps[:, None])).T

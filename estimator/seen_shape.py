@@ -24,8 +24,10 @@ from scipy.optimize import least_squares
 
 from estimator import load_cell
 from estimator.beam import Beam
+from estimator.numerics import central_differences
 from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
+from estimator.vectors import dot, turned_about_z
 
 FEW = NamedReason("whisker_points_few", "one camera shows too few points or frames of the whisker")
 NOT_PUSHED = NamedReason(
@@ -391,15 +393,15 @@ class _ShapeFit:
         seen = self.seen
         pushed = np.maximum(self.motor - vector[_TOUCH], 0.0)
         points, tangents = self.points(vector, self.along, pushed)
-        eye = _turn_about_z(seen.eye_mm, -self.motor)
-        along = _turn_about_z(np.cross(seen.across, seen.sight), -self.motor)
-        across = _turn_about_z(seen.across, -self.motor)
-        step = np.einsum("ni,ni->n", along, eye - points) / np.einsum("ni,ni->n", along, tangents)
+        eye = turned_about_z(seen.eye_mm, -self.motor)
+        along = turned_about_z(np.cross(seen.across, seen.sight), -self.motor)
+        across = turned_about_z(seen.across, -self.motor)
         # The whisker is straight over a step of a thousandth of its length.
+        step = dot(along, eye - points) / dot(along, tangents)
         from_eye = points + step[:, None] * tangents - eye
-        lateral = np.einsum("ni,ni->n", across, from_eye) / np.linalg.norm(from_eye, axis=1)
-        lateral = lateral - seen.shared_rad @ vector[_OWN:]  # rad
-        return np.concatenate([lateral / seen.sigma_rad, vector / self.prior])
+        lateral_rad = dot(across, from_eye) / np.linalg.norm(from_eye, axis=1)
+        own_rad = lateral_rad - seen.shared_rad @ vector[_OWN:]
+        return np.concatenate([own_rad / seen.sigma_rad, vector / self.prior])
 
     def observables(self, vector: np.ndarray) -> np.ndarray:
         """Compute (4,): touch in rad, d_x, force, and how far the contact has moved."""
@@ -445,19 +447,13 @@ class _ShapeFit:
         """Return the factor on sigmas, at least 1, by the residuals' scatter and the correlation of
         neighbours.
         """
-        same = np.diff(self.seen.frame) == 0
-        products = (residuals[1:] * residuals[:-1])[same]
+        are_neighbours = np.diff(self.seen.frame) == 0
+        products = (residuals[1:] * residuals[:-1])[are_neighbours]
         correlation = float(np.clip(products.mean() / np.mean(residuals**2), 0.0, 0.95))
-        scatter = np.sum(residuals**2) / max(len(residuals) - len(self.prior), 1)
-        return float(np.sqrt(max(scatter * (1 + correlation) / (1 - correlation), 1.0)))
-
-
-def _turn_about_z(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Turn vectors (n, 3) or (3,), each by its angle (n,), about z."""
-    x, y, z = np.moveaxis(np.asarray(vectors), -1, 0)
-    c = np.cos(angle)
-    s = np.sin(angle)
-    return np.stack([c * x - s * y, s * x + c * y, z + 0 * angle], axis=-1)
+        freedom = max(len(residuals) - len(self.prior), 1)
+        scatter = np.sum(residuals**2) / freedom
+        widening = scatter * (1 + correlation) / (1 - correlation)
+        return float(np.sqrt(max(widening, 1.0)))
 
 
 def _initial_parameters(fit: _ShapeFit) -> tuple[float, np.ndarray]:
@@ -496,10 +492,10 @@ class _PlanarShape:
         self.taper = fit.taper
         straight = np.zeros((len(self.arc), 3))
         straight[:, 0] = self.arc
-        to_eye = _turn_about_z(seen.eye_mm, -self.motor) - straight
-        across = _turn_about_z(seen.across, -self.motor)
+        to_eye = turned_about_z(seen.eye_mm, -self.motor) - straight
+        across = turned_about_z(seen.across, -self.motor)
         weight = 1.0 / (seen.sigma_rad * np.linalg.norm(to_eye, axis=1))  # 1/length
-        aim = np.einsum("ni,ni->n", across, to_eye) * weight
+        aim = dot(across, to_eye) * weight
         powers = self.arc[:, None] ** np.arange(4)
         self.side = across[:, 1] * weight
         self.aim = np.append(aim, np.zeros(4))
@@ -521,20 +517,14 @@ class _PlanarShape:
         """
         reach = np.full(len(self.arc), contact)
         shape = _deflection(self.arc, reach, self.taper) / bend(reach, reach, self.taper)
-        column = self.side * shape * np.maximum(self.motor - touch, 0.0)
-        design = np.column_stack([self.rest, np.append(column, np.zeros(4))])
+        by_bend = self.side * shape * np.maximum(self.motor - touch, 0.0)
+        design = np.column_stack([self.rest, np.append(by_bend, np.zeros(4))])
         values = np.linalg.lstsq(design, self.aim, rcond=None)[0]
-        cost = float(np.sum((design @ values - self.aim) ** 2)) if values[4] < 0 else np.inf
-        return cost, values
+        if values[4] >= 0:
+            return np.inf, values
+        return float(np.sum((design @ values - self.aim) ** 2)), values
 
 
 def _derivatives(function: Callable, vector: np.ndarray) -> np.ndarray:
-    """Compute the derivatives (values, parameters) of a function of the parameters by central
-    differences.
-    """
-    steps = 1e-5 * np.maximum(np.abs(vector), 1e-2)
-    columns = []
-    for step in np.diag(steps):
-        change = function(vector + step) - function(vector - step)
-        columns.append(change / (2 * step.sum()))
-    return np.stack(columns, axis=1)
+    """Compute the derivatives (values, parameters) of a function of the parameters."""
+    return central_differences(function, vector, 1e-5 * np.maximum(np.abs(vector), 1e-2))

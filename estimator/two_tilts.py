@@ -135,9 +135,11 @@ class _Equations:
     def refine(self, solution: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Solve for (d, μ) and its covariance with errors and weights at the solution so far."""
         models = [_model(whisk, solution, self.settings) for whisk in self.whisks]
-        held = np.array([model.held for model in models])
         error = np.array([model.error for model in models])
-        rows = np.column_stack([self.per_mm * (1 + error), np.where(held, 0.0, self.m_y)])
+        is_held = np.array([model.held for model in models])
+        by_distance = self.per_mm * (1 + error)
+        by_friction = np.where(is_held, 0.0, self.m_y)
+        rows = np.column_stack([by_distance, by_friction])
         return _weighted(rows, self.m_z, self.spread(models, solution))
 
     def spread(self, models: "Sequence[_TiltModel]", solution: np.ndarray) -> np.ndarray:
@@ -327,16 +329,20 @@ def _rolling(theta, phi, alpha, d_x, left, settings) -> tuple[float, float]:
 
 def _contact(whisk: Whisk, solution: np.ndarray, covariance: np.ndarray) -> SharedContact:
     """Convert (d, μ) with its covariance to d_x and α."""
-    length = whisk.beam.length_mm
-    d_x = whisk.beam.distance_mm(solution[0])
-    alpha = atan(max(solution[1], 0.0))
-    jacobian = np.diag([(d_x / solution[0]) ** 2, cos(alpha) ** 2])
+    d, mu = solution.tolist()
+    d_x = float(whisk.beam.distance_mm(d))
+    alpha = atan(max(mu, 0.0))
+    jacobian = np.diag([(d_x / d) ** 2, cos(alpha) ** 2])
     covariance = jacobian @ covariance @ jacobian
-    half = Z_95 * covariance[0, 0] ** 0.5
-    low = float(max(d_x - half, 0.0))
-    high = float(min(d_x + half, length))
-    status = BELOW_ZERO if solution[1] < -Z_95 * covariance[1, 1] ** 0.5 else ""
-    return SharedContact(float(d_x), alpha, covariance, low, high, status)
+    half_d_x, half_alpha = Z_95 * np.sqrt(np.diag(covariance))
+    return SharedContact(
+        d_x_mm=d_x,
+        alpha_rad=alpha,
+        covariance=covariance,
+        low_mm=float(max(d_x - half_d_x, 0.0)),
+        high_mm=float(min(d_x + half_d_x, whisk.beam.length_mm)),
+        status=BELOW_ZERO if mu < -half_alpha else "",
+    )
 
 
 def _without_contact(status: str) -> SharedContact:

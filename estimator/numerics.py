@@ -1,0 +1,38 @@
+"""Numerical methods that several estimators use: derivatives by differences, a march in steps."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+
+def central_differences(
+    function: Callable[[np.ndarray], np.ndarray], inputs: np.ndarray, steps: np.ndarray
+) -> np.ndarray:
+    """Return the derivatives (..., k) of a function's values (...) by each of its inputs (k,).
+
+    Each input goes to either side by its own step (k,).
+    """
+    derivatives = []
+    for change, step in zip(np.diag(steps), steps):
+        difference = function(inputs + change) - function(inputs - change)
+        derivatives.append(difference / (2 * step))
+    return np.stack(derivatives, axis=-1)
+
+
+def runge_kutta(
+    gain: Callable[[float, np.ndarray], np.ndarray], state: np.ndarray, steps: int
+) -> np.ndarray:
+    """Return the states (steps + 1, ...) of a march from a state (...), by Runge and Kutta's method
+    of fourth order.
+
+    gain: returns what a state gains in a step by its rate at a place, counted in steps.
+    """
+    states = [state]
+    for place in range(steps):
+        first = gain(place, state)
+        second = gain(place + 0.5, state + 0.5 * first)
+        third = gain(place + 0.5, state + 0.5 * second)
+        last = gain(place + 1.0, state + third)
+        state = state + (first + 2 * second + 2 * third + last) / 6
+        states.append(state)
+    return np.stack(states)
