@@ -33,7 +33,7 @@ def accuracy_line(accuracy: Accuracy, settings: Settings) -> str:
         return f"{name}: {errors} {_stated(accuracy)}{missing}"
     if accuracy.left_out:
         errors = _error_range(accuracy.left_out)
-        return f"{name}: no verdict, all {len(accuracy.left_out)} whisks are doubtful ({errors}).{missing}"
+        return f"{name}: no verdict, all {len(accuracy.left_out)} whisks have warnings ({errors}).{missing}"
     return f"{name}: it gave no distance.{missing}"
 
 
@@ -80,7 +80,7 @@ def _missing(accuracy: Accuracy) -> str:
         parts.append(f"a warning for {len(accuracy.warned)} ({accuracy.warned[0].status})")
     if accuracy.judged and accuracy.left_out:
         errors = _error_range(accuracy.left_out)
-        parts.append(f"{len(accuracy.left_out)} doubtful left out ({errors})")
+        parts.append(f"{len(accuracy.left_out)} left out for a warning of the whisk ({errors})")
     if not parts:
         return ""
     return f" Of {counted(accuracy.with_truth, 'whisk')}: {'; '.join(parts)}."

@@ -284,8 +284,8 @@ class TruthUncertainty:
     def d_x_text(self) -> str:
         """Return how well d_x is known, in the parts that whisks have of their own and share."""
         if math.isfinite(self.d_x_own_mm) and self.known > 1:
-            own = f"± {self.d_x_own_mm:.2g} mm each"
-            return f"{own}, and ± {self.d_x_shared_mm:.2g} mm that all whisks share"
+            own = f"± {self.d_x_own_mm:.2g} mm (each whisk's own)"
+            return f"{own} and ± {self.d_x_shared_mm:.2g} mm (shared by all)"
         return f"± {self.d_x_mm:.2g} mm"
 
 

@@ -134,7 +134,7 @@ def effect_on_truth(name: str, model: WhiskModel) -> LeftOut:
 def _effect_of_clock(model: WhiskModel) -> LeftOut:
     """Return the effect of the error of the frames' clock, as felt − seen shows it."""
     shared = model.shared
-    if shared is None or not shared.tells_clock:
+    if shared is None or not shared.separates_clock:
         return LeftOut(0.0, NAN, 0.0, reason("clock_like_zero"))
     late_s = shared.values[1]
     sigma_s = np.sqrt(shared.covariance[1, 1])

@@ -173,7 +173,7 @@ _TABLE = (
         reaches=(TRUTH,),
     ),
     Status("camera_moved", WARNING, "a camera moved and was left out", _FASTEN_CAMERA),
-    Status("cameras_contradict", WARNING, "the cameras see different whisks", _FASTEN_CAMERA),
+    Status("cameras_contradict", WARNING, "the cameras contradict each other", _FASTEN_CAMERA),
     Status(
         "whisker_behind_camera", WARNING, "by a camera's pose the whisker is behind it", _CHECK_POSE
     ),
@@ -369,7 +369,7 @@ _TABLE = (
         "tip_contact",
         WARNING,
         "the distance came out longer than the whisker, and was set to its length",
-        "take it as a contact near the tip; a touch nearer to the base is told better",
+        "take it as a contact near the tip; a touch nearer to the base is measured better",
     ),
     Status("no_distance_given", REFUSAL, "gave no distance and no reason", _LOOK_AT_ESTIMATOR),
     Status(
@@ -388,7 +388,7 @@ _TABLE = (
     Status(
         "touch_apart",
         WARNING,
-        "touch felt and touch seen differ in all whisks alike",
+        "touch felt and touch seen differ by the same in all whisks",
         "check how frames are stamped, and record strokes at two speeds or with their way back",
     ),
     Status(
@@ -457,7 +457,7 @@ _TABLE = (
     Status(
         "scale_unconfirmed",
         WARNING,
-        "the bars are hardly seen where square_mm and T_rig_board have the whisker",
+        "hardly any bar is seen where square_mm and T_rig_board place the whisker",
         _MEASURE_BOARD,
         reaches=(TRUTH,),
     ),
@@ -501,7 +501,7 @@ _TABLE = (
     Status(
         "bar_width_unlike_board",
         WARNING,
-        "the bar looks thicker or thinner than said, or the board's squares are",
+        "the bar looks thicker or thinner than stated, or the board's squares are not as stated",
         _MEASURE_BOARD,
         reaches=(TRUTH,),
     ),
@@ -538,7 +538,7 @@ _TABLE = (
     Status("no_camera_with_frames", REFUSAL, "no camera has three frames or more"),
     Status("no_bar_seen", REFUSAL, "no bar is seen near the whisker"),
     Status(
-        "bar_distance_unseen", REFUSAL, "one camera alone does not tell how far away the bar is"
+        "bar_distance_unseen", REFUSAL, "one camera alone does not show how far away the bar is"
     ),
     Status(
         "trace_elsewhere",
@@ -557,7 +557,7 @@ _TABLE = (
     Status("no_object_edge", REFUSAL, "a camera shows no edge of the object"),
     Status("no_object_outline", REFUSAL, "no clear outline of the object is seen"),
     Status("picture_size_differs", REFUSAL, "frames of a camera differ in size"),
-    Status("refused", REFUSAL, "nothing is seen, for a reason that the sentence tells"),
+    Status("refused", REFUSAL, "nothing is seen, for the reason that the sentence gives"),
     Status(
         "trial_lost",
         REFUSAL,
@@ -622,9 +622,11 @@ _TABLE = (
         "the distance is known only to be nearer than a bound",
         _GENTLER,
     ),
-    Status("two_distances", WARNING, "an object that runs away is felt alike at two distances"),
-    Status("motion_not_stated", REFUSAL, "nobody says how the object moves"),
-    Status("object_runs_away", REFUSAL, "an object that moves as told would be touched nowhere"),
+    Status(
+        "two_distances", WARNING, "two distances explain the moments of an object that moves away"
+    ),
+    Status("motion_not_stated", REFUSAL, "it is not stated how the object moves"),
+    Status("object_runs_away", REFUSAL, "an object that moves as stated would be touched nowhere"),
     Status("no_force_recorded", REFUSAL, "no force at the base was recorded"),
     Status("no_moment_rate", REFUSAL, "the rate of the moment is not known"),
     Status("phi_turns", WARNING, "the force's angle turns over the push"),
@@ -659,9 +661,9 @@ _TABLE = (
     Status("radius_not_positive", REFUSAL, "the radius of curvature is not positive"),
     Status("object_passed", REFUSAL, "the whisker has passed the object"),
     Status("slip_angle_too_large", REFUSAL, "the slip angle reaches 90 degrees"),
-    Status("force_unlike_moment", REFUSAL, "the force is not the one that its moment asks for"),
+    Status("force_unlike_moment", REFUSAL, "force and moment contradict each other"),
     Status("never_slipped", REFUSAL, "no slope is steeper than the friction angle"),
-    Status("friction_vague", REFUSAL, "the data hardly hold the friction angle"),
+    Status("friction_vague", REFUSAL, "the data hardly constrain the friction angle"),
     Status("friction_at_zero", WARNING, "the best friction angle is 0"),
     Status("friction_below_zero", WARNING, "the friction angle came out below 0"),
     Status(
@@ -672,10 +674,10 @@ _TABLE = (
     Status("tilts_one_sided", REFUSAL, "the slip angle does not leave zero on both sides"),
     Status("still_slips", WARNING, "the whisker still slips sideways", "turn the plane once more"),
     Status("whisker_does_not_ring", REFUSAL, "no ringing stands out of the noise"),
-    Status("ring_not_of_a_prop", REFUSAL, "the ring's frequency is no contact's"),
+    Status("ring_not_of_a_prop", REFUSAL, "no contact makes the whisker ring at this frequency"),
     Status("not_a_straight_cylinder", REFUSAL, "the whisker is no straight cylinder"),
     Status("no_unfiltered_samples", REFUSAL, "no samples as recorded are kept"),
-    Status("two_places_ring_alike", WARNING, "two distances ring alike"),
+    Status("two_places_ring_alike", WARNING, "two distances give the same frequency"),
     Status("nothing_heard", REFUSAL, "no sound stands out of the noise", _LOUDER),
     Status(
         "moment_does_not_vanish",
@@ -707,7 +709,7 @@ _TABLE = (
         "needs moments at {least} pushing angles a degree apart: push further",
     ),
     Status("phi_turns_far", REFUSAL, "phi turns by {degrees:.0f} degrees: too far"),
-    Status("distances_missing", REFUSAL, "(10) has no distance at all of the angles"),
+    Status("distances_missing", REFUSAL, "(10) gives no distance at one of the angles"),
     Status("no_lateral_slip", NOTE, "does not slip sideways: no lateral curvature"),
     Status("not_soft", NOTE, "no softer than a rigid object within the noise"),
     Status("compliances_contradict", REFUSAL, "no distance explains both compliances"),
@@ -730,11 +732,11 @@ _TABLE = (
     Status("no_push_on_object", REFUSAL, "a whisk is no push against an object"),
     Status("slip_angles_alike", REFUSAL, "the whisks do not span two slip angles"),
     Status("no_truth", REFUSAL, "no truth"),
-    Status("effect_not_fitted", REFUSAL, "the fit does not tell"),
+    Status("effect_not_fitted", REFUSAL, "the fit does not show this effect"),
     Status(
         "clock_like_zero",
         REFUSAL,
-        "at one speed and in one direction a clock is not told from a zero",
+        "strokes at one speed and in one direction do not separate a late clock from a shifted zero",
     ),
     Status("bar_radius_unknown", REFUSAL, "no bar diameter or friction angle is known"),
     Status("tilt_unknown", REFUSAL, "no tilt is known"),
@@ -748,7 +750,7 @@ _TABLE = (
     Status("no_stick_slip", NOTE, "the moments show no stick–slip"),
     Status("contacts_few", REFUSAL, "too few, of {distances}"),
     Status("size_open", REFUSAL, "contacts leave the size open"),
-    Status("size_may_be_zero", WARNING, "not told: the interval holds 0"),
+    Status("size_may_be_zero", WARNING, "not known: the interval holds 0"),
     Status(
         "contacts_off_surface",
         WARNING,

@@ -225,7 +225,7 @@ def _terms(camera: Camera, report: CameraReport) -> Iterator[str]:
         is_distortion = name[0] in "kp"
         is_needed = not is_distortion or abs(value) > _NEEDED_SIGMAS * sigma
         digits = 2 if name[0] in "fc" else 4
-        remark = "" if is_needed else " (not asked for)"
+        remark = "" if is_needed else " (not needed)"
         yield f"{name} {value:.{digits}f} ± {sigma:.{digits}f}{remark}"
 
 

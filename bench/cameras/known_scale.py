@@ -44,20 +44,20 @@ def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[Rea
     share = float(np.median(shares))
     sigma = float(np.hypot(SIGMA_SHARE, scatter) / np.sqrt(len(shares)))
     _check_bar_diameter(session, trials, share, sigma)
-    looks = f"bars look {share:.3f} ± {sigma:.3f} times as thick as given"
-    return [f"Second length: {looks}; square_mm can be right."], []
+    looks = f"bars look {share:.3f} ± {sigma:.3f} times as thick as stated"
+    return [f"Bars as a second length: {looks}; that agrees with square_mm."], []
 
 
 def _scatter_warning(shares: np.ndarray, scatter: float) -> Reason:
     """Return the warning on bars whose apparent diameters scatter. Raises BadInput where by much."""
     seen = (
-        f"bars look {min(shares):.2f} to {max(shares):.2f} times as thick as given, so they are "
-        "hardly seen where square_mm and T_rig_board have the whisker"
+        f"bars look {min(shares):.2f} to {max(shares):.2f} times as thick as stated, so hardly any bar "
+        "is seen where square_mm and T_rig_board place the whisker"
     )
     if scatter > _MOST_SCATTER:
         cure = "measure a square of the board and enter it, then check T_rig_board"
         raise BadInput(f"{seen}: {cure}", file="session.toml")
-    return Reason("scale_unconfirmed", f"Second length: {seen}: check both")
+    return Reason("scale_unconfirmed", f"Bars as a second length: {seen}: check both")
 
 
 def _has_measurable_bar(trial: Trial, session: Session) -> bool:

@@ -64,7 +64,7 @@ class SharedTouch:
         return float(row @ self.values), float(np.sqrt(row @ self.covariance @ row))
 
     @property
-    def tells_clock(self) -> bool:
+    def separates_clock(self) -> bool:
         """Return whether speeds or directions differ enough to separate a clock from a zero."""
         return bool(np.ptp(self.speeds_rad_s) >= _ALIKE * abs(np.max(self.speeds_rad_s)))
 
@@ -79,9 +79,9 @@ class SharedTouch:
     def line(self) -> str:
         """Return the line of the summary."""
         begin = f"felt − seen, by {self.strokes} together: "
-        if not self.tells_clock:
+        if not self.separates_clock:
             late, sigma = np.degrees(self.at(np.max(self.speeds_rad_s)))
-            alone = "at one speed and in one direction a clock is not told from a zero"
+            alone = "strokes at one speed and in one direction do not separate a late clock from a shifted zero"
             return f"{begin}{late:+.3f} ± {sigma:.3f}°; {alone}"
         units = [np.degrees(1.0), 1e3]  # degrees, ms
         zero, clock = self.values * units

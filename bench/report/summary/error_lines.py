@@ -77,4 +77,4 @@ def contact_lines(results: Iterable[TrialResult]) -> Iterator[str]:
         parts.append(part)
     if parts:
         errors = ", ".join(parts)
-        yield f"the contact felt by (10), RMS of what it is off by: {errors} (estimates.csv)"
+        yield f"the contact by (10), RMS error: {errors} (estimates.csv)"

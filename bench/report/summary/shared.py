@@ -148,11 +148,11 @@ def shared_lines(results: Sequence[TrialResult]) -> Iterator[str]:
     if shared is None:
         return
     yield (
-        f"of d_x's sigma ± {shared.shared_mm:.4f} mm is one error that all {shared.n} whisks share "
-        f"({_causes(results)}), ± {shared.own_mm:.4f} mm each whisk's own: "
-        f"the mean of {counted(shared.settings, 'recording')} is known to ± {shared.mean_sigma_mm:.4f} mm"
+        f"d_x's sigma has two parts: ± {shared.shared_mm:.4f} mm of one error that all {shared.n} whisks share "
+        f"({_causes(results)}), and ± {shared.own_mm:.4f} mm of each whisk's own; so the mean of "
+        f"{counted(shared.settings, 'recording')} is known to ± {shared.mean_sigma_mm:.4f} mm"
     )
-    yield f"  shared by all and each whisk's own, one sigma: {_other_parts(_known(results))}"
+    yield f"  both parts (shared, own) of other sigmas: {_other_parts(_known(results))}"
     if shared.freedom:
         angles = []
         for name, field in _ANGLES.items():

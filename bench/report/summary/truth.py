@@ -48,7 +48,7 @@ def clock_lines(results: Sequence[TrialResult]) -> Iterator[str]:
         else:
             yield (
                 f"frame times by {clock.source}, {count}: no recorded edge ties them to the signals, and forward "
-                f"strokes do not tell the clock from the encoder's zero; {known}"
+                f"strokes do not separate a late clock from a shifted zero of the encoder; {known}"
             )
     yield from _delay_lines(results)
     shared = shared_touch(results) if clocks else None
@@ -88,7 +88,7 @@ def budget_lines(results: Iterable[TrialResult]) -> Iterator[str]:
             parts.append(f"{CAUSES[k]} {means[k]:.0f} %")
     yield f"variance of d_x by cause, mean over the whisks: {', '.join(parts)} (docs/truth.md, budget.csv)"
     if np.isnan(table).any():
-        yield "  cameras.npz does not tell the rig board's part from the lenses': `cameras` is both"
+        yield "  cameras.npz does not separate the rig board's part from the lenses': `cameras` is both"
 
 
 def beam_lines(results: Iterable[TrialResult]) -> Iterator[str]:
@@ -105,7 +105,7 @@ def beam_lines(results: Iterable[TrialResult]) -> Iterator[str]:
         row = rows[largest]
         sigma = row[f"{name}_difference_sigma_{unit}"]
         parts.append(f"{name} {changes[largest]:+.4f} ± {sigma:.4f} {unit} ({row['trial']})")
-    yield f"by a spline instead of a beam with a point load, at most: {', '.join(parts)} (beam.csv)"
+    yield f"a spline for the wire, in place of a beam with a point load, changes at most: {', '.join(parts)} (beam.csv)"
 
 
 def _with_sigma(value: Value, digits: int) -> str:

@@ -77,7 +77,7 @@ def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warni
         known = f"no pictures, so the true distance is not known; {count} felt"
     else:
         known = f"the true distance is known for none of {count}"
-    warned = f"{counted(warnings, 'doubt')}, see below" if warnings else "nothing doubtful"
+    warned = f"{counted(warnings, 'warning')}, see below" if warnings else "no warning"
     return f"{session}: {known}; {warned}."
 
 
@@ -141,13 +141,14 @@ def _sample_line(accuracy: Accuracy) -> str:
     """Return what so many whisks allow to say of further ones."""
     low, high = accuracy.rms_range_percent
     text = (
-        f"{counted(len(accuracy.judged), 'whisk')} at {counted(accuracy.settings, 'setting')} (a slope of a "
-        f"surface at a speed): over others like these, {accuracy.label} errs by {low:.2g} to {high:.2g} % RMS"
+        f"By {counted(len(accuracy.judged), 'whisk')} at {counted(accuracy.settings, 'setting')} (a slope of a surface "
+        f"at a speed), with 95 % confidence: over others like these {accuracy.label} errs by {low:.2g} to "
+        f"{high:.2g} % RMS"
     )
     if accuracy.intervals:
         least, most = accuracy.holding_range_percent
-        text += f" and its interval holds in {least:.0f} to {most:.0f} %"
-    return f"{text} (95 % confidence)."
+        text += f", and its interval holds the truth in {least:.0f} to {most:.0f} % of them"
+    return f"{text}."
 
 
 def _recommendation(
@@ -162,9 +163,9 @@ def _recommendation(
     text = f"Use {best.label} here, at a pushing angle of {theta_deg:g}°"
     if alike:
         whisks_text = counted(len(best.judged), "whisk")
-        text += f"; {whisks_text} cannot tell {' or '.join(alike)} from it"
+        text += f"; {whisks_text} do not show whether {' or '.join(alike)} is better or worse"
     if not best.is_covered:
-        text += "; but take its stated uncertainty as too small"
+        text += "; but its stated uncertainty is too small"
     for one in fitted:
         if len(one.judged) == len(best.judged) and best.is_worse_than(one):
             text += f"; where α can be fitted to the surface first, {one.rms_percent:.1f} % RMS are left"
@@ -189,10 +190,10 @@ def preset_lines(results: Iterable[TrialResult], settings: Settings) -> Iterator
         above = sum(not seen.d_x_mm.sigma <= settings.accuracy_mm for seen in measured)
         presets = ", ".join(f"{name} {count}" for name, count in counts.items())
         yield (
-            f"Looked at until d_x's sigma is {settings.accuracy_mm:g} mm or less: {presets}; "
+            f"Pictures were evaluated until d_x's sigma is {settings.accuracy_mm:g} mm or less: {presets}; "
             f"{above} of {len(measured)} whisks are above."
         )
     elif settings.seeing != Seeing():
         cameras = ", ".join(settings.seeing.cameras)
         chosen = f", cameras {cameras}" if cameras else ""
-        yield f"Pictures were looked at by the settings {settings.seeing.name}{chosen}."
+        yield f"Pictures were evaluated by the settings {settings.seeing.name}{chosen}."

@@ -69,7 +69,7 @@ def test_a_distance_is_stated_with_both_parts():
 
 def test_the_truth_of_several_whisks_is_known_in_two_parts():
     two = truth_uncertainty(session(np.random.default_rng(7), 1, 2))
-    assert two.d_x_text == "± 0.002 mm each, and ± 0.008 mm that all whisks share"
+    assert two.d_x_text == "± 0.002 mm (each whisk's own) and ± 0.008 mm (shared by all)"
     one = truth_uncertainty(session(np.random.default_rng(7), 1, 1))
     assert one.d_x_text == "± 0.0082 mm"
 

@@ -11,13 +11,7 @@ from bench.base.settings import Settings
 from bench.base.statuses import cure_of
 from bench.gauges.felt import gauge_delay, lateness
 from bench.records.plain import from_plain, to_plain
-from bench.records.trial_result import (
-    Clock,
-    EstimateRow,
-    FeltWhisk,
-    SeenTrial,
-    TrialResult,
-)
+from bench.records.trial_result import Clock, EstimateRow, FeltWhisk, SeenTrial, TrialResult
 from bench.report.assembly import beam_rows, budget_rows
 from bench.report.run_facts import Section
 from bench.report.summary.compose import Summary
@@ -50,7 +44,10 @@ def test_frames_without_recorded_times_say_what_is_known_of_their_clock():
     own, other = clock_lines([result(recorded), result(stated), result(stated)])
     assert own.endswith("(frames.csv), 1 of 3 trials; their clock is taken as that of the signals")
     assert "by frame_rate_Hz, 2 of 3 trials: no recorded edge" in other
-    assert "do not tell the clock from the encoder's zero; taken as known to 25 ms" in other
+    assert (
+        "do not separate a late clock from a shifted zero of the encoder; taken as known to 25 ms"
+        in other
+    )
 
 
 @pytest.mark.parametrize(
@@ -119,7 +116,7 @@ def test_the_screen_shows_the_verdict_and_the_warnings(tmp_path):
 
 @pytest.mark.parametrize(
     ("warnings", "said"),
-    [(0, "nothing doubtful."), (1, "1 doubt, see below."), (2, "2 doubts, see below.")],
+    [(0, "no warning."), (1, "1 warning, see below."), (2, "2 warnings, see below.")],
 )
 def test_warnings_are_counted_apart_from_whisks(warnings, said):
     """Of one whisk there may be two."""

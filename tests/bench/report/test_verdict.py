@@ -50,7 +50,7 @@ def lines_of(*estimators: Accuracy) -> list[str]:
 def test_one_whisk_has_no_line_by_slope():
     _, of_estimator, sample, use = lines_of(accuracy([judged(30.0, 2.0)], 1))
     assert "at θ = 3° off by +2.0 ± 1.0 % (+1.00 mm)" in of_estimator
-    assert sample.startswith("1 whisk at 1 setting ") and "errs by 0.89 to 64 % RMS" in sample
+    assert sample.startswith("By 1 whisk at 1 setting ") and "errs by 0.89 to 64 % RMS" in sample
     assert use.startswith("Use (10) with friction here")
 
 

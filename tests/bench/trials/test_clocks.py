@@ -7,12 +7,7 @@ import pytest
 
 from bench.base.statuses import reason
 from bench.gauges.felt import gauge_delay
-from bench.records.trial_result import (
-    BackStroke,
-    FeltTrial,
-    FeltWhisk,
-    SeenTrial,
-)
+from bench.records.trial_result import BackStroke, FeltTrial, FeltWhisk, SeenTrial
 from bench.trials.clocks import shared_touch, shared_touch_warning, with_shared_touch
 from tests.scenes.results import seen_whisk, trial_result
 from vision.truth.records import FrameTruth
@@ -132,5 +127,7 @@ def test_no_touch_no_word():
 def test_one_speed_is_told_as_a_sum(rng):
     """Apart, zero and clock are known to half a degree and 45 ms there, which says nothing."""
     line = shared_touch(session(rng, [10.0] * 8)).line
-    assert "by 8 whisks together" in line and line.endswith("a clock is not told from a zero")
+    assert "by 8 whisks together" in line and line.endswith(
+        "do not separate a late clock from a shifted zero"
+    )
     assert "8 whisks and 8 back strokes" in shared_touch(session(rng, [10.0] * 8, back=True)).line
