@@ -13,7 +13,7 @@ def add(verbs: Verbs) -> None:
         verbs,
         "compare",
         run,
-        "evaluated runs side by side: which whisks changed, and by how many sigmas (exit code 1 where any did)",
+        "compare evaluated runs: which whisks changed, and by how many sigmas (exit code 1 where any did)",
         "whisker-bench compare monday-out tuesday-out --out changes.csv",
     )
     verb.add_argument(

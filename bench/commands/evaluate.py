@@ -30,7 +30,7 @@ def add(verbs: Verbs) -> None:
         verbs,
         "evaluate",
         run,
-        "true distance and slip of every whisk, the estimates beside them, and their errors",
+        "true distance and slip of every whisk, the estimates, and their errors",
         "whisker-bench evaluate fixtures/small-session --out demo-out --workers 2",
     )
     add_recorded(verb)
@@ -43,7 +43,7 @@ def add(verbs: Verbs) -> None:
         nargs="?",
         const=2.0,
         metavar="S",
-        help="while the session is recorded: evaluate each trial that is complete, looking every S seconds (2), until "
+        help="while the session is recorded: evaluate each trial once it is complete, checked every S seconds (2), until "
         "Ctrl-C",
     )
     verb.add_argument(
@@ -58,13 +58,13 @@ def add(verbs: Verbs) -> None:
         default=[],
         dest="estimators",
         metavar="MODULE:FUNCTION",
-        help="one of your own, importable from here; may be given several times",
+        help="an estimator of your own, importable from the working folder; may be given several times",
     )
     verb.add_argument(
         "--one-camera",
         metavar="NAME",
         help="distance, force and stiffness by the shape that this camera alone sees, too, without gauges: "
-        "one_camera.csv (it sees its own trial, and has a line of its own)",
+        "one_camera.csv (from pictures of the same trial, so it is not compared with estimators)",
     )
     add_trials(verb, ", e.g. 'b3*'")
     verb.add_argument(
@@ -104,13 +104,13 @@ def _add_numbers(verb: argparse.ArgumentParser) -> None:
         "--alpha-est-sigma-deg",
         type=float,
         metavar="X",
-        help="how far that may be off, one sigma (default: by the spread of the session's surfaces, 5 without any)",
+        help="one sigma of that friction angle (default: by the spread of the session's surfaces, 5 without any)",
     )
     verb.add_argument(
         "--cutoff-Hz",
         type=float,
         metavar="X",
-        help="of the low-pass ahead of one's own estimators (0.5 a deg/s)",
+        help="cut-off of the low-pass ahead of your own estimators (default: 0.5 Hz for each deg/s of the motor)",
     )
     verb.add_argument(
         "--clock-sigma-s",
@@ -127,19 +127,19 @@ def _add_seeing(verb: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--preset",
         metavar="NAME",
-        help="how hard pictures are looked at: draft or standard (default); what each costs, tradeoff measures",
+        help="how thoroughly pictures are evaluated: draft or standard (default); `tradeoff` measures what each costs",
     )
     group.add_argument(
         "--accuracy-mm",
         type=float,
         metavar="X",
-        help="look at each whisk by draft and standard in turn until d_x's stated sigma is X or less",
+        help="evaluate each whisk by draft, then by standard, until d_x's stated sigma is X or less",
     )
     group.add_argument(
         "--settings",
         type=Path,
         metavar="FILE",
-        help="the same from a TOML file, as tradeoff writes it",
+        help="a file in place of a preset, as `tradeoff` writes it",
     )
 
 

@@ -20,7 +20,7 @@ def add(verbs: Verbs) -> None:
         verbs,
         "live",
         run,
-        "play a recorded trial at its own speed, and say distance, touch and slip right after its last frame",
+        "play a recorded trial at its own speed, and print distance, touch and slip right after its last frame",
         "whisker-bench live fixtures/small-session b30_3 --out live-out",
     )
     add_recorded(verb)

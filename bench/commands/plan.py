@@ -24,7 +24,7 @@ def add(verbs: Verbs) -> None:
         "plan",
         run,
         "what sigmas a bench would give before it is built, what limits them and which one change would halve them; "
-        "of a recorded session, expected beside stated",
+        "of a recorded session, expected and stated sigmas",
         "whisker-bench plan --example > rig.toml && whisker-bench plan rig.toml --out plan-out",
     )
     verb.add_argument(
@@ -39,13 +39,13 @@ def add(verbs: Verbs) -> None:
     )
     verb.add_argument("--example", action="store_true", help="print a RIG.toml to begin with")
     verb.add_argument(
-        "--theta-deg", type=float, default=3.0, metavar="X", help="of slip, φ and α (default 3)"
+        "--theta-deg", type=float, default=3.0, metavar="X", help="pushing angle at which slip, φ and α are planned (default 3)"
     )
     verb.add_argument(
         "--no-changes",
         action="store_false",
         dest="changes",
-        help="try no change: sigmas alone, sooner",
+        help="sigmas alone, without what one change of the bench would do; faster",
     )
     add_follow_links(verb)
     add_workers(verb)

@@ -23,7 +23,7 @@ def add(verbs: Verbs) -> None:
         verbs,
         "score-traces",
         run,
-        "hold a tracker's lines of the wire against ours, frame by frame: bias, scatter, coverage",
+        "compare a tracker's lines of the wire with ours, frame by frame: bias, scatter, coverage",
         "whisker-bench score-traces fixtures/bring/traces --traces fixtures/bring/traces/trials --out scores",
     )
     add_recorded(verb)

@@ -21,7 +21,7 @@ def add(verbs: Verbs) -> None:
         verbs,
         "tradeoff",
         run,
-        "time against error of the truth, over how hard pictures are looked at: table, plot, settings files",
+        "time against error of the truth, over how thoroughly pictures are evaluated: table, plot, settings files",
         "whisker-bench tradeoff fixtures/small-session --out tradeoff-out",
     )
     add_recorded(verb)
