@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from bench.session.angle_source import SOURCES, angle_source
 from bench.session.session import Session
 from bench.session.signals import has_moments
-from bench.session.trace_files import IN_SPACE
+from bench.session.traces import has_points_in_one_camera
 from bench.session.trial import Trial
 
 # [cameras] A line in space is where two views of it meet. Derived.
@@ -120,11 +120,7 @@ def _lacks_of_pictures(trial: Trial, session: Session) -> str:
         return 'a motor log (motor_deg), or angle_from = "marker" or "whisker"'
     if angle_source(trial).lacks(trial):
         return angle_source(trial).lacks(trial)
-    if (
-        trial.is_traced_alone
-        and len(trial.object_files) == 1
-        and IN_SPACE not in trial.object_files
-    ):
+    if trial.is_traced_alone and has_points_in_one_camera(trial):
         return "points of the bar (object_<camera>) in a second camera"
     if len(trial.cameras) < _FEWEST_CAMERAS and not trial.is_bar:
         return "a second camera, or a mirror ([[cameras]] of, crop, mirrored)"

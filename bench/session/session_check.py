@@ -17,8 +17,8 @@ from bench.session.frame_times import frame_times
 from bench.session.object_board import board_on_object
 from bench.session.session import Session, load_session
 from bench.session.signals import Signals, forward_strokes, read_signals
-from bench.session.traces import read_traces, read_traces_alone
-from bench.session.trial import Trial
+from bench.session.traces import read_object_points, read_traces, read_traces_alone
+from bench.session.trial import Trial, require_object_placed
 from bench.session.whisker import Whisker
 from vision.calibration import read_cameras
 from vision.geometry import Reason, Refused, counted
@@ -201,8 +201,10 @@ def check_traces(session: Session, problems: InputProblems) -> None:
     for trial in alone:
         with problems.guard():
             count = len(frame_times(trial))
-            for files in (trial.trace_files, trial.object_files):
-                read_traces_alone(files, count, sizes_px, trial.place)
+            read_traces_alone(trial, count, sizes_px)
+            points = read_object_points(trial, count, sizes_px)
+            is_stated = session.truth is not None
+            require_object_placed(trial, has_points=bool(points), is_stated=is_stated)
             if trial.shows_board:
                 board_on_object(trial, session.board)
 

@@ -7,7 +7,9 @@ it is made.
 
 import csv
 import io
+import json
 import pickle
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,6 +50,8 @@ _MOST_LINES = 1e6
 _SLEAP_CORNER_PX = 0.5
 # [version] Of SLEAP's files, from which it counts from the centre. Stated by SLEAP.
 _SLEAP_CENTRED = 1.1
+# Names of joints that are on the touched object and not on the wire: bar_top, object_2, bar1.
+_ON_OBJECT = re.compile(r"(bar|object)([_\d]|$)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +59,8 @@ class DrawnLines:
     """Points of a tracker's lines in one camera's pictures.
 
     frame (n,): as the file numbers pictures. px (n, 2). line (n,): number of the line that a point
-    is of; has_identity: it is the same in all frames. sigma_px (n,): NaN where not stated.
+    is of; has_identity: it is the same in all frames. sigma_px (n,): NaN where not stated. on_object (n,)
+    bool: which are joints of the touched object by their names; None where joints have no names.
     """
 
     frame: np.ndarray
@@ -63,20 +68,52 @@ class DrawnLines:
     line: np.ndarray
     sigma_px: np.ndarray
     has_identity: bool = True
+    on_object: np.ndarray | None = None
 
     @classmethod
-    def of_joints(cls, frame: np.ndarray, px: np.ndarray) -> "DrawnLines":
+    def of_joints(cls, frame: np.ndarray, px: np.ndarray, names: Sequence[str]) -> "DrawnLines":
         """Return the lines of joints (frames, lines, joints, 2) that a file gives by frame (frames,).
 
-        Joints that are not seen are NaN.
+        Joints that are not seen are NaN. names: of the joints. Those of the object are one line.
         """
         frames, lines, joints, _ = px.shape
         in_frame = np.repeat(frame, lines * joints)
         line = np.tile(np.repeat(np.arange(lines), joints), frames)
+        on_object = np.tile(named_for_object(names), frames * lines)
+        line[on_object] = 0
         flat_px = px.reshape(-1, 2)
         is_seen = np.all(np.isfinite(flat_px), axis=1)
         unknown = np.full(int(is_seen.sum()), np.nan)
-        return cls(in_frame[is_seen], flat_px[is_seen], line[is_seen], unknown)
+        return cls(
+            in_frame[is_seen],
+            flat_px[is_seen],
+            line[is_seen],
+            unknown,
+            on_object=on_object[is_seen],
+        )
+
+    @property
+    def of_wire(self) -> "DrawnLines":
+        """Return the points that are not of the object."""
+        return self if self.on_object is None else self._only(~self.on_object)
+
+    @property
+    def of_object(self) -> "DrawnLines":
+        """Return the joints that are named for the object."""
+        nothing = np.zeros(len(self.frame), dtype=bool)
+        return self._only(nothing if self.on_object is None else self.on_object)
+
+    def _only(self, kept: np.ndarray) -> "DrawnLines":
+        """Return some of the points, kept (n,) bool."""
+        frame = self.frame[kept]
+        return DrawnLines(
+            frame, self.px[kept], self.line[kept], self.sigma_px[kept], self.has_identity
+        )
+
+
+def named_for_object(names: Sequence[str]) -> np.ndarray:
+    """Return which joints (n,) bool are of the touched object by their names."""
+    return np.array([_ON_OBJECT.match(name) is not None for name in names], dtype=bool)
 
 
 def read_lines(path: Path, label: str) -> DrawnLines:
@@ -216,7 +253,7 @@ def _joints_by_name(
                 px[:, i, j] = _probable_px(values, *of_joint)
     if not np.any(np.isfinite(px)):
         raise BadInput(f"holds no joint with a likelihood of {_LEAST_LIKELIHOOD:g}", file=label)
-    return DrawnLines.of_joints(frame, px)
+    return DrawnLines.of_joints(frame, px, joints)
 
 
 def _probable_px(values: np.ndarray, u: int, v: int, likelihood: int | None) -> np.ndarray:
@@ -248,7 +285,9 @@ def _hdf5(path: Path, label: str) -> DrawnLines:
 def _sleap_analysis(file: Mapping) -> DrawnLines:
     """Read SLEAP's analysis file: tracks (tracks, 2, nodes, frames)."""
     tracks = file["tracks"][()]
-    return DrawnLines.of_joints(np.arange(tracks.shape[3]), np.transpose(tracks, (3, 0, 2, 1)))
+    names = file["node_names"].asstr()[()].tolist()
+    px = np.transpose(tracks, (3, 0, 2, 1))
+    return DrawnLines.of_joints(np.arange(tracks.shape[3]), px, names)
 
 
 def _sleap_labels(file: Mapping) -> DrawnLines:
@@ -256,27 +295,45 @@ def _sleap_labels(file: Mapping) -> DrawnLines:
     corner_px = _sleap_corner_px(file)
     number_of = {int(row["frame_id"]): int(row["frame_idx"]) for row in file["frames"][()]}
     points = {0: file["points"][()], 1: file["pred_points"][()]}  # by hand, predicted
+    skeletons = [named_for_object(names) for names in _sleap_joints(file)]
     frame = []
     line = []
     px = []
+    on_object = []
     for instance in file["instances"][()]:
-        own = _visible_points(points[int(instance["instance_type"])], instance)
+        own = points[int(instance["instance_type"])][_points_of(instance)]
+        is_seen = own["visible"] & np.isfinite(own["x"])
+        own = own[is_seen]
+        named = skeletons[int(instance["skeleton"])][is_seen]
         frame += [number_of[int(instance["frame_id"])]] * len(own)
-        line += [int(instance["track"])] * len(own)
+        line += np.where(named, 0, int(instance["track"])).tolist()
         px += list(zip(own["x"] - corner_px, own["y"] - corner_px))
-    return DrawnLines(np.array(frame), np.array(px), np.array(line), np.full(len(frame), np.nan))
+        on_object += named.tolist()
+    return DrawnLines(
+        np.array(frame),
+        np.array(px),
+        np.array(line),
+        np.full(len(frame), np.nan),
+        on_object=np.array(on_object, dtype=bool),
+    )
+
+
+def _sleap_joints(file: Mapping) -> list[list[str]]:
+    """Return of each skeleton of SLEAP's project the names of its joints, in the order of its points."""
+    stated = json.loads(file["metadata"].attrs["json"])
+    names = [node["name"] for node in stated["nodes"]]
+    return [[names[node["id"]] for node in one["nodes"]] for one in stated["skeletons"]]
+
+
+def _points_of(instance: np.void) -> slice:
+    """Return which rows of SLEAP's table of points an instance has."""
+    return slice(int(instance["point_id_start"]), int(instance["point_id_end"]))
 
 
 def _sleap_corner_px(file: Mapping) -> float:
     """Return how far the centre of the first pixel is from where SLEAP's file counts from."""
     version = float(file["metadata"].attrs.get("format_id", 1.0))
     return _SLEAP_CORNER_PX if version < _SLEAP_CENTRED else 0.0
-
-
-def _visible_points(points: np.ndarray, instance: np.void) -> np.ndarray:
-    """Return the rows of SLEAP's table of points that an instance has and that are in the picture."""
-    own = points[int(instance["point_id_start"]) : int(instance["point_id_end"])]
-    return own[own["visible"] & np.isfinite(own["x"])]
 
 
 class _NamesAlone(pickle.Unpickler):

@@ -3,7 +3,7 @@ of these pictures.
 
 A trial's folder holds `trace_<camera>` with the suffix of the tracker (`trace_files.KINDS`), or
 Anipose's points in space, `trace_3d.csv`, with its cameras, `trace_3d.toml`. Points of the object are in
-`object_<camera>`, where there are no pictures to find it in.
+`object_<camera>`, or are joints of a trace that are named for it, where there are no pictures to find it in.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,6 +17,7 @@ from bench.base.errors import BadInput
 from bench.session.footage import frame_count
 from bench.session.trace_files import IN_SPACE
 from bench.session.trace_readers import DrawnLines, read_lines
+from bench.session.trial import Trial
 from vision import Trace
 from vision.geometry import counted
 from vision.pictures import Frames
@@ -70,37 +71,74 @@ def read_traces(
     or is not of these pictures.
     """
     traces = {}
-    for name, (lines, of_file) in _drawn(files, list(sources), label).items():
+    for name, (drawn, of_file) in _drawn(files, list(sources), label).items():
         if name not in sources:
             found = f"there are no pictures of camera {name}; there are those of"
             raise BadInput(f"{found} {', '.join(sources) or 'none'}", file=of_file)
         camera = TracedCamera.of_pictures(sources[name], pictures[name], name)
-        traces[name] = _checked(lines, name, camera, of_file)
+        traces[name] = _checked(drawn.of_wire, name, camera, of_file)
     return traces
 
 
 def read_traces_alone(
-    files: Mapping[str, Path],
-    count: int,
-    sizes_px: Mapping[str, tuple[int, int]],
-    label: str,
+    trial: Trial, count: int, sizes_px: Mapping[str, tuple[int, int]]
 ) -> dict[str, Traced]:
-    """Return the traces by camera of a trial that has no pictures.
+    """Return the wire's traces by camera of a trial that has no pictures.
 
-    files: as of `bench.session.trace_files`. count: of the trial's frames. sizes_px: of the pictures of
-    the cameras that are calibrated, empty where none is known. Raises BadInput where a file cannot be
-    read or is not of these frames.
+    count: of the trial's frames. sizes_px: of the pictures of the cameras that are calibrated, empty where none is
+    known. Raises BadInput where a file cannot be read or is not of these frames.
     """
     traces = {}
-    for name, (lines, of_file) in _drawn(files, list(sizes_px), label).items():
-        if sizes_px and name not in sizes_px:
-            raise BadInput(
-                f"there is no camera {name}; there are {', '.join(sizes_px)}", file=of_file
-            )
-        has = f"frames.csv has {counted(count, 'row')}"
-        camera = TracedCamera(count, sizes_px.get(name), np.arange(count), has)
-        traces[name] = _checked(lines, name, camera, of_file)
+    for name, (drawn, of_file) in _drawn(trial.trace_files, list(sizes_px), trial.place).items():
+        camera = _camera_alone(name, count, sizes_px, of_file)
+        traces[name] = _checked(drawn.of_wire, name, camera, of_file)
     return traces
+
+
+def read_object_points(
+    trial: Trial, count: int, sizes_px: Mapping[str, tuple[int, int]]
+) -> dict[str, Traced]:
+    """Return the points of the object by camera of a trial that has no pictures.
+
+    They are in files of their own, or else joints of the wire's traces that are named for the object. count, sizes_px, and
+    what is raised: as of `read_traces_alone`.
+    """
+    cameras = list(sizes_px)
+    files = dict(_drawn(trial.object_files, cameras, trial.place))
+    for name, (drawn, of_file) in _drawn(trial.trace_files, cameras, trial.place).items():
+        joints = drawn.of_object
+        if len(joints.frame):
+            files.setdefault(name, (joints, of_file))
+    points = {}
+    for name, (drawn, of_file) in files.items():
+        camera = _camera_alone(name, count, sizes_px, of_file)
+        points[name] = _checked(drawn, name, camera, of_file)
+    return points
+
+
+def has_points_in_one_camera(trial: Trial) -> bool:
+    """Return whether one camera alone has points of the object, in a file of their own or as joints of its trace.
+
+    Raises BadInput where a file cannot be read.
+    """
+    found = set(trial.object_files)
+    if IN_SPACE in {*found, *trial.trace_files}:
+        return False
+    for name, path in trial.trace_files.items():
+        drawn = read_lines(path, trial.label(path.name))
+        if len(drawn.of_object.frame):
+            found.add(name)
+    return len(found) == 1
+
+
+def _camera_alone(
+    name: str, count: int, sizes_px: Mapping[str, tuple[int, int]], label: str
+) -> TracedCamera:
+    """Return what a trace without pictures is of. Raises BadInput where there is no such camera."""
+    if sizes_px and name not in sizes_px:
+        raise BadInput(f"there is no camera {name}; there are {', '.join(sizes_px)}", file=label)
+    has = f"frames.csv has {counted(count, 'row')}"
+    return TracedCamera(count, sizes_px.get(name), np.arange(count), has)
 
 
 def _drawn(

@@ -42,12 +42,16 @@ def lines_in_space(path: Path, cameras: Sequence[str], label: str) -> dict[str, 
     if missing:
         found = f"has no camera {missing[0]}; it has {', '.join(known.names)}"
         raise BadInput(found, file=f"{folder}/{calibration.name}")
-    frame, points = _joints(path, label)
-    return {name: _as_seen(known[name], frame, points) for name in cameras}
+    frame, points, joints = _joints(path, label)
+    found = {}
+    for name in cameras:
+        px = _as_seen(known[name], points)
+        found[name] = DrawnLines.of_joints(frame, px[:, None], joints)
+    return found
 
 
-def _joints(path: Path, label: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return frames (n,) and points (n, joints, 3) in the cameras' frame."""
+def _joints(path: Path, label: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Return frames (n,), points (n, joints, 3) in the cameras' frame, and the joints' names."""
     wanted, columns = _coordinates(path, label)
     count = len(columns[wanted[0]])
     points = np.stack([columns[name] for name in wanted], axis=1).reshape(count, -1, 3)
@@ -55,7 +59,8 @@ def _joints(path: Path, label: str) -> tuple[np.ndarray, np.ndarray]:
     if largest_mm > _MOST_MM:
         raise BadInput(f"holds {largest_mm:g}, which is no place in mm", file=label)
     frame = columns.get("fnum", np.arange(float(count)))
-    return frame, _in_cameras_frame(points, columns, label)
+    joints = [name.removesuffix("_x") for name in wanted[:: len(_AXES)]]
+    return frame, _in_cameras_frame(points, columns, label), joints
 
 
 def _coordinates(path: Path, label: str) -> tuple[list[str], dict[str, np.ndarray]]:
@@ -115,9 +120,9 @@ def _is_turn(matrix: np.ndarray) -> bool:
     return has_unit_size and np.allclose(matrix @ matrix.T, np.eye(3), atol=_ROUNDING)
 
 
-def _as_seen(camera: Camera, frame: np.ndarray, points: np.ndarray) -> DrawnLines:
-    """Return joints (frames, joints, 3) in a camera's picture, as one line."""
+def _as_seen(camera: Camera, points: np.ndarray) -> np.ndarray:
+    """Return joints (frames, joints, 3) in a camera's picture, (frames, joints, 2) px."""
     px = np.full((*points.shape[:2], 2), np.nan)
     is_known = np.all(np.isfinite(points), axis=2)
     px[is_known] = camera.project(points[is_known])
-    return DrawnLines.of_joints(frame, px[:, None])
+    return px

@@ -139,28 +139,35 @@ def load_trial(
     else:
         trial = _with_stage(trial, table, place)
     if trial.is_traced_alone:
-        _check_traced_alone(trial, is_stated=session.keys.truth is not None)
+        _check_traced_alone(trial)
     else:
         _warn_of_unread_object(trial, problems)
     return trial
 
 
-def _check_traced_alone(trial: Trial, *, is_stated: bool) -> None:
+def require_object_placed(trial: Trial, *, has_points: bool, is_stated: bool) -> None:
     """Raise BadInput where nothing places the object of a trial that has traces and no pictures.
 
-    is_stated: whether the session's truth is a stage's.
+    has_points: whether points of it are tracked. is_stated: whether the session's truth is a stage's.
     """
-    label = trial.label(next(iter(trial.trace_files.values())).name)
-    has_place = (is_stated and trial.states_place) or trial.shows_board
-    if not trial.object_files and not has_place:
-        found = (
-            "there are no pictures, in which the object is found, and nothing else says where it is"
-        )
-        cure = (
-            f"add its points ({OBJECT}<camera>.csv), pictures of a board on it ({BOARD}<camera>.png, board_point_mm), "
-            'or its place by a stage ([truth] source = "stage")'
-        )
-        raise BadInput(f"{found}; {cure}", file=label)
+    if has_points or trial.shows_board or (is_stated and trial.states_place):
+        return
+    found = "there are no pictures, in which the object is found, and nothing else says where it is"
+    cure = (
+        f"add its points ({OBJECT}<camera>.csv, or joints bar_… in the trace), pictures of a board on it "
+        f'({BOARD}<camera>.png, board_point_mm), or its place by a stage ([truth] source = "stage")'
+    )
+    raise BadInput(f"{found}; {cure}", file=_first_trace(trial))
+
+
+def _first_trace(trial: Trial) -> str:
+    """Return how messages name the first of the trial's traces."""
+    return trial.label(next(iter(trial.trace_files.values())).name)
+
+
+def _check_traced_alone(trial: Trial) -> None:
+    """Raise BadInput for an object that a trial of traces without pictures cannot have."""
+    label = _first_trace(trial)
     moves = trial.object_gives_way or trial.object_velocity_mm_s is not None
     if moves or (trial.stage is not None and trial.stage.moves):
         raise BadInput("traces without pictures need an object that stands", file=label)

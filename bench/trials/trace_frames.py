@@ -1,8 +1,6 @@
 """A trial's frames where another program's traces are all that came: no picture is read."""
 
 from collections.abc import Mapping
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -11,7 +9,7 @@ from bench.cameras.session_cameras import SessionCalibration
 from bench.session.frame_times import frame_times
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
-from bench.session.traces import read_traces_alone
+from bench.session.traces import Traced, read_object_points, read_traces_alone
 from bench.session.trial import Trial
 from bench.trials.placed_by_board import place_by_board
 from bench.trials.stated_truth import stated_place
@@ -33,14 +31,16 @@ def traced_frames(
     Raises BadInput where traces and times do not match, Refused where nothing places the object.
     """
     times = frame_times(trial)
-    read = partial(_read, count=len(times), cameras=calibration.cameras, settings=settings)
-    traces = read(trial.trace_files, label=trial.place)
+    cameras = calibration.cameras
+    sizes_px = {camera.name: tuple(camera.size_px) for camera in cameras}
+    traces = _asked(read_traces_alone(trial, len(times), sizes_px), settings)
+    points = read_object_points(trial, len(times), sizes_px)
     motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
-    if trial.object_files:
-        points = read(trial.object_files, label=trial.place)
-        recording = TrialTraces.with_points(traces, times.time_s, motor_rad, points)
+    if points:
+        asked = _asked(points, settings)
+        recording = TrialTraces.with_points(traces, times.time_s, motor_rad, asked)
     else:
-        axis, sigma = _place(session, trial, signals, calibration.cameras)
+        axis, sigma = _place(session, trial, signals, cameras)
         recording = TrialTraces.with_place(traces, times.time_s, motor_rad, axis, sigma)
     return TrialFrames(
         times=times,
@@ -64,13 +64,6 @@ def _place(
     return stated_place(session, trial, signals)
 
 
-def _read(
-    files: Mapping[str, Path], *, count: int, cameras: Cameras, settings: Settings, label: str
-) -> dict[str, Trace]:
-    """Return lines or points by camera, of those that the settings name. Raise BadInput."""
-    sizes_px = {camera.name: tuple(camera.size_px) for camera in cameras}
-    found = {}
-    for name, traced in read_traces_alone(files, count, sizes_px, label).items():
-        if settings.seeing.asks(name):
-            found[name] = traced.trace
-    return found
+def _asked(traces: Mapping[str, Traced], settings: Settings) -> dict[str, Trace]:
+    """Return lines or points by camera, of those that the settings name."""
+    return {name: one.trace for name, one in traces.items() if settings.seeing.asks(name)}

@@ -227,7 +227,9 @@ def _sleap_labels(file, px: np.ndarray) -> None:
     file["instances"] = np.array(rows, dtype=instance)
     group = file.create_group("metadata")
     group.attrs["format_id"] = 1.2
-    group.attrs["json"] = json.dumps({})
+    nodes = [{"name": f"n{k}"} for k in range(_POINTS)]
+    skeleton = {"nodes": [{"id": k} for k in range(_POINTS)]}
+    group.attrs["json"] = json.dumps({"nodes": nodes, "skeletons": [skeleton]})
 
 
 def brought_files(session: Path) -> list[Path]:

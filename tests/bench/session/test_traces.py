@@ -1,5 +1,6 @@
 """Traces of other programs: each tracker's file as its program writes it, and what is wrong with one."""
 
+import json
 import pickle
 import shutil
 import struct
@@ -174,8 +175,43 @@ def test_sleap_gives_a_line_a_track(tmp_path):
     path = tmp_path / "trace_high.h5"
     with h5py.File(path, "w") as file:
         file["tracks"] = tracks
-        file["node_names"] = np.array([b"a", b"b", b"c"])
+        file["node_names"] = np.array([b"a", b"barb", b"c"])
     assert_both_lines(read_lines(path, "x"))
+
+
+def test_joints_named_for_the_object_are_no_points_of_the_wire(tmp_path):
+    """Of SLEAP's analysis, and of its project with a skeleton that has the nodes in another order."""
+    h5py = pytest.importorskip("h5py")
+    analysis = tmp_path / "trace_high.h5"
+    project = tmp_path / "trace_low.slp"
+    with h5py.File(analysis, "w") as file:
+        file["tracks"] = np.transpose(PX[:1], (1, 3, 2, 0))
+        file["node_names"] = np.array([b"w1", b"Bar_top", b"object2"])
+    with h5py.File(project, "w") as file:
+        sleap_project(file, PX[0], names=["object2", "w1", "Bar_top"], order=[1, 2, 0])
+    for path in (analysis, project):
+        lines = read_lines(path, "x")
+        np.testing.assert_allclose(lines.of_wire.px, PX[0, :, 0])
+        assert lines.of_wire.line.tolist() == [0, 1]
+        np.testing.assert_allclose(lines.of_object.px, PX[0, :, 1:].reshape(-1, 2))
+        assert set(lines.of_object.line.tolist()) == {0}
+
+
+def sleap_project(file, px, names, order):
+    """Write SLEAP's project of one frame: two predicted instances with points px (instances, joints, 2)."""
+    point = [("x", "f8"), ("y", "f8"), ("visible", "?")]
+    instance = ("instance_type", "frame_id", "skeleton", "track", "point_id_start", "point_id_end")
+    joints = len(names)
+    rows = [(1, 0, 0, k, joints * k, joints * (k + 1)) for k in range(len(px))]
+    file["pred_points"] = np.array([(*p, True) for own in px for p in own], dtype=point)
+    file["points"] = np.zeros(0, dtype=point)
+    file["frames"] = np.array([(0, 4)], dtype=[("frame_id", "u8"), ("frame_idx", "u8")])
+    file["instances"] = np.array(rows, dtype=[(name, "i8") for name in instance])
+    stated = {"nodes": [{"name": name} for name in names]}
+    stated["skeletons"] = [{"nodes": [{"id": k} for k in order]}]
+    group = file.create_group("metadata")
+    group.attrs["format_id"] = 1.2
+    group.attrs["json"] = json.dumps(stated)
 
 
 def test_another_hdf5_file_is_refused(tmp_path):
@@ -244,6 +280,10 @@ def test_anipose_points_are_seen_by_its_own_cameras(tmp_path):
     expected = camera.project(np.array([points[0, 0], points[0, 1], points[1, 0]]))
     np.testing.assert_allclose(lines.px, expected, atol=1e-9)
     assert lines.frame.tolist() == [0, 0, 1]
+    table = tmp_path / "trace_3d.csv"
+    table.write_text(table.read_text().replace("j1_", "bar_low_"))
+    lines = lines_in_space(table, ["high"], "trials/w/trace_3d.csv")["high"]
+    np.testing.assert_allclose(lines.of_object.px, expected[[1]], atol=1e-9)
 
 
 def test_anipose_points_need_its_cameras(tmp_path):

@@ -1,5 +1,6 @@
 """A session of traces without pictures: what places the object, and what is wrong with its files."""
 
+import csv
 import shutil
 
 import cv2
@@ -46,6 +47,22 @@ def add_points(session, points):
         (trial_of(session) / f"object_{camera}.csv").write_text(text)
 
 
+def add_points_and_joints(session, points):
+    """One camera's points of the bar in a file of their own, the other's as joints in its tracker's table."""
+    add_points(session, {"high": points["high"]})
+    rows = csv.DictReader(points["low"].splitlines())
+    cells = [f",{row['u_px']},{row['v_px']},1" for row in rows]
+    table = trial_of(session) / "trace_low.csv"
+    scorer, joints, axes, *frames = table.read_text().splitlines()
+    lines = [
+        scorer + 6 * ",tracker",
+        joints + 3 * ",bar_top" + 3 * ",bar_low",
+        axes + 2 * ",x,y,likelihood",
+    ]
+    lines += [frame + top + low for frame, top, low in zip(frames, cells[::2], cells[1::2])]
+    table.write_text("\n".join(lines) + "\n")
+
+
 def state_place(session):
     """Let a stage say where the object of a trial stands: its axis where it passes the height of the base."""
     with (session / "session.toml").open("a") as manifest:
@@ -73,8 +90,8 @@ def show_board(session):
 @pytest.mark.parametrize("way", ["points", "stage", "board"])
 def test_traces_alone_give_the_truth(alone, points, way, tmp_path):
     """With points of the object, its place by a stage, or pictures of a board on it."""
-    ways = {"points": lambda s: add_points(s, points), "stage": state_place, "board": show_board}
-    ways[way](alone)
+    ways = {"points": add_points_and_joints, "stage": state_place, "board": show_board}
+    ways[way](alone, *[points] * (way == "points"))
     session = checked_session(alone)
     assert [ability.count for ability in abilities(session)[:3]] == [1, 1, 1]
     (trial,) = session.trials
