@@ -18,7 +18,7 @@ from bench.session.object_board import board_on_object
 from bench.session.session import Session, load_session
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.traces import read_object_points, read_traces, read_traces_alone
-from bench.session.trial import Trial, require_object_placed
+from bench.session.trial import PLACE_UNCHECKED, Trial, require_object_placed
 from bench.session.whisker import Whisker
 from vision.calibration import read_cameras
 from vision.geometry import Reason, Refused, counted
@@ -205,6 +205,8 @@ def check_traces(session: Session, problems: InputProblems) -> None:
             points = read_object_points(trial, count, sizes_px)
             is_stated = session.truth is not None
             require_object_placed(trial, has_points=bool(points), is_stated=is_stated)
+            if not points:
+                problems.notes.append(f"{trial.place}: {PLACE_UNCHECKED}")
             if trial.shows_board:
                 board_on_object(trial, session.board)
 

@@ -19,6 +19,11 @@ from vision.pictures import PicturePart
 
 MANIFEST = "trial.toml"
 SIGNALS = "signals.csv"
+# Of a trial of traces alone whose object is placed by a stage or a board on it.
+PLACE_UNCHECKED = (
+    "nothing checks where along the wire the object is said to stand: traces show no object, and a wrong place "
+    f"gives as wrong a d_x; tracked points of it ({OBJECT}<camera>) or pictures would"
+)
 BOARD = "board_"  # before a camera's name, of a picture of the board on the object
 
 

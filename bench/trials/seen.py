@@ -182,7 +182,7 @@ def _notes(frames: TrialFrames) -> tuple[str, ...]:
     traced = ", ".join(frames.pictures.traces)
     alone = "" if frames.by_camera else ", and no picture was read"
     others = [f"the wire's lines are another program's ({traced}){alone}"] if traced else []
-    return (*missing, *lost, *frames.scene.notes, *others)
+    return (*missing, *lost, *frames.scene.notes, *others, *frames.notes)
 
 
 def _observe(

@@ -10,7 +10,7 @@ from bench.session.frame_times import frame_times
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
 from bench.session.traces import Traced, read_object_points, read_traces_alone
-from bench.session.trial import Trial
+from bench.session.trial import PLACE_UNCHECKED, Trial
 from bench.trials.placed_by_board import place_by_board
 from bench.trials.stated_truth import stated_place
 from bench.trials.still_scene import StillScene
@@ -52,6 +52,7 @@ def traced_frames(
         rods=Rods(session.whisker.wire, stated_object(trial)),
         motor_sigma_rad=signals.motor_sigma_at(times.time_s),
         observe=TrialTraces.observe,
+        notes=() if points else (PLACE_UNCHECKED,),
     )
 
 

@@ -28,7 +28,7 @@ class TrialFrames:
 
     by_camera: pictures by frame, as read. places: frames of each forward stroke. back: frames of
     ways back by the number of the whisk, last frame first. pictures: what vision evaluates, or traces alone;
-    observe: evaluates it. motor_sigma_rad (n,): of each frame's own motor angle.
+    observe: evaluates it. motor_sigma_rad (n,): of each frame's own motor angle. notes: on what places the object.
     """
 
     times: FrameTimes
@@ -40,6 +40,7 @@ class TrialFrames:
     rods: Rods
     motor_sigma_rad: np.ndarray
     observe: Callable[..., TrialTruth] = observe_trial
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def read(

@@ -7,12 +7,14 @@ import cv2
 import numpy as np
 import pytest
 
+from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.cameras.session_cameras import calibrate_session
 from bench.session.abilities import abilities
 from bench.session.session_check import checked_session
 from bench.session.signals import forward_strokes, read_signals
 from bench.session.strict_toml import read_toml
+from bench.session.trial import PLACE_UNCHECKED
 from bench.trials.seen import see_trial
 from bench.trials.stated_truth import stated_whisk
 from tests.scenes.refusals import refusal
@@ -92,14 +94,16 @@ def test_traces_alone_give_the_truth(alone, points, way, tmp_path):
     """With points of the object, its place by a stage, or pictures of a board on it."""
     ways = {"points": add_points_and_joints, "stage": state_place, "board": show_board}
     ways[way](alone, *[points] * (way == "points"))
-    session = checked_session(alone)
+    problems = InputProblems()
+    session = checked_session(alone, problems)
     assert [ability.count for ability in abilities(session)[:3]] == [1, 1, 1]
     (trial,) = session.trials
     calibration = calibrate_session(session, tmp_path / "out")
     seen = see_trial(session, trial, read_signals(trial), calibration, Settings())
-    assert seen.notes == (
-        "the wire's lines are another program's (high, low), and no picture was read",
-    )
+    drawn, *unchecked = seen.notes
+    assert drawn == "the wire's lines are another program's (high, low), and no picture was read"
+    assert unchecked == [PLACE_UNCHECKED] * (way != "points")
+    assert problems.notes == [f"trials/{trial.name}: {note}" for note in unchecked]
     truth = read_toml(trial.folder / "truth.toml", "truth.toml")
     (whisk,) = seen.whisks
     assert not whisk.overlay

@@ -45,7 +45,9 @@ def row(look: str, way: Way, native: Way, most_mm: float) -> dict:
 def by_stage(folder: Path, seeds: range, workers: int) -> Iterator[dict]:
     """Yield the row of a bar's place by a stage."""
     session = load_session(stage.SESSION)
-    drawn = stage.drawn_whisks(session, "bar", STAGE_WHISKS, len(seeds))
+    drawn = []
+    for seed in seeds:
+        drawn += stage.drawn_whisks(session, "bar", STAGE_WHISKS, seed + 1)
     way = of_whisks([(w.d_x_error_mm, w.d_x_sigma_mm) for w in drawn])
     yield row("stage", way, way, MOST_OF_NATIVE * way[2])
 
