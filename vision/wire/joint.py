@@ -21,7 +21,7 @@ from vision.wire.common_shift import CommonShift, common_shift
 from vision.wire.descent import Point, Shared, descend
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import LEAST_POWER, PositionEquations, SegmentEquations
-from vision.wire.starts import find_start
+from vision.wire.starts import descend_coarsely, find_start
 
 # [segments] By which the posterior of a common shift is computed, at most: more pixels at one
 # distance from the axis determine it no better, for the model errs alike in all of them. Set by eye. Study: wire_scenes.py.
@@ -49,11 +49,11 @@ def solve_jointly(task: ShadedSegments, *, last: bool = True) -> Solved:
     is the last pass, so that other common shifts that are as probable enter the sigma.
     """
     tempered = task.tempered()
+    if not last:
+        return place_each_segment(task, descend_coarsely(tempered))
     shift_px, log_blur = find_start(task)
     shared = descend(Point.at_common_shift(tempered, shift_px, log_blur).weighted())
-    if last:
-        shared = _with_all_shifts(tempered, shared)
-    return place_each_segment(task, shared)
+    return place_each_segment(task, _with_all_shifts(tempered, shared))
 
 
 def _with_all_shifts(task: ShadedSegments, shared: Shared) -> Shared:

@@ -7,7 +7,7 @@ all starts of a grid are ranked by their evidence, and the best are followed.
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from vision.wire.descent import Point, descend
+from vision.wire.descent import Point, Shared, descend
 from vision.wire.gathered import GatheredEquations, exactly_if_needed
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import stiffness, wave_prior
@@ -23,6 +23,8 @@ _START_SEGMENTS = 300
 _MOST_STARTS = 3
 # [px] No two starts that are followed have common shifts so near. Study: wire_scenes.py.
 _START_SEPARATION_PX = 0.3
+# [px] Ends of two descents that are nearer are one minimum: they are 0.01 px apart. Set by eye. Study: wire_scenes.py.
+_SAME_END_PX = 0.1
 # [1] Factor on both for a start's descent, from whose end another begins: half a sigma by what all
 # share. With it d_x, touch, slope and slip move by 0.006 sigma at most in twelve scenes. Study:
 # thresholds.py wire.starts _COARSE ….
@@ -36,16 +38,30 @@ def find_start(task: ShadedSegments) -> tuple[float, float]:
     """
     if task.seen_blur_px is not None:
         return 0.0, float(np.log(task.seen_blur_px))
-    task = task.of(slice(None, None, 1 + len(task.pieces) // _START_SEGMENTS)).tempered()
+    some = task.of(slice(None, None, 1 + len(task.pieces) // _START_SEGMENTS)).tempered()
+    best = descend_coarsely(some)
+    return _common_shift_px(some, best), float(np.log(best.blur_px))
+
+
+def descend_coarsely(task: ShadedSegments) -> Shared:
+    """Return the most probable end of descents from the best starts, until two of them end alike."""
     starts = _rank_starts(task)
     robust = Point.at_common_shift(task, *starts[0]).weighted().robust
-    ends = []
+    ends: list[Shared] = []
     for shift_px, log_blur in _keep_apart(starts)[:_MOST_STARTS]:
         start = Point.at_common_shift(task, shift_px, log_blur, robust)
-        ends.append(descend(start, _COARSE))
-    best = min(ends, key=lambda end: end.evidence)
-    shift_px = np.median(best.shift_px / task.pieces.relative_radius)
-    return float(shift_px), float(np.log(best.blur_px))
+        end = descend(start, _COARSE)
+        shift_px = _common_shift_px(task, end)
+        is_known = any(abs(shift_px - _common_shift_px(task, one)) < _SAME_END_PX for one in ends)
+        ends.append(end)
+        if is_known:
+            break
+    return min(ends, key=lambda end: end.evidence)
+
+
+def _common_shift_px(task: ShadedSegments, shared: Shared) -> float:
+    """Return the shift that segments have in common, px at their mean half-width."""
+    return float(np.median(shared.shift_px / task.pieces.relative_radius))
 
 
 def _rank_starts(task: ShadedSegments) -> list[tuple[float, float]]:
