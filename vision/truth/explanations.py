@@ -64,7 +64,7 @@ class Explanation:
 
     def from_place(self, bar: SeenBar) -> Self:
         """Return the fit that begins from another place. Raises Refused where there is none."""
-        begin = replace(self.whisk, bar=bar, light={})
+        begin = replace(self.whisk, bar=bar, light={}, earlier=None)
         try:
             return Explanation(begin, fit_whisk(begin))
         except np.linalg.LinAlgError as error:

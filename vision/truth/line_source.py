@@ -53,6 +53,9 @@ class LineSource(ABC):
         """Return by how much a camera's points may scatter about a wire, px."""
         return _MOST_SCATTER_PX
 
+    def begin_as(self, earlier: "LineSource") -> None:  # noqa: B027
+        """Begin from what the lines of an earlier whisk of the same trial have shown."""
+
     @abstractmethod
     def wire_points(self, place: WhiskPlace, *, last: bool) -> dict[str, list[Observed]]:
         """Return by camera, for each of them, the wire's points near its curves.

@@ -76,9 +76,13 @@ def observe_trial(
         return nothing_seen(whisks, reason.reason)
     rows = []
     found = scene.found
+    earlier = None
     for whisk in scene.whisks:
-        row, found = see_whisk(replace(whisk, bar=found), explain, _truth)
+        row, explained = see_whisk(replace(whisk, bar=found, earlier=earlier), explain, _truth)
         rows.append(row)
+        if explained is not None:
+            found = explained.whisk.bar
+            earlier = explained.fitted
     axis = found.axis.as_bar()
     light = [whisk.light for whisk in scene.whisks]
     bars = {}
@@ -265,12 +269,13 @@ def see_whisk(
     whisk: WhiskPictures,
     explain_by: Callable[[WhiskPictures], Explanation],
     truth_of: Callable[[Explanation], WhiskTruth],
-) -> tuple[WhiskTruth, SeenBar]:
-    """Return the truth of one whisk, or its status where there is none, and the bar to begin the
-    next whisk from: another one where the pictures showed it elsewhere.
+) -> tuple[WhiskTruth, Explanation | None]:
+    """Return the truth of one whisk, or its status where there is none, and the fit to begin the next
+    whisk from, None without one.
 
     explain_by: fits a whisk. truth_of: makes the row of the fit. A camera that shows something else
-    than the others is left out, and the others are evaluated again.
+    than the others is left out, and the others are evaluated again. A whisk that cannot begin as an earlier
+    one ended begins by itself.
     """
     while True:
         whisk = whisk.without_gaps()
@@ -280,21 +285,28 @@ def see_whisk(
                 f"{_FEWEST_FRAMES} are needed"
             )
             status = joined(Reason("too_few_frames", few), *whisk.left_out)
-            return WhiskTruth(whisk.number, None, status=status), whisk.bar
+            return WhiskTruth(whisk.number, None, status=status), None
         try:
             explained = explain_by(whisk)
             break
-        except Misled as reason:
-            if len(whisk.views) == 1:
-                return _refused(whisk, reason.reason), whisk.bar
-            whisk = whisk.without(reason.camera, reason.reason)
-        except Refused as reason:
-            if not whisk.is_thinned or reason.code not in _TOO_LITTLE_FREE:
-                return _refused(whisk, reason.reason), whisk.bar
-            whisk = whisk.with_all_frames()
-        except np.linalg.LinAlgError:
-            return _refused(whisk, NOT_CONVERGED), whisk.bar
-    return truth_of(explained), explained.whisk.bar
+        except (Refused, np.linalg.LinAlgError) as reason:
+            begins_anew = _again(whisk, reason)
+            if begins_anew is None:
+                why = reason.reason if isinstance(reason, Refused) else NOT_CONVERGED
+                return _refused(whisk, why), None
+            whisk = begins_anew
+    return truth_of(explained), explained
+
+
+def _again(whisk: WhiskPictures, reason: Exception) -> WhiskPictures | None:
+    """Return how a whisk that was refused is evaluated again; None where it is not."""
+    if whisk.earlier is not None:
+        return replace(whisk, earlier=None)
+    if isinstance(reason, Misled) and len(whisk.views) > 1:
+        return whisk.without(reason.camera, reason.reason)
+    if isinstance(reason, Refused) and whisk.is_thinned and reason.code in _TOO_LITTLE_FREE:
+        return whisk.with_all_frames()
+    return None
 
 
 def _refused(whisk: WhiskPictures, status: Reason) -> WhiskTruth:

@@ -61,6 +61,9 @@ class WhereAbout:
 class ObjectReader(ABC):
     """What reads the touched object's edges in all views of a whisk."""
 
+    def begin_as(self, earlier: "ObjectReader") -> None:  # noqa: B027
+        """Begin from what a reader of the same form has read in an earlier whisk of the same trial."""
+
     @abstractmethod
     def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the lines of the object.
@@ -83,6 +86,15 @@ class BarMiddles(ObjectReader):
     settings: VisionSettings
     lines: dict[str, BarLineEstimate] = field(default_factory=dict)
     are_fine: bool = False
+
+    def begin_as(self, earlier: "BarMiddles") -> None:
+        """Begin with the lines of an earlier whisk, where that had the same cameras: they are of the
+        trial's mean pictures.
+        """
+        names = [view.camera.name for view in self.views]
+        if names == [view.camera.name for view in earlier.views]:
+            self.lines = earlier.lines
+            self.are_fine = earlier.are_fine
 
     def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the middle of the bar, where there is one."""

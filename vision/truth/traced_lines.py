@@ -48,6 +48,12 @@ class TracedLines(LineSource):
     reader: ObjectReader | None = None
     blur_px: Mapping[str, float] = field(default_factory=dict)
 
+    def begin_as(self, earlier: "TracedLines") -> None:
+        """Begin with the lens blurs and the object's lines of an earlier whisk of the same trial."""
+        self.blur_px = earlier.blur_px
+        if type(self.reader) is type(earlier.reader):
+            self.reader.begin_as(earlier.reader)
+
     def wire_points(self, place: WhiskPlace, *, last: bool) -> dict[str, list[Observed]]:
         """Return by camera the wire's points. Fills whisk.light with how each camera sees it."""
         found = {}

@@ -57,7 +57,8 @@ class WhiskPictures:
     filled with how each camera sees the wire. left_out: a line on each camera that is not used.
     stated_velocity: of a bar that moves. gives: of one that gives way. lines: makes the source of the
     whisk's lines (`vision.truth.traced_lines.TracedLines` or one made as that is). picture_of: as of
-    `TrialPictures`. stated_place: of an object whose place is known without its lines.
+    `TrialPictures`. stated_place: of an object whose place is known without its lines. earlier: the fit of
+    a whisk of the same trial, from whose rest shape, lens blurs and lines of the object this one begins.
     """
 
     number: int
@@ -76,6 +77,7 @@ class WhiskPictures:
     lines: Callable[..., LineSource] | None = None
     picture_of: Mapping[str, str] = field(default_factory=dict)
     stated_place: AxisPrior | None = None
+    earlier: "FittedWhisk | None" = None
 
     def axis_prior(self, axis: Axis) -> AxisPrior:
         """Return what is believed of the object's place: what is stated, or that it is about the axis of the pass before."""
@@ -182,7 +184,7 @@ class WhiskPictures:
 @dataclass(frozen=True, eq=False)
 class FittedWhisk:
     """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user
-    asks for.
+    asks for. lines: the source of its lines.
     """
 
     problem: Problem
@@ -191,15 +193,23 @@ class FittedWhisk:
     uncertainty: Uncertainty
     measured: Measured
     by_parameter: Jacobians
+    lines: LineSource | None = None
 
     @classmethod
-    def of(cls, problem: Problem, state: State, gain: np.ndarray, frames: list[int]) -> Self:
+    def of(
+        cls,
+        problem: Problem,
+        state: State,
+        gain: np.ndarray,
+        frames: list[int],
+        lines: LineSource | None = None,
+    ) -> Self:
         """Return a fit with its uncertainty; gain (size, size): the second result of `solve`, which is
         `Uncertainty.inverse_normal`.
         """
         measured, by_parameter = jacobians(problem, state)
         errors = uncertainty(problem, state, gain)
-        return cls(problem, state, frames, errors, measured, by_parameter)
+        return cls(problem, state, frames, errors, measured, by_parameter, lines)
 
     @cached_property
     def exposure(self) -> Exposure:

@@ -61,7 +61,10 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
 def _fit_by(whisk: WhiskPictures, strategy: Strategy) -> FittedWhisk:
     """Fit a whisk by one strategy. Raises Refused where it does not serve."""
     whisk, expected = _expect_coarsely(whisk, strategy.touch)
-    return fit_lines(whisk, whisk.lines(whisk, strategy.reader), expected, strategy.touch)
+    lines = whisk.lines(whisk, strategy.reader)
+    if whisk.earlier is not None:
+        lines.begin_as(whisk.earlier.lines)
+    return fit_lines(whisk, lines, expected, strategy.touch)
 
 
 def fit_lines(
@@ -105,7 +108,7 @@ def fit_last(
     seen = lines.all_points(expected.place, last=True)
     problem, state, covariance = _fit(whisk, expected, seen, touch)
     touch.part_by_fit(problem, state, covariance)  # raises where the last fit shows no free stroke
-    return FittedWhisk.of(problem, state, covariance, whisk.frames)
+    return FittedWhisk.of(problem, state, covariance, whisk.frames, lines)
 
 
 def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, ExpectedWhisk]:
@@ -157,8 +160,11 @@ def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarra
         SwingPictures.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm)
         for view in whisk.views
     ]
-    free = np.array(whisk.frames)[early(whisk.angles_rad)]
-    rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
+    if whisk.earlier is None:
+        free = np.array(whisk.frames)[early(whisk.angles_rad)]
+        rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
+    else:
+        rest = rest_shape(whisk.earlier.problem, whisk.earlier.state.vector)
     return rest, follow_bends(sights, axis, rest, whisk.motor)
 
 

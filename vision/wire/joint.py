@@ -49,11 +49,13 @@ def solve_jointly(task: ShadedSegments, *, last: bool = True) -> Solved:
     is the last pass, so that other common shifts that are as probable enter the sigma.
     """
     tempered = task.tempered()
-    if not last:
+    if not last and task.seen_blur_px is None:
         return place_each_segment(task, descend_coarsely(tempered))
     shift_px, log_blur = find_start(task)
     shared = descend(Point.at_common_shift(tempered, shift_px, log_blur).weighted())
-    return place_each_segment(task, _with_all_shifts(tempered, shared))
+    if last:
+        shared = _with_all_shifts(tempered, shared)
+    return place_each_segment(task, shared)
 
 
 def _with_all_shifts(task: ShadedSegments, shared: Shared) -> Shared:
