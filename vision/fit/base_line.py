@@ -19,6 +19,7 @@ from vision.fit.problem import (
     WANDER_PX,
     Problem,
     State,
+    columns_of_camera,
     point_rows,
     wandering,
 )
@@ -85,19 +86,15 @@ def base_lines(problem: Problem, state: State) -> BaseLines | None:
     for frame, angle in zip(frames, motor_rad):
         own_line = _own_line([r for r in rows if r.frame == frame], shape)
         lines.append(_in_space(own_line, angle, length_mm))
-    point, point_spread, point_by_shared = map(np.array, zip(*[line[:3] for line in lines]))
-    direction, direction_spread, direction_by_shared = map(
-        np.array, zip(*[line[3:] for line in lines])
-    )
     return BaseLines(
-        motor_rad,
-        point,
-        point_spread,
-        direction,
-        direction_spread,
-        _shared(covariance, float(motor_rad.mean()), length_mm),
-        point_by_shared,
-        direction_by_shared,
+        motor_rad=motor_rad,
+        point_mm=np.array([line.point_mm for line in lines]),
+        point_covariance=np.array([line.point_covariance for line in lines]),
+        direction=np.array([line.direction for line in lines]),
+        direction_covariance=np.array([line.direction_covariance for line in lines]),
+        shared_covariance=_shared(covariance, float(motor_rad.mean()), length_mm),
+        point_by_shared=np.array([line.point_by_shared for line in lines]),
+        direction_by_shared=np.array([line.direction_by_shared for line in lines]),
     )
 
 
@@ -156,7 +153,7 @@ def _nuisances(problem: Problem, seen: Observed) -> np.ndarray:
     """Return of each camera a shift of the whole line and interpolation weights along the wire, px:
     (n, cameras · (1 + knots))."""
     own = np.column_stack([np.ones(len(seen.points)), wandering(problem, seen)])
-    return np.kron(np.arange(len(problem.cameras)) == seen.camera, own)
+    return columns_of_camera(problem, seen.camera, own)
 
 
 def _drifts(problem: Problem, camera: int, by_offsets: np.ndarray) -> np.ndarray:
@@ -166,7 +163,7 @@ def _drifts(problem: Problem, camera: int, by_offsets: np.ndarray) -> np.ndarray
     by_offsets (n, offsets): derivatives of residuals by the camera's own offsets.
     """
     own = by_offsets[:, _DRIFTS] * drift_sigma_px(problem, camera)
-    return np.kron(np.arange(len(problem.cameras)) == camera, own)
+    return columns_of_camera(problem, camera, own)
 
 
 def drift_sigma_px(problem: Problem, camera: int) -> np.ndarray:
@@ -176,12 +173,15 @@ def drift_sigma_px(problem: Problem, camera: int) -> np.ndarray:
 
 def _shape_at_rest(rows: list[_FrameRows]) -> tuple[np.ndarray, np.ndarray]:
     """Fit the rest shape (8,) with its covariance."""
-    J = np.concatenate([np.hstack([r.by_rest, r.by_nuisance]) for r in rows])
-    residual = np.concatenate([r.residual for r in rows])
-    rest_sigma = np.concatenate([REST_PRIOR_MM[:2], _STRAIGHT_MM])
-    nuisance_sigma = np.full(J.shape[1] - _REST, WANDER_PX)
-    prior = np.concatenate([rest_sigma, rest_sigma, nuisance_sigma])
-    covariance = np.linalg.inv(J.T @ J + np.diag(prior**-2.0))
+    by_rest = np.concatenate([own.by_rest for own in rows])
+    by_nuisance = np.concatenate([own.by_nuisance for own in rows])
+    residual = np.concatenate([own.residual for own in rows])
+    J = np.hstack([by_rest, by_nuisance])
+    one_way_sigma = np.concatenate([REST_PRIOR_MM[:2], _STRAIGHT_MM])
+    rest_sigma = np.tile(one_way_sigma, 2)  # in y, then in z
+    nuisance_sigma = np.full(by_nuisance.shape[1], WANDER_PX)
+    prior_sigma = np.append(rest_sigma, nuisance_sigma)
+    covariance = np.linalg.inv(J.T @ J + np.diag(prior_sigma**-2.0))
     solution = -covariance @ (J.T @ residual)
     return solution[:_REST], covariance[:_REST, :_REST]
 
@@ -200,13 +200,24 @@ def _own_line(
     return shape[_LINE] + gain @ residual, covariance, gain @ by_shared
 
 
+@dataclass(frozen=True, eq=False)
+class _SpaceLine:
+    """The base in one frame, in the rig frame: a row of `BaseLines`."""
+
+    point_mm: np.ndarray
+    point_covariance: np.ndarray
+    point_by_shared: np.ndarray
+    direction: np.ndarray
+    direction_covariance: np.ndarray
+    direction_by_shared: np.ndarray
+
+
 def _in_space(
     own_line: tuple[np.ndarray, np.ndarray, np.ndarray], motor_rad: float, length_mm: float
-) -> tuple[np.ndarray, ...]:
-    """Return a point and a direction of a frame's line (see `_own_line`), each with its covariance
-    and its change (3, k) with each error that frames share.
+) -> _SpaceLine:
+    """Return a frame's line (see `_own_line`) in the rig frame.
 
-    The point is taken where offset and slope err independently of each other.
+    Its point is taken where offset and slope err independently of each other.
     """
     line, covariance, by_shared = own_line
     place = -np.trace(covariance[:2, 2:]) / np.trace(covariance[2:, 2:])  # in lengths
@@ -216,13 +227,13 @@ def _in_space(
     identity = np.eye(2)
     point_by_line = across @ np.hstack([identity, place * identity])  # (3, 4)
     turn_by_line = across @ np.hstack([np.zeros((2, 2)), identity / length_mm])  # (3, 4)
-    return (
-        place * length_mm * along + point_by_line @ line,
-        point_by_line @ covariance @ point_by_line.T,
-        point_by_line @ by_shared,
-        unit(along + turn_by_line @ line),
-        turn_by_line @ covariance @ turn_by_line.T,
-        turn_by_line @ by_shared,
+    return _SpaceLine(
+        point_mm=place * length_mm * along + point_by_line @ line,
+        point_covariance=point_by_line @ covariance @ point_by_line.T,
+        point_by_shared=point_by_line @ by_shared,
+        direction=unit(along + turn_by_line @ line),
+        direction_covariance=turn_by_line @ covariance @ turn_by_line.T,
+        direction_by_shared=turn_by_line @ by_shared,
     )
 
 

@@ -20,10 +20,18 @@ import numpy as np
 from scipy.special import chdtrc
 
 from vision.fit.covariance import camera_rows
-from vision.fit.problem import WANDER_PX, Problem, State, bends, curves_of, wandering
+from vision.fit.problem import (
+    WANDER_PX,
+    Problem,
+    State,
+    bends,
+    columns_of_camera,
+    curves_of,
+    wandering,
+)
 from vision.fit.quantities import Jacobians, Measured
 from vision.fit.reshaped import by_contacts, by_lines
-from vision.fit.solve import LAST_SCALE, linear_at, robust_weights
+from vision.fit.solve import linear_at
 from vision.geometry.centreline import Curves, rotation_z
 
 # [chance] By which a wire that is a beam departs from it so far, a whisk. Study: chosen.
@@ -188,14 +196,15 @@ def _estimate_departure(
     still.
     """
     linear = linear_at(problem, state)
-    root = np.sqrt(robust_weights(linear, LAST_SCALE))
+    root = np.sqrt(linear.weights())
     curves, _ = curves_of(problem, state.vector, state.arcs_mm)
     moves = _moves(problem, state, curves)
     on_contacts, slip_by = by_contacts(problem, state, curves, moves, frame, _STEP_MM_PER_RAD)
     by_departure = np.concatenate([by_lines(problem, curves, moves), on_contacts])
-    jacobian = np.hstack([linear.jacobian * root[:, None], _weighted(root, _wander_rows(problem))])
+    weighted_fit = linear.weighted()
+    jacobian = np.hstack([weighted_fit.jacobian, _weighted(root, _wander_rows(problem))])
     weighted = _LeastSquares(
-        residual=linear.residual * root,
+        residual=weighted_fit.residual,
         jacobian=jacobian,
         prior=np.eye(jacobian.shape[1])[problem.size :] / WANDER_PX,
         by_camera=_weighted(root, camera_rows(problem, state)),
@@ -255,7 +264,7 @@ def _wander_rows(problem: Problem) -> np.ndarray:
     """Return derivatives (n, w) of the line points' residuals by each camera's wandering."""
     rows = []
     for seen in problem.seen:
-        is_own = np.arange(len(problem.cameras)) == seen.camera
-        by_knot = np.kron(is_own, wandering(problem, seen)) * (seen.frame >= 0)
+        by_knot = columns_of_camera(problem, seen.camera, wandering(problem, seen))
+        by_knot *= seen.frame >= 0
         rows.append(by_knot / seen.points.sigma_px[:, None])
     return np.concatenate(rows)

@@ -13,7 +13,7 @@ import numpy as np
 
 from vision.fit.covariance import camera_rows, times_residual_covariance
 from vision.fit.problem import Problem, State, point_rows
-from vision.fit.solve import LAST_SCALE, linear_at, robust_weights
+from vision.fit.solve import linear_at
 from vision.fit.turns import by_turn
 
 # [frames⁻²] Information on the delay of a camera that shows no wire, which would run away. Stated.
@@ -33,7 +33,7 @@ def camera_delays(
     if len(set(pictures)) < 2:
         return {}
     linear = linear_at(problem, state)
-    weight = robust_weights(linear, LAST_SCALE)
+    weight = linear.weights()
     columns = _by_delay(problem, by_turn(problem, state, linear))
     by_cameras = camera_rows(problem, state)
     found = {}

@@ -11,7 +11,7 @@ from scipy.ndimage import correlate1d
 from vision.fit.blocks import columns_of
 from vision.fit.object_rows import object_rows
 from vision.fit.problem import Problem, State, curves_of, point_rows
-from vision.fit.solve import LAST_SCALE, linear_at, robust_weights, weighted_jacobian
+from vision.fit.solve import linear_at, weighted_jacobian
 from vision.geometry.camera import N_PARAMETERS
 from vision.geometry.centreline import Curves
 from vision.wire.points import Observed
@@ -84,8 +84,8 @@ def by_lens(problem: Problem, state: State, inverse_normal: np.ndarray) -> np.nd
     fit a move of all cameras together moves the whole scene and nothing in it.
     """
     linear = linear_at(problem, state)
-    weights = robust_weights(linear, LAST_SCALE)[linear.is_point, None]
-    by_camera = weights * camera_rows(problem, state)
+    weights = linear.weights()[linear.is_point]
+    by_camera = weights[:, None] * camera_rows(problem, state)
     return -inverse_normal @ (linear.jacobian[linear.is_point].T @ by_camera)
 
 

@@ -113,11 +113,15 @@ class BarRows(ObjectRows):
     def part(self, seen: CameraPoints, with_jacobian: bool, vector: np.ndarray) -> Part:
         """Return residuals and Jacobian rows of one camera's points of the bar."""
         blocks = self.problem.blocks
-        wider = [blocks.reach] if np.any(seen.side) else []
-        moved_blocks = [blocks.bar_axis, *wider, blocks.motion] if with_jacobian else []
-        columns, moved = self.moved_alone(moved_blocks, vector)
+        varied = []
+        if with_jacobian:
+            varied = [blocks.bar_axis, blocks.motion]
+            if np.any(seen.side):  # edges also move with the bar's width
+                varied.append(blocks.reach)
+        columns, moved = self.moved_alone(varied, vector)
         px = self._expected_px(moved, seen)
-        jacobian = self.jacobian_of(columns, np.sum((px[1:] - px[0]) * seen.points.normal, axis=-1))
+        change_px = np.sum((px[1:] - px[0]) * seen.points.normal, axis=-1)
+        jacobian = self.jacobian_of(columns, change_px)
         modes = np.stack([np.ones(len(seen.side)), seen.points.place / BAR_TILT_ARM_MM], axis=1)
         return seen.over_sigma(px[0], jacobian, blocks.bar_offsets[seen.camera], modes, vector)
 

@@ -21,7 +21,7 @@ from vision.fit.blocks import Blocks, columns_of
 from vision.fit.covariance import Uncertainty, camera_rows, times_residual_covariance
 from vision.fit.problem import Problem, State, point_rows
 from vision.fit.quantities import Jacobians
-from vision.fit.solve import LAST_SCALE, linear_at, robust_weights
+from vision.fit.solve import linear_at
 
 # [cameras] With one fewer nothing is left over to compare. Derived.
 FEWEST_CAMERAS = 3
@@ -100,10 +100,11 @@ class _Observations:
     def of(cls, problem: Problem, state: State) -> "_Observations":
         """Return the observations of a fit that has converged."""
         linear = linear_at(problem, state)
-        root = np.sqrt(robust_weights(linear, LAST_SCALE))
-        by_camera = np.zeros((len(root), problem.cameras.covariance.shape[0]))
-        by_camera[linear.is_point] = camera_rows(problem, state) * root[linear.is_point, None]
-        return cls(problem, linear.residual * root, linear.jacobian * root[:, None], by_camera)
+        weighted = linear.weighted()
+        root_weight = np.sqrt(linear.weights())[linear.is_point]
+        by_camera = np.zeros((len(linear.residual), len(problem.cameras.covariance)))
+        by_camera[linear.is_point] = camera_rows(problem, state) * root_weight[:, None]
+        return cls(problem, weighted.residual, weighted.jacobian, by_camera)
 
     def without(self, camera: int) -> np.ndarray:
         """Return the Jacobian (n, size) with zeros for the line points of a camera."""
@@ -222,7 +223,8 @@ class _LinesOff:
     def worst_px(self) -> tuple[float, float]:
         """Return by how much the line lies off that does most, in its sigmas, and its sigma, px."""
         off_px = self.px_per_value @ self.value
-        sigma_px = np.sqrt(np.diag(self.px_per_value @ self.covariance @ self.px_per_value.T))
+        variance_px2 = np.diag(self.px_per_value @ self.covariance @ self.px_per_value.T)
+        sigma_px = np.sqrt(variance_px2)
         in_sigmas = np.abs(off_px) / np.maximum(sigma_px, 1e-300)
         is_determined = np.sum(self.directions**2, axis=1) > 0.5
         worst = int(np.argmax(np.where(is_determined, in_sigmas, 0.0)))

@@ -273,6 +273,11 @@ def wire_modes(
     return (by_turn[:, :, None] * by_place[:, None]).reshape(len(lever), 6)
 
 
+def columns_of_camera(problem: Problem, camera: int, own: np.ndarray) -> np.ndarray:
+    """Return columns (n, cameras · k), zero but for those (n, k) of one camera."""
+    return np.kron(np.arange(len(problem.cameras)) == camera, own)
+
+
 def wandering(problem: Problem, seen: Observed) -> np.ndarray:
     """Return the linear interpolation weights (n, knots) along the wire by which a traced line may
     wander.

@@ -23,7 +23,7 @@ from vision.fit.covariance import by_lens
 from vision.fit.problem import Problem, State, bar_axes, bends, curves_of
 from vision.fit.quantities import Jacobians, Measured, measure
 from vision.fit.reshaped import by_contacts, by_lines
-from vision.fit.solve import LAST_SCALE, linear_at, linearise, robust_weights
+from vision.fit.solve import linear_at, linearise
 from vision.geometry.camera import N_PARAMETERS, PARAMETERS
 from vision.geometry.centreline import (
     REST_POWERS,
@@ -95,7 +95,7 @@ class Fit:
         residuals.
         """
         linear = linear_at(self.problem, self.state)
-        weights = robust_weights(linear, LAST_SCALE)[: len(residual)]
+        weights = linear.weights()[: len(residual)]
         jacobian = linear.jacobian[: len(residual)]
         return -self.inverse_normal @ (jacobian.T @ (weights * residual))
 

@@ -27,11 +27,13 @@ def by_lines(problem: Problem, curves: Curves, moves: Curves) -> np.ndarray:
 
 def _across_line(problem: Problem, seen: Observed, curves: Curves, moves: Curves) -> np.ndarray:
     """Return how far (n, k) each change moves the line across itself in the picture, px."""
-    own_moves = Curves(curves.arc_mm, moves.points_mm[:, seen.frame], moves.tangents[:, seen.frame])
-    points, _ = curves.one(seen.frame).at(seen.points.place)
-    moved_mm, _ = own_moves.at(seen.points.place)  # (k, n, 3)
-    _, by_point, _ = problem.cameras.cameras[seen.camera].project_with_jacobians(points)
-    return np.einsum("ni,nij,knj->nk", seen.points.normal, by_point, moved_mm)
+    place_mm = seen.points.place
+    points_mm, _ = curves.one(seen.frame).at(place_mm)
+    in_frame = Curves(curves.arc_mm, moves.points_mm[:, seen.frame], moves.tangents[:, seen.frame])
+    moves_mm, _ = in_frame.at(place_mm)  # (k, n, 3)
+    camera = problem.cameras.cameras[seen.camera]
+    _, by_point, _ = camera.project_with_jacobians(points_mm)  # (n, 2, 3)
+    return np.einsum("ni,nij,knj->nk", seen.points.normal, by_point, moves_mm)
 
 
 def by_contacts(

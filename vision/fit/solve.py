@@ -59,6 +59,15 @@ class Linear:
     jacobian: np.ndarray
     is_point: np.ndarray
 
+    def weights(self, scale: float = LAST_SCALE) -> np.ndarray:
+        """Return Cauchy weights (n,) of line points, scale in sigmas, and 1 of touching and priors."""
+        return np.where(self.is_point, cauchy_weights(self.residual, scale), 1.0)
+
+    def weighted(self, scale: float = LAST_SCALE) -> "Linear":
+        """Return residuals and Jacobian times the roots of their weights."""
+        root = np.sqrt(self.weights(scale))
+        return replace(self, residual=self.residual * root, jacobian=self.jacobian * root[:, None])
+
 
 def linearise(
     problem: Problem, state: State, jacobian: np.ndarray | None = None
@@ -190,11 +199,6 @@ def _prior_part(problem: Problem, vector: np.ndarray) -> Part:
     return vector / sigma, np.diag(1.0 / sigma)
 
 
-def robust_weights(linear: Linear, scale: float) -> np.ndarray:
-    """Return Cauchy weights (n,) of line points, and 1 of touching and priors."""
-    return np.where(linear.is_point, cauchy_weights(linear.residual, scale), 1.0)
-
-
 def solve(
     problem: Problem, state: State, *, scales: Sequence[float] = _SCALES
 ) -> tuple[State, np.ndarray]:
@@ -224,11 +228,11 @@ def _step_of(blocks: Blocks, linear: Linear, scale: float) -> tuple[np.ndarray, 
     """Return Gauss–Newton's step (size,), within _LONGEST_RAD of bend, and the Jacobian that it was
     found with, robustly weighted.
     """
-    root = np.sqrt(robust_weights(linear, scale))
-    jacobian = linear.jacobian * root[:, None]
-    step = np.linalg.lstsq(jacobian, -linear.residual * root, rcond=None)[0]
+    weighted = linear.weighted(scale)
+    step = np.linalg.lstsq(weighted.jacobian, -weighted.residual, rcond=None)[0]
     most_bend_rad = np.max(np.abs(step[blocks.bends.slice]), initial=0.0)
-    return step * min(1.0, _LONGEST_RAD / max(most_bend_rad, 1e-9)), jacobian
+    share = min(1.0, _LONGEST_RAD / max(most_bend_rad, 1e-9))
+    return share * step, weighted.jacobian
 
 
 def weighted_jacobian(
@@ -243,4 +247,4 @@ def weighted_jacobian(
         linear = linear_at(problem, state)
     else:
         linear, _ = linearise(problem, state, jacobian)
-    return linear.jacobian * np.sqrt(robust_weights(linear, scale))[:, None]
+    return linear.weighted(scale).jacobian

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit.problem import Problem, State, bar_axis, bends, resting_curves, shift_at_mm
-from vision.fit.solve import LAST_SCALE, linearise, robust_weights
+from vision.fit.solve import Linear, linearise
 from vision.geometry.contact import clearance
+from vision.geometry.rotation import unit
 
 # [frames] Before touch: one gives the rest shape, two show that it swings with the motor. Derived.
 FEWEST_FREE = 2
@@ -152,16 +153,22 @@ def frames_that_touch(motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.n
 def _hinge(motor_rad: np.ndarray, bend_rad: np.ndarray) -> float:
     """Find the motor angle up to which there is no bend and from which on it grows in proportion:
     that of the least absolute misfit."""
-    last = bend_rad[-max(2, len(bend_rad) // 3) :]
-    sure = np.linalg.norm(last, axis=1) > _SURE_BEND_RAD  # of few that bend the median has none
-    towards = np.median(last[sure] if np.any(sure) else last, axis=0)
-    direction = towards / max(np.linalg.norm(towards), 1e-12)
-    bend = bend_rad @ direction  # (f,)
+    bend = bend_rad @ _last_direction(bend_rad)  # (f,)
     starts = np.linspace(motor_rad[0], motor_rad[-2], _STARTS_PER_FRAME * len(motor_rad))
-    rises = np.maximum(motor_rad - starts[:, None], 0.0)  # (starts, f)
-    slopes = np.sum(rises * bend, axis=1) / np.sum(rises**2, axis=1)
-    misfit = np.sum(np.abs(bend - slopes[:, None] * rises), axis=1)
+    past_start = np.maximum(motor_rad - starts[:, None], 0.0)  # (starts, f) rad
+    slopes = np.sum(past_start * bend, axis=1) / np.sum(past_start**2, axis=1)
+    misfit = np.sum(np.abs(bend - slopes[:, None] * past_start), axis=1)
     return float(starts[np.argmin(misfit)])
+
+
+def _last_direction(bend_rad: np.ndarray) -> np.ndarray:
+    """Return the unit direction (2,) of the bends (f, 2) in the last third of the frames.
+
+    Where few of these surely bend, the median over all of them would be no bend: it is over those.
+    """
+    last = bend_rad[-max(2, len(bend_rad) // 3) :]
+    is_sure = np.linalg.norm(last, axis=1) > _SURE_BEND_RAD
+    return unit(np.median(last[is_sure] if np.any(is_sure) else last, axis=0))
 
 
 def frames_by_touch(
@@ -193,30 +200,26 @@ def unbent_frames(problem: Problem, state: State, free: np.ndarray) -> np.ndarra
     bend_rad = np.where(free[:, None], 0.0, bends(problem, state.vector))
     vector[problem.first_bend :] = bend_rad.ravel()
     linear, _ = linearise(loose, replace(state, vector=vector))
-    root = np.sqrt(robust_weights(linear, LAST_SCALE))
-    jacobian = linear.jacobian * root[:, None]
-    residual = linear.residual * root
+    weighted = linear.weighted()
     while np.sum(free) >= FEWEST_FREE:
         last = int(np.flatnonzero(free)[-1])
-        if _bend_chi2(loose, jacobian, residual, free, last) < _LEAST_BEND:
+        if _bend_chi2(loose, weighted, free, last) < _LEAST_BEND:
             break
         free[last] = False
     return free
 
 
-def _bend_chi2(
-    loose: Problem, jacobian: np.ndarray, residual: np.ndarray, free: np.ndarray, frame: int
-) -> float:
+def _bend_chi2(loose: Problem, weighted: Linear, free: np.ndarray, frame: int) -> float:
     """Return by how much chi² falls where one of the free frames (f,) bool may bend.
 
-    loose: problem in which all may. jacobian (n, size), residual (n,): over their sigma.
+    loose: problem in which all may.
     """
     varies = np.ones(loose.size, dtype=bool)
     for one in np.flatnonzero(free).tolist():
         varies[loose.bend_of(one)] = one == frame
-    rows = jacobian[:, varies]
+    rows = weighted.jacobian[:, varies]
     covariance = np.linalg.inv(rows.T @ rows)
-    step = -covariance @ (rows.T @ residual)
+    step = -covariance @ (rows.T @ weighted.residual)
     first = int(np.sum(varies[: loose.bend_of(frame).start]))
     own = slice(first, first + 2)
     return float(step[own] @ np.linalg.solve(covariance[own, own], step[own]))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit.problem import Problem, State, point_rows
-from vision.fit.solve import LAST_SCALE, Linear, linear_at, linearise, robust_weights
+from vision.fit.solve import Linear, linear_at, linearise
 
 # [rad] Of differences: the tip moves by 0.01 mm. Derived.
 _STEP_RAD = 1e-4
@@ -38,10 +38,10 @@ def frame_turns(problem: Problem, state: State, index: Sequence[int]) -> Turns:
     """Return the turns of the frames (f,) of a fit that has converged."""
     linear = linear_at(problem, state)
     count = len(problem.motor_rad)
-    weight = robust_weights(linear, LAST_SCALE)
     jacobian = np.hstack([linear.jacobian, _by_turns(problem, state, linear)])
-    weighted = jacobian.T * weight
-    prior = np.append(np.zeros(problem.size), np.full(count, _PRIOR_RAD**-2.0))
+    weighted = jacobian.T * linear.weights()
+    no_prior = np.zeros(problem.size)  # of the fit's parameters, whose priors are rows
+    prior = np.append(no_prior, np.full(count, _PRIOR_RAD**-2.0))
     covariance = np.linalg.inv(weighted @ jacobian + np.diag(prior))
     step = -covariance @ (weighted @ linear.residual)
     turn_rad = step[-count:]
