@@ -13,7 +13,7 @@ from vision.wire.carried import carry_on
 from vision.wire.one_sided import WireAppearance
 from vision.wire.points import Observed
 from vision.wire.shading import LIT_ALIKE_RAD, Knots
-from vision.wire.trace import Placed, Traced, observed, placed, points_of
+from vision.wire.trace import SegmentPositions, WireTrace, observed, points_of
 
 # [rad] A wire that is lit otherwise than where it was traced (`LIT_ALIKE_RAD`) is traced anew, in the frames
 # of so much of the stroke before: then it is lit alike for two more degrees. Stated.
@@ -28,12 +28,12 @@ class WireLines:
     sees it.
     """
 
-    traced: dict[str, Traced]
+    traced: dict[str, WireTrace]
     knots: Knots
     first_rad: float
     light: dict[str, WireAppearance]
     frames: list[int]
-    segments: dict[str, list[Placed]] = field(default_factory=dict)
+    segments: dict[str, list[SegmentPositions]] = field(default_factory=dict)
 
     @classmethod
     def trace(cls, whisk: WhiskPictures, place: WhiskPlace, blur_px: Mapping[str, float]) -> Self:
@@ -45,7 +45,7 @@ class WireLines:
             found = trace_camera(whisk, view, place, blur_px=blur_px.get(name), last=True)
             if found is not None:
                 traced[name] = found
-                segments[name] = [placed(found)]
+                segments[name] = [found.positions]
         first_rad = float(np.min(whisk.angles_rad))
         frames = list(whisk.frames)
         return cls(traced, wire_knots(whisk), first_rad, whisk.light, frames, segments)
@@ -83,6 +83,6 @@ class CarriedLines(TracedLines):
         for number, name in enumerate(self.whisk.cameras.names):
             found[name] = []
             if name in self.wire.segments:
-                points, source = points_of(Placed.join(self.wire.segments[name]))
+                points, source = points_of(SegmentPositions.join(self.wire.segments[name]))
                 found[name] = observed(points, source, number, list(place.curves))
         return found

@@ -16,7 +16,7 @@ from vision.wire.points import Observed
 from vision.wire.shading import Knots
 from vision.wire.trace import (
     NEAR_CLAMP_MM,
-    Traced,
+    WireTrace,
     clear_of_bar,
     observed,
     to_points,
@@ -106,7 +106,7 @@ def trace_wire(
 
 def trace_camera(
     whisk: WhiskPictures, view: View, place: WhiskPlace, *, blur_px: float | None, last: bool
-) -> Traced | None:
+) -> WireTrace | None:
     """Return the wire's segments brought to where it is; None where there are none.
 
     Arguments and effect as of `trace_wire`.

@@ -113,9 +113,13 @@ class _Path:
         knots = curve_px[order, along]
         first, last = np.clip(np.round(knots[[0, -1]]), 0, shape[1 - along] - 1).astype(int)
         step = np.arange(first, last + 1)
-        others = (curve_px[:, 1 - along], np.asarray(place), np.asarray(radius_px))
-        at_steps = [np.interp(step, knots, values[order]) for values in others]
-        return _Path(along, step, *at_steps)
+
+        def at_steps(values: np.ndarray) -> np.ndarray:
+            """Return values (m,) of the curve's points at the steps (n,)."""
+            return np.interp(step, knots, np.asarray(values)[order])
+
+        middle = at_steps(curve_px[:, 1 - along])
+        return _Path(along, step, middle, at_steps(place), at_steps(radius_px))
 
     @cached_property
     def slope(self) -> np.ndarray:

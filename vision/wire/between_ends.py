@@ -26,7 +26,7 @@ from vision.wire.ridge_path import CoarsePath, find_paths
 from vision.wire.shading import Knots
 from vision.wire.steepest_edges import half_width_of, steepest_edges
 from vision.wire.strip import Curve, cut_strip, noise_beside, with_background
-from vision.wire.trace import Traced, to_points, trace
+from vision.wire.trace import WireTrace, to_points, trace
 
 # [px] Half-widths above this are evaluated in a shrunk picture: wires on the bench have 1 to 7.
 # Derived.
@@ -154,7 +154,7 @@ class _Fitted:
     """Hold a line about which nothing moves: its curve, trace, points, and scatter."""
 
     curve: Curve
-    traced: Traced
+    traced: WireTrace
     points: LinePoints
     scatter: float
     piece_px: float
@@ -200,8 +200,8 @@ def _last_pass(
 
 
 def _with_hidden_causes(
-    grey: np.ndarray, curve: Curve, settings: BetweenSettings, traced: Traced, log_sigma: float
-) -> Traced:
+    grey: np.ndarray, curve: Curve, settings: BetweenSettings, traced: WireTrace, log_sigma: float
+) -> WireTrace:
     """Return a trace whose shared causes hold what one sigma of the object's width moves, and light that
     hides a side of it.
     """
@@ -294,7 +294,7 @@ def _robust_line(
     return level + slope * along, scatter
 
 
-def _points(traced: Traced, curve: Curve, settings: BetweenSettings) -> LinePoints:
+def _points(traced: WireTrace, curve: Curve, settings: BetweenSettings) -> LinePoints:
     """Return the points that can be trusted, in order; raises Refused where they are too few."""
     points, _ = to_points(traced)
     _refuse_few(len(points), curve.length_px / settings.piece_px)

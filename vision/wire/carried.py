@@ -12,7 +12,7 @@ from vision.wire.bands import Pieces
 from vision.wire.descent import positions_with_shared
 from vision.wire.joint import widened_blurs
 from vision.wire.shading import LONGEST_PX, Knots, PositionEquations, SegmentEquations
-from vision.wire.trace import WIRE_WAVES, Placed, Traced
+from vision.wire.trace import WIRE_WAVES, SegmentPositions, WireTrace
 
 # [steps] From a curve that is a pixel or two off: each of `LONGEST_PX` at most. Derived.
 _STEPS = 5
@@ -23,7 +23,7 @@ _CONVERGED_PX = 0.5 * LONGEST_PX
 _STILL_PX = 0.005
 
 
-def carry_on(pieces: Pieces, traced: Traced, knots: Knots) -> Placed:
+def carry_on(pieces: Pieces, traced: WireTrace, knots: Knots) -> SegmentPositions:
     """Find where the rod lies in segments of later frames, by the shading and blur of traced ones.
 
     traced: by a last pass. knots: those of its shading.
@@ -36,7 +36,7 @@ def carry_on(pieces: Pieces, traced: Traced, knots: Knots) -> Placed:
     has_converged = np.abs(linear.step_px) < _CONVERGED_PX
     sensitivity = positions_with_shared(linear, knot_weights) / linear.power[:, None]
     relative_radius = pieces.radius_px / np.mean(traced.pieces.radius_px)
-    return Placed(
+    return SegmentPositions(
         px=moved.foot_px,
         normal=moved.normal,
         place=moved.place,

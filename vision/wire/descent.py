@@ -49,7 +49,7 @@ _CONVERGED_EACH = 1e-3
 
 
 @dataclass(frozen=True)
-class Shared:
+class SharedSolution:
     """Hold what all segments share, and where they lie by it.
 
     shift_px (s,): positions. shared_px (s, k): by how much each moves with one sigma of each of k
@@ -96,7 +96,7 @@ class Causes:
         return np.concatenate([own_px, self.common_px * relative_radius[:, None]], axis=1)
 
 
-def descend(here: "Point", coarse: float = 1.0) -> Shared:
+def descend(here: "Point", coarse: float = 1.0) -> SharedSolution:
     """Descend from a point by damped Gauss–Newton, with the segments' weights as they are there.
 
     Weights that changed at each step would let segments that a shift spoils count ever less.
@@ -181,17 +181,17 @@ class Point:
         of_priors = shared @ stiff @ shared + task.blur_deviation(log_blur) ** 2
         misfit = float(robust @ chi2 + of_priors)
         return cls(
-            task,
-            shift_px,
-            log_blur,
-            robust,
-            stiff,
-            equations,
-            left,
-            by_knot,
-            coefficients,
-            chi2,
-            misfit,
+            task=task,
+            shift_px=shift_px,
+            log_blur=log_blur,
+            robust=robust,
+            stiff=stiff,
+            equations=equations,
+            left=left,
+            by_knot=by_knot,
+            coefficients=coefficients,
+            chi2=chi2,
+            misfit=misfit,
         )
 
     @classmethod
@@ -286,7 +286,7 @@ class Arrow:
         left[-1, -1] += damping * self.shared[-1, -1]
         shared_right = -own.T @ right
         shared_right[-1] += self.log_blur_right
-        shared = cho_solve(cho_factor(left, check_finite=False), shared_right, check_finite=False)
+        shared = _solve_positive(left, shared_right)
         return Step(
             shift_px=(right - cross @ shared) / power,
             log_blur=float(shared[-1]),
@@ -294,7 +294,7 @@ class Arrow:
             gain_each=float(right @ (right / power)),
         )
 
-    def solve(self, damping: float) -> Shared:
+    def solve(self, damping: float) -> SharedSolution:
         """Return the solution a step farther on, with the sensitivity of positions to what all
         share.
         """
@@ -304,7 +304,7 @@ class Arrow:
         left = self.shared - (point.robust[:, None] * self.cross).T @ own
         log_blur = point.log_blur + np.clip(step.log_blur, -_LONGEST_LOG, _LONGEST_LOG)
         causes = Causes(np.linalg.cholesky(left))
-        return Shared(
+        return SharedSolution(
             shift_px=point.shift_px + np.clip(step.shift_px, -LONGEST_PX, LONGEST_PX),
             shared_px=causes.shifts_px(own),
             coefficients=point.coefficients,
@@ -328,6 +328,12 @@ def positions_with_shared(linear: PositionEquations, knot_weights: np.ndarray) -
 def _shared_block(point: Point, linear: PositionEquations) -> np.ndarray:
     """Return the normal matrix (size + 1, size + 1) of shading and, last, the blur's logarithm."""
     weighted_knots = point.task.knot_weights * point.robust[:, None]
-    by_shading = (weighted_knots.T @ linear.rod[:, 1]).ravel()
+    blur_with_shading = (weighted_knots.T @ linear.rod[:, 1]).ravel()  # (size,)
     of_blur = point.robust @ linear.gram[:, 1, 1] + point.task.blur_sigma**-2.0
-    return np.block([[point.left, by_shading[:, None]], [by_shading[None], of_blur]])
+    size = len(blur_with_shading)
+    matrix = np.empty((size + 1, size + 1))
+    matrix[:size, :size] = point.left
+    matrix[:size, size] = blur_with_shading
+    matrix[size, :size] = blur_with_shading
+    matrix[size, size] = of_blur
+    return matrix

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.wire.common_shift import CommonShift, common_shift
-from vision.wire.descent import Point, Shared, descend
+from vision.wire.descent import Point, SharedSolution, descend
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import LEAST_POWER, PositionEquations, SegmentEquations
 from vision.wire.starts import descend_coarsely, find_start
@@ -29,8 +29,8 @@ _SPREAD_SEGMENTS = 120
 
 
 @dataclass(frozen=True)
-class Solved(Shared):
-    """Besides what `Shared` has, for each segment (s,): own_sigma_px by its own noise, chi2 per
+class SegmentSolution(SharedSolution):
+    """Besides what `SharedSolution` has, for each segment (s,): own_sigma_px by its own noise, chi2 per
     pixel, contrast.
 
     widened_px2 (s, 2): excess of its blur² over the common one, and its sigma.
@@ -42,7 +42,7 @@ class Solved(Shared):
     widened_px2: np.ndarray
 
 
-def solve_jointly(task: ShadedSegments, *, last: bool = True) -> Solved:
+def solve_jointly(task: ShadedSegments, *, last: bool = True) -> SegmentSolution:
     """Return the most probable positions, shading and blur of segments.
 
     The segments lie where they are expected, or, in the first pass, all to one side. last: this
@@ -58,7 +58,7 @@ def solve_jointly(task: ShadedSegments, *, last: bool = True) -> Solved:
     return place_each_segment(task, shared)
 
 
-def _with_all_shifts(task: ShadedSegments, shared: Shared) -> Shared:
+def _with_all_shifts(task: ShadedSegments, shared: SharedSolution) -> SharedSolution:
     """Return the solution with a sigma for its common shift that holds all probable shifts.
 
     Where the posterior of that shift lies elsewhere, the descent has ended in a wrong minimum. It
@@ -98,13 +98,15 @@ def _in_common(task: ShadedSegments, shifts_px: np.ndarray, weight: np.ndarray) 
     return (weighted @ shifts_px) / (weighted @ common)
 
 
-def _weighted_point(task: ShadedSegments, shared: Shared) -> Point:
+def _weighted_point(task: ShadedSegments, shared: SharedSolution) -> Point:
     """Return the point at a solution, segments weighed by their misfit."""
     every = np.ones(len(task.pieces))
     return Point.at(task, shared.shift_px, np.log(shared.blur_px), every).weighted()
 
 
-def _descend_from(task: ShadedSegments, shared: Shared, shift: CommonShift) -> Shared:
+def _descend_from(
+    task: ShadedSegments, shared: SharedSolution, shift: CommonShift
+) -> SharedSolution:
     """Return where the descent ends from a solution moved by the mean of a common shift."""
     moved_px = shared.shift_px + shift.mean_px * task.pieces.relative_radius
     log_blur = np.log(shared.blur_px) + shift.log_blur
@@ -118,7 +120,7 @@ def _common_shift(task: ShadedSegments, here: Point) -> CommonShift:
     return common_shift(moved, here.robust[some], float(np.exp(here.log_blur)))
 
 
-def place_each_segment(task: ShadedSegments, shared: Shared) -> Solved:
+def place_each_segment(task: ShadedSegments, shared: SharedSolution) -> SegmentSolution:
     """Find each segment's position by its own pixels, with shading and blur held.
 
     The common shift of all segments stays as it is.
@@ -129,7 +131,7 @@ def place_each_segment(task: ShadedSegments, shared: Shared) -> Solved:
     misfit = chi2 / max(float(np.median(chi2)), 1e-9)
     share = linear.power / np.maximum(misfit, 1.0) ** 2
     step_px = _without_common(task, linear.step_px[:, None], share)[:, 0]
-    return Solved(
+    return SegmentSolution(
         shift_px=shared.shift_px + step_px,
         shared_px=shared.shared_px,
         coefficients=shared.coefficients,
@@ -149,8 +151,10 @@ def widened_blurs(linear: PositionEquations, blur_px: float, chi2: np.ndarray) -
 
     The segment's position is estimated with it.
     """
-    position_by_blur = linear.gram[:, 0, 1] / linear.power
-    information = linear.gram[:, 1, 1] - position_by_blur * linear.gram[:, 0, 1] + LEAST_POWER
-    right = linear.gram[:, 1, 2] - position_by_blur * linear.gram[:, 0, 2]
-    log_blur = np.stack([right / information, np.sqrt(chi2 / information)], axis=1)
-    return 2.0 * blur_px**2 * log_blur
+    position, blur, residual = range(3)  # rows and columns of the products
+    position_by_blur = linear.gram[:, position, blur] / linear.power
+    of_blur = linear.gram[:, blur] - position_by_blur[:, None] * linear.gram[:, position]
+    information = of_blur[:, blur] + LEAST_POWER  # the position eliminated
+    log_blur = of_blur[:, residual] / information
+    log_blur_sigma = np.sqrt(chi2 / information)
+    return 2.0 * blur_px**2 * np.stack([log_blur, log_blur_sigma], axis=1)

@@ -72,16 +72,22 @@ def seen_width(pieces: Pieces, blur_px: float) -> SeenWidth:
 
 def _seen_bins(pieces: Pieces, reach_px: float) -> np.ndarray:
     """Return in which bins across, from -reach_px on, the segments differ from their background."""
-    use = (pieces.weight > 0) & (np.abs(pieces.offset_px) < reach_px)
-    bins = np.floor((pieces.offset_px[use] + reach_px) * _BINS_PER_PX).astype(int)
+    is_used = (pieces.weight > 0) & (np.abs(pieces.offset_px) < reach_px)
+    bins = np.floor((pieces.offset_px[is_used] + reach_px) * _BINS_PER_PX).astype(int)
     size = int(np.ceil(2 * reach_px * _BINS_PER_PX)) + 1
     count = np.maximum(np.bincount(bins, minlength=size), 1)
-    variance = pieces.weight[use] ** -2.0
-    squares = (pieces.grey - pieces.background)[use] ** 2 - variance
-    power = np.bincount(bins, squares, minlength=size) / count
-    noise = np.bincount(bins, variance, minlength=size) / count * np.sqrt(2.0 / count)
+
+    def mean_of(values: np.ndarray) -> np.ndarray:
+        """Return the mean of the pixels' values in each bin."""
+        return np.bincount(bins, values, minlength=size) / count
+
+    variance = pieces.weight[is_used] ** -2.0
+    difference = (pieces.grey - pieces.background)[is_used]
+    power = mean_of(difference**2 - variance)
+    noise = mean_of(variance) * np.sqrt(2.0 / count)
     strength = np.sqrt(np.maximum(power, 0.0))
-    return (power > _LEAST_SIGMAS * noise) & (strength > _LEAST_SHARE * strength.max())
+    exceeds_noise = power > _LEAST_SIGMAS * noise
+    return exceeds_noise & (strength > _LEAST_SHARE * strength.max())
 
 
 @dataclass(frozen=True)

@@ -312,11 +312,11 @@ class _PathSearch:
 
     def _path(self, nodes: np.ndarray, share: float) -> CoarsePath:
         """Return the path of nodes (n, 3) in the full picture; share: its cost over the least."""
-        moves = np.any(np.diff(nodes[:, 1:], axis=0) != 0, axis=1)
-        places = nodes[np.concatenate([[True], moves])]
-        px = full_px(places[:, :0:-1].astype(float), self.scale)
-        score = np.sqrt(np.maximum(1.0 / self.cost[tuple(nodes.T)] - _LEAST_SCORE, 0.0))
-        return CoarsePath(px, self.radius_px[places[:, 0]], float(np.mean(score)), share)
+        changes_pixel = np.any(np.diff(nodes[:, 1:], axis=0) != 0, axis=1)
+        radius, row, column = nodes[np.append(True, changes_pixel)].T
+        px = full_px(np.stack([column, row], axis=1).astype(float), self.scale)
+        score = float(np.mean(_score_of(self.cost[tuple(nodes.T)])))
+        return CoarsePath(px, self.radius_px[radius], score, share)
 
     def refined(self) -> CoarsePath:
         """Return the cheapest path at full resolution, within some pixels of the coarse one."""
@@ -378,7 +378,8 @@ class _PathSearch:
         middle = self.nodes[quarter : len(self.nodes) - quarter]
         off_path = np.ones(self.cost.shape[1:], dtype=bool)
         off_path[middle[:, 1], middle[:, 2]] = False
-        width = 2.0 * float(np.median(self.radius_px[self.nodes[:, 0]])) / self.scale
+        usual_radius_px = float(np.median(self.radius_px[self.nodes[:, 0]]))
+        width = 2.0 * usual_radius_px / self.scale
         return distance_transform_edt(off_path) <= width + 2.0
 
     def _cost_along(self, nodes: np.ndarray) -> float:
@@ -391,6 +392,11 @@ class _PathSearch:
 def _cost_of(score: np.ndarray) -> np.ndarray:
     """Return what a pixel of a score costs."""
     return 1.0 / (score**2 + _LEAST_SCORE)
+
+
+def _score_of(cost: np.ndarray) -> np.ndarray:
+    """Return the score of a pixel that costs so much."""
+    return np.sqrt(np.maximum(1.0 / cost - _LEAST_SCORE, 0.0))
 
 
 def _search(space: Medialness, plain: float, ends: np.ndarray) -> _PathSearch:

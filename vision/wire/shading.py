@@ -128,14 +128,12 @@ def _hidden_light(pieces: Pieces, bells: np.ndarray, blur_px: float) -> np.ndarr
 def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots) -> tuple[Shading, float]:
     """Fit the radiance of segments where they lie; also return chi² per pixel."""
     equations = SegmentEquations(pieces, blur_px, terms)
-    every = np.ones(len(pieces))
-    left, right = equations.shared(knots.weights(pieces), every)
-    ridge = _RIDGE * np.trace(left) / len(left) * np.eye(len(left))
+    left, right = equations.shared(knots.weights(pieces), np.ones(len(pieces)))
+    ridge = _RIDGE * np.mean(np.diag(left)) * np.eye(len(left))
     found = lu_solve(lu_factor(left + ridge, check_finite=False), right, check_finite=False)
-    chi2 = float(every @ equations.power - 2.0 * right @ found + found @ left @ found)
-    pixels = float(np.sum(pieces.weight > 0))
-    shading = Shading(knots, found.reshape(len(knots), terms), blur_px)
-    return shading, chi2 / max(1.0, pixels)
+    chi2 = float(np.sum(equations.power) - 2.0 * right @ found + found @ left @ found)
+    pixels = max(1, np.count_nonzero(pieces.weight))
+    return Shading(knots, found.reshape(len(knots), terms), blur_px), chi2 / pixels
 
 
 class SegmentEquations:
@@ -170,11 +168,13 @@ class SegmentEquations:
         """
         count, knots = knot_weights.shape
         terms = self.moment.shape[1]
-        pairs = knot_weights[:, :, None] * knot_weights[:, None, :] * robust[:, None, None]
-        left = pairs.reshape(count, -1).T @ self.gram.reshape(count, -1)
+        size = knots * terms
+        weighted_knots = knot_weights * robust[:, None]
+        knot_pairs = weighted_knots[:, :, None] * knot_weights[:, None, :]
+        left = knot_pairs.reshape(count, -1).T @ self.gram.reshape(count, -1)
         left = left.reshape(knots, knots, terms, terms).transpose(0, 2, 1, 3)
-        right = (knot_weights * robust[:, None]).T @ self.moment
-        return left.reshape(knots * terms, knots * terms), right.reshape(knots * terms)
+        right = weighted_knots.T @ self.moment
+        return left.reshape(size, size), right.reshape(size)
 
     def chi2(self, coefficients: np.ndarray) -> np.ndarray:
         """Return the chi² (s,) that segments of this shading, coefficients (s, terms), leave."""
@@ -295,19 +295,20 @@ def _split_off_background(pieces: Pieces, blur_px: float) -> tuple[Pieces, np.nd
     Also returned are the products (s, 3, 3) of these pixels' background, 1 and grey level with each
     other, by squared weight.
     """
-    near = np.abs(pieces.offset_px) < pieces.radius_px[:, None] + _REACH_BLURS * blur_px
-    near &= pieces.weight > 0
-    first, last = np.flatnonzero(np.any(near, axis=0))[[0, -1]] if np.any(near) else (0, -1)
-    background = _both_ends(pieces.background, first, last)
-    grey = _both_ends(pieces.grey, first, last)
-    weight = _both_ends(pieces.weight, first, last)
+    reach_px = pieces.radius_px[:, None] + _REACH_BLURS * blur_px
+    is_near = (np.abs(pieces.offset_px) < reach_px) & (pieces.weight > 0)
+    columns = np.flatnonzero(np.any(is_near, axis=0))
+    near = slice(columns[0], columns[-1] + 1) if len(columns) else slice(0, 0)
+    background = _both_ends(pieces.background, near)
+    grey = _both_ends(pieces.grey, near)
+    weight = _both_ends(pieces.weight, near)
     far = np.stack([background * weight, weight, grey * weight], axis=1)
-    return pieces.columns(slice(first, last + 1)), far @ far.transpose(0, 2, 1)
+    return pieces.columns(near), far @ far.transpose(0, 2, 1)
 
 
-def _both_ends(values: np.ndarray, first: int, last: int) -> np.ndarray:
-    """Return the columns of values (s, p) before the first and after the last."""
-    return np.concatenate([values[:, :first], values[:, last + 1 :]], axis=1)
+def _both_ends(values: np.ndarray, middle: slice) -> np.ndarray:
+    """Return the columns of values (s, p) before and after those in the middle."""
+    return np.concatenate([values[:, : middle.start], values[:, middle.stop :]], axis=1)
 
 
 def _inverse_of_two(matrices: np.ndarray) -> np.ndarray:
@@ -336,11 +337,15 @@ def between_knots(knots: Knots) -> np.ndarray:
 @lru_cache
 def _between(turns: int, places: int) -> np.ndarray:
     """Return `between_knots` of so many turns and places."""
-    along_steps = np.diff(np.eye(places), axis=0)
-    turn_steps = np.diff(np.eye(turns), axis=0)
-    along = np.kron(np.eye(turns), along_steps.T @ along_steps)
-    turned = np.kron(turn_steps.T @ turn_steps, np.eye(places))
-    return np.eye(turns * places) + along / _CHANGE_SHARE**2 + turned / _TURNED_SHARE**2
+    from_place_to_place = np.kron(np.eye(turns), _squared_steps(places)) / _CHANGE_SHARE**2
+    from_turn_to_turn = np.kron(_squared_steps(turns), np.eye(places)) / _TURNED_SHARE**2
+    return np.eye(turns * places) + from_place_to_place + from_turn_to_turn
+
+
+def _squared_steps(count: int) -> np.ndarray:
+    """Return the matrix (count, count) of the sum of squared steps between neighbouring values."""
+    steps = np.diff(np.eye(count), axis=0)
+    return steps.T @ steps
 
 
 def contrast_of(pieces: Pieces) -> float:

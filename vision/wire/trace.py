@@ -21,7 +21,7 @@ from vision.pictures.others import RodLines, mask_rods
 from vision.pictures.view import View
 from vision.wire.bands import Pieces, cut_pieces, read_band
 from vision.wire.binned import binned, without
-from vision.wire.joint import Solved, place_each_segment, solve_jointly
+from vision.wire.joint import SegmentSolution, place_each_segment, solve_jointly
 from vision.wire.points import SHARED, LinePoints, Observed
 from vision.wire.shaded_segments import BLUR_SIGMA, ShadedSegments
 from vision.wire.shading import Knots
@@ -132,17 +132,31 @@ def clear_of_bar(
 
 
 @dataclass(frozen=True)
-class Traced:
+class WireTrace:
     """Hold segments moved to where the rod is, what is known of each, and the lens blur in px."""
 
     pieces: Pieces
-    solved: Solved
+    solved: SegmentSolution
     blur_px: float
 
     @property
     def misfit(self) -> float:
         """Return the median chi² per pixel."""
         return float(np.median(self.solved.chi2))
+
+    @property
+    def positions(self) -> "SegmentPositions":
+        """Return the segments without their pixels."""
+        return SegmentPositions(
+            px=self.pieces.foot_px,
+            normal=self.pieces.normal,
+            place=self.pieces.place,
+            source=self.pieces.source,
+            own_sigma_px=self.solved.own_sigma_px,
+            chi2=self.solved.chi2,
+            shared_px=self.solved.shared_px,
+            widened_px2=self.solved.widened_px2,
+        )
 
 
 def trace(
@@ -152,7 +166,7 @@ def trace(
     *,
     seen_blur_px: float | None = None,
     last: bool = True,
-) -> Traced:
+) -> WireTrace:
     """Find where the rod lies in segments that are a few pixels off at most.
 
     optics: what is known of the lens blur. seen_blur_px: the blur of an earlier pass that predicted these
@@ -172,15 +186,15 @@ def trace(
     if last:
         task = ShadedSegments(pieces, WIRE_WAVES, knots, blur_px)
         solved = place_each_segment(task, replace(solved, blur_px=blur_px))
-    return Traced(pieces.moved(solved.shift_px), solved, blur_px)
+    return WireTrace(pieces.moved(solved.shift_px), solved, blur_px)
 
 
 @dataclass(frozen=True)
-class Placed(Rows):
-    """Hold traced segments without their pixels.
+class SegmentPositions(Rows):
+    """Hold where s segments of a wire lie, without their pixels.
 
     px, normal (s, 2), place (s,): as of `LinePoints`. source (s,): the band of each. own_sigma_px,
-    chi2 (s,), shared_px (s, k), widened_px2 (s, 2): as of `vision.wire.joint.Solved`.
+    chi2 (s,), shared_px (s, k), widened_px2 (s, 2): as of `vision.wire.joint.SegmentSolution`.
     """
 
     px: np.ndarray
@@ -193,28 +207,12 @@ class Placed(Rows):
     widened_px2: np.ndarray
 
 
-def placed(traced: Traced) -> Placed:
-    """Return traced segments without their pixels."""
-    pieces = traced.pieces
-    solved = traced.solved
-    return Placed(
-        px=pieces.foot_px,
-        normal=pieces.normal,
-        place=pieces.place,
-        source=pieces.source,
-        own_sigma_px=solved.own_sigma_px,
-        chi2=solved.chi2,
-        shared_px=solved.shared_px,
-        widened_px2=solved.widened_px2,
-    )
-
-
-def to_points(traced: Traced) -> tuple[LinePoints, np.ndarray]:
+def to_points(traced: WireTrace) -> tuple[LinePoints, np.ndarray]:
     """Return the line points that can be trusted, and the source of each; sigmas hold the misfit."""
-    return points_of(placed(traced))
+    return points_of(traced.positions)
 
 
-def points_of(segments: Placed) -> tuple[LinePoints, np.ndarray]:
+def points_of(segments: SegmentPositions) -> tuple[LinePoints, np.ndarray]:
     """Return the line points of segments that can be trusted, and the source of each."""
     median = float(np.median(segments.chi2))
     most_chi2 = _WORST_MISFIT * max(median, _LEAST_MEDIAN_MISFIT)

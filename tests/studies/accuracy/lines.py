@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from vision.pictures.pixel_noise import Noise
 from vision.wire.bands import cut_pieces, read_band
 from vision.wire.shading import Knots
-from vision.wire.trace import Traced, clear_of_bar, to_points, trace
+from vision.wire.trace import WireTrace, clear_of_bar, to_points, trace
 
 FINE, FRAMES, SHAPE = 5, 13, (110, 300)
 NOISE, PIECE_PX, MARGIN_PX = 2.0, 12, 7
@@ -216,7 +216,7 @@ def first_look(scene: Scene, rng, off_px: float = 0.7):
     return pictures, background, trace(pieces, KNOTS)
 
 
-def look_again(scene: Scene, pictures, background, seen: Traced) -> tuple[Traced, np.ndarray]:
+def look_again(scene: Scene, pictures, background, seen: WireTrace) -> tuple[WireTrace, np.ndarray]:
     """The wire beside a curve through what was measured, and the bound of each piece's position, px."""
     points, source = to_points(seen)
     curves = [_through(points.select(source == f)) for f in range(FRAMES)]

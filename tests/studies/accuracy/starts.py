@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from vision.pictures.pixel_noise import Noise
 from vision.wire.bands import cut_pieces, read_band
 from vision.wire.shading import Knots
-from vision.wire.trace import Traced, trace
+from vision.wire.trace import WireTrace, trace
 
 FRAMES, SHAPE = 13, (480, 640)
 RADIUS_PX, BLUR_PX, NOISE = 2.8, 0.95, 2.0
@@ -93,7 +93,7 @@ def rough_bands(background, frames, off_px: float, phase_rad: float = 0.0):
     ]
 
 
-def looked_once(background, frames, off_px: float, phase_rad: float) -> Traced:
+def looked_once(background, frames, off_px: float, phase_rad: float) -> WireTrace:
     """The wire in all frames, found from a start that is off."""
     return trace(
         cut_pieces(
@@ -103,7 +103,7 @@ def looked_once(background, frames, off_px: float, phase_rad: float) -> Traced:
     )
 
 
-def looked_twice(background, frames, off_px: float, phase_rad: float) -> Traced:
+def looked_twice(background, frames, off_px: float, phase_rad: float) -> WireTrace:
     """The same, and then found again beside a smooth curve through what was found, as in a whisk."""
     seen, bands = looked_once(background, frames, off_px, phase_rad), []
     for number, frame in enumerate(frames):
@@ -124,12 +124,12 @@ def looked_twice(background, frames, off_px: float, phase_rad: float) -> Traced:
     )
 
 
-def whole_sigma_px(traced: Traced) -> np.ndarray:
+def whole_sigma_px(traced: WireTrace) -> np.ndarray:
     """Sigma (s,) of each piece alone, what it shares with others included."""
     return np.hypot(traced.solved.own_sigma_px, np.linalg.norm(traced.solved.shared_px, axis=1))
 
 
-def errors(traced: Traced) -> np.ndarray:
+def errors(traced: WireTrace) -> np.ndarray:
     """Distance (s,) of each piece from the axis, px."""
     column, heights = np.arange(SHAPE[1]), np.array(axis_heights())
     slopes = np.gradient(heights, axis=1)

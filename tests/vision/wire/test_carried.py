@@ -18,7 +18,7 @@ from tests.studies.accuracy.lines import (
 from vision.pictures.pixel_noise import Noise
 from vision.wire.bands import cut_pieces
 from vision.wire.carried import carry_on
-from vision.wire.trace import Placed, placed, points_of, trace
+from vision.wire.trace import SegmentPositions, points_of, trace
 
 FIRST = 4
 # [px] Bias that a line may have by its model of light, as in test_line.
@@ -61,11 +61,11 @@ def test_later_frames_are_as_near_as_is_said(carried):
 def test_the_causes_that_frames_share_are_those_of_the_first(carried):
     """What moves the segments of the first frames together moves the later ones by as much."""
     _, traced, later = carried
-    first = placed(traced)
+    first = traced.positions
     assert later.shared_px.shape[1] == first.shared_px.shape[1]
     sizes = [np.sqrt(np.mean(np.sum(one.shared_px**2, axis=1))) for one in (first, later)]
     assert sizes[1] == pytest.approx(sizes[0], rel=0.3)
-    together = Placed.join([first, later])
+    together = SegmentPositions.join([first, later])
     points, source = points_of(together)
     assert set(source.tolist()) == set(range(FRAMES)) and len(points) > 0.9 * len(together.place)
 
@@ -77,8 +77,8 @@ def test_a_wire_far_from_its_curve_gives_no_point(rng):
     traced = trace(pieces_of(scene, background, rng, range(FIRST), 0.3), KNOTS)
     later = pieces_of(scene, background, rng, range(FIRST, FRAMES), 0.3)
     points, _ = points_of(
-        Placed.join(
-            [placed(traced), carry_on(later.moved(np.full(len(later), 6.0)), traced, KNOTS)]
+        SegmentPositions.join(
+            [traced.positions, carry_on(later.moved(np.full(len(later), 6.0)), traced, KNOTS)]
         )
     )
     assert len(points) - len(traced.pieces) < 0.05 * len(later)
