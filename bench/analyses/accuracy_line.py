@@ -3,8 +3,8 @@
 import math
 from collections.abc import Sequence
 
+from bench.analyses.estimates_again import FITTED, KINETIC, SEEN
 from bench.analyses.estimator_accuracy import Accuracy
-from bench.analyses.runs import FITTED, KINETIC, SEEN
 from bench.base.settings import Settings
 from bench.trials.estimate_errors import Judged
 from vision.geometry import counted

@@ -2,8 +2,8 @@
 
 from bench.analyses.accuracy_line import accuracy_line
 from bench.analyses.analysis import Analysis, EvaluatedRun
+from bench.analyses.estimates_again import FITTED, KINETIC, SEEN
 from bench.analyses.friction_tables import FRICTION_ANGLE
-from bench.analyses.runs import FITTED, KINETIC, SEEN
 
 
 class KnownFriction(Analysis):

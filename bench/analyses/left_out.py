@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.alphas import felt_friction
-from bench.analyses.runs import GIVEN, KINETIC
+from bench.analyses.estimates_again import GIVEN, KINETIC
 from bench.base.statuses import reason
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import BY_STAGE, EstimateRow, FeltWhisk, SeenWhisk, TrialResult

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
+from bench.analyses.estimates_again import GIVEN
 from bench.analyses.pooling import (
     as_cell,
     degrees,
@@ -20,7 +21,6 @@ from bench.analyses.pooling import (
     sound_measured_whisks,
     value_cells,
 )
-from bench.analyses.runs import GIVEN
 from bench.base.settings import Settings
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult

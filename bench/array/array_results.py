@@ -6,18 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from bench.analyses.estimates_again import alpha_est_sigma
 from bench.analyses.estimator_accuracy import RunAccuracy
-from bench.analyses.runs import alpha_est_sigma
 from bench.array.array_page import write_page
 from bench.array.cloud import ContactPoint, Mount, contacts
 from bench.array.contour import CONTOUR, TrialContour, contours, write_contours
 from bench.array.exchanged_whiskers import exchanged
-from bench.array.shape_verdict import (
-    SURFACE_POINTS,
-    surface_lines,
-    surface_verdict,
-    write_surface,
-)
+from bench.array.shape_verdict import SURFACE_POINTS, surface_lines, surface_verdict, write_surface
 from bench.array.size import SIZE, FeltSize, fit_sizes, size_lines, write_sizes
 from bench.array.surface import ObjectSurface, seen_surface, stated_surface
 from bench.base.atomic import write_whole

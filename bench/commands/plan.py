@@ -39,7 +39,11 @@ def add(verbs: Verbs) -> None:
     )
     verb.add_argument("--example", action="store_true", help="print a RIG.toml to begin with")
     verb.add_argument(
-        "--theta-deg", type=float, default=3.0, metavar="X", help="pushing angle at which slip, φ and α are planned (default 3)"
+        "--theta-deg",
+        type=float,
+        default=3.0,
+        metavar="X",
+        help="pushing angle at which slip, φ and α are planned (default 3)",
     )
     verb.add_argument(
         "--no-changes",

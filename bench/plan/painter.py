@@ -10,10 +10,10 @@ from bench.base.progress import count_parts
 from bench.plan.planned_cameras import as_board, as_seen_camera
 from bench.plan.staged import StagedWhisk
 from bench.rig import boards, build
-from bench.rig.album import JPEG_QUALITY
-from bench.rig.moments import exposure_moments
+from bench.rig.exposure_instants import exposure_instants
 from bench.rig.other_boards import AnyBoard
 from bench.rig.painted_scene import block_corners_mm
+from bench.rig.picture_files import JPEG_QUALITY
 from bench.rig.protocol import Protocol
 from bench.rig.studio import Setting, Studio
 from vision import CameraPictures, LineNoise, line_noise_in_pictures
@@ -102,7 +102,7 @@ class Painter:
         """Return one painted frame (h, w) of one camera as its file gives it back."""
         studio = self.studios[number]
         motor_rad = float(staged.known.motor_rad[frame])
-        instants = exposure_moments(
+        instants = exposure_instants(
             self.protocol, studio, staged.recording, staged.marched, motor_rad, False
         )
         brightness = setting.brightness(instants)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.rig import boards, papers
+from bench.rig import boards, session_files
 from bench.rig.other_boards import AnyBoard
 from bench.rig.pinhole import PinholeCamera
 from bench.rig.protocol_tables import BoardTable
@@ -104,4 +104,4 @@ def as_seen_camera(camera: PinholeCamera) -> Camera:
 
 def as_board(table: BoardTable) -> Board:
     """Return the board of a protocol for vision."""
-    return stated_board(BoardKeys(**papers.board_keys(table)), "[board]")
+    return stated_board(BoardKeys(**session_files.board_keys(table)), "[board]")

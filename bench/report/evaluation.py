@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.analyses.analysis import EvaluatedRun
+from bench.analyses.estimates_again import alpha_est_sigma, with_runs
 from bench.analyses.friction_tables import friction_of
-from bench.analyses.runs import alpha_est_sigma, with_runs
 from bench.base.settings import Settings
 from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.certificate import Certificate

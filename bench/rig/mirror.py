@@ -12,7 +12,7 @@ from bench.rig.bar import TouchedBar
 from bench.rig.painted_scene import Scene
 from bench.rig.pinhole import PinholeCamera
 from bench.rig.sensor import Sensor
-from bench.rig.studio import Moment, Setting, Studio
+from bench.rig.studio import Instant, Setting, Studio
 
 _FLIP = np.diag([-1.0, 1.0, 1.0])  # a camera's x axis
 
@@ -141,6 +141,6 @@ class MirrorSetting:
         """Return the picture of the scene without whisker and hub."""
         return self._studio.joined([setting.empty for setting in self._settings])
 
-    def brightness(self, moments: list[Moment]) -> np.ndarray:
-        """Draw one exposure, the mean over its moments."""
-        return self._studio.joined([setting.brightness(moments) for setting in self._settings])
+    def brightness(self, instants: list[Instant]) -> np.ndarray:
+        """Draw one exposure, the mean over its instants."""
+        return self._studio.joined([setting.brightness(instants) for setting in self._settings])

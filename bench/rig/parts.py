@@ -8,11 +8,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from bench.rig import boards, build, papers, truth_files
-from bench.rig.album import write_frames, write_picture
+from bench.rig import boards, build, session_files, truth_files
 from bench.rig.array_rig import ArrayRecording, MountedWhisker, mount_whiskers
+from bench.rig.exposure_instants import array_exposure_instants, exposure_instants
 from bench.rig.mirror import MirrorStudio
-from bench.rig.moments import array_exposure_moments, exposure_moments
+from bench.rig.picture_files import write_frames, write_picture
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
 from bench.rig.reorienting import turned_plane
@@ -54,9 +54,9 @@ class Job:
         stated = build.stated_T_rig_board(self.protocol, self.stream(_POSE))
         measured = {}
         if self.protocol.whisker.widths:
-            measured["profile.csv"] = papers.profile_csv(build.rod(self.protocol))
+            measured["profile.csv"] = session_files.profile_csv(build.rod(self.protocol))
         return measured | {
-            "session.toml": papers.session_toml(self.protocol, stated, self.whiskers),
+            "session.toml": session_files.session_toml(self.protocol, stated, self.whiskers),
             "truth.json": truth_files.truth_json(self.protocol, self.seed, self.whiskers),
         }
 
@@ -130,9 +130,9 @@ def _write_trial(job, number, folder):
     recording = Recording.make(job.protocol, run, job.stream(_TRIAL, number))
     clock_offset_s = job.protocol.pictures.clock_offset_s
     texts = {
-        "trial.toml": papers.trial_toml(recording, by_stage=bool(job.protocol.stage)),
-        "signals.csv": papers.signals_csv(recording),
-        "frames.csv": papers.frames_csv(recording.frames.time_s, clock_offset_s),
+        "trial.toml": session_files.trial_toml(recording, by_stage=bool(job.protocol.stage)),
+        "signals.csv": session_files.signals_csv(recording),
+        "frames.csv": session_files.frames_csv(recording.frames.time_s, clock_offset_s),
         "truth.csv": truth_files.truth_csv(recording),
         "truth.toml": truth_files.truth_toml(recording),
     }
@@ -148,9 +148,9 @@ def _write_array_trial(job, number, folder):
     clock_offset_s = job.protocol.pictures.clock_offset_s
     times_s = np.concatenate(recording.frame_times_s)
     texts = {
-        "trial.toml": papers.array_trial_toml(recording, says_where=not job.has_pictures),
-        "signals.csv": papers.array_signals_csv(recording),
-        "frames.csv": papers.frames_csv(times_s, clock_offset_s),
+        "trial.toml": session_files.array_trial_toml(recording, says_where=not job.has_pictures),
+        "signals.csv": session_files.array_signals_csv(recording),
+        "frames.csv": session_files.frames_csv(times_s, clock_offset_s),
     }
     for name, own in recording.recordings.items():
         if own is not None:
@@ -162,7 +162,7 @@ def _write_array_trial(job, number, folder):
 def _write_files(job, folder, texts, render):
     """Write text files, and the frames that `render` yields of each camera."""
     for name, text in texts.items():
-        papers.write(folder / name, text)
+        session_files.write(folder / name, text)
     if job.has_pictures:
         for i, studio in enumerate(job.studios):
             write_frames(folder, studio.camera.name, job.protocol.pictures.moving, render(i))
@@ -176,14 +176,14 @@ def render_frames(job: Job, trial: int, camera: int, recording: Recording) -> It
     still = studio.setting(bar, middle) if bar.velocity_mm_rad is None else None
     for number, (_, motor_rad, which, back) in enumerate(recording.frames):
         whisk = recording.whisks[which]
-        moments = exposure_moments(job.protocol, studio, recording, whisk, motor_rad, back)
+        instants = exposure_instants(job.protocol, studio, recording, whisk, motor_rad, back)
         gave = whisk.gave_mm(motor_rad, back)
         setting = still
         if still is None or gave.any():
             moved = bar.moved_mm(motor_rad) + gave
             setting = studio.setting(bar.shift(moved), middle + moved)
         noise = job.stream(_TRIAL, trial, camera + 1, number)
-        yield studio.sensor.expose(setting.brightness(moments), noise)
+        yield studio.sensor.expose(setting.brightness(instants), noise)
 
 
 def render_array_frames(
@@ -196,9 +196,9 @@ def render_array_frames(
     number = 0
     for whisk, times_s in enumerate(recording.frame_times_s):
         for time_s in times_s.tolist():
-            moments = array_exposure_moments(
+            instants = array_exposure_instants(
                 job.protocol, studio, recording, job.whiskers, time_s, whisk
             )
             noise = job.stream(_TRIAL, trial, camera + 1, number)
-            yield studio.sensor.expose(setting.brightness(moments), noise)
+            yield studio.sensor.expose(setting.brightness(instants), noise)
             number += 1

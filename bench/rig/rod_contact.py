@@ -20,8 +20,8 @@ import numpy as np
 
 from bench.rig.bar import UnloadedTouch
 from bench.rig.elastic_rod import Rod
+from bench.rig.friction_laws import ContactLoad, Held, Oiled, Sliding
 from bench.rig.kirchhoff_rod import KirchhoffRod
-from bench.rig.laws import ContactLoad, Held, Oiled, Sliding
 from bench.rig.linear import across, cross, cross_matrix, rotation_about_z, solve
 from bench.rig.loaded_point import BentRod, LoadedPoint
 from bench.rig.planar_rod import PlanarRod

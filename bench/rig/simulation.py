@@ -9,7 +9,7 @@ import cv2
 
 from bench.base.errors import BadInput
 from bench.base.workers import Workers
-from bench.rig import build, papers
+from bench.rig import build, session_files
 from bench.rig.parts import Job, SessionPart
 from bench.rig.protocol import load
 
@@ -121,7 +121,7 @@ def _claim(job):
     (job.session / "trials").mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         if not (job.session / name).exists():
-            papers.write(job.session / name, text)
+            session_files.write(job.session / name, text)
 
 
 def make_part(job: Job, part: SessionPart) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.rig.bar import UnloadedTouch
 from bench.rig.elastic_rod import Rod
-from bench.rig.laws import GIVE, Held, Oiled, Sliding
+from bench.rig.friction_laws import GIVE, Held, Oiled, Sliding
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import ContactState, RodContact
 from bench.rig.touched_object import TouchedObject

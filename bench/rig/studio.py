@@ -22,15 +22,15 @@ _PIXEL_BLUR_PX = math.sqrt(1 / 12)  # px: standard deviation of a pixel's own wi
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class Instant:
     """The things that move, at one instant: hubs, and whiskers as tubes."""
 
     hubs: tuple[Box, ...]
     whiskers: tuple[Tube, ...]
 
     @classmethod
-    def alone(cls, motor_rad: float, whisker: Tube) -> "Moment":
-        """Return the moment of one whisker at the rig's origin."""
+    def alone(cls, motor_rad: float, whisker: Tube) -> "Instant":
+        """Return the instant of one whisker at the rig's origin."""
         return cls((Stand.alone().hub(motor_rad),), (whisker,))
 
 
@@ -101,15 +101,15 @@ class Setting:
         """Return the picture of the scene without whisker and hub."""
         return self._studio.crop(self._still)
 
-    def brightness(self, moments: list[Moment]) -> np.ndarray:
-        """Draw one exposure, the mean over its moments (one where nothing moves far)."""
+    def brightness(self, instants: list[Instant]) -> np.ndarray:
+        """Draw one exposure, the mean over its instants (one where nothing moves far)."""
         studio = self._studio
         blur_px = studio.sensor.blur_px
-        px = [studio.scene.moving_px(studio.camera, one.hubs, one.whiskers) for one in moments]
+        px = [studio.scene.moving_px(studio.camera, one.hubs, one.whiskers) for one in instants]
         part = studio.window.crop(np.concatenate(px), 4 * blur_px + 3)
         picture = self._still.copy()
         if part is not None:
-            drawn = part.blur_to_pixels(self._draw_moments(part, moments), blur_px)
+            drawn = part.blur_to_pixels(self._draw_instants(part, instants), blur_px)
             rim = math.ceil(3 * blur_px)  # of the part's pixels, which its own edge blurs wrongly
             inner = drawn[rim : len(drawn) - rim, rim : drawn.shape[1] - rim]
             top = part.top - studio.window.top + rim
@@ -117,13 +117,13 @@ class Setting:
             picture[top : top + len(inner), left : left + inner.shape[1]] = inner
         return studio.crop(picture)
 
-    def _draw_moments(self, part, moments):
-        """Return the mean radiance of a part of the window over moments."""
+    def _draw_instants(self, part, instants):
+        """Return the mean radiance of a part of the window over instants."""
         studio = self._studio
         still = self._radiance[part.slices_in(studio.window)]
         total = np.zeros_like(still)
-        for moment in moments:
+        for instant in instants:
             radiance = still.copy()
-            studio.scene.draw_moving(part, radiance, moment.hubs, moment.whiskers, self._occluder)
+            studio.scene.draw_moving(part, radiance, instant.hubs, instant.whiskers, self._occluder)
             total += radiance
-        return total / np.float32(len(moments))
+        return total / np.float32(len(instants))

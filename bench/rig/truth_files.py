@@ -10,9 +10,9 @@ import tomli_w
 
 from bench.rig import build
 from bench.rig.array_rig import MountedWhisker
-from bench.rig.papers import csv_text, object_keys
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
+from bench.rig.session_files import csv_text, object_keys
 from bench.rig.surface_slip import COLUMNS, slips_mm
 
 _HEADER = "frame,time_s,motor_deg,contact,x_mm,y_mm,z_mm,slip_mm,arc_mm,m_y_Nmm,m_z_Nmm,status"

@@ -10,8 +10,8 @@ from msgspec import structs
 
 from bench.plan.planned_cameras import as_board, as_seen_camera
 from bench.rig import build
-from bench.rig.album import JPEG_QUALITY
 from bench.rig.painted_scene import Stand, draw_floor_and_wall
+from bench.rig.picture_files import JPEG_QUALITY
 from bench.rig.protocol import Protocol, load
 from bench.rig.studio import Studio
 from vision.boards import find_other_markers

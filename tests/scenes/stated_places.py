@@ -8,8 +8,8 @@ import numpy as np
 
 from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import RestShape, Rod
-from bench.rig.papers import object_keys
 from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
+from bench.rig.session_files import object_keys
 from bench.rig.touched_object import TouchedObject
 from bench.session.manifest import ObjectKeys
 from bench.session.session import Session

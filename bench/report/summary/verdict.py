@@ -10,9 +10,9 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 from bench.analyses.accuracy_line import accuracy_line
+from bench.analyses.estimates_again import FITTED, RUNS
 from bench.analyses.estimator_accuracy import Accuracy, RunAccuracy, TruthUncertainty
 from bench.analyses.pooling import grouped, panel_title, rms
-from bench.analyses.runs import FITTED, RUNS
 from bench.base.settings import Seeing, Settings
 from bench.base.statuses import cure_of
 from bench.gauges.matrix import FROM_ALL, GaugeCalibration

@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from bench.analyses.runs import RUNS
+from bench.analyses.estimates_again import RUNS
 from bench.base.input_problems import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks

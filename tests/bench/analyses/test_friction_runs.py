@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from bench.analyses.alphas import alphas_of, felt_friction, mean_alpha
+from bench.analyses.estimates_again import FITTED, SEEN, _rescaled, with_runs
 from bench.analyses.friction_tables import FrictionAngles, friction_of
-from bench.analyses.runs import FITTED, SEEN, _rescaled, with_runs
 from bench.analyses.section_vii import (
     FeltContact,
     by_consistency,

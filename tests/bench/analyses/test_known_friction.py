@@ -3,10 +3,10 @@
 from types import SimpleNamespace
 
 from bench.analyses.catalogue import ANALYSES
+from bench.analyses.estimates_again import FITTED, SEEN
 from bench.analyses.estimator_accuracy import Accuracy
 from bench.analyses.friction_tables import FrictionAngles
 from bench.analyses.known_friction import KnownFriction
-from bench.analyses.runs import FITTED, SEEN
 from bench.base.settings import Settings
 from bench.trials.estimate_errors import Judged
 

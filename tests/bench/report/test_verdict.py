@@ -2,8 +2,8 @@
 
 import pytest
 
+from bench.analyses.estimates_again import FITTED
 from bench.analyses.estimator_accuracy import Accuracy, RunAccuracy, TruthUncertainty
-from bench.analyses.runs import FITTED
 from bench.base.settings import Settings
 from bench.report.summary.verdict import verdict
 from bench.trials.estimate_errors import Judged

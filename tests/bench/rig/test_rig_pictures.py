@@ -18,7 +18,7 @@ from bench.rig.pinhole import PinholeCamera
 from bench.rig.printed_board import Ink, PrintedBoard
 from bench.rig.protocol import load
 from bench.rig.sensor import Sensor
-from bench.rig.studio import Moment, Studio
+from bench.rig.studio import Instant, Studio
 from bench.rig.tube import Tube
 from bench.rig.window import Window
 from tests.studies.accuracy.renderer import (
@@ -158,7 +158,7 @@ def moment(motor_rad, material=None):
     tube = Tube(
         unloaded_curve(rod, motor_rad, arc)[0], rod.radius_mm(arc), material or Material(0.25)
     )
-    return Moment.alone(motor_rad, tube)
+    return Instant.alone(motor_rad, tube)
 
 
 @pytest.fixture(scope="module", params=[0, 1])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bench.rig.papers import trial_toml
 from bench.rig.protocol import Protocol
 from bench.rig.protocol_tables import TrialTable
 from bench.rig.recording import Recording
+from bench.rig.session_files import trial_toml
 from bench.rig.truth_files import truth_csv
 
 EXACTLY = {"beta_scatter_deg": 0.0, "d_x_scatter_mm": 0.0, "touch_scatter_deg": 0.0}

@@ -23,8 +23,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.analyses.curved import Curvature, mean_radius_error
+from bench.analyses.estimates_again import settings_without_alpha
 from bench.analyses.friction_tables import friction_of
-from bench.analyses.runs import settings_without_alpha
 from bench.analyses.soft import Soft, _place, softness
 from bench.base.combined import Measurement
 from bench.base.settings import TILT_SIGMA_RAD
@@ -51,12 +51,7 @@ from estimator.two_tilts import SharedContact, shared_contact
 from estimator.uncertainty import Z_95
 from tests.scenes.friction_results import run_of
 from tests.scenes.marches import touched_bar
-from tests.studies.accuracy.estimates_montecarlo import (
-    DIAMETER_MM,
-    E_GPA,
-    LENGTH_MM,
-    rod_and_beam,
-)
+from tests.studies.accuracy.estimates_montecarlo import DIAMETER_MM, E_GPA, LENGTH_MM, rod_and_beam
 from vision import Value, WhiskTruth
 from vision.truth.at_angle import TruthAtAngle
 from vision.truth.records import FrameTruth, SharedSigmas

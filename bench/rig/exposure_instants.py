@@ -12,7 +12,7 @@ from bench.rig.mirror import MirrorStudio
 from bench.rig.painted_scene import HUB_FRONT_MM
 from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
-from bench.rig.studio import Moment, Studio
+from bench.rig.studio import Instant, Studio
 from bench.rig.tube import Tube
 from bench.rig.whisk_mechanics import WhiskMechanics
 
@@ -20,42 +20,42 @@ _STATIONS = 257  # of a whisker's axis
 _LEAST_RADIUS_MM = 0.01  # of a whisker in pictures
 
 
-def exposure_moments(
+def exposure_instants(
     protocol: Protocol,
     studio: Studio | MirrorStudio,
     recording: Recording,
     whisk: WhiskMechanics,
     motor_rad: float,
     back: bool,
-) -> list[Moment]:
+) -> list[Instant]:
     """Return the instants of one exposure: as many as keep the whisker's tip within half a pixel
     from one to the next."""
     rod = recording.rod
     speed_deg_s = recording.run.speed_deg_s
     near_mm = recording.touch.point_mm
     arc = _drawn_arcs_mm(rod)
-    moments = []
+    instants = []
     for turn in _exposure_turns_rad(protocol, studio, speed_deg_s, rod.length_mm, near_mm):
         state = whisk.path(back).state_between(motor_rad + turn)
         points = whisk.centreline_mm(motor_rad + turn, state, arc)
         tube = _tube(rod, arc, points, studio.scene.appearance.wire)
-        moments.append(Moment.alone(motor_rad + turn, tube))
-    return moments
+        instants.append(Instant.alone(motor_rad + turn, tube))
+    return instants
 
 
-def array_exposure_moments(
+def array_exposure_instants(
     protocol: Protocol,
     studio: Studio | MirrorStudio,
     recording: ArrayRecording,
     whiskers: Sequence[MountedWhisker],
     time_s: float,
     whisk: int,
-) -> list[Moment]:
+) -> list[Instant]:
     """Return the instants of one exposure of an array, about a time of one of its whisks."""
     length_mm = max(whisker.rod.length_mm for whisker in whiskers)
     near_mm = recording.bar.point_mm
     speed_deg_s = recording.run.speed_deg_s
-    moments = []
+    instants = []
     for turn in _exposure_turns_rad(protocol, studio, speed_deg_s, length_mm, near_mm):
         motor = {}  # rad, by column
         hubs = []
@@ -68,8 +68,8 @@ def array_exposure_moments(
             tubes.append(
                 _array_tube(whisker, recording, whisk, at_rad, studio.scene.appearance.wire)
             )
-        moments.append(Moment(tuple(hubs), tuple(tubes)))
-    return moments
+        instants.append(Instant(tuple(hubs), tuple(tubes)))
+    return instants
 
 
 def _exposure_turns_rad(protocol, studio, speed_deg_s, length_mm, near_mm) -> list[float]:
