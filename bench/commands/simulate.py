@@ -2,14 +2,9 @@
 
 import argparse
 from functools import partial
+from pathlib import Path
 
-from bench.commands.options import (
-    DONE,
-    Verbs,
-    add_session,
-    add_verb,
-    add_workers,
-)
+from bench.commands.options import DONE, Verbs, add_session, add_verb, add_workers
 
 
 def add(verbs: Verbs) -> None:
@@ -26,7 +21,7 @@ def add(verbs: Verbs) -> None:
         "--protocol",
         default="quick",
         metavar="NAME|FILE",
-        help="quick, paper, mirror, nitinol, thin-wire, polymer-cone, vibrissa, reorient, sweep, ring, tap or a TOML file",
+        help=f"{', '.join(_built_in())} or a TOML file (default quick)",
     )
     verb.add_argument(
         "--signals-only",
@@ -56,3 +51,9 @@ def run(options: argparse.Namespace) -> int:
         announce=partial(print, flush=True),
     )
     return DONE
+
+
+def _built_in() -> list[str]:
+    """Return the names of the protocols that come with the rig."""
+    folder = Path(__file__).resolve().parents[1] / "rig" / "protocols"
+    return sorted(path.stem for path in folder.glob("*.toml"))
