@@ -10,12 +10,12 @@ from bench.gauges.felt import FeltStroke, is_free, strokes_of
 from bench.session.signals import Signals, forward_strokes, stroke_ends
 from bench.session.strokes import without_spikes
 from bench.session.trial import Trial
+from estimator.onset import MIN_FREE_SAMPLES
 
-# [samples] Of a mean or a way back: fewer have no level beyond the noise. Set by eye.
-_LEAST_SAMPLES = 20
 # [angles] Between a tenth and nine tenths of the push: the largest of so many is the hysteresis.
 _ANGLES = 15
-# [rad] A line is straight over twice that. Set by eye.
+# [rad] To either side of a line's middle. Over it moments leave a line by less than 1e-5 of themselves, since their
+# curvature goes with the square of the pushing angle. Derived.
 _HALF_WINDOW_RAD = np.radians(0.15)
 
 
@@ -50,7 +50,7 @@ def _reversal(
 ) -> Reversal | None:
     """Compare a stroke with its way back, motor (b,) and channels (b, 2); None without one."""
     touch = stroke.touch()
-    if touch.status or len(motor) < _LEAST_SAMPLES:
+    if touch.status or len(motor) < MIN_FREE_SAMPLES:
         return None
     push = stroke.motor_rad[-1] - touch.motor_rad
     if motor.min() > touch.motor_rad + 0.1 * push:
@@ -60,7 +60,7 @@ def _reversal(
     back = _volts_at(motor, channels, angles)
     free = is_free(motor, touch)
     level_after = np.full(2, np.nan)
-    if free.sum() >= _LEAST_SAMPLES:
+    if free.sum() >= MIN_FREE_SAMPLES:
         level_after = np.nanmean(channels[free], axis=0)
     return Reversal(name, back - forward, level_after - touch.offset)
 

@@ -36,7 +36,7 @@ from vision.pictures import PicturePart
 # [1] Frames of a trial whose exposure and scene are compared. Stated.
 _SCENE_FRAMES = 5
 # [px] Largest blur (sigma) of a board's edges: lenses in focus have 0.6 to 1.2; from 2 on the small
-# session's boards are not found. Set by eye.
+# session's boards are not found. Stated, between the two: it makes a warning, and enters no number.
 _LARGEST_BLUR_PX = 1.5
 # [1] Largest share of a channel's samples in a stroke that are saturated. Stated.
 _LARGEST_SATURATED_SHARE = 0.1
