@@ -45,7 +45,7 @@ class ErrorAgainstSlope(Analysis):
     figure_caption = (
         "Error of d_x, estimate less truth, in per cent of the truth, ± one sigma; a row a surface and speed. "
         "Lines: as (13), (14) predict with the α that fits it. Estimators stand side by side, points and lines. "
-        "A hollow point is in doubt and not in the verdict."
+        "A hollow point has a warning and is not in the verdict."
     )
 
     def compute(self, run: EvaluatedRun) -> EvaluatedRun:

@@ -92,7 +92,7 @@ def _write(
     else:
         write_cameras(out, cameras)
         written = f"written: {out} and {out.with_suffix('.npz').name}"
-    print("\n".join([*lines, *warnings, written]))
+    print(*lines, *(f"warning: {line}" for line in warnings), written, sep="\n")
     return 1 if warnings else 0
 
 
@@ -263,4 +263,4 @@ def _corner_warnings(calibration: Calibration) -> Iterator[str]:
         share = report.left_out / max(report.corners + report.left_out, 1)
         if share > _MOST_LEFT_OUT:
             percent = f"{100 * share:.0f} % of its corners left out as beyond 4.5 sigma"
-            yield f"doubtful: camera {report.name} has {percent}"
+            yield f"camera {report.name} has {percent}"

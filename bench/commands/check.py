@@ -12,7 +12,7 @@ def add(verbs: Verbs) -> None:
         verbs,
         "check",
         run,
-        "list everything that is wrong or doubtful in a session, without evaluating it",
+        "list all errors and warnings of a session, without evaluating it",
         "whisker-bench check fixtures/small-session",
     )
     add_recorded(verb)

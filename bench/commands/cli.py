@@ -74,7 +74,7 @@ def make_parser() -> argparse.ArgumentParser:
         prog="whisker-bench",
         description="How wrong is the distance that a robotic whisker feels? Recorded sessions in, truth, "
         "estimates and their errors out.",
-        epilog="Exit codes: 0 done, 1 done with something doubtful, 2 bad input or usage, 130 interrupted.",
+        epilog="Exit codes: 0 done, 1 done with a warning, 2 bad input or usage, 130 interrupted.",
     )
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     for name in VERBS:

@@ -112,7 +112,7 @@ _HEAD = """\
 # Lengths in mm, angles in degrees, gauges in volts. Any length or angle may have its standard deviation beside it:
 # length_sigma_mm, square_sigma_mm. What has none is known as well as a careful lab knows it (docs/formats.md), and the
 # report marks it. Exact is what has a sigma of 0, or none in a table with exact = true.
-# Every key: docs/formats.md. `whisker-bench check` on this folder lists all that is wrong or doubtful.
+# Every key: docs/formats.md. `whisker-bench check` on this folder lists all errors and warnings.
 format = 1
 {named}
 # surfaces = ["steel", "sandpaper"]  # their order in tables and figures

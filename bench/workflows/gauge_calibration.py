@@ -47,7 +47,7 @@ def calibrate_gauges_command(
         page(certificate).savefig(temporary, metadata=undated)
     print(*header, "", sep="\n")
     for warning in problems.warnings:
-        print(f"doubtful: {warning}")
+        print(f"warning: {warning}")
     print(f"written: {out}, {out.stem}.pdf")
     return 1 if problems.warnings else 0
 

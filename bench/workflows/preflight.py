@@ -75,7 +75,7 @@ def check(path: Path, *, follow_links: bool = False) -> int:
         return 1
     whiskers = f", {counted(len(views), 'whisker')}" if session.base else ""
     trials = counted(len(session.trials), "trial")
-    print(f"{session.whole_name}{whiskers}: {trials}, nothing wrong or doubtful")
+    print(f"{session.whole_name}{whiskers}: {trials}, no error, no warning")
     print(f"then run: whisker-bench evaluate {path} --out OUT")
     return 0
 
@@ -83,9 +83,9 @@ def check(path: Path, *, follow_links: bool = False) -> int:
 def _print_problems(problems: InputProblems) -> None:
     """Print each refusal, then each warning and note, once."""
     for line in dict.fromkeys(problems.refusals):
-        print(f"bad: {line}")
+        print(f"error: {line}")
     for line in dict.fromkeys(problems.warnings):
-        print(f"doubtful: {line}")
+        print(f"warning: {line}")
     for line in problems.notes:
         print(f"note: {line}")
 

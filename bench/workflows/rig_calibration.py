@@ -94,7 +94,7 @@ def calibrate_rig_command(
     advice = [f"to know it better: {line}" for line in what_would_help(found)]
     print(*lines, *advice, "", sep="\n")
     for warning in problems.warnings:
-        print(f"doubtful: {warning}")
+        print(f"warning: {warning}")
     print(f"written: {target}, {picture.name}")
     return 1 if problems.warnings else 0
 

@@ -108,7 +108,7 @@ def test_a_link_within_the_session_and_a_linked_session_are_taken(session, tmp_p
 def test_a_name_that_breaks_tables_is_one_clear_line(session, name, fault, tmp_path, capsys):
     os.mkdir(os.path.join(os.fsencode(session), b"trials", name))
     assert cli.main(["check", str(session)]) == 2
-    bad = [line for line in capsys.readouterr().out.splitlines() if line.startswith("bad: ")]
+    bad = [line for line in capsys.readouterr().out.splitlines() if line.startswith("error: ")]
     assert len(bad) == 1
     assert fault in bad[0]
     assert bad[0].isascii()

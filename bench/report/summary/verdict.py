@@ -62,7 +62,7 @@ def _withheld(truth: TruthUncertainty, compared: Sequence[Accuracy]) -> str:
         return "No verdict on the estimators: no whisk has both a truth and an estimate."
     # What speaks against the truth of many comes before what a single whisk has.
     why = truth.contradiction or left_out[0].whisk_status
-    return f"No verdict on the estimators: all whisks are doubtful ({why}). To have one: {cure_of(why.codes)}."
+    return f"No verdict on the estimators: all whisks have warnings ({why}). To have one: {cure_of(why.codes)}."
 
 
 def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warnings: int) -> str:

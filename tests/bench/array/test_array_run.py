@@ -152,4 +152,4 @@ def test_arrays_are_compared_whisker_by_whisker(out, tmp_path):
 
 def test_check_takes_arrays(session, capsys):
     assert check(session) == 0
-    assert "two, 2 whiskers: 1 trial, nothing wrong or doubtful" in capsys.readouterr().out
+    assert "two, 2 whiskers: 1 trial, no error, no warning" in capsys.readouterr().out

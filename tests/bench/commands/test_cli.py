@@ -82,7 +82,7 @@ def test_a_check_without_boards_imports_no_solver(steel_signals):
         "skimage",
         "jinja2",
     }
-    assert "nothing wrong or doubtful" in said and not heavy & set(said.split())
+    assert "no error, no warning" in said and not heavy & set(said.split())
 
 
 def test_linear_algebra_has_one_thread_before_it_is_loaded(small_session):
@@ -125,7 +125,7 @@ def test_wrong_usage_is_exit_code_2(arguments, capsys):
 def test_check_of_a_sound_session(small_session, capsys):
     assert cli.main(["check", str(small_session)]) == 0
     said = capsys.readouterr().out
-    assert "4 trials, nothing wrong or doubtful" in said
+    assert "4 trials, no error, no warning" in said
     assert "rig: placed by T_rig_board" in said
     assert said.endswith(f"then run: whisker-bench evaluate {small_session} --out OUT\n")
 
@@ -134,13 +134,13 @@ def test_check_of_a_session_with_a_warning(small_copy, capsys):
     manifest = small_copy / "trials" / "b30_3" / "trial.toml"
     manifest.write_text(manifest.read_text().replace("speed_deg_s = 10.0", "speed_deg_s = 90.0"))
     assert cli.main(["check", str(small_copy)]) == 1
-    assert capsys.readouterr().out.startswith("doubtful: trials/b30_3/signals.csv")
+    assert capsys.readouterr().out.startswith("warning: trials/b30_3/signals.csv")
 
 
 def test_check_of_a_bad_session(small_copy, capsys):
     (small_copy / "session.toml").unlink()
     assert cli.main(["check", str(small_copy)]) == 2
-    assert capsys.readouterr().out.startswith("bad: ")
+    assert capsys.readouterr().out.startswith("error: ")
 
 
 def test_info(capsys):

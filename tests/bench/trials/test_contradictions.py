@@ -88,7 +88,7 @@ def test_the_verdict_is_withheld_with_cause_and_cure():
     results = [compared(MISPLACED)]
     first, *_, last = verdict("s", True, RunAccuracy.of_results(results), Settings(), 1)
     assert "to ± 0.02 mm, but in doubt" in first
-    assert last.startswith("No verdict on the estimators: all whisks are doubtful")
+    assert last.startswith("No verdict on the estimators: all whisks have warnings")
     assert MISPLACED in last and cure_of(["board_misplaced"]) in last
 
 
@@ -136,4 +136,4 @@ def test_a_run_has_it_in_json_and_csv_and_judges_no_estimator(
     assert (said in row["status"]) == doubtful
     record = json.loads((tmp_path / "run.json").read_text())
     assert record["warnings"].count(said) == 1
-    assert ("No verdict on the estimators: all whisks are doubtful" in announced[0]) == doubtful
+    assert ("No verdict on the estimators: all whisks have warnings" in announced[0]) == doubtful

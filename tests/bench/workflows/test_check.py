@@ -98,7 +98,7 @@ def test_a_session_without_trials(steel_signals, tmp_path, capsys):
     shutil.copyfile(steel_signals / "session.toml", tmp_path / "session.toml")
     (tmp_path / "trials").mkdir()
     assert check(tmp_path) == 2
-    assert capsys.readouterr().out.splitlines()[0] == "bad: trials: there is no trial to evaluate"
+    assert capsys.readouterr().out.splitlines()[0] == "error: trials: there is no trial to evaluate"
 
 
 def test_signals_of_another_trial(small_copy):

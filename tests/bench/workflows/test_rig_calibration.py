@@ -100,7 +100,7 @@ def test_a_stated_pose_enters_nothing_and_is_compared(measure, small_copy, capsy
     stated = "[rig]\nT_rig_board_sigma_mm = 0.05\nT_rig_board_sigma_deg = 0.05"
     (small_copy / "session.toml").write_text(text.replace("[rig]", stated))
     assert measure() == 1
-    assert "doubtful: rig.toml: T_rig_board and rig.toml disagree" in capsys.readouterr().out
+    assert "warning: rig.toml: T_rig_board and rig.toml disagree" in capsys.readouterr().out
     beside = load_session(small_copy).measured_rig
     without_stated(small_copy)
     (small_copy / "rig.toml").unlink()

@@ -101,7 +101,7 @@ def test_check_finds_nothing_wrong_and_says_what_is(tmp_path, capsys):
     capsys.readouterr()
     assert main(["check", str(bad)]) == 2
     said = capsys.readouterr().out
-    assert "bad: trials/steel_b60_v10/trial.toml: d_x_mm is 600" in said
+    assert "error: trials/steel_b60_v10/trial.toml: d_x_mm is 600" in said
     assert main(["evaluate", str(bad), "--out", str(tmp_path / "out")]) == 2
     assert "Traceback" not in capsys.readouterr().err
 
@@ -163,7 +163,9 @@ def test_a_stage_beside_pictures_is_compared_and_named_where_it_contradicts(
     assert "stage_unlike_pictures" in codes(with_pictures, "b60_4")
     assert "stage_unlike_pictures" not in codes(with_pictures, "b30_3")
     verdict = read_record(with_pictures).verdict
-    assert "in doubt for 1 of these" in verdict[0] and "1 doubtful left out" in " ".join(verdict)
+    assert "in doubt for 1 of these" in verdict[0] and "1 left out for a warning" in " ".join(
+        verdict
+    )
 
 
 def test_errors_by_the_stage_are_those_by_pictures_but_for_its_own(with_pictures, exact_run):
