@@ -1,10 +1,10 @@
-"""(10) run again with what is known of the friction: α fitted per surface, α as seen, and on the kinetic cone.
+"""(10) evaluated again with what is known of the friction: α fitted per surface, α as seen, and on the kinetic cone.
 
 Of a whisk whose moments alone show that it sticks and slips (`bench.trials.gate`), (10) with α_est as given is
 evaluated once more at the kinetic ends of its teeth.
 
 α_est as given needs nothing and stands in each whisk's own result. The fit of Fig. 8 leaves out the whisk that it
-judges. The run with α as seen is no estimate that a robot could make: it shows what is left of the error when friction
+judges. The one with α as seen is no estimate that a robot could make: it shows what is left of the error when friction
 is known.
 """
 
@@ -38,7 +38,7 @@ GIVEN = "with_friction"
 FITTED = "with_friction_fitted"
 SEEN = "with_friction_seen"
 KINETIC = "with_friction_kinetic"
-RUNS = (FITTED, SEEN, KINETIC)
+EVALUATED_AGAIN = (FITTED, SEEN, KINETIC)
 ASSUMING = {
     GIVEN: with_friction,
     "corrected": corrected,
@@ -83,7 +83,7 @@ class AlphaUncertainty:
 
 
 @dataclass(frozen=True)
-class AskedAgain:
+class SecondEvaluation:
     """How (10) is evaluated once more on the whisks of one trial."""
 
     theta_rad: float
@@ -125,7 +125,7 @@ class AskedAgain:
         return tuple(rows)
 
 
-def with_runs(
+def with_estimates_again(
     results: Iterable[TrialResult], whisker: Whisker, settings: Settings
 ) -> list[TrialResult]:
     """Return the results, (10) with the session's sigma of α_est.
@@ -139,13 +139,15 @@ def with_runs(
     turns = _turns(results, settings.alpha_est_rad)
     finished = []
     for result in count_parts(results, "trials by the friction of all", len(results)):
-        again = AskedAgain(np.radians(result.theta_deg), whisker.beam, _radii_mm(result), alpha_est)
+        again = SecondEvaluation(
+            np.radians(result.theta_deg), whisker.beam, _radii_mm(result), alpha_est
+        )
         surface = surface_of.get(result.trial.panel)
         felt = []
         for _, seen, of_whisk in whisks([result]):
             fit = surface and surface.fit_without(result.trial.name, seen.whisk)
             turning = turns[result.trial.name, seen.whisk]
-            felt.append(_with_runs(seen, of_whisk, fit, again, turning))
+            felt.append(_with_estimates_again(seen, of_whisk, fit, again, turning))
         finished.append(replace(result, felt=replace(result.felt, whisks=tuple(felt))))
     return finished
 
@@ -171,11 +173,11 @@ def _turns(results: Iterable[TrialResult], alpha_est_rad: float) -> dict[tuple[s
     return {key: _Turning(rate, bool(one)) for key, rate, one in zip(keys, rates, sure)}
 
 
-def _with_runs(
+def _with_estimates_again(
     seen: SeenWhisk,
     felt: FeltWhisk,
     fit: FrictionFit | None,
-    again: AskedAgain,
+    again: SecondEvaluation,
     turning: _Turning,
 ) -> FeltWhisk:
     """Return the whisk with (10) run again. fit: of α to the other whisks of its surface."""
@@ -194,7 +196,7 @@ def _estimates(
     seen: SeenWhisk,
     felt: FeltWhisk,
     fit: FrictionFit | None,
-    again: AskedAgain,
+    again: SecondEvaluation,
     turning: _Turning,
 ) -> tuple[EstimateRow, ...]:
     """Return the whisk's estimates with the new ones."""
@@ -204,7 +206,7 @@ def _estimates(
     phi_rad = felt.phi_felt_rad.value
     rows = []
     for row in (*given, *_runs(seen, felt, fit, again)):
-        if row.estimator in ASSUMING or row.estimator in RUNS:
+        if row.estimator in ASSUMING or row.estimator in EVALUATED_AGAIN:
             row = with_turn(
                 row,
                 phi_rad,
@@ -218,7 +220,7 @@ def _estimates(
 
 
 def _runs(
-    seen: SeenWhisk, felt: FeltWhisk, fit: FrictionFit | None, again: AskedAgain
+    seen: SeenWhisk, felt: FeltWhisk, fit: FrictionFit | None, again: SecondEvaluation
 ) -> Iterator[EstimateRow]:
     """Yield (10) with α fitted and seen, where known, and at the kinetic ends, where there are any."""
     whisk = whisk_of(felt, again.theta_rad, again.beam)

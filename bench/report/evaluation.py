@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.analyses.analysis import EvaluatedRun
-from bench.analyses.estimates_again import alpha_est_sigma, with_runs
+from bench.analyses.estimates_again import alpha_est_sigma, with_estimates_again
 from bench.analyses.friction_tables import friction_of
 from bench.base.settings import Settings
 from bench.cameras.session_cameras import SessionCalibration
@@ -47,7 +47,7 @@ class Evaluation(Finished):
 
 def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Settings) -> Finished:
     """Return the results brought together, as they stand in trials/."""
-    results = tuple(with_runs(results, whisker, settings))
+    results = tuple(with_estimates_again(results, whisker, settings))
     shared = shared_touch(results)
     warning = shared_touch_warning(shared)
     results = with_shared_touch(results, shared)

@@ -138,7 +138,8 @@ def session_drift(units: Sequence[Unit], pool: Workers) -> tuple[np.ndarray, np.
     strokes all over the session; None for forces where no load cell was recorded.
     """
     every = max(1, len(units) // _MOST_DRIFT_STROKES)
-    channels, forces = [], []
+    channels = []
+    forces = []
     for strokes in pool.run(free_strokes, units[::every], "free strokes"):
         channels += strokes.channels
         forces += strokes.forces
@@ -150,8 +151,8 @@ def session_gauges(
 ) -> tuple[GaugeCalibration | None, Certificate | None]:
     """Return the session's gauges, and their certificate where its own trials calibrate them.
 
-    GaugeCalibration that were brought along come first; else they are fitted to the gauge trials, or to all
-    where the settings ask for that. Where these cannot fix them there are none, and a note.
+    Gauges that were brought along come first; else they are fitted to the gauge trials, or to all where
+    the settings ask for that. Where the trials cannot fix them there are none, and a warning says why.
     """
     gauges = given_gauges(units[0].session)
     from_all = units[0].settings.gauges_from_all

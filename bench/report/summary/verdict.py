@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 from bench.analyses.accuracy_line import accuracy_line
-from bench.analyses.estimates_again import FITTED, RUNS
+from bench.analyses.estimates_again import EVALUATED_AGAIN, FITTED
 from bench.analyses.estimator_accuracy import Accuracy, RunAccuracy, TruthUncertainty
 from bench.analyses.pooling import grouped, panel_title, rms
 from bench.base.settings import Seeing, Settings
@@ -38,7 +38,7 @@ def verdict(
     session: its name. has_pictures: whether it has any. warnings: how many there are.
     """
     yield _truth_line(session, has_pictures, accuracy.truth, warnings)
-    compared = [one for one in accuracy.estimators if one.estimator not in RUNS]
+    compared = [one for one in accuracy.estimators if one.estimator not in EVALUATED_AGAIN]
     fitted = [one for one in accuracy.estimators if one.estimator == FITTED and one.judged]
     for one in (*compared, *fitted):
         yield accuracy_line(one, settings)

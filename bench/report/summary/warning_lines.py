@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from bench.analyses.estimates_again import RUNS
+from bench.analyses.estimates_again import EVALUATED_AGAIN
 from bench.base.input_problems import in_one_status
 from bench.base.statuses import reason
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
@@ -13,7 +13,7 @@ from vision.geometry import Reason, as_reason, counted
 # Codes of statuses that are as they should be: of a session without pictures, of a gauge trial.
 SILENT = {"no_pictures", "slip_not_seen", "own_gauges"}
 # (10) run again repeats what it said first; what the others miss is the result, no fault of the run.
-_EXPECTED = ("no_slip", "frictionless", *RUNS)
+_EXPECTED = ("no_slip", "frictionless", *EVALUATED_AGAIN)
 
 # Codes of answers that are a fault of the estimator's code, not a limit of its model.
 FAILURES = {"estimator_raised", "no_distance_given", "distance_impossible", "sigma_impossible"}

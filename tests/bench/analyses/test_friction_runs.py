@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench.analyses.alphas import alphas_of, felt_friction, mean_alpha
-from bench.analyses.estimates_again import FITTED, SEEN, _rescaled, with_runs
+from bench.analyses.estimates_again import FITTED, SEEN, _rescaled, with_estimates_again
 from bench.analyses.friction_tables import FrictionAngles, friction_of
 from bench.analyses.section_vii import (
     FeltContact,
@@ -36,7 +36,7 @@ def errors(results, name) -> dict[str, float]:
 
 
 def test_with_the_right_friction_nothing_is_left_of_the_error():
-    results = with_runs([result(b) for b in SLOPES], WHISKER, Settings())
+    results = with_estimates_again([result(b) for b in SLOPES], WHISKER, Settings())
     assert abs(errors(results, "with_friction")["b70"]) > 5.0
     for name in (FITTED, SEEN):
         assert list(errors(results, name)) == [f"b{b}" for b in SLOPES]
@@ -48,7 +48,9 @@ def test_sigma_holds_what_alpha_est_may_be_off_by():
     what the error of (10) is made of, and without it the sigma is far too small."""
     results = [result(b) for b in SLOPES]
     rows = {
-        r["trial"]: r for r in estimate_rows(with_runs(results, WHISKER, Settings())) if _is_10(r)
+        r["trial"]: r
+        for r in estimate_rows(with_estimates_again(results, WHISKER, Settings()))
+        if _is_10(r)
     }
     steep = rows["b70"]
     by_alpha = np.sqrt(steep["d_x_est_sigma_mm"] ** 2 - steep["d_x_est_sigma_alpha_exact_mm"] ** 2)
@@ -60,7 +62,9 @@ def test_sigma_holds_what_alpha_est_may_be_off_by():
     assert steep["d_x_est_low_mm"] < 60.0 < steep["d_x_est_high_mm"]
     given = [
         r
-        for r in estimate_rows(with_runs(results, WHISKER, Settings(alpha_est_sigma_deg=1.0)))
+        for r in estimate_rows(
+            with_estimates_again(results, WHISKER, Settings(alpha_est_sigma_deg=1.0))
+        )
         if _is_10(r)
     ]
     assert all(g["d_x_est_sigma_mm"] < rows[g["trial"]]["d_x_est_sigma_mm"] for g in given)
@@ -73,7 +77,7 @@ def _is_10(row) -> bool:
 def test_the_fit_leaves_out_the_whisk_that_it_judges():
     """One whisk whose friction is its own: its own run has the others' α, theirs are spoilt by it."""
     odd = result(60, alpha=np.radians(25.0), name="odd")
-    results = with_runs([*(result(b) for b in SLOPES), odd], WHISKER, Settings())
+    results = with_estimates_again([*(result(b) for b in SLOPES), odd], WHISKER, Settings())
     alphas = {
         r["trial"]: r["alpha_est_deg"] for r in estimate_rows(results) if r["estimator"] == FITTED
     }
@@ -82,7 +86,7 @@ def test_the_fit_leaves_out_the_whisk_that_it_judges():
 
 
 def test_a_whisk_alone_on_its_surface_has_no_fitted_run_but_a_seen_one():
-    results = with_runs([result(60)], WHISKER, Settings())
+    results = with_estimates_again([result(60)], WHISKER, Settings())
     assert errors(results, FITTED) == {}
     assert list(errors(results, SEEN)) == ["b60"]
 
@@ -90,7 +94,7 @@ def test_a_whisk_alone_on_its_surface_has_no_fitted_run_but_a_seen_one():
 def test_uncertainty_of_friction_is_in_the_sigma():
     row = next(
         r
-        for r in estimate_rows(with_runs([result(70)], WHISKER, Settings()))
+        for r in estimate_rows(with_estimates_again([result(70)], WHISKER, Settings()))
         if r["estimator"] == SEEN
     )
     by_alpha = (np.tan(np.radians(70.0)) - np.tan(ALPHA)) * np.radians(
@@ -100,7 +104,7 @@ def test_uncertainty_of_friction_is_in_the_sigma():
 
 
 def test_every_way_finds_the_friction_angle(tmp_path):
-    results = with_runs([result(b) for b in (-60, -40, *SLOPES)], WHISKER, Settings())
+    results = with_estimates_again([result(b) for b in (-60, -40, *SLOPES)], WHISKER, Settings())
     found = friction_of(results, WHISKER, np.radians(10.0))
     (surface,) = found
     for name in ("seen", "felt", "least_squares", "tilting", "consistency"):
@@ -280,7 +284,9 @@ def test_a_stated_sigma_of_alpha_is_not_rescaled():
         (Settings(alpha_est_sigma_deg=0.0), 1.0),
     ):
         rows = [
-            a for r in with_runs(results, WHISKER, settings) for a in r.felt.whisks[0].estimates
+            a
+            for r in with_estimates_again(results, WHISKER, settings)
+            for a in r.felt.whisks[0].estimates
         ]
         assert {a.d_x_est_mm.sigma for a in rows if a.estimator == "own"} == {
             np.hypot(0.3, part * 0.4)
