@@ -1,7 +1,8 @@
 """Every view of the board in a session: held before the cameras, standing on the rig, and in the trials' frames."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -108,15 +109,7 @@ def _series(frames: Frames, board: Board, place: str, mirrored: bool) -> list[Co
     views = []
     chosen = sampled_frames(frames.count)
     samples = _Samples(every=max(1, len(chosen) // _SAMPLES))
-
-    def find(frame: tuple[int, np.ndarray | None]) -> tuple[int, np.ndarray | None, Corners]:
-        """Return a frame with its view of the board."""
-        index, grey = frame
-        if grey is None or index not in chosen:
-            return index, grey, Corners.none()
-        return index, grey, find_corners(grey, board)
-
-    searched = in_threads(find, frames.read())
+    searched = in_threads(partial(_find_in_chosen, chosen, board), frames.read())
     for index, grey, view in count_parts(searched, f"pictures in {place}", frames.count):
         views.append(view)
         samples.add(index, grey, view)
@@ -125,6 +118,16 @@ def _series(frames: Frames, board: Board, place: str, mirrored: bool) -> list[Co
     with refused_as_bad_input(place):
         board.check_print(samples.with_board)
     return views
+
+
+def _find_in_chosen(
+    chosen: Collection[int], board: Board, frame: tuple[int, np.ndarray | None]
+) -> tuple[int, np.ndarray | None, Corners]:
+    """Return a frame, its number and picture, with its view of the board, none unless it is chosen."""
+    index, grey = frame
+    if grey is None or index not in chosen:
+        return index, grey, Corners.none()
+    return index, grey, find_corners(grey, board)
 
 
 def _require_no_reason(

@@ -45,9 +45,12 @@ from vision.geometry import (
     skew,
 )
 
-# [sigmas] A camera whose board stands farther elsewhere than this, and than the next, was moved. Set by eye.
+# [sigmas] A camera whose board stands farther elsewhere than this, and than the next, was moved. Chance alone gives a
+# motion (six numbers) 3 sigma, RMS, once in 1e9 pictures; five leave room for errors of the lens. Derived; study:
+# bench_thresholds.py cameras.session_cameras _MOVED_SIGMAS 3 4 changes nothing.
 _MOVED_SIGMAS = 5.0
-# [px] Set by eye.
+# [px] Less moves d_x by less than its sigma. Study: bench_thresholds.py cameras.session_cameras _MOVED_PX 0.02 0.1
+# changes nothing.
 _MOVED_PX = 0.3
 # [trials] In fewer the bar stands before a place too often.
 _FEWEST_FOR_MEDIAN = 5

@@ -17,7 +17,8 @@ from bench.gauges.matrix import FROM_TRIALS, GaugeCalibration, GaugeMatrix
 # Below this share of the stronger direction, the weaker one is not known to the per cent that is wanted: a mount that
 # was turned by 6° instead of 90°, or one slope only.
 _LEAST_DIRECTION = 0.1
-# [rounds] In which the weights follow the coefficients. Set by eye.
+# [rounds] In which the weights follow the coefficients: after two no estimate moves by 2e-5 of its sigma. Study:
+# bench_thresholds.py gauges.fit _ROUNDS 1 2 3 10.
 _ROUNDS = 5
 # Probability that sound residuals are taken for too large.
 _CHANCE = 0.01

@@ -132,10 +132,10 @@ def expected_error(
     by_making = _share_by_making(design, equipment, d_x)
     bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
     sigma = np.linalg.norm(np.broadcast_arrays(by_noise, by_lean, by_making), axis=0)
-    has_distance = np.isfinite(bias + by_noise)
-    return ExpectedError(
-        np.where(has_distance, 100.0 * bias, np.inf), np.where(has_distance, 100.0 * sigma, np.inf)
-    )
+    is_open = ~np.isfinite(bias + by_noise)  # no distance there
+    bias[is_open] = np.inf
+    sigma[is_open] = np.inf
+    return ExpectedError(100.0 * bias, 100.0 * sigma)
 
 
 def _share_by_making(design: Design, equipment: Equipment, d_x: Numbers) -> Numbers:

@@ -94,12 +94,13 @@ def _seen_angles(
     turning = _turning_at_rest(frames, index, d_x_mm)
     angles = []
     for first, last in jumps:
-        middle = float(0.5 * (theta[first] + theta[last]))
-        width = theta[last] - theta[first]
-        for kind, k, half in ((STATIC, first, 0.5), (KINETIC, last, -0.5)):
-            carried = alpha[k] + half * width * turning[k]
-            by_width = turning[k] * width / np.sqrt(12.0)
-            angles.append(Angle(kind, middle, float(carried), float(np.hypot(sigma[k], by_width))))
+        half_width = 0.5 * (theta[last] - theta[first])
+        for kind, k, way in ((STATIC, first, half_width), (KINETIC, last, -half_width)):
+            by_way = way * turning[k]
+            spread = np.hypot(sigma[k], by_way / np.sqrt(3.0))  # uniform between the frames
+            angles.append(
+                Angle(kind, float(theta[k] + way), float(alpha[k] + by_way), float(spread))
+            )
     return angles
 
 
