@@ -116,7 +116,7 @@ def errors_percent(push: Push) -> tuple[float, float]:
 
 
 def predicted_percent(push: Push) -> float:
-    """Return the error of (10) to first order in θ, derived in docs/maps.md.
+    """Return the error of (10) to first order in θ, derived in docs/equations.md.
 
     Slipping sideways (β ≥ α): 100 θ (½ tan ψ sin φ / cos α − ⅜ (R/d_x) cos β / cos² ψ), with
     φ = β − α and R the radii of bar and whisker together. Held at β = ψ = 0: 100 θ (−⅕ tan α −
