@@ -10,7 +10,8 @@ from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import GaugeMatrix
 
 _CHANNELS = "yz"
-# A channel within so many of its own noise throughout hears nothing. Set by eye.
+# [sigmas] A channel that stays within so many of its own noise hears nothing. In thousands of readings noise reaches
+# four; twice that, for a sigma that may be too small. Derived.
 _HEARD_SIGMAS = 8.0
 # Of the samples; a whisk that saturates late can still be used.
 _LEAST_UNSATURATED = 0.2
