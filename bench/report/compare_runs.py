@@ -40,7 +40,8 @@ COMPARISON = Table(
         Column("same_recording", "1 where the trial's files are the same, else 0"),
     ),
 )
-DONE, CHANGED = 0, 1
+DONE = 0
+CHANGED = 1
 # [sigma] A whisk evaluated again that moves by more has another truth, or another estimate. Stated.
 _LEAST_SIGMAS_AGAIN = 1.0
 # [sigma] Of another recording's whisk, by chance once in 370. Derived.
@@ -110,7 +111,7 @@ def compare_runs(outs: Sequence[Path], table: Path | None = None) -> tuple[list[
         changes += of_run
         lines += _run_lines(first, other, of_run)
     if not changes:
-        alone = f"shares no whisk with {outs[0]}: trials are told by their names"
+        alone = f"shares no whisk with {outs[0]}: trials are matched by their names"
         raise BadInput(alone, file=outs[1])
     if table is not None:
         COMPARISON.write_file(table, [_row(change, Path(outs[0])) for change in changes])

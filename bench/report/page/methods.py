@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from bench.analyses.estimator_accuracy import Accuracy
+from bench.analyses.estimator_accuracy import Accuracy, TruthUncertainty
 from bench.analyses.friction_tables import SurfaceFriction
 from bench.report.evaluation import Finished
 from bench.report.page.words import MISSING, number, with_sigma
@@ -56,24 +56,25 @@ def methods(record: RunRecord, run: Finished) -> str:
 def _truth(record: RunRecord, run: Finished) -> Iterator[str]:
     """Yield the sentences on the whisker, the cameras, and how well the truth is known."""
     truth = run.accuracy.truth
+    slope = f"slope {number(truth.beta_deg, 3)}°"
     yield _sentence_on_whisker(record, run)
     if run.is_by_stage:
-        yield (
-            f"The true radial distance d_x is known by a stage for {truth.known} of {truth.measured} whisks, with a "
-            f"median standard uncertainty of {number(truth.d_x_mm, 4)} mm, of which {number(truth.d_x_own_mm, 4)} mm "
-            f"are each whisk's own and {number(truth.d_x_shared_mm, 4)} mm are common to all (slope "
-            f"{number(truth.beta_deg, 3)}°)."
-        )
-        return
-    if not record.cameras:
+        yield _sentence_on_distance(truth, " by a stage", slope)
+    elif record.cameras:
+        yield _sentence_on_cameras(record.cameras)
+        touch = f"touch {number(truth.touch_deg, 4)}°"
+        slip = f"slip {number(truth.slip_mm, 4)} mm"
+        yield _sentence_on_distance(truth, "", f"{touch}, {slope}, {slip}")
+    else:
         yield "No pictures were recorded, so that no truth stands beside the estimates."
-        return
-    yield _sentence_on_cameras(record.cameras)
-    yield (
-        f"The true radial distance d_x is known for {truth.known} of {truth.measured} whisks, with a median standard "
-        f"uncertainty of {number(truth.d_x_mm, 4)} mm, of which {number(truth.d_x_own_mm, 4)} mm are each whisk's own "
-        f"and {number(truth.d_x_shared_mm, 4)} mm are common to all (touch {number(truth.touch_deg, 4)}°, slope "
-        f"{number(truth.beta_deg, 3)}°, slip {number(truth.slip_mm, 4)} mm)."
+
+
+def _sentence_on_distance(truth: TruthUncertainty, source: str, others: str) -> str:
+    """Return the sentence on how well the distance is known. others: sigmas of other quantities."""
+    return (
+        f"The true radial distance d_x is known{source} for {truth.known} of {truth.measured} whisks, with a median "
+        f"standard uncertainty of {number(truth.d_x_mm, 4)} mm, of which {number(truth.d_x_own_mm, 4)} mm are each "
+        f"whisk's own and {number(truth.d_x_shared_mm, 4)} mm are common to all ({others})."
     )
 
 
