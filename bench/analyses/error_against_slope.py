@@ -101,15 +101,19 @@ def error_against_slope(
         without_2 = [j for j in every if j.estimator != "no_slip"]
         _draw_estimators(left, every, lanes, surface, settings)
         _draw_estimators(right, without_2, lanes, surface, settings)
-        left.set_title(f"{panel_title(*panel)}: every estimator")
-        right.set_title(f"{panel_title(*panel)}: without (2)")
-        left.set_ylabel("error of d$_x$  [%]")
         left.set_ylim(*_limits([j for j in every if not j.one_factor]))
         right.set_ylim(*_limits(without_2))
+        _name_panels(left, right, panel_title(*panel))
     for axes in rows[-1]:
         axes.set_xlabel("slope β  [°]")
     add_legend(figure, 3)
     return figure
+
+
+def _name_panels(left: "Axes", right: "Axes", title: str) -> None:
+    """Write the titles above the panels of one surface and speed, and what is drawn upwards."""
+    left.set(ylabel="error of d$_x$  [%]", title=f"{title}: every estimator")
+    right.set_title(f"{title}: without (2)")
 
 
 Lane = tuple[str, bool]  # estimator, and whether it was given one gauge factor a channel

@@ -195,11 +195,12 @@ class _Rods:
         bend = (lever * softness) @ nodes.from_clamp.T
         bend_by = nodes.from_clamp @ (softness[:, :, None] * lever_by)
         bend_by_arc = 2.0 * arc * bend + arc**2 * ((lever * softness_by_arc) @ nodes.from_clamp.T)
+        scale = force * arc**2
         derivatives = np.empty((*angle.shape, count + 2))
-        derivatives[:, :, :count] = np.eye(count) - (force * arc**2)[:, :, None] * bend_by
+        derivatives[:, :, :count] = np.eye(count) - scale[:, :, None] * bend_by
         derivatives[:, :, count] = -(arc**2) * bend
         derivatives[:, :, count + 1] = -force * bend_by_arc
-        return angle - force * arc**2 * bend, derivatives
+        return angle - scale * bend, derivatives
 
     def _closure(self, unknowns: np.ndarray, nodes: _Nodes) -> tuple[np.ndarray, np.ndarray]:
         """Return how far (n, 2) the rod's end is from the contact, along and across, and the

@@ -209,9 +209,15 @@ class _Sliding:
         of_normal = -np.sign(press) * self.growth * leans * share / (1.0 - leans**2)
         friction = -slip * (_dot(held.force_N, across) / press - of_normal)
         friction = np.sign(share) * np.sign(press) * friction
-        past = np.tan(heading(self.whole, self.deflection.theta_rad))
-        past = past + leans - np.sin(self.psi_rad)
-        return friction, np.abs(share) / np.hypot(share, past)
+        return friction, self._cosine_across(share, leans)
+
+    def _cosine_across(self, share: np.ndarray, leans: np.ndarray) -> np.ndarray:
+        """Return the cosine (n,) of the angle at which the whisker slides along itself.
+
+        share, leans (n,): parts of the bar's direction across the whisker and along it.
+        """
+        past = np.tan(heading(self.whole, self.deflection.theta_rad)) + leans - np.sin(self.psi_rad)
+        return np.abs(share) / np.hypot(share, past)
 
     def _bar_directions(self) -> np.ndarray:
         """Return the object's direction (n, 3) in the axes of the hub."""
