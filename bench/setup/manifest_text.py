@@ -74,7 +74,7 @@ def _to_record(lab: Lab) -> Iterator[tuple[str, str]]:
     if lab.truth == "traces-only":
         yield (
             "trials/<trial>/object_<camera>.csv",
-            "likewise, two places or more of the bar's middle",
+            "likewise, two places or more of the bar's middle (or joints bar_... of the trace)",
         )
     motor = "motor_deg," if lab.motor_log == "yes" else ""
     channels = "m_y_Nmm,m_z_Nmm" if lab.gauges == "moments" else "y_V,z_V"
