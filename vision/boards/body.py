@@ -25,9 +25,6 @@ _N_POSE = 6
 _TURN_SIGMA = 0.3
 # [1] Of a face's shift about its first guess, over the side of a face. As above. Stated.
 _SHIFT_SIGMA = 0.3
-# [mm] By which a point lies beside its place, per axis: rows of a laser print and paper on a cube
-# err by 0.02. Study: real_cube.py.
-_POINT_SIGMA_MM = 0.03
 
 
 @dataclass(frozen=True)
@@ -104,11 +101,6 @@ class Body(Board):
     def spare_markers(self) -> tuple[str, int]:
         """Return the faces' dictionary, and the first number beyond those of all faces."""
         return self.dictionary, max(face.spare_markers[1] for face in self.faces)
-
-    @property
-    def point_sigma_mm(self) -> float:
-        """Return how far each point lies from its place on its face, per axis, as prints on bodies do."""
-        return _POINT_SIGMA_MM
 
     def detect(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return OpenCV's own corners on all faces, ids (n,) and px (n, 2)."""

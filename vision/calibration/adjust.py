@@ -4,16 +4,23 @@ A view's pose touches only the cameras that saw it, so that all poses are elimin
 equations (Schur complement) after the pictures' instants. The work grows linearly with views; what
 is left to solve is as small as the cameras are few, and its inverse is the covariance of what is
 kept, everything eliminated being marginalised. Where the board's points are free they are eliminated
-first, which couples all views.
+last.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solveh_banded
+from scipy.linalg import block_diag, cho_factor, cho_solve, solveh_banded
 
 from vision.calibration.bundle import N_CAMERA, N_VIEW, BundleState, Priors, Sightings
-from vision.calibration.normal_equations import LinearisedCost, NormalEquations, normal_equations
+from vision.calibration.normal_equations import (
+    LinearisedCost,
+    NormalEquations,
+    normal_equations,
+    shape_changes,
+)
 from vision.geometry.board import Board
 
 # [1] Keeps a view whose few corners fix no pose solvable; of what is fixed it changes the tenth
@@ -70,6 +77,36 @@ class _Problem:
         """Return the cost and the normal equations at a state."""
         return normal_equations(state, self.seen, self.board, self.priors, self.width)
 
+    @cached_property
+    def free(self) -> "_Free":
+        """Return what is free of globals and points."""
+        by_globals = self.priors.directions()
+        if not self.priors.point_sigma_mm:
+            return _Free(by_globals, *by_globals.shape)
+        by_points = shape_changes(self.board, self.seen.corner)
+        return _Free(block_diag(by_globals, by_points), *by_globals.shape)
+
+    def fitted_points(self, normal: LinearisedCost) -> float:
+        """Return how many coordinates of the board's points the pictures determine."""
+        if normal.equations is None or not self.priors.point_sigma_mm:
+            return 0.0
+        size = self.free.n_globals
+        changes = self.free.directions[size:, self.free.n_free_globals :]
+        precision = changes.T @ normal.equations.A[size:, size:] @ changes
+        prior = self.priors.point_sigma_mm**-2.0
+        return float(len(precision) - prior * np.trace(np.linalg.inv(precision)))
+
+
+class _Free(NamedTuple):
+    """Hold how globals, and points behind them, move with the free ones.
+
+    directions (G [+ 3 m], F + k). n_globals, n_free_globals: G and F.
+    """
+
+    directions: np.ndarray
+    n_globals: int
+    n_free_globals: int
+
 
 def adjust_bundle(
     state: BundleState,
@@ -87,8 +124,8 @@ def adjust_bundle(
     """
     problem = _Problem(seen, board, priors, width)
     state, normal, converged = _descend(problem, state, tolerance)
-    covariance = _covariance(normal, priors.directions())
-    fitted = normal.points.fitted if normal.points else 0.0
+    covariance = _covariance(normal, problem.free)
+    fitted = problem.fitted_points(normal)
     return Solution(state, normal.residual_px, covariance, normal.cost, converged, fitted)
 
 
@@ -103,9 +140,8 @@ def _descend(
     damping = _DAMPED
     converged = False
     fall = np.inf
-    directions = problem.priors.directions()
     for _ in range(_MOST_STEPS if np.isfinite(normal.cost) else 0):
-        steps = _solve_step(normal, directions, damping)
+        steps = _solve_step(normal, problem.free, damping)
         trial_state = state.move(*steps)
         trial = problem.normal(trial_state)
         if trial.cost <= normal.cost * (1 + 1e-13):
@@ -123,21 +159,46 @@ def _descend(
 
 
 def _solve_step(
-    normal: LinearisedCost, directions: np.ndarray, damping: float
+    normal: LinearisedCost, free: _Free, damping: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return Marquardt's step of the globals (G,), the views (V, 6), the instants (V, C) and the
-    points (m, 3).
-
-    directions (G, F): how the globals move with the free ones.
+    points (m, 3), 0 (1, 3) of points that are held.
     """
+    directions = free.directions
     reduced, gradient, CB, Cc = _eliminate_views(normal.equations, directions, damping)
     curvature = np.einsum("gf,gf->f", directions, normal.equations.A @ directions)
     np.einsum("ii->i", reduced)[...] += damping * curvature
-    free_step = _solve_scaled(reduced, gradient)
+    reduced, gradient, by_globals, constant = _eliminate_points(reduced, gradient, free)
+    global_step = _solve_scaled(reduced, gradient)
+    free_step = np.append(global_step, constant - by_globals @ global_step)
     step = directions @ free_step
     view_steps = (Cc - CB @ free_step).reshape(-1, N_VIEW)
-    point_steps = normal.points.steps(np.concatenate([step, view_steps.ravel()]))
-    return step, view_steps, _instant_steps(normal, step, view_steps), point_steps
+    of_globals = step[: free.n_globals]
+    of_points = step[free.n_globals :].reshape(-1, 3)
+    if not len(of_points):
+        of_points = np.zeros((1, 3))
+    return of_globals, view_steps, _instant_steps(normal, of_globals, view_steps), of_points
+
+
+def _eliminate_points(
+    reduced: np.ndarray, gradient: np.ndarray, free: _Free
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Eliminate the points from a reduced matrix (F + k, F + k) and its gradient (F + k,).
+
+    Returns both of the free globals, and what the points' step is: a constant (k,) less a matrix (k, F)
+    times that of the globals.
+    """
+    count = free.n_free_globals
+    points = slice(count, None)
+    if count == len(reduced):
+        return reduced, gradient, np.zeros((0, count)), np.zeros(0)
+    right = np.column_stack([reduced[points, :count], gradient[points]])
+    solved = cho_solve(cho_factor(reduced[points, points]), right)
+    coupling = reduced[:count, points]
+    by_globals = solved[:, :-1]
+    constant = solved[:, -1]
+    left = reduced[:count, :count] - coupling @ by_globals
+    return left, gradient[:count] - coupling @ constant, by_globals, constant
 
 
 def _instant_steps(normal: LinearisedCost, step: np.ndarray, view_steps: np.ndarray) -> np.ndarray:
@@ -155,9 +216,10 @@ def _instant_steps(normal: LinearisedCost, step: np.ndarray, view_steps: np.ndar
 def _eliminate_views(
     equations: NormalEquations, directions: np.ndarray, damping: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Reduce the equations to the free globals: eliminate the views' poses by the Schur complement.
+    """Reduce the equations to what is free of globals and points: eliminate the views' poses by the
+    Schur complement.
 
-    directions (G, F): how the globals move with the free ones. Returns the reduced matrix (F, F) and
+    directions (G, F): how these move with the free ones. Returns the reduced matrix (F, F) and
     gradient (F,) of the free globals, C⁻¹Bᵀ (6 V, F) and C⁻¹c (6 V,).
     """
     A, a, B, C, c = equations
@@ -186,15 +248,14 @@ def _solve_scaled(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return scale * np.linalg.lstsq(unit, scale * vector, rcond=1e-14)[0]
 
 
-def _covariance(normal: LinearisedCost, directions: np.ndarray) -> np.ndarray:
-    """Return the covariance (G, G) of the globals, all poses and instants being marginalised.
-
-    directions (G, F): how the globals move with the free ones.
-    """
-    size, free = directions.shape
-    if normal.equations is None or not free:
+def _covariance(normal: LinearisedCost, free: _Free) -> np.ndarray:
+    """Return the covariance (G, G) of the globals, all poses, points and instants being marginalised."""
+    size = free.n_globals
+    if normal.equations is None or not free.n_free_globals:
         return np.zeros((size, size))
-    reduced, *_ = _eliminate_views(normal.equations, directions)
+    reduced, gradient, *_ = _eliminate_views(normal.equations, free.directions)
+    reduced, *_ = _eliminate_points(reduced, gradient, free)
     scale = np.outer(_unit_scale(reduced), _unit_scale(reduced))
     inverse = np.linalg.pinv(reduced * scale, rcond=1e-14, hermitian=True)
+    directions = free.directions[:size, : free.n_free_globals]
     return directions @ (inverse * scale) @ directions.T

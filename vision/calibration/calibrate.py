@@ -55,6 +55,9 @@ _WARP_GAIN = 18.4
 # [mm] A prior, wider than any print bows. moves nothing on the fixtures between 0.5 and 10 (they
 # do not call for a warp). Study: thresholds.py calibration.calibrate _WARP_SIGMA_MM ….
 _WARP_SIGMA_MM = 2.0
+# [mm] Errors of the board's points from which a note says them: half of those of a cube's prints.
+# Stated.
+_NOTED_POINTS_MM = 0.01
 # [chance] By which a print that is stretched as its sigma says would call for a warning: 2.6 sigma,
 # of which the views take nearly all into account. Stated.
 _STRETCH_ALARM = 0.01
@@ -142,6 +145,7 @@ def calibrate_cameras(
     joint = JointInput(alone, standing, board, on_rig, views.times_s, triggered, crops).adjust()
     adjustment, notes = _with_warp(joint.layout, joint.adjustment, board)
     _check_adjustment(alone, adjustment, triggered)
+    notes += _point_notes(adjustment)
     adjustment, shared_notes = with_shared_errors(adjustment, board, list(alone))
     if joint.timing is not None:
         notes.append(timing_note(alone, joint.timing))
@@ -343,6 +347,16 @@ def _with_warp(layout: Layout, flat: Adjustment, board: Board) -> tuple[Adjustme
     x_mm, y_mm = adjustment.solution.state.board[-2:]
     note = f"The board is bent by {x_mm:+.3f} mm along x and {y_mm:+.3f} mm along y; taken into account."
     return adjustment, [note]
+
+
+def _point_notes(adjustment: Adjustment) -> list[str]:
+    """Return a note on how far the board's points are from their places, where that is worth one."""
+    rms_mm = np.sqrt(np.mean(adjustment.solution.state.points_mm**2))
+    if rms_mm < _NOTED_POINTS_MM:
+        return []
+    return [
+        f"The board's points lie beside their places by {rms_mm:.3f} mm RMS an axis; taken into account."
+    ]
 
 
 def _board_covariance(adjustment: Adjustment) -> np.ndarray:

@@ -42,6 +42,10 @@ _MIN_LATE = 8
 # [1] Of all cameras' lateness, below which none is taken: no camera is exactly on time. Set by
 # eye.
 _LEAST_LATE_SHARE = 0.02
+# [coordinates] Of the board's points that the pictures determine: fewer have no scatter. Derived.
+_LEAST_FITTED_POINTS = 1.0
+# [mm] Scatter of the board's points, at least: no print is better. Stated.
+_LEAST_POINT_SIGMA_MM = 0.001
 # [1] Of the residuals' number, left over however many parameters are fitted: keeps the model
 # error finite. Stated.
 _LEAST_FREEDOM = 0.1
@@ -125,6 +129,7 @@ def _adjust_robustly(
         )
     if state.trajectory is not None:
         priors = _with_lateness(priors, solution.state, seen)
+    priors = _with_print_errors(priors, solution)
     return solution, _error_by_median(solution.residual_px, seen, len(error)), priors
 
 
@@ -142,6 +147,7 @@ def _without_outliers(
     for _ in range(2):
         fitted = solution.fitted_points
         error = _error_by_mean(residual_px, seen, kept, error, priors, fitted)
+        priors = _with_print_errors(priors, solution)
         weighted = _with_error(seen, error)
         solution = adjust_bundle(solution.state, weighted.select(kept), board, priors)
         residual_px = seen.px - predict(solution.state, seen, board)[0]
@@ -168,6 +174,16 @@ def _with_lateness(priors: Priors, state: BundleState, seen: Sightings) -> Prior
             variances[c] = np.mean(own)
     least = _LEAST_LATE_SHARE * np.sqrt(overall)
     return replace(priors, late_sigma_s=np.maximum(np.sqrt(variances), least))
+
+
+def _with_print_errors(priors: Priors, solution: Solution) -> Priors:
+    """Return the priors with the scatter of the board's points as the fitted points have it
+    (MacKay, Neural Computation 4, 415, 1992).
+    """
+    if solution.fitted_points < _LEAST_FITTED_POINTS:
+        return priors
+    squared_mm2 = np.sum(solution.state.points_mm**2) / solution.fitted_points
+    return replace(priors, point_sigma_mm=max(float(np.sqrt(squared_mm2)), _LEAST_POINT_SIGMA_MM))
 
 
 def _with_error(seen: Sightings, error_px: np.ndarray) -> Sightings:

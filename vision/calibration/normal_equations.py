@@ -1,15 +1,16 @@
-"""The normal equations of an adjustment, formed picture by picture, with instants and points eliminated.
+"""The normal equations of an adjustment, formed picture by picture, with instants eliminated.
 
-A picture's instant touches only that picture, a point of the board those in which it is seen. Points
-are free only where instants are held. Shapes: s pictures ("shots"), G = 16 C + B global
-parameters, V views, p = 16 + B + 6 or 18 parameters that a picture depends on: 16 + B of them global, the
-rest poses of its view and that view's neighbours.
+A picture's instant touches only that picture. The board's points are free only where instants are
+held. Shapes: s pictures ("shots"), G = 16 C + B global parameters, V views, p = 16 + B + 6 or 18
+parameters that a picture depends on: 16 + B of them global, the rest poses of its view and that
+view's neighbours.
 """
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from vision.calibration.bundle import (
     CLOCK,
@@ -20,11 +21,13 @@ from vision.calibration.bundle import (
     Sightings,
     predict_with_points,
 )
-from vision.geometry.board import Board
+from vision.geometry.board import PRINT_TERMS, Board
 from vision.geometry.rotation import pose_difference, skew
 
 # [points] Three determine the motion of a face. Derived.
 _FEWEST_POINTS = 3
+# [columns] Of a board's terms: scale and stretch. A layout, no threshold.
+_SIZES = [PRINT_TERMS.index(name) - len(PRINT_TERMS) for name in ("scale", "stretch")]
 
 
 class Shots(NamedTuple):
@@ -56,30 +59,9 @@ class Instants(NamedTuple):
         return Instants(np.ones(pictures), np.zeros(pictures), coupling)
 
 
-class EliminatedPoints(NamedTuple):
-    """The eliminated equations of the board's points.
-
-    step (m, 3): of each while nothing else moves. by_others (m, 3, G + 6 V): what a step of the globals and
-    the views takes off it. fitted: how many coordinates the pictures determine, their priors counting
-    for the rest.
-    """
-
-    step: np.ndarray
-    by_others: np.ndarray
-    fitted: float
-
-    @staticmethod
-    def none() -> "EliminatedPoints":
-        """Return the equations of a board whose points are held."""
-        return EliminatedPoints(np.zeros((1, 3)), np.zeros((1, 3, 1)), 0.0)
-
-    def steps(self, others: np.ndarray) -> np.ndarray:
-        """Return the steps (m, 3) of the points that go with those of globals and views (G + 6 V,)."""
-        return self.step - self.by_others @ others if self.fitted else self.step
-
-
 class NormalEquations(NamedTuple):
-    """The normal equations: A (G, G), a (G,) of the globals; B (G, 6 V); C, c (6 V,) of the views.
+    """The normal equations: A (G, G), a (G,) of the globals, with the board's points (3 m) behind them
+    where these are free; B (G, 6 V); C, c (6 V,) of the views.
 
     C is kept as its lower band (b, 6 V), C[i − j, j] being row i, column j: views touch only their
     neighbours in time.
@@ -100,7 +82,6 @@ class LinearisedCost:
     residual_px: np.ndarray
     shots: Shots | None = None
     instants: Instants | None = None
-    points: EliminatedPoints | None = None
     equations: NormalEquations | None = None
 
 
@@ -130,13 +111,12 @@ def _with_equations(
     blocks = _shot_blocks(rows.others, rows.seen.shot_starts())
     instants, cost = _eliminate_instants(blocks, shots, state, priors)
     equations = _assemble(blocks, shots, state)
-    points = EliminatedPoints.none()
     if priors.point_sigma_mm:
-        equations, points = rows.eliminate(equations, shots, state, priors.point_sigma_mm)
+        equations = rows.with_points(equations, shots, state, priors.point_sigma_mm)
         cost += np.sum(state.points_mm**2) / priors.point_sigma_mm**2
     equations, prior_cost = _with_priors(equations, state, priors)
     cost += loss + prior_cost
-    return LinearisedCost(float(cost), residual_px, shots, instants, points, equations)
+    return LinearisedCost(float(cost), residual_px, shots, instants, equations)
 
 
 def _cauchy(squared: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
@@ -250,25 +230,27 @@ class _SightingRows(NamedTuple):
     seen: Sightings
     board: Board
 
-    def eliminate(
+    def with_points(
         self, equations: NormalEquations, shots: Shots, state: BundleState, sigma_mm: float
-    ) -> tuple[NormalEquations, EliminatedPoints]:
-        """Return the equations of globals and views without the points, and the points' own.
+    ) -> NormalEquations:
+        """Return the equations of globals and views with the board's points behind the globals.
 
-        sigma_mm: of a point about its place, per axis. The points of a face do not move as one: that is
-        the face's pose. The views are then all coupled.
+        sigma_mm: of a point about its place, per axis.
         """
         prior = sigma_mm**-2.0
         H = prior * np.tile(np.eye(3), (len(self.board.corners_mm), 1, 1))
         np.add.at(H, self.seen.corner, np.swapaxes(self.own, 1, 2) @ self.own)
         W = self._couplings(shots, equations)  # (m, 3, G + 6 V + 1)
         W[:, :, -1] -= prior * state.points_mm
-        shape = _FaceShape.of(H, _rigid_modes(self.board, self.seen.corner))
-        solved = shape.solve(W)
-        points = solved.reshape(W.shape)
-        return (
-            _less(equations, _flat(W).T @ solved),
-            EliminatedPoints(points[:, :, -1], points[:, :, :-1], shape.fitted(prior)),
+        of_points = W.reshape(-1, W.shape[2])
+        size = len(equations.a)
+        by_globals = of_points[:, :size]
+        return NormalEquations(
+            A=np.block([[equations.A, by_globals.T], [by_globals, block_diag(*H)]]),
+            a=np.append(equations.a, of_points[:, -1]),
+            B=np.vstack([equations.B, of_points[:, size:-1]]),
+            C=equations.C,
+            c=equations.c,
         )
 
     def _couplings(self, shots: Shots, equations: NormalEquations) -> np.ndarray:
@@ -283,78 +265,28 @@ class _SightingRows(NamedTuple):
         return W
 
 
-@dataclass(frozen=True, eq=False)
-class _FaceShape:
-    """Hold the points' equations H (m, 3, 3) for changes of faces in shape: no face moves as one.
+def shape_changes(board: Board, seen: np.ndarray) -> np.ndarray:
+    """Return orthonormal changes of a board's points (3 m, k): none moves a face as one, nor changes it by
+    the print's scale and stretch, which are the face's pose and the print's terms.
 
-    modes (3 m, 6 F): orthonormal motions of faces as one. yielding (3 m, 6 F): H⁻¹ modes. stiffness
-    (6 F, 6 F): of the faces against these motions.
+    seen (n,): the points seen. Those of a face of which too few are do not change.
     """
-
-    H: np.ndarray
-    modes: np.ndarray
-    yielding: np.ndarray
-    stiffness: np.ndarray
-
-    @staticmethod
-    def of(H: np.ndarray, modes: np.ndarray) -> "_FaceShape":
-        """Return the equations H with these motions held."""
-        yielding = _flat(np.linalg.solve(H, modes.reshape(*H.shape[:2], -1)))
-        stiffness = np.linalg.pinv(modes.T @ yielding, hermitian=True)
-        return _FaceShape(H, modes, yielding, stiffness)
-
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """Return the solutions (3 m, k) for right sides (m, 3, k)."""
-        solved = _flat(np.linalg.solve(self.H, right))
-        solved -= self.yielding @ (self.stiffness @ (self.modes.T @ solved))
-        return solved
-
-    def fitted(self, prior: float) -> float:
-        """Return how many coordinates the pictures determine; prior: precision of each, 1/mm²."""
-        variance = np.trace(np.linalg.inv(self.H), axis1=1, axis2=2).sum()
-        variance -= np.sum(self.stiffness * (self.yielding.T @ self.yielding))
-        return float(len(self.modes) - np.sum(self.modes**2) - prior * variance)
-
-
-def _flat(rows: np.ndarray) -> np.ndarray:
-    """Return the coordinates of points, (m, 3, k), as rows (3 m, k)."""
-    return rows.reshape(-1, rows.shape[2])
-
-
-def _rigid_modes(board: Board, seen: np.ndarray) -> np.ndarray:
-    """Return the orthonormal motions of each face of a board as one, (3 m, 6 F), over its points among
-    those seen (n,); 0 where too few are.
-    """
-    faces = np.unique(board.face_of)
+    by_size = board.printed(board.stated_terms)[1][:, :, _SIZES]
     is_seen = np.isin(np.arange(len(board.face_of)), seen)
-    modes = np.zeros((*board.corners_mm.shape, len(faces), N_VIEW))
-    for number, face in enumerate(faces):
+    changes = [np.zeros((3 * len(is_seen), 0))]
+    for face in np.unique(board.face_of):
         points = np.flatnonzero(is_seen & (board.face_of == face))
         if len(points) < _FEWEST_POINTS:
             continue
         away = board.corners_mm[points] - board.corners_mm[points].mean(axis=0)
         shifts = np.broadcast_to(np.eye(3), (len(points), 3, 3))
-        motions = np.concatenate([shifts, -skew(away)], axis=2)
-        modes[points, :, number] = np.linalg.qr(_flat(motions))[0].reshape(-1, 3, N_VIEW)
-    return modes.reshape(-1, len(faces) * N_VIEW)
-
-
-def _less(equations: NormalEquations, taken: np.ndarray) -> NormalEquations:
-    """Return equations less what eliminated parameters explain, (G + 6 V + 1, G + 6 V + 1)."""
-    A, a, B, C, c = equations
-    size = len(a)
-    views = taken[size:-1, size:-1]
-    band = np.zeros_like(views)
-    band[: len(C)] = C
-    for offset in range(len(views)):
-        band[offset, : len(views) - offset] -= np.diagonal(views, -offset)
-    return NormalEquations(
-        A - taken[:size, :size],
-        a - taken[:size, -1],
-        B - taken[:size, size:-1],
-        band,
-        c - taken[size:-1, -1],
-    )
+        common = np.concatenate([shifts, -skew(away), by_size[points]], axis=2)
+        common = common.reshape(-1, common.shape[2])
+        others = np.linalg.qr(common, mode="complete")[0][:, common.shape[1] :]
+        own = np.zeros((*board.corners_mm.shape, others.shape[1]))
+        own[points] = others.reshape(len(points), 3, -1)
+        changes.append(own.reshape(-1, others.shape[1]))
+    return np.hstack(changes)
 
 
 def _with_priors(
@@ -371,7 +303,7 @@ def _add_priors(equations: NormalEquations, state: BundleState, priors: Priors) 
     precision = 1.0 / priors.sigma**2
     residual = np.where(precision == 0, 0.0, priors.mean - state.global_values())
     equations.A[np.diag_indices(len(residual))] += precision
-    equations.a[:] += precision * residual
+    equations.a[: len(residual)] += precision * residual
     cost = np.sum(precision * residual**2)
     view = priors.pose_view
     if view is not None and priors.view_free[view]:

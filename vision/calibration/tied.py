@@ -211,12 +211,13 @@ class JointInput:
     def _with_instants(
         self, layout: Layout, first: BundleState, rounds: int | None = None
     ) -> Adjustment:
-        """Adjust all cameras with instants of the pictures, from a first state.
+        """Adjust all cameras with instants of the pictures and the board's points as stated, from a
+        first state.
 
         rounds: of learning the noise anew.
         """
         return adjust_with_noise(
-            replace(first, trajectory=layout.trajectory),
+            replace(first, trajectory=layout.trajectory, points_mm=layout.first.points_mm),
             layout.seen,
             self.board,
             allow_lateness(self._priors_of(layout), layout.trajectory),

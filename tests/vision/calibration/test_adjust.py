@@ -184,7 +184,7 @@ def test_more_iterations_change_nothing_at_rest():
     priors.free[9:15] = False
     settled = adjust_with_noise(start, corners, BOARD, priors)
     seen = settled.seen.select(settled.kept)
-    again = adjust_bundle(settled.solution.state, seen, BOARD, replace(priors), tolerance=1e-14)
+    again = adjust_bundle(settled.solution.state, seen, BOARD, settled.priors, tolerance=1e-14)
     sigma = np.sqrt(np.diag(again.covariance)[:9])
     assert np.all(np.abs(again.state.lens[0] - settled.solution.state.lens[0]) < 0.02 * sigma)
 

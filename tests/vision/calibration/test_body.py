@@ -56,7 +56,7 @@ def drawn_views(rng, faces=None):
     cameras = two_cameras()
     flat = BODY.flat_mm[: len(BODY.flat_mm) // len(faces)]
     points = np.concatenate([apply(T, flat) for T in faces])
-    points += _unlike_motions(rng.normal(0.0, BODY.point_sigma_mm, points.shape), points)
+    points += _in_shape(rng.normal(0.0, BODY.point_sigma_mm, points.shape), points, faces)
     boards = {camera.name: [] for camera in cameras}
     for k in range(VIEWS):
         R = exp_rotation([0.0, 2 * np.pi * k / VIEWS, 0.0]) @ exp_rotation(rng.normal(0, 0.25, 3))
@@ -66,16 +66,18 @@ def drawn_views(rng, faces=None):
     return BoardViews(boards, dict.fromkeys(boards, SIZE_PX))
 
 
-def _unlike_motions(errors_mm, points_mm):
-    """Return errors of points (m, 3) without what moves all points of a face as one."""
+def _in_shape(errors_mm, points_mm, faces):
+    """Return errors of points (m, 3) without what moves all points of a face as one, or changes its size."""
     left = errors_mm.copy()
-    for face in range(len(BODY.faces)):
+    for face, T in enumerate(faces):
         own = BODY.face_of == face
         away = points_mm[own] - points_mm[own].mean(axis=0)
-        motions = np.concatenate([np.tile(np.eye(3), (len(away), 1, 1)), skew(away)], axis=2)
-        motions = motions.reshape(-1, 6)
-        motion = np.linalg.lstsq(motions, errors_mm[own].ravel(), rcond=None)[0]
-        left[own] -= (motions @ motion).reshape(-1, 3)
+        along = T[:, :2]  # the face's x and y
+        sizes = (away @ along)[:, None, :] * along
+        shifts = np.tile(np.eye(3), (len(away), 1, 1))
+        common = np.concatenate([shifts, skew(away), sizes], axis=2).reshape(-1, 8)
+        motion = np.linalg.lstsq(common, errors_mm[own].ravel(), rcond=None)[0]
+        left[own] -= (common @ motion).reshape(-1, 3)
     return left
 
 
