@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from vision.fit.blocks import REST_PRIOR_MM
 from vision.fit.problem import Problem, rest_shape, start
@@ -333,13 +334,14 @@ def _prior_information(axis: Axis, views: int) -> np.ndarray:
 
 
 def contact_arc(
-    rest_mm: np.ndarray, bend: np.ndarray, motor: float, axis: Axis, wire: Wire
-) -> float:
-    """Return the arc length in mm at which a whisker is nearest to the axis.
+    rest_mm: np.ndarray, bend_rad: np.ndarray, motor_rad: ArrayLike, axis: Axis, wire: Wire
+) -> np.ndarray:
+    """Return the arc lengths (…), mm, at which whiskers of one rest shape (2, 4), mm, are nearest to the axis.
 
-    rest_mm (2, 4): its rest shape, mm. bend (2,): rad.
+    bend_rad (…, 2), motor_rad (…).
     """
-    straight = unbent_centrelines(rest_mm, motor, wire)
-    arc = np.clip(closest_arc(straight, axis, wire), 1.0, wire.length_mm)
-    bent = centrelines(rest_mm, bend, arc, motor, wire)
-    return float(np.clip(closest_arc(bent, axis, wire), 1.0, wire.length_mm))
+    rest_mm = np.broadcast_to(rest_mm, (*np.shape(motor_rad), 2, REST_POWERS))
+    straight = unbent_centrelines(rest_mm, motor_rad, wire)
+    arc_mm = np.clip(closest_arc(straight, axis, wire), 1.0, wire.length_mm)
+    bent = centrelines(rest_mm, bend_rad, arc_mm, motor_rad, wire)
+    return np.clip(closest_arc(bent, axis, wire), 1.0, wire.length_mm)

@@ -176,13 +176,12 @@ def coarse_curves(
     rest_mm (2, 4): rest shape. bend_rad: by frame the bend (2,).
     """
     wire = whisk.rods.wire
-    curves = {}
-    arcs_mm = []
-    for f, motor_rad in whisk.motor.items():
-        arc_mm = contact_arc(rest_mm, bend_rad[f], motor_rad, whisk.bar.axis, wire)
-        curves[f] = centrelines(rest_mm, bend_rad[f], arc_mm, motor_rad, wire)
-        arcs_mm.append(arc_mm)
-    return curves, np.array(arcs_mm)
+    motor_rad = whisk.angles_rad
+    bends = np.array([bend_rad[frame] for frame in whisk.frames])
+    arcs_mm = contact_arc(rest_mm, bends, motor_rad, whisk.bar.axis, wire)
+    rests_mm = np.broadcast_to(rest_mm, (len(bends), *rest_mm.shape))
+    curves = centrelines(rests_mm, bends, arcs_mm, motor_rad, wire)
+    return {frame: curves.one(k) for k, frame in enumerate(whisk.frames)}, arcs_mm
 
 
 def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndarray) -> np.ndarray:
