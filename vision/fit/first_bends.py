@@ -38,8 +38,6 @@ _PIECE_PX = 16
 # [px] How far to either side of the place predicted by the last two frames a wire is searched for.
 # Set by eye. Study: thresholds.py fit.first_bends _REACH_PX ….
 _REACH_PX = 26
-# [px] From curve to curve that is tried: half of a wire's width. Derived.
-_STEP_PX = 2
 # [sigma] Of the rest shape's prior (`fit/problem.py`) within which a wire is searched for: 95 % of
 # what is believed. Derived.
 _REST_SIGMAS = 2.0
@@ -158,11 +156,12 @@ def _resting_points(
     most_px = _most_rest_px(sight.view, next(iter(curves.values())))
     found = sight.votes(curves, int(np.ceil(most_px[1])))
     shapes = _rest_modes(found.pieces.place / sight.rods.wire.length_mm)
-    grids = [np.arange(-n, n + 1) * _STEP_PX for n in np.ceil(most_px / _STEP_PX)]
+    step_px = found.step_px
+    grids = [np.arange(-n, n + 1) * step_px for n in np.ceil(most_px / step_px)]
     best, is_sure = likely_curve([found], shapes, grids)
     if not is_sure:
         return []
-    points = found.points(shapes @ best)
+    points = found.points(shapes @ best, near_px=2 * step_px)
     source = found.pieces.source
     return [Observed(k, camera, points.select(source == own)) for k, own in enumerate(curves)]
 

@@ -20,6 +20,8 @@ from vision.wire.bands import Pieces
 from vision.wire.binned import sums
 from vision.wire.points import LinePoints
 
+# [px] Least step from curve to curve that is tried; a thicker wire's is half of its width. Derived.
+_LEAST_STEP_PX = 2
 # [px] Largest distance of the wire from the nearest curve that is tried: twice their step.
 # Derived.
 _NEAR_PX = 4
@@ -63,14 +65,21 @@ class Votes:
         """Return the largest shift."""
         return self.share.shape[1] // 2
 
-    def points(self, shift_px: np.ndarray) -> LinePoints:
-        """Return the middle of each segment's votes near a curve, shift_px (s,) off the predicted
-        one.
+    @property
+    def step_px(self) -> int:
+        """Return the step from curve to curve in which the wire is not missed: half of its width."""
+        if not len(self.pieces):
+            return _LEAST_STEP_PX
+        return max(_LEAST_STEP_PX, round(float(np.median(self.pieces.radius_px))))
+
+    def points(self, shift_px: np.ndarray, near_px: int = _NEAR_PX) -> LinePoints:
+        """Return the middle of each segment's votes within near_px of a curve, shift_px (s,) off the
+        predicted one.
 
         A segment that the picture of what stands still explains has no votes, however much it differs
         from the picture without rods: before a lens cap that is so everywhere.
         """
-        near = np.rint(shift_px).astype(int)[:, None] + np.arange(-_NEAR_PX, _NEAR_PX + 1)
+        near = np.rint(shift_px).astype(int)[:, None] + np.arange(-near_px, near_px + 1)
         share = self._squared_votes(near)
         total = np.sum(share, axis=1)
         mean = np.sum(share * near, axis=1) / np.maximum(total, 1e-12)
