@@ -77,9 +77,10 @@ class LivePush:
         return self.whisk.finish()
 
     def following(self) -> "LivePush":
-        """Return the push after this one. The bar is looked for where it was; it may have moved."""
-        bench = replace(self.whisk.bench, bar=self.whisk.axis)
-        return LivePush(LiveWhisk(bench, self.whisk.number + 1))
+        """Return the push after this one. Bar and wire are looked for where they were; they may have moved."""
+        before = self.whisk
+        bench = replace(before.bench, bar=before.axis, wire=before.wire)
+        return LivePush(LiveWhisk(bench, before.number + 1))
 
 
 def open_push(

@@ -27,6 +27,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from vision.fit.first_bends import SwingPictures, find_bend, find_rest
+from vision.fit.problem import rest_shape
 from vision.fit.touch import frames_that_touch
 from vision.geometry.camera import Cameras
 from vision.geometry.number_words import counted
@@ -72,12 +73,21 @@ _DEFAULT = VisionSettings()
 
 
 @dataclass(frozen=True, eq=False)
+class KnownWire:
+    """The wire's rest shape (2, 4), mm, and by camera the lens blur, px, as a whisk has shown them."""
+
+    rest_mm: np.ndarray
+    blur_px: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
 class LiveBench:
     """What is known before a whisk.
 
     background: by camera the scene (h, w) without whisker and bar. stroke_rad: lowest and highest
     motor angle of the stroke to come. settings: all but picture_scale, every_frame and rounds, which
-    a live whisk does without. bar: where the object was in the whisk before; the search begins there.
+    a live whisk does without. bar, wire: where the object was in the whisk before, and the wire; search
+    and fit begin there.
     """
 
     cameras: Cameras
@@ -86,6 +96,7 @@ class LiveBench:
     stroke_rad: tuple[float, float]
     settings: VisionSettings = _DEFAULT
     bar: Axis | None = None
+    wire: KnownWire | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +159,8 @@ class LiveWhisk:
     """One whisk that is being recorded.
 
     frames: by camera the pictures so far, by frame. time_s, motor_rad: by frame. refused: why there
-    will be no truth, None as long as nothing says so. axis: the object's by the truth, None before
-    it and without one.
+    will be no truth, None as long as nothing says so. axis, wire: the object's and the wire by the truth,
+    None before it and without one.
     """
 
     bench: LiveBench
@@ -159,6 +170,7 @@ class LiveWhisk:
     motor_rad: dict[int, float] = field(default_factory=dict)
     refused: Reason | None = None
     axis: Axis | None = None
+    wire: KnownWire | None = None
     _standing: set[int] = field(default_factory=set)
     _found: _FirstViews | None = None
     _follower: _Follower | None = None
@@ -198,11 +210,17 @@ class LiveWhisk:
             return False
         try:
             step()
-        except Refused as reason:
-            self.refused = reason.reason
-        except np.linalg.LinAlgError:
-            self.refused = NOT_CONVERGED
+        except (Refused, np.linalg.LinAlgError) as reason:
+            if self.bench.wire is not None and self._reading is None:
+                self._forget_wire()
+            else:
+                self.refused = reason.reason if isinstance(reason, Refused) else NOT_CONVERGED
         return True
+
+    def _forget_wire(self) -> None:
+        """Begin again without the wire of the whisk before, which may have slipped in its hub."""
+        self.bench = replace(self.bench, wire=None)
+        self._follower = None
 
     def finish(self) -> WhiskTruth:
         """Return the truth by all frames, without a number where its status says why."""
@@ -309,7 +327,8 @@ class LiveWhisk:
         axis = found.bar.axis
         motor = {f: self.motor_rad[f] for f in found.views[0].frames}
         sights = self._sights(found.views, axis)
-        rest_mm = find_rest(sights, found.cameras, axis, motor)
+        known = self.bench.wire
+        rest_mm = known.rest_mm if known else find_rest(sights, found.cameras, axis, motor)
         self._follower = _Follower(sights, axis, rest_mm)
 
     def _sights(self, views: Sequence[View], axis: Axis) -> list[SwingPictures]:
@@ -360,7 +379,8 @@ class LiveWhisk:
         follower = self._follower
         whisk = self._whisk().during(follower.free_frames(self.motor_rad))
         strategy = strategies(whisk)[0]
-        lines = TracedLines(whisk, strategy.reader)
+        known = self.bench.wire
+        lines = TracedLines(whisk, strategy.reader, known.blur_px if known else {})
         axis, rest_mm = fit_before_touch(whisk, lines, follower.rest_mm)
         self._reading = _LineReading(strategy, lines.blur_px)
         self._found = replace(self._found, bar=replace(self._found.bar, axis=axis))
@@ -423,6 +443,8 @@ class LiveWhisk:
             return self._without_truth(elsewhere)
         truth = to_whisk(whisk, fitted)
         self.axis = explanation.axis
+        rest_mm = rest_shape(fitted.problem, fitted.state.vector)
+        self.wire = KnownWire(rest_mm, self._reading.blur_px)
         return replace(truth, status=joined(truth.status, *warnings_of(whisk, fitted, beam=None)))
 
     def _without_truth(self, status: Reason) -> WhiskTruth:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tests.scenes.recorded import RODS, Recorded
+from vision.geometry.centreline import REST_POWERS
 from vision.geometry.reasons import NO_REASON
-from vision.live.whisk import LiveBench, LiveWhisk
+from vision.live.whisk import KnownWire, LiveBench, LiveWhisk
 
 # [sigmas] Allowed between two readings of the same pictures, and of errors against the truth.
 ONE, MOST = 1.0, 3.0
@@ -185,6 +186,21 @@ def test_a_bar_is_looked_for_where_it_was(recorded, monkeypatch):
     assert apart_mm(found_bar(recorded, away(searched, 15.0)).axis) == 0.0
     monkeypatch.setattr("vision.touched.search.find_bars", None)  # a search would raise
     assert apart_mm(found_bar(recorded, away(searched, 1.0)).axis) < PIXEL_MM
+
+
+def test_a_whisker_that_slipped_in_its_hub_since_the_whisk_before_is_searched_for(recorded):
+    """Its rest shape is 6 mm off at the tip; there is no line there, and the whisk begins by itself."""
+    live = begun(recorded)
+    slipped_mm = np.zeros((2, REST_POWERS))
+    slipped_mm[0, 1] = 6.0
+    wire = KnownWire(slipped_mm, {"high": 1.0, "low": 1.0})
+    live.bench = replace(live.bench, wire=wire)
+    for frame in range(3):
+        add(live, recorded, frame)
+    while live._reading is None and live.work():
+        pass
+    assert live.refused is None and live.bench.wire is None
+    assert np.all(np.abs(live._follower.rest_mm[:, 1]) < 1.0)
 
 
 def away(axis, distance_mm):
