@@ -26,6 +26,8 @@ _HALVINGS = 2
 # [1] A step that gains no more than this score is no gain. By 1e-4 or 1e-2 a search ends
 # elsewhere, and a slope moves by 1.1 or 1.4 sigma. Study: thresholds.py touched.grid_search _LEAST_GAIN ….
 _LEAST_GAIN = 1e-3
+# [hypotheses] That are compared with better ones at once; no result depends on it. Stated.
+_AT_ONCE = 1000
 # [values] Of the motor angle: fewer are no grid. Stated.
 _FEWEST_ANGLES = 3
 
@@ -93,14 +95,23 @@ def suppress_neighbours(
     At most so many are returned. hypotheses (n, k), scores (n,). Two are neighbours where no number
     differs by more than its separation (k,).
     """
-    remaining = hypotheses[np.argsort(scores)[::-1]]
-    chosen = []
-    while len(remaining) and len(chosen) < most:
-        best = remaining[0]
-        chosen.append(best)
-        is_apart = np.any(np.abs(remaining - best) > separation, axis=1)
-        remaining = remaining[is_apart]
+    order = np.argsort(scores)[::-1]
+    chosen: list[np.ndarray] = []
+    for first in range(0, len(order), _AT_ONCE):
+        remaining = hypotheses[order[first : first + _AT_ONCE]]
+        for better in chosen:
+            remaining = _apart_from(better, remaining, separation)
+        while len(remaining) and len(chosen) < most:
+            chosen.append(remaining[0])
+            remaining = _apart_from(remaining[0], remaining, separation)
+        if len(chosen) == most:
+            break
     return np.array(chosen)
+
+
+def _apart_from(one: np.ndarray, others: np.ndarray, separation: np.ndarray) -> np.ndarray:
+    """Return those of others (n, k) that are no neighbours of one (k,)."""
+    return others[np.any(np.abs(others - one) > separation, axis=1)]
 
 
 def climb(
