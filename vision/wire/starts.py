@@ -7,7 +7,7 @@ all starts of a grid are ranked by their evidence, and the best are followed.
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from vision.wire.descent import Point, Shared, descend
+from vision.wire.descent import Point, SharedSolution, descend
 from vision.wire.gathered import GatheredEquations, exactly_if_needed
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import stiffness, wave_prior
@@ -43,11 +43,11 @@ def find_start(task: ShadedSegments) -> tuple[float, float]:
     return _common_shift_px(some, best), float(np.log(best.blur_px))
 
 
-def descend_coarsely(task: ShadedSegments) -> Shared:
+def descend_coarsely(task: ShadedSegments) -> SharedSolution:
     """Return the most probable end of descents from the best starts, until two of them end alike."""
     starts = _rank_starts(task)
     robust = Point.at_common_shift(task, *starts[0]).weighted().robust
-    ends: list[Shared] = []
+    ends: list[SharedSolution] = []
     for shift_px, log_blur in _keep_apart(starts)[:_MOST_STARTS]:
         start = Point.at_common_shift(task, shift_px, log_blur, robust)
         end = descend(start, _COARSE)
@@ -59,7 +59,7 @@ def descend_coarsely(task: ShadedSegments) -> Shared:
     return min(ends, key=lambda end: end.evidence)
 
 
-def _common_shift_px(task: ShadedSegments, shared: Shared) -> float:
+def _common_shift_px(task: ShadedSegments, shared: SharedSolution) -> float:
     """Return the shift that segments have in common, px at their mean half-width."""
     return float(np.median(shared.shift_px / task.pieces.relative_radius))
 
