@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
+from vision.calibration.marker_pictures import BIASES, FIRST_BIAS, MarkerPictures
 from vision.calibration.place import Placement
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import rotation_z
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import exp_rotation, skew
+from vision.geometry.rotation import skew
 
 # [pictures] Of a marker in two cameras; fewer show no turn. Derived.
 _FEWEST_INSTANTS = 4
@@ -149,11 +150,13 @@ class _AxisFit:
     def __init__(self, marker: _Turning, cameras: Cameras):
         """Fit the axis by all pictures of a marker."""
         self._cameras = cameras
-        self._px = np.array([one.px for one in marker.sightings])  # (pictures, 4, 2)
+        self._seen = MarkerPictures(
+            px=np.array([one.px for one in marker.sightings]),
+            camera=np.array([cameras.index(one.camera) for one in marker.sightings]),
+        )
         motor_rad = np.array([one.motor_rad for one in marker.sightings])
+        self._motor_rad = motor_rad
         self._from_middle = motor_rad - 0.5 * (motor_rad.min() + motor_rad.max())
-        self._turn = rotation_z(motor_rad)
-        self._camera = np.array([cameras.index(one.camera) for one in marker.sightings])
         self.number = marker.sightings[0].number
         self.pictures = len(marker.sightings)
         fitted = self._fit(marker)
@@ -164,7 +167,7 @@ class _AxisFit:
 
     def _fit(self, marker: _Turning) -> OptimizeResult:
         """Fit in passes: each gives the corners' scatter and the size of their biases to the next."""
-        biases = np.repeat(BIAS_PX, 8 * len(self._cameras))
+        biases = np.repeat(BIAS_PX, BIASES // 2 * len(self._cameras))
         stated = np.concatenate([biases, DRIFT_PER_RAD * biases])  # px, px/rad
         self._prior = stated
         self._scatter_px = np.full((len(self._cameras), 2), FIRST_SCATTER_PX)
@@ -192,10 +195,10 @@ class _AxisFit:
 
     def _scatter(self, fitted: OptimizeResult) -> np.ndarray:
         """Return the scatter (cameras, 2) of corners along x and y, px, by the residuals."""
-        residual = fitted.fun[: self._px.size].reshape(self._px.shape)
+        residual = fitted.fun[: self._seen.px.size].reshape(self._seen.px.shape)
         scatter_px = self._scatter_px.copy()
-        for k in np.unique(self._camera):
-            typical = np.median(np.abs(residual[self._camera == k]), axis=(0, 1))
+        for k in self._seen.cameras_with_pictures:
+            typical = np.median(np.abs(residual[self._seen.camera == k]), axis=(0, 1))
             scatter_px[k] = PER_MEDIAN * typical * self._scatter_px[k]
         return np.maximum(scatter_px, LEAST_SCATTER_PX)
 
@@ -204,8 +207,8 @@ class _AxisFit:
         constrain them.
         """
         covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
-        constrained = np.sum(1.0 - np.diag(covariance)[16:] / np.square(self._prior))
-        found = np.sum(np.square(fitted.x[16:] / self._prior))
+        constrained = np.sum(1.0 - np.diag(covariance)[FIRST_BIAS:] / np.square(self._prior))
+        found = np.sum(np.square(fitted.x[FIRST_BIAS:] / self._prior))
         # The prior counts as one bias of its size more.
         return float(np.sqrt((1.0 + found) / (1.0 + constrained)))
 
@@ -214,34 +217,27 @@ class _AxisFit:
         pictures, plain for the biases.
         """
         loss = np.stack([squares, np.ones_like(squares), np.zeros_like(squares)])
-        seen = 1.0 + squares[: self._px.size]
-        loss[:, : self._px.size] = 2.0 * (np.sqrt(seen) - 1.0), seen**-0.5, -0.5 * seen**-1.5
+        seen = 1.0 + squares[: self._seen.px.size]
+        loss[:, : self._seen.px.size] = 2.0 * (np.sqrt(seen) - 1.0), seen**-0.5, -0.5 * seen**-1.5
         return loss
 
     def _residuals(self, parameters: np.ndarray) -> np.ndarray:
         """Return all residuals over their sigmas: of the corners in pictures, then of the biases."""
-        bias_px, drift_px_rad = parameters[16:].reshape(2, -1, 4, 2)
-        px = self._project(parameters, self._cameras) + bias_px[self._camera]
-        px += drift_px_rad[self._camera] * self._from_middle[:, None, None]
-        seen = (px - self._px) / self._scatter_px[self._camera][:, None]
-        return np.concatenate([seen.ravel(), parameters[16:] / self._prior])
+        biases = parameters[FIRST_BIAS:]
+        expected_px = self._project(parameters, self._cameras)
+        expected_px += self._seen.bias_px(biases, self._from_middle)
+        off = (expected_px - self._seen.px) / self._scatter_px[self._seen.camera][:, None]
+        return np.concatenate([off.ravel(), biases / self._prior])
 
     def _project(self, parameters: np.ndarray, cameras: Cameras) -> np.ndarray:
         """Return the corners (pictures, 4, 2), px, without bias."""
-        w_x, w_y, v_x, v_y = parameters[:4]
-        in_hub = parameters[4:16].reshape(4, 3)
-        turned = in_hub @ np.swapaxes(self._turn, 1, 2)  # (pictures, 4, 3)
-        points = turned @ exp_rotation(np.array([w_x, w_y, 0.0])).T + np.array([v_x, v_y, 0.0])
-        px = np.empty_like(self._px)
-        for k, camera in enumerate(cameras):
-            px[self._camera == k] = camera.project(points[self._camera == k])
-        return px
+        return self._seen.project(parameters, self._motor_rad, cameras)
 
     def _of_cameras(self, fitted: OptimizeResult, covariance: np.ndarray) -> np.ndarray:
         """Return what the cameras' uncertainty adds to the axis' covariance, (4, 4)."""
         cameras = self._cameras
         sigma = np.sqrt(np.diag(cameras.covariance))
-        gain = -(covariance @ fitted.jac.T)[:4, : self._px.size]
+        gain = -(covariance @ fitted.jac.T)[:4, : self._seen.px.size]
         here = self._project(fitted.x, cameras)
         sensitivity = np.zeros((4, len(sigma)))
         for k in np.flatnonzero(sigma):
@@ -249,7 +245,7 @@ class _AxisFit:
             step[k] = sigma[k]
             moved = self._project(fitted.x, cameras.moved(step)) - here
             sensitivity[:, k] = (
-                gain @ (moved / self._scatter_px[self._camera][:, None]).ravel() / sigma[k]
+                gain @ (moved / self._scatter_px[self._seen.camera][:, None]).ravel() / sigma[k]
             )
         return sensitivity @ cameras.covariance @ sensitivity.T
 

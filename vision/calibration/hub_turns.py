@@ -1,12 +1,8 @@
 """How far a hub has turned in each frame, by the marker on it: the motor's angle where none was logged.
 
-As in `hub_marker.py`, with the rig's axis known and the angles sought. With a frame's turn t, the
-corner's place q in the hub, and the axis near z of the cameras' frame:
-
-    x = Exp(w) Rz(t) q + v
-
-A corner's bias in each camera, its change as the print turns, and the axis within its placement's
-covariance are nuisances. Turns count from the first frame.
+The rig's axis is known and the angles are sought, by the model of `marker_pictures.py`. A corner's bias
+in each camera, its change as the print turns, and the axis within its placement's covariance are
+nuisances. Turns count from the first frame.
 """
 
 from collections.abc import Sequence
@@ -25,10 +21,10 @@ from vision.calibration.hub_marker import (
     MarkerSighting,
     meet,
 )
+from vision.calibration.marker_pictures import BIASES, FIRST_BIAS, MarkerPictures
 from vision.geometry.camera import Cameras, symmetric_root
 from vision.geometry.centreline import rotation_z
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import exp_rotation
 
 # [frames] In which two cameras see the marker; a smooth motion has no fewer. Derived.
 _FEWEST_FRAMES = 5
@@ -37,8 +33,6 @@ _FEWEST_FRAMES = 5
 _EXACT = np.array([1e-6, 1e-6, 1e-5, 1e-5])
 # [parameters] Of a placement, those of the axis: two turns, two shifts. A layout, no threshold.
 _AXIS = np.array([0, 1, 3, 4])
-# [parameters] Of the axis and of the corners, before the biases. A layout, no threshold.
-_FIRST_BIAS = 16
 # [mixed] Step of differences of a parameter: of mm, rad and px alike. Derived.
 _STEP = 1e-5
 # [passes] Each gives the scatter of corners to the next. Stated.
@@ -81,24 +75,25 @@ def marker_turns(sightings: Sequence[MarkerSighting], cameras: Cameras) -> HubTu
 class _TurnFit:
     """The fit of turns to a marker's sightings.
 
-    Parameters: w_x, w_y (rad), v_x, v_y (mm); the corners in the hub (4, 3), mm; of each camera's
-    corners a bias (8,), px, and its change with the turn (8,), px/rad; the turns (n - 1,) of all frames but the first, rad.
+    Parameters: those of `marker_pictures.py`, then the turns (n - 1,) of all frames but the first, rad.
     """
 
     def __init__(self, sightings: Sequence[MarkerSighting], cameras: Cameras):
         """Take the sightings of one marker in one trial."""
         self.cameras = cameras
-        self.px = np.array([one.px for one in sightings])  # (pictures, 4, 2)
-        self.camera = np.array([cameras.index(one.camera) for one in sightings])
+        self.seen = MarkerPictures(
+            px=np.array([one.px for one in sightings]),
+            camera=np.array([cameras.index(one.camera) for one in sightings]),
+        )
         numbers = [one.instant[1] for one in sightings]
         self.frames, self.frame = np.unique(numbers, return_inverse=True)
-        self.first_turn = _FIRST_BIAS + 16 * len(cameras)
+        self.first_turn = FIRST_BIAS + BIASES * len(cameras)
         placement = np.zeros((6, 6)) if cameras.placement is None else cameras.placement
         axis_sigma = np.hypot(np.sqrt(np.diag(placement))[_AXIS], _EXACT)
-        biases = np.repeat(BIAS_PX, 8 * len(cameras))
+        biases = np.repeat(BIAS_PX, BIASES // 2 * len(cameras))
         self._prior = np.concatenate([axis_sigma, biases, DRIFT_PER_RAD * biases])
         # of the axis and the biases; corners and turns have no prior
-        self._with_prior = np.r_[0:4, _FIRST_BIAS : self.first_turn]
+        self._with_prior = np.r_[0:4, FIRST_BIAS : self.first_turn]
 
     def start(self) -> np.ndarray:
         """Return first parameters by triangulated corners, turned about z. Raises Refused where two
@@ -114,7 +109,7 @@ class _TurnFit:
         met_mm = corners_mm[is_met]
         turn = np.interp(self.frames, self.frames[is_met], _turns_about_z(met_mm))
         in_hub = np.mean(met_mm @ rotation_z(turn[is_met] - turn[0]), axis=0)
-        nuisances = np.zeros(16 * len(self.cameras))
+        nuisances = np.zeros(BIASES * len(self.cameras))
         return np.concatenate([np.zeros(4), in_hub.ravel(), nuisances, turn[1:] - turn[0]])
 
     def _triangulated_mm(self) -> np.ndarray:
@@ -125,8 +120,8 @@ class _TurnFit:
         for k in range(len(self.frames)):
             own = np.flatnonzero(self.frame == k)
             if len(own) > 1:
-                views = [self.cameras.cameras[c] for c in self.camera[own]]
-                corners_mm[k] = meet(views, self.px[own])
+                views = [self.cameras.cameras[c] for c in self.seen.camera[own]]
+                corners_mm[k] = meet(views, self.seen.px[own])
         return corners_mm
 
     def turns_rad(self, parameters: np.ndarray) -> np.ndarray:
@@ -151,18 +146,18 @@ class _TurnFit:
 
         The fit's parameters take up their share of it.
         """
-        freedom = max(self.px.size - len(fitted.x), 1)
-        residual = np.abs(fitted.fun[: self.px.size]).reshape(self.px.shape)
-        residual *= np.sqrt(self.px.size / freedom)
+        freedom = max(self.seen.px.size - len(fitted.x), 1)
+        residual = np.abs(fitted.fun[: self.seen.px.size]).reshape(self.seen.px.shape)
+        residual *= np.sqrt(self.seen.px.size / freedom)
         scatter = used_px.copy()
-        for k in np.unique(self.camera):
-            scatter[k] *= PER_MEDIAN * np.median(residual[self.camera == k])
+        for k in self.seen.cameras_with_pictures:
+            scatter[k] *= PER_MEDIAN * np.median(residual[self.seen.camera == k])
         return np.maximum(scatter, LEAST_SCATTER_PX)
 
     def covariance(self, fitted: OptimizeResult, scatter_px: np.ndarray) -> np.ndarray:
         """Return the covariance of the parameters, with what the cameras' own errors add to it."""
         own = np.linalg.inv(fitted.jac.T @ fitted.jac)
-        weight = 1.0 / scatter_px[self.camera][:, None, None]
+        weight = 1.0 / scatter_px[self.seen.camera][:, None, None]
         here = self._project(fitted.x, self.cameras)
         by_error = []
         for error in self._camera_errors.T:
@@ -170,7 +165,7 @@ class _TurnFit:
             by_error.append((weight * moved).ravel())
         if not by_error:
             return own
-        gain = own @ fitted.jac[: self.px.size].T @ np.array(by_error).T
+        gain = own @ fitted.jac[: self.seen.px.size].T @ np.array(by_error).T
         return own + gain @ gain.T
 
     @cached_property
@@ -187,12 +182,12 @@ class _TurnFit:
 
     def _residuals(self, parameters: np.ndarray, scatter_px: np.ndarray) -> np.ndarray:
         """Return all residuals over their sigmas: of the corners in pictures, then of the priors."""
-        bias_px, drift_px_rad = parameters[_FIRST_BIAS : self.first_turn].reshape(2, -1, 4, 2)
-        turned = self.turns_rad(parameters)[self.frame] - self._middle_rad
-        px = self._project(parameters, self.cameras) + bias_px[self.camera]
-        px += drift_px_rad[self.camera] * turned[:, None, None]
-        seen = (px - self.px) / scatter_px[self.camera][:, None, None]
-        return np.concatenate([seen.ravel(), parameters[self._with_prior] / self._prior])
+        from_middle_rad = self.turns_rad(parameters)[self.frame] - self._middle_rad
+        biases = parameters[FIRST_BIAS : self.first_turn]
+        expected_px = self._project(parameters, self.cameras)
+        expected_px += self.seen.bias_px(biases, from_middle_rad)
+        off = (expected_px - self.seen.px) / scatter_px[self.seen.camera][:, None, None]
+        return np.concatenate([off.ravel(), parameters[self._with_prior] / self._prior])
 
     def _jacobian(self, parameters: np.ndarray, scatter_px: np.ndarray) -> np.ndarray:
         """Return the derivatives of the residuals; of the turns all at once, each picture has one."""
@@ -205,22 +200,14 @@ class _TurnFit:
         moved = parameters.copy()
         moved[self.first_turn :] += _STEP
         by_turn = (self._residuals(moved, scatter_px) - here) / _STEP
-        of_frame = np.repeat(self.frame, self.px[0].size)
+        of_frame = np.repeat(self.frame, self.seen.px[0].size)
         rows = np.flatnonzero(of_frame)  # the first frame has no turn
         jacobian[rows, self.first_turn + of_frame[rows] - 1] = by_turn[rows]
         return jacobian
 
     def _project(self, parameters: np.ndarray, cameras: Cameras) -> np.ndarray:
         """Return the corners (pictures, 4, 2), px, without bias."""
-        w_x, w_y, v_x, v_y = parameters[:4]
-        in_hub = parameters[4:_FIRST_BIAS].reshape(4, 3)
-        turn = rotation_z(self.turns_rad(parameters)[self.frame])
-        turned = in_hub @ np.swapaxes(turn, 1, 2)  # (pictures, 4, 3)
-        points = turned @ exp_rotation(np.array([w_x, w_y, 0.0])).T + np.array([v_x, v_y, 0.0])
-        px = np.empty_like(self.px)
-        for k, camera in enumerate(cameras):
-            px[self.camera == k] = camera.project(points[self.camera == k])
-        return px
+        return self.seen.project(parameters, self.turns_rad(parameters)[self.frame], cameras)
 
 
 def _turns_about_z(corners_mm: np.ndarray) -> np.ndarray:
