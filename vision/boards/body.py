@@ -194,8 +194,9 @@ class PlacedBody(Body):
 
     def faces_at(self, terms: np.ndarray) -> np.ndarray:
         """Return the poses (F, 3, 4) of the faces on the body, by the terms of its shape."""
-        steps = np.reshape(terms[: len(self.shape_sigma)], (-1, _N_POSE))
-        steps = np.concatenate([np.zeros((1, _N_POSE)), steps])
+        of_shape = terms[: len(self.shape_sigma)]
+        first_face = np.zeros(_N_POSE)  # the body's frame is tied to it
+        steps = np.append(first_face, of_shape).reshape(-1, _N_POSE)
         R = exp_rotation(steps[:, :3]) @ self.T_body_face[:, :, :3]
         t = self.T_body_face[:, :, 3] + steps[:, 3:]
         return np.concatenate([R, t[:, :, None]], axis=2)

@@ -94,13 +94,18 @@ class Checkerboard(SaddleBoard):
         return corners
 
     def _darkness(self, px: np.ndarray, picture: np.ndarray) -> float:
-        """Return how much darker the squares are that should be dark, by corners (m, 2) px."""
+        """Return by how many grey levels the squares that should be dark are darker than the others,
+        summed over the squares between corners (m, 2) px.
+        """
         columns, rows = self.grid
-        grid = px.reshape(rows, columns, 2)
-        middles = 0.25 * (grid[1:, 1:] + grid[1:, :-1] + grid[:-1, 1:] + grid[:-1, :-1])
-        column, row = np.round(middles).astype(int).reshape(-1, 2).T
-        sign = 1 - 2 * (np.add.outer(np.arange(rows - 1), np.arange(columns - 1)) % 2)
-        return -float(sign.ravel() @ picture[row, column].astype(float))
+        corners = px.reshape(rows, columns, 2)
+        upper = corners[:-1, :-1] + corners[:-1, 1:]
+        lower = corners[1:, :-1] + corners[1:, 1:]
+        middles = np.rint(0.25 * (upper + lower)).astype(int)  # (rows − 1, columns − 1, 2)
+        grey = picture[middles[..., 1], middles[..., 0]].astype(float)
+        square_row, square_column = np.indices(grey.shape)
+        should_be_dark = (square_row + square_column) % 2 == 0
+        return float(grey[~should_be_dark].sum() - grey[should_be_dark].sum())
 
     def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:
         """Return a sentence on what grid is seen in place of the board's; None if it is found."""

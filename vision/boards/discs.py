@@ -73,8 +73,9 @@ def _from_edge(unit: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarr
     from the edge, to first order.
     """
     radius = np.maximum(np.linalg.norm(unit, axis=1), 1e-6)
-    by_px = np.swapaxes(np.linalg.inv(axes), 1, 2) @ (unit / radius[:, None])
-    return radius, (radius - 1.0) / np.linalg.norm(by_px, axis=1)
+    outward = unit / radius[:, None]
+    radius_by_px = np.swapaxes(np.linalg.inv(axes), 1, 2) @ outward  # (n, 2, k)
+    return radius, (radius - 1.0) / np.linalg.norm(radius_by_px, axis=1)
 
 
 def fit_discs(windows: DiscWindows, px_guess: np.ndarray) -> Saddles:
@@ -114,8 +115,10 @@ def _edge(windows: DiscWindows, p: np.ndarray) -> np.ndarray:
     """Return the blurred edge, −1 within the disc to 1 beyond, (n, k), by parameters p (n, 10)."""
     along = p[:, _ALONG]
     between = p[:, _BETWEEN]
-    form = np.array([[1.0 + along, between], [between, 1.0 - along]]).transpose(2, 0, 1)
-    axes = windows.axes @ form * np.exp(p[:, _LOG_SIZE, None, None])
+    elongation = np.array([[1.0 + along, between], [between, 1.0 - along]]).transpose(2, 0, 1)
+    size = np.exp(p[:, _LOG_SIZE, None, None])
+    axes = size * (windows.axes @ elongation)  # (n, 2, 2)
     offset = windows.offset - p[:, PLACE, None]
     _, from_edge_px = _from_edge(np.linalg.solve(axes, offset), axes)
-    return erf(from_edge_px / (np.sqrt(2.0) * np.exp(p[:, _LOG_BLUR, None])))
+    blur_px = np.exp(p[:, _LOG_BLUR, None])
+    return erf(from_edge_px / (np.sqrt(2.0) * blur_px))

@@ -59,12 +59,13 @@ def _focal_equations(view: Corners, corners_mm: np.ndarray, size_px: tuple[int, 
     """Return rows (2, 2): coefficient · (width/f)² = constant, of one view; none without
     homography.
     """
-    width = size_px[0]
-    picture = (view.px - 0.5 * (np.array(size_px) - 1)) / width  # in widths, from the middle
-    H, _ = cv2.findHomography(corners_mm[view.ids, :2], picture, 0)
+    middle_px = 0.5 * (np.array(size_px) - 1)
+    in_widths = (view.px - middle_px) / size_px[0]
+    H, _ = cv2.findHomography(corners_mm[view.ids, :2], in_widths, 0)
     if H is None:
         return np.zeros((0, 2))
-    h1, h2 = (H / np.sqrt(np.sum(H[:, :2] ** 2)))[:, :2].T
+    axes = H[:, :2] / np.linalg.norm(H[:, :2])
+    h1, h2 = axes.T  # pictures of the board's x and y
     at_right_angles = [h1[:2] @ h2[:2], -h1[2] * h2[2]]
     of_equal_length = [h1[:2] @ h1[:2] - h2[:2] @ h2[:2], h2[2] ** 2 - h1[2] ** 2]
     return np.array([at_right_angles, of_equal_length])

@@ -18,7 +18,7 @@ import numpy as np
 from vision.calibration.moving_line import MovingLines
 from vision.geometry.centreline import rotation_z
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import compose, invert_transform, nearest_rotation
+from vision.geometry.rotation import apply, compose, invert_transform, nearest_rotation
 
 # [share of the stroke] The first seventh is taken as free; from there on what goes on turning as it
 # did. Set by eye. Study: tests/bench/trials/test_placing_pictures.py.
@@ -103,11 +103,10 @@ def _heights_mm(points: np.ndarray, directions: np.ndarray) -> np.ndarray:
 def _outward_lines(lines: MovingLines, T_world_axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return points, mm, and directions (n, 3) of lines in the axis's frame, directions away from the axis."""
     T_axis_world = invert_transform(T_world_axis)
-    points = lines.point_mm @ T_axis_world[:, :3].T + T_axis_world[:, 3]
+    points = apply(T_axis_world, lines.point_mm)
     directions = lines.direction @ T_axis_world[:, :3].T
-    outward = np.sum(points[:, :2] * directions[:, :2], axis=1) >= 0
-    directions *= np.where(outward, 1.0, -1.0)[:, None]
-    return points, directions
+    points_outward = np.sum(points[:, :2] * directions[:, :2], axis=1) >= 0
+    return points, np.where(points_outward[:, None], directions, -directions)
 
 
 def _is_near_axis(points_mm: np.ndarray, directions: np.ndarray) -> np.ndarray:

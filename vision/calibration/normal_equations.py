@@ -259,9 +259,10 @@ class _SightingRows(NamedTuple):
         W = np.zeros((len(self.board.corners_mm), 3, size + 1))
         starts = self.seen.shot_starts()
         for shot, rows in enumerate(np.split(np.arange(len(self.seen)), starts[1:])):
-            columns = [shots.columns[shot], len(equations.a) + shots.poses[shot], [size]]
-            index = np.ix_(self.seen.corner[rows], np.arange(3), np.concatenate(columns))
-            W[index] += np.swapaxes(self.own[rows], 1, 2) @ self.others[rows]
+            of_views = len(equations.a) + shots.poses[shot]
+            columns = np.concatenate([shots.columns[shot], of_views, [size]])
+            products = np.swapaxes(self.own[rows], 1, 2) @ self.others[rows]
+            W[np.ix_(self.seen.corner[rows], np.arange(3), columns)] += products
         return W
 
 

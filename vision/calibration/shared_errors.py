@@ -143,10 +143,12 @@ def _two_covariances(
 
 def _without_pose(J: np.ndarray, columns: np.ndarray, n_board: int) -> np.ndarray:
     """Return the derivatives (2 n, k) of a picture by `columns` (k,) that no pose or instant takes up."""
-    pose = np.column_stack([J[:, CLOCK], J[:, N_CAMERA + n_board :]])
-    basis, size, _ = np.linalg.svd(pose, full_matrices=False)
+    by_instant = J[:, CLOCK]
+    by_pose = J[:, N_CAMERA + n_board :]
+    basis, size, _ = np.linalg.svd(np.column_stack([by_instant, by_pose]), full_matrices=False)
     basis = basis[:, size > _LEAST_EIGENVALUE * size[0]]
-    return J[:, columns] - basis @ (basis.T @ J[:, columns])
+    wanted = J[:, columns]
+    return wanted - basis @ (basis.T @ wanted)
 
 
 def _columns(camera: int, priors: Priors, n_board: int) -> tuple[np.ndarray, np.ndarray]:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.geometry.robust import mean_and_sigma
+
 # [1] Of the bend: how far it may leave the curve through the first degrees, where the whisker
 # begins to slide or sticks. Set by eye. Study: coverage.py alone.
 _MODEL_SHARE = 0.05
@@ -67,9 +69,7 @@ def onset(motor_rad: np.ndarray, bend_rad: np.ndarray, covariance: np.ndarray) -
     least = np.min(chi2)
     scatter = max(1.0, least / len(motor_rad))
     above = np.where(possible, chi2 - least, np.inf)
-    weight = np.exp(-0.5 * above / scatter)
-    mean = float(np.average(tries, weights=weight))
-    spread = np.sqrt(np.average((tries - mean) ** 2, weights=weight))
+    mean, spread = mean_and_sigma(tries, np.exp(-0.5 * above / scatter))
     return Onset(mean, float(np.hypot(spread, _LEAST_SIGMA_RAD)))
 
 
@@ -100,10 +100,11 @@ def _misfit_of_parabola(past: np.ndarray, bend_rad: np.ndarray, covariance: np.n
     root = np.linalg.cholesky(covariance + np.diag(model_variance))
     after = np.maximum(past, 0.0)
     whitened = np.linalg.solve(root, np.stack([after, after**2, bend_rad], axis=1))
-    linear, _, bend = whitened.T
+    linear, square, bend = whitened.T
     slope = abs(linear @ bend) / (linear @ linear)
     curvature_sigma = max(slope * _CURVED_PER_RAD, 1e-9)
-    columns = np.vstack([whitened[:, :2], [0.0, 1.0 / curvature_sigma]])
+    prior_row = [0.0, 1.0 / curvature_sigma]
+    columns = np.vstack([np.stack([linear, square], axis=1), prior_row])
     wanted = np.append(bend, 0.0)
     solution = np.linalg.lstsq(columns, wanted, rcond=None)[0]
     return float(np.sum((wanted - columns @ solution) ** 2))

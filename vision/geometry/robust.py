@@ -1,4 +1,4 @@
-"""The width of a normal distribution, from deviations of which some are outliers."""
+"""The width of a distribution: by deviations of which some are outliers, or by its density."""
 
 import numpy as np
 
@@ -11,3 +11,11 @@ def robust_sigma(deviations: np.ndarray) -> float:
     size (MAD).
     """
     return float(np.median(np.abs(deviations))) / _MEDIAN
+
+
+def mean_and_sigma(values: np.ndarray, density: np.ndarray) -> tuple[float, float]:
+    """Return mean and standard deviation of a distribution whose density (n,), up to a factor, is
+    known at evenly spaced values (n,).
+    """
+    mean = float(np.average(values, weights=density))
+    return mean, float(np.sqrt(np.average((values - mean) ** 2, weights=density)))

@@ -86,11 +86,10 @@ class ChangeMap:
     def at(self, px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the field (...) at the nearest pixels to px (..., 2), and which lie within it."""
         height, width = self.field.shape
-        last = np.array([width, height]) - 1.0
-        is_inside = np.all((px >= 0.0) & (px < last), axis=-1)
+        is_inside = np.all((px >= 0.0) & (px < [width - 1.0, height - 1.0]), axis=-1)
         nearest = np.where(is_inside[..., None], px + 0.5, 0.0).astype(np.intp)
-        index = nearest[..., 1] * width + nearest[..., 0]
-        return self.field.ravel().take(index), is_inside
+        column, row = np.moveaxis(nearest, -1, 0)
+        return self.field.ravel().take(row * width + column), is_inside
 
 
 def find_covering(

@@ -59,6 +59,12 @@ class EdgeMap:
         tensor[:, [0, -1]] = 0.0
         return replace(self, tensor=tensor)
 
+    def strength_across(self, px: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """Return the strength (...) of edges with unit normals (..., 2) at points (..., 2) px."""
+        x, y = np.moveaxis(normal, -1, 0)
+        xx, xy, yy = np.moveaxis(self.tensor_at(px[..., 0], px[..., 1]), -1, 0)
+        return x * x * xx + 2.0 * x * y * xy + y * y * yy
+
     def tensor_at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the tensors (..., 3) of the pixels nearest to x, y (...).
 
@@ -81,7 +87,7 @@ def compute_edge_map(
     """
     middle_mm = 0.5 * rods.wire.length_mm * rotation_z(motor_rad)[:, 0]
     distance_mm = float(np.linalg.norm(middle_mm - camera.centre_mm))
-    focal_px = float(np.mean(np.diag(camera.matrix)[:2])) / HALF
+    focal_px = float(np.mean(camera.lens[:2])) / HALF
     half_width_px = rods.bar.radius_mm * focal_px / distance_mm
     blur_px = max(_EDGE_BLUR * half_width_px, _LEAST_BLUR_PX)
     return EdgeMap(camera, edge_strength_tensor(still, background, blur_px), half_width_px)

@@ -23,6 +23,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from vision.geometry.optics import UNKNOWN, Optics
+from vision.geometry.robust import mean_and_sigma
 from vision.touched.evidence import Evidence, LitRod, compute_evidence
 from vision.touched.pieces import ARM_MM
 from vision.touched.profiles import STEP_PX, Profiles, compute_profiles
@@ -241,9 +242,8 @@ def estimate_log_width(pieces: Pieces) -> tuple[float, float]:
         if 0 < np.argmin(deviance) < len(log_widths) - 1:
             break
     fine = np.linspace(log_widths[0], log_widths[-1], 10 * len(log_widths))
-    density = np.exp(-0.5 * (CubicSpline(log_widths, deviance)(fine) - deviance.min()))
-    mean = float(density @ fine / density.sum())
-    return mean, float(np.sqrt(density @ (fine - mean) ** 2 / density.sum()))
+    fine_deviance = CubicSpline(log_widths, deviance)(fine)
+    return mean_and_sigma(fine, np.exp(-0.5 * (fine_deviance - deviance.min())))
 
 
 def _evaluate_widths(pieces: Pieces, log_widths: np.ndarray) -> np.ndarray:

@@ -292,17 +292,18 @@ def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) 
 
 def _weights(view: View, grey: np.ndarray, background: np.ndarray) -> np.ndarray:
     """Return one over the noise (n,) of grey values (n,), 0 where one of both is unknown or full."""
-    noise = view.noise.times(view.mean_share)
-    is_used = np.isfinite(grey) & np.isfinite(background)
-    is_used &= np.nan_to_num(grey) < SATURATED * view.full_scale
-    return np.where(is_used, 1.0 / noise.sigma(np.where(is_used, grey, 0.0)), 0.0)
+    is_known = np.isfinite(grey) & np.isfinite(background)
+    is_used = is_known & (grey < SATURATED * view.full_scale)
+    sigma = view.noise.times(view.mean_share).sigma(np.where(is_used, grey, 0.0))
+    return np.where(is_used, 1.0 / sigma, 0.0)
 
 
 def _gradient(picture: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
     """Return the central differences (n, 2) of a picture by x and y at whole pixels."""
-    height, width = picture.shape
-    right = picture[row, np.minimum(column + 1, width - 1)]
+    last_row = picture.shape[0] - 1
+    last_column = picture.shape[1] - 1
+    right = picture[row, np.minimum(column + 1, last_column)]
     left = picture[row, np.maximum(column - 1, 0)]
-    below = picture[np.minimum(row + 1, height - 1), column]
+    below = picture[np.minimum(row + 1, last_row), column]
     above = picture[np.maximum(row - 1, 0), column]
     return 0.5 * np.stack([right - left, below - above], axis=1)

@@ -99,10 +99,11 @@ class SilhouetteScore(ObjectScore):
 
 
 def _strength_along(edges: EdgeMap, points_mm: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return the strength (...) of edges through points (..., 3) of a surface with normals."""
-    both_mm = np.stack([points_mm, points_mm + _OUTWARDS_MM * normals])
-    px, outwards_px = edges.camera.project(both_mm) / HALF
-    x, y = np.moveaxis(np.nan_to_num(unit(outwards_px - px)), -1, 0)
-    column, row = np.moveaxis(np.nan_to_num(px), -1, 0)
-    xx, xy, yy = np.moveaxis(edges.tensor_at(column, row), -1, 0)
-    return x * x * xx + 2.0 * x * y * xy + y * y * yy
+    """Return the strength (...) of edges along an outline, by points (..., 3) of the surface there.
+
+    normals (..., 3): of the surface, which project to those of its outline.
+    """
+    outside_mm = points_mm + _OUTWARDS_MM * normals
+    px, outside_px = edges.camera.project(np.stack([points_mm, outside_mm])) / HALF
+    normal_px = unit(outside_px - px)
+    return edges.strength_across(np.nan_to_num(px), np.nan_to_num(normal_px))

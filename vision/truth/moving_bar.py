@@ -32,10 +32,8 @@ class BarInFrames(ObjectReader):
         spread = np.linspace(0, len(about.frames) - 1, _MOST_FRAMES)
         found: dict[str, list[ReadLine]] = {}
         for k in np.unique(spread.round().astype(int)).tolist():
-            axis = BarAxis(about.axis.point_mm + about.came_mm[k], about.axis.direction)
-            wires_px = {name: [lines[k]] for name, lines in about.wires_px.items()}
-            there = replace(about, axis=axis, wires_px=wires_px)
-            for name, lines in self._reader(about.frames[k]).read(there, last=last).items():
+            reader = self._reader(about.frames[k])
+            for name, lines in reader.read(_about_frame(about, k), last=last).items():
                 own = found.setdefault(name, [])
                 own += [replace(line, frame=k) for line in lines]
         return found
@@ -46,6 +44,13 @@ class BarInFrames(ObjectReader):
             views = in_one_frame(self.views, frame)
             self.readers[frame] = BarMiddles(views, self.radius_mm, self.settings)
         return self.readers[frame]
+
+
+def _about_frame(about: WhereAbout, k: int) -> WhereAbout:
+    """Return where bar and wires are in the k-th frame."""
+    axis = BarAxis(about.axis.point_mm + about.came_mm[k], about.axis.direction)
+    wires_px = {name: [lines[k]] for name, lines in about.wires_px.items()}
+    return replace(about, axis=axis, wires_px=wires_px)
 
 
 def in_one_frame(views: Sequence[View], frame: int) -> list[View]:

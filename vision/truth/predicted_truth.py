@@ -88,10 +88,10 @@ class PredictedTruth:
 
 def _largest_cause(fitted: FittedWhisk, gradient: np.ndarray) -> tuple[str, float]:
     """Return the cause of the largest part of a variance, and that part. gradient (size,)."""
-    parts = variance_by_cause(fitted.problem, fitted.state, fitted.uncertainty, gradient)
-    known = {name: part for name, part in parts.items() if np.isfinite(part)}
-    cause = max(known, key=lambda name: known[name])
-    return cause, float(known[cause] / sum(known.values()))
+    variances = variance_by_cause(fitted.problem, fitted.state, fitted.uncertainty, gradient)
+    known = {cause: variance for cause, variance in variances.items() if np.isfinite(variance)}
+    largest = max(known, key=known.__getitem__)
+    return largest, float(known[largest] / sum(known.values()))
 
 
 def predict_truth(

@@ -224,9 +224,11 @@ def _shape(fitted: FittedWhisk) -> WireShape:
 
 def _speed(time_s: np.ndarray, motor_rad: np.ndarray, at_rad: float) -> float:
     """Return the motor's speed, rad/s, near an angle."""
-    nearest = int(np.clip(np.argmin(np.abs(motor_rad - at_rad)), 1, len(motor_rad) - 1))
-    step_s = time_s[nearest] - time_s[nearest - 1]
-    return abs(motor_rad[nearest] - motor_rad[nearest - 1]) / max(step_s, _LEAST_STEP_S)
+    nearest = int(np.argmin(np.abs(motor_rad - at_rad)))
+    later = min(max(nearest, 1), len(motor_rad) - 1)
+    step_rad = motor_rad[later] - motor_rad[later - 1]
+    step_s = time_s[later] - time_s[later - 1]
+    return abs(step_rad) / max(step_s, _LEAST_STEP_S)
 
 
 def _outside(fitted: FittedWhisk, touch_rad: float) -> str:

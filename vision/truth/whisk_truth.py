@@ -12,6 +12,7 @@ from vision.fit.solve import LAST_SCALE, solve
 from vision.geometry.centreline import Curves, centrelines, unbent_curves
 from vision.geometry.contact import clearance
 from vision.geometry.refusals import Misled, Refused
+from vision.geometry.rotation import unit
 from vision.geometry.touched import Axis
 from vision.truth.line_source import LineSource, WhiskPlace
 from vision.truth.strategies import Strategy, Touch, early, strategies
@@ -191,9 +192,10 @@ def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndar
     for k in np.flatnonzero(touching).tolist():
         distance, arc, _ = clearance(curves[k], axis, whisk.rods.wire)
         _, tangents = curves[k].at(np.atleast_1d(arc))
-        away = np.cross(axis.direction, tangents[0])
-        away *= np.sign(away[1]) / np.linalg.norm(away)
-        came[k] = max(whisk.rods.reach_mm(arc) - distance, 0.0) * away
+        normal = unit(np.cross(axis.direction, tangents[0]))
+        away = normal * np.sign(normal[1])  # the way that the whisker pushes
+        past_mm = max(whisk.rods.reach_mm(arc) - distance, 0.0)
+        came[k] = past_mm * away
     return came
 
 

@@ -9,6 +9,7 @@ shift of the line and each blur that may go with it.
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from vision.geometry.robust import mean_and_sigma
 from vision.wire.bands import Pieces
 from vision.wire.binned import binned
 from vision.wire.common_shift import EVIDENCE_COUNTS, NO_CHANCE, evidences_of
@@ -62,9 +63,7 @@ def _mean_and_sigma(places: np.ndarray, evidences: np.ndarray) -> tuple[float, f
     """
     fine = np.linspace(places[0], places[-1], _FINE)
     values = CubicSpline(places, evidences)(fine)
-    density = np.exp(-0.5 * (values - values.min()))
-    mean = float(np.average(fine, weights=density))
-    return mean, float(np.sqrt(np.average((fine - mean) ** 2, weights=density)))
+    return mean_and_sigma(fine, np.exp(-0.5 * (values - values.min())))
 
 
 def _evidences_of_widths(
