@@ -62,7 +62,7 @@ def test_a_whole_board_at_the_wrong_scale_is_told_by_the_bars(small_copy, refuse
     """A third too large: the bars are not where the whisker could touch them, so what is found for them disagrees."""
     edit(small_copy, "square_mm = 15.0\nmarker_mm = 11.0", "square_mm = 20.0\nmarker_mm = 14.67")
     assert (
-        "hardly seen where square_mm and T_rig_board have the whisker: measure a square of the board"
+        "is seen where square_mm and T_rig_board place the whisker: measure a square of the board"
         in refused()
     )
 
