@@ -161,10 +161,8 @@ def measure_rig(
 def _by_hub_marker(
     session: Session, calibration: SessionCalibration
 ) -> tuple[SessionCalibration, Placement, tuple[Placement, ...]]:
-    """Return the calibration moved to where a marker on the hub has the rig, taken as exact, the placement
-    by marker and first look, and that by the marker alone.
-
-    Without a marker it is placed by a first look at what turns.
+    """Return the calibration moved to where a marker on the hub has the rig, taken as exact; that placement,
+    with what is known before; and the placement by the marker alone, none where there is no marker.
     """
     coarse = by_first_look()
     exact = _as_exact(coarse)
