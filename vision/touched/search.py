@@ -102,6 +102,17 @@ def find_object_again(scene: SearchScene, axis: Axis) -> SeenBar:
     return find_object(scene)
 
 
+def with_lines(scene: SearchScene, bar: SeenBar) -> SeenBar:
+    """Return a straight bar with its lines about its axis, where that is from elsewhere than the search.
+
+    A camera that looks along the axis, or has it behind it, ends this: the bar stays as it is.
+    """
+    if not bar.lines and isinstance(bar.axis, BarAxis) and isinstance(scene.rods.bar, Bar):
+        with suppress(Refused):
+            return replace(bar, lines=BarSearch(scene).lines_about(scene.views, bar.axis))
+    return bar
+
+
 @singledispatch
 def _search(touched: Touched, scene: SearchScene) -> SeenBar:
     """Find an object by the search that its form has."""
@@ -233,7 +244,7 @@ class BarSearch:
                 continue
             lines: dict[str, BarLineEstimate] = {}
             with suppress(Refused):  # a camera that looks along an axis has no line of it
-                lines = self._lines([view], axis)
+                lines = self.lines_about([view], axis)
             for line in lines.values():
                 if line.is_bar:
                     through = self._axis_through(axis, {camera.name: line})
@@ -259,7 +270,7 @@ class BarSearch:
             names = [view.camera.name for view in left]
             about |= dict.fromkeys(names, axis)
             kept = {name: line for name, line in lines.items() if name not in names}
-            lines = kept | self._lines(left, axis)
+            lines = kept | self.lines_about(left, axis)
             axis = self._axis_through(axis, lines)
         return SeenBar(axis, lines)
 
@@ -274,7 +285,7 @@ class BarSearch:
         for view in self.scene.views:
             with suppress(Refused):
                 axis = self.axis_of_one_camera(view)
-                lines = self._lines(self.scene.views, axis)
+                lines = self.lines_about(self.scene.views, axis)
                 alone = SeenBar(self._axis_through(axis, lines), lines)
                 if view.camera.name in alone.seen_by:
                     found.append(alone)
@@ -292,7 +303,7 @@ class BarSearch:
         wire = scene.rods.wire
         return see_bar_alone(first, view, wire, scene.radius_mm, scene.motor_rad, scene.settings)
 
-    def _lines(self, views: Sequence[View], axis: BarAxis) -> dict[str, BarLineEstimate]:
+    def lines_about(self, views: Sequence[View], axis: BarAxis) -> dict[str, BarLineEstimate]:
         """Measure the lines about an axis quickly, in some views."""
         scene = self.scene
         return find_lines(views, axis, scene.radius_mm, scene.wires_px, scene.settings)

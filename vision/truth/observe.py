@@ -29,7 +29,7 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.others import RodLines
 from vision.pictures.pyramid import shrunk_cameras
 from vision.pictures.view import View
-from vision.touched.search import SeenBar, find_object
+from vision.touched.search import SeenBar, find_object, with_lines
 from vision.touched.search_scene import SearchScene
 from vision.touched.width import measure_relative_widths
 from vision.truth.explanations import Explanation, explain
@@ -86,7 +86,7 @@ def observe_trial(
     axis = found.axis.as_bar()
     light = [whisk.light for whisk in scene.whisks]
     bars = {}
-    for name, width in measure_relative_widths(found).items():
+    for name, width in measure_relative_widths(with_lines(scene.search, found)).items():
         bars[name] = Value(*width)
     return TrialTruth(axis.point_mm, axis.direction, tuple(rows), one_sided_widths(light), bars)
 
@@ -109,7 +109,8 @@ def wire_lines(
         curves |= _coarse_curves(whisk.without_gaps())
     if not curves:
         return {}
-    return {view.camera.name: lines_of(view.camera, rods.wire, curves) for view in scene.still}
+    cameras = scene.search.cameras
+    return {camera.name: lines_of(camera, rods.wire, curves) for camera in cameras}
 
 
 def _coarse_curves(whisk: WhiskPictures) -> dict[int, Curves]:
@@ -124,11 +125,11 @@ def _coarse_curves(whisk: WhiskPictures) -> dict[int, Curves]:
 
 @dataclass(frozen=True)
 class _TrialScene:
-    """A trial before any wire is known: its whisks, the object, and the views in which it stands."""
+    """A trial before any wire is known: its whisks, the object, and what that was searched in."""
 
     whisks: list[WhiskPictures]
     found: SeenBar
-    still: Sequence[View]
+    search: SearchScene
 
 
 def _whisks_of(
@@ -149,7 +150,8 @@ def _whisks_of(
     views, used, left_out = views_facing(pictures, cameras, rods.wire, motor_rad)
     strokes = [range(*where.indices(len(time_s)))[:: settings.every_frame] for where in whisks]
     velocity, still = _stated_motion(pictures, strokes, views, rods)
-    found = find_object(SearchScene(still, used, rods, motor_rad, settings))
+    search = SearchScene(still, used, rods, motor_rad, settings)
+    found = find_object(search)
     seen = []
     for number, stroke in enumerate(strokes):
         whisk = WhiskPictures(
@@ -169,7 +171,7 @@ def _whisks_of(
             picture_of=pictures.picture_of,
         )
         seen.append(whisk)
-    return _TrialScene(seen, found, still)
+    return _TrialScene(seen, found, search)
 
 
 def views_facing(

@@ -298,9 +298,16 @@ def test_a_whisk_fitted_from_a_wrong_place_has_the_truth(small_session, monkeypa
         return replace(found, axis=found.axis.shifted(frame, np.array([1.5, -1.5, 0.0, 0.05])))
 
     monkeypatch.setattr(observe, "find_object", find_elsewhere)
-    seen = steep.see()
+    motor_rad = np.radians(steep.rows["motor_deg"])
+    pictures = TrialPictures(steep.frames, steep.rows["time_s"], motor_rad, steep.background)
+    whole = [slice(0, len(motor_rad))]
+    trial = observe_trial(pictures, whole, steep.cameras, RODS, VisionSettings())
+    (seen,) = trial.whisks
     assert abs(seen.d_x_mm.value - steep.truth["d_x_mm"]) < 3 * seen.d_x_mm.sigma
     assert seen.status == ""
+    assert set(trial.bar_widths) == {"high", "low"}  # measured where the bar is
+    for width in trial.bar_widths.values():
+        assert abs(width.value - 1.0) < 3.0 * width.sigma
 
 
 def test_a_bar_and_its_shadow_that_are_equally_clear_are_told():
