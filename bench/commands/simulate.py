@@ -4,6 +4,7 @@ import argparse
 from functools import partial
 from pathlib import Path
 
+from bench.base.progress import begin_step
 from bench.commands.options import DONE, Verbs, add_session, add_verb, add_workers
 
 
@@ -40,6 +41,7 @@ def add(verbs: Verbs) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Simulate the session; return the exit code."""
+    begin_step(f"building the rig of {options.protocol}")
     from bench.rig.simulation import simulate
 
     simulate(

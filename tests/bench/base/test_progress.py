@@ -10,7 +10,16 @@ from bench.base import progress
 from bench.base.progress import count_parts, show_progress
 
 REPOSITORY = Path(__file__).resolve().parents[3]
-VERBS_THAT_TAKE_LONG = ("evaluate", "check", "robot", "tradeoff", "plan", "design", "calibrate")
+VERBS_THAT_TAKE_LONG = (
+    "evaluate",
+    "check",
+    "robot",
+    "tradeoff",
+    "plan",
+    "design",
+    "calibrate",
+    "simulate",
+)
 
 
 def test_parts_are_passed_on_and_each_slow_one_has_a_line(caplog, monkeypatch):
