@@ -6,7 +6,7 @@ FOLDER holds board.toml (the keys of session.toml's [board]) and a video or a fo
 is fetched. Every camera is calibrated by itself, from the same corners, by this project, by OpenCV (five terms of
 distortion) and by mrcal (by each of three models; where its command is installed) without every fourth view; prints the root
 mean square error of those, px an axis, each view with the pose that suits it best by plain least squares; ours with the
-board's bend and print as learnt from the other views, too.
+board's points and bend as learnt from the other views, too, and what is said of these.
 Then from random halves of its views, so many times (0: not): the root mean square of each lens parameter's difference
 between the halves over its stated sigma, which is 1 where sigmas are true. Then, of cameras that share views and are not
 triggered together, what instants of their own make of held-out views.
@@ -99,6 +99,7 @@ def held_out_errors(views: BoardViews, name: str, board: Board) -> dict[str, flo
     learnt = [series[k] for k in kept]
     size_px = views.sizes_px[name]
     made = calibrate_cameras(_some_views(views, name, kept), board, None)
+    print(*(f"{name}: {note}" for note in made.notes), sep="\n")
     ours = made.cameras[name].lens
     lenses = {"ours, the board as stated": ours, "OpenCV": _by_opencv(learnt, board, size_px)}
     for model in MRCAL_MODELS if shutil.which(MRCAL) else ():

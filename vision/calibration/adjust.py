@@ -9,17 +9,16 @@ last.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag, cho_factor, cho_solve, solveh_banded
+from scipy.linalg import cho_factor, cho_solve, solveh_banded
 
 from vision.calibration.bundle import N_CAMERA, N_VIEW, BundleState, Priors, Sightings
 from vision.calibration.normal_equations import (
     LinearisedCost,
     NormalEquations,
+    common_modes,
     normal_equations,
-    shape_changes,
 )
 from vision.geometry.board import Board
 
@@ -80,32 +79,46 @@ class _Problem:
     @cached_property
     def free(self) -> "_Free":
         """Return what is free of globals and points."""
-        by_globals = self.priors.directions()
-        if not self.priors.point_sigma_mm:
-            return _Free(by_globals, *by_globals.shape)
-        by_points = shape_changes(self.board, self.seen.corner)
-        return _Free(block_diag(by_globals, by_points), *by_globals.shape)
+        modes = np.zeros((0, 0))
+        if self.priors.point_sigma_mm:
+            modes = common_modes(self.board, self.seen.corner)
+        return _Free(self.priors.directions(), modes)
 
     def fitted_points(self, normal: LinearisedCost) -> float:
         """Return how many coordinates of the board's points the pictures determine."""
-        if normal.equations is None or not self.priors.point_sigma_mm:
+        modes = self.free.modes
+        if normal.equations is None or not len(modes):
             return 0.0
-        size = self.free.n_globals
-        changes = self.free.directions[size:, self.free.n_free_globals :]
-        precision = changes.T @ normal.equations.A[size:, size:] @ changes
-        prior = self.priors.point_sigma_mm**-2.0
-        return float(len(precision) - prior * np.trace(np.linalg.inv(precision)))
+        H = normal.equations.A[-len(modes) :, -len(modes) :]
+        variance = np.trace(_solve_but_modes(H, np.eye(len(modes)), modes))
+        freedom = len(modes) - modes.shape[1]
+        return float(freedom - self.priors.point_sigma_mm**-2.0 * variance)
 
 
-class _Free(NamedTuple):
-    """Hold how globals, and points behind them, move with the free ones.
+@dataclass(frozen=True, eq=False)
+class _Free:
+    """Hold what is free of globals and points.
 
-    directions (G [+ 3 m], F + k). n_globals, n_free_globals: G and F.
+    directions (G, F): how the globals move with the free ones. modes (3 m, k): orthonormal changes of
+    points that are held; (0, 0) where all points are.
     """
 
     directions: np.ndarray
-    n_globals: int
-    n_free_globals: int
+    modes: np.ndarray
+
+    def of(self, equations: NormalEquations) -> NormalEquations:
+        """Return the equations (F + 3 m) of the free globals and the points."""
+        A, a, B, C, c = equations
+        D = self.directions
+        size = len(D)
+        coupling = D.T @ A[:size, size:]
+        return NormalEquations(
+            A=np.block([[D.T @ A[:size, :size] @ D, coupling], [coupling.T, A[size:, size:]]]),
+            a=np.append(D.T @ a[:size], a[size:]),
+            B=np.vstack([D.T @ B[:size], B[size:]]),
+            C=C,
+            c=c,
+        )
 
 
 def adjust_bundle(
@@ -164,41 +177,44 @@ def _solve_step(
     """Return Marquardt's step of the globals (G,), the views (V, 6), the instants (V, C) and the
     points (m, 3), 0 (1, 3) of points that are held.
     """
-    directions = free.directions
-    reduced, gradient, CB, Cc = _eliminate_views(normal.equations, directions, damping)
-    curvature = np.einsum("gf,gf->f", directions, normal.equations.A @ directions)
-    np.einsum("ii->i", reduced)[...] += damping * curvature
+    equations = free.of(normal.equations)
+    reduced, gradient, CB, Cc = _eliminate_views(equations, damping)
+    np.einsum("ii->i", reduced)[...] += damping * np.diag(equations.A)
     reduced, gradient, by_globals, constant = _eliminate_points(reduced, gradient, free)
-    global_step = _solve_scaled(reduced, gradient)
-    free_step = np.append(global_step, constant - by_globals @ global_step)
-    step = directions @ free_step
-    view_steps = (Cc - CB @ free_step).reshape(-1, N_VIEW)
-    of_globals = step[: free.n_globals]
-    of_points = step[free.n_globals :].reshape(-1, 3)
-    if not len(of_points):
-        of_points = np.zeros((1, 3))
-    return of_globals, view_steps, _instant_steps(normal, of_globals, view_steps), of_points
+    free_step = _solve_scaled(reduced, gradient)
+    of_points = constant - by_globals @ free_step
+    step = free.directions @ free_step
+    view_steps = (Cc - CB @ np.append(free_step, of_points)).reshape(-1, N_VIEW)
+    point_steps = of_points.reshape(-1, 3) if len(of_points) else np.zeros((1, 3))
+    return step, view_steps, _instant_steps(normal, step, view_steps), point_steps
 
 
 def _eliminate_points(
     reduced: np.ndarray, gradient: np.ndarray, free: _Free
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Eliminate the points from a reduced matrix (F + k, F + k) and its gradient (F + k,).
+    """Eliminate the points from a reduced matrix (F + 3 m, F + 3 m) and its gradient (F + 3 m,).
 
-    Returns both of the free globals, and what the points' step is: a constant (k,) less a matrix (k, F)
-    times that of the globals.
+    Returns both of the free globals, and what the points' step is: a constant (3 m,) less a matrix
+    (3 m, F) times that of the globals.
     """
-    count = free.n_free_globals
-    points = slice(count, None)
-    if count == len(reduced):
+    count = free.directions.shape[1]
+    if not len(free.modes):
         return reduced, gradient, np.zeros((0, count)), np.zeros(0)
-    right = np.column_stack([reduced[points, :count], gradient[points]])
-    solved = cho_solve(cho_factor(reduced[points, points]), right)
-    coupling = reduced[:count, points]
+    coupling = reduced[:count, count:]
+    right = np.column_stack([coupling.T, gradient[count:]])
+    solved = _solve_but_modes(reduced[count:, count:], right, free.modes)
     by_globals = solved[:, :-1]
     constant = solved[:, -1]
     left = reduced[:count, :count] - coupling @ by_globals
     return left, gradient[:count] - coupling @ constant, by_globals, constant
+
+
+def _solve_but_modes(matrix: np.ndarray, right: np.ndarray, modes: np.ndarray) -> np.ndarray:
+    """Solve matrix · x = right (n, q) by x without any share of some modes (n, k), for a positive matrix."""
+    solved = cho_solve(cho_factor(matrix), np.column_stack([right, modes]))
+    yielding = solved[:, right.shape[1] :]
+    x = solved[:, : right.shape[1]]
+    return x - yielding @ np.linalg.solve(modes.T @ yielding, modes.T @ x)
 
 
 def _instant_steps(normal: LinearisedCost, step: np.ndarray, view_steps: np.ndarray) -> np.ndarray:
@@ -214,23 +230,20 @@ def _instant_steps(normal: LinearisedCost, step: np.ndarray, view_steps: np.ndar
 
 
 def _eliminate_views(
-    equations: NormalEquations, directions: np.ndarray, damping: float = 0.0
+    equations: NormalEquations, damping: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Reduce the equations to what is free of globals and points: eliminate the views' poses by the
-    Schur complement.
+    """Eliminate the views' poses by the Schur complement.
 
-    directions (G, F): how these move with the free ones. Returns the reduced matrix (F, F) and
-    gradient (F,) of the free globals, C⁻¹Bᵀ (6 V, F) and C⁻¹c (6 V,).
+    Returns the reduced matrix (F, F) and gradient (F,) of the other parameters, C⁻¹Bᵀ (6 V, F) and
+    C⁻¹c (6 V,).
     """
     A, a, B, C, c = equations
-    B = directions.T @ B
     raised = C.copy()
     raised[0] *= (1.0 + damping) * (1.0 + _RIDGE)
     solved = solveh_banded(raised, np.column_stack([B.T, c]), lower=True, check_finite=False)
     CB = solved[:, :-1]
     Cc = solved[:, -1]
-    reduced = directions.T @ A @ directions - B @ CB
-    return reduced, directions.T @ a - B @ Cc, CB, Cc
+    return A - B @ CB, a - B @ Cc, CB, Cc
 
 
 def _unit_scale(matrix: np.ndarray) -> np.ndarray:
@@ -250,12 +263,11 @@ def _solve_scaled(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 def _covariance(normal: LinearisedCost, free: _Free) -> np.ndarray:
     """Return the covariance (G, G) of the globals, all poses, points and instants being marginalised."""
-    size = free.n_globals
-    if normal.equations is None or not free.n_free_globals:
+    size, count = free.directions.shape
+    if normal.equations is None or not count:
         return np.zeros((size, size))
-    reduced, gradient, *_ = _eliminate_views(normal.equations, free.directions)
+    reduced, gradient, *_ = _eliminate_views(free.of(normal.equations))
     reduced, *_ = _eliminate_points(reduced, gradient, free)
     scale = np.outer(_unit_scale(reduced), _unit_scale(reduced))
     inverse = np.linalg.pinv(reduced * scale, rcond=1e-14, hermitian=True)
-    directions = free.directions[:size, : free.n_free_globals]
-    return directions @ (inverse * scale) @ directions.T
+    return free.directions @ (inverse * scale) @ free.directions.T

@@ -266,28 +266,26 @@ class _SightingRows(NamedTuple):
         return W
 
 
-def shape_changes(board: Board, seen: np.ndarray) -> np.ndarray:
-    """Return orthonormal changes of a board's points (3 m, k): none moves a face as one, nor changes it by
-    the print's scale and stretch, which are the face's pose and the print's terms.
+def common_modes(board: Board, seen: np.ndarray) -> np.ndarray:
+    """Return the orthonormal changes (3 m, k) of a board's points that are no errors of theirs: motions of
+    a face as one, which are its pose, and of all faces by the print's scale and stretch.
 
-    seen (n,): the points seen. Those of a face of which too few are do not change.
+    seen (n,): the points seen. A face of which too few are has no motions.
     """
-    by_size = board.printed(board.stated_terms)[1][:, :, _SIZES]
     is_seen = np.isin(np.arange(len(board.face_of)), seen)
-    changes = [np.zeros((3 * len(is_seen), 0))]
+    modes = []
     for face in np.unique(board.face_of):
         points = np.flatnonzero(is_seen & (board.face_of == face))
         if len(points) < _FEWEST_POINTS:
             continue
         away = board.corners_mm[points] - board.corners_mm[points].mean(axis=0)
         shifts = np.broadcast_to(np.eye(3), (len(points), 3, 3))
-        common = np.concatenate([shifts, -skew(away), by_size[points]], axis=2)
-        common = common.reshape(-1, common.shape[2])
-        others = np.linalg.qr(common, mode="complete")[0][:, common.shape[1] :]
-        own = np.zeros((*board.corners_mm.shape, others.shape[1]))
-        own[points] = others.reshape(len(points), 3, -1)
-        changes.append(own.reshape(-1, others.shape[1]))
-    return np.hstack(changes)
+        motions = np.zeros((*board.corners_mm.shape, N_VIEW))
+        motions[points] = np.concatenate([shifts, -skew(away)], axis=2)
+        modes.append(motions)
+    by_size = board.printed(board.stated_terms)[1][:, :, _SIZES]
+    columns = np.concatenate([*modes, is_seen[:, None, None] * by_size], axis=2)
+    return np.linalg.qr(columns.reshape(-1, columns.shape[2]))[0]
 
 
 def _with_priors(

@@ -11,10 +11,11 @@ from vision.boards.body import Body
 from vision.boards.corners import Corners, by_face
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.held_out import check_held_out
+from vision.calibration.normal_equations import common_modes
 from vision.calibration.views import BoardViews
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import apply, compose, exp_rotation, pose_difference, skew
+from vision.geometry.rotation import apply, compose, exp_rotation, pose_difference
 
 SIZE_PX = (1280, 960)
 BODY = Body((6, 6), 6.0, marker_mm=4.4, dictionary="DICT_4X4_250", first_ids=(0, 18, 40, 80))
@@ -67,18 +68,9 @@ def drawn_views(rng, faces=None):
 
 
 def _in_shape(errors_mm, points_mm, faces):
-    """Return errors of points (m, 3) without what moves all points of a face as one, or changes its size."""
-    left = errors_mm.copy()
-    for face, T in enumerate(faces):
-        own = BODY.face_of == face
-        away = points_mm[own] - points_mm[own].mean(axis=0)
-        along = T[:, :2]  # the face's x and y
-        sizes = (away @ along)[:, None, :] * along
-        shifts = np.tile(np.eye(3), (len(away), 1, 1))
-        common = np.concatenate([shifts, skew(away), sizes], axis=2).reshape(-1, 8)
-        motion = np.linalg.lstsq(common, errors_mm[own].ravel(), rcond=None)[0]
-        left[own] -= (common @ motion).reshape(-1, 3)
-    return left
+    """Return errors of points (m, 3) without what moves a face as one, or changes all faces alike in size."""
+    modes = common_modes(BODY.placed(faces), np.arange(len(points_mm)))
+    return errors_mm - (modes @ (modes.T @ errors_mm.ravel())).reshape(-1, 3)
 
 
 def _seen(camera, T_world_body, faces, points, rng):
