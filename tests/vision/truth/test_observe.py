@@ -5,8 +5,10 @@ from copy import copy
 import numpy as np
 import pytest
 
-from tests.scenes.recorded import Recorded
+from tests.scenes.recorded import RODS, Recorded
 from vision.geometry.camera import Camera, Cameras
+from vision.geometry.vision_settings import VisionSettings
+from vision.truth.observe import observe_trial
 from vision.truth.trial_pictures import TrialPictures
 
 
@@ -187,3 +189,27 @@ def test_a_stroke_is_not_thinned_where_too_few_frames_come_before_touch(small_se
 
 def test_a_stroke_of_many_frames_is_thinned(steep):
     assert steep.see(rounds=0, every_frame=2).frames_used == 6
+
+
+def test_a_whisk_begins_as_the_one_before_ended_though_the_wire_has_slipped_in_its_hub(steep):
+    """The same stroke twice, the second time with the motor 1° farther on."""
+    few = slice(None, None, 3)
+    motor_rad = np.radians(steep.rows["motor_deg"][few])
+    time_s = steep.rows["time_s"][few]
+    count = len(time_s)
+    frames = {}
+    for name, pictures in steep.frames.items():
+        chosen = list(pictures.values())[few]
+        frames[name] = dict(enumerate([*chosen, *chosen]))
+    slipped_rad = np.radians(1.0)
+    pictures = TrialPictures(
+        frames,
+        np.concatenate([time_s, time_s + 10.0]),
+        np.concatenate([motor_rad, motor_rad + slipped_rad]),
+        steep.background,
+    )
+    strokes = [slice(0, count), slice(count, 2 * count)]
+    quick = VisionSettings(check_beam=False)
+    first, second = observe_trial(pictures, strokes, steep.cameras, RODS, quick).whisks
+    assert second.touch_rad.value - first.touch_rad.value == pytest.approx(slipped_rad, abs=1e-4)
+    assert abs(second.d_x_mm.value - first.d_x_mm.value) < 0.2 * first.d_x_mm.sigma
