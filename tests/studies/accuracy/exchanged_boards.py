@@ -27,8 +27,9 @@ from tests.studies.accuracy.board_scenes import (
     rig_view,
     two_cameras,
 )
+from vision.calibration.calibrate import standing_boards
 from vision.calibration.exchanged import lens_residuals_px
-from vision.calibration.one_picture import calibrate_alone, standing_boards
+from vision.calibration.one_picture import calibrate_alone
 from vision.geometry.camera import Cameras, camera_matrix
 
 SIGMA_PX = 0.04
