@@ -11,7 +11,8 @@ from bench.gauges.matrix import GaugeMatrix
 
 _CHANNELS = "yz"
 # [sigmas] A channel that stays within so many of its own noise hears nothing. In thousands of readings noise reaches
-# four; twice that, for a sigma that may be too small. Derived.
+# four; twice that, for a sigma that may be too small. Derived; study: bench_thresholds.py gauges.gauge_faults
+# _HEARD_SIGMAS 4 20 100 changes nothing.
 _HEARD_SIGMAS = 8.0
 # Of the samples; a whisk that saturates late can still be used.
 _LEAST_UNSATURATED = 0.2

@@ -23,7 +23,8 @@ from vision.geometry import unit
 # at 8° α is then off by 0.06°. Derived; study: tests/studies/accuracy/combined_numbers.py.
 _FARTHEST_RAD = np.radians(10.0)
 # [rad] Nearer to touch the force has no direction yet: at 60 mm a whisker is bent by 0.3 mm there, whose direction
-# lines known to 0.01 mm give to 2°. Derived.
+# lines known to 0.01 mm give to 2°. Derived; twice that moves α seen by 0.11 sigma: bench_thresholds.py
+# trials.seen_friction _NEAREST_RAD 0.0105.
 _NEAREST_RAD = np.radians(0.3)
 _FEWEST_NEAR = 5  # frames
 # [1] Sigma of α over the square of the slope at the contact of an unloaded whisker that is stated to be straight: six
