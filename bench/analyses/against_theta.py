@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 AGAINST_THETA = Table(
     "against_theta",
-    "A row an estimator and pushing angle, over the measured whisks with a truth of which nothing "
-    "is doubtful.",
+    "A row an estimator and pushing angle, over the measured whisks with a truth and no warning.",
     (
         Column("estimator", "as in estimates.csv", Kind.TEXT),
         Column("theta_deg", "pushing angle, from 0.2° as far as strokes go"),

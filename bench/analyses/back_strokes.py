@@ -55,7 +55,7 @@ BOTH_WAYS = Table(
         Column("error_mm", "d_x_est_mm less d_x_mm"),
         Column("error_percent", "that error, % of d_x_mm"),
         Column("inside", "1 where the estimate's 95 % interval holds d_x_mm, else 0"),
-        status("what is doubtful of way back and estimate"),
+        status("warnings of way back and estimate"),
     ),
 )
 

@@ -104,7 +104,7 @@ SURFACES = Table(
         Column("error_rms_weighted_percent", "of (10), whisks weighted by confidence"),
         Column(
             "notes",
-            "why a way of section VII has no result, or what is doubtful of it",
+            "why a way of section VII has no result, or its warnings",
             Kind.SENTENCE,
         ),
     ),

@@ -53,7 +53,7 @@ MOVING = Table(
         Column("error_mm", "estimate less truth"),
         Column("error_percent", "that error, % of the truth"),
         Column("inside", "1 where the estimate's 95 % interval holds the truth, else 0"),
-        status("what is doubtful of the estimate"),
+        status("warnings of the estimate"),
     ),
 )
 

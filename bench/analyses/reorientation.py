@@ -57,7 +57,7 @@ REORIENTATION = Table(
         Column("inside", "1 where the 95 % interval holds d_x_mm, else 0"),
         Column("error_with_friction_mm", "the same of (10) by this push"),
         Column("inside_with_friction", "1 where the interval of (10) holds d_x_mm, else 0"),
-        status("why there is no distance, or what is doubtful of it"),
+        status("why there is no distance, or its warnings"),
     ),
 )
 

@@ -22,8 +22,8 @@ from vision.geometry import counted
 
 SENSORS = Table(
     "sensors",
-    "A row a sensor, surface and range of slopes, over the measured whisks with a truth of which "
-    "nothing is doubtful; none without a load cell ([sensors.md](sensors.md)).",
+    "A row a sensor, surface and range of slopes, over the measured whisks with a truth "
+    "and no warning; none without a load cell ([sensors.md](sensors.md)).",
     (
         Column(
             "estimator",

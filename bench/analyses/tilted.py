@@ -45,7 +45,7 @@ TILTS = Table(
         Column("correlation", "of distance and friction angle"),
         Column("error_mm", "estimate less the mean of the distances seen"),
         Column("error_percent", "that error, % of that mean"),
-        status("why there is none, or what is doubtful"),
+        status("why there is none, or its warnings"),
     ),
 )
 # [°] Nominal slopes that differ by less are one, set up again.

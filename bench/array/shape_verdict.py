@@ -9,17 +9,7 @@ import numpy as np
 
 from bench.array.cloud import SEEN, ContactPoint
 from bench.base.drawing import label_of
-from bench.base.tables import (
-    TRIAL,
-    WHISK,
-    WHISKER,
-    Column,
-    Kind,
-    Table,
-    alike,
-    status,
-    with_sigma,
-)
+from bench.base.tables import TRIAL, WHISK, WHISKER, Column, Kind, Table, alike, status, with_sigma
 from estimator.uncertainty import Z_95
 from vision.geometry import counted
 
@@ -53,7 +43,7 @@ SURFACE_POINTS = Table(
             "the object is not known, and of contacts seen on that bar",
             Kind.TEXT,
         ),
-        status("what is doubtful of it"),
+        status("its warnings"),
     ),
 )
 FELT = "with_friction"  # equation (10), whose contacts are the array's verdict

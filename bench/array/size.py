@@ -35,13 +35,15 @@ SIZE = Table(
         TRIAL,
         Column("shape", "as the manifest has it", Kind.TEXT),
         Column("contacts", "how many touches served"),
-        Column("distances", "how many of their distances served: those of the others are doubtful"),
+        Column(
+            "distances", "how many of their distances served: those of the others have a warning"
+        ),
         *with_sigma("radius_mm", "of a bar or sphere, or of a ring's circle"),
         Column("stated_radius_mm", "the radius as the manifest has it"),
         *with_sigma("half_angle_deg", "of a cone"),
         Column("stated_half_angle_deg", "the half angle as the manifest has it"),
         Column("chance", "that contacts on such a surface lie as far off it"),
-        status("why there is none, or what is doubtful of it"),
+        status("why there is none, or its warnings"),
     ),
 )
 _STEP = 1e-3  # mm, rad: of differences
@@ -120,7 +122,7 @@ def _as_size(unknown: FeltSize, fit: "_SizeFit", freedom: int) -> FeltSize:
 
 
 def one_a_whisker(contacts: Sequence[ContactPoint]) -> list[ContactPoint]:
-    """Return the mean contact of each whisker, known as well as one of them; doubtful ones where it has no others."""
+    """Return the mean contact of each whisker, known as well as one of them; ones with a warning where it has no others."""
     found = []
     for of_whisker in grouped(contacts, lambda contact: contact.whisker).values():
         sound = [contact for contact in of_whisker if not contact.status] or of_whisker

@@ -50,7 +50,7 @@ PLAN = Table(
             "what part of d_x's sigma it leaves; 0 where there is a truth only with it",
         ),
         Column("obstacles", "what stands in a camera's way", Kind.TEXT),
-        status("why there is no truth, or what is doubtful"),
+        status("why there is no truth, or its warnings"),
     ),
 )
 CHANGES = Table(

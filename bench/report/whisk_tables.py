@@ -71,7 +71,7 @@ WHISKS = Table(
         Column(
             "looked", "preset, or settings file, by which the pictures were looked at", Kind.TEXT
         ),
-        status("what is doubtful, seen and felt; or why there is nothing"),
+        status("warnings, seen and felt; or why there is nothing"),
     ),
 )
 

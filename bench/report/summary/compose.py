@@ -14,11 +14,7 @@ from bench.report.summary.error_lines import contact_lines, error_lines
 from bench.report.summary.gauge_lines import gauge_lines
 from bench.report.summary.shared import scatter_warnings, shared_lines
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines, truth_lines
-from bench.report.summary.verdict import (
-    gauge_source_lines,
-    preset_lines,
-    verdict,
-)
+from bench.report.summary.verdict import gauge_source_lines, preset_lines, verdict
 from bench.report.summary.warning_lines import (
     damage_warnings,
     estimator_limits,
@@ -32,7 +28,7 @@ from bench.session.session import Session
 from bench.trials.estimate_errors import judge
 from vision.geometry import counted
 
-WARNINGS = "Doubtful"
+WARNINGS = "Warnings"
 SCORE = "Score against the truth files of this synthetic session (no result knows them)"
 _MOST_ON_SCREEN = 20  # lines: a screen
 # Codes of the sections of analyses in their order; those of other analyses come after these.

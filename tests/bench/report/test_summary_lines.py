@@ -101,10 +101,10 @@ def test_the_screen_shows_the_verdict_and_the_warnings(tmp_path):
     warnings = tuple(f"t{k}, whisk 0: slips in jumps" for k in range(30))
     sections = (
         Section("cameras", "Cameras", ("camera high: 10 views",)),
-        Section("warnings", "Doubtful", warnings),
+        Section("warnings", "Warnings", warnings),
     )
     shown = Summary(("(2) is wrong.",), warnings, sections).on_screen(tmp_path).splitlines()
-    assert shown[:3] == ["(2) is wrong.", "", "Doubtful"]
+    assert shown[:3] == ["(2) is wrong.", "", "Warnings"]
     where = f"All of it: {tmp_path}/report.html, {tmp_path}/summary.txt"
     assert shown[-3:] == ["  and 10 more, in summary.txt", "", where]
     assert len(shown) == 26 and not any("camera high" in line for line in shown)

@@ -23,15 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.commands import cli
-from tests.scenes.faults import (
-    ENTERED_WRONGLY,
-    FAULTS,
-    TRIAL,
-    WHOLE,
-    WITH_BOARDS,
-    alone,
-    copy_of,
-)
+from tests.scenes.faults import ENTERED_WRONGLY, FAULTS, TRIAL, WHOLE, WITH_BOARDS, alone, copy_of
 
 SMALL_SESSION = Path(__file__).resolve().parents[3] / "fixtures" / "small-session"
 SILENT_SIGMAS = 3.0
@@ -93,9 +85,9 @@ def prepared(folder: Path, sound: Path) -> tuple[Path, Path]:
 def warning_lines(printed: str) -> list[str]:
     """Warnings; all lines where there is no verdict."""
     lines = printed.splitlines()
-    if "Doubtful" not in lines:
+    if "Warnings" not in lines:
         return [] if any(line.startswith("All of it: ") for line in lines) else lines
-    after = lines[lines.index("Doubtful") + 1 :]
+    after = lines[lines.index("Warnings") + 1 :]
     return after[: after.index("") if "" in after else None]
 
 
