@@ -8,7 +8,7 @@ from bench.rig import build
 from bench.rig.parts import Job
 from bench.rig.protocol import load
 from bench.rig.recording import Recording
-from vision.geometry.camera import Camera
+from vision.geometry.camera import Camera, Cameras
 from vision.geometry.polyline import normals
 
 STEP_PX = 4.0
@@ -21,16 +21,27 @@ _TRIAL = 2  # first word of a trial's random stream, as bench.rig.parts has it
 def exact_lines(session: Path, protocol: Path, seed: int) -> dict[str, dict[str, list]]:
     """By trial and camera, of each frame the wire's line (n, 2) px from the hub to the tip."""
     job = Job(session, load(protocol), seed, False)
+    cameras = exact_cameras(job)
+    found = {}
+    for number, run in enumerate(job.protocol.runs()):
+        recording = recorded_run(job, run, number)
+        curves = [_curve(recording, *row) for row in recording.frames]
+        found[run.name] = {c.name: [c.project(curve) for curve in curves] for c in cameras}
+    return found
+
+
+def exact_cameras(job: Job) -> Cameras:
+    """The true cameras of a job's protocol."""
     cameras = []
     for c in build.cameras(job.protocol):
         pose = np.column_stack([c.rotation, c.translation_mm])
         cameras.append(Camera(c.name, c.size_px, c.matrix, c.distortion, pose))
-    found = {}
-    for number, run in enumerate(job.protocol.runs()):
-        recording = Recording.make(job.protocol, run, job.stream(_TRIAL, number))
-        curves = [_curve(recording, *row) for row in recording.frames]
-        found[run.name] = {c.name: [c.project(curve) for curve in curves] for c in cameras}
-    return found
+    return Cameras(tuple(cameras))
+
+
+def recorded_run(job: Job, run, number: int) -> Recording:
+    """What the rig records of a job's run, of this number among all."""
+    return Recording.make(job.protocol, run, job.stream(_TRIAL, number))
 
 
 def _curve(recording, _time_s, motor_rad, whisk, back):
