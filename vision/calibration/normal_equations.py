@@ -268,13 +268,15 @@ class _SightingRows(NamedTuple):
 
 def common_modes(board: Board, seen: np.ndarray) -> np.ndarray:
     """Return the orthonormal changes (3 m, k) of a board's points that are no errors of theirs: motions of
-    a face as one, which are its pose, and of all faces by the print's scale and stretch.
+    a face as one, which are its pose, and a plane's scale and stretch, which no view shows apart from
+    distance and lens.
 
     seen (n,): the points seen. A face of which too few are has no motions.
     """
     is_seen = np.isin(np.arange(len(board.face_of)), seen)
+    faces = np.unique(board.face_of)
     modes = []
-    for face in np.unique(board.face_of):
+    for face in faces:
         points = np.flatnonzero(is_seen & (board.face_of == face))
         if len(points) < _FEWEST_POINTS:
             continue
@@ -283,9 +285,11 @@ def common_modes(board: Board, seen: np.ndarray) -> np.ndarray:
         motions = np.zeros((*board.corners_mm.shape, N_VIEW))
         motions[points] = np.concatenate([shifts, -skew(away)], axis=2)
         modes.append(motions)
-    by_size = board.printed(board.stated_terms)[1][:, :, _SIZES]
-    columns = np.concatenate([*modes, is_seen[:, None, None] * by_size], axis=2)
-    return np.linalg.qr(columns.reshape(-1, columns.shape[2]))[0]
+    if len(faces) == 1:
+        by_size = board.printed(board.stated_terms)[1][:, :, _SIZES]
+        modes.append(is_seen[:, None, None] * by_size)
+    columns = np.concatenate(modes, axis=2).reshape(board.corners_mm.size, -1)
+    return np.linalg.qr(columns)[0]
 
 
 def _with_priors(
