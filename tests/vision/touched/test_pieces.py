@@ -8,10 +8,13 @@ import pytest
 from tests.studies.accuracy.board_scenes import two_cameras
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
+from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
 from vision.touched.pieces import bar_pieces, beside_wires
+from vision.touched.search import BarSearch
+from vision.touched.search_scene import SearchScene
 from vision.wire.bands import Pieces
 
 
@@ -44,3 +47,18 @@ def test_a_bar_about_a_camera_is_refused():
     with pytest.raises(Refused) as refused:
         bar_pieces(view, view.noise, about, 3.0, [], VisionSettings())
     assert refused.value.code == "bar_behind_camera"
+
+
+def test_a_bar_about_a_camera_does_not_end_the_search():
+    """Of an empty bench each view has no candidate; that axis refused the whole recording."""
+    cameras = two_cameras()
+    views = []
+    for camera in cameras:
+        width, height = camera.size_px
+        grey = np.full((height, width), 100.0)
+        views.append(View(camera, {0: grey}, grey, Noise(1.0, 0.0)))
+    beside_mm = np.array([0.5, 0.0, 0.0])
+    about = BarAxis(cameras["high"].centre_mm + beside_mm, np.array([0.0, 0.0, 1.0]))
+    rods = Rods(Wire("cylinder", 100.0, 1.0), Bar(6.0))
+    scene = SearchScene(views, cameras, rods, np.zeros(1), VisionSettings())
+    assert BarSearch(scene)._candidates([about]) == []
