@@ -9,6 +9,7 @@ how light that changes as the whisker turns, and cameras, move them. In the hub'
 mm, slopes in mm at the tip.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,13 +87,21 @@ def base_lines(problem: Problem, state: State) -> BaseLines | None:
     for frame, angle in zip(frames, motor_rad):
         own_line = _own_line([r for r in rows if r.frame == frame], shape)
         lines.append(_in_space(own_line, angle, length_mm))
+    in_common = _shared(covariance, float(motor_rad.mean()), length_mm)
+    return _as_base_lines(motor_rad, lines, in_common)
+
+
+def _as_base_lines(
+    motor_rad: np.ndarray, lines: Sequence["_SpaceLine"], in_common: np.ndarray
+) -> BaseLines:
+    """Return the lines of all frames; in_common (6, 6): see `BaseLines.shared_covariance`."""
     return BaseLines(
         motor_rad=motor_rad,
         point_mm=np.array([line.point_mm for line in lines]),
         point_covariance=np.array([line.point_covariance for line in lines]),
         direction=np.array([line.direction for line in lines]),
         direction_covariance=np.array([line.direction_covariance for line in lines]),
-        shared_covariance=_shared(covariance, float(motor_rad.mean()), length_mm),
+        shared_covariance=in_common,
         point_by_shared=np.array([line.point_by_shared for line in lines]),
         direction_by_shared=np.array([line.direction_by_shared for line in lines]),
     )

@@ -339,17 +339,22 @@ def _hide_wire(hidden: np.ndarray, camera: Camera, curve: Curves, rods: Rods) ->
 
 def _change(still: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarray:
     """Return the confidence (m, k) that samples are not as without rods; _UNKNOWN where hidden."""
-    along = (1, _AVERAGED)  # OpenCV's order: across, along
-    share = cv2.blur(shows.astype(np.float32), along)
+    share = _averaged(shows)
     seen = shows & (share > 0.5)
     if not np.any(seen):
         return np.full(still.shape, _UNKNOWN)
-    difference = np.where(shows, still - _relit(still, empty, shows), 0.0).astype(np.float32)
-    mean = cv2.blur(difference, along) / np.maximum(share, 0.5)
-    level = cv2.blur(np.where(shows, empty, 0.0).astype(np.float32), along) / np.maximum(share, 0.5)
+    difference = np.where(shows, still - _relit(still, empty, shows), 0.0)
+    mean = _averaged(difference) / np.maximum(share, 0.5)
+    level = _averaged(np.where(shows, empty, 0.0)) / np.maximum(share, 0.5)
     z = np.abs(mean) / _noise(mean, level, seen)
     changed = np.clip((z - _NOISE_SIGMAS) / _SURE_SIGMAS, 0.0, 1.0)
     return np.where(seen, changed, _UNKNOWN)
+
+
+def _averaged(samples: np.ndarray) -> np.ndarray:
+    """Return samples (m, k) averaged along the bar."""
+    across_along = (1, _AVERAGED)  # OpenCV's order
+    return cv2.blur(samples.astype(np.float32), across_along)
 
 
 def _light_design(empty: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ Golub and Pereyra 1973, in Kaufman's form).
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -134,7 +135,7 @@ class Point:
 
     left: normal matrix (size, size) of the shading. by_knot (knots, terms): the shading at its knots.
     coefficients (s, terms): of each segment.
-    chi2 (s,): of each segment. misfit: all chi² by weight, and what the priors add.
+    chi2 (s,): of each segment.
     stiff (size, size): prior of the shading. robust (s,): weight of each segment.
     """
 
@@ -148,7 +149,14 @@ class Point:
     by_knot: np.ndarray
     coefficients: np.ndarray
     chi2: np.ndarray
-    misfit: float
+
+    @cached_property
+    def misfit(self) -> float:
+        """Return all chi² by weight, and what the priors add."""
+        shading = self.by_knot.ravel()
+        of_shading = shading @ self.stiff @ shading
+        of_blur = self.task.blur_deviation(self.log_blur) ** 2
+        return float(self.robust @ self.chi2 + of_shading + of_blur)
 
     @classmethod
     def at(
@@ -177,9 +185,6 @@ class Point:
         shared = _solve_positive(left, right)
         by_knot = shared.reshape(weights.shape[1], task.terms)
         coefficients = weights @ by_knot
-        chi2 = equations.chi2(coefficients)
-        of_priors = shared @ stiff @ shared + task.blur_deviation(log_blur) ** 2
-        misfit = float(robust @ chi2 + of_priors)
         return cls(
             task=task,
             shift_px=shift_px,
@@ -190,8 +195,7 @@ class Point:
             left=left,
             by_knot=by_knot,
             coefficients=coefficients,
-            chi2=chi2,
-            misfit=misfit,
+            chi2=equations.chi2(coefficients),
         )
 
     @classmethod

@@ -76,18 +76,18 @@ def _seen_bins(pieces: Pieces, reach_px: float) -> np.ndarray:
     bins = np.floor((pieces.offset_px[is_used] + reach_px) * _BINS_PER_PX).astype(int)
     size = int(np.ceil(2 * reach_px * _BINS_PER_PX)) + 1
     count = np.maximum(np.bincount(bins, minlength=size), 1)
-
-    def mean_of(values: np.ndarray) -> np.ndarray:
-        """Return the mean of the pixels' values in each bin."""
-        return np.bincount(bins, values, minlength=size) / count
-
     variance = pieces.weight[is_used] ** -2.0
     difference = (pieces.grey - pieces.background)[is_used]
-    power = mean_of(difference**2 - variance)
-    noise = mean_of(variance) * np.sqrt(2.0 / count)
+    power = _means(bins, difference**2 - variance, count)
+    noise = _means(bins, variance, count) * np.sqrt(2.0 / count)
     strength = np.sqrt(np.maximum(power, 0.0))
     exceeds_noise = power > _LEAST_SIGMAS * noise
     return exceeds_noise & (strength > _LEAST_SHARE * strength.max())
+
+
+def _means(bins: np.ndarray, values: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Return the mean (b,) of values (n,) in each bin, of which count (b,) values are."""
+    return np.bincount(bins, values, minlength=len(count)) / count
 
 
 @dataclass(frozen=True)
