@@ -200,15 +200,13 @@ class FittedWhisk:
         cls,
         problem: Problem,
         state: State,
-        gain: np.ndarray,
+        inverse_normal: np.ndarray,
         frames: list[int],
         lines: LineSource | None = None,
     ) -> Self:
-        """Return a fit with its uncertainty; gain (size, size): the second result of `solve`, which is
-        `Uncertainty.inverse_normal`.
-        """
+        """Return a fit with its uncertainty; inverse_normal (size, size): the second result of `solve`."""
         measured, by_parameter = jacobians(problem, state)
-        errors = uncertainty(problem, state, gain)
+        errors = uncertainty(problem, state, inverse_normal)
         return cls(problem, state, frames, errors, measured, by_parameter, lines)
 
     @cached_property

@@ -130,7 +130,7 @@ def expect_by_bends(
     curves, arcs_mm = coarse_curves(whisk, rest_mm, coarse)
     came = _expected_to_come_mm(whisk)
     if whisk.gives is not None:
-        came = _given_way(whisk, list(curves.values()), touching)
+        came = _given_way_mm(whisk, list(curves.values()), touching)
         whisk = whisk.yielding(came, _coarse_touch_rad(whisk, touching, free))
     place = WhiskPlace(whisk.bar.axis, curves, whisk.bar_swept_mm, came)
     return whisk, ExpectedWhisk(place, rest_mm, bend, arcs_mm, touching, free)
@@ -185,7 +185,9 @@ def coarse_curves(
     return {frame: curves.one(k) for k, frame in enumerate(whisk.frames)}, arcs_mm
 
 
-def _given_way(whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndarray) -> np.ndarray:
+def _given_way_mm(
+    whisk: WhiskPictures, curves: Sequence[Curves], touching: np.ndarray
+) -> np.ndarray:
     """Return the displacement (f, 3) of a bar that gives way, mm: by how far curves pass its place."""
     axis = whisk.bar.axis
     came = np.zeros((len(curves), 3))
@@ -208,13 +210,13 @@ def _fit(
     """
     prior = whisk.axis_prior(expected.place.axis)
     problem = Problem(
-        whisk.cameras,
-        whisk.rods,
-        prior.axis,
-        whisk.angles_rad,
-        expected.touching,
-        ~expected.free,
-        seen,
+        cameras=whisk.cameras,
+        rods=whisk.rods,
+        axis=prior.axis,
+        motor_rad=whisk.angles_rad,
+        touching=expected.touching,
+        bent=~expected.free,  # may bend
+        seen=seen,
         motion=whisk.motion,
         onset=whisk.onset,
         axis_sigma=prior.sigma,
@@ -272,7 +274,13 @@ def fit_before_touch(
     nothing = np.zeros(len(whisk.frames), dtype=bool)
     seen = lines.all_points(place, last=False)
     problem = Problem(
-        whisk.cameras, whisk.rods, whisk.bar.axis, whisk.angles_rad, nothing, nothing, seen
+        cameras=whisk.cameras,
+        rods=whisk.rods,
+        axis=whisk.bar.axis,
+        motor_rad=whisk.angles_rad,
+        touching=nothing,
+        bent=nothing,
+        seen=seen,
     )
     middle_mm = np.full(len(nothing), 0.5 * whisk.rods.wire.length_mm)
     vector = np.zeros(problem.size)
