@@ -44,8 +44,10 @@ def check_scale(session: Session, cameras: Cameras) -> tuple[list[str], list[Rea
     share = float(np.median(shares))
     sigma = float(np.hypot(SIGMA_SHARE, scatter) / np.sqrt(len(shares)))
     _check_bar_diameter(session, trials, share, sigma)
-    looks = f"bars look {share:.3f} ± {sigma:.3f} times as thick as stated"
-    return [f"Bars as a second length: {looks}; that agrees with square_mm."], []
+    times = f"{share:.3f} ± {sigma:.3f} times"
+    return [
+        f"A second length: bars look {times} as thick as stated; that agrees with square_mm."
+    ], []
 
 
 def _scatter_warning(shares: np.ndarray, scatter: float) -> Reason:
@@ -57,7 +59,7 @@ def _scatter_warning(shares: np.ndarray, scatter: float) -> Reason:
     if scatter > _MOST_SCATTER:
         cure = "measure a square of the board and enter it, then check T_rig_board"
         raise BadInput(f"{seen}: {cure}", file="session.toml")
-    return Reason("scale_unconfirmed", f"Bars as a second length: {seen}: check both")
+    return Reason("scale_unconfirmed", f"A second length: {seen}: check both")
 
 
 def _has_measurable_bar(trial: Trial, session: Session) -> bool:
