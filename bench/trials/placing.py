@@ -273,7 +273,7 @@ def _converge(
     exact = _as_exact(board)
     here = _moved(calibration, board, exact)
     for round_number in range(_MOST_ROUNDS):
-        units = [replace(unit, calibration=here, stage=f"swing{round_number}") for unit in chosen]
+        units = [_of_swing(unit, here, f"swing{round_number}") for unit in chosen]
         both = place(board, units, see_units(units, pool, "free strokes", problems))
         if np.all(np.abs(both.step) < _SMALL_STEP):
             break
@@ -281,6 +281,14 @@ def _converge(
         board = replace(board, step=board.step - both.step)
         both = replace(both, step=exact.step)
     return _with_scale(_moved(here, exact, both), both), both
+
+
+def _of_swing(unit: Unit, calibration: SessionCalibration, stage: str) -> Unit:
+    """Return a unit of which the free stroke is read, without checks of what bends: nothing reads them."""
+    seeing = unit.settings.seeing
+    vision = replace(seeing.vision, check_beam=False)
+    settings = replace(unit.settings, seeing=replace(seeing, vision=vision))
+    return replace(unit, calibration=calibration, settings=settings, stage=stage)
 
 
 def _with_scale(calibration: SessionCalibration, placed: Placement) -> SessionCalibration:
