@@ -83,7 +83,8 @@ def test_a_camera_that_took_no_pictures_is_refused():
 
 
 def test_rows_and_the_line_of_the_summary(tmp_path):
-    result = SimpleNamespace(trial=SimpleNamespace(name="b00", surface="steel"))
+    trial = SimpleNamespace(name="b00", surface="steel", speed_deg_s=10.0)
+    result = SimpleNamespace(trial=trial)
     truth = seen_whisk(d_x_mm=Value(60.0, 0.03), touch_rad=Value(0.04, 1e-4))
     found = [
         ShapeSeen(result, truth, ByOneCamera("one", d_x_mm=Value(60.0 + error, 0.4)))
