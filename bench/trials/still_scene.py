@@ -19,8 +19,9 @@ Pictures = Mapping[int, np.ndarray]
 # Twice what sound scenes show, where a lit wire moves through the dark (0.028 in 54 scenes). Five of eleven frames 10 %
 # brighter move the slope by 1.4 sigma, 20 % darker by 3.3 (tests/studies/accuracy/faults.py OUT exposure).
 _STEADY = 0.05
-# A frame whose exposure is further off is not made good: what is clipped or lost in noise stays so.
+# A brighter frame is not made good: what is clipped stays so. Of a darker one only the noise grows.
 _MOST_CORRECTED = 1.25
+_LEAST_CORRECTED = 0.6
 # what is less is measured by the corners of the rig board, or not told from none
 _LEAST_MOVED_PX = 3.0
 # times: a picture that shows the scene otherwise does so much more clearly than as it is
@@ -124,7 +125,7 @@ def evenly_exposed(name: str, pictures: Pictures) -> tuple[Pictures, list[str], 
     corrected, lost = {}, {}
     for k, gain in zip(indices, gains):
         if abs(gain - 1.0) > _STEADY:
-            is_usable = 1.0 / _MOST_CORRECTED < gain < _MOST_CORRECTED
+            is_usable = _LEAST_CORRECTED < gain < _MOST_CORRECTED
             (corrected if is_usable else lost)[k] = gain
     if not corrected and not lost:
         return pictures, [], []

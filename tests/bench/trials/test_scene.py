@@ -64,14 +64,14 @@ def series(gains, rng):
 
 
 def test_exposure_is_made_good(rng):
-    pictures = series([1.0, 1.0, 1.0, 1.1, 0.85], rng)
+    pictures = series([1.0, 1.0, 1.0, 1.1, 0.7], rng)
     even, lines, lost = evenly_exposed("low", pictures)
     assert not lost
     assert lines == [
-        "camera low: 2 of 5 frames are 0.850 to 1.100 times as bright as most, made good (from frame 3 on)"
+        "camera low: 2 of 5 frames are 0.700 to 1.100 times as bright as most, made good (from frame 3 on)"
     ]
     for grey in even.values():
-        np.testing.assert_allclose(grey, pictures[0].astype(float), atol=1.1)
+        np.testing.assert_allclose(grey, pictures[0].astype(float), atol=1.3)
 
 
 def test_exposure_far_off_is_left_out(rng):
