@@ -130,7 +130,7 @@ def _weigh_rivals(best: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
 def ask_early(whisk: WhiskPictures, curves: Mapping[int, Curves]) -> BarQuestion | None:
     """Return the question about the bar where a whisk's search has it, its best place known already.
 
-    curves: by frame, of the wire, to a pixel or two. None where the bar may not be asked about.
+    curves: by frame, of the wire, to a pixel or two. None where the pictures cannot answer it.
     """
     if not _may_be_asked(whisk):
         return None
@@ -141,13 +141,13 @@ def ask_early(whisk: WhiskPictures, curves: Mapping[int, Curves]) -> BarQuestion
     return question
 
 
-def unexplained(fit: Explanation, asked: BarQuestion | None) -> Reason:
+def unexplained(fit: Explanation, earlier: BarQuestion | None) -> Reason:
     """Return why a fit may not be the truth, without another fit; no reason where nothing says so.
 
-    Another place explains the pictures better, or the fit ended far from its beginning. asked: the
-    question about the fit's bar, as asked before it was known; None where it is still to be asked.
+    Another place explains the pictures better, or the fit ended far from its beginning. earlier:
+    the question about the fit's bar, of before the fit was known; None where there is none yet.
     """
-    question = _question(fit, asked)
+    question = _question(fit, earlier)
     if question is None:
         return NO_REASON
     place = _better_place(question, fit)
@@ -163,15 +163,15 @@ def _may_be_asked(whisk: WhiskPictures) -> bool:
     return is_straight and is_known and whisk.motion is None
 
 
-def _question(fit: Explanation, asked: BarQuestion | None = None) -> BarQuestion | None:
-    """Return the question about a fit, as asked before or now; None where pictures cannot answer it.
+def _question(fit: Explanation, earlier: BarQuestion | None = None) -> BarQuestion | None:
+    """Return the question about a fit, an earlier one or a new one; None where pictures cannot answer it.
 
-    They can where the bar may be asked about and every camera sees it: a fit that reads a bar where a
+    They can where the bar is one to ask about and every camera sees it: a fit that reads a bar where a
     camera sees none could be worse.
     """
     if not _may_be_asked(fit.whisk):
         return None
-    question = asked or fit.question()
+    question = earlier or fit.question()
     return question if len(question.bands) == len(fit.whisk.views) else None
 
 
