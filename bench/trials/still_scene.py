@@ -19,8 +19,9 @@ Pictures = Mapping[int, np.ndarray]
 # Twice what sound scenes show, where a lit wire moves through the dark (0.028 in 54 scenes). Five of eleven frames 10 %
 # brighter move the slope by 1.4 sigma, 20 % darker by 3.3 (tests/studies/accuracy/faults.py OUT exposure).
 _STEADY = 0.05
-# A brighter frame is not made good: what is clipped stays so. Of a darker one only the noise grows.
+# A brighter frame is not made good: what is clipped stays so.
 _MOST_CORRECTED = 1.25
+# Of a darker one only the noise grows; one of 0.79 at touch is as good as the others (path-traced, flickering light).
 _LEAST_CORRECTED = 0.6
 # what is less is measured by the corners of the rig board, or not told from none
 _LEAST_MOVED_PX = 3.0
