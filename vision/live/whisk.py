@@ -43,7 +43,7 @@ from vision.touched.search_scene import SearchScene
 from vision.truth.explanations import Explanation, ask_early, unexplained
 from vision.truth.last_question import FRAMES, BarQuestion
 from vision.truth.line_source import WhiskPlace
-from vision.truth.observe import NOT_CONVERGED, views_facing, warnings_of
+from vision.truth.observe import views_facing, warnings_of, why_failed
 from vision.truth.records import WhiskTruth
 from vision.truth.strategies import Strategy, strategies
 from vision.truth.traced_lines import TracedLines
@@ -214,7 +214,7 @@ class LiveWhisk:
             if self.bench.wire is not None and self._reading is None:
                 self._forget_wire()
             else:
-                self.refused = reason.reason if isinstance(reason, Refused) else NOT_CONVERGED
+                self.refused = why_failed(reason)
         return True
 
     def _forget_wire(self) -> None:
@@ -229,10 +229,8 @@ class LiveWhisk:
         if self.refused is None:
             try:
                 return self._truth()
-            except Refused as reason:
-                self.refused = reason.reason
-            except np.linalg.LinAlgError:
-                self.refused = NOT_CONVERGED
+            except (Refused, np.linalg.LinAlgError) as reason:
+                self.refused = why_failed(reason)
         return self._without_truth(self.refused)
 
     def lines_px(self) -> dict[str, dict[str, np.ndarray]]:

@@ -294,10 +294,14 @@ def see_whisk(
         except (Refused, np.linalg.LinAlgError) as reason:
             begins_anew = _again(whisk, reason)
             if begins_anew is None:
-                why = reason.reason if isinstance(reason, Refused) else NOT_CONVERGED
-                return _refused(whisk, why), None
+                return _refused(whisk, why_failed(reason)), None
             whisk = begins_anew
     return truth_of(explained), explained
+
+
+def why_failed(error: Refused | np.linalg.LinAlgError) -> Reason:
+    """Return why a fit gave no truth: its refusal, or that it has not converged."""
+    return error.reason if isinstance(error, Refused) else NOT_CONVERGED
 
 
 def _again(whisk: WhiskPictures, reason: Exception) -> WhiskPictures | None:

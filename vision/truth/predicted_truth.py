@@ -17,7 +17,7 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.touched.one_view import seen_from_one_side
 from vision.truth.at_angle import scatter
 from vision.truth.known_whisk import KnownWhisk
-from vision.truth.observe import NOT_CONVERGED
+from vision.truth.observe import why_failed
 from vision.truth.predicted_lines import PredictedLines
 from vision.truth.records import WhiskTruth
 from vision.truth.sight import Hides, Sight, blank_view, find_sight
@@ -116,10 +116,8 @@ def predict_truth(
     lines = PredictedLines(known, cameras, sights, noise)
     try:
         fitted = _fit(lines)
-    except Refused as refused:
-        return _without_truth(lines, refused.reason)
-    except np.linalg.LinAlgError:
-        return _without_truth(lines, NOT_CONVERGED)
+    except (Refused, np.linalg.LinAlgError) as error:
+        return _without_truth(lines, why_failed(error))
     frames = range(len(known.motor_rad))
     views = [blank_view(camera, frames) for camera in cameras]
     truth = to_whisk(known.pictured(views, cameras, settings), fitted)
