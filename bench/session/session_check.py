@@ -17,7 +17,7 @@ from bench.session.frame_times import frame_times
 from bench.session.object_board import board_on_object
 from bench.session.session import Session, load_session
 from bench.session.signals import Signals, forward_strokes, read_signals
-from bench.session.traces import read_object_points, read_traces, read_traces_alone
+from bench.session.traces import read_traces, read_traces_alone
 from bench.session.trial import PLACE_UNCHECKED, Trial, require_object_placed
 from bench.session.whisker import Whisker
 from vision.calibration import read_cameras
@@ -201,8 +201,7 @@ def check_traces(session: Session, problems: InputProblems) -> None:
     for trial in alone:
         with problems.guard():
             count = len(frame_times(trial))
-            read_traces_alone(trial, count, sizes_px)
-            points = read_object_points(trial, count, sizes_px)
+            points = read_traces_alone(trial, count, sizes_px).object_points
             is_stated = session.truth is not None
             require_object_placed(trial, has_points=bool(points), is_stated=is_stated)
             if not points:

@@ -9,7 +9,7 @@ Anipose's points in space, `trace_3d.csv`, with its cameras, `trace_3d.toml`. Po
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -80,40 +80,38 @@ def read_traces(
     return traces
 
 
+class TracesAlone(NamedTuple):
+    """What a trial without pictures has, by camera: the wire's traces, and the points of its object."""
+
+    wire: dict[str, Traced]
+    object_points: dict[str, Traced]
+
+
 def read_traces_alone(
     trial: Trial, count: int, sizes_px: Mapping[str, tuple[int, int]]
-) -> dict[str, Traced]:
-    """Return the wire's traces by camera of a trial that has no pictures.
+) -> TracesAlone:
+    """Return the traces of a trial that has no pictures.
 
-    count: of the trial's frames. sizes_px: of the pictures of the cameras that are calibrated, empty where none is
-    known. Raises BadInput where a file cannot be read or is not of these frames.
-    """
-    traces = {}
-    for name, (drawn, of_file) in _drawn(trial.trace_files, list(sizes_px), trial.place).items():
-        camera = _camera_alone(name, count, sizes_px, of_file)
-        traces[name] = _checked(drawn.of_wire, name, camera, of_file)
-    return traces
-
-
-def read_object_points(
-    trial: Trial, count: int, sizes_px: Mapping[str, tuple[int, int]]
-) -> dict[str, Traced]:
-    """Return the points of the object by camera of a trial that has no pictures.
-
-    They are in files of their own, or else joints of the wire's traces that are named for the object. count, sizes_px, and
-    what is raised: as of `read_traces_alone`.
+    Points of the object are in files of their own, or else joints of the wire's traces that are named for it. count: of the
+    trial's frames. sizes_px: of the pictures of the cameras that are calibrated, empty where none is known. Raises
+    BadInput where a file cannot be read or is not of these frames.
     """
     cameras = list(sizes_px)
-    files = dict(_drawn(trial.object_files, cameras, trial.place))
-    for name, (drawn, of_file) in _drawn(trial.trace_files, cameras, trial.place).items():
+    of_wire = _drawn(trial.trace_files, cameras, trial.place)
+    wire = {}
+    for name, (drawn, of_file) in of_wire.items():
+        camera = _camera_alone(name, count, sizes_px, of_file)
+        wire[name] = _checked(drawn.of_wire, name, camera, of_file)
+    of_object = dict(_drawn(trial.object_files, cameras, trial.place))
+    for name, (drawn, of_file) in of_wire.items():
         joints = drawn.of_object
         if len(joints.frame):
-            files.setdefault(name, (joints, of_file))
+            of_object.setdefault(name, (joints, of_file))
     points = {}
-    for name, (drawn, of_file) in files.items():
+    for name, (drawn, of_file) in of_object.items():
         camera = _camera_alone(name, count, sizes_px, of_file)
         points[name] = _checked(drawn, name, camera, of_file)
-    return points
+    return TracesAlone(wire, points)
 
 
 def has_points_in_one_camera(trial: Trial) -> bool:

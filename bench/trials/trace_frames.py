@@ -9,7 +9,7 @@ from bench.cameras.session_cameras import SessionCalibration
 from bench.session.frame_times import frame_times
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
-from bench.session.traces import Traced, read_object_points, read_traces_alone
+from bench.session.traces import Traced, read_traces_alone
 from bench.session.trial import PLACE_UNCHECKED, Trial
 from bench.trials.placed_by_board import place_by_board
 from bench.trials.stated_truth import stated_place
@@ -33,8 +33,9 @@ def traced_frames(
     times = frame_times(trial)
     cameras = calibration.cameras
     sizes_px = {camera.name: tuple(camera.size_px) for camera in cameras}
-    traces = _asked(read_traces_alone(trial, len(times), sizes_px), settings)
-    points = read_object_points(trial, len(times), sizes_px)
+    alone = read_traces_alone(trial, len(times), sizes_px)
+    traces = _asked(alone.wire, settings)
+    points = alone.object_points
     motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
     if points:
         asked = _asked(points, settings)
