@@ -2,10 +2,10 @@
 
 import argparse
 from functools import partial
-from pathlib import Path
 
 from bench.base.progress import begin_step
 from bench.commands.options import DONE, Verbs, add_session, add_verb, add_workers
+from bench.rig.built_in import protocol_names
 
 
 def add(verbs: Verbs) -> None:
@@ -22,7 +22,7 @@ def add(verbs: Verbs) -> None:
         "--protocol",
         default="quick",
         metavar="NAME|FILE",
-        help=f"{', '.join(_built_in())} or a TOML file (default quick)",
+        help=f"{protocol_names()} or a TOML file (default quick)",
     )
     verb.add_argument(
         "--signals-only",
@@ -53,9 +53,3 @@ def run(options: argparse.Namespace) -> int:
         announce=partial(print, flush=True),
     )
     return DONE
-
-
-def _built_in() -> list[str]:
-    """Return the names of the protocols that come with the rig."""
-    folder = Path(__file__).resolve().parents[1] / "rig" / "protocols"
-    return sorted(path.stem for path in folder.glob("*.toml"))

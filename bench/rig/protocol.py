@@ -10,6 +10,7 @@ from typing import Annotated
 import msgspec
 
 from bench.base.errors import BadInput
+from bench.rig.built_in import FOLDER, protocol_names
 from bench.rig.feasible import check_protocol
 from bench.rig.protocol_tables import (
     BoardTable,
@@ -27,8 +28,6 @@ from bench.rig.protocol_tables import (
     TrialTable,
     WhiskerTable,
 )
-
-FOLDER = Path(__file__).with_name("protocols")
 
 
 class Protocol(ProtocolTable, kw_only=True):
@@ -147,9 +146,9 @@ def load(protocol: str | Path) -> Protocol:
         tables = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
         found = msgspec.convert(tables, Protocol)
     except OSError as problem:
-        known = ", ".join(sorted(built_in.stem for built_in in FOLDER.glob("*.toml")))
         raise BadInput(
-            f"cannot be read ({problem.strerror}); the built-in protocols are {known}", file=path
+            f"cannot be read ({problem.strerror}); the built-in protocols are {protocol_names()}",
+            file=path,
         ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as problem:
         raise BadInput(f"is not TOML: {problem}", file=path) from None
