@@ -169,7 +169,7 @@ class LitRod:
         self, normal: np.ndarray, precision: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the deviance (k, …) of linear Gaussian models, and their misfit (k, …): χ² per
-        bin.
+        bin of the profile, less what the pattern always adds.
 
         normal (k, …, n, n): products of the whitened columns [A y], the light y last; only its
         lower triangle is used. precision (n - 1, n - 1): P of the coefficients.
@@ -180,21 +180,21 @@ class LitRod:
         prior = np.eye(len(precision) + 1)  # 1 keeps it positive definite where χ² is 0
         prior[:-1, :-1] = precision
         diagonal = np.diagonal(np.linalg.cholesky(normal + prior), axis1=-2, axis2=-1)
-        chi2 = diagonal[..., -1] ** 2 - 1.0
+        least_chi2 = self.profiles.pattern.least_chi2[:, None]
+        chi2 = diagonal[..., -1] ** 2 - 1.0 - least_chi2
         log_determinant = 2.0 * np.sum(np.log(diagonal[..., :-1]), axis=-1)
         prior_log_determinant = np.linalg.slogdet(precision)[1]
         deviance = chi2 + log_determinant - prior_log_determinant
         deviance = deviance + self.profiles.log_jacobian[:, None]
         bins = np.maximum(np.sum(self.profiles.is_observed, axis=1), 1)
-        return deviance, chi2 / bins[:, None]
+        return deviance, np.maximum(chi2, 0.0) / bins[:, None]
 
     @cached_property
     def without_rod(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the deviance (k,) of the background alone, without a rod, and its misfit (k,) per
         bin."""
-        return self._marginalise_columns(
-            self._background_columns, self._outside_precision[[0, 1, 4]]
-        )
+        precision = self._outside_precision[[0, 1, 4]]
+        return self._marginalise_columns(self._background_columns, self._pattern_shares, precision)
 
     @cached_property
     def _background_columns(self) -> np.ndarray:
@@ -203,6 +203,13 @@ class LitRod:
         slope = self.profiles.offset_px / OUTSIDE_PX
         columns = [1.0, slope, background]
         return np.stack([np.broadcast_to(column, background.shape) for column in columns])
+
+    @property
+    def _pattern_shares(self) -> np.ndarray:
+        """Return how much of the background's pattern is in each of `_background_columns`."""
+        shares = np.zeros_like(self._background_columns)
+        shares[2] = 1.0
+        return shares
 
     def detection_score(self, evidence: "Evidence") -> float:
         """Return log of the misfit without the bar over that with it, of the median segment.
@@ -222,20 +229,27 @@ class LitRod:
         """Return the misfit (k,) per bin of a single edge at edge_px (k,) between two
         backgrounds."""
         beyond = ndtr((self.profiles.offset_px - edge_px[:, None]) / blur_px)
-        columns = self._background_columns
-        both_sides = np.concatenate([(1.0 - beyond) * columns, beyond * columns])
+
+        def on_both_sides(columns: np.ndarray) -> np.ndarray:
+            return np.concatenate([(1.0 - beyond) * columns, beyond * columns])
+
+        columns = on_both_sides(self._background_columns)
+        shares = on_both_sides(self._pattern_shares)
         precision = np.tile(self._outside_precision[[0, 1, 4]], 2)
-        return self._marginalise_columns(both_sides, precision)[1]
+        return self._marginalise_columns(columns, shares, precision)[1]
 
     def _marginalise_columns(
-        self, columns: np.ndarray, precision: np.ndarray
+        self, columns: np.ndarray, shares: np.ndarray, precision: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the deviance and the misfit (k,) of columns (n, k, b) whose coefficients have
-        precision (n,)."""
+        precision (n,).
+
+        shares (n, k, b): of the background's pattern in each.
+        """
         profiles = self.profiles
         design = np.stack([*columns, profiles.light], axis=-1)  # (k, b, n + 1)
         whitened = np.sqrt(profiles.weight)[..., None] * design
-        normal = np.swapaxes(whitened, -1, -2) @ whitened
+        normal = np.swapaxes(whitened, -1, -2) @ whitened + profiles.pattern.products(shares)
         deviance, misfit = self.marginalise(normal[:, None], np.diag(precision))
         return deviance[:, 0], misfit[:, 0]
 
@@ -440,14 +454,13 @@ def _normal_matrices(profiles: Profiles, tried: _Positions, design: _Design) -> 
     """
     windows = _shifted_moments(profiles, tried)
     products = [window @ table for window, table in zip(windows, design.products)]
-    power = np.sum(profiles.weight * profiles.light**2, axis=1)
     sums = [
         products[0],
         products[1] + products[2],
         products[3] + products[4] + products[5],
         products[6],
         products[7] + products[8],
-        np.repeat(power, len(tried.shifts))[:, None],
+        np.repeat(profiles.power, len(tried.shifts))[:, None],
     ]
     _, _, element = _element_layout(design.light.shape[1])
     elements = np.concatenate(sums, axis=1).take(element.ravel(), axis=1)

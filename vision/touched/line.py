@@ -21,6 +21,7 @@ from vision.geometry.optics import LEAST_PROBABILITY, Optics, probable_gammas
 from vision.geometry.rotation import unit
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
+from vision.touched.patches import FULL_SCALE
 from vision.touched.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces, beside_wires
 from vision.touched.posterior import (
     Posterior,
@@ -28,7 +29,6 @@ from vision.touched.posterior import (
     fit_quick,
     refine,
 )
-from vision.touched.profiles import FULL_SCALE
 from vision.wire.bands import Pieces
 from vision.wire.points import SHARED, LinePoints
 
@@ -338,6 +338,7 @@ def _read_pieces(
         background=pieces.background * scale,
         slope=pieces.slope * scale,
         weight=pieces.weight / scale,
+        noise_behind=np.full(len(pieces), 1.0 / view.mean_share),
     )
 
 

@@ -25,12 +25,11 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from vision.geometry.optics import light_of
 from vision.pictures.view import SATURATED
+from vision.touched.patches import FULL_SCALE, MEDIAN_SQUARED, TINY, PatchDifferences, PatchSums
+from vision.touched.pattern import Pattern, sum_pattern
 from vision.wire.bands import Pieces
 
-# [grey] Largest value of a picture of 8 bit. Stated.
-FULL_SCALE = 255.0
 # [px] Step of the grid across the bar: a third of a lens blur. Study: thresholds.py
 # touched.profiles STEP_PX ….
 STEP_PX = 0.25
@@ -49,13 +48,9 @@ _MODEL_ERROR_SHARE = 0.001
 _CORRELATION_PX = 1.0
 # [steps] Window over which the texture is averaged: the distance of correlated errors. Derived.
 _TEXTURE_WINDOW = 5
-# [1] Median of the square of a standard Gaussian variable. Derived.
-_MEDIAN_SQUARED = 0.455
 # [1] Largest texture over the one that the median gives: the edge of a bar that is tilted against
 # its expected axis passes a few patches only, and is no texture. Study: bar_scenes.py.
 _LARGEST_OVER_MEDIAN = 3.0
-# [1] Divisor in place of zero. Derived.
-_TINY = 1e-100
 # [bins] Weight of the prior that a segment has the mean texture: half the bins of a segment. Set
 # by eye. Study: bar_starts.py.
 _PRIOR_BINS = 50
@@ -73,6 +68,7 @@ class Profiles:
     place_mm (k,): the segments' middles along the bar. radius_px: half the bar's width.
     variance_inflation: variance of a mean over bins, over that of independent bins.
     is_saturated: whether the light on the bar is brighter somewhere than its pixels can say.
+    pattern: what the patches of each segment differ by.
     """
 
     offset_px: np.ndarray
@@ -85,6 +81,7 @@ class Profiles:
     radius_px: float
     variance_inflation: float
     is_saturated: bool
+    pattern: Pattern
 
     def __len__(self) -> int:
         """Return the number of segments."""
@@ -111,7 +108,7 @@ class Profiles:
     @cached_property
     def moments(self) -> np.ndarray:
         """Return the products (9, k, b) of w, the background g, its slope s and the light y for the
-        normal equations.
+        normal equations, with what the pattern adds to them.
 
         In this order, which `evidence._Design.products` has, too: w, w g, w s, w g², w g s, w s²,
         w y, w g y, w s y.
@@ -119,7 +116,15 @@ class Profiles:
         one = np.ones_like(self.light)
         first = np.stack([one, self.background, self.background_slope])
         products = [*first, *(first[[1, 1, 2]] * first[[1, 2, 2]]), *(first * self.light)]
-        return self.weight * np.stack(products)
+        moments = self.weight * np.stack(products)
+        moments[3:6] += self.pattern.background
+        moments[7:] += self.pattern.light
+        return moments
+
+    @cached_property
+    def power(self) -> np.ndarray:
+        """Return the weighted sum (k,) of the light's square, over its profile and pattern."""
+        return np.sum(self.weight * self.light**2, axis=1) + self.pattern.power
 
     @cached_property
     def log_jacobian(self) -> np.ndarray:
@@ -130,91 +135,6 @@ class Profiles:
         """
         whitened = np.where(self.is_observed, np.sqrt(self.weight) * self.light_per_grey, 1.0)
         return -2.0 * np.sum(np.log(whitened), axis=1)
-
-
-@dataclass(frozen=True)
-class _PatchSums:
-    """Weighted sums (s, b) over the pixels of each of s patches, in bins across the bar.
-
-    weight: of the weights; the next four: of weight times that quantity; variance_share: of
-    interpolation weight times pixel weight, which over weight² is the variance of the patch's mean.
-    """
-
-    weight: np.ndarray
-    light: np.ndarray
-    background: np.ndarray
-    background_slope: np.ndarray
-    light_per_grey: np.ndarray
-    variance_share: np.ndarray
-
-    @classmethod
-    def along_bar(
-        cls, pieces: Pieces, is_used: np.ndarray, position: np.ndarray, bins: int, gamma: float
-    ) -> "_PatchSums":
-        """Return the sums of pieces, in their order along the bar.
-
-        is_used, position (s, p): of the pixels, which of them count and their places, in bins.
-        """
-        light, light_per_grey = light_of(pieces.grey[is_used], FULL_SCALE, gamma)
-        background, background_per_grey = light_of(pieces.background[is_used], FULL_SCALE, gamma)
-        background_slope = background_per_grey * pieces.slope[is_used]
-        weight = (pieces.weight[is_used] / light_per_grey) ** 2
-        patch, _ = np.nonzero(is_used)
-        patch = np.argsort(np.argsort(pieces.place))[patch]  # its number along the bar
-        shared = _SharedPixels.between(position[is_used], patch, weight, (len(pieces), bins))
-        return cls(
-            weight=shared.sums(1.0),
-            light=shared.sums(light),
-            background=shared.sums(background),
-            background_slope=shared.sums(background_slope),
-            light_per_grey=shared.sums(light_per_grey),
-            variance_share=shared.sums(shared.share),
-        )
-
-    def mean(self, sums: np.ndarray) -> np.ndarray:
-        """Return sums (s, b) over the weight, 0 where there is none."""
-        return sums / np.where(self.weight > 0, self.weight, 1.0)
-
-
-@dataclass(frozen=True)
-class _NeighbourDifferences:
-    """The light of each patch, but the outermost two, minus the mean of its two neighbours'.
-
-    So light that changes steadily along the bar is no difference. All (s - 2, b).
-    residual: without the share of the background's own difference that explains it best. noise: its
-    variance by the pixels' noise. weight: one over the variance that patches of their weights have,
-    0 where a bin has hardly any of a pixel: rounding decides whether it has one.
-    """
-
-    residual: np.ndarray
-    noise: np.ndarray
-    weight: np.ndarray
-
-    @classmethod
-    def of(cls, patches: _PatchSums) -> "_NeighbourDifferences":
-        """Return the differences of patches along the bar."""
-        light = _second_difference(patches.mean(patches.light))
-        background = _second_difference(patches.mean(patches.background))
-        noise = _sum_variances(patches.mean(patches.mean(patches.variance_share)))
-        variance = _sum_variances(1.0 / np.maximum(patches.weight, _TINY))
-        weight = np.where(variance < 0.1 / _TINY, 1.0 / variance, 0.0)
-        power = np.maximum(np.sum(weight * background**2, axis=0), _TINY)
-        share = np.sum(weight * light * background, axis=0) / power
-        return cls(light - np.clip(share, 0.0, 1.0) * background, noise, weight)
-
-    @cached_property
-    def relative(self) -> np.ndarray:
-        """Return the weights, 1 where all patches weigh the same."""
-        power = np.maximum(np.sum(self.weight**2, axis=0), _TINY)
-        return self.weight * np.sum(self.weight, axis=0) / power
-
-    def patch_variance(self, variance: np.ndarray) -> np.ndarray:
-        """Return the variance (b,) of one patch by those of all differences, averaged across.
-
-        The difference to the mean of two neighbours has 1.5 times the variance of one patch.
-        """
-        number = np.maximum(np.sum(self.relative, axis=0), _TINY)
-        return np.sum(self.relative * variance, axis=0) / (1.5 * number)
 
 
 def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: float) -> Profiles:
@@ -230,61 +150,33 @@ def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: floa
     position = offset_px / STEP_PX + half
     is_used = (position >= 0) & (position < 2 * half)
     is_used &= np.abs(offset_px) > radius_px - reach_px - _INSIDE_PX
-    patches = _PatchSums.along_bar(pieces, is_used, position, 2 * half + 1, gamma)
+    patches = PatchSums.along_bar(pieces, is_used, position, 2 * half + 1, gamma)
     number = max(1, min(segments, len(pieces) // 2))
     place_mm = np.array_split(np.sort(pieces.place), number)  # of the patches of each segment
     grid_px = STEP_PX * np.arange(-half, half + 1)
     is_bright = np.nan_to_num(pieces.grey) >= SATURATED * FULL_SCALE
     is_saturated = bool(np.any(is_bright & (np.abs(offset_px) < radius_px)))
-    return _average_patches(patches, place_mm, grid_px, radius_px, is_saturated)
-
-
-@dataclass(frozen=True)
-class _SharedPixels:
-    """Pixels (n,), each shared between the two bins nearest to its position.
-
-    cell (2 n,): first the bin below each pixel, then that above, counted through all patches.
-    share (2, n): interpolation weights. weight (2, n): the same times the pixels' weights. shape:
-    how many patches and bins there are.
-    """
-
-    cell: np.ndarray
-    share: np.ndarray
-    weight: np.ndarray
-    shape: tuple[int, int]
-
-    @classmethod
-    def between(
-        cls, position: np.ndarray, patch: np.ndarray, weight: np.ndarray, shape: tuple[int, int]
-    ) -> "_SharedPixels":
-        """Return pixels at positions (n,), in bins, of patches by their number (n,)."""
-        bins = shape[1]
-        below = np.clip(np.floor(position), 0, bins - 2)
-        fraction = np.clip(position - below, 0.0, 1.0)
-        first = bins * patch + below.astype(int)
-        share = np.stack([1.0 - fraction, fraction])
-        return cls(np.concatenate([first, first + 1]), share, share * weight, shape)
-
-    def sums(self, values: np.ndarray | float) -> np.ndarray:
-        """Return the weighted sums (s, b) of values of the pixels (n,), or of their shares (2, n)."""
-        weighted = np.ravel(self.weight * values)
-        return np.bincount(self.cell, weighted, self.shape[0] * self.shape[1]).reshape(self.shape)
+    noise_behind = float(np.median(pieces.noise_behind))
+    return _average_patches(patches, place_mm, grid_px, radius_px, is_saturated, noise_behind)
 
 
 def _average_patches(
-    patches: _PatchSums,
+    patches: PatchSums,
     place_mm: Sequence[np.ndarray],
     offset_px: np.ndarray,
     radius_px: float,
     is_saturated: bool,
+    noise_behind: float,
 ) -> Profiles:
     """Average patches into the profiles of k segments.
 
     place_mm: of the patches, by segment, in their order along the bar. offset_px (b,): of the bins.
-    radius_px, is_saturated: as of `Profiles`.
+    radius_px, is_saturated: as of `Profiles`. noise_behind: as of `Pieces`.
     """
     averages = _Averages(_membership([len(some) for some in place_mm]), patches.weight)
-    texture, variance_inflation = _estimate_texture(averages.membership[:, 1:-1], patches)
+    inner = averages.membership[:, 1:-1]  # of patches with two neighbours
+    differences = PatchDifferences.of(patches)
+    texture, variance_inflation = _estimate_texture(inner, differences)
     background = averages.mean(patches.background)
     return Profiles(
         offset_px=offset_px,
@@ -297,6 +189,7 @@ def _average_patches(
         radius_px=radius_px,
         variance_inflation=variance_inflation,
         is_saturated=is_saturated,
+        pattern=sum_pattern(differences, inner, texture, noise_behind),
     )
 
 
@@ -360,7 +253,7 @@ def _about_median(background: np.ndarray, is_observed: np.ndarray) -> np.ndarray
     return background - np.array(medians)[:, None]
 
 
-def _estimate_texture(membership, patches: _PatchSums) -> tuple[np.ndarray, float]:
+def _estimate_texture(membership, differences: PatchDifferences) -> tuple[np.ndarray, float]:
     """Estimate the variance (k, b) between patches beyond their noise, and the inflation by
     correlated bins.
 
@@ -371,31 +264,18 @@ def _estimate_texture(membership, patches: _PatchSums) -> tuple[np.ndarray, floa
     spread is at least the noise: where a single patch has pixels, the fitted share of the
     background leaves only rounding, compared with which any other segment would be rough.
     """
-    differences = _NeighbourDifferences.of(patches)
     squares = differences.residual**2
-    by_median = _weighted_median(squares, differences.weight) / (1.5 * _MEDIAN_SQUARED)
+    by_median = _weighted_median(squares, differences.weight) / (1.5 * MEDIAN_SQUARED)
     spread = np.minimum(differences.patch_variance(squares), _LARGEST_OVER_MEDIAN * by_median)
     spread = uniform_filter1d(spread, _TEXTURE_WINDOW)
     noise = uniform_filter1d(differences.patch_variance(differences.noise), _TEXTURE_WINDOW)
-    spread = np.maximum(spread, np.maximum(noise, _TINY))
+    spread = np.maximum(spread, np.maximum(noise, TINY))
     standardised = differences.residual * np.sqrt(differences.relative / (1.5 * spread))
     power = np.sum(membership @ standardised**2, axis=1)
     bins = np.sum(membership @ differences.relative, axis=1)
     roughness = (power + _PRIOR_BINS) / (bins + _PRIOR_BINS)  # (k,) of each segment
     texture = np.maximum(roughness[:, None] * spread - noise, 0.0)
     return texture, _estimate_variance_inflation(standardised)
-
-
-def _second_difference(values) -> np.ndarray:
-    """Return each row but the outermost two of values (s, b) minus the mean of its two
-    neighbours."""
-    return values[1:-1] - 0.5 * (values[:-2] + values[2:])
-
-
-def _sum_variances(variance) -> np.ndarray:
-    """Return the variance (s - 2, b) of `_second_difference` from those of independent rows (s,
-    b)."""
-    return variance[1:-1] + 0.25 * (variance[:-2] + variance[2:])
 
 
 def _weighted_median(values, weight) -> np.ndarray:

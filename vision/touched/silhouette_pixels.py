@@ -15,7 +15,8 @@ from vision.geometry.polyline import at_lengths, lengths_px, tangents_by
 from vision.geometry.rounded import RoundedAxis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
-from vision.touched.profiles import FULL_SCALE, OUTSIDE_PX
+from vision.touched.patches import FULL_SCALE
+from vision.touched.profiles import OUTSIDE_PX
 from vision.wire.bands import Pieces
 from vision.wire.points import LinePoints
 
@@ -287,6 +288,7 @@ def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) 
         foot_px=side.px[station],
         normal=side.normal[station],
         source=station,
+        noise_behind=np.full(len(rows.pieces), 1.0 / view.mean_share),
     )
 
 

@@ -210,7 +210,8 @@ def _better_from(place: BarAxis, fit: Explanation, question: BarQuestion) -> Exp
         return other
     if _is_better(question, fit.axis, other.axis, _LIKELY_SIGMAS):
         return replace(fit, warning=_unexplained(question, place, fit.axis))
-    _require_one(fit, other)
+    if question.apart_px(other.axis, fit.axis) > _APART_PX:
+        _require_one(fit, other)
     return fit
 
 

@@ -48,10 +48,13 @@ class Band(Rows):
     place: np.ndarray
     radius_px: np.ndarray
     still: np.ndarray | None = None
+    noise_behind: np.ndarray | None = None
 
     def __post_init__(self):
         if self.still is None:
             object.__setattr__(self, "still", np.zeros((len(self.place), 0)))
+        if self.noise_behind is None:
+            object.__setattr__(self, "noise_behind", np.ones(len(self.place)))
 
 
 def read_band(
@@ -200,6 +203,7 @@ class Pieces(Rows):
     weight (s, p): one over the sigma of the noise; 0 where there is no pixel.
     place, radius_px (s,), foot_px, normal (s, 2): of the segment's middle.
     source (s,): the band of each. still (s, p): another background; (s, 0) where there is none.
+    noise_behind (s,): variance of the background's noise over that of grey, 1 where not given.
     """
 
     offset_px: np.ndarray
@@ -214,10 +218,13 @@ class Pieces(Rows):
     normal: np.ndarray
     source: np.ndarray
     still: np.ndarray | None = None
+    noise_behind: np.ndarray | None = None
 
     def __post_init__(self):
         if self.still is None:
             object.__setattr__(self, "still", np.zeros((len(self.place), 0)))
+        if self.noise_behind is None:
+            object.__setattr__(self, "noise_behind", np.ones(len(self.place)))
 
     def __len__(self) -> int:
         return len(self.place)

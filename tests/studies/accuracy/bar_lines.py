@@ -52,6 +52,7 @@ SCENES: dict[str, tuple[Callable, Callable]] = {
     "painted, flat background": (painted, lambda x, y: 60.0 + 0.0 * x),
     "painted, step of a fifth": (painted, lambda x, y: np.where(x > 210.0, 60.0, 40.0)),
     "painted, printed squares": (painted, squares),
+    "grey as the mean of printed squares": (lambda t: 105.0 + 0.0 * t, squares),
     "polished, flat background": (metal, lambda x, y: 110.0 + 0.0 * x),
     "polished, printed squares": (metal, squares),
     "glossy, as dark a background": (glossy, lambda x, y: 18.0 + 0.0 * x),

@@ -5,6 +5,7 @@ import pytest
 
 from vision.touched import evidence
 from vision.touched.evidence import LitRod, compute_evidence
+from vision.touched.pattern import Pattern
 from vision.touched.profiles import STEP_PX, Profiles
 
 
@@ -16,6 +17,9 @@ def profile_with_stripes(radius_px: float) -> Profiles:
     sigma = np.where(np.abs(offset_px) > radius_px - 11.0, 1e-3, np.inf)
     nothing = np.zeros((1, len(offset_px)))
     one = nothing + 1.0
+    no_pattern = Pattern(
+        np.zeros((3, *nothing.shape)), np.zeros((2, *nothing.shape)), np.zeros(1), np.zeros(1)
+    )
     return Profiles(
         offset_px,
         light[None],
@@ -27,6 +31,7 @@ def profile_with_stripes(radius_px: float) -> Profiles:
         radius_px,
         1.0,
         False,
+        no_pattern,
     )
 
 
