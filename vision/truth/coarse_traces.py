@@ -25,6 +25,7 @@ from vision.truth.trace_points import (
     Trace,
     averaged,
     beside_wire,
+    closest_lines,
 )
 from vision.wire.points import LinePoints, Observed
 from vision.wire.trace import NEAR_CLAMP_MM, observed
@@ -148,8 +149,8 @@ def _resting_points(
 
 
 def _beside(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> BesideWire:
-    """Return a point for each segment of the line that is nearest to the wire in each frame."""
-    beside = _nearest_lines(beside_wire(trace, camera, curves))
+    """Return a point for each segment of the line that is closest to the wire in each frame."""
+    beside = closest_lines(beside_wire(trace, camera, curves))
     beside = beside.select(beside.place_mm > NEAR_CLAMP_MM)
     return averaged(beside, _SEGMENT_PX) if len(beside.frame) else beside
 
@@ -162,16 +163,6 @@ def _as_points(beside: BesideWire) -> LinePoints:
         sigma_px=np.full(len(beside.frame), _COARSE_PX),
         place=beside.place_mm,
     )
-
-
-def _nearest_lines(beside: BesideWire) -> BesideWire:
-    """Return the points of the line with the least median distance from the wire in each frame."""
-    is_kept = np.zeros(len(beside.frame), dtype=bool)
-    for frame in np.unique(beside.frame).tolist():
-        in_frame = beside.frame == frame
-        of_lines = [in_frame & (beside.line == k) for k in np.unique(beside.line[in_frame])]
-        is_kept |= min(of_lines, key=lambda own: np.median(np.abs(beside.offset_px[own])))
-    return beside.select(is_kept)
 
 
 def _otherwise_meant(traces: Traces, cameras: Cameras) -> Iterator[tuple[str, dict[str, Trace]]]:

@@ -9,6 +9,7 @@ is their scatter about the curve of the pass before. What neighbours share is me
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -105,17 +106,10 @@ class TracesAlone(GivenTraces):
 
 
 def traces_as_lines(traces: Mapping[str, Trace]) -> Callable[..., TracedLines]:
-    """Return what makes the source of a whisk's lines: other programs' traces, where there are any,
-    else its pictures.
+    """Return what makes the source of a whisk's lines, by arguments as of `TracedLines`: other
+    programs' traces, where there are any, else its pictures.
     """
-    if not traces:
-        return TracedLines
-
-    def from_traces(*made_of, **known) -> TracedLines:
-        """Return the source of a whisk's lines, made as a TracedLines is."""
-        return GivenTraces(*made_of, **known, traces=traces)
-
-    return from_traces
+    return partial(GivenTraces, traces=traces) if traces else TracedLines
 
 
 def _line_points(segments: BesideWire, length_mm: float) -> LinePoints:

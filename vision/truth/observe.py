@@ -7,7 +7,7 @@
 Nothing here knows of a gauge.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,7 +38,7 @@ from vision.truth.moving_bar import in_one_frame
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.trial_pictures import TrialPictures
 from vision.truth.truth_rows import to_whisk
-from vision.truth.value import Value
+from vision.truth.value import as_values
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.whisk_truth import coarse_curves, coarse_shapes, free_stroke
 from vision.truth.wire_end import wire_ends
@@ -85,10 +85,10 @@ def observe_trial(
             earlier = explained.fitted
     axis = found.axis.as_bar()
     light = [whisk.light for whisk in scene.whisks]
-    bars = {}
-    for name, width in measure_relative_widths(with_lines(scene.search, found)).items():
-        bars[name] = Value(*width)
-    return TrialTruth(axis.point_mm, axis.direction, tuple(rows), one_sided_widths(light), bars)
+    bars = measure_relative_widths(with_lines(scene.search, found))
+    return TrialTruth(
+        axis.point_mm, axis.direction, tuple(rows), one_sided_widths(light), as_values(bars)
+    )
 
 
 def wire_lines(
@@ -167,7 +167,7 @@ def _whisks_of(
             left_out=tuple(left_out),
             stated_velocity=velocity,
             gives=Gives() if pictures.object_gives_way else None,
-            lines=traces_as_lines(pictures.traces),
+            make_lines=traces_as_lines(pictures.traces),
             picture_of=pictures.picture_of,
         )
         seen.append(whisk)
@@ -355,19 +355,10 @@ def fitted_truth(explained: Explanation) -> WhiskTruth:
         refinements=refinements,
         status=status,
         turns=frame_turns(fitted.problem, fitted.state, fitted.frames),
-        delays=_delays(fitted, whisk.picture_of),
+        delays=as_values(camera_delays(fitted.problem, fitted.state, whisk.picture_of)),
         base=base_lines(*free),
         beam=beam,
     )
-
-
-def _delays(fitted: FittedWhisk, picture_of: Mapping[str, str]) -> dict[str, Value]:
-    """Return by how many frames each camera shows the whisker later than the others.
-
-    picture_of: of cameras that are parts of one picture, the camera whose picture it is.
-    """
-    delays = camera_delays(fitted.problem, fitted.state, picture_of)
-    return {name: Value(*delay) for name, delay in delays.items()}
 
 
 def warnings_of(

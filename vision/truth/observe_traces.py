@@ -123,7 +123,7 @@ def _whisks_of(
     used = facing.subset(names)
     views = tuple(blank_view(camera, frames[camera.name].tolist()) for camera in used)
     axis = recording.place.axis(used, rods)
-    lines = partial(TracesAlone, traces=recording.traces, place=recording.place)
+    make_lines = partial(TracesAlone, traces=recording.traces, place=recording.place)
     for number, where in enumerate(whisks):
         stroke = range(*where.indices(len(recording.time_s)))[:: settings.every_frame]
         yield WhiskPictures(
@@ -137,7 +137,7 @@ def _whisks_of(
             SeenBar(axis, {}),
             replace(settings, picture_scale=1),
             left_out=tuple(left_out),
-            lines=lines,
+            make_lines=make_lines,
             stated_place=recording.place.prior(),
         )
 
@@ -151,7 +151,7 @@ def _explain(recording: TrialTraces, whisk: WhiskPictures) -> Explanation:
     bends_rad = follow_traced_bends(traces, whisk.cameras, whisk.rods, axis, rest_mm, whisk.motor)
     touch = _touch(whisk.cameras, axis)
     begun, expected = expect_by_bends(whisk, touch, rest_mm, bends_rad)
-    lines = begun.lines(begun, recording.place.reader(begun.cameras))
+    lines = begun.make_lines(begun, recording.place.reader(begun.cameras))
     fitted = fit_lines(begun, lines, expected, touch)
     _require_one_place(fitted)
     return Explanation(whisk, fitted)

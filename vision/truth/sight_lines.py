@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.fit.blocks import WIRE_MODES_PX
+from vision.fit.object_rows import CameraPoints
 from vision.fit.problem import Problem, wire_modes
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import rotation_z
@@ -43,9 +44,13 @@ def sights_of(problem: Problem, name: str) -> Sights | None:
     """
     if name not in problem.cameras:
         return None
-    frame, points = _points_in(problem, name)
-    if not len(frame):
+    number = problem.cameras.index(name)
+    on_wire = [one for one in problem.seen if one.camera == number and one.frame >= 0]
+    if not any(len(one.points) for one in on_wire):
         return None
+    joined = CameraPoints.joined(number, on_wire)
+    frame = joined.frame
+    points = joined.points
     camera = problem.cameras[name]
     sight = camera.rays(points.px)
     further_along = camera.rays(points.px - tangents_by(points.normal))
@@ -61,22 +66,6 @@ def sights_of(problem: Problem, name: str) -> Sights | None:
         sigma_rad=points.sigma_px * np.abs(rad_per_px),
         shared_rad=shared_px * rad_per_px[:, None],
     )
-
-
-def _points_in(problem: Problem, name: str) -> tuple[np.ndarray, LinePoints | None]:
-    """Return the frame (n,) of each line point of the wire in one camera, and the points; None of
-    none.
-    """
-    number = problem.cameras.index(name)
-    frames = []
-    points = []
-    for one in problem.seen:
-        if one.camera == number and one.frame >= 0 and len(one.points):
-            frames.append(np.full(len(one.points), one.frame))
-            points.append(one.points)
-    if not points:
-        return np.zeros(0, dtype=int), None
-    return np.concatenate(frames), LinePoints.join(points)
 
 
 def _shared_px(problem: Problem, name: str, points: LinePoints, motor_rad) -> np.ndarray:

@@ -116,25 +116,30 @@ def nearest_lines(beside: BesideWire) -> dict[int, int]:
 def points_of_wire(beside: BesideWire) -> BesideWire:
     """Return the points near the wire of the line that is nearest to it in each frame."""
     nearest = nearest_lines(beside)
-    line = np.array([nearest.get(frame, -1) for frame in beside.frame.tolist()])
+    line = np.array([nearest.get(frame, np.nan) for frame in beside.frame.tolist()])
     is_near = np.abs(beside.offset_px) < NEAR_PX
-    has_line = np.isin(beside.frame, list(nearest))
-    return beside.select(has_line & is_near & (beside.line == line))
+    return beside.select(is_near & (beside.line == line))
+
+
+def closest_lines(beside: BesideWire) -> BesideWire:
+    """Return the points of the line with the least median distance from the wire in each frame."""
+    is_closest = np.zeros(len(beside.frame), dtype=bool)
+    for frame in np.unique(beside.frame).tolist():
+        in_frame = beside.frame == frame
+        of_lines = [in_frame & (beside.line == line) for line in np.unique(beside.line[in_frame])]
+        is_closest |= min(of_lines, key=lambda own: np.median(np.abs(beside.offset_px[own])))
+    return beside.select(is_closest)
 
 
 def distances_px(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> np.ndarray:
     """Return for each of the frames with a trace, (n,), the median distance of its points from the
     wire, of the line with the least; infinite where none has a point beside the wire.
     """
-    beside = beside_wire(trace, camera, curves)
+    closest = closest_lines(beside_wire(trace, camera, curves))
     found = []
     for frame in np.intersect1d(trace.frame, list(curves)).tolist():
-        in_frame = beside.frame == frame
-        of_lines = [np.inf]
-        for line in np.unique(beside.line[in_frame]):
-            own = in_frame & (beside.line == line)
-            of_lines.append(float(np.median(np.abs(beside.offset_px[own]))))
-        found.append(min(of_lines))
+        own_px = closest.offset_px[closest.frame == frame]
+        found.append(np.median(np.abs(own_px)) if len(own_px) else np.inf)
     return np.array(found)
 
 

@@ -61,7 +61,7 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     outside = Reason("touch_outside_frames", _outside(fitted, touch.value))
     slope = Reason("slope_vague", _slope_unresolved(beta.sigma))
     slip = Reason("slip_vague", _slip_unresolved(frames))
-    shared = shared_covariance(fitted.problem, fitted.state, fitted.uncertainty)
+    in_common = shared_covariance(fitted.problem, fitted.state, fitted.uncertainty)
     is_known = not (lost or outside or slip) and not beta.sigma > _MOST_SLOPE_SIGMA_RAD
     truth = WhiskTruth(
         whisk.number,
@@ -73,11 +73,11 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
         budget=_budget(fitted),
         lines=line_noise(fitted.problem),
         shape=_shape(fitted),
-        smooth=_smooth(fitted, shared),
+        smooth=_smooth(fitted, in_common),
         velocity_mm_s=_velocity(whisk, fitted),
         problem=fitted.problem,
     )
-    return _with_contact(truth, whisk, fitted, touch, beta, shared) if is_known else truth
+    return _with_contact(truth, whisk, fitted, touch, beta, in_common) if is_known else truth
 
 
 def _with_contact(
@@ -86,11 +86,11 @@ def _with_contact(
     fitted: FittedWhisk,
     touch: Value,
     beta: Value,
-    shared: np.ndarray,
+    in_common: np.ndarray,
 ) -> WhiskTruth:
     """Return the row of a whisk with all that a known contact adds.
 
-    shared (size, size): the covariance of the parameters that all whisks share.
+    in_common (size, size): the part of the parameters' covariance that all whisks share.
     """
     point = [fitted.of_whisk(name) for name in _VECTORS]
     by_parameter = np.stack([fitted.by_parameter.whisk[name] for name in _VECTORS])
@@ -102,7 +102,7 @@ def _with_contact(
         psi_rad=fitted.of_whisk("psi"),
         point_mm=_stacked(point),
         point_covariance_mm2=by_parameter @ fitted.covariance @ by_parameter.T,
-        shared=_shared_sigmas(whisk, fitted, shared),
+        shared=_shared_sigmas(whisk, fitted, in_common),
         gave=None if whisk.gives is None else _gave(fitted),
         rounded=_seen_object(fitted.problem.rods.bar, fitted),
     )
@@ -269,10 +269,10 @@ def _lost_at_touch(whisk: WhiskPictures, touch_rad: float) -> str:
     return f"frame {near[0]} at touch was lost" if near else ""
 
 
-def _smooth(fitted: FittedWhisk, shared: np.ndarray) -> Smooth:
+def _smooth(fitted: FittedWhisk, in_common: np.ndarray) -> Smooth:
     """Return what the touching frames determine, whether or not there is a truth.
 
-    shared (size, size): the covariance of the parameters that all whisks share.
+    in_common (size, size): the part of the parameters' covariance that all whisks share.
     """
     measured = fitted.measured
     by_parameter = fitted.by_parameter
@@ -284,7 +284,7 @@ def _smooth(fitted: FittedWhisk, shared: np.ndarray) -> Smooth:
         {name: measured.frame[name][touching] for name in names},
         {name: by_parameter.frame[name][touching] for name in names},
         fitted.covariance,
-        shared,
+        in_common,
         fitted.uncertainty.by_camera_error,
         float(measured.whisk["d_x"]),
     )

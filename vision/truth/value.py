@@ -1,5 +1,6 @@
 """A number with its sigma, and the six that exist only while the whisker touches."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,11 @@ class Value:
 
     value: float | np.ndarray = NAN
     sigma: float | np.ndarray = NAN
+
+
+def as_values(pairs: Mapping[str, tuple[float, float]]) -> dict[str, Value]:
+    """Return values with their sigmas, by name; pairs: of both."""
+    return {name: Value(*pair) for name, pair in pairs.items()}
 
 
 def propagated_sigma(rows: np.ndarray, covariance: np.ndarray) -> np.ndarray:

@@ -55,8 +55,8 @@ class WhiskPictures:
 
     indices: the frames of the stroke. time_s, motor_rad (n,): at every frame of the trial. light:
     filled with how each camera sees the wire. left_out: a line on each camera that is not used.
-    stated_velocity: of a bar that moves. gives: of one that gives way. lines: makes the source of the
-    whisk's lines (`vision.truth.traced_lines.TracedLines` or one made as that is). picture_of: as of
+    stated_velocity: of a bar that moves. gives: of one that gives way. make_lines: makes the source of
+    the whisk's lines, by arguments as of `vision.truth.traced_lines.TracedLines`. picture_of: as of
     `TrialPictures`. stated_place: of an object whose place is known without its lines. earlier: the fit of
     a whisk of the same trial, from whose rest shape, lens blurs and lines of the object this one begins.
     """
@@ -74,7 +74,7 @@ class WhiskPictures:
     left_out: tuple[Reason, ...] = ()
     stated_velocity: StatedVelocity | None = None
     gives: Gives | None = None
-    lines: Callable[..., LineSource] | None = None
+    make_lines: Callable[..., LineSource] | None = None
     picture_of: Mapping[str, str] = field(default_factory=dict)
     stated_place: AxisPrior | None = None
     earlier: "FittedWhisk | None" = None

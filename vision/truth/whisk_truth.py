@@ -62,7 +62,7 @@ def fit_whisk(whisk: WhiskPictures) -> FittedWhisk:
 def _fit_by(whisk: WhiskPictures, strategy: Strategy) -> FittedWhisk:
     """Fit a whisk by one strategy. Raises Refused where it does not serve."""
     whisk, expected = _expect_coarsely(whisk, strategy.touch)
-    lines = whisk.lines(whisk, strategy.reader)
+    lines = whisk.make_lines(whisk, strategy.reader)
     if whisk.earlier is not None:
         lines.begin_as(whisk.earlier.lines)
     return fit_lines(whisk, lines, expected, strategy.touch)
@@ -292,7 +292,7 @@ def fit_before_touch(
 
 def _wire_points(whisk: WhiskPictures, place: WhiskPlace) -> list[Observed]:
     """Return the points of the wire by all cameras, where traced with the blur of each."""
-    lines = whisk.lines(whisk, blur_px=blurs_px(whisk))
+    lines = whisk.make_lines(whisk, blur_px=blurs_px(whisk))
     seen = []
     for on_wire in lines.wire_points(place, last=True).values():
         seen += on_wire
