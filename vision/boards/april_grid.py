@@ -10,12 +10,12 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from vision.boards.corners import to_8_bit
-from vision.boards.saddle_board import SaddleBoard
+from vision.boards.corners import is_found, marker_dictionary
+from vision.boards.saddle_board import SaddleBoard, require_marker_fits
 from vision.geometry.board import grid_mm
-from vision.geometry.checks import require, require_length
+from vision.geometry.checks import require
 
-_DICTIONARY = cv2.aruco.DICT_APRILTAG_36h11
+_DICTIONARY = "DICT_APRILTAG_36h11"
 # [modules] Widths of the dark rim about a tag's code: Kalibr's, and that of AprilTag's own pictures. A
 # layout.
 _RIMS = (2, 1)
@@ -47,14 +47,17 @@ class AprilGrid(SaddleBoard):
     def __post_init__(self):
         """Raise Refused for counts or lengths that cannot be."""
         super().__post_init__()
-        require_length("board", marker_mm=self.marker_mm)
+        require_marker_fits(self.marker_mm, self.square_mm)
+        available = len(marker_dictionary(_DICTIONARY).bytesList)
         require(
-            self.marker_mm < self.square_mm,
-            f"board marker_mm = {self.marker_mm} is not smaller than square_mm = {self.square_mm}",
+            self.tag_count <= available,
+            f"board of {self.tag_count} tags: there are {available}",
         )
-        available = len(cv2.aruco.getPredefinedDictionary(_DICTIONARY).bytesList)
-        count = self.squares[0] * self.squares[1]
-        require(count <= available, f"board of {count} tags: there are {available}")
+
+    @property
+    def tag_count(self) -> int:
+        """Return the number of tags."""
+        return self.squares[0] * self.squares[1]
 
     @property
     def grid(self) -> tuple[int, int]:
@@ -74,7 +77,7 @@ class AprilGrid(SaddleBoard):
     @property
     def spare_markers(self) -> tuple[str, int]:
         """Return the tags' dictionary, and the first number that the board does not use."""
-        return "DICT_APRILTAG_36h11", self.squares[0] * self.squares[1]
+        return _DICTIONARY, self.tag_count
 
     @property
     def cell_mm(self) -> float:
@@ -121,15 +124,13 @@ class AprilGrid(SaddleBoard):
         parameters = cv2.aruco.DetectorParameters()
         parameters.markerBorderBits = rim
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-        dictionary = cv2.aruco.getPredefinedDictionary(_DICTIONARY)
-        outlines, numbers, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(
-            picture
-        )
+        detector = cv2.aruco.ArucoDetector(marker_dictionary(_DICTIONARY), parameters)
+        outlines, numbers, _ = detector.detectMarkers(picture)
         if numbers is None:
             return np.empty(0, dtype=int), np.empty((0, 4, 2))
         numbers = numbers.ravel().astype(int)
         values, counts = np.unique(numbers, return_counts=True)
-        once = np.isin(numbers, values[counts == 1]) & (numbers < self.squares[0] * self.squares[1])
+        once = np.isin(numbers, values[counts == 1]) & (numbers < self.tag_count)
         return numbers[once], np.array(outlines, dtype=float).reshape(-1, 4, 2)[once]
 
     def _corner_ids(self, numbers: np.ndarray, order: np.ndarray) -> np.ndarray:
@@ -149,10 +150,9 @@ class AprilGrid(SaddleBoard):
 
     def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:
         """Return a sentence on how many tags are seen; None if the board is found."""
-        counts = [len(self.detect(to_8_bit(grey))[0]) for grey in greys]
-        if any(counts):
+        if is_found(self, greys):
             return None
         return (
-            f"no tag of DICT_APRILTAG_36h11 numbered 0 to {self.squares[0] * self.squares[1] - 1} is seen: "
+            f"no tag of {_DICTIONARY} numbered 0 to {self.tag_count - 1} is seen: "
             "is this the board, of this family, lit and sharp?"
         )

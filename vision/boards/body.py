@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from vision.boards.charuco import CharucoBoard
-from vision.boards.corners import Corners, to_8_bit
+from vision.boards.corners import Corners, is_found
 from vision.geometry.board import PRINT_TERMS, Board, printed_corners
 from vision.geometry.checks import require
 from vision.geometry.rotation import apply, exp_rotation, left_jacobian, skew
@@ -136,7 +136,7 @@ class Body(Board):
         """Return a sentence naming the setting that would find the first face; None if any face is
         found.
         """
-        if any(len(self.detect(to_8_bit(grey))[0]) for grey in greys):
+        if is_found(self, greys):
             return None
         return self.faces[0].why_not_found(greys, mirrored=mirrored)
 

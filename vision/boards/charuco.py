@@ -1,22 +1,22 @@
 """The ChArUco board: a checkerboard with markers in its white squares, which name its corners."""
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import cv2
 import numpy as np
 
-from vision.boards.corners import MIN_CORNERS
+from vision.boards.corners import MIN_CORNERS, marker_dictionary
 from vision.boards.diagnosis import why_no_charuco
 from vision.boards.marker_size import check_marker_size
-from vision.boards.saddle_board import SaddleBoard
-from vision.geometry.board import grid_mm
-from vision.geometry.checks import require, require_length
+from vision.boards.saddle_board import CheckeredBoard, require_marker_fits
+from vision.geometry.checks import require
 
 
 @dataclass(frozen=True)
-class CharucoBoard(SaddleBoard):
-    """A ChArUco board in OpenCV's frame: origin top left, z into the board.
+class CharucoBoard(CheckeredBoard):
+    """A ChArUco board in OpenCV's frame: origin top left, z into the board. A point's id is its
+    ChArUco id.
 
     legacy: OpenCV's pattern from before 4.6. inverted: printed white on black. first_id: of its
     markers, which are numbered on from there. Raises Refused for a board that cannot be.
@@ -33,16 +33,12 @@ class CharucoBoard(SaddleBoard):
     def __post_init__(self):
         """Raise Refused for counts, lengths or a dictionary that cannot be."""
         super().__post_init__()
-        require_length("board", marker_mm=self.marker_mm)
-        require(
-            self.marker_mm < self.square_mm,
-            f"board marker_mm = {self.marker_mm} is not smaller than square_mm = {self.square_mm}",
-        )
+        require_marker_fits(self.marker_mm, self.square_mm)
         require(
             self.dictionary.startswith("DICT_") and hasattr(cv2.aruco, self.dictionary),
             f"board dictionary {self.dictionary!r} is not one of OpenCV's, such as DICT_5X5_100",
         )
-        available = len(_dictionary(self.dictionary).bytesList)
+        available = len(marker_dictionary(self.dictionary).bytesList)
         require(
             0 <= self.first_id <= available - self.marker_count,
             f"board of {self.squares[0]} x {self.squares[1]} squares needs {self.marker_count} markers"
@@ -73,24 +69,6 @@ class CharucoBoard(SaddleBoard):
         it.)
         """
         return _opencv_board(self)
-
-    @property
-    def grid(self) -> tuple[int, int]:
-        """Return the number of inner corners along x and y."""
-        return self.squares[0] - 1, self.squares[1] - 1
-
-    @cached_property
-    def corners_mm(self) -> np.ndarray:
-        """Return the inner corners in the board frame, ((nx − 1)(ny − 1), 3); the row is the
-        ChArUco id.
-        """
-        x_mm = np.arange(1, self.squares[0]) * self.square_mm
-        return grid_mm(x_mm, np.arange(1, self.squares[1]) * self.square_mm)
-
-    @property
-    def cell_mm(self) -> float:
-        """Return the side of a square: neighbouring corners share the edge between them."""
-        return self.square_mm
 
     @property
     def clear_mm(self) -> float:
@@ -129,15 +107,10 @@ class CharucoBoard(SaddleBoard):
         check_marker_size(greys, self)
 
 
-def _dictionary(name: str) -> cv2.aruco.Dictionary:
-    """Return OpenCV's dictionary of markers of that name."""
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
-
-
 @lru_cache(maxsize=32)
 def _opencv_board(board: CharucoBoard) -> cv2.aruco.CharucoBoard:
     """Make OpenCV's board, once for each board: OpenCV warns of narrow borders each time."""
-    whole = _dictionary(board.dictionary)
+    whole = marker_dictionary(board.dictionary)
     markers = whole.bytesList[board.first_id :][: board.marker_count]
     own = cv2.aruco.Dictionary(markers, whole.markerSize, whole.maxCorrectionBits)
     square_mm = float(board.square_mm)

@@ -6,15 +6,13 @@ picture, and `vision.calibration.turned` makes the cameras agree.
 """
 
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import cv2
 import numpy as np
 
-from vision.boards.corners import MIN_CORNERS, Corners, to_8_bit
-from vision.boards.saddle_board import SaddleBoard
+from vision.boards.corners import MIN_CORNERS, Corners, is_found, to_8_bit
+from vision.boards.saddle_board import CheckeredBoard
 from vision.boards.symmetry import possible_labels, turns_onto_itself, upper_left_first
-from vision.geometry.board import grid_mm
 from vision.geometry.checks import require
 
 # [squares] OpenCV's detector needs three corners either way. Stated.
@@ -25,7 +23,7 @@ _SMALLEST_GRID = (3, 3)
 
 
 @dataclass(frozen=True)
-class Checkerboard(SaddleBoard):
+class Checkerboard(CheckeredBoard):
     """A plain checkerboard: origin at the outer corner of a dark square, z into the board."""
 
     kind: str = field(default="checkerboard", init=False)
@@ -39,17 +37,6 @@ class Checkerboard(SaddleBoard):
         )
 
     @property
-    def grid(self) -> tuple[int, int]:
-        """Return the number of inner corners along x and y."""
-        return self.squares[0] - 1, self.squares[1] - 1
-
-    @cached_property
-    def corners_mm(self) -> np.ndarray:
-        """Return the inner corners in the board frame, ((nx − 1)(ny − 1), 3)."""
-        x_mm = np.arange(1, self.squares[0]) * self.square_mm
-        return grid_mm(x_mm, np.arange(1, self.squares[1]) * self.square_mm)
-
-    @property
     def hidden_turns(self) -> tuple[np.ndarray, ...]:
         """Return the turns that put dark squares onto dark squares."""
         return tuple(ids for ids in turns_onto_itself(self)[1:] if self._is_dark_after(ids))
@@ -59,11 +46,6 @@ class Checkerboard(SaddleBoard):
         columns = self.grid[0]
         rows_of, columns_of = np.divmod(ids[[0, 1, columns, columns + 1]], columns)
         return bool((rows_of.min() + columns_of.min()) % 2 == 0)
-
-    @property
-    def cell_mm(self) -> float:
-        """Return the side of a square: neighbouring corners share the edge between them."""
-        return self.square_mm
 
     @property
     def clear_mm(self) -> float:
@@ -109,7 +91,7 @@ class Checkerboard(SaddleBoard):
 
     def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:
         """Return a sentence on what grid is seen in place of the board's; None if it is found."""
-        if any(len(self.detect(to_8_bit(grey))[0]) for grey in greys):
+        if is_found(self, greys):
             return None
         entered = f"a checkerboard of {self.squares[0]} x {self.squares[1]} squares is not found"
         sizes = [size for grey in greys if (size := _largest_grid(to_8_bit(grey)))]

@@ -10,7 +10,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from vision.boards.corners import MIN_CORNERS, Corners, to_8_bit
+from vision.boards.corners import MIN_CORNERS, Corners, is_found, to_8_bit
 from vision.boards.discs import cut_discs, fit_discs
 from vision.boards.saddle import Saddles
 from vision.boards.saddle_board import local_frames
@@ -108,10 +108,9 @@ class CircleGrid(Board):
 
     def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:
         """Return a sentence on how many dark spots are seen; None if the board is found."""
-        pictures = [to_8_bit(grey) for grey in greys]
-        if any(len(self.detect(picture)[0]) for picture in pictures):
+        if is_found(self, greys):
             return None
-        counts = [len(_spot_detector(p.size).detect(p)) for p in pictures]
+        counts = [len(_spot_detector(grey.size).detect(to_8_bit(grey))) for grey in greys]
         return (
             f"no grid of {self.squares[0]} x {self.squares[1]} circles is found, {max(counts, default=0)} dark spots "
             f"are seen where {self.squares[0] * self.squares[1]} should be: check squares, and that no part of the "
@@ -172,14 +171,13 @@ def perspective_shift(px: np.ndarray, places_mm: np.ndarray, radius_mm: float) -
     """Return by how much the centres of circles' pictures, (n, 2) px, lie off the pictures of their
     centres at places_mm (n, 2), (n, 2) px.
     """
+    centres = np.column_stack([places_mm, np.ones(len(places_mm))])
+    # the dual conic of a circle is H-covariant: its picture's last column is the centre
+    circles = centres[:, :, None] * centres[:, None] - radius_mm**2 * np.diag([1.0, 1.0, 0.0])
     shift_px = np.zeros_like(px)
     for _ in range(2):
         H, _ = cv2.findHomography(places_mm, px - shift_px, 0)
-        # the dual conic of a circle is H-covariant: its picture's last column is the centre
-        for k, (x, y) in enumerate(places_mm):
-            centre = np.array([x, y, 1.0])
-            dual = np.outer(centre, centre) - radius_mm**2 * np.diag([1.0, 1.0, 0.0])
-            of_picture = H @ dual @ H.T
-            of_centre = H @ centre
-            shift_px[k] = of_picture[:2, 2] / of_picture[2, 2] - of_centre[:2] / of_centre[2]
+        of_centre = centres @ H.T
+        of_picture = (H @ circles @ H.T)[:, :, 2]
+        shift_px = of_picture[:, :2] / of_picture[:, 2:] - of_centre[:, :2] / of_centre[:, 2:]
     return shift_px

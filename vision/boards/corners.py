@@ -5,8 +5,10 @@ itself (`vision.boards.saddle`: two crossing blurred edges; `vision.boards.discs
 because OpenCV's own scatter by 0.12 to 0.28 px where the picture is noisy or soft.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from vision.geometry.board import Board
@@ -76,6 +78,16 @@ def refine_corners(
 def detect(grey: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray]:
     """Return OpenCV's own points: ids (n,) and px (n, 2), good to about 0.2 px."""
     return board.detect(to_8_bit(grey))
+
+
+def is_found(board: Board, greys: Sequence[np.ndarray]) -> bool:
+    """Return whether any of some grey pictures shows the board."""
+    return any(len(detect(grey, board)[0]) for grey in greys)
+
+
+def marker_dictionary(name: str) -> cv2.aruco.Dictionary:
+    """Return OpenCV's dictionary of markers of a name, such as DICT_5X5_100."""
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
 
 
 def to_8_bit(grey: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from vision.boards.corners import MIN_CORNERS, detect, to_8_bit
+from vision.boards.corners import MIN_CORNERS, detect, marker_dictionary, to_8_bit
 
 if TYPE_CHECKING:
     from vision.boards.charuco import CharucoBoard
@@ -114,7 +114,7 @@ def _boards_of_other_dictionaries(
         return
     sizes = {}
     for name, count in counts.items():
-        size = len(_opencv_dictionary(name).bytesList)
+        size = len(marker_dictionary(name).bytesList)
         if count > least and size >= board.spare_markers[1]:
             sizes[name] = size
     for name in sorted(sizes, key=sizes.get)[:_MOST_DICTIONARIES]:
@@ -123,16 +123,11 @@ def _boards_of_other_dictionaries(
         yield from _other_prints(entered)
 
 
-def _opencv_dictionary(name: str) -> cv2.aruco.Dictionary:
-    """Return OpenCV's dictionary of this name."""
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
-
-
 def _count_markers(greys: Sequence[np.ndarray], dictionary: str) -> float:
     """Return how many markers of a dictionary are seen in a picture, on average."""
     parameters = cv2.aruco.DetectorParameters()
     parameters.detectInvertedMarker = True
-    detector = cv2.aruco.ArucoDetector(_opencv_dictionary(dictionary), parameters)
+    detector = cv2.aruco.ArucoDetector(marker_dictionary(dictionary), parameters)
     return float(np.mean([len(detector.detectMarkers(to_8_bit(grey))[0]) for grey in greys]))
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from vision.boards.corners import to_8_bit
+from vision.boards.corners import marker_dictionary, to_8_bit
 from vision.geometry.board import Board
 
 # [px] Pixels about a marker that are cut out with it: what OpenCV's corners are off by. Stated.
@@ -68,7 +68,7 @@ def find_other_markers(grey: np.ndarray, board: Board) -> list[Marker]:
     if board.is_white_on_black:
         picture = 255 - picture
     name, first_spare = board.spare_markers
-    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    dictionary = marker_dictionary(name)
     outlines, numbers, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(picture)
     found = []
     for outline, number in zip(outlines, () if numbers is None else numbers.ravel()):

@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from vision.boards.corners import MIN_CORNERS, Corners
 from vision.boards.edge_pixels import Windows, cut_windows
 from vision.boards.saddle import Saddles, fit_saddles
-from vision.geometry.board import Board
+from vision.geometry.board import Board, grid_mm
+from vision.geometry.checks import require, require_length
 
 # [1] A wire, bar or glare near a corner: the picture misses the model by this many times the
 # board's usual miss; over 500 pixels the ratio of two clean corners stays within 1.2. Moves
@@ -78,6 +80,36 @@ class SaddleBoard(Board):
             ratio = value / np.median(value[good])
             alike &= (ratio < _ODD_FACTOR) & (ratio > 1 / _ODD_FACTOR)
         return alike & (saddles.misfit < _DISTURBED_RATIO * np.median(saddles.misfit[good]))
+
+
+@dataclass(frozen=True)
+class CheckeredBoard(SaddleBoard):
+    """A board of squares, dark and white in turn, whose points are their inner corners."""
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Return the number of inner corners along x and y."""
+        return self.squares[0] - 1, self.squares[1] - 1
+
+    @cached_property
+    def corners_mm(self) -> np.ndarray:
+        """Return the inner corners in the board frame, ((nx − 1)(ny − 1), 3), row by row."""
+        x_mm = np.arange(1, self.squares[0]) * self.square_mm
+        return grid_mm(x_mm, np.arange(1, self.squares[1]) * self.square_mm)
+
+    @property
+    def cell_mm(self) -> float:
+        """Return the side of a square: neighbouring corners share the edge between them."""
+        return self.square_mm
+
+
+def require_marker_fits(marker_mm: float, square_mm: float) -> None:
+    """Raise Refused where a marker is no length, or not smaller than its square."""
+    require_length("board", marker_mm=marker_mm)
+    require(
+        marker_mm < square_mm,
+        f"board marker_mm = {marker_mm} is not smaller than square_mm = {square_mm}",
+    )
 
 
 def local_frames(px: np.ndarray, places: np.ndarray) -> np.ndarray | None:

@@ -28,24 +28,23 @@ def mean_view(rig_view: Corners, frames: Sequence[Corners]) -> Corners:
 
     Corners that the rig picture lacks are compared with their median over the frames.
     """
-    views = [rig_view, *frames]
-    ids = np.concatenate([view.ids for view in views])
-    px = np.concatenate([view.px for view in views])
-    sigma_px = np.concatenate([view.sigma_px for view in views])
+    seen = Corners.join([rig_view, *frames])
+    ids = np.unique(seen.ids)
     means = []
     sigmas = []
-    for corner in np.unique(ids):
-        rows = ids == corner
-        mean, sigma = _mean_corner(px[rows], sigma_px[rows], corner in rig_view.ids)
+    for corner in ids:
+        mean, sigma = _mean_corner(seen.select(seen.ids == corner), corner in rig_view.ids)
         means.append(mean)
         sigmas.append(sigma)
-    return Corners(np.unique(ids), means, sigmas)
+    return Corners(ids, means, sigmas)
 
 
-def _mean_corner(
-    px: np.ndarray, sigma_px: np.ndarray, first_is_rig: bool
-) -> tuple[np.ndarray, float]:
-    """Return the mean (2,) of one corner's places (n, 2), and its sigma, without disturbed ones."""
+def _mean_corner(seen: Corners, first_is_rig: bool) -> tuple[np.ndarray, float]:
+    """Return the mean (2,) of one corner as often as it is seen, and its sigma, without disturbed
+    places.
+    """
+    px = seen.px
+    sigma_px = seen.sigma_px
     reference = px[0] if first_is_rig else np.median(px, axis=0)
     reference_sigma_px = sigma_px[0] if first_is_rig else 0.0
     limit_px = _DISTURBED_SIGMA * np.hypot(sigma_px, reference_sigma_px)
