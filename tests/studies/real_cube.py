@@ -28,7 +28,7 @@ from vision.boards.body import Body
 from vision.boards.corners import find_corners
 from vision.calibration.adjust import adjust_bundle
 from vision.calibration.calibrate import Calibration, calibrate_cameras
-from vision.calibration.held_out import check_held_out, usable_views
+from vision.calibration.held_out import camera_alone, check_held_out
 from vision.calibration.layout import lay_out
 from vision.calibration.tied import pose_priors
 from vision.calibration.views import BoardViews
@@ -116,7 +116,7 @@ def body_poses(made: Calibration, views: BoardViews) -> np.ndarray:
     """Return the poses of the body T_world_body (views, 3, 4) by all cameras."""
     alone = {}
     for camera in made.cameras:
-        alone[camera.name] = usable_views(camera, views.boards[camera.name], made.placed_board)
+        alone[camera.name] = camera_alone(camera, views.boards[camera.name], made.placed_board)
     T_camera_world = np.array([camera.T_camera_rig for camera in made.cameras])
     layout = lay_out(alone, T_camera_world, together=True)
     priors = pose_priors(len(alone), len(layout.index), made.placed_board)

@@ -16,7 +16,7 @@ from vision.boards.charuco import CharucoBoard
 from vision.boards.corners import Corners, is_found
 from vision.geometry.board import PRINT_TERMS, Board, printed_corners
 from vision.geometry.checks import require
-from vision.geometry.rotation import apply, exp_rotation, left_jacobian, skew
+from vision.geometry.rotation import apply, left_jacobian, moved_pose, skew
 
 # [parameters] Of a face's pose. A layout, no threshold.
 _N_POSE = 6
@@ -197,9 +197,7 @@ class PlacedBody(Body):
         of_shape = terms[: len(self.shape_sigma)]
         first_face = np.zeros(_N_POSE)  # the body's frame is tied to it
         steps = np.append(first_face, of_shape).reshape(-1, _N_POSE)
-        R = exp_rotation(steps[:, :3]) @ self.T_body_face[:, :, :3]
-        t = self.T_body_face[:, :, 3] + steps[:, 3:]
-        return np.concatenate([R, t[:, :, None]], axis=2)
+        return moved_pose(self.T_body_face, steps)
 
 
 def _by_step(from_origin: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -104,6 +104,16 @@ def _normalise(points: np.ndarray) -> np.ndarray:
     return centred / max(np.sqrt(np.mean(np.sum(centred**2, axis=1))), 1e-12)
 
 
+def usable_views(series: Sequence[Corners], board: Board) -> dict[int, Corners]:
+    """Return by index, without stray corners, the views of a series that fix a pose of the board."""
+    usable = {}
+    for k, view in enumerate(series):
+        view = without_strays(view, board)
+        if fixes_pose(view, board):
+            usable[k] = view
+    return usable
+
+
 def check_views(name: str, views: Collection[Corners]) -> None:
     """Raise Refused for a camera with too few views."""
     if len(views) < MIN_VIEWS:

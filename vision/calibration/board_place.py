@@ -10,7 +10,7 @@ from vision.calibration.first_guess import board_pose
 from vision.geometry.board import Board
 from vision.geometry.camera import Cameras
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import apply, compose, exp_rotation, invert_transform
+from vision.geometry.rotation import apply, compose, invert_transform, moved_pose
 
 # [sigmas] RMS of corners about the board: more is no board that stands still before these cameras. Stated.
 _MOST_SIGMAS = 8.0
@@ -32,16 +32,12 @@ def place_board(
     T_camera_board = board_pose(seen[first], board.corners_mm, camera.lens)
     T_first = compose(invert_transform(camera.T_camera_rig), T_camera_board)
 
-    def moved(step: np.ndarray) -> np.ndarray:
-        """Return the first pose, turned and shifted by a step (6,)."""
-        turned = exp_rotation(step[:3]) @ T_first[:, :3]
-        return np.column_stack([turned, T_first[:, 3] + step[3:]])
-
     def residuals(step: np.ndarray) -> np.ndarray:
         """Return how far (n,) corners are off, over their sigma."""
         off = []
         for name, view in seen.items():
-            px = cameras[name].project(apply(moved(step), board.corners_mm[view.ids]))
+            T_rig_board = moved_pose(T_first, step)
+            px = cameras[name].project(apply(T_rig_board, board.corners_mm[view.ids]))
             off.append(((px - view.px) / view.sigma_px[:, None]).ravel())
         return np.concatenate(off)
 
@@ -54,4 +50,4 @@ def place_board(
             code="object_points_elsewhere",
         )
     covariance = max(rms, 1.0) ** 2 * np.linalg.inv(found.jac.T @ found.jac)
-    return moved(found.x), covariance
+    return moved_pose(T_first, found.x), covariance

@@ -16,27 +16,19 @@ Poses move as T ← (Exp(w) R, t + v). `vision.calibration.adjust` finds the par
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from vision.calibration.board_motion import Trajectory
 from vision.geometry import lens as lens_model
 from vision.geometry.board import PRINT_TERMS, Board
+from vision.geometry.camera import PARAMETERS
 from vision.geometry.crop import Crop
-from vision.geometry.rotation import exp_rotation, left_jacobian, skew
+from vision.geometry.rotation import exp_rotation, left_jacobian, moved_pose, skew
 from vision.geometry.rows import Rows
 
-CAMERA_COLUMNS = (
-    *lens_model.LENS_TERMS,
-    "w_x",
-    "w_y",
-    "w_z",
-    "v_x",
-    "v_y",
-    "v_z",
-    "clock_offset_s",
-)
+CAMERA_COLUMNS = (*PARAMETERS, "clock_offset_s")
 N_CAMERA = len(CAMERA_COLUMNS)
 N_BOARD = len(PRINT_TERMS)
 # [parameters] A layout, no threshold.
@@ -69,6 +61,18 @@ class Sightings(Rows):
         """Return the first row of each shot, a shot being one camera's picture of one view."""
         is_new = (np.diff(self.view) != 0) | (np.diff(self.camera) != 0)
         return np.concatenate([[0], np.flatnonzero(is_new) + 1])
+
+    def pictures_by_view(self, views: int) -> np.ndarray:
+        """Return how many pictures there are of each of so many views, (views,)."""
+        return np.bincount(self.view[self.shot_starts()], minlength=views)
+
+    def with_error(self, error_px: np.ndarray) -> Self:
+        """Return the corners with their camera's model error in their sigmas; error_px (C,)."""
+        return replace(self, sigma_px=np.hypot(self.sigma_px, error_px[self.camera]))
+
+    def with_equal_sigmas(self) -> Self:
+        """Return the corners with a sigma of 1 px each."""
+        return replace(self, sigma_px=np.ones(len(self)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,20 +122,13 @@ class BundleState:
         return replace(
             self,
             lens=self.lens + cameras[:, :9],
-            T_camera_world=_move_poses(self.T_camera_world, cameras[:, POSE]),
-            T_world_board=_move_poses(self.T_world_board, view_steps),
+            T_camera_world=moved_pose(self.T_camera_world, cameras[:, POSE]),
+            T_world_board=moved_pose(self.T_world_board, view_steps),
             board=self.board + global_step[of_cameras:],
             points_mm=self.points_mm + point_steps,
             clock=self.clock + cameras[:, CLOCK],
             instants=self.instants + instant_steps,
         )
-
-
-def _move_poses(T: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Return poses (n, 3, 4) moved by steps (n, 6), w rad and v mm."""
-    R = exp_rotation(steps[:, :3]) @ T[:, :, :3]
-    t = T[:, :, 3] + steps[:, 3:]
-    return np.concatenate([R, t[:, :, None]], axis=2)
 
 
 @dataclass(frozen=True, eq=False)

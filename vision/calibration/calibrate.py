@@ -25,9 +25,9 @@ from vision.boards.sufficiency import (
     check_rig_view,
     check_views,
     depth_ratio,
-    fixes_pose,
     squash_of,
     tilt_deg,
+    usable_views,
     without_strays,
 )
 from vision.calibration.adjust import adjust_bundle
@@ -35,7 +35,7 @@ from vision.calibration.bundle import N_CAMERA, BundleState, Priors
 from vision.calibration.corner_noise import Adjustment, adjust_with_noise
 from vision.calibration.exchanged import check_own_lenses
 from vision.calibration.faces import place_faces
-from vision.calibration.first_guess import has_pose
+from vision.calibration.first_guess import with_pose
 from vision.calibration.layout import Alone, Layout
 from vision.calibration.one_picture import calibrate_picture, first_lenses
 from vision.calibration.place import by_board
@@ -276,22 +276,14 @@ def _alone_of_picture(
 ) -> dict[str, Alone]:
     """Calibrate the cameras that are parts of one picture. Raises Refused where its views do not suffice."""
     crops = [views.crop(name) for name in names]
-    usable = [_usable(views.boards[name], board) for name in names]
-    lenses = first_lenses([list(own.values()) for own in usable], board, crops)
-    for own, lens in zip(usable, lenses):
-        _drop_without_pose(own, board, lens)
+    fixing = [usable_views(views.boards[name], board) for name in names]
+    lenses = first_lenses([list(own.values()) for own in fixing], board, crops)
+    usable = [with_pose(own, board.corners_mm, lens) for own, lens in zip(fixing, lenses)]
     check_views(" and ".join(names), [view for own in usable for view in own.values()])
     for name, own in zip(names, usable):
         _check_sees_board(name, len(own), views.rig.get(name), board, with_rig)
     by_camera = [list(own.values()) for own in usable]
     return _each_alone(names, usable, calibrate_picture(by_camera, board, crops))
-
-
-def _drop_without_pose(views: dict[int, Corners], board: Board, lens: np.ndarray) -> None:
-    """Remove the views in which a lens gives the board no pose."""
-    for k in list(views):
-        if not has_pose(views[k], board.corners_mm, lens):
-            del views[k]
 
 
 def _each_alone(
@@ -305,16 +297,6 @@ def _each_alone(
         own_poses = {k: next(poses) for k in own}
         found[name] = Alone(state.lens[c], float(adjustment.error_px[c]), own, own_poses)
     return found
-
-
-def _usable(series: Sequence[Corners], board: Board) -> dict[int, Corners]:
-    """Return the views of a series that fix a pose, by index."""
-    usable = {}
-    for k, view in enumerate(series):
-        view = without_strays(view, board)
-        if fixes_pose(view, board):
-            usable[k] = view
-    return usable
 
 
 def _check_sees_board(

@@ -87,7 +87,7 @@ def adjust_coarse(state: BundleState, seen: Sightings, board: Board, priors: Pri
     error = np.full(len(state.lens), _FIRST_ERROR_PX)
     solution, error, priors = _adjust_robustly(state, seen, board, priors, error)
     kept = np.ones(len(seen), dtype=bool)
-    weighted = _with_error(seen, np.full(len(state.lens), _FIRST_ERROR_PX))
+    weighted = seen.with_error(np.full(len(state.lens), _FIRST_ERROR_PX))
     return Adjustment(solution, weighted, kept, solution.residual_px, error, priors)
 
 
@@ -121,7 +121,7 @@ def _adjust_robustly(
     it.
     """
     solution = adjust_bundle(
-        state, _with_error(seen, error), board, priors, width=_ROBUST_WIDTH, tolerance=1e-4
+        state, seen.with_error(error), board, priors, width=_ROBUST_WIDTH, tolerance=1e-4
     )
     if not np.isfinite(solution.cost):
         raise Refused(
@@ -140,14 +140,14 @@ def _without_outliers(
     Raises Refused where no corner is left.
     """
     residual_px = solution.residual_px
-    kept = _inliers(residual_px, _with_error(seen, error))
+    kept = _inliers(residual_px, seen.with_error(error))
     if not kept.any():
         raise Refused("no corner agrees with the others: is this the board as described?")
     for _ in range(2):
         fitted = solution.fitted_points
         error = _error_by_mean(residual_px, seen, kept, error, priors, fitted)
         priors = _with_print_errors(priors, solution, board)
-        weighted = _with_error(seen, error)
+        weighted = seen.with_error(error)
         solution = adjust_bundle(solution.state, weighted.select(kept), board, priors)
         residual_px = seen.px - predict(solution.state, seen, board)[0]
     solution = replace(solution, residual_px=residual_px)
@@ -186,11 +186,6 @@ def _with_print_errors(priors: Priors, solution: Solution, board: Board) -> Prio
         return priors
     squared_mm2 = np.sum(solution.state.points_mm**2) / solution.fitted_points
     return replace(priors, point_sigma_mm=max(float(np.sqrt(squared_mm2)), _LEAST_POINT_SIGMA_MM))
-
-
-def _with_error(seen: Sightings, error_px: np.ndarray) -> Sightings:
-    """Return the corners with their camera's model error in their sigmas."""
-    return replace(seen, sigma_px=np.hypot(seen.sigma_px, error_px[seen.camera]))
 
 
 def _error_by_median(residual: np.ndarray, seen: Sightings, n_cameras: int) -> np.ndarray:

@@ -119,6 +119,13 @@ def has_pose(view: Corners, corners_mm: np.ndarray, lens: np.ndarray) -> bool:
         return False
 
 
+def with_pose(
+    views: Mapping[int, Corners], corners_mm: np.ndarray, lens: np.ndarray
+) -> dict[int, Corners]:
+    """Return by index the views in which a lens gives the board a pose."""
+    return {k: view for k, view in views.items() if has_pose(view, corners_mm, lens)}
+
+
 def chain_cameras(poses: Mapping[str, Mapping[int, np.ndarray]]) -> dict[str, np.ndarray]:
     """Return T_camera_world of every camera, the world being the first camera's frame.
 

@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.boards.corners import Corners
-from vision.boards.sufficiency import fixes_pose, without_strays
+from vision.boards.sufficiency import usable_views
 from vision.calibration.adjust import Solution, adjust_bundle
-from vision.calibration.bundle import BundleState, Priors, Sightings, predict
+from vision.calibration.bundle import BundleState, Priors, predict
 from vision.calibration.calibrate import Calibration
-from vision.calibration.first_guess import board_pose, has_pose
+from vision.calibration.first_guess import board_pose, with_pose
 from vision.calibration.layout import Alone, Layout, lay_out
 from vision.calibration.tied import pose_priors
 from vision.geometry.board import Board
@@ -86,7 +86,7 @@ def check_held_out(
     usable = {}
     alone_px = {}
     for camera in cameras:
-        alone = usable_views(camera, views[camera.name], calibration.placed_board)
+        alone = camera_alone(camera, views[camera.name], calibration.placed_board)
         usable[camera.name] = alone
         alone_px[camera.name] = _alone_px(camera, alone, is_held, calibration)
     together = calibration.together if together is None else together
@@ -100,15 +100,12 @@ def check_held_out(
     return _JointFits(calibration, layout, rows).errors(alone_px)
 
 
-def usable_views(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
+def camera_alone(camera: Camera, views: Sequence[Corners], board: Board) -> Alone:
     """Return the camera by itself, with its usable views and their board poses."""
-    usable = {}
+    usable = with_pose(usable_views(views, board), board.corners_mm, camera.lens)
     poses = {}
-    for k, view in enumerate(views):
-        view = without_strays(view, board)
-        if fixes_pose(view, board) and has_pose(view, board.corners_mm, camera.lens):
-            usable[k] = view
-            poses[k] = board_pose(view, board.corners_mm, camera.lens)
+    for k, view in usable.items():
+        poses[k] = board_pose(view, board.corners_mm, camera.lens)
     return Alone(camera.lens, camera.rms_px, usable, poses)
 
 
@@ -122,7 +119,7 @@ def _alone_px(
     if not held:
         return np.nan
     layout = lay_out({camera.name: replace(alone, views=held)}, np.eye(3, 4)[None], together=False)
-    seen = _with_equal_sigmas(layout.seen)
+    seen = layout.seen.with_equal_sigmas()
     board = calibration.placed_board
     first = calibration.with_board(layout.first)
     solution = adjust_bundle(first, seen, board, pose_priors(1, len(held), board))
@@ -131,15 +128,9 @@ def _alone_px(
 
 def _held_rows(layout: Layout, is_held: Sequence[bool]) -> np.ndarray:
     """Return the mask (n,) of corners in held views that more than one camera has."""
-    starts = layout.seen.shot_starts()
-    pictures = np.bincount(layout.seen.view[starts], minlength=len(layout.index))
+    pictures = layout.seen.pictures_by_view(len(layout.index))
     held_views = np.asarray(is_held)[layout.index] & (pictures > 1)
     return held_views[layout.seen.view]
-
-
-def _with_equal_sigmas(seen: Sightings) -> Sightings:
-    """Return the corners with a sigma of 1 px each."""
-    return replace(seen, sigma_px=np.ones(len(seen)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,8 +173,7 @@ class _JointFits:
     def instants(self) -> Agreement:
         """Return the agreement with each picture's own instant fitted, robustly."""
         error_px = np.array([report.error_px for report in self.calibration.report])
-        seen = self.layout.seen
-        seen = replace(seen, sigma_px=np.hypot(seen.sigma_px, error_px[seen.camera]))
+        seen = self.layout.seen.with_error(error_px)
         priors = replace(self._priors, late_sigma_s=self.calibration.timing.scatter_s)
         fitted = adjust_bundle(
             self._moving, seen, self.board, priors, width=_ROBUST_WIDTH, tolerance=1e-5
@@ -192,7 +182,7 @@ class _JointFits:
 
     def _with_equal_sigmas(self, first: BundleState) -> Agreement:
         """Return the agreement with all corners alike, from a first state."""
-        seen = _with_equal_sigmas(self.layout.seen)
+        seen = self.layout.seen.with_equal_sigmas()
         return self._agreement(adjust_bundle(first, seen, self.board, self._priors))
 
     @property

@@ -80,10 +80,10 @@ def residuals_by_view(
         clock=cameras.clock,
         trajectory=layout.trajectory,
     )
-    seen = replace(layout.seen, sigma_px=np.ones(len(layout.seen)))
+    seen = layout.seen.with_equal_sigmas()
     fitted = adjust_bundle(state, seen, board, priors)
     squared = np.sum(fitted.residual_px**2, axis=1)
-    pictures = np.bincount(seen.view[seen.shot_starts()], minlength=len(layout.index))
+    pictures = seen.pictures_by_view(len(layout.index))
     found = {}
     for view, index in enumerate(layout.index):
         if is_held.get(int(index)) and pictures[view] > 1:

@@ -13,8 +13,8 @@ from typing import TypeVar
 import numpy as np
 
 from vision.boards.corners import Corners
-from vision.boards.sufficiency import MIN_VIEWS, fixes_pose, without_strays
-from vision.calibration.first_guess import board_pose, first_lens, has_pose, transform_distances
+from vision.boards.sufficiency import MIN_VIEWS, fixes_pose, usable_views
+from vision.calibration.first_guess import board_pose, first_lens, transform_distances, with_pose
 from vision.calibration.one_picture import calibrate_alone
 from vision.calibration.views import BoardViews
 from vision.geometry.board import Board
@@ -76,11 +76,10 @@ class _Sight:
         self, views: BoardViews, name: str, board: Board, turns: Sequence[np.ndarray]
     ) -> None:
         """Calibrate the camera by itself, which needs no right names."""
-        seen = _posed_views(views.boards[name], board)
+        usable = usable_views(views.boards[name], board)
         size_px = views.sizes_px[name]
-        start = first_lens(list(seen.values()), board.corners_mm, size_px)
-        seen = {k: view for k, view in seen.items() if has_pose(view, board.corners_mm, start)}
-        lens = start
+        lens = first_lens(list(usable.values()), board.corners_mm, size_px)
+        seen = with_pose(usable, board.corners_mm, lens)
         if len(seen) >= MIN_VIEWS:
             adjusted = calibrate_alone(list(seen.values()), board, size_px)
             lens = adjusted.solution.state.lens[0]
@@ -102,16 +101,6 @@ def _poses(
 def _renamed(view: Corners, turn: np.ndarray) -> Corners:
     """Return a view's points under their names after a turn."""
     return replace(view, ids=turn[view.ids])
-
-
-def _posed_views(views: Sequence[Corners], board: Board) -> dict[int, Corners]:
-    """Return by number, without stray corners, the views that determine a pose of the board."""
-    found = {}
-    for k, view in enumerate(views):
-        view = without_strays(view, board)
-        if fixes_pose(view, board):
-            found[k] = view
-    return found
 
 
 def _candidates(first: _Sight, other: _Sight, shared: Sequence[int]) -> np.ndarray:

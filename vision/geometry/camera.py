@@ -13,7 +13,7 @@ import numpy as np
 from vision.geometry import lens as lens_model
 from vision.geometry.checks import require
 from vision.geometry.optics import UNKNOWN, Optics
-from vision.geometry.rotation import apply, exp_rotation, nearest_rotation, skew, unit
+from vision.geometry.rotation import apply, moved_pose, nearest_rotation, skew, unit
 
 # [parameters] A layout, no threshold: nine of the lens, six of the pose.
 N_PARAMETERS = 15
@@ -126,13 +126,11 @@ class Camera:
         or a step of a fit.
         """
         lens = self.lens + step[:9]
-        R = exp_rotation(step[9:12]) @ self.T_camera_rig[:, :3]
-        shift_mm = self.T_camera_rig[:, 3] + step[12:15]
         return replace(
             self,
             matrix=camera_matrix(lens),
             distortion=lens[4:],
-            T_camera_rig=np.column_stack([R, shift_mm]),
+            T_camera_rig=moved_pose(self.T_camera_rig, step[9:]),
         )
 
 

@@ -111,7 +111,14 @@ def apply(T_a_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
     return points_b @ T_a_b[:, :3].T + T_a_b[:, 3]
 
 
+def moved_pose(T: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Return poses (..., 3, 4) moved by steps (..., 6), w rad and v mm: (Exp(w) R, t + v)."""
+    R = exp_rotation(step[..., :3]) @ T[..., :3]
+    t = T[..., 3] + step[..., 3:]
+    return np.concatenate([R, t[..., None]], axis=-1)
+
+
 def pose_difference(T_from: np.ndarray, T_to: np.ndarray) -> np.ndarray:
-    """Return (w, v) (6,), rad and mm, between two poses (3, 4): T_to = (Exp(w) R_from, t_from + v)."""
+    """Return (w, v) (6,), rad and mm, by which `moved_pose` makes T_to (3, 4) of T_from (3, 4)."""
     w = log_rotation(T_to[:, :3] @ T_from[:, :3].T)
     return np.concatenate([w, T_to[:, 3] - T_from[:, 3]])
