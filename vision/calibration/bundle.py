@@ -135,8 +135,8 @@ class BundleState:
 class Priors:
     """What is known besides the pictures, and what is held.
 
-    free (16 C + B,): bool. mean, sigma (16 C + B,): of independent observations of the global
-    parameters, sigma inf where there is none (poses: always inf). view_free (V,): bool. pose_view,
+    free (16 C + B,): bool. sigma (16 C + B,): about 0, of independent observations of the global
+    parameters, inf where there is none (poses: always inf). view_free (V,): bool. pose_view,
     pose_T (3, 4), pose_sigma (6,): one view whose pose was measured (the board on the rig), in w
     rad and v mm; pose_view is None where there is none. late_sigma_s (C,): how far a picture's instant
     strays from its time; None: not at all. shared: cameras with one lens, of which all but the first have no
@@ -145,7 +145,6 @@ class Priors:
     """
 
     free: np.ndarray
-    mean: np.ndarray
     sigma: np.ndarray
     view_free: np.ndarray
     pose_view: int | None = None
@@ -154,6 +153,17 @@ class Priors:
     late_sigma_s: np.ndarray | None = None
     shared: "SharedLenses | None" = None
     point_sigma_mm: float = 0.0
+
+    def observed(self, where: slice, sigma: Sequence[float]) -> Self:
+        """Return the priors with some global parameters free and about 0 within a sigma each; those
+        whose sigma is 0 are held.
+        """
+        own_sigma = np.array(sigma)
+        free = self.free.copy()
+        free[where] = own_sigma > 0
+        sigmas = self.sigma.copy()
+        sigmas[where] = np.where(own_sigma > 0, own_sigma, np.inf)
+        return replace(self, free=free, sigma=sigmas)
 
     def directions(self) -> np.ndarray:
         """Return how the global parameters move with the free ones, (16 C + B, F)."""

@@ -31,7 +31,7 @@ from vision.boards.sufficiency import (
     without_strays,
 )
 from vision.calibration.adjust import adjust_bundle
-from vision.calibration.bundle import N_CAMERA, BundleState, Priors
+from vision.calibration.bundle import N_CAMERA, BundleState
 from vision.calibration.corner_noise import Adjustment, adjust_with_noise
 from vision.calibration.exchanged import check_own_lenses
 from vision.calibration.faces import place_faces
@@ -318,7 +318,7 @@ def _with_warp(layout: Layout, flat: Adjustment, board: Board) -> tuple[Adjustme
 
     Returns the adjustment and notes.
     """
-    priors = allow_warp(flat.priors)
+    priors = flat.priors.observed(slice(-2, None), [_WARP_SIGMA_MM] * 2)
     kept = flat.seen.select(flat.kept)
     warped = adjust_bundle(flat.solution.state, kept, board, priors, tolerance=1e-6)
     if flat.solution.cost - warped.cost < _WARP_GAIN:
@@ -369,15 +369,6 @@ def _stretch_lines(adjustment: Adjustment, board: Board) -> tuple[list[str], tup
         f"stretch_sigma says ± {100 * board.stretch_sigma:.2g} %: measure both directions"
     )
     return [note], (Reason("board_stretched", warning),)
-
-
-def allow_warp(priors: Priors) -> Priors:
-    """Return the priors with the board's two warps free."""
-    free = priors.free.copy()
-    sigma = priors.sigma.copy()
-    free[-2:] = True
-    sigma[-2:] = _WARP_SIGMA_MM
-    return replace(priors, free=free, sigma=sigma)
 
 
 def as_cameras(

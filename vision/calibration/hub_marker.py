@@ -14,12 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
-from vision.calibration.marker_pictures import BIASES, FIRST_BIAS, MarkerPictures
+from vision.calibration.marker_pictures import (
+    AXIS_OF_PLACEMENT,
+    BIASES,
+    FIRST_BIAS,
+    MarkerPictures,
+    MarkerSighting,
+)
 from vision.calibration.place import Placement
-from vision.geometry.camera import Camera, Cameras
+from vision.geometry.camera import Cameras
 from vision.geometry.centreline import rotation_z
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import skew
+from vision.geometry.triangulate import nearest_to_rays
 
 # [pictures] Of a marker in two cameras; fewer show no turn. Derived.
 _FEWEST_INSTANTS = 4
@@ -47,23 +54,7 @@ FIRST_SCATTER_PX = 0.05
 PER_MEDIAN = 1.4826
 # [rad], [mm] Prior sigma of what a marker does not constrain: none. Stated.
 _UNSEEN = (1.0, 1000.0)
-# [parameters] Of the axis: two turns, two shifts. A layout, no threshold.
-_AXIS = np.array([0, 1, 3, 4])
 _SOURCE = "marker on the hub"
-
-
-@dataclass(frozen=True, eq=False)
-class MarkerSighting:
-    """A marker that is not the board's, in one picture: its corners px (4, 2).
-
-    instant: the same for all cameras' pictures of one frame.
-    """
-
-    number: int
-    camera: str
-    instant: tuple[str, int]
-    motor_rad: float
-    px: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +97,8 @@ def by_marker(sightings: Sequence[MarkerSighting], cameras: Cameras) -> Placemen
         raise Refused("no marker is seen to turn with the motor in two cameras")
     covariance = np.diag(np.repeat(np.square(_UNSEEN), 3))
     step = np.zeros(6)
-    step[_AXIS], covariance[np.ix_(_AXIS, _AXIS)] = _combine(fits)
+    axis = AXIS_OF_PLACEMENT
+    step[axis], covariance[np.ix_(axis, axis)] = _combine(fits)
     numbers = ", ".join(str(fit.number) for fit in fits)
     pictures = sum(fit.pictures for fit in fits)
     basis = f"marker {numbers} on the hub in {pictures} pictures"
@@ -150,10 +142,7 @@ class _AxisFit:
     def __init__(self, marker: _Turning, cameras: Cameras):
         """Fit the axis by all pictures of a marker."""
         self._cameras = cameras
-        self._seen = MarkerPictures(
-            px=np.array([one.px for one in marker.sightings]),
-            camera=np.array([cameras.index(one.camera) for one in marker.sightings]),
-        )
+        self._seen = MarkerPictures.of(marker.sightings, cameras)
         motor_rad = np.array([one.motor_rad for one in marker.sightings])
         self._motor_rad = motor_rad
         self._from_middle = motor_rad - 0.5 * (motor_rad.min() + motor_rad.max())
@@ -276,23 +265,8 @@ def _triangulated(
         if len({one.camera for one in together}) > 1:
             angles.append(together[0].motor_rad)
             views = [cameras[one.camera] for one in together]
-            corners.append(meet(views, [one.px for one in together]))
+            corners.append(nearest_to_rays(views, [one.px for one in together]))
     return np.array(angles), np.array(corners).reshape(-1, 4, 3)
-
-
-def meet(cameras: Sequence[Camera], px: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the points (4, 3), mm, nearest to the rays of several cameras to a marker's corners.
-
-    px: of each camera the corners (4, 2).
-    """
-    across = np.zeros((4, 3, 3))
-    offset = np.zeros((4, 3))
-    for camera, corners_px in zip(cameras, px):
-        rays = camera.rays(corners_px)
-        projector = np.eye(3) - rays[:, :, None] * rays[:, None, :]
-        across += projector
-        offset += projector @ camera.centre_mm
-    return np.linalg.solve(across, offset[:, :, None])[:, :, 0]
 
 
 def _twist(marker: _Turning) -> np.ndarray:

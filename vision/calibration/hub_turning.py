@@ -127,11 +127,7 @@ def _of_all(strokes: Sequence[MovingLines]) -> MovingLines:
     """Return the lines of all strokes as one. Raise Refused where there is no stroke."""
     if not strokes:
         raise Refused(_NOTHING_TURNS.format(0))
-    return MovingLines(
-        np.concatenate([stroke.motor_rad for stroke in strokes]),
-        np.concatenate([stroke.point_mm for stroke in strokes]),
-        np.concatenate([stroke.direction for stroke in strokes]),
-    )
+    return MovingLines.join(strokes)
 
 
 def _free_lines(
@@ -151,7 +147,7 @@ def _free_lines(
         for _ in range(_REJECTIONS):
             if kept.sum() < _FEWEST_LINES:
                 raise Refused(_NOTHING_TURNS.format(kept.sum()))
-            R, centre_mm = _fit(lines.rows(kept))
+            R, centre_mm = _fit(lines.select(kept))
             last = kept
             kept = _follows_motor(R, centre_mm, lines, kept) & (shares <= share)
             if np.array_equal(last, kept):
@@ -177,8 +173,7 @@ def _fan(motor_rad: np.ndarray, R: np.ndarray) -> np.ndarray:
     """Return the directions (n, 3) of a whisker at these motor angles, in the frame to which R
     rotates the rig.
     """
-    zero = np.zeros(len(motor_rad))
-    return np.column_stack([np.cos(motor_rad), np.sin(motor_rad), zero]) @ R.T
+    return rotation_z(motor_rad)[:, :, 0] @ R.T
 
 
 def _fit(lines: MovingLines) -> tuple[np.ndarray, np.ndarray]:

@@ -18,21 +18,24 @@ from vision.calibration.hub_marker import (
     FIRST_SCATTER_PX,
     LEAST_SCATTER_PX,
     PER_MEDIAN,
-    MarkerSighting,
-    meet,
 )
-from vision.calibration.marker_pictures import BIASES, FIRST_BIAS, MarkerPictures
+from vision.calibration.marker_pictures import (
+    AXIS_OF_PLACEMENT,
+    BIASES,
+    FIRST_BIAS,
+    MarkerPictures,
+    MarkerSighting,
+)
 from vision.geometry.camera import Cameras, symmetric_root
 from vision.geometry.centreline import rotation_z
 from vision.geometry.refusals import Refused
+from vision.geometry.triangulate import nearest_to_rays
 
 # [frames] In which two cameras see the marker; a smooth motion has no fewer. Derived.
 _FEWEST_FRAMES = 5
 # [rad], [mm] Least prior sigmas of the axis, where its placement is exact: below what a corner shows.
 # Derived.
 _EXACT = np.array([1e-6, 1e-6, 1e-5, 1e-5])
-# [parameters] Of a placement, those of the axis: two turns, two shifts. A layout, no threshold.
-_AXIS = np.array([0, 1, 3, 4])
 # [mixed] Step of differences of a parameter: of mm, rad and px alike. Derived.
 _STEP = 1e-5
 # [passes] Each gives the scatter of corners to the next. Stated.
@@ -81,15 +84,12 @@ class _TurnFit:
     def __init__(self, sightings: Sequence[MarkerSighting], cameras: Cameras):
         """Take the sightings of one marker in one trial."""
         self.cameras = cameras
-        self.seen = MarkerPictures(
-            px=np.array([one.px for one in sightings]),
-            camera=np.array([cameras.index(one.camera) for one in sightings]),
-        )
+        self.seen = MarkerPictures.of(sightings, cameras)
         numbers = [one.instant[1] for one in sightings]
         self.frames, self.frame = np.unique(numbers, return_inverse=True)
         self.first_turn = FIRST_BIAS + BIASES * len(cameras)
         placement = np.zeros((6, 6)) if cameras.placement is None else cameras.placement
-        axis_sigma = np.hypot(np.sqrt(np.diag(placement))[_AXIS], _EXACT)
+        axis_sigma = np.hypot(np.sqrt(np.diag(placement))[AXIS_OF_PLACEMENT], _EXACT)
         biases = np.repeat(BIAS_PX, BIASES // 2 * len(cameras))
         self._prior = np.concatenate([axis_sigma, biases, DRIFT_PER_RAD * biases])
         # of the axis and the biases; corners and turns have no prior
@@ -121,7 +121,7 @@ class _TurnFit:
             own = np.flatnonzero(self.frame == k)
             if len(own) > 1:
                 views = [self.cameras.cameras[c] for c in self.seen.camera[own]]
-                corners_mm[k] = meet(views, self.seen.px[own])
+                corners_mm[k] = nearest_to_rays(views, self.seen.px[own])
         return corners_mm
 
     def turns_rad(self, parameters: np.ndarray) -> np.ndarray:
@@ -176,8 +176,8 @@ class _TurnFit:
             return np.zeros((len(cameras.covariance), 0))
         if cameras.placement is None:
             return cameras.by_error
-        by_placement = cameras.by_placement[:, _AXIS]
-        axis = cameras.placement[np.ix_(_AXIS, _AXIS)]
+        by_placement = cameras.by_placement[:, AXIS_OF_PLACEMENT]
+        axis = cameras.placement[np.ix_(AXIS_OF_PLACEMENT, AXIS_OF_PLACEMENT)]
         return symmetric_root(cameras.covariance - by_placement @ axis @ by_placement.T)
 
     def _residuals(self, parameters: np.ndarray, scatter_px: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ Parameters: w_x, w_y (rad), v_x, v_y (mm); the corners in the hub (4, 3), mm; of
 bias (8,), px, and its change with the turn (8,), px/rad.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,6 +22,22 @@ from vision.geometry.rotation import exp_rotation
 FIRST_BIAS = 16
 # [parameters] The biases and their changes of one camera. A layout, no threshold.
 BIASES = 16
+# [parameters] Of a placement, those of the axis: two turns, two shifts. A layout, no threshold.
+AXIS_OF_PLACEMENT = np.array([0, 1, 3, 4])
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerSighting:
+    """A marker that is not the board's, in one picture: its corners px (4, 2).
+
+    instant: the same for all cameras' pictures of one frame.
+    """
+
+    number: int
+    camera: str
+    instant: tuple[str, int]
+    motor_rad: float
+    px: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +46,12 @@ class MarkerPictures:
 
     px: np.ndarray
     camera: np.ndarray
+
+    @classmethod
+    def of(cls, sightings: Sequence[MarkerSighting], cameras: Cameras) -> "MarkerPictures":
+        """Return the pictures of one marker's sightings."""
+        px = np.array([one.px for one in sightings])
+        return cls(px, np.array([cameras.index(one.camera) for one in sightings]))
 
     @cached_property
     def cameras_with_pictures(self) -> list[int]:

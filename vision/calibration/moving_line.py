@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.newton import cauchy_weights
+from vision.geometry.planes import fit_plane, meet_planes, nearest_along_mm
+from vision.geometry.rows import Rows
 from vision.pictures.change import HALF, change_confidence
 from vision.pictures.pixel_noise import Noise, measure_noise
 
@@ -37,8 +38,6 @@ _BIN_PX = 6.0
 _NEAR_PX = 8.0
 # [px] Beside a line: what noise scatters. Study: tests/bench/trials/test_placing_pictures.py.
 _SCATTER_PX = 1.0
-# [rounds] Of reweighting, at most; it converges in fewer. Stated.
-_ROUNDS = 12
 # [px] Of a line's pixels; shorter gives no direction. Set by eye. Study:
 # tests/bench/trials/test_placing_pictures.py.
 _LEAST_LENGTH_PX = 40.0
@@ -50,7 +49,7 @@ _FEWEST_FRAMES = 4
 
 
 @dataclass(frozen=True, eq=False)
-class MovingLines:
+class MovingLines(Rows):
     """The line that moves in one stroke, one row per frame in which it is found, in the cameras'
     frame.
 
@@ -61,10 +60,6 @@ class MovingLines:
     motor_rad: np.ndarray
     point_mm: np.ndarray
     direction: np.ndarray
-
-    def rows(self, which: np.ndarray) -> "MovingLines":
-        """Return the lines that a mask or indices choose."""
-        return MovingLines(self.motor_rad[which], self.point_mm[which], self.direction[which])
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +72,6 @@ class _Plane:
     centre_mm: np.ndarray
     normal: np.ndarray
     ray: np.ndarray
-
-    def middle_along(self, point_mm: np.ndarray, direction: np.ndarray) -> float:
-        """Return how far along a line through a point (3,) its visible middle lies, mm."""
-        across = self.ray - (self.ray @ direction) * direction
-        depth_mm = (point_mm - self.centre_mm) @ across / (across @ across)
-        return (self.centre_mm + depth_mm * self.ray - point_mm) @ direction
 
 
 def moving_lines(
@@ -161,12 +150,11 @@ def _fit_plane(rays: np.ndarray, focal_px: float) -> tuple[np.ndarray, np.ndarra
     """Return the unit normal (3,) of the plane of rays (n, 3), with Cauchy's weights, and the ray
     (3,) in their middle; None where too few rays agree.
     """
-    weight = np.ones(len(rays))
-    for _ in range(_ROUNDS):
-        if weight.sum() * HALF < _LEAST_LENGTH_PX:
-            return None
-        normal = np.linalg.svd(rays * np.sqrt(weight)[:, None], full_matrices=False)[2][2]
-        weight = cauchy_weights(rays @ normal * focal_px, _SCATTER_PX)
+    if len(rays) * HALF < _LEAST_LENGTH_PX:
+        return None
+    normal, weight = fit_plane(rays, focal_px, _SCATTER_PX)
+    if weight.sum() * HALF < _LEAST_LENGTH_PX:
+        return None
     middle = np.searchsorted(np.cumsum(weight), 0.5 * weight.sum())
     return normal, rays[middle]
 
@@ -196,11 +184,11 @@ def _intersection(planes: Sequence[_Plane]) -> tuple[np.ndarray, np.ndarray] | N
     if len(planes) < 2:
         return None
     normals = np.array([plane.normal for plane in planes])
-    offsets_mm = [plane.normal @ plane.centre_mm for plane in planes]
-    _, strength, axes = np.linalg.svd(normals)
+    strength = np.linalg.svd(normals, compute_uv=False)
     if strength[1] < np.sqrt(2) * np.sin(0.5 * _LEAST_ANGLE_RAD):
         return None
-    direction = axes[2]
-    point = np.linalg.lstsq(normals, offsets_mm, rcond=None)[0]
-    along_mm = [plane.middle_along(point, direction) for plane in planes]
+    point, direction = meet_planes(normals, np.array([plane.centre_mm for plane in planes]))
+    along_mm = []
+    for plane in planes:
+        along_mm.append(nearest_along_mm(point, direction, plane.centre_mm, plane.ray))
     return point + np.median(along_mm) * direction, direction

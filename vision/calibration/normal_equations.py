@@ -304,7 +304,7 @@ def _with_priors(
 def _add_priors(equations: NormalEquations, state: BundleState, priors: Priors) -> float:
     """Add the observations besides the pictures, in place; return their cost."""
     precision = 1.0 / priors.sigma**2
-    residual = np.where(precision == 0, 0.0, priors.mean - state.global_values())
+    residual = np.where(precision == 0, 0.0, -state.global_values())
     equations.A[np.diag_indices(len(residual))] += precision
     equations.a[: len(residual)] += precision * residual
     cost = np.sum(precision * residual**2)

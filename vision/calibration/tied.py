@@ -315,7 +315,6 @@ def lens_priors(
     shape_sigma = board.shape_sigma
     return Priors(
         np.concatenate([free.ravel(), np.isfinite(shape_sigma), [False] * N_BOARD]),
-        np.zeros(N_CAMERA * n_cameras + len(shape_sigma) + N_BOARD),
         np.concatenate([sigma.ravel(), shape_sigma, [np.inf] * N_BOARD]),
         np.ones(n_views, dtype=bool),
         shared=shared,
@@ -333,12 +332,8 @@ def with_print(priors: Priors, board: Board) -> Priors:
     """Return the priors with size and stretch of the board's print free where they have a sigma,
     and observed to be as stated within that.
     """
-    sigmas = np.array([board.square_sigma_mm / board.square_mm, board.stretch_sigma])
-    free = priors.free.copy()
-    sigma = priors.sigma.copy()
-    free[-N_BOARD:-2] = sigmas > 0
-    sigma[-N_BOARD:-2] = np.where(sigmas > 0, sigmas, np.inf)
-    return replace(priors, free=free, sigma=sigma)
+    sigmas = [board.square_sigma_mm / board.square_mm, board.stretch_sigma]
+    return priors.observed(slice(-N_BOARD, -2), sigmas)
 
 
 def _priors(

@@ -2,7 +2,7 @@
 covariance.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +44,8 @@ def triangulate(
     """
     visible = {name: np.isfinite(px[name]).all(axis=1) for name in cameras.names}
     enough = np.sum(list(visible.values()), axis=0) > 1  # (n,)
-    points = np.where(enough[:, None], _nearest_to_rays(cameras, px), np.nan)
+    meeting = nearest_to_rays(cameras.cameras, [px[name] for name in cameras.names])
+    points = np.where(enough[:, None], meeting, np.nan)
     for _ in range(_STEPS):
         step, normal, coupling = _gauss_newton_step(cameras, px, sigma_px, points)
         points = points + step
@@ -52,13 +53,15 @@ def triangulate(
     return Points(points, covariance, covariance @ coupling)
 
 
-def _nearest_to_rays(cameras: Cameras, px) -> np.ndarray:
-    """Return where the rays of all cameras come nearest to each other, (n, 3)."""
-    count = len(px[cameras.names[0]])
-    A = np.zeros((count, 3, 3))
-    b = np.zeros((count, 3))
-    for camera in cameras:
-        rays = camera.rays(px[camera.name])
+def nearest_to_rays(cameras: Sequence[Camera], px: Sequence[np.ndarray]) -> np.ndarray:
+    """Return where the rays of several cameras come nearest to each other, (n, 3) mm.
+
+    px: of each camera (n, 2), NaN where it does not see the point.
+    """
+    A = np.zeros((len(px[0]), 3, 3))
+    b = np.zeros((len(px[0]), 3))
+    for camera, own_px in zip(cameras, px):
+        rays = camera.rays(own_px)
         across = np.nan_to_num(np.eye(3) - rays[:, :, None] * rays[:, None, :])
         A += across
         b += across @ camera.centre_mm

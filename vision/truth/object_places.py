@@ -14,6 +14,7 @@ import numpy as np
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.contact import BarAxis
 from vision.geometry.newton import cauchy_weights
+from vision.geometry.planes import fit_plane, meet_planes, nearest_along_mm
 from vision.geometry.polyline import normals
 from vision.geometry.refusals import Refused
 from vision.geometry.robust import robust_sigma
@@ -34,8 +35,6 @@ _REACH_MM = 200.0
 _LEAST_SIGMA_PX = 0.02
 # [px] Scale of the Cauchy weights of points about their plane: trackers scatter by less. Stated.
 _SCATTER_PX = 2.0
-# [rounds] Of such weights. Stated.
-_ROUNDS = 5
 # [1] By how much the distance of two tracked edges may differ from the object's width. Stated.
 _MOST_UNLIKE_WIDTH = 0.3
 # [mm] From a place of an axis: itself and to either side, for the normal there. A layout.
@@ -114,10 +113,8 @@ class TrackedObject(ObjectPlace):
         if len(seeing) < 2:
             raise _from_one_side()
         planes = np.array([_plane(self.points[camera.name], camera) for camera in seeing])
-        distances_mm = [plane @ camera.centre_mm for plane, camera in zip(planes, seeing)]
-        direction = np.linalg.svd(planes)[2][2]
-        meeting_mm = np.linalg.lstsq(planes, distances_mm, rcond=None)[0]
-        axis = BarAxis(meeting_mm, direction).upward()
+        centres_mm = np.array([camera.centre_mm for camera in seeing])
+        axis = BarAxis(*meet_planes(planes, centres_mm)).upward()
         if seen_from_one_side(Cameras(tuple(seeing)), axis):
             raise _from_one_side()
         axis = _opposite_points(axis, self.points[seeing[0].name], seeing[0])
@@ -234,26 +231,16 @@ def _plane(points: Trace, camera: Camera) -> np.ndarray:
     """
     found: list[np.ndarray] = []
     for line in np.unique(points.line):
-        normal = _plane_of_rays(camera.rays(points.px[points.line == line]), camera.lens[0])
+        rays = camera.rays(points.px[points.line == line])
+        normal, _ = fit_plane(rays, camera.lens[0], _SCATTER_PX)
         found.append(normal if not found or normal @ found[0] > 0 else -normal)
     return unit(np.sum(found, axis=0))
-
-
-def _plane_of_rays(rays: np.ndarray, focal_px: float) -> np.ndarray:
-    """Return the unit normal (3,) of the plane of rays (n, 3), with Cauchy's weights."""
-    weight = np.ones(len(rays))
-    for _ in range(_ROUNDS):
-        normal = np.linalg.svd(rays * np.sqrt(weight)[:, None], full_matrices=False)[2][-1]
-        weight = cauchy_weights(rays @ normal * focal_px, _SCATTER_PX)
-    return normal
 
 
 def _opposite_points(axis: BarAxis, points: Trace, camera: Camera) -> BarAxis:
     """Return an axis whose point is in the middle of a camera's tracked points."""
     ray = unit(np.mean(camera.rays(points.px), axis=0))
-    across = np.cross(axis.direction, ray)
-    from_centre_mm = axis.point_mm - camera.centre_mm
-    along_mm = np.cross(ray, from_centre_mm) @ across / (across @ across)
+    along_mm = nearest_along_mm(axis.point_mm, axis.direction, camera.centre_mm, ray)
     return BarAxis(axis.point_mm + along_mm * axis.direction, axis.direction)
 
 
