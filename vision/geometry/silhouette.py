@@ -15,10 +15,10 @@ from vision.geometry.rotation import cross
 def outline(
     camera: Camera, points_mm: np.ndarray, directions: np.ndarray, radius_mm: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middle (n, 2) and half-width (n,) px of a rod's outline at points (n, 3) of its
+    """Return the middle (..., n, 2) and half-width (..., n) px of a rod's outline at points of its
     axis.
 
-    directions (n, 3): unit vectors along the rod. radius_mm: one, or (n,).
+    Arguments are as of `grazed`.
     """
     one, other = edges(camera, points_mm, directions, radius_mm)
     middle = 0.5 * (one + other)

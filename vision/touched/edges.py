@@ -16,6 +16,7 @@ import numpy as np
 
 from vision.geometry.contact import BarAxis
 from vision.geometry.newton import covariance_of, descend
+from vision.geometry.polyline import normals
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.pieces import (
@@ -164,6 +165,5 @@ def _points_of_edges(pieces: Pieces, q, covariance) -> dict[int, LinePoints]:
 def _normals_of_line(px, normal) -> np.ndarray:
     """Return the unit normals (2, 2) of the line through two points, on the side of the given
     ones."""
-    along = (px[1] - px[0]) / np.linalg.norm(px[1] - px[0])
-    across = np.array([-along[1], along[0]])
-    return np.tile(across * np.sign(across @ normal.sum(axis=0)), (2, 1))
+    across = normals(px)
+    return across * np.sign(across[0] @ normal.sum(axis=0))

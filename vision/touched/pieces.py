@@ -7,12 +7,13 @@ background and nothing else.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from vision.geometry.contact import BarAxis
+from vision.geometry.polyline import tangents_by
 from vision.geometry.refusals import Refused
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
@@ -103,7 +104,7 @@ def _from_whole(band: Band, length_px: int) -> Band:
     extent = np.ptp(band.foot_px, axis=0)
     along = int(np.argmin(np.abs(extent - len(band.place) + 1)))
     first = int(-band.foot_px[0, along] % length_px)
-    return Band(*(getattr(band, field.name)[first:] for field in fields(Band)))
+    return band.select(slice(first, None))
 
 
 def bar_knots(settings: VisionSettings) -> Knots:
@@ -116,7 +117,7 @@ def clear_of_wire(pieces: Pieces, wires_px: Sequence[np.ndarray], margin_px: flo
     bar."""
     if not len(wires_px):
         return np.ones(len(pieces), dtype=bool)
-    tangent = np.stack([pieces.normal[:, 1], -pieces.normal[:, 0]], axis=1)
+    tangent = tangents_by(pieces.normal)
     from_feet_px = np.concatenate(wires_px) - pieces.foot_px[:, None]  # (s, all m, 2)
     along = np.abs(np.einsum("smi,si->sm", from_feet_px, tangent))
     across = np.abs(np.einsum("smi,si->sm", from_feet_px, pieces.normal))

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from vision.geometry.camera import Camera
 from vision.geometry.polyline import at_lengths, lengths_px, tangents_by
 from vision.geometry.rounded import RoundedAxis
+from vision.geometry.rows import Rows
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
 from vision.touched.patches import FULL_SCALE
@@ -116,7 +117,7 @@ def _normals_in_picture(
 
 
 @dataclass(frozen=True)
-class _SidePixels:
+class _SidePixels(Rows):
     """Pixels near one side of a silhouette.
 
     pixels (n, 2): whole, x and y. station (n,): the nearest one. offset_px, along_px (n,): across
@@ -137,12 +138,6 @@ class _SidePixels:
         past_station_px = np.sum(displacement * side.tangent[nearest], axis=1)
         return cls(pixels, nearest, offset_px, side.arc_px[nearest] + past_station_px)
 
-    def select(self, keep: np.ndarray) -> "_SidePixels":
-        """Return the pixels where keep (n,) holds."""
-        return _SidePixels(
-            self.pixels[keep], self.station[keep], self.offset_px[keep], self.along_px[keep]
-        )
-
 
 def read_pieces(
     view: View,
@@ -156,7 +151,7 @@ def read_pieces(
     outside_px = reach_px + OUTSIDE_PX + 1.0
     pixels = _pixels_near(view.mean.shape, side, inside_px, outside_px)
     if not len(pixels):
-        return _no_pieces()
+        return Pieces.none()
     found = _SidePixels.of(side, pixels)
     keep = side.is_clear[found.station] & (found.offset_px < outside_px)
     keep &= found.offset_px > -np.minimum(inside_px, side.half_px[found.station])
@@ -196,15 +191,6 @@ def _pixels_near(
     is_within = np.all((near >= 0) & (near < np.array([width, height])), axis=1)
     index = np.unique(near[is_within, 1] * width + near[is_within, 0])
     return np.stack([index % width, index // width], axis=1).astype(float)
-
-
-def _no_pieces() -> Pieces:
-    """Return pieces without any pixel."""
-    empty = np.zeros((0, 1))
-    none = np.zeros(0)
-    points = np.zeros((0, 2))
-    source = np.zeros(0, dtype=int)
-    return Pieces(empty, empty, empty, empty, empty, empty, none, none, points, points, source)
 
 
 @dataclass(frozen=True)
@@ -270,7 +256,7 @@ def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) 
     """
     rows = _Rows.of((found.along_px // length_px).astype(int))
     if not len(rows.pieces):
-        return _no_pieces()
+        return Pieces.none()
     light = _PixelLight.of(view, side, found)
     half_px = side.model_half_px
     middle = (rows.pieces + 0.5) * length_px

@@ -226,6 +226,15 @@ class Pieces(Rows):
         if self.noise_behind is None:
             object.__setattr__(self, "noise_behind", np.ones(len(self.place)))
 
+    @staticmethod
+    def none() -> "Pieces":
+        """Return no segments."""
+        pixels = np.zeros((0, 1))
+        values = np.zeros(0)
+        vectors = np.zeros((0, 2))
+        source = np.zeros(0, dtype=int)
+        return Pieces(*[pixels] * 6, values, values, vectors, vectors, source, pixels)
+
     def __len__(self) -> int:
         return len(self.place)
 
@@ -300,17 +309,8 @@ def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
         if count:
             whole.append(band.select(slice(count * length_px)))
     if not whole:
-        return _no_pieces()
+        return Pieces.none()
     return _cut(Band.join(whole), length_px, noise, np.repeat(np.arange(len(bands)), counts))
-
-
-def _no_pieces() -> Pieces:
-    """Return no segments."""
-    pixels = np.zeros((0, 1))
-    none = np.zeros(0)
-    vectors = np.zeros((0, 2))
-    source = np.zeros(0, dtype=int)
-    return Pieces(*[pixels] * 6, none, none, vectors, vectors, source, pixels)
 
 
 def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray) -> Pieces:

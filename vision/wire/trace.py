@@ -12,11 +12,10 @@ import numpy as np
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.optics import UNKNOWN, Optics
-from vision.geometry.polyline import normals
 from vision.geometry.rods import Wire
 from vision.geometry.rotation import unit
 from vision.geometry.rows import Rows
-from vision.geometry.silhouette import edges
+from vision.geometry.silhouette import outline
 from vision.pictures.others import RodLines, mask_rods
 from vision.pictures.view import View
 from vision.wire.bands import Pieces, cut_pieces, read_band
@@ -101,12 +100,7 @@ def _outlines(
     """
     arc = np.linspace(2.0, wire.length_mm - 1.0, _NODES)
     points, tangents = _joined(curves.values()).at(arc)  # (f, n, 3)
-    directions = unit(tangents)
-    radii_mm = np.tile(wire.radius_mm(arc), len(curves))
-    sides = edges(camera, points.reshape(-1, 3), directions.reshape(-1, 3), radii_mm)
-    one, other = np.reshape(sides, (2, len(curves), _NODES, 2))
-    middle = 0.5 * (one + other)
-    half_px = 0.5 * np.abs(np.sum((one - other) * normals(middle), axis=-1))
+    middle, half_px = outline(camera, points, unit(tangents), wire.radius_mm(arc))
     return arc, middle, half_px
 
 
