@@ -14,6 +14,7 @@ import numpy as np
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.planes import fit_plane, meet_planes, nearest_along_mm
 from vision.geometry.rows import Rows
+from vision.geometry.sampling import spread_indices
 from vision.pictures.change import HALF, change_confidence
 from vision.pictures.pixel_noise import Noise, measure_noise
 
@@ -123,7 +124,7 @@ def _planes(
 
 def _change(grey: np.ndarray, others: Sequence[np.ndarray], noise: Noise) -> np.ndarray:
     """Return by how much a picture (h, w) surely differs from a choice of others, the least of all."""
-    chosen = np.unique(np.linspace(0, len(others) - 1, _MOST_OTHERS).astype(int))
+    chosen = spread_indices(len(others), _MOST_OTHERS)
     return np.min([change_confidence(grey, others[k], noise) for k in chosen], axis=0)
 
 

@@ -4,7 +4,7 @@ frame.
 Coarse: to a pixel or two, enough for the strips that `trace` reads.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from vision.geometry.contact import closest_arc
 from vision.geometry.newton import cauchy_weights
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods, Wire
+from vision.geometry.sampling import spread_indices
 from vision.geometry.silhouette import outline
 from vision.geometry.touched import Axis
 from vision.pictures.view import View, median_of
@@ -91,7 +92,7 @@ class SwingPictures:
 
         frames: those of the whisk, in which the wire moves; bar_mm: radius within which the bar is.
         """
-        places = np.unique(np.linspace(0, len(frames) - 1, _MEDIAN_OF).round().astype(int))
+        places = spread_indices(len(frames), _MEDIAN_OF)
         still = median_of([view.frames[frames[k]] for k in places])
         bar_px = axis.covering_discs(view.camera, bar_mm)
         return cls(view, rods, still, 0.5 * np.pi / len(places), bar_px)
@@ -202,11 +203,18 @@ def bends_in_order(
     find: finds that of a frame at a motor angle near a guess (2,), the extrapolation of the last two
     frames.
     """
-    bends_rad = [np.zeros(2), np.zeros(2)]  # before the first frame
+    bends_rad: dict[int, np.ndarray] = {}
     for frame, motor in motor_rad.items():
-        guess_rad = 2 * bends_rad[-1] - bends_rad[-2]
-        bends_rad.append(find(frame, motor, guess_rad))
-    return dict(zip(motor_rad, bends_rad[2:]))
+        bends_rad[frame] = find(frame, motor, next_bend(bends_rad.values()))
+    return bends_rad
+
+
+def next_bend(bends_rad: Iterable[np.ndarray]) -> np.ndarray:
+    """Return the bend (2,) that follows some in order, rad, by the last two; before the first frame
+    there was none.
+    """
+    *_, before, last = np.zeros(2), np.zeros(2), *bends_rad
+    return 2 * last - before
 
 
 def find_bend(

@@ -156,10 +156,9 @@ def bar_axis(problem: Problem, vector: np.ndarray) -> Axis:
     """Return the object's axis by parameters (…, size): shifted and tilted, and shifted along
     itself where the object has a parameter for that.
     """
-    axis = problem.axis.shifted(axis_frame(problem.axis.direction), vector)
     own = vector[..., problem.blocks.shift_along.slice]  # (…, 1), or (…, 0) of a bar
     along_mm = np.sum(own, axis=-1, keepdims=True)
-    return replace(axis, point_mm=axis.point_mm + along_mm * problem.axis.direction)
+    return problem.axis.shifted(axis_frame(problem.axis.direction), vector, along_mm)
 
 
 def shifts_mm(problem: Problem, vector: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ and its line in `vision.geometry.forms`.
 """
 
 from abc import abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -306,11 +306,6 @@ class RoundedAxis(Axis):
         """Return middles (m, 2) and radii (m,) px of discs that cover the object in a picture."""
         points, _ = self.silhouette(camera.centre_mm, radius_mm, OUTLINE_MM, OUTLINE_POINTS)
         return self.form.covering_discs(camera.project(points))
-
-    def shifted_along(self, across: np.ndarray, vector: np.ndarray) -> "RoundedAxis":
-        """Return the object moved as by `shifted`, and by vector[..., 4] mm along its axis."""
-        shifted = self.shifted(across, vector)
-        return replace(shifted, point_mm=shifted.point_mm + vector[..., 4:] * self.direction)
 
 
 def upwards(directions: np.ndarray) -> np.ndarray:

@@ -155,15 +155,17 @@ class Axis(ABC):
         steps_mm = np.asarray(place_mm)[..., None] * self.direction[..., None, :]
         return self.point_mm[..., None, :] + steps_mm
 
-    def shifted(self, across: np.ndarray, vector: np.ndarray) -> Self:
-        """Return the object moved by two shifts in mm and two tilts across its axis.
+    def shifted(
+        self, across: np.ndarray, vector: np.ndarray, along_mm: np.ndarray | float = 0.0
+    ) -> Self:
+        """Return the object moved by two shifts in mm and two tilts across its axis, and along it.
 
-        vector (..., 4 or more): more than one give a batch. across (2, 3): see
+        vector (..., 4 or more), along_mm (..., 1): more than one give a batch. across (2, 3): see
         `vision.geometry.contact.axis_frame`.
         """
-        direction = self.direction + vector[..., 2:4] @ across
+        moved_mm = self.point_mm + vector[..., 0:2] @ across
         return replace(
             self,
-            point_mm=self.point_mm + vector[..., 0:2] @ across,
-            direction=unit(direction),
+            point_mm=moved_mm + along_mm * self.direction,
+            direction=unit(self.direction + vector[..., 2:4] @ across),
         )

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vision.fit.first_bends import SwingPictures, find_bend, find_rest
+from vision.fit.first_bends import SwingPictures, find_bend, find_rest, next_bend
 from vision.fit.problem import rest_shape
 from vision.fit.touch import frames_that_touch
 from vision.geometry.camera import Cameras
@@ -127,8 +127,7 @@ class _Follower:
 
     def follow(self, frame: int, motor_rad: float, views: Sequence[View]) -> None:
         """Find the bend in the next frame, which the views have."""
-        before = [np.zeros(2), np.zeros(2), *list(self.bends_rad.values())[-2:]]
-        guess_rad = 2 * before[-1] - before[-2]
+        guess_rad = next_bend(self.bends_rad.values())
         sights = [replace(sight, view=view) for sight, view in zip(self.sights, views)]
         self.bends_rad[frame] = find_bend(
             sights, self.axis, self.rest_mm, frame, motor_rad, guess_rad

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from vision.geometry.camera import Camera
+from vision.geometry.sampling import spread_indices
 from vision.pictures.others import Others, RodLines, mask_rods
 from vision.pictures.pixel_noise import Noise
 
@@ -43,8 +44,7 @@ class View:
     def sample_frames(self, most: int) -> list[int]:
         """Return the indices of at most so many frames, spread over all of them."""
         frames = list(self.frames)
-        positions = np.linspace(0, len(frames) - 1, most).round().astype(int)
-        return [frames[k] for k in np.unique(positions)]
+        return [frames[k] for k in spread_indices(len(frames), most)]
 
     def some(self, most: int) -> list[np.ndarray]:
         """Return at most so many of the pictures, spread over all of them."""

@@ -18,6 +18,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from vision.geometry.sampling import grid_points
+
 # [steps] Most steps of a climb; it ends earlier. Study: bar_scenes.py.
 _MOST_CLIMBS = 20
 # [halvings] Of a climb's first step: a quarter of it is less than the lines of a bar correct.
@@ -63,7 +65,7 @@ def coarse_to_fine(
     number; 0 holds a number at its grid values. separation: least distance between two hypotheses
     of the grid that go on, in steps. starts: number of hypotheses of the grid that go on.
     """
-    grid = np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
+    grid = grid_points(*values)
     best = suppress_neighbours(grid, passes[0].score(grid), separation * steps, starts)
     for one in passes:
         tops, scores = climb(best, steps * one.step_share, one.score)

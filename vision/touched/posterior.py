@@ -24,6 +24,7 @@ from scipy.interpolate import CubicSpline
 
 from vision.geometry.optics import UNKNOWN, Optics
 from vision.geometry.robust import mean_and_sigma
+from vision.geometry.sampling import grid_points
 from vision.touched.evidence import Evidence, LitRod, compute_evidence
 from vision.touched.pieces import ARM_MM
 from vision.touched.profiles import STEP_PX, Profiles, compute_profiles
@@ -115,8 +116,7 @@ class LineWindow:
 
     def grid(self) -> np.ndarray:
         """Return the lines (lines², 2): shift and tilt, px."""
-        axes = [np.linspace(-most, most, self.lines) for most in self.most_px]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        return grid_points(*[np.linspace(-most, most, self.lines) for most in self.most_px])
 
     @classmethod
     def about(cls, posterior: "Posterior", positions: int, optics: Optics) -> "LineWindow":

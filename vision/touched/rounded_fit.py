@@ -116,18 +116,22 @@ def fit_silhouette(
     if not used:
         return place, True
 
+    def moved(axis: RoundedAxis, vectors: np.ndarray) -> RoundedAxis:
+        """Return an object moved by vectors (..., 5)."""
+        return axis.shifted(across, vectors, vectors[..., 4:])
+
     def residuals_of(vectors: np.ndarray) -> np.ndarray:
         """Compute the residuals (m, n) of all cameras' edge points for vectors (m, 5).
 
         All but the first vector are small steps from the place that the first one gives.
         """
-        here = place.shifted_along(across, vectors[0])
-        places = here.shifted_along(across, vectors - vectors[0])
+        here = moved(place, vectors[0])
+        places = moved(here, vectors - vectors[0])
         residuals = [_residuals(places, cameras[name], used[name], radius_mm) for name in used]
         return np.concatenate(residuals, axis=1)
 
     vector, has_converged = gauss_newton(residuals_of, prior, _STEPS, _GAUSS_NEWTON, _CAUCHY_SIGMAS)
-    return place.shifted_along(across, vector), has_converged
+    return moved(place, vector), has_converged
 
 
 def _residuals(

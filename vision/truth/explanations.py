@@ -20,9 +20,10 @@ from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.geometry.refusals import Refused
+from vision.geometry.sampling import spread_indices
 from vision.touched.search import SeenBar
 from vision.truth.last_question import FRAMES, BarQuestion
-from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures, spread_indices
+from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 from vision.truth.whisk_truth import fit_whisk
 
 # [1] Of the bar's width, all cameras together: so much more must have changed under another place.

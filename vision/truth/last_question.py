@@ -30,6 +30,7 @@ from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis, axis_frame
 from vision.geometry.polyline import at_lengths, lengths_px, normals, tangents_by
 from vision.geometry.rods import Rods
+from vision.geometry.sampling import grid_points
 from vision.geometry.silhouette import outline
 from vision.pictures.others import mask_rods
 from vision.pictures.view import View
@@ -181,7 +182,7 @@ class _Band:
     def coarsely_covered(self, offsets: np.ndarray) -> np.ndarray:
         """Return the mean share (n,) covered by strips, interpolated between steps of their ends."""
         ends = _steps(_FARTHEST_RADII + _MOST_TILT_RADII, _COARSE_RADII)
-        share = np.mean(self.covered(_grid(ends, ends)), axis=1).reshape(len(ends), -1)
+        share = np.mean(self.covered(grid_points(ends, ends)), axis=1).reshape(len(ends), -1)
         position = (offsets - ends[0]).T / _COARSE_RADII
         return map_coordinates(share, position, order=1, mode="nearest")
 
@@ -227,7 +228,7 @@ class BarQuestion:
         slopes = [band.offsets(moved) for band in self.bands]  # (4, 2) each
         shift = _steps(_FARTHEST_RADII, _COARSE_RADII)
         tilt = _steps(_MOST_TILT_RADII, _COARSE_RADII)
-        vectors = _grid(shift, shift, tilt, tilt)
+        vectors = grid_points(shift, shift, tilt, tilt)
         total = sum(
             band.coarsely_covered(vectors @ slope) for band, slope in zip(self.bands, slopes)
         )
@@ -276,12 +277,7 @@ def _steps(farthest: float, step: float) -> np.ndarray:
 def _around(vectors: np.ndarray, step: float) -> np.ndarray:
     """Return vectors (81 n, 4) on a grid of one step about each of n, itself in the middle."""
     near = _steps(step, step)
-    return (vectors[:, None] + _grid(near, near, near, near)).reshape(-1, vectors.shape[1])
-
-
-def _grid(*values: np.ndarray) -> np.ndarray:
-    """Return all combinations (n, k) of k lists of values."""
-    return np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
+    return (vectors[:, None] + grid_points(near, near, near, near)).reshape(-1, vectors.shape[1])
 
 
 def _straightened(

@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from vision.geometry.contact import BarAxis
+from vision.geometry.sampling import spread_indices
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.truth.readers import BarMiddles, ObjectReader, ReadLine, WhereAbout
@@ -29,9 +28,8 @@ class BarInFrames(ObjectReader):
 
     def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the middle of the bar in some frames."""
-        spread = np.linspace(0, len(about.frames) - 1, _MOST_FRAMES)
         found: dict[str, list[ReadLine]] = {}
-        for k in np.unique(spread.round().astype(int)).tolist():
+        for k in spread_indices(len(about.frames), _MOST_FRAMES):
             reader = self._reader(about.frames[k])
             for name, lines in reader.read(_about_frame(about, k), last=last).items():
                 own = found.setdefault(name, [])

@@ -20,6 +20,7 @@ from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
 from vision.geometry.reasons import Reason
 from vision.geometry.rods import Rods
+from vision.geometry.sampling import spread_indices
 from vision.geometry.touched import Axis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
@@ -241,8 +242,3 @@ class FittedWhisk:
         """Return a quantity of each frame (f,) by its name."""
         sigma = propagated_sigma(self.by_parameter.frame[name], self.covariance)
         return Value(self.measured.frame[name], sigma)
-
-
-def spread_indices(length: int, count: int) -> list[int]:
-    """Return so many indices at most, spread evenly over a sequence from its first to its last."""
-    return np.unique(np.linspace(0, length - 1, count).astype(int)).tolist()

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from vision.geometry.sampling import grid_points
 from vision.wire.bands import Pieces
 from vision.wire.binned import sums
 from vision.wire.points import LinePoints
@@ -111,7 +112,7 @@ def likely_curve(
     share = np.concatenate([one.share for one in seen])
     if len(share) == 0:
         return np.zeros(len(grids)), False
-    coefficients = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, len(grids))
+    coefficients = grid_points(*grids)
     widest = np.maximum([grid[-1] for grid in grids], 1e-12)
     total = _votes_of_curves(share, coefficients, shapes_px)
     total -= _LEAST_VOTE * np.sum((coefficients / widest) ** 2, axis=1)

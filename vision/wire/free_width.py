@@ -14,6 +14,7 @@ from vision.pictures.pixel_noise import Noise
 from vision.wire.bands import Pieces
 from vision.wire.binned import binned
 from vision.wire.common_shift import EVIDENCE_COUNTS, NO_CHANCE, evidences_of
+from vision.wire.rod_width import mean_and_sigma_between
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import Knots
 from vision.wire.strip import noise_beside, with_background
@@ -29,7 +30,7 @@ _SHIFTS_PX = np.linspace(-1.2, 1.2, 5)
 _LOG_BLURS = np.array([-0.4, 0.0, 0.4])
 # [segments] By which the width of a part of the line is found. Set by eye. Study: real_wires.py.
 _MOST_SEGMENTS = 16
-# [nodes] Of the splines through the grids. Derived.
+# [nodes] Of the spline through common shifts. Derived.
 _FINE = 301
 
 
@@ -49,7 +50,8 @@ def log_width_of(pieces: Pieces, blur_px: float) -> float:
     evidences = _evidences(some, logs, noise, blurs_px)
     pixels = max(int(np.sum(some.weight > 0)), 1)
     misfit = max(1.0, evidences.min() / pixels)
-    return _mean_of(logs, EVIDENCE_COUNTS / misfit * (evidences - evidences.min()))
+    mean, _ = mean_and_sigma_between(logs, EVIDENCE_COUNTS / misfit * (evidences - evidences.min()))
+    return mean
 
 
 def _evidences(pieces: Pieces, logs: np.ndarray, noise: Noise, blurs_px: np.ndarray) -> np.ndarray:
@@ -75,10 +77,3 @@ def _evidence(pieces: Pieces, blurs_px: np.ndarray) -> float:
     evidences = evidences + task.blur_deviation(np.log(blurs_px)) ** 2
     fine = np.linspace(_SHIFTS_PX[0], _SHIFTS_PX[-1], _FINE)
     return float(np.min(CubicSpline(_SHIFTS_PX, evidences)(fine)))
-
-
-def _mean_of(places: np.ndarray, evidences: np.ndarray) -> float:
-    """Return the mean of the density whose minus twice logarithm is known at some places (n,)."""
-    fine = np.linspace(places[0], places[-1], _FINE)
-    values = CubicSpline(places, evidences)(fine)
-    return float(np.average(fine, weights=np.exp(-0.5 * (values - values.min()))))

@@ -54,10 +54,10 @@ def log_width(pieces: Pieces, blur_px: float, knots: Knots) -> tuple[float, floa
     logs = best + _NEAR
     evidences = _evidences_of_widths(task, logs, _LOG_BLURS, np.inf)
     misfit = max(1.0, evidences.min() / max(int(np.sum(task.pieces.weight > 0)), 1))
-    return _mean_and_sigma(logs, EVIDENCE_COUNTS / misfit * (evidences - evidences.min()))
+    return mean_and_sigma_between(logs, EVIDENCE_COUNTS / misfit * (evidences - evidences.min()))
 
 
-def _mean_and_sigma(places: np.ndarray, evidences: np.ndarray) -> tuple[float, float]:
+def mean_and_sigma_between(places: np.ndarray, evidences: np.ndarray) -> tuple[float, float]:
     """Return mean and sigma of the density whose minus twice logarithm is known at some places
     (n,).
     """
