@@ -33,7 +33,7 @@ from vision.boards.sufficiency import (
 from vision.calibration.adjust import adjust_bundle
 from vision.calibration.bundle import N_CAMERA, BundleState
 from vision.calibration.corner_noise import Adjustment, adjust_with_noise
-from vision.calibration.exchanged import check_own_lenses
+from vision.calibration.exchanged_boards import check_own_lenses
 from vision.calibration.faces import place_faces
 from vision.calibration.first_guess import with_pose
 from vision.calibration.layout import Alone, Layout

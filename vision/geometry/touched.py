@@ -6,8 +6,8 @@ search finds and a fit moves, and where distances and outlines are computed. A s
 `vision.geometry.rods.Bar`, with its `vision.geometry.contact.BarAxis`. All others derive from
 `vision.geometry.rounded.Rounded` and share `vision.geometry.rounded.RoundedAxis`. The forms by name
 are in `vision.geometry.forms`. What an object needs besides geometry is chosen by its class: its
-search in `vision.touched.search`, the residuals of its line points in `vision.fit.object_rows`, and
-how its edges are read in `vision.truth.strategies`.
+search in `vision.touched.search`, the residuals of its line points in `vision.fit.object_rows`, how
+its edges are read in `vision.truth.strategies`, and its record in `vision.truth.truth_rows`.
 """
 
 from abc import ABC, abstractmethod

@@ -40,17 +40,16 @@ from vision.live.wire_lines import CarriedLines, WireLines, frames_lit_alike
 from vision.pictures.view import View
 from vision.touched.search import SeenBar, find_object, find_object_again
 from vision.touched.search_scene import SearchScene
-from vision.truth.explanations import Explanation, ask_early, unexplained
-from vision.truth.last_question import FRAMES, BarQuestion
+from vision.truth.explanations import Explanation, compare_early, unexplained
 from vision.truth.line_source import WhiskPlace
 from vision.truth.observe import views_facing, warnings_of, why_failed
+from vision.truth.place_comparison import FRAMES, PlaceComparison
 from vision.truth.records import WhiskTruth
 from vision.truth.strategies import Strategy, strategies
 from vision.truth.traced_lines import TracedLines
 from vision.truth.trial_pictures import TrialPictures
 from vision.truth.truth_rows import DRAWN_MM, DRAWN_POINTS, to_whisk
-from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
-from vision.truth.whisk_truth import (
+from vision.truth.whisk_fit import (
     check_scatter,
     coarse_curves,
     expect_by_bends,
@@ -58,6 +57,7 @@ from vision.truth.whisk_truth import (
     fit_last,
     require_cameras,
 )
+from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
 # [frames] With which work begins: two give the noise, a third what moves. In fifteen path-traced
 # scenes the bar was as near by three frames as by all. Study: tests/studies/speed/live.py.
@@ -176,8 +176,8 @@ class LiveWhisk:
     _reading: _LineReading | None = None
     _is_bar_fine: bool = False
     _wire: WireLines | None = None
-    _question: BarQuestion | None = None
-    _is_asked: bool = False
+    _comparison: PlaceComparison | None = None
+    _is_compared: bool = False
 
     def add(
         self, camera: str, frame: int, time_s: float, motor_rad: float, picture: np.ndarray
@@ -274,8 +274,8 @@ class LiveWhisk:
             return self._trace_wire
         if last not in self._wire.frames:
             return self._carry_on
-        is_due = len(self._wire.frames) >= FRAMES and not self._is_asked
-        return self._ask if is_due else None
+        is_due = len(self._wire.frames) >= FRAMES and not self._is_compared
+        return self._compare_places if is_due else None
 
     def _shared_frames(self) -> list[int]:
         """Return the frames that every camera has."""
@@ -410,11 +410,11 @@ class LiveWhisk:
         whisk = whisk.during([frame for frame in whisk.frames if frame > known[-1]])
         self._wire.carry_on(whisk, self._place(whisk))
 
-    def _ask(self) -> None:
-        """Ask where else the bar may be, about where the free frames have it."""
+    def _compare_places(self) -> None:
+        """Compare the bar's place by the free frames with others nearby."""
         whisk = self._whisk()
-        self._question = ask_early(whisk, self._place(whisk).curves)
-        self._is_asked = True
+        self._comparison = compare_early(whisk, self._place(whisk).curves)
+        self._is_compared = True
 
     def _truth(self) -> WhiskTruth:
         """Return the truth by all frames. Raises Refused where they determine none."""
@@ -435,7 +435,7 @@ class LiveWhisk:
     def _unless_elsewhere(self, whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
         """Return the truth that was fitted; none where another place explains the object better."""
         explanation = Explanation(whisk, fitted)
-        elsewhere = unexplained(explanation, self._question)
+        elsewhere = unexplained(explanation, self._comparison)
         if elsewhere:
             return self._without_truth(elsewhere)
         truth = to_whisk(whisk, fitted)

@@ -1,7 +1,7 @@
 """Which place of the bar explains a whisk's pictures: the fitted one, or another one nearby.
 
 A fit ends near the place from which it began. Where the pictures say that another one explains them
-better (`vision.truth.last_question`), the whisk is fitted from there as well, and the fit whose
+better (`vision.truth.place_comparison`), the whisk is fitted from there as well, and the fit whose
 silhouettes explain more is the truth. Where two fits explain the pictures equally well and their
 distances differ, there is no number; that holds for a second bar that the search found as clear,
 too, such as the shadow beside a bar. A fit that ended far from its beginning may not have
@@ -22,15 +22,15 @@ from vision.geometry.reasons import NO_REASON, Reason
 from vision.geometry.refusals import Refused
 from vision.geometry.sampling import spread_indices
 from vision.touched.search import SeenBar
-from vision.truth.last_question import FRAMES, BarQuestion
+from vision.truth.place_comparison import FRAMES, PlaceComparison
+from vision.truth.whisk_fit import fit_whisk
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
-from vision.truth.whisk_truth import fit_whisk
 
 # [1] Of the bar's width, all cameras together: so much more must have changed under another place.
 # True places gain 0.06 at most (by the blur of a bright side), false ones 0.02 to 0.3. Study:
 # last_question.py.
 _LEAST_GAIN = 0.02
-# [sigmas] By which the best of all places exceeds the drawn one where that is asked about again.
+# [sigmas] By which the best of all places exceeds the drawn one where the whisk is fitted again.
 # Study: last_question.py.
 _SURE_SIGMAS = 2.5
 # [sigmas] By which one of two fits exceeds the other. Study: last_question.py.
@@ -58,14 +58,14 @@ class Explanation:
         along_mm = (contact - axis.point_mm) @ axis.direction
         return BarAxis(axis.point_mm + along_mm * axis.direction, axis.direction)
 
-    def question(self) -> BarQuestion:
-        """Return the question about this fit to the pictures."""
+    def place_comparison(self) -> PlaceComparison:
+        """Return the comparison of this fit's place with others."""
         curves = self.fitted.some_curves(FRAMES)
-        return BarQuestion(self.whisk.views, curves, self.axis, self.whisk.rods)
+        return PlaceComparison(self.whisk.views, curves, self.axis, self.whisk.rods)
 
-    def from_place(self, bar: SeenBar) -> Self:
+    def from_place(self, axis: BarAxis) -> Self:
         """Return the fit that begins from another place. Raises Refused where there is none."""
-        begin = replace(self.whisk, bar=bar, light={}, earlier=None)
+        begin = replace(self.whisk, bar=SeenBar(axis, {}), light={}, earlier=None)
         try:
             return Explanation(begin, fit_whisk(begin))
         except np.linalg.LinAlgError as error:
@@ -89,13 +89,12 @@ def best_explanation(first: Explanation) -> Explanation:
     """
     best = first
     for _ in range(_MOST_FITS):
-        other = _better(best)
-        if other.fitted is best.fitted:
-            best = other
+        before = best
+        best = _better(before)
+        if best.fitted is before.fitted:
             break
-        best = other
     else:
-        best = replace(best, warning=_unconverged(best.question(), best))
+        best = replace(best, warning=_unconverged_warning(best.place_comparison(), best))
     if best.fitted is first.fitted:
         return best
     light = first.whisk.light
@@ -109,18 +108,18 @@ def _weigh_rivals(best: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
 
     rivals: axes that the search found as clear. Raises Refused where their distances differ.
     """
-    question = _question(best) if rivals else None
-    if question is None:
+    comparison = _comparison(best) if rivals else None
+    if comparison is None:
         return best
     for axis in rivals:
-        if question.apart_px(axis, best.axis) <= _APART_PX:
+        if comparison.apart_px(axis, best.axis) <= _APART_PX:
             continue
         try:
-            other = best.from_place(SeenBar(axis, {}))
+            other = best.from_place(axis)
         except Refused:
             continue
-        away_px = question.apart_px(other.axis, best.axis)
-        if away_px <= _APART_PX or _is_better(question, best.axis, other.axis, _LIKELY_SIGMAS):
+        away_px = comparison.apart_px(other.axis, best.axis)
+        if away_px <= _APART_PX or _is_better(comparison, best.axis, other.axis, _LIKELY_SIGMAS):
             continue
         _require_one(best, other)
         sentence = f"the bar may be elsewhere: a place up to {away_px:.0f} px away explains the pictures as well"
@@ -128,58 +127,60 @@ def _weigh_rivals(best: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
     return best
 
 
-def ask_early(whisk: WhiskPictures, curves: Mapping[int, Curves]) -> BarQuestion | None:
-    """Return the question about the bar where a whisk's search has it, its best place known already.
+def compare_early(whisk: WhiskPictures, curves: Mapping[int, Curves]) -> PlaceComparison | None:
+    """Return the comparison of places about that where a whisk's search has the bar, its best one
+    known already.
 
-    curves: by frame, of the wire, to a pixel or two. None where the pictures cannot answer it.
+    curves: by frame, of the wire, to a pixel or two. None where the pictures cannot decide.
     """
-    if not _may_be_asked(whisk):
+    if not _is_comparable(whisk):
         return None
     frames = list(curves)
     some_curves = {frames[k]: curves[frames[k]] for k in spread_indices(len(frames), FRAMES)}
-    question = BarQuestion(whisk.views, some_curves, whisk.bar.axis, whisk.rods)
-    _ = question.best  # the costly part, kept
-    return question
+    comparison = PlaceComparison(whisk.views, some_curves, whisk.bar.axis, whisk.rods)
+    _ = comparison.best  # the costly part, kept
+    return comparison
 
 
-def unexplained(fit: Explanation, earlier: BarQuestion | None) -> Reason:
+def unexplained(fit: Explanation, earlier: PlaceComparison | None) -> Reason:
     """Return why a fit may not be the truth, without another fit; no reason where nothing says so.
 
     Another place explains the pictures better, or the fit ended far from its beginning. earlier:
-    the question about the fit's bar, of before the fit was known; None where there is none yet.
+    the comparison about the fit's bar, of before the fit was known; None where there is none yet.
     """
-    question = _question(fit, earlier)
-    if question is None:
+    comparison = _comparison(fit, earlier)
+    if comparison is None:
         return NO_REASON
-    place = _better_place(question, fit)
+    place = _better_place(comparison, fit)
     if place is not None:
-        return _unexplained(question, place, fit.axis)
-    return _unconverged(question, fit)
+        return _elsewhere_warning(comparison, place, fit.axis)
+    return _unconverged_warning(comparison, fit)
 
 
-def _may_be_asked(whisk: WhiskPictures) -> bool:
+def _is_comparable(whisk: WhiskPictures) -> bool:
     """Return whether the bar is straight, stands, and is seen before a known background."""
     is_straight = isinstance(whisk.bar.axis, BarAxis)
     is_known = all(np.any(view.background) for view in whisk.views)
     return is_straight and is_known and whisk.motion is None
 
 
-def _question(fit: Explanation, earlier: BarQuestion | None = None) -> BarQuestion | None:
-    """Return the question about a fit, an earlier one or a new one; None where pictures cannot answer it.
+def _comparison(fit: Explanation, earlier: PlaceComparison | None = None) -> PlaceComparison | None:
+    """Return the comparison of a fit's place, an earlier one or a new one; None where the pictures
+    cannot decide.
 
-    They can where the bar is one to ask about and every camera sees it: a fit that reads a bar where a
-    camera sees none could be worse.
+    They can where every camera sees the bar from a side: a fit that reads a bar where a camera sees
+    none could be worse.
     """
-    if not _may_be_asked(fit.whisk):
+    if not _is_comparable(fit.whisk):
         return None
-    question = earlier or fit.question()
-    return question if len(question.bands) == len(fit.whisk.views) else None
+    comparison = earlier or fit.place_comparison()
+    return comparison if len(comparison.bands) == len(fit.whisk.views) else None
 
 
-def _better_place(question: BarQuestion, fit: Explanation) -> BarAxis | None:
+def _better_place(comparison: PlaceComparison, fit: Explanation) -> BarAxis | None:
     """Return the place that surely explains the pictures better than a fit does; None without one."""
-    place = question.best
-    return place if _is_better(question, place, fit.axis, _SURE_SIGMAS) else None
+    place = comparison.best
+    return place if _is_better(comparison, place, fit.axis, _SURE_SIGMAS) else None
 
 
 def _better(fit: Explanation) -> Explanation:
@@ -187,63 +188,63 @@ def _better(fit: Explanation) -> Explanation:
 
     Raises Refused where both explain them equally well.
     """
-    question = _question(fit)
-    if question is None:
+    comparison = _comparison(fit)
+    if comparison is None:
         return fit
-    place = _better_place(question, fit)
+    place = _better_place(comparison, fit)
     if place is not None:
-        return _better_from(place, fit, question)
-    if question.apart_px(fit.whisk.bar.axis, fit.axis) > _APART_PX:
-        return _converged(fit, question)
+        return _better_from(place, fit, comparison)
+    if comparison.apart_px(fit.whisk.bar.axis, fit.axis) > _APART_PX:
+        return _fit_again_from_end(fit, comparison)
     return fit
 
 
-def _better_from(place: BarAxis, fit: Explanation, question: BarQuestion) -> Explanation:
+def _better_from(place: BarAxis, fit: Explanation, comparison: PlaceComparison) -> Explanation:
     """Return the fit from a better place, or this one with a warning.
 
     Raises Refused where both explain the pictures equally well.
     """
     try:
-        other = fit.from_place(SeenBar(place, {}))
+        other = fit.from_place(place)
     except Refused:
-        return replace(fit, warning=_unexplained(question, place, fit.axis))
-    if _is_better(question, other.axis, fit.axis, _LIKELY_SIGMAS):
+        return replace(fit, warning=_elsewhere_warning(comparison, place, fit.axis))
+    if _is_better(comparison, other.axis, fit.axis, _LIKELY_SIGMAS):
         return other
-    if _is_better(question, fit.axis, other.axis, _LIKELY_SIGMAS):
-        return replace(fit, warning=_unexplained(question, place, fit.axis))
-    if question.apart_px(other.axis, fit.axis) > _APART_PX:
+    if _is_better(comparison, fit.axis, other.axis, _LIKELY_SIGMAS):
+        return replace(fit, warning=_elsewhere_warning(comparison, place, fit.axis))
+    if comparison.apart_px(other.axis, fit.axis) > _APART_PX:
         _require_one(fit, other)
     return fit
 
 
-def _converged(fit: Explanation, question: BarQuestion) -> Explanation:
+def _fit_again_from_end(fit: Explanation, comparison: PlaceComparison) -> Explanation:
     """Return the fit that begins where this one ended, far from its own beginning.
 
     Its lines are measured in windows about where they are expected, so that they may not have
     converged. A fit that explains less is not taken; this one has a warning then.
     """
-    unconverged = replace(fit, warning=_unconverged(question, fit))
+    unconverged = replace(fit, warning=_unconverged_warning(comparison, fit))
     try:
-        again = fit.from_place(SeenBar(fit.axis, {}))
+        again = fit.from_place(fit.axis)
     except Refused:
         return unconverged
-    is_worse = _is_better(question, fit.axis, again.axis, _LIKELY_SIGMAS)
+    is_worse = _is_better(comparison, fit.axis, again.axis, _LIKELY_SIGMAS)
     return unconverged if is_worse else again
 
 
-def _is_better(question: BarQuestion, place: BarAxis, other: BarAxis, sigmas: float) -> bool:
+def _is_better(comparison: PlaceComparison, place: BarAxis, other: BarAxis, sigmas: float) -> bool:
     """Return whether a place explains the pictures better than another one, and is not the same.
 
     sigmas: by which its gain must exceed chance.
     """
-    gain, sigma = question.gain(place, other)
+    gain, sigma = comparison.gain(place, other)
     is_sure = gain > max(_LEAST_GAIN, sigmas * sigma)
-    return is_sure and question.apart_px(place, other) > _APART_PX
+    return is_sure and comparison.apart_px(place, other) > _APART_PX
 
 
-def _unexplained(question: BarQuestion, place: BarAxis, drawn: BarAxis) -> Reason:
+def _elsewhere_warning(comparison: PlaceComparison, place: BarAxis, drawn: BarAxis) -> Reason:
     """Return the warning that no fit was found at a place that explains the pictures better."""
-    away_px = question.apart_px(place, drawn)
+    away_px = comparison.apart_px(place, drawn)
     return Reason(
         "bar_elsewhere",
         f"the bar may be elsewhere: a place up to {away_px:.0f} px away explains more of the "
@@ -251,9 +252,9 @@ def _unexplained(question: BarQuestion, place: BarAxis, drawn: BarAxis) -> Reaso
     )
 
 
-def _unconverged(question: BarQuestion, fit: Explanation) -> Reason:
+def _unconverged_warning(comparison: PlaceComparison, fit: Explanation) -> Reason:
     """Return the warning that a fit ended far from its beginning; no reason where it did not."""
-    moved_px = question.apart_px(fit.whisk.bar.axis, fit.axis)
+    moved_px = comparison.apart_px(fit.whisk.bar.axis, fit.axis)
     if moved_px <= _APART_PX:
         return NO_REASON
     return Reason(

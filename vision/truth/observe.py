@@ -39,8 +39,8 @@ from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.trial_pictures import TrialPictures
 from vision.truth.truth_rows import to_whisk
 from vision.truth.value import as_values
+from vision.truth.whisk_fit import coarse_curves, coarse_shapes, free_stroke
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
-from vision.truth.whisk_truth import coarse_curves, coarse_shapes, free_stroke
 from vision.truth.wire_end import wire_ends
 from vision.truth.wire_width import wire_widths
 from vision.wire.one_sided import one_sided_widths

@@ -33,8 +33,8 @@ from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.sight import blank_view
 from vision.truth.strategies import Touch, TouchByClearance, TouchByOnset, early
 from vision.truth.trace_points import Trace
+from vision.truth.whisk_fit import expect_by_bends, fit_lines
 from vision.truth.whisk_pictures import AxisPrior, FittedWhisk, WhiskPictures
-from vision.truth.whisk_truth import expect_by_bends, fit_lines
 
 # [frames] Of a camera that is used, as of one with pictures. Derived.
 _FEWEST_FRAMES = 3

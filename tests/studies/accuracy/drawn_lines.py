@@ -67,7 +67,7 @@ from vision.geometry.base_lines import BaseLines
 from vision.geometry.board import Board, printed_corners
 from vision.geometry.camera import Cameras
 from vision.geometry.rods import Bar, Wire
-from vision.truth.whisk_truth import FREE_SHARED
+from vision.truth.whisk_fit import FREE_SHARED
 
 GIVENS = ("placement", "square", "stretch", "bar", "wire", "length", "clock")
 BETAS_DEG = (0.0, 30.0, 60.0)
@@ -286,7 +286,7 @@ def _during(problem: Problem, chosen: np.ndarray) -> Problem:
 
 
 def _free_stroke(whole: Problem, problem: Problem, state: State) -> tuple[Problem, State]:
-    """All frames before touch, fitted as `vision.truth.whisk_truth.free_stroke` does."""
+    """All frames before touch, fitted as `vision.truth.whisk_fit.free_stroke` does."""
     alone = _during(whole, ~whole.bent)
     alone = replace(alone, seen=[one for one in alone.seen if one.frame >= 0])
     middle_mm = np.full(len(alone.motor_rad), 0.5 * alone.wire.length_mm)

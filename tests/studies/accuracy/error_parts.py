@@ -26,8 +26,8 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.touched.search import find_object
 from vision.touched.search_scene import SearchScene
 from vision.truth.traced_lines import TracedLines
+from vision.truth.whisk_fit import fit_whisk
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
-from vision.truth.whisk_truth import fit_whisk
 
 
 def read_whisk(folder: Path) -> tuple[WhiskPictures, BarAxis]:

@@ -28,7 +28,7 @@ from tests.studies.accuracy.board_scenes import (
     two_cameras,
 )
 from vision.calibration.calibrate import standing_boards
-from vision.calibration.exchanged import lens_residuals_px
+from vision.calibration.exchanged_boards import lens_residuals_px
 from vision.calibration.one_picture import calibrate_alone
 from vision.geometry.camera import Cameras, camera_matrix
 

@@ -26,8 +26,8 @@ from vision.geometry.contact import BarAxis, axis_frame
 from vision.geometry.refusals import Refused
 from vision.touched.search import SeenBar
 from vision.truth.explanations import Explanation, best_explanation
+from vision.truth.whisk_fit import fit_whisk
 from vision.truth.whisk_pictures import WhiskPictures
-from vision.truth.whisk_truth import fit_whisk
 
 MOVED = ((0.5, 0.0), (1.0, 0.0), (2.0, 0.0), (0.0, 2.0), (0.0, 5.0))  # mm, degrees
 MOST_SIGMAS = 4.0
@@ -73,7 +73,7 @@ def ask(whisk: WhiskPictures, true: BarAxis, d_x_mm: float) -> Row:
     """A whisk fitted from its bar's place, and asked about. Raises Refused where there is no first fit."""
     first = Explanation(whisk, fit_whisk(whisk))
     begin = time.process_time()
-    question = first.question()
+    question = first.place_comparison()
     best = question.best
     gain, gain_sigma = question.gain(best, first.axis)
     asked_ms = 1e3 * (time.process_time() - begin)

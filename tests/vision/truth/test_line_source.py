@@ -11,7 +11,7 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.truth.predicted_lines import PredictedLines
 from vision.truth.sight import blank_view, find_sight
 from vision.truth.strategies import TouchByClearance
-from vision.truth.whisk_truth import ExpectedWhisk, fit_lines
+from vision.truth.whisk_fit import ExpectedWhisk, fit_lines
 
 SETTINGS = VisionSettings()
 

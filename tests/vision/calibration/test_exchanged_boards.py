@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.studies.accuracy.board_scenes import BOARD, noisy, rig_view, two_cameras
-from vision.calibration.exchanged import check_own_lenses
+from vision.calibration.exchanged_boards import check_own_lenses
 from vision.geometry.refusals import Refused
 
 

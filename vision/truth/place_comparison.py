@@ -1,18 +1,18 @@
-"""The last question to a fit: does another place explain the pictures better than the drawn bar?
+"""Does another place of the bar explain the pictures better than the fitted one?
 
-Nothing here knows how the bar was found. A bar changes what a camera sees: inside its silhouette
-the picture is another one than that without rods, outside it is the same up to smooth light. So of
-all strips as wide as the bar, its silhouette covers most of what has changed, of whatever
-colour. In each camera the pixels along the drawn silhouette are straightened into a band that
-reaches two diameters beyond it to either side. The wire is left out. How much of the silhouette's
-area has changed is then known at every shift and tilt, and summed over the cameras for every axis
-nearby in space.
+Nothing here knows how the bar was found; the bar as it was fitted is called the drawn one. A bar
+changes what a camera sees: inside its silhouette the picture is another one than that without
+rods, outside it is the same up to smooth light. So of all strips as wide as the bar, its
+silhouette covers most of what has changed, of whatever colour. In each camera the pixels along
+the drawn silhouette are straightened into a band that reaches two diameters beyond it to either
+side. The wire is left out. How much of the silhouette's area has changed is then known at every
+shift and tilt, and summed over the cameras for every axis nearby in space.
 
 The number that decides is a share of area: by how much more of the bar's width has changed under
 another strip than under the drawn one, summed over the cameras. Its standard error is that of the
-mean over segments along the bar. Rims as dark as the background, shadows next to the bar and hidden
-pixels make many strips alike and are evidence for none. The blur of the lens widens what has
-changed by a pixel or two: a strip as near as that is no other place. A bar that moves, and an
+mean over segments along the bar. Rims as dark as the background, shadows next to the bar and
+hidden pixels make many strips alike and are evidence for none. The blur of the lens widens what
+has changed by a pixel or two: a strip as near as that is no other place. A bar that moves, and an
 object that is no straight bar, are left out.
 """
 
@@ -35,7 +35,7 @@ from vision.geometry.silhouette import outline
 from vision.pictures.others import mask_rods
 from vision.pictures.view import View
 
-# [mm] To either side of the contact: what is asked about. Bars are clamped farther out. Stated.
+# [mm] To either side of the contact: what is compared. Bars are clamped farther out. Stated.
 _REACH_MM = 30.0
 # [radii] Half the band's width: two diameters beyond the silhouette. Stated.
 _BAND_RADII = 5.0
@@ -70,7 +70,7 @@ _ITERATIONS = 6
 _SAME_LIGHT = 1e-3
 # [1] A hidden sample has changed or not, with this probability. Derived.
 _UNKNOWN = 0.5
-# [1] Share of hidden samples above which a camera is not asked: it looks past the bar. Stated.
+# [1] Share of hidden samples above which a camera is not used: it looks past the bar. Stated.
 _MOST_HIDDEN = 0.5
 # [radii] Farthest shift in space: two diameters. Stated.
 _FARTHEST_RADII = 4.0
@@ -192,8 +192,8 @@ def _projected(camera: Camera, axes: BarAxis) -> np.ndarray:
     return camera.project(axes.points_at([-_REACH_MM, _REACH_MM]))
 
 
-class BarQuestion:
-    """The question for other places of a bar that explain the pictures, about one drawn axis."""
+class PlaceComparison:
+    """Compares places of a bar near a drawn axis by how well they explain the pictures."""
 
     def __init__(
         self,

@@ -20,8 +20,8 @@ from vision.pictures.view import View
 from vision.touched.search import SeenBar, find_object
 from vision.truth import observe
 from vision.truth.explanations import Explanation, best_explanation
-from vision.truth.last_question import BarQuestion
 from vision.truth.observe import observe_trial
+from vision.truth.place_comparison import PlaceComparison
 from vision.truth.trial_pictures import TrialPictures
 from vision.truth.value import Value
 
@@ -96,15 +96,15 @@ def moved(mm: float, degrees: float, towards: float) -> BarAxis:
     return TRUE.shifted(axis_frame(TRUE.direction), vector)
 
 
-def ask(drawn: BarAxis, shadow: float = 1.0) -> BarQuestion:
+def comparison_about(drawn: BarAxis, shadow: float = 1.0) -> PlaceComparison:
     rng = np.random.default_rng(3)
-    return BarQuestion([view(one, rng, shadow) for one in CAMERAS], wire(), drawn, RODS)
+    return PlaceComparison([view(one, rng, shadow) for one in CAMERAS], wire(), drawn, RODS)
 
 
 def test_no_other_place_explains_more_than_the_true_one():
-    question = ask(TRUE)
-    gain, _ = question.gain(question.best, TRUE)
-    assert gain < 0.02 and question.apart_px(question.best, TRUE) < 2.0
+    comparison = comparison_about(TRUE)
+    gain, _ = comparison.gain(comparison.best, TRUE)
+    assert gain < 0.02 and comparison.apart_px(comparison.best, TRUE) < 2.0
 
 
 @pytest.mark.parametrize(
@@ -112,16 +112,16 @@ def test_no_other_place_explains_more_than_the_true_one():
     [moved(1.5, 0.0, 1.0), moved(2.0, 0.0, 2.0), moved(0.5, 4.0, 4.0), moved(3.0, 3.0, 5.0)],
 )
 def test_the_place_that_explains_more_is_the_true_one(drawn):
-    question = ask(drawn)
-    gain, sigma = question.gain(question.best, drawn)
+    comparison = comparison_about(drawn)
+    gain, sigma = comparison.gain(comparison.best, drawn)
     assert gain > 0.02 and gain > 2.5 * sigma
-    assert question.apart_px(question.best, TRUE) < 2.0
+    assert comparison.apart_px(comparison.best, TRUE) < 2.0
 
 
 def test_a_shadow_beside_the_bar_makes_no_other_place_better():
-    question = ask(TRUE, shadow=0.7)
-    gain, sigma = question.gain(question.best, TRUE)
-    assert gain < max(0.02, 2.5 * sigma) or question.apart_px(question.best, TRUE) < 2.0
+    comparison = comparison_about(TRUE, shadow=0.7)
+    gain, sigma = comparison.gain(comparison.best, TRUE)
+    assert gain < max(0.02, 2.5 * sigma) or comparison.apart_px(comparison.best, TRUE) < 2.0
 
 
 @pytest.mark.parametrize("degrees, asked", [(8.0, 0), (25.0, 1)])
@@ -130,12 +130,12 @@ def test_a_camera_that_looks_along_the_bar_is_not_asked(degrees, asked):
     across = axis_frame(TRUE.direction)[0]
     angle = np.radians(degrees)
     looks = camera("along", tuple(np.cos(angle) * TRUE.direction + np.sin(angle) * across))
-    question = BarQuestion([view(looks, np.random.default_rng(3), 1.0)], wire(), TRUE, RODS)
-    assert len(question.bands) == asked
+    comparison = PlaceComparison([view(looks, np.random.default_rng(3), 1.0)], wire(), TRUE, RODS)
+    assert len(comparison.bands) == asked
 
 
 def test_a_wire_on_the_bar_is_left_out():
-    hidden = ask(TRUE).bands[0].changed == 0.5
+    hidden = comparison_about(TRUE).bands[0].changed == 0.5
     assert 0.005 < np.mean(hidden) < 0.1
 
 
@@ -167,17 +167,17 @@ class Placed(Explanation):
     def axis(self) -> BarAxis:
         return at(self.fitted.x_mm)
 
-    def question(self):
-        return AskedPlaces()
+    def place_comparison(self):
+        return ComparedPlaces()
 
-    def from_place(self, bar: SeenBar):
-        other = OTHERS[bar.axis.point_mm[0]]
+    def from_place(self, axis: BarAxis):
+        other = OTHERS[axis.point_mm[0]]
         if isinstance(other, Refused):
             raise other
         return other
 
 
-class AskedPlaces:
+class ComparedPlaces:
     """Places on a line, x mm; COVERED: the share of the bar's width that each explains."""
 
     bands = (None,)  # a camera
