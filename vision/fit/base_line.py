@@ -120,7 +120,7 @@ def _free_rows(problem: Problem, state: State) -> list[_FrameRows]:
     by_camera_error = camera_rows(problem, state) @ problem.cameras.by_error
     found = []
     for seen, rows in point_rows(problem):
-        if seen.frame >= 0 and not problem.bent[seen.frame]:
+        if seen.on_wire and not problem.bent[seen.frame]:
             found.append(
                 _rows_of(
                     problem,

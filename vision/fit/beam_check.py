@@ -265,6 +265,6 @@ def _wander_rows(problem: Problem) -> np.ndarray:
     rows = []
     for seen in problem.seen:
         by_knot = columns_of_camera(problem, seen.camera, wandering(problem, seen))
-        by_knot *= seen.frame >= 0
+        by_knot *= seen.on_wire
         rows.append(by_knot / seen.points.sigma_px[:, None])
     return np.concatenate(rows)

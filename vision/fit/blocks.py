@@ -94,7 +94,7 @@ class Blocks:
     as a whole (of the wire the shapes of `wire_modes`, then what its points share). motion: of a
     bar that does not stand still. shift_along: of the object along its axis, mm. outline_bias: by
     camera, px by which the object's outline is read too far out. friction: along the whisker, over
-    the force across it. bends: rad, two of each frame that may bend.
+    the force across it. bends: rad, two of each frame that may bend. in_order: all of these.
     """
 
     bar_axis: Block
@@ -107,6 +107,7 @@ class Blocks:
     outline_bias: Block
     friction: Block
     bends: Block
+    in_order: Sequence[Block]
 
     @classmethod
     def laid_out(
@@ -140,16 +141,8 @@ class Blocks:
             outline_bias=layout.add(outline_sigma, _STEP_MM),
             friction=layout.add([PULL_PRIOR], _STEP_FRICTION),
             bends=layout.add([BEND_PRIOR_RAD] * (2 * bent_frames), _STEP_BEND_RAD),
+            in_order=layout.blocks,
         )
-
-    @property
-    def in_order(self) -> list[Block]:
-        """Return all blocks in the order of the vector."""
-        offsets = []
-        for wire, bar in zip(self.wire_offsets, self.bar_offsets):
-            offsets += [wire, bar]
-        last = [self.motion, self.shift_along, self.outline_bias, self.friction, self.bends]
-        return [self.bar_axis, self.rest_shape, self.reach, *offsets, *last]
 
     @property
     def size(self) -> int:
@@ -181,16 +174,17 @@ class Blocks:
 
 
 class _Layout:
-    """The blocks laid out so far: where the next one begins."""
+    """The blocks laid out so far, one behind the other."""
 
     def __init__(self):
         """Start with no parameter."""
-        self.size = 0
+        self.blocks: list[Block] = []
 
     def add(self, sigma: Sequence[float], step: float | np.ndarray = 0.0) -> Block:
         """Return a block behind all others."""
-        block = Block(self.size, np.asarray(sigma, dtype=float), step)
-        self.size += len(block)
+        start = self.blocks[-1].slice.stop if self.blocks else 0
+        block = Block(start, np.asarray(sigma, dtype=float), step)
+        self.blocks.append(block)
         return block
 
 

@@ -74,6 +74,6 @@ def _by_delay(problem: Problem, by_turn_rad: np.ndarray) -> np.ndarray:
     behind = -np.diff(motor, prepend=2.0 * motor[0] - motor[1])  # (f,) rad, of one frame
     columns = np.zeros((len(by_turn_rad), len(problem.cameras)))
     for seen, rows in point_rows(problem):
-        if seen.frame >= 0:
+        if seen.on_wire:
             columns[rows, seen.camera] = by_turn_rad[rows] * behind[seen.frame]
     return columns

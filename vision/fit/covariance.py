@@ -69,7 +69,7 @@ def times_residual_covariance(problem: Problem, rows: np.ndarray) -> np.ndarray:
     if not problem.neighbour_correlation:
         return product
     for seen, mine in point_rows(problem):
-        if seen.frame >= 0:
+        if seen.on_wire:
             correlation = problem.neighbour_correlation[seen.camera]
             shared = correlation ** np.abs(np.arange(-_FARTHEST, _FARTHEST + 1))
             weights = shared / shared.sum()
@@ -128,7 +128,7 @@ def variance_by_cause(
 def _sum_by_cause(problem: Problem, parts: np.ndarray) -> dict[str, float]:
     """Return the sums of all residuals' parts (n,) by the cause that each belongs to."""
     blocks = problem.blocks
-    on_wire = [seen.frame >= 0 for seen in problem.seen]
+    on_wire = [seen.on_wire for seen in problem.seen]
     is_wire = np.repeat(on_wire, [len(seen.points) for seen in problem.seen])
     by_point = parts[: len(is_wire)]
     priors = parts[problem.prior_rows.start :]
@@ -190,7 +190,7 @@ def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> l
     """Return points (n, 3) that line points are pictures of: of the wire's axis, or as the object's
     form has them.
     """
-    if seen.frame < 0:
+    if not seen.on_wire:
         return object_rows(problem).shown_mm(seen, state.vector)
     points_mm, _ = curves.one(seen.frame).at(seen.points.place)
     return [points_mm]

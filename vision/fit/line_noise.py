@@ -39,7 +39,7 @@ def line_noise(problem: Problem) -> dict[str, LineNoise]:
 
 def _wire_sigma_px(problem: Problem, camera: int) -> float:
     """Return the sigma of one camera's points of the wire, px; NaN where it has none."""
-    own = [one for one in problem.seen if one.camera == camera and one.frame >= 0]
+    own = problem.seen_of_wire(camera)
     if not own:
         return float("nan")
     sigma_px = np.concatenate([one.points.sigma_px for one in own])
@@ -51,6 +51,6 @@ def _bar_sigmas_px(problem: Problem, camera: int) -> np.ndarray:
     rows = object_rows(problem)
     lines = []
     for one in problem.seen:
-        if one.camera == camera and one.frame < 0:
+        if one.camera == camera and not one.on_wire:
             lines += rows.sigmas_px(one)
     return np.array(lines, dtype=float).reshape(-1, 3)

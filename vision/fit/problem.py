@@ -90,6 +90,10 @@ class Problem:
         first = self.first_bend + 2 * int(np.sum(self.bent[:frame]))
         return slice(first, first + 2)
 
+    def seen_of_wire(self, camera: int) -> list[Observed]:
+        """Return what one camera has seen of the wire, by its number."""
+        return [one for one in self.seen if one.camera == camera and one.on_wire]
+
     @property
     def contact_rows(self) -> slice:
         """Return the place of the touching frames among the residuals: behind the line points."""
@@ -111,8 +115,8 @@ class Problem:
         rows = []
         for camera in range(len(self.cameras)):
             own = [one for one in self.seen if one.camera == camera]
-            wire = [one.points.shared_px for one in own if one.frame >= 0]
-            bar = [one.points.shared_px for one in own if one.frame < 0]
+            wire = [one.points.shared_px for one in own if one.on_wire]
+            bar = [one.points.shared_px for one in own if not one.on_wire]
             rows.append([*self._wire_sigma_px(wire), *np.ones(SHARED), *_bar_sigma_px(bar)])
         return np.array(rows)
 

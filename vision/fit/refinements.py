@@ -237,6 +237,6 @@ def _one_sided(fit: Fit, light: Mapping[str, WireAppearance]) -> LeftOut:
         return LeftOut(why="every camera sees both edges of the wire")
     moved = []
     for seen in fit.problem.seen:
-        by_light_px = off_px.get(seen.camera, 0.0) if seen.frame >= 0 else 0.0
+        by_light_px = off_px.get(seen.camera, 0.0) if seen.on_wire else 0.0
         moved.append(-by_light_px / seen.points.sigma_px)
     return fit.after(fit.step(np.concatenate(moved)))

@@ -17,7 +17,7 @@ def by_lines(problem: Problem, curves: Curves, moves: Curves) -> np.ndarray:
     """Return the change (n, k) of the line points' residuals; the bar's do not change."""
     rows = []
     for seen in problem.seen:
-        if seen.frame >= 0:
+        if seen.on_wire:
             moved_px = _across_line(problem, seen, curves, moves)
             rows.append(moved_px / seen.points.sigma_px[:, None])
         else:

@@ -68,7 +68,7 @@ def inflated_by_residuals(problem: Problem, state: State, least_shared: float = 
         factor.append(float(np.sqrt(max(own.along * own.over_frames, least_shared))))
     seen = []
     for one in problem.seen:
-        if one.frame >= 0:
+        if one.on_wire:
             sigma_px = np.hypot(one.points.sigma_px, excess_px[one.camera]) * factor[one.camera]
             one = replace(one, points=replace(one.points, sigma_px=sigma_px))
         seen.append(one)
@@ -95,7 +95,7 @@ def _of_wire(problem: Problem, values: Sequence, camera: int) -> list:
     """Select of values, one for each observation, those of the wire in one camera, frame by
     frame.
     """
-    is_own = [seen.camera == camera and seen.frame >= 0 for seen in problem.seen]
+    is_own = [seen.camera == camera and seen.on_wire for seen in problem.seen]
     return [value for value, own in zip(values, is_own) if own]
 
 

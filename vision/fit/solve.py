@@ -125,7 +125,7 @@ def _camera_and_rod(seen: Observed) -> tuple[int, bool]:
     """Return the camera of an observation and whether it is of the wire: those alike are predicted
     together.
     """
-    return seen.camera, seen.frame >= 0
+    return seen.camera, seen.on_wire
 
 
 @lru_cache(maxsize=1)

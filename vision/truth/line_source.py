@@ -86,11 +86,11 @@ class LineSource(ABC):
     def require_rods(self, seen: Sequence[Observed]) -> None:
         """Raise Refused where wire or bar is seen in no camera."""
         require_wire(seen)
-        if not any(one.frame < 0 for one in seen):
+        if not any(not one.on_wire for one in seen):
             raise Refused(_HIDDEN.format("bar clear of the wire"), code="rod_hidden")
 
 
 def require_wire(seen: Sequence[Observed]) -> None:
     """Raise Refused where no camera has a point of the wire."""
-    if not any(one.frame >= 0 for one in seen):
+    if not any(one.on_wire for one in seen):
         raise Refused(_HIDDEN.format("wire clear of the bar"), code="rod_hidden")

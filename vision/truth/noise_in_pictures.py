@@ -136,7 +136,7 @@ def _with_scatter(known: KnownWhisk, cameras: Cameras, seen: Sequence[Observed])
     They stay as stated where wire or bar is not seen, or the lines do not determine the fit.
     """
     problem = known.problem(cameras, seen)
-    if len({one.frame >= 0 for one in seen}) < 2:
+    if len({one.on_wire for one in seen}) < 2:
         return problem
     try:
         state, _ = solve(problem, known.state(problem))

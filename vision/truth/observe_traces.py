@@ -162,7 +162,7 @@ def _require_one_place(fitted: FittedWhisk) -> None:
     problem = fitted.problem
     over_sigma = residuals(problem, fitted.state)
     of_object = [fitted.state.vector[problem.blocks.bar_axis.slice] / problem.axis_sigma]
-    of_object += [over_sigma[rows] for seen, rows in point_rows(problem) if seen.frame < 0]
+    of_object += [over_sigma[rows] for seen, rows in point_rows(problem) if not seen.on_wire]
     farthest = float(np.max(np.abs(np.concatenate(of_object))))
     if farthest > _MOST_APART:
         found = f"the whisker touches {farthest:.0f} sigmas from where the object is said to be"

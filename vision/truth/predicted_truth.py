@@ -144,7 +144,7 @@ def _fit(lines: PredictedLines) -> FittedWhisk:
     problem = known.problem(cameras, seen, correlation)
     if not np.any(problem.touching):
         raise Refused(NEVER_TOUCHES, code="never_touches")
-    seeing_wire = {one.camera for one in seen if one.frame >= 0}
+    seeing_wire = {one.camera for one in seen if one.on_wire}
     is_by_edges = any(one.side for one in seen)
     if seen_from_one_side(cameras, known.axis) or (is_by_edges and len(seeing_wire) < 2):
         problem, state = _part_by_onset(problem, known)

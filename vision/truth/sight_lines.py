@@ -45,7 +45,7 @@ def sights_of(problem: Problem, name: str) -> Sights | None:
     if name not in problem.cameras:
         return None
     number = problem.cameras.index(name)
-    on_wire = [one for one in problem.seen if one.camera == number and one.frame >= 0]
+    on_wire = problem.seen_of_wire(number)
     if not any(len(one.points) for one in on_wire):
         return None
     joined = CameraPoints.joined(number, on_wire)

@@ -95,7 +95,7 @@ def fit_lines(
 
 def require_cameras(seen: Sequence[Observed], touch: Touch) -> None:
     """Raise Refused where fewer cameras see the wire than touch is found with."""
-    if len({one.camera for one in seen if one.frame >= 0}) < touch.fewest_cameras:
+    if len({one.camera for one in seen if one.on_wire}) < touch.fewest_cameras:
         raise Refused("a single camera sees wire and bar", code="single_camera")
 
 

@@ -40,7 +40,7 @@ class LinePoints(Rows):
 
 @dataclass(frozen=True)
 class Observed:
-    """Hold the line points of one camera in one frame; frame is -1 for the bar, which stands still.
+    """Hold the line points of one camera in one frame; frame is -1 for those of the touched object.
 
     side: of the bar's outline the middle (0), or the edge towards (1) or against (-1) the points'
     normals. bar_in: the frame in which a bar that moves is seen.
@@ -51,3 +51,8 @@ class Observed:
     points: LinePoints
     side: int = 0
     bar_in: int = 0
+
+    @property
+    def on_wire(self) -> bool:
+        """Return whether the points are the wire's, not the touched object's."""
+        return self.frame >= 0
