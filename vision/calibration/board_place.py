@@ -27,10 +27,7 @@ def place_board(
     seen = {name: view for name, view in views.items() if name in cameras and len(view)}
     if not seen:
         raise Refused("no camera sees the board", code="object_points_elsewhere")
-    first = max(seen, key=lambda name: len(seen[name]))
-    camera = cameras[first]
-    T_camera_board = board_pose(seen[first], board.corners_mm, camera.lens)
-    T_first = compose(invert_transform(camera.T_camera_rig), T_camera_board)
+    T_first = _first_pose(cameras, seen, board)
 
     def residuals(step: np.ndarray) -> np.ndarray:
         """Return how far (n,) corners are off, over their sigma."""
@@ -51,3 +48,13 @@ def place_board(
         )
     covariance = max(rms, 1.0) ** 2 * np.linalg.inv(found.jac.T @ found.jac)
     return moved_pose(T_first, found.x), covariance
+
+
+def _first_pose(cameras: Cameras, seen: Mapping[str, Corners], board: Board) -> np.ndarray:
+    """Return T_rig_board (3, 4) by the camera that sees most corners. Raises Refused where these give
+    none.
+    """
+    name = max(seen, key=lambda name: len(seen[name]))
+    camera = cameras[name]
+    T_camera_board = board_pose(seen[name], board.corners_mm, camera.lens)
+    return compose(invert_transform(camera.T_camera_rig), T_camera_board)

@@ -17,9 +17,8 @@ and its square over that covariance is a chi² (the test of Hausman, Econometric
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
 
-from vision.fit.covariance import camera_rows
+from vision.fit.covariance import camera_rows, chance_of
 from vision.fit.problem import (
     WANDER_PX,
     Problem,
@@ -122,18 +121,8 @@ def check_beam(
         touch=comparison.of(touch, by.whisk["touch"], 0.0),
         slip=comparison.of(measured.frame["slip"][last], by.frame["slip"][last], slip_by),
         theta_rad=float(problem.motor_rad[last] - touch),
-        chance=_chance(departure.values, departure.covariance),
+        chance=chance_of(departure.values, departure.covariance),
     )
-
-
-def _chance(departure: np.ndarray, spread: np.ndarray) -> float:
-    """Return the chance that a beam departs so far; 1 where the lines do not determine it, NaN
-    where the fit is nowhere.
-    """
-    if not np.all(np.isfinite(spread)):
-        return float("nan")
-    square = departure @ np.linalg.pinv(spread, hermitian=True) @ departure
-    return float(chdtrc(len(departure), square))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import correlate1d
+from scipy.special import chdtrc
 
 from vision.fit.blocks import columns_of
 from vision.fit.object_rows import object_rows
@@ -87,6 +88,18 @@ def by_lens(problem: Problem, state: State, inverse_normal: np.ndarray) -> np.nd
     weights = linear.weights()[linear.is_point]
     by_camera = weights[:, None] * camera_rows(problem, state)
     return -inverse_normal @ (linear.jacobian[linear.is_point].T @ by_camera)
+
+
+def chance_of(values: np.ndarray, covariance: np.ndarray) -> float:
+    """Return the chance that what has this covariance (k, k) is so far (k,) from 0, by chi²; 1 where
+    nothing is determined, NaN where the covariance is not finite.
+    """
+    if not np.all(np.isfinite(covariance)):
+        return float("nan")
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))  # 0 of what is not determined
+    z = values / sigma
+    correlation = covariance / np.outer(sigma, sigma)
+    return float(chdtrc(len(z), z @ np.linalg.pinv(correlation, hermitian=True) @ z))
 
 
 def shared_covariance(problem: Problem, state: State, fitted: Uncertainty) -> np.ndarray:

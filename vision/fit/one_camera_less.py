@@ -15,10 +15,14 @@ one of those that fail, each with the same probability, and as uncertain as it i
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from vision.fit.blocks import Blocks, columns_of
-from vision.fit.covariance import Uncertainty, camera_rows, times_residual_covariance
+from vision.fit.covariance import (
+    Uncertainty,
+    camera_rows,
+    chance_of,
+    times_residual_covariance,
+)
 from vision.fit.problem import Problem, State, point_rows
 from vision.fit.quantities import Jacobians
 from vision.fit.solve import linear_at
@@ -151,7 +155,7 @@ def _leave_out(
     lines = _LinesOff.of(observations, state, fitted.inverse_normal, camera)
     line_offset_px, line_offset_sigma_px = lines.worst_px()
     names = observations.problem.cameras.names
-    least = min(_chance(moved, spread), lines.chance)
+    least = min(chance_of(moved, spread), lines.chance)
     one = OneLess(
         camera=names[camera],
         step=step,
@@ -218,7 +222,7 @@ class _LinesOff:
     @property
     def chance(self) -> float:
         """Return the chance that cameras which agree have lines so far off."""
-        return _chance(self.value, self.covariance) if len(self.value) else 1.0
+        return chance_of(self.value, self.covariance) if len(self.value) else 1.0
 
     def worst_px(self) -> tuple[float, float]:
         """Return by how much the line lies off that does most, in its sigmas, and its sigma, px."""
@@ -247,14 +251,6 @@ def _determined_directions(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarr
     determined, directions = np.linalg.eigh(np.eye(len(covariance)) - covariance)
     is_kept = determined > _DETERMINED
     return determined[is_kept], directions[:, is_kept]
-
-
-def _chance(moved: np.ndarray, spread: np.ndarray) -> float:
-    """Return the chance that what has this covariance (k, k) is so far (k,) from 0."""
-    sigma = np.sqrt(np.maximum(np.diag(spread), 1e-300))  # 0 of a camera that shows nothing
-    z = moved / sigma
-    correlation = spread / np.outer(sigma, sigma)
-    return float(chdtrc(len(z), z @ np.linalg.pinv(correlation, hermitian=True) @ z))
 
 
 def contradiction(found: list[OneLess]) -> str:

@@ -122,14 +122,17 @@ def _fit_traced_rest(
             return _TracedRest(rest_mm, np.inf, np.inf)
         rest_mm = fit_rest(seen, cameras, rods, nowhere, motor_rad)
     unlikeliness = float(np.sum((rest_mm / REST_PRIOR_MM) ** 2))
-    curves = unbent_curves(rest_mm, motor_rad, rods.wire)
-    offsets_px = []
+    chi2 = _bounded_chi2(traces, cameras, unbent_curves(rest_mm, motor_rad, rods.wire))
+    return _TracedRest(rest_mm, unlikeliness, unlikeliness + chi2)
+
+
+def _bounded_chi2(traces: Traces, cameras: Cameras, curves: Mapping[int, Curves]) -> float:
+    """Return the χ² of all traces about a wire, each point's bounded by NEAR_PX."""
+    chi2 = 0.0
     for camera in cameras:
-        offsets_px.append(_beside(traces[camera.name], camera, curves).offset_px)
-    bounded_px = np.minimum(np.abs(np.concatenate(offsets_px)), NEAR_PX)
-    return _TracedRest(
-        rest_mm, unlikeliness, unlikeliness + float(np.sum((bounded_px / _COARSE_PX) ** 2))
-    )
+        offset_px = _beside(traces[camera.name], camera, curves).offset_px
+        chi2 += np.sum((np.minimum(np.abs(offset_px), NEAR_PX) / _COARSE_PX) ** 2)
+    return float(chi2)
 
 
 def _resting_points(

@@ -20,6 +20,7 @@ from vision.geometry.refusals import Refused
 from vision.geometry.robust import robust_sigma
 from vision.geometry.rods import Bar, Rods
 from vision.geometry.rotation import unit
+from vision.geometry.rows import Rows
 from vision.geometry.silhouette import outline
 from vision.geometry.touched import Axis
 from vision.touched.one_view import seen_from_one_side
@@ -155,7 +156,7 @@ class _TrackedMiddle(ObjectReader):
 
 
 @dataclass(frozen=True, eq=False)
-class _BesideAxis:
+class _BesideAxis(Rows):
     """Points off the picture of an axis.
 
     place_mm (n,): along the axis, from its point. offset_px (n,): across its picture. line (n,): of each point.
@@ -192,16 +193,13 @@ def _middle(points: Trace, camera: Camera, axis: BarAxis) -> LinePoints:
     offsets_px = []
     scatters_px = []
     for line in np.unique(beside.line):
-        own = beside.line == line
-        by_place = np.polynomial.Polynomial.fit(
-            beside.place_mm[own], beside.offset_px[own], 1, w=_weights(beside.offset_px[own])
-        )
-        offsets_px.append(by_place(place_mm))
-        scatters_px.append(robust_sigma(beside.offset_px[own] - by_place(beside.place_mm[own])))
-    sigma_px = np.mean(beside.sigma_px)  # NaN where it is not stated
+        offset_px, scatter_px = _straight_line(beside.select(beside.line == line), place_mm)
+        offsets_px.append(offset_px)
+        scatters_px.append(scatter_px)
+    sigma_px = float(np.mean(beside.sigma_px))  # NaN where it is not stated
     if not np.isfinite(sigma_px):
         sigma_px = float(np.sqrt(np.mean(np.square(scatters_px))))
-    sigma_px = max(float(sigma_px), _LEAST_SIGMA_PX) / np.sqrt(len(offsets_px))
+    sigma_px = max(sigma_px, _LEAST_SIGMA_PX) / np.sqrt(len(offsets_px))
     foot_px, normal = _at_places(camera, axis, place_mm)
     return LinePoints(
         px=foot_px + np.mean(offsets_px, axis=0)[:, None] * normal,
@@ -211,9 +209,15 @@ def _middle(points: Trace, camera: Camera, axis: BarAxis) -> LinePoints:
     )
 
 
-def _weights(offset_px: np.ndarray) -> np.ndarray:
-    """Return the weights (n,) of points by how far they are off their median."""
-    return np.sqrt(cauchy_weights(offset_px - np.median(offset_px), _SCATTER_PX))
+def _straight_line(beside: _BesideAxis, place_mm: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the offsets (k,) px, at places (k,), of the straight line through points of one line, and
+    the points' scatter about it.
+
+    Points count by how far they are off their median, with Cauchy's weights.
+    """
+    weight = cauchy_weights(beside.offset_px - np.median(beside.offset_px), _SCATTER_PX)
+    by_place = np.polynomial.Polynomial.fit(beside.place_mm, beside.offset_px, 1, w=np.sqrt(weight))
+    return by_place(place_mm), robust_sigma(beside.offset_px - by_place(beside.place_mm))
 
 
 def _at_places(

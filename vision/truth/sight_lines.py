@@ -42,15 +42,11 @@ def sights_of(problem: Problem, name: str) -> Sights | None:
     """Return the lines of sight of one camera; None where it shows nothing of the wire, or was left
     out.
     """
-    if name not in problem.cameras:
+    seen = _wire_points(problem, name)
+    if seen is None:
         return None
-    number = problem.cameras.index(name)
-    on_wire = problem.seen_of_wire(number)
-    if not any(len(one.points) for one in on_wire):
-        return None
-    joined = CameraPoints.joined(number, on_wire)
-    frame = joined.frame
-    points = joined.points
+    frame = seen.frame
+    points = seen.points
     camera = problem.cameras[name]
     sight = camera.rays(points.px)
     further_along = camera.rays(points.px - tangents_by(points.normal))
@@ -66,6 +62,16 @@ def sights_of(problem: Problem, name: str) -> Sights | None:
         sigma_rad=points.sigma_px * np.abs(rad_per_px),
         shared_rad=shared_px * rad_per_px[:, None],
     )
+
+
+def _wire_points(problem: Problem, name: str) -> CameraPoints | None:
+    """Return the line points of the wire in one camera; None where it has none, or was left out."""
+    if name not in problem.cameras:
+        return None
+    number = problem.cameras.index(name)
+    seen = problem.seen_of_wire(number)
+    has_points = any(len(one.points) for one in seen)
+    return CameraPoints.joined(number, seen) if has_points else None
 
 
 def _shared_px(problem: Problem, name: str, points: LinePoints, motor_rad) -> np.ndarray:

@@ -6,7 +6,8 @@ import pytest
 from bench.rig.protocol_tables import WhiskerTable
 from tests.studies.accuracy.broken_beams import broken, check_of, joint, loose_clamp, softer_outside
 from tests.studies.accuracy.scenes import as_problem, draw_scene, line_points
-from vision.fit.beam_check import BeamCheck, Compared, _chance, _fit_added, _LeastSquares
+from vision.fit.beam_check import BeamCheck, Compared, _fit_added, _LeastSquares
+from vision.fit.covariance import chance_of
 from vision.geometry.rods import Wire
 
 
@@ -65,8 +66,8 @@ def test_little_is_no_alarm_however_sure():
 def test_lines_that_tell_nothing_are_no_departure():
     """No point lies on a bent wire: nothing is told, and nothing breaks."""
     found = _fit_added(_least_squares(np.ones(3), np.eye(3)), np.zeros((3, 2)))
-    assert _chance(found.values, found.covariance) == 1.0
-    assert np.isnan(_chance(found.values, np.nan * found.covariance))
+    assert chance_of(found.values, found.covariance) == 1.0
+    assert np.isnan(chance_of(found.values, np.nan * found.covariance))
 
 
 def _least_squares(residual, jacobian):
