@@ -10,6 +10,8 @@ from vision.geometry.refusals import Refused
 _MOST_STEPS = 50
 # [px⁻²] A prior of half a pixel on what the pictures do not constrain. Stated.
 _LEAST_CURVATURE = 4.0
+# [sigmas] Scale of the Cauchy distribution that weighs residuals. Stated.
+_CAUCHY_SIGMAS = 5.0
 
 
 def descend(
@@ -100,7 +102,11 @@ def cauchy_weights(residual: np.ndarray, scale: float) -> np.ndarray:
 
 
 def gauss_newton(
-    residuals_of: Callable, prior: np.ndarray, steps: np.ndarray, rounds: int, scale: float
+    residuals_of: Callable,
+    prior: np.ndarray,
+    steps: np.ndarray,
+    rounds: int,
+    scale: float = _CAUCHY_SIGMAS,
 ) -> tuple[np.ndarray, bool]:
     """Fit parameters (k,) by Gauss–Newton's method from 0, with Cauchy weights.
 

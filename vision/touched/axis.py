@@ -28,8 +28,6 @@ _PRIOR = np.array([5.0, 5.0, 0.5, 0.5])
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5])
 # [steps] Gauss–Newton: 184 fits took 4 at most; one that takes more does not converge. Stated.
 _GAUSS_NEWTON = 50
-# [sigmas] Scale of the Cauchy distribution that weighs residuals. Stated.
-_CAUCHY_SIGMAS = 5.0
 
 
 def settle_axis(
@@ -55,9 +53,7 @@ def settle_axis(
         residuals = [_residuals(axes, cameras[name], used[name], radius_mm) for name in used]
         return np.concatenate(residuals, axis=1)
 
-    vector, has_converged = gauss_newton(
-        residuals_of, _PRIOR, _STEPS, _GAUSS_NEWTON, _CAUCHY_SIGMAS
-    )
+    vector, has_converged = gauss_newton(residuals_of, _PRIOR, _STEPS, _GAUSS_NEWTON)
     if not has_converged:
         raise not_converged(_GAUSS_NEWTON)
     return axis.shifted(across, vector).upward()

@@ -262,7 +262,7 @@ def _evaluate_widths(pieces: Pieces, log_widths: np.ndarray) -> np.ndarray:
             width_factor=width_factor,
         )
         evidences.append(evidence)
-    temperature = estimate_temperature(_best_of(evidences), profiles)
+    temperature = estimate_temperature(best_of(evidences), profiles)
     deviances = np.array([evidence.bar_deviance[..., 0] for evidence in evidences])  # (n, k, g)
     tempered = deviances / temperature[:, None]
     excess = _bound_deviance(tempered - tempered.min(axis=(0, 2), keepdims=True))
@@ -284,7 +284,7 @@ def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> 
     mean, covariance = grid.average_line()
     log_blur, log_blur_sigma = grid.average_log_blur()
     cell = window.cell_px2 * max(grid.blur_step, 1e-300)
-    best = _best_of(evidences)
+    best = best_of(evidences)
     odds = (best.no_bar_deviance - best.least_deviance) / grid.temperature
     return Posterior(
         line=line + mean,
@@ -323,7 +323,7 @@ def _coarse_steps(blur_px: float) -> int:
     return max(1, int(_SPACING_BLURS * blur_px / STEP_PX))
 
 
-def _best_of(evidences: Sequence[Evidence]) -> Evidence:
+def best_of(evidences: Sequence[Evidence]) -> Evidence:
     """Return the evidence under the blur that has the most of it."""
     return min(evidences, key=lambda evidence: evidence.least_deviance.sum())
 
@@ -362,7 +362,7 @@ def _evaluate_lines(
     by their misfit.
     """
     lines = window.grid()
-    temperature = estimate_temperature(_best_of(evidences), profiles)
+    temperature = estimate_temperature(best_of(evidences), profiles)
     shift_px = evidences[0].shift_px  # of the narrowest blur, which has the most positions
     deviance = _at_shifts(evidences, shift_px) / temperature[:, None, None, None]
     log_blurs, deviance = _at_fine_blurs(np.log(window.blurs_px), deviance)

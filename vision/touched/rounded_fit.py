@@ -29,8 +29,6 @@ _PRIOR = np.array([8.0, 8.0, 0.5, 0.5, 8.0])
 _STEPS = np.array([1e-3, 1e-3, 1e-5, 1e-5, 1e-3])
 # [steps] Gauss–Newton within an iteration: three in ten take more and go on in the next. Stated.
 _GAUSS_NEWTON = 6
-# [sigmas] Scale of the Cauchy distribution that weighs residuals. Stated.
-_CAUCHY_SIGMAS = 5.0
 # [nats] Of one segment of a silhouette for or against a place: odds of 20 to one. Derived.
 _MOST_NATS = 3.0
 # [mm] A fit that moves the object by less has converged: the whisk's fit does the rest. Stated.
@@ -130,7 +128,7 @@ def fit_silhouette(
         residuals = [_residuals(places, cameras[name], used[name], radius_mm) for name in used]
         return np.concatenate(residuals, axis=1)
 
-    vector, has_converged = gauss_newton(residuals_of, prior, _STEPS, _GAUSS_NEWTON, _CAUCHY_SIGMAS)
+    vector, has_converged = gauss_newton(residuals_of, prior, _STEPS, _GAUSS_NEWTON)
     return moved(place, vector), has_converged
 
 

@@ -25,7 +25,7 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.edges import EDGE_PX, FORMAL_TO_TRUE
 from vision.touched.evidence import Evidence, LitRod, compute_evidence
-from vision.touched.posterior import estimate_temperature
+from vision.touched.posterior import best_of, estimate_temperature
 from vision.touched.profiles import compute_profiles
 from vision.touched.silhouette_pixels import OutlineSide, predict_sides, read_pieces
 from vision.wire.bands import Pieces
@@ -245,7 +245,7 @@ def _fit_side(pieces: Pieces, one_pass: _EdgePass, gamma: float) -> _EdgePosteri
             every=one_pass.every,
         )
         evidences.append(evidence)
-    best = min(evidences, key=lambda evidence: evidence.least_deviance.sum())
+    best = best_of(evidences)
     temperature = estimate_temperature(best, profiles)
     moments = [_moments_of_edge(evidence, temperature) for evidence in evidences]
     deviances, means, variances = map(np.array, zip(*moments))

@@ -19,6 +19,7 @@ from vision.pictures.view import SATURATED, View
 from vision.touched.patches import FULL_SCALE
 from vision.touched.profiles import OUTSIDE_PX
 from vision.wire.bands import Pieces
+from vision.wire.pixel_table import PixelTable
 from vision.wire.points import LinePoints
 
 # [px] Depth inside an edge that is read: that of a thick bar, and one pixel more. Stated.
@@ -194,40 +195,11 @@ def _pixels_near(
 
 
 @dataclass(frozen=True)
-class _Rows:
-    """The order in which n pixels fill the rows of a table (pieces, pixels).
-
-    pieces (r,): the numbers of the pieces. order (n,): of the pixels, piece by piece. row, column
-    (n,): of each pixel in that order.
-    """
-
-    pieces: np.ndarray
-    order: np.ndarray
-    row: np.ndarray
-    column: np.ndarray
-
-    @classmethod
-    def of(cls, piece: np.ndarray) -> "_Rows":
-        """Return the rows of pixels that belong to pieces (n,) by number."""
-        order = np.argsort(piece, kind="stable")
-        pieces, first, count = np.unique(piece[order], return_index=True, return_counts=True)
-        row = np.repeat(np.arange(len(pieces)), count)
-        column = np.arange(len(order)) - np.repeat(first, count)
-        return cls(pieces, order, row, column)
-
-    def table(self, values: np.ndarray, empty: float) -> np.ndarray:
-        """Return the pixels' values (n,) as a table (pieces, pixels), filled up with `empty`."""
-        filled = np.full((len(self.pieces), int(self.column.max()) + 1), empty)
-        filled[self.row, self.column] = np.nan_to_num(values[self.order], nan=empty)
-        return filled
-
-
-@dataclass(frozen=True)
 class _PixelLight:
     """The light of n pixels near one side of a silhouette, in grey levels of `FULL_SCALE`.
 
     grey, background (n,): with the object and without it. slope (n,): of the background across the
-    side outwards, per px. weight (n,): one over the noise of the grey value.
+    side outwards, per px. weight (n,): one over the noise of the grey value. What is not known is 0.
     """
 
     grey: np.ndarray
@@ -245,7 +217,8 @@ class _PixelLight:
         across = side.normal[side.station_at(found.along_px)]
         slope = np.sum(_gradient(view.background, row, column) * across, axis=1)
         weight = _weights(view, grey, background)
-        return cls(grey * scale, background * scale, slope * scale, weight / scale)
+        known = np.nan_to_num([grey * scale, background * scale, slope * scale])
+        return cls(*known, weight / scale)
 
 
 def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) -> Pieces:
@@ -254,23 +227,24 @@ def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) 
 
     `place` of a piece is along it, px; `source` is its station.
     """
-    rows = _Rows.of((found.along_px // length_px).astype(int))
-    if not len(rows.pieces):
+    number = (found.along_px // length_px).astype(int)
+    numbers, piece = np.unique(number, return_inverse=True)
+    if not len(numbers):
         return Pieces.none()
+    table = PixelTable.by_segment(piece, found.offset_px, len(numbers))
     light = _PixelLight.of(view, side, found)
     half_px = side.model_half_px
-    middle = (rows.pieces + 0.5) * length_px
+    middle = (numbers + 0.5) * length_px
     station = side.station_at(middle)
-    offset_px = rows.table(found.offset_px + half_px, 0.0)
     return Pieces(
-        offset_px=offset_px,
-        grey=rows.table(light.grey, 1.0),
-        background=rows.table(light.background, 1.0),
-        slope=rows.table(light.slope, 0.0),
-        curvature=np.zeros_like(offset_px),
-        weight=rows.table(light.weight, 0.0),
+        offset_px=table.filled(found.offset_px + half_px),
+        grey=table.filled(light.grey),
+        background=table.filled(light.background),
+        slope=table.filled(light.slope),
+        curvature=np.zeros(table.shape),
+        weight=table.filled(light.weight),
         place=middle,
-        radius_px=np.full(len(rows.pieces), half_px),
+        radius_px=np.full(len(numbers), half_px),
         foot_px=side.px[station],
         normal=side.normal[station],
         source=station,

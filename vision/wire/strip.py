@@ -17,6 +17,7 @@ from vision.geometry.robust import robust_sigma
 from vision.geometry.rotation import unit
 from vision.pictures.pixel_noise import Noise
 from vision.wire.bands import Pieces
+from vision.wire.pixel_table import PixelTable
 
 # [px] Between nodes of the curve: a pixel's foot is found from the nearest one. Derived.
 _NODE_PX = 0.5
@@ -79,7 +80,7 @@ def cut_strip(grey: np.ndarray, curve: Curve, margin_px: float, length_px: float
     count = max(int(curve.length_px / length_px), 1)
     middles = (np.arange(count) + 0.5) * (curve.length_px / count)
     piece = np.clip((pixels.place_px / curve.length_px * count).astype(int), 0, count - 1)
-    table = _PixelTable.by_segment(piece, pixels.offset_px, count)
+    table = PixelTable.by_segment(piece, pixels.offset_px, count)
     foot, normal, radius = curve.at(middles)
     nothing = np.zeros(table.shape)
     pieces = Pieces(
@@ -105,36 +106,6 @@ def _shows_both_sides(pieces: Pieces) -> np.ndarray:
     shows_one = np.any(known_px > needed_px, axis=1)
     shows_other = np.any(known_px < -needed_px, axis=1)
     return shows_one & shows_other
-
-
-@dataclass(frozen=True)
-class _PixelTable:
-    """Hold where pixels (n,) stand in a table of this shape, a row for each segment.
-
-    order (n,): the pixels by segment and then by offset. row, column (n,): of each in that order; a
-    short row's pixels stand in the middle.
-    """
-
-    order: np.ndarray
-    row: np.ndarray
-    column: np.ndarray
-    shape: tuple[int, int]
-
-    @staticmethod
-    def by_segment(segment: np.ndarray, offset_px: np.ndarray, count: int) -> "_PixelTable":
-        """Return the table of pixels (n,) in `count` segments, by the segment and offset of each."""
-        order = np.lexsort((offset_px, segment))
-        own = np.bincount(segment, minlength=count)  # pixels of each segment
-        most = own.max()
-        column = np.arange(len(order)) - np.repeat(np.cumsum(own) - own, own)
-        column += np.repeat((most - own) // 2, own)
-        return _PixelTable(order, segment[order], column, (count, max(int(most), 1)))
-
-    def filled(self, values: np.ndarray) -> np.ndarray:
-        """Return the table of values (n,), 0 where no pixel stands."""
-        table = np.zeros(self.shape)
-        table[self.row, self.column] = values[self.order]
-        return table
 
 
 @dataclass(frozen=True)
