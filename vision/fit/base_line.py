@@ -15,16 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.fit.blocks import REST_PRIOR_MM, WIRE_MODES_PX
-from vision.fit.covariance import camera_rows
 from vision.fit.problem import (
     WANDER_PX,
     Problem,
-    State,
     columns_of_camera,
     point_rows,
     wandering,
 )
-from vision.fit.solve import linear_at
+from vision.fit.solution import Solution
 from vision.geometry.base_lines import BaseLines
 from vision.geometry.centreline import REST_POWERS, rotation_z
 from vision.geometry.rotation import unit
@@ -71,12 +69,13 @@ class _FrameRows:
     by_shared: np.ndarray
 
 
-def base_lines(problem: Problem, state: State) -> BaseLines | None:
+def base_lines(fit: Solution) -> BaseLines | None:
     """Return the whisker's base as a line in each frame before touch.
 
     None where fewer than two frames are free and well seen.
     """
-    rows = _free_rows(problem, state)
+    problem = fit.problem
+    rows = _free_rows(fit)
     frames = _well_seen_frames(rows)
     if len(frames) < 2:
         return None
@@ -114,46 +113,31 @@ def _well_seen_frames(rows: list[_FrameRows]) -> np.ndarray:
     return np.flatnonzero(counts >= _FEWEST_POINTS)
 
 
-def _free_rows(problem: Problem, state: State) -> list[_FrameRows]:
+def _free_rows(fit: Solution) -> list[_FrameRows]:
     """Return the rows of the wire in all frames that do not bend."""
-    linear = linear_at(problem, state)
-    by_camera_error = camera_rows(problem, state) @ problem.cameras.by_error
     found = []
-    for seen, rows in point_rows(problem):
-        if seen.on_wire and not problem.bent[seen.frame]:
-            found.append(
-                _rows_of(
-                    problem,
-                    seen,
-                    state,
-                    linear.residual[rows],
-                    linear.jacobian[rows],
-                    by_camera_error[rows],
-                )
-            )
+    for seen, rows in point_rows(fit.problem):
+        if seen.on_wire and not fit.problem.bent[seen.frame]:
+            found.append(_rows_of(fit, seen, rows))
     return found
 
 
-def _rows_of(
-    problem: Problem,
-    seen: Observed,
-    state: State,
-    residual: np.ndarray,
-    jacobian: np.ndarray,
-    by_camera_error: np.ndarray,
-) -> _FrameRows:
+def _rows_of(fit: Solution, seen: Observed, rows: slice) -> _FrameRows:
     """Return the rows of one observation, without the offsets that the whole fit gave the line, and
     counted from a straight whisker in its place.
-
-    residual (n,), jacobian (n, size), by_camera_error (n, k): of the fit, at its points.
     """
+    problem = fit.problem
+    vector = fit.state.vector
+    jacobian = fit.linear.jacobian[rows]
     clear = seen.points.place > _CLEAR_OF_HUB_MM
     offsets = problem.blocks.wire_offsets[seen.camera].slice
     rest = problem.blocks.rest_shape.slice
     by_rest = jacobian[:, rest]
     by_offsets = jacobian[:, offsets]
-    straight = residual - by_offsets @ state.vector[offsets] - by_rest @ state.vector[rest]
+    residual = fit.linear.residual[rows]
+    straight = residual - by_offsets @ vector[offsets] - by_rest @ vector[rest]
     nuisance = _nuisances(problem, seen) / seen.points.sigma_px[:, None]
+    by_camera_error = fit.by_camera[rows] @ problem.cameras.by_error
     shared = np.hstack([_drifts(problem, seen.camera, by_offsets), by_camera_error])
     return _FrameRows(seen.frame, straight[clear], by_rest[clear], nuisance[clear], shared[clear])
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.covariance import camera_rows, chance_of
+from vision.fit.covariance import chance_of
 from vision.fit.problem import (
     WANDER_PX,
     Problem,
@@ -28,9 +28,8 @@ from vision.fit.problem import (
     curves_of,
     wandering,
 )
-from vision.fit.quantities import Jacobians, Measured
 from vision.fit.reshaped import by_contacts, by_lines
-from vision.fit.solve import linear_at
+from vision.fit.solution import Solution
 from vision.geometry.centreline import Curves, rotation_z
 
 # [chance] By which a wire that is a beam departs from it so far, a whisk. Study: chosen.
@@ -104,23 +103,19 @@ class BeamCheck:
         )
 
 
-def check_beam(
-    problem: Problem, state: State, covariance: np.ndarray, measured: Measured, by: Jacobians
-) -> BeamCheck:
-    """Check the beam in a whisk that touches.
-
-    covariance (size, size): of the parameters, by the fit and by the cameras. measured, by: its
-    quantities and their derivatives.
-    """
-    last = np.flatnonzero(problem.touching)[-1]
-    departure, slip_by = _estimate_departure(problem, state, last)
+def check_beam(fit: Solution, covariance: np.ndarray) -> BeamCheck:
+    """Check the beam in a whisk that touches. covariance (size, size): of its parameters, as stated."""
+    measured = fit.measured
+    by = fit.by_parameter
+    last = fit.last_frame
+    departure, slip_by = _estimate_departure(fit)
     comparison = _Comparison(departure, covariance)
     touch = measured.whisk["touch"]
     return BeamCheck(
         d_x=comparison.of(measured.whisk["d_x"], by.whisk["d_x"], 0.0),
         touch=comparison.of(touch, by.whisk["touch"], 0.0),
         slip=comparison.of(measured.frame["slip"][last], by.frame["slip"][last], slip_by),
-        theta_rad=float(problem.motor_rad[last] - touch),
+        theta_rad=float(fit.problem.motor_rad[last] - touch),
         chance=chance_of(departure.values, departure.covariance),
     )
 
@@ -176,37 +171,34 @@ class _Comparison:
         return Compared(beam, beam + float(row @ departure.values), difference_sigma, sigma)
 
 
-def _estimate_departure(
-    problem: Problem, state: State, frame: int
-) -> tuple[_Departure, np.ndarray]:
+def _estimate_departure(fit: Solution) -> tuple[_Departure, np.ndarray]:
     """Estimate the departure (k,) by one linear step from the fit.
 
-    Returns with it the change (k,) of the slip in a frame by the departure, the parameters standing
-    still.
+    Returns with it the change (k,) of the slip in the last frame by the departure, the parameters
+    standing still.
     """
-    linear = linear_at(problem, state)
-    root = np.sqrt(linear.weights())
+    problem = fit.problem
+    state = fit.state
     curves, _ = curves_of(problem, state.vector, state.arcs_mm)
     moves = _moves(problem, state, curves)
-    on_contacts, slip_by = by_contacts(problem, state, curves, moves, frame, _STEP_MM_PER_RAD)
-    by_departure = np.concatenate([by_lines(problem, curves, moves), on_contacts])
-    weighted_fit = linear.weighted()
-    jacobian = np.hstack([weighted_fit.jacobian, _weighted(root, _wander_rows(problem))])
-    weighted = _LeastSquares(
-        residual=weighted_fit.residual,
-        jacobian=jacobian,
-        prior=np.eye(jacobian.shape[1])[problem.size :] / WANDER_PX,
-        by_camera=_weighted(root, camera_rows(problem, state)),
-        covariance=problem.cameras.covariance,
+    on_contacts, slip_by = by_contacts(
+        problem, state, curves, moves, fit.last_frame, _STEP_MM_PER_RAD
     )
-    return _fit_added(weighted, _weighted(root, by_departure)), slip_by
+    by_departure = np.concatenate([by_lines(problem, curves, moves), on_contacts])
+    return _fit_added(_wandering(fit), fit.linear.weigh(by_departure)), slip_by
 
 
-def _weighted(root_weight: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return rows of the first observations times their root weights (n,), and zeros below them."""
-    weighted = np.zeros((len(root_weight), rows.shape[1]))
-    weighted[: len(rows)] = rows * root_weight[: len(rows), None]
-    return weighted
+def _wandering(fit: Solution) -> _LeastSquares:
+    """Return the fit with lines that may wander."""
+    wander = fit.linear.weigh(_wander_rows(fit.problem))
+    jacobian = np.hstack([fit.weighted.jacobian, wander])
+    return _LeastSquares(
+        residual=fit.weighted.residual,
+        jacobian=jacobian,
+        prior=np.eye(jacobian.shape[1])[fit.problem.size :] / WANDER_PX,
+        by_camera=fit.weighted_by_camera,
+        covariance=fit.problem.cameras.covariance,
+    )
 
 
 def _fit_added(problem: _LeastSquares, rows: np.ndarray) -> _Departure:

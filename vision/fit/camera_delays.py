@@ -11,9 +11,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vision.fit.covariance import camera_rows, times_residual_covariance
-from vision.fit.problem import Problem, State, point_rows
-from vision.fit.solve import linear_at
+from vision.fit.problem import Problem, point_rows
+from vision.fit.solution import Solution, times_residual_covariance
 from vision.fit.turns import by_turn
 
 # [frames⁻²] Information on the delay of a camera that shows no wire, which would run away. Stated.
@@ -21,26 +20,26 @@ _PRIOR = 1e-4
 
 
 def camera_delays(
-    problem: Problem, state: State, picture_of: Mapping[str, str] | None = None
+    fit: Solution, picture_of: Mapping[str, str] | None = None
 ) -> dict[str, tuple[float, float]]:
     """Return the delay of each camera in frames, the others having none, and its sigma.
 
     picture_of: by camera that is a part of a picture, the camera whose picture it is; the delay is that
-    of all its parts, under its name. There is none of a single picture. The fit has converged.
+    of all its parts, under its name. There is none of a single picture.
     """
     parts = picture_of or {}
+    problem = fit.problem
     pictures = [parts.get(name, name) for name in problem.cameras.names]
     if len(set(pictures)) < 2:
         return {}
-    linear = linear_at(problem, state)
+    linear = fit.linear
     weight = linear.weights()
-    columns = _by_delay(problem, by_turn(problem, state, linear))
-    by_cameras = camera_rows(problem, state)
+    columns = _by_delay(problem, by_turn(fit))
     found = {}
     for picture in dict.fromkeys(pictures):
         column = columns[:, [other == picture for other in pictures]].sum(axis=1)
         gain = _gain_of_last(np.column_stack([linear.jacobian, column]), weight)
-        sigma = _sigma(problem, gain, gain[:, linear.is_point] @ by_cameras)
+        sigma = _sigma(problem, gain, gain[:, linear.is_point] @ fit.by_camera)
         found[picture] = (float(gain[0] @ linear.residual), sigma)
     return found
 

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vision.fit.problem import Problem, State, point_rows
-from vision.fit.solve import Linear, linear_at
+from vision.fit.problem import Problem, point_rows
+from vision.fit.solution import Solution
+from vision.fit.solve import Linear
 from vision.geometry.robust import robust_sigma
 
 # [sigma] A frame blurred along the bar by more than the median one: one sound frame in 30 000.
@@ -35,19 +36,16 @@ class Exposure:
     covariance: np.ndarray
 
 
-def slip_in_exposure(problem: Problem, state: State, slip_by: np.ndarray) -> Exposure:
-    """Return the slip while the shutter was open, by the blur of the lines.
-
-    slip_by (f, size): derivatives of slip by the fit's parameters.
-    """
-    linear = linear_at(problem, state)
+def slip_in_exposure(fit: Solution) -> Exposure:
+    """Return the slip while the shutter was open, by the blur of the lines."""
+    problem = fit.problem
     frames = np.flatnonzero(problem.touching)
-    moves = _along_bar(problem, linear, slip_by[frames])
+    moves = _along_bar(problem, fit.linear, fit.by_parameter.frame["slip"][frames])
     found = np.zeros(len(frames))
     if len(frames) >= _FEWEST:
         excess = []
         for frame, move in zip(frames, moves):
-            excess.append(_excess(problem, linear, frame, move))
+            excess.append(_excess(problem, fit.linear, frame, move))
         variance, sigma = np.transpose(excess)
         found = _surely_above(variance, sigma)
     variance_mm2 = np.zeros(len(problem.motor_rad))

@@ -17,15 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit.blocks import Blocks, columns_of
-from vision.fit.covariance import (
-    Uncertainty,
-    camera_rows,
-    chance_of,
-    times_residual_covariance,
-)
-from vision.fit.problem import Problem, State, point_rows
-from vision.fit.quantities import Jacobians
-from vision.fit.solve import linear_at
+from vision.fit.covariance import chance_of
+from vision.fit.problem import point_rows
+from vision.fit.solution import Solution
 
 # [cameras] With one fewer nothing is left over to compare. Derived.
 FEWEST_CAMERAS = 3
@@ -87,98 +81,55 @@ class OneLess:
         return f"without {self.camera} {name} is {by} elsewhere, {lines} (chance {self.chance:.1g})"
 
 
-@dataclass(frozen=True, eq=False)
-class _Observations:
-    """All observations of a fit about its solution, over sigma and robustly weighted.
-
-    residual (n,), jacobian (n, size), and by_camera (n, 15 cameras): derivatives by the cameras'
-    parameters, 0 but for line points.
-    """
-
-    problem: Problem
-    residual: np.ndarray
-    jacobian: np.ndarray
-    by_camera: np.ndarray
-
-    @classmethod
-    def of(cls, problem: Problem, state: State) -> "_Observations":
-        """Return the observations of a fit that has converged."""
-        linear = linear_at(problem, state)
-        weighted = linear.weighted()
-        root_weight = np.sqrt(linear.weights())[linear.is_point]
-        by_camera = np.zeros((len(linear.residual), len(problem.cameras.covariance)))
-        by_camera[linear.is_point] = camera_rows(problem, state) * root_weight[:, None]
-        return cls(problem, weighted.residual, weighted.jacobian, by_camera)
-
-    def without(self, camera: int) -> np.ndarray:
-        """Return the Jacobian (n, size) with zeros for the line points of a camera."""
-        others = np.ones(len(self.residual))
-        for seen, rows in point_rows(self.problem):
-            others[rows] = seen.camera != camera
-        return self.jacobian * others[:, None]
-
-    def spread(self, rows: np.ndarray) -> np.ndarray:
-        """Return the covariance (k, k) of rows (k, n) times the errors of observations and
-        cameras.
-        """
-        by_camera = rows @ self.by_camera
-        by_noise = times_residual_covariance(self.problem, rows) @ rows.T
-        return by_noise + by_camera @ self.problem.cameras.covariance @ by_camera.T
-
-
-def leave_out_each(
-    problem: Problem, state: State, fitted: Uncertainty, by: Jacobians
-) -> list[OneLess]:
+def leave_out_each(fit: Solution) -> list[OneLess]:
     """Return the fit without each of its cameras; none where there are fewer than three."""
-    if len(problem.cameras) < FEWEST_CAMERAS:
+    cameras = range(len(fit.problem.cameras))
+    if len(cameras) < FEWEST_CAMERAS:
         return []
-    observations = _Observations.of(problem, state)
-    last = np.flatnonzero(problem.touching)[-1]
-    gradients = np.array(
-        [by.whisk["d_x"], by.whisk["touch"], by.whisk["beta"], by.frame["slip"][last]]
-    )
-    cameras = range(len(problem.cameras))
-    return [_leave_out(observations, state, fitted, gradients, camera) for camera in cameras]
+    return [_leave_out(fit, camera) for camera in cameras]
 
 
-def _leave_out(
-    observations: _Observations,
-    state: State,
-    fitted: Uncertainty,
-    gradients: np.ndarray,
-    camera: int,
-) -> OneLess:
-    """Return the fit without one camera; gradients (4, size): of what `OneLess.moved` holds."""
-    step, change = _step_without(observations, fitted, camera)
+def _leave_out(fit: Solution, camera: int) -> OneLess:
+    """Return the fit without one camera."""
+    by = fit.by_parameter
+    whisk = [by.whisk[name] for name in ("d_x", "touch", "beta")]
+    gradients = np.array([*whisk, by.frame["slip"][fit.last_frame]])  # (4, size), as `moved`
+    step, change = _step_without(fit, camera)
     moved = gradients @ step
-    spread = observations.spread(gradients @ change)
-    lines = _LinesOff.of(observations, state, fitted.inverse_normal, camera)
+    spread = fit.spread(gradients @ change)
+    lines = _LinesOff.of(fit, camera)
     line_offset_px, line_offset_sigma_px = lines.worst_px()
-    names = observations.problem.cameras.names
+    names = fit.problem.cameras.names
     least = min(chance_of(moved, spread), lines.chance)
     one = OneLess(
         camera=names[camera],
         step=step,
         moved=moved,
         moved_sigma=np.sqrt(np.diag(spread)),
-        sigma=np.sqrt(np.diag(gradients @ fitted.covariance @ gradients.T)),
+        sigma=np.sqrt(np.diag(gradients @ fit.fit_covariance @ gradients.T)),
         line_offset_px=line_offset_px,
         line_offset_sigma_px=line_offset_sigma_px,
         chance=min(1.0, 2 * len(names) * least),
     )
-    return replace(one, spread=observations.spread(change)) if one.contradicts else one
+    return replace(one, spread=fit.spread(change)) if one.contradicts else one
 
 
-def _step_without(
-    observations: _Observations, fitted: Uncertainty, camera: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _step_without(fit: Solution, camera: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the step (size,) to the fit without one camera, and its derivatives (size, n) by the
     errors of the observations.
     """
-    kept = observations.without(camera)
+    kept = _rows_without(fit, camera)
     inverse_normal = np.linalg.inv(kept.T @ kept)
-    change = inverse_normal @ kept.T - fitted.inverse_normal @ observations.jacobian.T
-    return -inverse_normal @ (kept.T @ observations.residual), change
+    change = inverse_normal @ kept.T - fit.inverse_normal @ fit.weighted.jacobian.T
+    return -inverse_normal @ (kept.T @ fit.weighted.residual), change
+
+
+def _rows_without(fit: Solution, camera: int) -> np.ndarray:
+    """Return the weighted Jacobian (n, size) with zeros for the line points of a camera."""
+    others = np.ones(len(fit.weighted.residual))
+    for seen, rows in point_rows(fit.problem):
+        others[rows] = seen.camera != camera
+    return fit.weighted.jacobian * others[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,20 +153,18 @@ class _LinesOff:
     px_per_value: np.ndarray
 
     @classmethod
-    def of(
-        cls, observations: _Observations, state: State, inverse_normal: np.ndarray, camera: int
-    ) -> "_LinesOff":
+    def of(cls, fit: Solution, camera: int) -> "_LinesOff":
         """Return how far one camera's lines are off."""
-        problem = observations.problem
+        problem = fit.problem
         off = _offset_columns(problem.blocks, camera)
         sigma_px = problem.blocks.prior_sigma[off]
-        own = inverse_normal[np.ix_(off, off)] / np.outer(sigma_px, sigma_px)
+        own = fit.inverse_normal[np.ix_(off, off)] / np.outer(sigma_px, sigma_px)
         determined, directions = _determined_directions(own)
-        gain = inverse_normal[off] @ observations.jacobian.T  # (4, n)
+        gain = fit.inverse_normal[off] @ fit.weighted.jacobian.T  # (4, n)
         rows = -gain / sigma_px[:, None]
         rows[np.arange(len(off)), problem.prior_rows.start + off] += 1.0
-        in_sigmas = (state.vector[off] - gain @ observations.residual) / sigma_px
-        covariance = observations.spread(directions.T @ rows)
+        in_sigmas = (fit.state.vector[off] - gain @ fit.weighted.residual) / sigma_px
+        covariance = fit.spread(directions.T @ rows)
         px_per_value = sigma_px[:, None] * directions / determined
         return cls(directions, directions.T @ in_sigmas, covariance, px_per_value)
 

@@ -19,11 +19,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit.blocks import columns_of
-from vision.fit.covariance import by_lens
 from vision.fit.problem import Problem, State, bar_axes, bends, curves_of
-from vision.fit.quantities import Jacobians, Measured, measure
+from vision.fit.quantities import measure
 from vision.fit.reshaped import by_contacts, by_lines
-from vision.fit.solve import linear_at, linearise
+from vision.fit.solution import Solution
+from vision.fit.solve import residuals
 from vision.geometry.camera import N_PARAMETERS, PARAMETERS
 from vision.geometry.centreline import (
     REST_POWERS,
@@ -55,52 +55,38 @@ class LeftOut:
     why: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """A fit that has converged. inverse_normal (size, size): see `Uncertainty`."""
-
-    problem: Problem
-    state: State
-    inverse_normal: np.ndarray
-    measured: Measured
-    by: Jacobians
-
-    @property
-    def last(self) -> int:
-        """Return the touching frame of the largest pushing angle."""
-        return int(np.flatnonzero(self.problem.touching)[-1])
-
-    def after(self, step: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
-        """Return what a step (size,) of the parameters moves, with slip_mm added to the slip."""
-        return LeftOut(
-            d_x_mm=float(self.by.whisk["d_x"] @ step),
-            touch_rad=float(self.by.whisk["touch"] @ step),
-            slip_mm=float(self.by.frame["slip"][self.last] @ step) + slip_mm,
-        )
-
-    def held(self, rows: np.ndarray, values: np.ndarray) -> LeftOut:
-        """Return what it moves to change functions of the parameters by values (k,).
-
-        rows (k, size): derivatives of these functions.
-        """
-        gain = self.inverse_normal @ rows.T
-        return self.after(gain @ np.linalg.lstsq(rows @ gain, values, rcond=None)[0])
-
-    def held_parameters(self, columns: np.ndarray, changes: np.ndarray) -> LeftOut:
-        """Return what it moves to change the parameters of these columns (k,) by changes (k,)."""
-        return self.held(np.eye(self.problem.size)[columns], changes)
-
-    def step(self, residual: np.ndarray) -> np.ndarray:
-        """Return the step (size,) by which the parameters follow a change (n,) of the first n
-        residuals.
-        """
-        linear = linear_at(self.problem, self.state)
-        weights = linear.weights()[: len(residual)]
-        jacobian = linear.jacobian[: len(residual)]
-        return -self.inverse_normal @ (jacobian.T @ (weights * residual))
+def _after(fit: Solution, step: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
+    """Return what a step (size,) of the parameters moves, with slip_mm added to the slip."""
+    by = fit.by_parameter
+    return LeftOut(
+        d_x_mm=float(by.whisk["d_x"] @ step),
+        touch_rad=float(by.whisk["touch"] @ step),
+        slip_mm=float(by.frame["slip"][fit.last_frame] @ step) + slip_mm,
+    )
 
 
-def left_out(fit: Fit, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut]:
+def _held(fit: Solution, rows: np.ndarray, values: np.ndarray) -> LeftOut:
+    """Return what it moves to change functions of the parameters by values (k,).
+
+    rows (k, size): derivatives of these functions.
+    """
+    gain = fit.inverse_normal @ rows.T
+    return _after(fit, gain @ np.linalg.lstsq(rows @ gain, values, rcond=None)[0])
+
+
+def _held_parameters(fit: Solution, columns: np.ndarray, changes: np.ndarray) -> LeftOut:
+    """Return what it moves to change the parameters of these columns (k,) by changes (k,)."""
+    return _held(fit, np.eye(fit.problem.size)[columns], changes)
+
+
+def _followed(fit: Solution, residual: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
+    """Return what a change (n,) of the first n residuals moves, with slip_mm added to the slip."""
+    change = fit.linear.weigh(residual[:, None])[:, 0]
+    step = -fit.inverse_normal @ (fit.weighted.jacobian.T @ change)
+    return _after(fit, step, slip_mm)
+
+
+def left_out(fit: Solution, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut]:
     """Return the effect of each refinement of the truth by name. light: how each camera sees the
     wire.
     """
@@ -112,11 +98,11 @@ def left_out(fit: Fit, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut
     psi = -np.atleast_1d(fit.measured.whisk["psi"])
     found = {
         "large bending": _large_bending(fit),
-        "bar radius": fit.held_parameters(reach, -fit.problem.rods.bar.radius_mm - vector[reach]),
-        "psi": fit.held(fit.by.whisk["psi"][None], psi),
-        ALONG: fit.held_parameters(friction, -vector[friction]),
+        "bar radius": _held_parameters(fit, reach, -fit.problem.rods.bar.radius_mm - vector[reach]),
+        "psi": _held(fit, fit.by_parameter.whisk["psi"][None], psi),
+        ALONG: _held_parameters(fit, friction, -vector[friction]),
         "taper": _taper(fit),
-        "sag and set": fit.held_parameters(curved, -vector[curved]),
+        "sag and set": _held_parameters(fit, curved, -vector[curved]),
     }
     for name, terms in LENS_TERMS.items():
         found[name] = _lens(fit, terms)
@@ -124,7 +110,7 @@ def left_out(fit: Fit, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut
     return found
 
 
-def _large_bending(fit: Fit) -> LeftOut:
+def _large_bending(fit: Solution) -> LeftOut:
     """Return the effect of a beam of small angles, with no more friction along the whisker than it
     has.
     """
@@ -133,9 +119,9 @@ def _large_bending(fit: Fit) -> LeftOut:
     curves, arcs = curves_of(problem, state.vector, state.arcs_mm)
     contacts_mm = _contacts_of_small_angles(problem, state, curves, arcs)
     moves = _in_rig(problem, curves, _small_angles(problem, state, curves, contacts_mm))
-    on_contacts, slip = by_contacts(problem, state, curves, moves, fit.last)
+    on_contacts, slip = by_contacts(problem, state, curves, moves, fit.last_frame)
     rows = np.concatenate([by_lines(problem, curves, moves), on_contacts])
-    return fit.after(fit.step(rows[:, 0]), float(slip[0]))
+    return _followed(fit, rows[:, 0], float(slip[0]))
 
 
 def _in_rig(problem: Problem, curves: Curves, of_tangents: np.ndarray) -> Curves:
@@ -175,23 +161,21 @@ def _contacts_of_small_angles(
     return closest_arc(Curves(curves.arc_mm, points, tangents), axis, problem.wire, arcs_mm)
 
 
-def _taper(fit: Fit) -> LeftOut:
+def _taper(fit: Solution) -> LeftOut:
     """Return the effect of the whisker as a cylinder of its base's diameter."""
     problem = fit.problem
     state = fit.state
     if problem.wire.is_uniform:
         return LeftOut(why="the whisker does not taper")
     cylinder = replace(problem, rods=replace(problem.rods, wire=_cylinder(problem.wire)))
-    with_taper = linear_at(problem, state)
-    plain, _ = linearise(cylinder, state, with_taper.jacobian)
-    by_lines_moved = fit.after(fit.step(plain.residual - with_taper.residual))
+    by_lines_moved = _followed(fit, residuals(cylinder, state) - fit.linear.residual)
     there = measure(cylinder, state.vector, state.arcs_mm)
     here = fit.measured
     slip = there.frame["slip"] - here.frame["slip"]
     return LeftOut(
         d_x_mm=by_lines_moved.d_x_mm + float(there.whisk["d_x"] - here.whisk["d_x"]),
         touch_rad=by_lines_moved.touch_rad + float(there.whisk["touch"] - here.whisk["touch"]),
-        slip_mm=by_lines_moved.slip_mm + float(slip[fit.last]),
+        slip_mm=by_lines_moved.slip_mm + float(slip[fit.last_frame]),
     )
 
 
@@ -207,7 +191,7 @@ def _cylinder(wire: Wire) -> Wire:
     )
 
 
-def _lens(fit: Fit, terms: Sequence[str]) -> LeftOut:
+def _lens(fit: Solution, terms: Sequence[str]) -> LeftOut:
     """Return the effect of cameras that are calibrated without these terms."""
     cameras = fit.problem.cameras
     own = [PARAMETERS.index(term) for term in terms]
@@ -222,10 +206,10 @@ def _lens(fit: Fit, terms: Sequence[str]) -> LeftOut:
     rows = columns[free]
     gain = cameras.covariance[:, rows]
     moved = -gain @ np.linalg.lstsq(gain[rows], values[free], rcond=None)[0]
-    return fit.after(by_lens(fit.problem, fit.state, fit.inverse_normal) @ moved)
+    return _after(fit, fit.parameters_by_camera @ moved)
 
 
-def _one_sided(fit: Fit, light: Mapping[str, WireAppearance]) -> LeftOut:
+def _one_sided(fit: Solution, light: Mapping[str, WireAppearance]) -> LeftOut:
     """Return the effect of the wire's axis in the middle of what is seen, in cameras that do not
     see both its edges.
     """
@@ -239,4 +223,4 @@ def _one_sided(fit: Fit, light: Mapping[str, WireAppearance]) -> LeftOut:
     for seen in fit.problem.seen:
         by_light_px = off_px.get(seen.camera, 0.0) if seen.on_wire else 0.0
         moved.append(-by_light_px / seen.points.sigma_px)
-    return fit.after(fit.step(np.concatenate(moved)))
+    return _followed(fit, np.concatenate(moved))

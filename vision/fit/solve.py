@@ -10,7 +10,6 @@ by light and lens) enters as twelve displacements a camera with priors (`Blocks.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
@@ -67,6 +66,14 @@ class Linear:
         """Return residuals and Jacobian times the roots of their weights."""
         root = np.sqrt(self.weights(scale))
         return replace(self, residual=self.residual * root, jacobian=self.jacobian * root[:, None])
+
+    def weigh(self, rows: np.ndarray) -> np.ndarray:
+        """Return rows (m, k) of the first observations times the roots of their weights, and zeros
+        below them: (n, k).
+        """
+        weighted = np.zeros((len(self.residual), rows.shape[1]))
+        weighted[: len(rows)] = rows * np.sqrt(self.weights())[: len(rows), None]
+        return weighted
 
 
 def linearise(
@@ -126,14 +133,6 @@ def _camera_and_rod(seen: Observed) -> tuple[int, bool]:
     together.
     """
     return seen.camera, seen.on_wire
-
-
-@lru_cache(maxsize=1)
-def linear_at(problem: Problem, state: State) -> Linear:
-    """Return `linearise`, kept for the next call with the same arguments: each of a fit's
-    uncertainties needs it.
-    """
-    return linearise(problem, state)[0]
 
 
 def _wire_part(problem: Problem, seen: CameraPoints, curves: Curves, perturbed: Perturbed) -> Part:
@@ -220,7 +219,7 @@ def solve(
         is_near = np.all(np.abs(step[geometry]) < near)
         near_jacobian = linear.jacobian if is_near else None
     else:
-        jacobian = weighted_jacobian(problem, state, scales[-1], near_jacobian)
+        jacobian = linearise(problem, state, near_jacobian)[0].weighted(scales[-1]).jacobian
     return state, np.linalg.inv(jacobian.T @ jacobian)
 
 
@@ -233,18 +232,3 @@ def _step_of(blocks: Blocks, linear: Linear, scale: float) -> tuple[np.ndarray, 
     most_bend_rad = np.max(np.abs(step[blocks.bends.slice]), initial=0.0)
     share = min(1.0, _LONGEST_RAD / max(most_bend_rad, 1e-9))
     return share * step, weighted.jacobian
-
-
-def weighted_jacobian(
-    problem: Problem, state: State, scale: float = LAST_SCALE, jacobian: np.ndarray | None = None
-) -> np.ndarray:
-    """Return all observations' rows (n, size) over their sigma and robustly weighted: line points,
-    touching, priors.
-
-    jacobian: see `linearise`.
-    """
-    if jacobian is None:
-        linear = linear_at(problem, state)
-    else:
-        linear, _ = linearise(problem, state, jacobian)
-    return linear.weighted(scale).jacobian

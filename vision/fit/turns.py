@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.fit.problem import Problem, State, point_rows
-from vision.fit.solve import Linear, linear_at, linearise
+from vision.fit.problem import Problem, point_rows
+from vision.fit.solution import Solution
+from vision.fit.solve import residuals
 
 # [rad] Of differences: the tip moves by 0.01 mm. Derived.
 _STEP_RAD = 1e-4
@@ -34,11 +35,12 @@ class Turns:
     covariance: np.ndarray
 
 
-def frame_turns(problem: Problem, state: State, index: Sequence[int]) -> Turns:
-    """Return the turns of the frames (f,) of a fit that has converged."""
-    linear = linear_at(problem, state)
+def frame_turns(fit: Solution, index: Sequence[int]) -> Turns:
+    """Return the turns of a fit's frames (f,)."""
+    linear = fit.linear
+    problem = fit.problem
     count = len(problem.motor_rad)
-    jacobian = np.hstack([linear.jacobian, _by_turns(problem, state, linear)])
+    jacobian = np.hstack([linear.jacobian, _by_turns(fit)])
     weighted = jacobian.T * linear.weights()
     no_prior = np.zeros(problem.size)  # of the fit's parameters, whose priors are rows
     prior = np.append(no_prior, np.full(count, _PRIOR_RAD**-2.0))
@@ -48,17 +50,17 @@ def frame_turns(problem: Problem, state: State, index: Sequence[int]) -> Turns:
     return Turns(np.asarray(index), problem.motor_rad, turn_rad, covariance[-count:, -count:])
 
 
-def by_turn(problem: Problem, state: State, linear: Linear) -> np.ndarray:
+def by_turn(fit: Solution) -> np.ndarray:
     """Return derivatives (n,) of all residuals by the turn of the frame that each is of."""
-    turned_problem = replace(problem, motor_rad=problem.motor_rad + _STEP_RAD)
-    turned, _ = linearise(turned_problem, state, linear.jacobian)
-    return (turned.residual - linear.residual) / _STEP_RAD
+    turned = replace(fit.problem, motor_rad=fit.problem.motor_rad + _STEP_RAD)
+    return (residuals(turned, fit.state) - fit.linear.residual) / _STEP_RAD
 
 
-def _by_turns(problem: Problem, state: State, linear: Linear) -> np.ndarray:
+def _by_turns(fit: Solution) -> np.ndarray:
     """Return derivatives (n, f) of all residuals by the turn of each frame."""
-    own = by_turn(problem, state, linear)
-    is_of_frame = _frame_of_row(problem, len(own))[:, None] == np.arange(len(problem.motor_rad))
+    own = by_turn(fit)
+    frames = np.arange(len(fit.problem.motor_rad))
+    is_of_frame = _frame_of_row(fit.problem, len(own))[:, None] == frames
     return is_of_frame * own[:, None]
 
 

@@ -17,7 +17,8 @@ from vision.fit.beam_check import BeamCheck, check_beam
 from vision.fit.camera_delays import camera_delays
 from vision.fit.motion import Gives, StatedVelocity
 from vision.fit.one_camera_less import contradiction
-from vision.fit.refinements import Fit, LeftOut, left_out
+from vision.fit.refinements import LeftOut, left_out
+from vision.fit.solution import Solution
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before
@@ -343,20 +344,20 @@ def fitted_truth(explained: Explanation) -> WhiskTruth:
     fitted = explained.fitted
     whisk = explained.whisk.yielding_as(fitted.problem, fitted.state)
     truth = to_whisk(whisk, fitted)
-    beam = _check_beam(fitted) if whisk.settings.check_beam else None
+    beam = check_beam(fitted, fitted.covariance) if whisk.settings.check_beam else None
     status = joined(truth.status, explained.warning, *warnings_of(whisk, fitted, beam))
     # Before the free stroke is traced, which changes whisk.light.
     refinements = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
-    free = (fitted.problem, fitted.state)
+    free: Solution = fitted
     if len(fitted.frames) < len(whisk.frames):
         free = free_stroke(whisk, fitted)
     return replace(
         truth,
         refinements=refinements,
         status=status,
-        turns=frame_turns(fitted.problem, fitted.state, fitted.frames),
-        delays=as_values(camera_delays(fitted.problem, fitted.state, whisk.picture_of)),
-        base=base_lines(*free),
+        turns=frame_turns(fitted, fitted.frames),
+        delays=as_values(camera_delays(fitted, whisk.picture_of)),
+        base=base_lines(free),
         beam=beam,
     )
 
@@ -374,21 +375,7 @@ def warnings_of(
 
 def _refinements(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, LeftOut]:
     """Return what the truth would be without each refinement; nothing where that is unresolved."""
-    fit = Fit(
-        fitted.problem,
-        fitted.state,
-        fitted.uncertainty.inverse_normal,
-        fitted.measured,
-        fitted.by_parameter,
-    )
     try:
-        return left_out(fit, whisk.light)
+        return left_out(fitted, whisk.light)
     except np.linalg.LinAlgError:
         return {}
-
-
-def _check_beam(fitted: FittedWhisk) -> BeamCheck:
-    """Compare the fit with one of a whisker that is no beam."""
-    return check_beam(
-        fitted.problem, fitted.state, fitted.covariance, fitted.measured, fitted.by_parameter
-    )

@@ -8,7 +8,7 @@ import numpy as np
 from vision.fit.covariance import variance_by_cause
 from vision.fit.line_noise import LineNoise
 from vision.fit.problem import Problem, State
-from vision.fit.solve import weighted_jacobian
+from vision.fit.solution import Solution
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import is_before
 from vision.geometry.reasons import Reason
@@ -88,7 +88,7 @@ class PredictedTruth:
 
 def _largest_cause(fitted: FittedWhisk, gradient: np.ndarray) -> tuple[str, float]:
     """Return the cause of the largest part of a variance, and that part. gradient (size,)."""
-    variances = variance_by_cause(fitted.problem, fitted.state, fitted.uncertainty, gradient)
+    variances = variance_by_cause(fitted, gradient)
     known = {cause: variance for cause, variance in variances.items() if np.isfinite(variance)}
     largest = max(known, key=known.__getitem__)
     return largest, float(known[largest] / sum(known.values()))
@@ -150,19 +150,15 @@ def _fit(lines: PredictedLines) -> FittedWhisk:
         problem, state = _part_by_onset(problem, known)
     else:
         problem, state = _part_by_clearance(problem, known)
-    return FittedWhisk.of(problem, state, _covariance(problem, state), known.frames_to_fit)
-
-
-def _covariance(problem: Problem, state: State) -> np.ndarray:
-    """Return the covariance (size, size) of the parameters by noise and priors."""
-    rows = weighted_jacobian(problem, state)
-    return np.linalg.inv(rows.T @ rows)
+    fitted = FittedWhisk(problem, state, known.frames_to_fit)
+    _ = fitted.inverse_normal  # raises where the lines do not determine the fit
+    return fitted
 
 
 def _part_by_clearance(problem: Problem, known: KnownWhisk) -> tuple[Problem, State]:
     """Return the problem with the frames that a fit would know to touch or to be free."""
     state = known.state(problem)
-    covariance = _covariance(problem, state)
+    covariance = Solution(problem, state).inverse_normal
     touching, free = TouchByClearance().part_by_fit(problem, state, covariance)
     problem = replace(problem, touching=touching, bent=~free)
     return problem, known.state(problem)
@@ -173,4 +169,4 @@ def _part_by_onset(problem: Problem, known: KnownWhisk) -> tuple[Problem, State]
     free = early(problem.motor_rad)
     problem = replace(problem, touching=problem.touching & ~free, bent=~free)
     state = known.state(problem)
-    return TouchByOnset().with_touch(problem, state, _covariance(problem, state))
+    return TouchByOnset().with_touch(problem, state, Solution(problem, state).inverse_normal)

@@ -61,7 +61,7 @@ def to_whisk(whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:
     outside = Reason("touch_outside_frames", _outside(fitted, touch.value))
     slope = Reason("slope_vague", _slope_unresolved(beta.sigma))
     slip = Reason("slip_vague", _slip_unresolved(frames))
-    in_common = shared_covariance(fitted.problem, fitted.state, fitted.uncertainty)
+    in_common = shared_covariance(fitted)
     is_known = not (lost or outside or slip) and not beta.sigma > _MOST_SLOPE_SIGMA_RAD
     truth = WhiskTruth(
         whisk.number,
@@ -123,8 +123,7 @@ def _shared_sigmas(
         beta_rad=sigma("beta"),
         psi_rad=sigma("psi"),
         point_mm=np.array([sigma(name) for name in _VECTORS]),
-        d_x_by_camera_error_mm=fitted.by_parameter.whisk["d_x"]
-        @ fitted.uncertainty.by_camera_error,
+        d_x_by_camera_error_mm=fitted.by_parameter.whisk["d_x"] @ fitted.by_camera_error,
     )
 
 
@@ -285,7 +284,7 @@ def _smooth(fitted: FittedWhisk, in_common: np.ndarray) -> Smooth:
         {name: by_parameter.frame[name][touching] for name in names},
         fitted.covariance,
         in_common,
-        fitted.uncertainty.by_camera_error,
+        fitted.by_camera_error,
         float(measured.whisk["d_x"]),
     )
 
@@ -347,7 +346,7 @@ def _statuses(whisk: WhiskPictures, fitted: FittedWhisk, rows: np.ndarray) -> tu
 def _budget(fitted: FittedWhisk) -> dict[str, float]:
     """Return the shares of d_x's variance by cause; those that are known add up to 1."""
     gradient = fitted.by_parameter.whisk["d_x"]
-    parts = variance_by_cause(fitted.problem, fitted.state, fitted.uncertainty, gradient)
+    parts = variance_by_cause(fitted, gradient)
     whole = np.nansum(list(parts.values()))
     return {name: part / whole for name, part in parts.items()}
 

@@ -8,6 +8,7 @@ import numpy as np
 from vision.fit.first_bends import SwingPictures, contact_arc, find_rest, follow_bends
 from vision.fit.problem import Problem, State, bar_axis, bends, curves_of, rest_shape, shifts_mm
 from vision.fit.scatter import inflated_by_residuals, scatter_px
+from vision.fit.solution import Solution
 from vision.fit.solve import LAST_SCALE, solve
 from vision.geometry.centreline import Curves, centrelines, unbent_curves
 from vision.geometry.contact import clearance
@@ -109,7 +110,7 @@ def fit_last(
     seen = lines.all_points(expected.place, last=True)
     problem, state, covariance = _fit(whisk, expected, seen, touch)
     touch.part_by_fit(problem, state, covariance)  # raises where the last fit shows no free stroke
-    return FittedWhisk.of(problem, state, covariance, whisk.frames, lines)
+    return FittedWhisk(problem, state, whisk.frames, lines)
 
 
 def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, ExpectedWhisk]:
@@ -239,7 +240,7 @@ def check_scatter(problem: Problem, state: State, most_px: float) -> None:
         )
 
 
-def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, State]:
+def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> Solution:
     """Fit all frames before touch, about the object and the rest shape of a fit."""
     problem = fitted.problem
     vector = fitted.state.vector
@@ -259,7 +260,7 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> tuple[Problem, Sta
     middle_mm = np.full(len(place.curves), 0.5 * whisk.rods.wire.length_mm)
     state = State(vector[: problem.first_bend], middle_mm)
     state, _ = solve(alone, state, scales=[LAST_SCALE] * 3)
-    return inflated_by_residuals(alone, state, FREE_SHARED), state
+    return Solution(inflated_by_residuals(alone, state, FREE_SHARED), state)
 
 
 def fit_before_touch(

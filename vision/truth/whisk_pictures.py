@@ -3,18 +3,16 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 
 from vision.fit.bend_onset import Onset
 from vision.fit.blocks import BAR_PRIOR
-from vision.fit.covariance import Uncertainty, uncertainty
 from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
 from vision.fit.problem import Problem, State, curves_of, shifts_mm
-from vision.fit.quantities import Jacobians, Measured, jacobians
+from vision.fit.solution import Solution
 from vision.fit.touch import first_touch
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
@@ -183,42 +181,21 @@ class WhiskPictures:
 
 
 @dataclass(frozen=True, eq=False)
-class FittedWhisk:
-    """The fit to a whisk's pictures: frames are those in it; values and derivatives of what a user
-    asks for. lines: the source of its lines.
-    """
+class FittedWhisk(Solution):
+    """The fit to a whisk's pictures: frames are those in it. lines: the source of its lines."""
 
-    problem: Problem
-    state: State
     frames: list[int]
-    uncertainty: Uncertainty
-    measured: Measured
-    by_parameter: Jacobians
     lines: LineSource | None = None
-
-    @classmethod
-    def of(
-        cls,
-        problem: Problem,
-        state: State,
-        inverse_normal: np.ndarray,
-        frames: list[int],
-        lines: LineSource | None = None,
-    ) -> Self:
-        """Return a fit with its uncertainty; inverse_normal (size, size): the second result of `solve`."""
-        measured, by_parameter = jacobians(problem, state)
-        errors = uncertainty(problem, state, inverse_normal)
-        return cls(problem, state, frames, errors, measured, by_parameter, lines)
 
     @cached_property
     def exposure(self) -> Exposure:
         """Return the slip while the shutter was open."""
-        return slip_in_exposure(self.problem, self.state, self.by_parameter.frame["slip"])
+        return slip_in_exposure(self)
 
     @cached_property
     def one_less(self) -> list[OneLess]:
         """Return the fits without each of its cameras."""
-        return leave_out_each(self.problem, self.state, self.uncertainty, self.by_parameter)
+        return leave_out_each(self)
 
     @cached_property
     def covariance(self) -> np.ndarray:
@@ -226,7 +203,7 @@ class FittedWhisk:
         contradictions between the cameras included.
         """
         contradictions = covariance_of(self.one_less, self.problem.size)
-        return self.uncertainty.covariance + self.exposure.covariance + contradictions
+        return self.fit_covariance + self.exposure.covariance + contradictions
 
     def some_curves(self, count: int) -> dict[int, Curves]:
         """Return the centrelines of so many frames spread over the whisk, by frame."""

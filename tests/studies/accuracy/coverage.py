@@ -39,10 +39,9 @@ from tests.studies.accuracy.scenes import (
     hard_light,
     line_points,
 )
-from vision.fit.covariance import uncertainty
 from vision.fit.problem import Problem, State
-from vision.fit.quantities import jacobians
 from vision.fit.scatter import inflated_by_residuals
+from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
@@ -93,9 +92,10 @@ def see_lines(problem: Problem, start: State, scales=SCALES) -> Seen:
         problem, state = touch_by_onset(problem, state, covariance)
         state, _ = solve(problem, state)
     problem = inflated_by_residuals(problem, state)
-    state, lines = solve(problem, state, scales=(4.0, 4.0, 4.0))
-    covariance = uncertainty(problem, state, lines).covariance
-    measured, by = jacobians(problem, state)
+    state, _ = solve(problem, state, scales=(4.0, 4.0, 4.0))
+    fit = Solution(problem, state)
+    covariance = fit.fit_covariance
+    measured, by = fit.measured, fit.by_parameter
     sigma = {name: float(np.sqrt(j @ covariance @ j)) for name, j in by.whisk.items()}
     sigma["slip"] = np.sqrt(
         np.einsum("fi,ij,fj->f", by.frame["slip"], covariance, by.frame["slip"])

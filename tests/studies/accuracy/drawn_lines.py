@@ -58,10 +58,10 @@ from vision.calibration import (
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.views import BoardViews
 from vision.fit.base_line import base_lines
-from vision.fit.covariance import Uncertainty, shared_covariance, uncertainty
+from vision.fit.covariance import shared_covariance
 from vision.fit.problem import Problem, State
-from vision.fit.quantities import jacobians
 from vision.fit.scatter import inflated_by_residuals
+from vision.fit.solution import Solution
 from vision.fit.solve import LAST_SCALE, solve
 from vision.geometry.base_lines import BaseLines
 from vision.geometry.board import Board, printed_corners
@@ -241,11 +241,9 @@ def calibrated(bench: Bench) -> Cameras:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A whisk's fit, with its uncertainty, and the lines of its free stroke."""
+    """A whisk's fit, and the lines of its free stroke."""
 
-    problem: Problem
-    state: State
-    uncertainty: Uncertainty
+    fit: Solution
     base: BaseLines | None
 
 
@@ -259,12 +257,10 @@ def fit_whisk(bench: Bench, scene: Scene, seen: Sequence, cameras: Cameras) -> F
     start = begin(problem)
     state, _ = solve(problem, start, scales=SCALES)
     problem = inflated_by_residuals(problem, state)
-    state, lines = solve(problem, state, scales=CLIPPED)
-    found = uncertainty(problem, state, lines)
-    free = (problem, state)
-    if not np.all(near):
-        free = _free_stroke(whole, problem, state)
-    return Fitted(problem, state, found, base_lines(*free))
+    state, _ = solve(problem, state, scales=CLIPPED)
+    fit = Solution(problem, state)
+    free = fit if np.all(near) else Solution(*_free_stroke(whole, problem, state))
+    return Fitted(fit, base_lines(free))
 
 
 def _during(problem: Problem, chosen: np.ndarray) -> Problem:
@@ -339,11 +335,10 @@ def session_row(
 
 def _values(bench: Bench, scene: Scene, fitted: Fitted) -> dict[str, tuple[float, float, float]]:
     """Errors, sigmas and shared parts by quantity."""
-    problem = fitted.problem
-    measured, by = jacobians(problem, fitted.state)
+    measured, by = fitted.fit.measured, fitted.fit.by_parameter
     truth = scene.truth
-    covariance = fitted.uncertainty.covariance
-    shared = shared_covariance(problem, fitted.state, fitted.uncertainty)
+    covariance = fitted.fit.fit_covariance
+    shared = shared_covariance(fitted.fit)
     near = scene.motor_rad > truth.touch - NEAR_TOUCH_RAD
     at = int(np.argmin(np.abs(scene.motor_rad[near] - truth.touch - SLIP_AT_RAD)))
     pairs = {

@@ -19,7 +19,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from tests.studies.accuracy.bar_scenes import off_px, read_scene
 from vision.fit.blocks import BAR_OFFSET_PX
 from vision.fit.problem import point_rows
-from vision.fit.solve import weighted_jacobian
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.vision_settings import VisionSettings
@@ -59,9 +58,7 @@ def fit_scene(folder: Path) -> tuple[FittedWhisk, BarAxis]:
 def by_camera(found: FittedWhisk, axis: BarAxis) -> dict[str, tuple[float, float, float]]:
     """By camera whose line of the bar's middle is seen: its error and sigma, px, and what it adds to d_x, mm."""
     problem, parts = found.problem, {}
-    gain = weighted_jacobian(problem, found.state) @ (
-        found.uncertainty.inverse_normal @ found.by_parameter.whisk["d_x"]
-    )
+    gain = found.weighted.jacobian @ (found.inverse_normal @ found.by_parameter.whisk["d_x"])
     for seen, mine in point_rows(problem):
         if seen.frame >= 0 or seen.side:
             continue

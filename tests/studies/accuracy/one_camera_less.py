@@ -19,10 +19,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from tests.studies.accuracy.error_parts import fit_scene
 from vision.calibration.cameras_file import read_cameras
-from vision.fit.covariance import uncertainty
 from vision.fit.one_camera_less import contradiction, covariance_of, leave_out_each
 from vision.fit.problem import Problem, State
-from vision.fit.quantities import jacobians
+from vision.fit.solution import Solution
 from vision.fit.solve import solve
 
 SHIFT_PX = 2.0
@@ -52,13 +51,12 @@ def shifted(problem: Problem, camera: int, which: str) -> Problem:
 
 def asked(problem: Problem, state: State, d_x_mm: float):
     """Least chance, what is told, and d_x's error in stated sigmas, before and after."""
-    state, answer = solve(problem, state)
-    own, (measured, by) = uncertainty(problem, state, answer), jacobians(problem, state)
-    found, gradient = leave_out_each(problem, state, own, by), by.whisk["d_x"]
-    wider = own.covariance + covariance_of(found, problem.size)
+    fit = Solution(problem, solve(problem, state)[0])
+    found, gradient = leave_out_each(fit), fit.by_parameter.whisk["d_x"]
+    wider = fit.fit_covariance + covariance_of(found, problem.size)
     z = [
-        (measured.whisk["d_x"] - d_x_mm) / np.sqrt(gradient @ one @ gradient)
-        for one in (own.covariance, wider)
+        (fit.measured.whisk["d_x"] - d_x_mm) / np.sqrt(gradient @ one @ gradient)
+        for one in (fit.fit_covariance, wider)
     ]
     return min(one.chance for one in found), contradiction(found), z
 

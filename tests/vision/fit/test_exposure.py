@@ -8,7 +8,7 @@ import pytest
 from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
 from vision.fit.exposure import slip_in_exposure
 from vision.fit.problem import bar_axis, curves_of
-from vision.fit.quantities import jacobians
+from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.geometry.contact import BarAxis, clearance
 
@@ -17,15 +17,17 @@ JUMPED, VARIANCE_MM2, SIGMA_PX2 = 2, 0.05**2, 0.05
 
 @pytest.fixture(scope="module")
 def fitted():
-    """A scene of exact points, its parameters, and the derivatives of slip."""
+    """The fit to a scene of exact points."""
     scene = draw_scene(0)
     problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
     state, _ = solve(problem, begin(problem), scales=(1e9,) * 8)
-    return problem, state, jacobians(problem, state)[1].frame["slip"]
+    return Solution(problem, state)
 
 
-def slipped_px(problem, state, slip, frame):
+def slipped_px(fit, frame):
     """How far each of a frame's points moves (n,) as the wire slips by 1 mm along the bar."""
+    problem, state = fit.problem, fit.state
+    slip = fit.by_parameter.frame["slip"]
     own, step = problem.bend_of(frame), 1e-5
 
     def gap_and_lines(change):
@@ -57,9 +59,9 @@ def slipped_px(problem, state, slip, frame):
 
 def test_the_frame_that_jumped_is_told_and_its_slip_alone_is_less_sure(fitted, rng):
     """Blur of a part in 25 of a pixel² more, known to 0.05 in each of some 60 points."""
-    problem, state, slip = fitted
+    problem, state = fitted.problem, fitted.state
     frame = np.flatnonzero(problem.touching)[JUMPED]
-    px_per_mm, seen = slipped_px(problem, state, slip, frame), []
+    px_per_mm, seen = slipped_px(fitted, frame), []
     for one in problem.seen:
         count = len(one.points)
         above = 0.3 + SIGMA_PX2 * rng.standard_normal(
@@ -70,14 +72,15 @@ def test_the_frame_that_jumped_is_told_and_its_slip_alone_is_less_sure(fitted, r
             above += VARIANCE_MM2 * mine**2
         widened = np.stack([above, np.full(count, SIGMA_PX2)], axis=1)
         seen.append(replace(one, points=replace(one.points, widened_px2=widened)))
-    found = slip_in_exposure(replace(problem, seen=seen), state, slip)
+    found = slip_in_exposure(Solution(replace(problem, seen=seen), state))
     assert np.flatnonzero(found.variance_mm2).tolist() == [frame]
     assert found.variance_mm2[frame] == pytest.approx(VARIANCE_MM2, rel=0.15)
+    slip = fitted.by_parameter.frame["slip"]
     variances = np.einsum("fi,ij,fj->f", slip, found.covariance, slip)
     assert np.allclose(variances, found.variance_mm2, atol=1e-9)
 
 
 def test_points_of_which_no_blur_is_known_say_nothing(fitted):
     """Lines that were not traced in pictures."""
-    found = slip_in_exposure(*fitted)
+    found = slip_in_exposure(fitted)
     assert not np.any(found.variance_mm2) and not np.any(found.covariance)

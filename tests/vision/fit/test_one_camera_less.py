@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import CAMERAS, begun, camera, scene, with_points
-from vision.fit.covariance import uncertainty
 from vision.fit.one_camera_less import contradiction, covariance_of, leave_out_each
 from vision.fit.quantities import jacobians
 from vision.fit.scatter import inflated_by_residuals
+from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
 
@@ -30,9 +30,9 @@ def left_out(rng, cameras=THREE, off_px=0.0):
     problem = replace(problem, seen=seen)
     state, _ = solve(problem, begun(problem, _of(problem, true, cameras)))
     problem = inflated_by_residuals(problem, state)
-    state, answer = solve(problem, state)
-    fitted, (measured, by) = uncertainty(problem, state, answer), jacobians(problem, state)
-    return problem, state, fitted, measured, by, leave_out_each(problem, state, fitted, by)
+    state, _ = solve(problem, state)
+    fit = Solution(problem, state)
+    return problem, state, fit, fit.measured, fit.by_parameter, leave_out_each(fit)
 
 
 def _of(problem, true, cameras):
@@ -74,10 +74,10 @@ def test_a_camera_that_is_off_widens_the_sigmas_and_is_told(rng):
     """Two pixels of all lines, as of a camera that was knocked: the truth lies within three of the wider sigmas."""
     problem, _, fitted, measured, by, found = left_out(rng, off_px=2.0)
     assert contradiction(found)
-    whole = fitted.covariance + covariance_of(found, problem.size)
+    whole = fitted.fit_covariance + covariance_of(found, problem.size)
     gradient, error = by.whisk["d_x"], measured.whisk["d_x"] - 60.0
     before, after = (
-        float(np.sqrt(gradient @ one @ gradient)) for one in (fitted.covariance, whole)
+        float(np.sqrt(gradient @ one @ gradient)) for one in (fitted.fit_covariance, whole)
     )
     assert abs(error) > 3.0 * before
     assert abs(error) < 3.0 * after
@@ -90,7 +90,7 @@ def test_a_camera_off_is_told_where_the_others_hardly_know_the_bar(rng):
     assert np.all(np.abs(third.moved) < 2.0 * third.moved_sigma)
     assert third.contradicts
     assert abs(third.line_offset_px) == pytest.approx(2.0, abs=4.0 * third.line_offset_sigma_px)
-    whole, gradient = fitted.covariance + covariance_of(found, problem.size), by.whisk["d_x"]
+    whole, gradient = fitted.fit_covariance + covariance_of(found, problem.size), by.whisk["d_x"]
     assert abs(measured.whisk["d_x"] - 60.0) < 3.0 * np.sqrt(gradient @ whole @ gradient)
 
 

@@ -18,8 +18,8 @@ from tests.studies.accuracy.scenes import (
     line_points,
 )
 from vision.calibration.cameras_file import read_cameras
-from vision.fit.covariance import shared_covariance, uncertainty, variance_by_cause
-from vision.fit.quantities import jacobians
+from vision.fit.covariance import shared_covariance, variance_by_cause
+from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
 
@@ -65,19 +65,14 @@ def test_files_and_subsets_keep_it(loose, tmp_path):
 def test_the_budget_tells_rig_board_from_lenses(loose):
     scene, rng = scene_of(0.1), np.random.default_rng(2)
     problem = as_problem(scene, loose, *given(scene, rng), line_points(scene, rng))
-    near, _ = solve(problem, begin(problem), scales=SCALES)
-    state, answer = solve(
-        problem, near, scales=SCALES
-    )  # derivatives that nearly cancel are those at the end
-    _, by = jacobians(problem, state)
-    gradient = by.whisk["d_x"]
+    state, _ = solve(problem, begin(problem), scales=SCALES)
+    fit = Solution(problem, state)
+    gradient = fit.by_parameter.whisk["d_x"]
 
     def budget(cameras):
-        asked = replace(problem, cameras=cameras)
-        known = uncertainty(asked, state, answer)
-        return variance_by_cause(asked, state, known, gradient), float(
-            gradient @ known.covariance @ gradient
-        )
+        asked = Solution(replace(problem, cameras=cameras), state)
+        whole = float(gradient @ asked.fit_covariance @ gradient)
+        return variance_by_cause(asked, gradient), whole
 
     told, whole = budget(loose)
     untold, _ = budget(replace(loose, placement=None))
@@ -88,9 +83,7 @@ def test_the_budget_tells_rig_board_from_lenses(loose):
         told["cameras"] + told["placement"]
     )
     # all cameras moved together move bar and whisker alike: when they touch stays, to a fiftieth of the board's 0.1°
-    touch = variance_by_cause(
-        problem, state, uncertainty(problem, state, answer), by.whisk["touch"]
-    )["placement"]
+    touch = variance_by_cause(fit, fit.by_parameter.whisk["touch"])["placement"]
     assert np.sqrt(touch) < 0.02 * np.radians(0.1)
     # a board known to 0.1 mm shifts d_x by about as much, its turns on top
     assert 0.05 < np.sqrt(told["placement"]) < 0.3
@@ -102,15 +95,14 @@ def test_what_whisks_share_is_diameters_light_cameras_and_placement(loose):
     scene = scene_of(0.1)
     rng = np.random.default_rng(2)
     problem = as_problem(scene, loose, *given(scene, rng), line_points(scene, rng))
-    state, gain = solve(problem, begin(problem), scales=SCALES)
-    _, by = jacobians(problem, state)
-    fitted = uncertainty(problem, state, gain)
-    shared = shared_covariance(problem, state, fitted)
+    fit = Solution(problem, solve(problem, begin(problem), scales=SCALES)[0])
+    by = fit.by_parameter
+    shared = shared_covariance(fit)
     for name in ("d_x", "touch", "beta", "x", "y", "z"):
         gradient = by.whisk[name]
-        causes = variance_by_cause(problem, state, fitted, gradient)
+        causes = variance_by_cause(fit, gradient)
         parts = [causes[cause] for cause in ("diameters", "light", "cameras", "placement")]
         assert gradient @ shared @ gradient == pytest.approx(sum(parts), rel=1e-6)
-        assert gradient @ shared @ gradient < gradient @ fitted.covariance @ gradient
+        assert gradient @ shared @ gradient < gradient @ fit.fit_covariance @ gradient
     along_z = by.whisk["z"]
     assert 0.1 < np.sqrt(along_z @ shared @ along_z) < 0.4

@@ -13,8 +13,8 @@ from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_po
 from vision.fit import blocks, solve
 from vision.fit import problem as model
 from vision.fit.problem import Problem
-from vision.fit.quantities import jacobians
-from vision.fit.refinements import Fit, left_out
+from vision.fit.refinements import left_out
+from vision.fit.solution import Solution
 from vision.geometry import centreline
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
@@ -25,36 +25,42 @@ WHISKER = {"sag_mm": 0.3, "set_y_mm": 0.5, "set_z_mm": -0.4}
 
 
 @cache
-def drawn(seed: int, shape: str = "cylinder") -> Fit:
+def drawn(seed: int, shape: str = "cylinder") -> Solution:
     """The fit to a drawn scene with noisy points and exact cameras."""
     scene = draw_scene(seed, whisker=WhiskerTable(shape=shape, **WHISKER))
     seen = line_points(scene, np.random.default_rng([seed, 30]))
     return fitted(as_problem(scene, scene.cameras, scene.wire, scene.bar, seen))
 
 
-def fitted(problem: Problem) -> Fit:
+def fitted(problem: Problem) -> Solution:
     state, _ = solve.solve(problem, begin(problem), scales=SCALES)
-    state, answer = solve.solve(problem, state, scales=(4.0, 4.0, 4.0))
-    return Fit(problem, state, answer, *jacobians(problem, state))
+    state, _ = solve.solve(problem, state, scales=(4.0, 4.0, 4.0))
+    fit = Solution(problem, state)
+    _ = fit.measured, fit.by_parameter, fit.linear, fit.inverse_normal  # by the model as it is now
+    return fit
 
 
-def moved(before: Fit, after: Fit) -> np.ndarray:
+def moved(before: Solution, after: Solution) -> np.ndarray:
     """d_x, touch and slip at the end of the stroke, one less the other."""
     values = (
-        [f.measured.whisk["d_x"], f.measured.whisk["touch"], f.measured.frame["slip"][f.last]]
+        [f.measured.whisk["d_x"], f.measured.whisk["touch"], f.measured.frame["slip"][f.last_frame]]
         for f in (after, before)
     )
     return np.subtract(*values)
 
 
-def told(fit: Fit, name: str, light=()) -> np.ndarray:
+def told(fit: Solution, name: str, light=()) -> np.ndarray:
     found = left_out(fit, dict(light))[name]
     return np.array([found.d_x_mm, found.touch_rad, found.slip_mm])
 
 
-def sigmas(fit: Fit) -> np.ndarray:
+def sigmas(fit: Solution) -> np.ndarray:
     """By noise alone, of the same three."""
-    rows = fit.by.whisk["d_x"], fit.by.whisk["touch"], fit.by.frame["slip"][fit.last]
+    rows = (
+        fit.by_parameter.whisk["d_x"],
+        fit.by_parameter.whisk["touch"],
+        fit.by_parameter.frame["slip"][fit.last_frame],
+    )
     return np.array([np.sqrt(row @ fit.inverse_normal @ row) for row in rows])
 
 
@@ -109,11 +115,11 @@ def test_taper_left_out_is_seen_in_its_size():
 def test_a_tilt_that_is_held_is_held():
     """The step that holds psi at 0 changes psi by what it was, and the constrained optimum costs least."""
     fit = drawn(3)
-    step = fit.inverse_normal @ fit.by.whisk["psi"]
-    step *= -fit.measured.whisk["psi"] / (fit.by.whisk["psi"] @ step)
-    assert fit.by.whisk["psi"] @ step == pytest.approx(-fit.measured.whisk["psi"])
+    step = fit.inverse_normal @ fit.by_parameter.whisk["psi"]
+    step *= -fit.measured.whisk["psi"] / (fit.by_parameter.whisk["psi"] @ step)
+    assert fit.by_parameter.whisk["psi"] @ step == pytest.approx(-fit.measured.whisk["psi"])
     found = left_out(fit, {})["psi"]
-    assert found.d_x_mm == pytest.approx(fit.by.whisk["d_x"] @ step)
+    assert found.d_x_mm == pytest.approx(fit.by_parameter.whisk["d_x"] @ step)
 
 
 def test_friction_along_the_whisker_is_what_a_fit_without_any_differs_by(monkeypatch):
@@ -147,9 +153,7 @@ def test_lens_terms_answer_by_the_calibration_s_covariance():
     assert "exact" in left_out(fit, {})["lens k1 k2"].why and np.isnan(told(fit, "lens k1 k2")[0])
     cameras = fit.problem.cameras
     free = Cameras(cameras.cameras, 1e-8 * np.eye(len(cameras.covariance)))
-    loose = Fit(
-        replace(fit.problem, cameras=free), fit.state, fit.inverse_normal, fit.measured, fit.by
-    )
+    loose = Solution(replace(fit.problem, cameras=free), fit.state)
     step = np.zeros((len(cameras), 15))
     step[:, 4:6] = [-camera.lens[4:6] for camera in cameras]
     other = fitted(replace(fit.problem, cameras=cameras.moved(step.ravel())))

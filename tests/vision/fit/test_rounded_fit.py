@@ -6,7 +6,7 @@ import pytest
 from tests.scenes.model_scenes import rounded_scene, with_outline
 from vision.fit.problem import State, bar_axis
 from vision.fit.quantities import measure
-from vision.fit.solve import linear_at, solve
+from vision.fit.solve import linearise, residuals, solve
 from vision.geometry.cone import Cone
 from vision.geometry.ring import Ring
 from vision.geometry.sphere import Sphere
@@ -66,14 +66,14 @@ def test_derivatives_of_the_outline_are_those_of_differences(scene):
     problem, truth = scene
     problem = with_outline(problem, truth)
     rows = slice(sum(len(one.points) for one in problem.seen if one.frame >= 0) // 2, None)
-    jacobian = linear_at(problem, truth).jacobian
+    linear, _ = linearise(problem, truth)
+    jacobian = linear.jacobian
     for k in (0, 1, 2, 3, problem.blocks.shift_along.start, problem.blocks.outline_bias.start):
         step = 1e-4 * (np.arange(problem.size) == k)
         ahead, behind = (
-            linear_at(problem, State(truth.vector + way * step, truth.arcs_mm)).residual
-            for way in (1, -1)
+            residuals(problem, State(truth.vector + way * step, truth.arcs_mm)) for way in (1, -1)
         )
-        count = np.sum(linear_at(problem, truth).is_point)
+        count = np.sum(linear.is_point)
         np.testing.assert_allclose(
             jacobian[rows, k][: count // 4],
             ((ahead - behind) / 2e-4)[rows][: count // 4],

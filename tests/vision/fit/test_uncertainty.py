@@ -13,9 +13,9 @@ from tests.studies.accuracy.scenes import (
     draw_scene,
     line_points,
 )
-from vision.fit.covariance import uncertainty
 from vision.fit.scatter import inflated_by_residuals
-from vision.fit.solve import solve, weighted_jacobian
+from vision.fit.solution import Solution
+from vision.fit.solve import solve
 
 ALIKE = 0.6  # with the next point, 0.36 with the one after …: (1 + 0.6)/(1 - 0.6) times the variance of a mean
 
@@ -26,8 +26,8 @@ def fitted():
     scene = draw_scene(0)
     problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
     problem = replace(problem, neighbour_correlation=[ALIKE] * len(scene.cameras))
-    state, answer = solve(problem, begin(problem), scales=(1e9,) * 8)
-    return problem, state, answer
+    state, _ = solve(problem, begin(problem), scales=(1e9,) * 8)
+    return Solution(problem, state)
 
 
 def test_what_neighbours_share_spreads_parameters_as_stated(fitted, rng):
@@ -36,10 +36,9 @@ def test_what_neighbours_share_spreads_parameters_as_stated(fitted, rng):
 
     Of all else that errs each row is drawn by itself.
     """
-    problem, state, answer = fitted
-    by_row = answer @ weighted_jacobian(problem, state).T
-    draws = np.array([by_row @ _errors(problem, by_row.shape[1], rng) for _ in range(2000)])
-    stated = np.sqrt(np.diag(uncertainty(problem, state, answer).noise))
+    by_row = fitted.inverse_normal @ fitted.weighted.jacobian.T
+    draws = np.array([by_row @ _errors(fitted.problem, by_row.shape[1], rng) for _ in range(2000)])
+    stated = np.sqrt(np.diag(fitted.noise))
     assert np.allclose(draws.std(axis=0) / stated, 1.0, atol=4 * 0.016 + 0.01)
 
 
@@ -57,10 +56,9 @@ def _errors(problem, count: int, rng) -> np.ndarray:
 
 def test_what_changes_along_the_wire_is_told_better(fitted):
     """Than were each point as uncertain by itself as what it shares makes a mean; in the bends most of all."""
-    problem, state, answer = fitted
-    ratio = np.sqrt(np.diag(uncertainty(problem, state, answer).noise) / np.diag(answer))
+    ratio = np.sqrt(np.diag(fitted.noise) / np.diag(fitted.inverse_normal))
     assert np.all(ratio < 1.01)
-    assert np.median(ratio[problem.first_bend :]) < 0.98
+    assert np.median(ratio[fitted.problem.first_bend :]) < 0.98
 
 
 @pytest.mark.parametrize("group", [1, GROUP])

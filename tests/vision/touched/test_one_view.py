@@ -16,9 +16,9 @@ from tests.studies.accuracy.bar_lines import (
 )
 from tests.studies.accuracy.lines import squares
 from vision.fit.bend_onset import Onset, onset
-from vision.fit.covariance import uncertainty, variance_by_cause
+from vision.fit.covariance import variance_by_cause
 from vision.fit.problem import State, bar_axis
-from vision.fit.quantities import jacobians
+from vision.fit.solution import Solution
 from vision.fit.solve import linearise, solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
@@ -139,15 +139,15 @@ def test_edges_tell_how_far_away_the_bar_is():
     near = replace(
         problem, axis=BarAxis(problem.axis.point_mm - 8.0 * sight, problem.axis.direction)
     )
-    found, answer = solve(near, begun(near, truth))
+    found, _ = solve(near, begun(near, truth))
     axis = bar_axis(near, found.vector)
     away = axis.point_mm - problem.axis.point_mm
     away = away - (away @ axis.direction) * axis.direction
     assert np.linalg.norm(away) < 0.3
-    _, by = jacobians(near, found)
-    gradient, known = by.whisk["d_x"], uncertainty(near, found, answer)
-    parts = variance_by_cause(near, found, known, gradient)
-    assert sum(parts.values()) == pytest.approx(gradient @ known.covariance @ gradient, rel=1e-6)
+    fit = Solution(near, found)
+    gradient = fit.by_parameter.whisk["d_x"]
+    parts = variance_by_cause(fit, gradient)
+    assert sum(parts.values()) == pytest.approx(gradient @ fit.fit_covariance @ gradient, rel=1e-6)
 
 
 def test_touch_is_when_the_whisker_begins_to_bend():

@@ -8,8 +8,6 @@ import pytest
 from bench.rig.protocol_tables import PicturesTable
 from tests.studies.accuracy.coverage import SCALES
 from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
-from vision.fit.covariance import Uncertainty
-from vision.fit.quantities import jacobians
 from vision.fit.solve import linearise, solve
 from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
@@ -50,7 +48,7 @@ def test_a_clock_that_is_off_is_an_encoder_that_is_off():
 
 
 def _whisk(scene, problem, state, clock_sigma_s):
-    state, answer = solve(problem, state, scales=(4.0,))
+    state, _ = solve(problem, state, scales=(4.0,))
     frames = range(len(problem.motor_rad))
     pictures = WhiskPictures(
         0,
@@ -63,7 +61,4 @@ def _whisk(scene, problem, state, clock_sigma_s):
         None,
         VisionSettings(clock_sigma_s=clock_sigma_s),
     )
-    known = Uncertainty(answer, answer, 0.0 * answer)
-    return to_whisk(
-        pictures, FittedWhisk(problem, state, list(frames), known, *jacobians(problem, state))
-    )
+    return to_whisk(pictures, FittedWhisk(problem, state, list(frames)))

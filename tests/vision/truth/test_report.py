@@ -5,8 +5,6 @@ import pytest
 
 from bench.rig.protocol_tables import PicturesTable
 from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
-from vision.fit.covariance import Uncertainty
-from vision.fit.quantities import jacobians
 from vision.fit.solve import solve
 from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
@@ -19,9 +17,15 @@ def row_of(noise_of):
     """The row of a scene whose parameters have this noise, and the scene."""
     scene = draw_scene(0, pictures=PicturesTable(step_deg=1.5))
     problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
-    state, answer = solve(problem, begin(problem), scales=(1e9,) * 6)
-    frames, known = range(len(scene.motor_rad)), Uncertainty(answer, noise_of(answer), 0.0 * answer)
-    fitted = FittedWhisk(problem, state, list(frames), known, *jacobians(problem, state))
+    state, _ = solve(problem, begin(problem), scales=(1e9,) * 6)
+    frames = range(len(scene.motor_rad))
+
+    class Noisy(FittedWhisk):
+        @property
+        def noise(self):
+            return noise_of(self.inverse_normal)
+
+    fitted = Noisy(problem, state, list(frames))
     rods, no_bar = Rods(scene.wire, scene.bar), None
     return scene, to_whisk(
         WhiskPictures(

@@ -1,0 +1,175 @@
+"""A fit that has converged: what it says, and how uncertain that is by points, priors and cameras."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.ndimage import correlate1d
+
+from vision.fit.object_rows import object_rows
+from vision.fit.problem import Problem, State, curves_of, point_rows
+from vision.fit.quantities import Jacobians, Measured, jacobians
+from vision.fit.solve import Linear, linearise
+from vision.geometry.camera import N_PARAMETERS
+from vision.geometry.centreline import Curves
+from vision.wire.points import Observed
+
+# [points] Beyond, nothing is shared: at the highest correlation that `_MOST_ALIKE` allows, 7/9,
+# 0.7 % is left. Derived.
+_FARTHEST = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A problem and the state in which its fit has converged."""
+
+    problem: Problem
+    state: State
+
+    @cached_property
+    def linear(self) -> Linear:
+        """Return residuals and Jacobian of all observations."""
+        return linearise(self.problem, self.state)[0]
+
+    @cached_property
+    def weighted(self) -> Linear:
+        """Return residuals and Jacobian as the fit weighs them: times the roots of robust weights."""
+        return self.linear.weighted()
+
+    @cached_property
+    def inverse_normal(self) -> np.ndarray:
+        """Return (JᵀWJ)⁻¹, (size, size): the factor of JᵀW in the parameters' sensitivity to
+        observations.
+        """
+        jacobian = self.weighted.jacobian
+        return np.linalg.inv(jacobian.T @ jacobian)
+
+    @cached_property
+    def by_camera(self) -> np.ndarray:
+        """Return derivatives (points, 15 cameras) of the line points' residuals by the cameras'
+        parameters.
+        """
+        curves, _ = curves_of(self.problem, self.state.vector, self.state.arcs_mm)
+        seen = self.problem.seen
+        return np.concatenate([_by_camera(self.problem, one, self.state, curves) for one in seen])
+
+    @cached_property
+    def weighted_by_camera(self) -> np.ndarray:
+        """Return derivatives (n, 15 cameras) of `weighted` residuals by the cameras' parameters: 0 but
+        for line points.
+        """
+        return self.linear.weigh(self.by_camera)
+
+    @cached_property
+    def parameters_by_camera(self) -> np.ndarray:
+        """Return derivatives (size, 15 cameras) of the fit's parameters by the cameras'.
+
+        They are -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit is made of, and with W as in the
+        fit a move of all cameras together moves the whole scene and nothing in it.
+        """
+        return -self.inverse_normal @ (self.weighted.jacobian.T @ self.weighted_by_camera)
+
+    @cached_property
+    def by_camera_error(self) -> np.ndarray:
+        """Return how the parameters change (size, k) with each unit error of the cameras
+        (`Cameras.by_error`).
+        """
+        return self.parameters_by_camera @ self.problem.cameras.by_error
+
+    @cached_property
+    def noise(self) -> np.ndarray:
+        """Return the covariance (size, size) of the parameters by the observations' and priors' own
+        errors.
+
+        Neighbouring line points of the wire have correlated errors. Their sigmas are as wide as is
+        right for what changes slowly along the wire, and too wide for what does not, so that the
+        errors are propagated with their correlation.
+        """
+        by_row = self.inverse_normal @ self.weighted.jacobian.T
+        return times_residual_covariance(self.problem, by_row) @ by_row.T
+
+    @property
+    def lens(self) -> np.ndarray:
+        """Return the covariance (size, size) of the parameters by the cameras' errors."""
+        return self.by_camera_error @ self.by_camera_error.T
+
+    @property
+    def fit_covariance(self) -> np.ndarray:
+        """Return the covariance (size, size) of the parameters by observations, priors and cameras."""
+        return self.noise + self.lens
+
+    def spread(self, rows: np.ndarray) -> np.ndarray:
+        """Return the covariance (k, k) of rows (k, n) times the `weighted` residuals, by the errors of
+        observations and cameras.
+        """
+        by_camera = rows @ self.weighted_by_camera
+        by_noise = times_residual_covariance(self.problem, rows) @ rows.T
+        return by_noise + by_camera @ self.problem.cameras.covariance @ by_camera.T
+
+    @cached_property
+    def _quantities(self) -> tuple[Measured, Jacobians]:
+        """Return the values and derivatives of all that a user asks for."""
+        return jacobians(self.problem, self.state)
+
+    @property
+    def measured(self) -> Measured:
+        """Return the values of what a user asks for."""
+        return self._quantities[0]
+
+    @property
+    def by_parameter(self) -> Jacobians:
+        """Return the derivatives of what a user asks for by the fit's parameters."""
+        return self._quantities[1]
+
+    @property
+    def last_frame(self) -> int:
+        """Return the touching frame of the largest pushing angle."""
+        return int(np.flatnonzero(self.problem.touching)[-1])
+
+
+def times_residual_covariance(problem: Problem, rows: np.ndarray) -> np.ndarray:
+    """Return rows (k, n) over all observations times the covariance (n, n) of their residuals.
+
+    It is the unit matrix, but for points of the wire: points i and j of a line have the correlation
+    ρ^|i − j|, and their sigmas are widened so that the variance of a mean stays what it is.
+    """
+    product = rows.copy()
+    if not problem.neighbour_correlation:
+        return product
+    for seen, mine in point_rows(problem):
+        if seen.on_wire:
+            correlation = problem.neighbour_correlation[seen.camera]
+            shared = correlation ** np.abs(np.arange(-_FARTHEST, _FARTHEST + 1))
+            weights = shared / shared.sum()
+            product[:, mine] = correlate1d(rows[:, mine], weights, axis=1, mode="constant")
+    return product
+
+
+def _by_camera(problem: Problem, seen: Observed, state: State, curves: Curves) -> np.ndarray:
+    """Return derivatives (n, 15 cameras) of one observation's residuals by the cameras' parameters.
+
+    Each is the mean over the points in space that a line point shows. These count as fixed: where a
+    sight grazes a rod's edge, a move of the grazing point along the sight moves no edge.
+    """
+    points = seen.points
+    camera = problem.cameras.cameras[seen.camera]
+    each = []
+    for on_rod_mm in _on_rod(problem, seen, state, curves):
+        _, _, by_parameter = camera.project_with_jacobians(on_rod_mm)
+        each.append(by_parameter)
+    by_camera = np.mean(each, axis=0)  # (n, 2, 15) px
+    rows = np.zeros((len(points), N_PARAMETERS * len(problem.cameras)))
+    first = N_PARAMETERS * seen.camera
+    across_px = np.einsum("ni,nij->nj", points.normal, by_camera)
+    rows[:, first : first + N_PARAMETERS] = across_px / points.sigma_px[:, None]
+    return rows
+
+
+def _on_rod(problem: Problem, seen: Observed, state: State, curves: Curves) -> list[np.ndarray]:
+    """Return points (n, 3) that line points are pictures of: of the wire's axis, or as the object's
+    form has them.
+    """
+    if not seen.on_wire:
+        return object_rows(problem).shown_mm(seen, state.vector)
+    points_mm, _ = curves.one(seen.frame).at(seen.points.place)
+    return [points_mm]
