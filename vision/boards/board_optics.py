@@ -17,6 +17,7 @@ from vision.boards.edge_pixels import Windows
 from vision.boards.saddle import BLUR, fit_windows, predict_saddles, start_parameters
 from vision.geometry.board import Board
 from vision.geometry.optics import UNKNOWN, Optics
+from vision.geometry.robust import robust_sigma
 from vision.pictures.view import SATURATED
 
 # [corners] Fewer have no median that an odd one would not move. Derived.
@@ -32,8 +33,6 @@ _DEPTH_LOG_SIGMA = 0.1
 # 0.4 px two webcams' pictures give gammas of 0.6 to 1.7; at 0.49 to 1.5 px seven other cameras'
 # give 0.6 to 1.3. Study: optics.py.
 _LEAST_BLUR_PX = 0.45
-# [1] Sigma of a Gaussian over its median deviation. Derived.
-_SIGMA_BY_DEVIATION = 1.4826
 # [1] Sigma of the median of Gaussian values over that of their mean. Derived.
 _MEDIAN_BY_MEAN = 1.2533
 # [parameters] Of a saddle in light; gamma's logarithm is the next. A layout.
@@ -88,8 +87,7 @@ def _optics_of(fitted: np.ndarray) -> Optics:
 def _median(values: np.ndarray) -> tuple[float, float]:
     """Return the median of values (n,), and the sigma of one of them by their median deviation."""
     median = np.median(values)
-    deviation = np.median(np.abs(values - median))
-    return float(median), float(_SIGMA_BY_DEVIATION * deviation)
+    return float(median), robust_sigma(values - median)
 
 
 def _predict_grey(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,17 +16,20 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from vision.calibration.marker_pictures import (
     AXIS_OF_PLACEMENT,
-    BIASES,
     FIRST_BIAS,
+    FIRST_SCATTER_PX,
+    LEAST_SCATTER_PX,
     MarkerPictures,
     MarkerSighting,
+    bias_sigmas,
+    first_parameters,
+    triangulate_corners,
 )
 from vision.calibration.place import Placement
 from vision.geometry.camera import Cameras
-from vision.geometry.centreline import rotation_z
 from vision.geometry.refusals import Refused
+from vision.geometry.robust import robust_sigma
 from vision.geometry.rotation import skew
-from vision.geometry.triangulate import nearest_to_rays
 
 # [pictures] Of a marker in two cameras; fewer show no turn. Derived.
 _FEWEST_INSTANTS = 4
@@ -36,22 +39,8 @@ _LEAST_TURN_RAD = np.radians(2.0)
 # [1] How far a marker's turn may be from the motor's, over it, to be on the hub: one at rest is off by
 # 1, that of steel-sample by 0.004. Stated.
 _TURNS_AS_MOTOR = 0.2
-# [px] What print, blur and light displace a marker's corner by in all pictures of a camera alike.
-# Painted hubs' are 0.01 to 0.02 px RMS, and the fit raises this where its residuals show more.
-# Study: rig_place.py.
-BIAS_PX = 0.02
-# [1/rad] How fast that changes with the motor's angle, in parts of itself: a print that is foreshortened
-# to a third turns three times as fast in the picture as the motor does. Derived.
-DRIFT_PER_RAD = 3.0
 # [passes] Of the fit before the last: each gives scatter and size of the biases to the next. Stated.
 _PASSES = 3
-# [px] Least scatter of a corner from picture to picture: the fit of a pattern has that where there
-# is no noise. Stated.
-LEAST_SCATTER_PX = 0.01
-# [px] First scatter of a corner. The residuals give it then. Stated.
-FIRST_SCATTER_PX = 0.05
-# [1] Standard deviation of normal residuals over the median of their magnitudes. Derived.
-PER_MEDIAN = 1.4826
 # [rad], [mm] Prior sigma of what a marker does not constrain: none. Stated.
 _UNSEEN = (1.0, 1000.0)
 _SOURCE = "marker on the hub"
@@ -156,11 +145,10 @@ class _AxisFit:
 
     def _fit(self, marker: _Turning) -> OptimizeResult:
         """Fit in passes: each gives the corners' scatter and the size of their biases to the next."""
-        biases = np.repeat(BIAS_PX, BIASES // 2 * len(self._cameras))
-        stated = np.concatenate([biases, DRIFT_PER_RAD * biases])  # px, px/rad
+        stated = bias_sigmas(self._cameras)
         self._prior = stated
         self._scatter_px = np.full((len(self._cameras), 2), FIRST_SCATTER_PX)
-        parameters = self._first(marker)
+        parameters = first_parameters(marker.corners_mm, marker.motor_rad, self._cameras)
         scale = 1.0
         for _ in range(_PASSES):
             fitted = self._solve(parameters)
@@ -169,11 +157,6 @@ class _AxisFit:
             scale = max(scale * self._bias_excess(fitted), 1.0)
             self._prior = scale * stated
         return self._solve(parameters)
-
-    def _first(self, marker: _Turning) -> np.ndarray:
-        """Return first parameters: axis at z, corners as triangulated, no bias."""
-        in_hub = np.mean(marker.corners_mm @ rotation_z(marker.motor_rad), axis=0)  # (4, 3)
-        return np.concatenate([np.zeros(4), in_hub.ravel(), np.zeros(len(self._prior))])
 
     def _solve(self, first: np.ndarray) -> OptimizeResult:
         """Fit from these parameters. Raises Refused where the fit does not converge."""
@@ -187,8 +170,8 @@ class _AxisFit:
         residual = fitted.fun[: self._seen.px.size].reshape(self._seen.px.shape)
         scatter_px = self._scatter_px.copy()
         for k in self._seen.cameras_with_pictures:
-            typical = np.median(np.abs(residual[self._seen.camera == k]), axis=(0, 1))
-            scatter_px[k] = PER_MEDIAN * typical * self._scatter_px[k]
+            x_y = np.moveaxis(residual[self._seen.camera == k], -1, 0)
+            scatter_px[k] *= [robust_sigma(one) for one in x_y]
         return np.maximum(scatter_px, LEAST_SCATTER_PX)
 
     def _bias_excess(self, fitted: OptimizeResult) -> float:
@@ -213,60 +196,33 @@ class _AxisFit:
     def _residuals(self, parameters: np.ndarray) -> np.ndarray:
         """Return all residuals over their sigmas: of the corners in pictures, then of the biases."""
         biases = parameters[FIRST_BIAS:]
-        expected_px = self._project(parameters, self._cameras)
+        expected_px = self._seen.project(parameters, self._motor_rad, self._cameras)
         expected_px += self._seen.bias_px(biases, self._from_middle)
         off = (expected_px - self._seen.px) / self._scatter_px[self._seen.camera][:, None]
         return np.concatenate([off.ravel(), biases / self._prior])
 
-    def _project(self, parameters: np.ndarray, cameras: Cameras) -> np.ndarray:
-        """Return the corners (pictures, 4, 2), px, without bias."""
-        return self._seen.project(parameters, self._motor_rad, cameras)
-
     def _of_cameras(self, fitted: OptimizeResult, covariance: np.ndarray) -> np.ndarray:
         """Return what the cameras' uncertainty adds to the axis' covariance, (4, 4)."""
         cameras = self._cameras
-        sigma = np.sqrt(np.diag(cameras.covariance))
-        gain = -(covariance @ fitted.jac.T)[:4, : self._seen.px.size]
-        here = self._project(fitted.x, cameras)
-        sensitivity = np.zeros((4, len(sigma)))
-        for k in np.flatnonzero(sigma):
-            step = np.zeros(len(sigma))
-            step[k] = sigma[k]
-            moved = self._project(fitted.x, cameras.moved(step)) - here
-            sensitivity[:, k] = (
-                gain @ (moved / self._scatter_px[self._seen.camera][:, None]).ravel() / sigma[k]
-            )
-        return sensitivity @ cameras.covariance @ sensitivity.T
+        by_error = self._seen.by_errors(fitted.x, self._motor_rad, cameras, cameras.by_error)
+        by_error /= self._scatter_px[self._seen.camera][:, None, :, None]
+        gain = covariance[:4] @ fitted.jac[: self._seen.px.size].T
+        axis_by_error = gain @ by_error.reshape(gain.shape[1], -1)
+        return axis_by_error @ axis_by_error.T
 
 
 def _turning(sightings: Sequence[MarkerSighting], cameras: Cameras) -> Iterator[_Turning]:
     """Yield the markers that are seen to turn as the motor does."""
     for number in sorted({one.number for one in sightings}):
         own = [one for one in sightings if one.number == number]
-        motor_rad, corners_mm = _triangulated(own, cameras)
+        met, corners_mm = triangulate_corners(own, cameras)
+        motor_rad = np.array([one.motor_rad for one in met])
         marker = _Turning(own, motor_rad, corners_mm)
         if len(motor_rad) < _FEWEST_INSTANTS or np.ptp(motor_rad) < _LEAST_TURN_RAD:
             continue
         turn = np.linalg.norm(_twist(marker)[:3])
         if abs(turn - 1.0) < _TURNS_AS_MOTOR:
             yield marker
-
-
-def _triangulated(
-    sightings: Sequence[MarkerSighting], cameras: Cameras
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return motor angles (n,), rad, and corners (n, 4, 3), mm, of the instants that two cameras see."""
-    by_instant: dict[tuple[str, int], list[MarkerSighting]] = {}
-    for one in sightings:
-        by_instant.setdefault(one.instant, []).append(one)
-    angles = []
-    corners = []
-    for together in by_instant.values():
-        if len({one.camera for one in together}) > 1:
-            angles.append(together[0].motor_rad)
-            views = [cameras[one.camera] for one in together]
-            corners.append(nearest_to_rays(views, [one.px for one in together]))
-    return np.array(angles), np.array(corners).reshape(-1, 4, 3)
 
 
 def _twist(marker: _Turning) -> np.ndarray:

@@ -12,24 +12,21 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
-from vision.calibration.hub_marker import (
-    BIAS_PX,
-    DRIFT_PER_RAD,
-    FIRST_SCATTER_PX,
-    LEAST_SCATTER_PX,
-    PER_MEDIAN,
-)
 from vision.calibration.marker_pictures import (
     AXIS_OF_PLACEMENT,
     BIASES,
     FIRST_BIAS,
+    FIRST_SCATTER_PX,
+    LEAST_SCATTER_PX,
     MarkerPictures,
     MarkerSighting,
+    bias_sigmas,
+    first_parameters,
+    triangulate_corners,
 )
 from vision.geometry.camera import Cameras, symmetric_root
-from vision.geometry.centreline import rotation_z
 from vision.geometry.refusals import Refused
-from vision.geometry.triangulate import nearest_to_rays
+from vision.geometry.robust import robust_sigma
 
 # [frames] In which two cameras see the marker; a smooth motion has no fewer. Derived.
 _FEWEST_FRAMES = 5
@@ -84,14 +81,14 @@ class _TurnFit:
     def __init__(self, sightings: Sequence[MarkerSighting], cameras: Cameras):
         """Take the sightings of one marker in one trial."""
         self.cameras = cameras
+        self.sightings = sightings
         self.seen = MarkerPictures.of(sightings, cameras)
         numbers = [one.instant[1] for one in sightings]
         self.frames, self.frame = np.unique(numbers, return_inverse=True)
         self.first_turn = FIRST_BIAS + BIASES * len(cameras)
         placement = np.zeros((6, 6)) if cameras.placement is None else cameras.placement
         axis_sigma = np.hypot(np.sqrt(np.diag(placement))[AXIS_OF_PLACEMENT], _EXACT)
-        biases = np.repeat(BIAS_PX, BIASES // 2 * len(cameras))
-        self._prior = np.concatenate([axis_sigma, biases, DRIFT_PER_RAD * biases])
+        self._prior = np.concatenate([axis_sigma, bias_sigmas(cameras)])
         # of the axis and the biases; corners and turns have no prior
         self._with_prior = np.r_[0:4, FIRST_BIAS : self.first_turn]
 
@@ -99,30 +96,16 @@ class _TurnFit:
         """Return first parameters by triangulated corners, turned about z. Raises Refused where two
         cameras see the marker in too few frames.
         """
-        corners_mm = self._triangulated_mm()
-        is_met = np.isfinite(corners_mm[:, 0, 0])
-        if is_met.sum() < _FEWEST_FRAMES:
+        met, corners_mm = triangulate_corners(self.sightings, self.cameras)
+        if len(met) < _FEWEST_FRAMES:
             raise Refused(
-                f"the marker is seen by two cameras in {is_met.sum()} frames, {_FEWEST_FRAMES} are needed",
+                f"the marker is seen by two cameras in {len(met)} frames, {_FEWEST_FRAMES} are needed",
                 code="marker_not_seen",
             )
-        met_mm = corners_mm[is_met]
-        turn = np.interp(self.frames, self.frames[is_met], _turns_about_z(met_mm))
-        in_hub = np.mean(met_mm @ rotation_z(turn[is_met] - turn[0]), axis=0)
-        nuisances = np.zeros(BIASES * len(self.cameras))
-        return np.concatenate([np.zeros(4), in_hub.ravel(), nuisances, turn[1:] - turn[0]])
-
-    def _triangulated_mm(self) -> np.ndarray:
-        """Return the corners (frames, 4, 3), mm; NaN in frames in which fewer than two cameras see
-        them.
-        """
-        corners_mm = np.full((len(self.frames), 4, 3), np.nan)
-        for k in range(len(self.frames)):
-            own = np.flatnonzero(self.frame == k)
-            if len(own) > 1:
-                views = [self.cameras.cameras[c] for c in self.seen.camera[own]]
-                corners_mm[k] = nearest_to_rays(views, self.seen.px[own])
-        return corners_mm
+        turn = _turns_about_z(corners_mm)
+        turns = np.interp(self.frames, [one.instant[1] for one in met], turn)
+        first = first_parameters(corners_mm, turn - turns[0], self.cameras)
+        return np.concatenate([first, turns[1:] - turns[0]])
 
     def turns_rad(self, parameters: np.ndarray) -> np.ndarray:
         """Return the turns (n,) of all frames, rad, from the first."""
@@ -147,26 +130,22 @@ class _TurnFit:
         The fit's parameters take up their share of it.
         """
         freedom = max(self.seen.px.size - len(fitted.x), 1)
-        residual = np.abs(fitted.fun[: self.seen.px.size]).reshape(self.seen.px.shape)
-        residual *= np.sqrt(self.seen.px.size / freedom)
+        residual = fitted.fun[: self.seen.px.size].reshape(self.seen.px.shape)
+        residual = residual * np.sqrt(self.seen.px.size / freedom)
         scatter = used_px.copy()
         for k in self.seen.cameras_with_pictures:
-            scatter[k] *= PER_MEDIAN * np.median(residual[self.seen.camera == k])
+            scatter[k] *= robust_sigma(residual[self.seen.camera == k])
         return np.maximum(scatter, LEAST_SCATTER_PX)
 
     def covariance(self, fitted: OptimizeResult, scatter_px: np.ndarray) -> np.ndarray:
         """Return the covariance of the parameters, with what the cameras' own errors add to it."""
         own = np.linalg.inv(fitted.jac.T @ fitted.jac)
-        weight = 1.0 / scatter_px[self.seen.camera][:, None, None]
-        here = self._project(fitted.x, self.cameras)
-        by_error = []
-        for error in self._camera_errors.T:
-            moved = self._project(fitted.x, self.cameras.moved(error)) - here
-            by_error.append((weight * moved).ravel())
-        if not by_error:
-            return own
-        gain = own @ fitted.jac[: self.seen.px.size].T @ np.array(by_error).T
-        return own + gain @ gain.T
+        turn_rad = self.turns_rad(fitted.x)[self.frame]
+        by_error = self.seen.by_errors(fitted.x, turn_rad, self.cameras, self._camera_errors)
+        by_error /= scatter_px[self.seen.camera][:, None, None, None]
+        gain = own @ fitted.jac[: self.seen.px.size].T
+        parameters_by_error = gain @ by_error.reshape(gain.shape[1], -1)
+        return own + parameters_by_error @ parameters_by_error.T
 
     @cached_property
     def _camera_errors(self) -> np.ndarray:
@@ -182,10 +161,10 @@ class _TurnFit:
 
     def _residuals(self, parameters: np.ndarray, scatter_px: np.ndarray) -> np.ndarray:
         """Return all residuals over their sigmas: of the corners in pictures, then of the priors."""
-        from_middle_rad = self.turns_rad(parameters)[self.frame] - self._middle_rad
+        turn_rad = self.turns_rad(parameters)[self.frame]
         biases = parameters[FIRST_BIAS : self.first_turn]
-        expected_px = self._project(parameters, self.cameras)
-        expected_px += self.seen.bias_px(biases, from_middle_rad)
+        expected_px = self.seen.project(parameters, turn_rad, self.cameras)
+        expected_px += self.seen.bias_px(biases, turn_rad - self._middle_rad)
         off = (expected_px - self.seen.px) / scatter_px[self.seen.camera][:, None, None]
         return np.concatenate([off.ravel(), parameters[self._with_prior] / self._prior])
 
@@ -204,10 +183,6 @@ class _TurnFit:
         rows = np.flatnonzero(of_frame)  # the first frame has no turn
         jacobian[rows, self.first_turn + of_frame[rows] - 1] = by_turn[rows]
         return jacobian
-
-    def _project(self, parameters: np.ndarray, cameras: Cameras) -> np.ndarray:
-        """Return the corners (pictures, 4, 2), px, without bias."""
-        return self.seen.project(parameters, self.turns_rad(parameters)[self.frame], cameras)
 
 
 def _turns_about_z(corners_mm: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ import numpy as np
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import rotation_z
 from vision.geometry.rotation import exp_rotation
+from vision.geometry.triangulate import nearest_to_rays
 
 # [parameters] Of the axis and of the corners, before the biases. A layout, no threshold.
 FIRST_BIAS = 16
@@ -24,6 +25,18 @@ FIRST_BIAS = 16
 BIASES = 16
 # [parameters] Of a placement, those of the axis: two turns, two shifts. A layout, no threshold.
 AXIS_OF_PLACEMENT = np.array([0, 1, 3, 4])
+# [px] What print, blur and light displace a marker's corner by in all pictures of a camera alike.
+# Painted hubs' are 0.01 to 0.02 px RMS, and the fit raises this where its residuals show more.
+# Study: rig_place.py.
+_BIAS_PX = 0.02
+# [1/rad] How fast that changes with the motor's angle, in parts of itself: a print that is foreshortened
+# to a third turns three times as fast in the picture as the motor does. Derived.
+_DRIFT_PER_RAD = 3.0
+# [px] Least scatter of a corner from picture to picture: the fit of a pattern has that where there
+# is no noise. Stated.
+LEAST_SCATTER_PX = 0.01
+# [px] First scatter of a corner. The residuals give it then. Stated.
+FIRST_SCATTER_PX = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +51,39 @@ class MarkerSighting:
     instant: tuple[str, int]
     motor_rad: float
     px: np.ndarray
+
+
+def triangulate_corners(
+    sightings: Sequence[MarkerSighting], cameras: Cameras
+) -> tuple[list[MarkerSighting], np.ndarray]:
+    """Return a sighting of each instant in which two cameras see a marker, and its corners there
+    (n, 4, 3), mm.
+    """
+    by_instant: dict[tuple[str, int], list[MarkerSighting]] = {}
+    for one in sightings:
+        by_instant.setdefault(one.instant, []).append(one)
+    seen = []
+    corners = []
+    for _, together in sorted(by_instant.items()):
+        if len({one.camera for one in together}) > 1:
+            views = [cameras[one.camera] for one in together]
+            seen.append(together[0])
+            corners.append(nearest_to_rays(views, [one.px for one in together]))
+    return seen, np.array(corners).reshape(-1, 4, 3)
+
+
+def first_parameters(corners_mm: np.ndarray, turn_rad: np.ndarray, cameras: Cameras) -> np.ndarray:
+    """Return first parameters: the axis at z, corners as triangulated (n, 4, 3) after turns (n,), no
+    bias.
+    """
+    in_hub = np.mean(corners_mm @ rotation_z(turn_rad), axis=0)  # (4, 3)
+    return np.concatenate([np.zeros(4), in_hub.ravel(), np.zeros(BIASES * len(cameras))])
+
+
+def bias_sigmas(cameras: Cameras) -> np.ndarray:
+    """Return the prior sigmas (16 cameras,) of all biases, px, and of their changes, px/rad."""
+    biases = np.repeat(_BIAS_PX, BIASES // 2 * len(cameras))
+    return np.concatenate([biases, _DRIFT_PER_RAD * biases])
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +116,18 @@ class MarkerPictures:
             own = self.camera == k
             px[own] = cameras.cameras[k].project(points_mm[own])
         return px
+
+    def by_errors(
+        self, parameters: np.ndarray, turn_rad: np.ndarray, cameras: Cameras, errors: np.ndarray
+    ) -> np.ndarray:
+        """Return by how much the corners (n, 4, 2, k) move with unit errors (15 cameras, k) of the
+        cameras, px.
+        """
+        here = self.project(parameters, turn_rad, cameras)
+        by_error = np.zeros((*here.shape, errors.shape[1]))
+        for k, error in enumerate(errors.T):
+            by_error[..., k] = self.project(parameters, turn_rad, cameras.moved(error)) - here
+        return by_error
 
     def bias_px(self, biases: np.ndarray, from_middle_rad: np.ndarray) -> np.ndarray:
         """Return the biases (n, 4, 2) of the corners, by the parameters (16 cameras,) of all cameras.
