@@ -150,10 +150,7 @@ def _wider(low, d_x, high, sigma):
 
 def frictionless(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Estimate by equation (12): slip accounted for, as if there were no friction."""
-    felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, whisk.beam.C_Nmm2)
-    d_x = distance.frictionless(*felt)
-    gradient = uncertainty.gradient_frictionless(*felt)
-    return _assuming(whisk, _without_friction(settings), d_x, gradient, _model_share)
+    return _with_friction(whisk, _without_friction(settings), _model_share)
 
 
 def printed_17(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
@@ -224,7 +221,10 @@ def _phi(whisk):
 
 
 def _with_friction(whisk, settings, model):
-    """Estimate by (10); model: the function of its own relative sigma, such as `_model_share`."""
+    """Estimate by (10), with its friction angle and the slope (9) that follows.
+
+    model: the function of its own relative sigma, such as `_model_share`.
+    """
     felt = (
         whisk.theta_at_rad,
         whisk.m_y_at_Nmm,
@@ -234,21 +234,14 @@ def _with_friction(whisk, settings, model):
     )
     d_x = distance.with_friction(*felt)
     gradient = uncertainty.gradient_with_friction(*felt)
-    return _assuming(whisk, settings, d_x, gradient, model)
+    estimate = _estimate(whisk, settings, d_x, gradient, model, m_y=whisk.m_y_at_Nmm)
+    slope = distance.estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad)
+    return replace(estimate, alpha_est_rad=settings.alpha_est_rad, beta_rad=slope)
 
 
 def _without_friction(settings: EstimatorSettings) -> EstimatorSettings:
     """Return the settings with a friction angle that is exactly 0."""
     return replace(settings, alpha_est_rad=0.0, alpha_est_sigma_rad=0.0)
-
-
-def _assuming(whisk, settings, d_x, gradient, model):
-    """Assemble an estimate from both moments, with its friction angle and the slope (9) that
-    follows.
-    """
-    slope = distance.estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad)
-    estimate = _estimate(whisk, settings, d_x, gradient, model, m_y=whisk.m_y_at_Nmm)
-    return replace(estimate, alpha_est_rad=settings.alpha_est_rad, beta_rad=slope)
 
 
 def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):

@@ -21,12 +21,10 @@ from estimator.domain import (
     Numbers,
     elementwise,
     first_failure,
-    quotient,
     require_friction_angle,
     require_positive,
     where_all,
 )
-from estimator.double_range import across_slope, by_friction, by_slope, friction_share, harmonic
 from estimator.reasons import NamedReason
 
 ANGLE_NOT_POSITIVE = NamedReason("angle_not_positive", "the pushing angle is not positive")
@@ -54,10 +52,9 @@ def rotational_compliance(theta: ArrayLike, m_z: ArrayLike) -> Numbers:
     """
     if min(theta.ndim, m_z.ndim) < 1 or min(theta.shape[-1], m_z.shape[-1]) < 2:
         raise ValueError("rotational_compliance needs two samples or more along the last axis")
-    angle, angle_scale = _centred(theta)
-    moment, moment_scale = _centred(m_z)
-    scaled = (angle**2).sum(axis=-1) / (angle * moment).sum(axis=-1)
-    compliance = quotient((scaled, angle_scale), (moment_scale,))
+    angle = theta - theta.mean(axis=-1, keepdims=True)
+    moment = m_z - m_z.mean(axis=-1, keepdims=True)
+    compliance = (angle**2).sum(axis=-1) / (angle * moment).sum(axis=-1)
     return np.where((compliance > 0) & np.isfinite(compliance), compliance, np.nan)
 
 
@@ -66,7 +63,7 @@ def from_compliance(compliance: ArrayLike, C: ArrayLike) -> Numbers:
     """Return d_x of (1), in mm: C k_θ, for a compliance in rad/(N·mm)."""
     require_positive("C", C, "N·mm²")
     known = (("the compliance is missing", np.isfinite(compliance)),)
-    return _distance(quotient((C, compliance), ()), known)
+    return _distance(C * compliance, known)
 
 
 @elementwise
@@ -77,7 +74,7 @@ def no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
     50.0
     """
     require_positive("C", C, "N·mm²")
-    return _distance(quotient((C, theta), (m_z,)), _conditions(theta, 0.0, m_z))
+    return _distance(C * theta / m_z, _conditions(theta, 0.0, m_z))
 
 
 @elementwise
@@ -86,15 +83,8 @@ def known_slope(
 ) -> Numbers:
     """Return d_x of (6), in mm, at a known slope β: Cθ cos β / (m_z cos β + m_y sin β)."""
     require_positive("C", C, "N·mm²")
-    return _distance(by_slope(theta, m_y, m_z, beta, C), _conditions(theta, m_y, m_z, beta=beta))
-
-
-@elementwise
-def friction_angle(mu: ArrayLike) -> Numbers:
-    """Return α of (7), in rad: atan μ. A negative or infinite coefficient raises ValueError."""
-    if not np.all((mu >= 0) & np.isfinite(mu)):
-        raise ValueError(f"mu = {mu}: a friction coefficient must be zero or positive, and finite")
-    return np.arctan(mu)
+    d_x = C * theta * np.cos(beta) / _across_slope(m_y, m_z, beta)
+    return _distance(d_x, _conditions(theta, m_y, m_z, beta=beta))
 
 
 @elementwise
@@ -123,25 +113,16 @@ def with_friction(
     d_x = Cθ (m_z − μ |m_y|) / (m_z² + m_y²) with μ = tan α_est. The printed form with β_est = φ +
     α_est is the same number; this one is exact to the last digit.
     """
-    _require_settings(alpha_est, C)
-    d_x = by_friction(theta, m_y, m_z, alpha_est, C)
+    require_friction_angle("alpha_est", alpha_est)
+    require_positive("C", C, "N·mm²")
+    d_x = C * theta * _across_friction(m_y, m_z, alpha_est) / (m_z**2 + m_y**2)
     return _distance(d_x, _conditions(theta, m_y, m_z, alpha_est))
 
 
 @elementwise
-def frictionless_sum(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
-    """Return d_x of (11), in mm: Cθ / (m_z + m_y²/m_z), (10) without friction.
-
-    It is computed as (12), which it equals.
-    """
-    return frictionless(theta, m_y, m_z, C)
-
-
-@elementwise
 def frictionless(theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> Numbers:
-    """Return d_x of (12), in mm: (Cθ/|m|) cos φ = Cθ m_z / (m_z² + m_y²)."""
-    require_positive("C", C, "N·mm²")
-    return _distance(by_friction(theta, m_y, m_z, 0.0, C), _conditions(theta, m_y, m_z))
+    """Return d_x of (11) and (12), in mm: (Cθ/|m|) cos φ = Cθ m_z / (m_z² + m_y²), (10) without friction."""
+    return with_friction(theta, m_y, m_z, 0.0, C)
 
 
 @elementwise
@@ -167,60 +148,9 @@ def general(
     `nu(theta, magnitude)` takes and returns arrays.
     """
     require_friction_angle("alpha_est", alpha_est)
-    share, exponent = friction_share(m_y, m_z, alpha_est)
     magnitude = np.hypot(m_y, m_z)
-    scaled_theta = quotient((theta, share), (magnitude,), exponent)
+    scaled_theta = theta * _across_friction(m_y, m_z, alpha_est) / magnitude
     return _distance(nu(scaled_theta, magnitude), _conditions(theta, m_y, m_z, alpha_est))
-
-
-@elementwise
-def cone_no_slip(theta: ArrayLike, m: ArrayLike, C: ArrayLike, length: ArrayLike) -> Numbers:
-    """Return ν(θ, |m|) of a cone with its apex at `length`, in mm: CθL / (Cθ + mL), inside (17)."""
-    _require_settings(0.0, C, length)
-    return _distance(harmonic(quotient((C, theta), (m,)), length), _conditions(theta, 0.0, m))
-
-
-@elementwise
-def cone_printed(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike, length: ArrayLike
-) -> Numbers:
-    """Return d_x of (17) as printed, in mm: CθL / (Cθ + |m| L) · cos φ.
-
-    It is far from the truth under slip; use `cone`.
-    """
-    _require_settings(0.0, C, length)
-    magnitude = np.hypot(m_y, m_z)
-    d_x = harmonic(quotient((C, theta), (magnitude,)), length) * (m_z / magnitude)
-    return _distance(d_x, _conditions(theta, m_y, m_z))
-
-
-@elementwise
-def cone(
-    theta: ArrayLike,
-    m_y: ArrayLike,
-    m_z: ArrayLike,
-    alpha_est: ArrayLike,
-    C: ArrayLike,
-    length: ArrayLike,
-) -> Numbers:
-    """Return d_x of a cone, in mm, by (17) at the scaled angle.
-
-    d_x = 1 / (1/L + 1/d) with d from (10) for a cylinder of the base's diameter.
-    """
-    _require_settings(alpha_est, C, length)
-    d_x = harmonic(by_friction(theta, m_y, m_z, alpha_est, C), length)
-    return _distance(d_x, _conditions(theta, m_y, m_z, alpha_est))
-
-
-@elementwise
-def taper(d_x: ArrayLike, length: ArrayLike) -> Numbers:
-    """Convert a distance d_x for a cylinder to that along a cone of the same base: 1 / (1/d_x +
-    1/L).
-
-    Both are in mm; NaN unless d_x is positive and finite.
-    """
-    require_positive("length", length, "mm")
-    return np.where((d_x > 0) & np.isfinite(d_x), harmonic(d_x, length), np.nan)
 
 
 @elementwise
@@ -270,12 +200,13 @@ def why_not(
 ) -> str | np.ndarray:
     """Return a sentence why these arguments give no distance; empty where they give one.
 
-    Give `beta` for (6), `alpha_est` for (9), (10) and their cones; with C, a distance too large or
+    Give `beta` for (6), `alpha_est` for (9) and (10); with C, a distance too large or
     too small for a float is reported as well. Returns a str for scalars, else an array of str.
     """
     slope = 0.0 if beta is None else beta
     stiffness = 1.0 if C is None else C
-    _require_settings(alpha_est, stiffness)
+    require_friction_angle("alpha_est", alpha_est)
+    require_positive("C", stiffness, "N·mm²")
     arguments = np.broadcast_arrays(theta, m_y, m_z, alpha_est, slope, stiffness)
     theta, m_y, m_z, alpha_est, slope, stiffness = (a.astype(float) for a in arguments)
     with np.errstate(all="ignore"):
@@ -294,35 +225,28 @@ def _conditions(theta, m_y, m_z, alpha_est=0.0, beta=0.0):
     first.
     """
     finite = np.isfinite(theta) & np.isfinite(m_y) & np.isfinite(m_z) & np.isfinite(beta)
-    downhill = across_slope(m_y, m_z, beta)[0] > 0
     return (
         (VALUE_MISSING, finite),
         (ANGLE_NOT_POSITIVE, theta > 0),
         (ANGLE_TOO_LARGE, theta < RIGHT_ANGLE),
         (NOT_PUSHING, m_z > 0),
         (SLOPE_TOO_STEEP, np.abs(beta) < RIGHT_ANGLE),
-        (UP_THE_SLOPE, downhill),
-        (BEYOND_FRICTION, friction_share(m_y, m_z, alpha_est)[0] > 0),
+        (UP_THE_SLOPE, _across_slope(m_y, m_z, beta) > 0),
+        (BEYOND_FRICTION, _across_friction(m_y, m_z, alpha_est) > 0),
     )
 
 
-def _require_settings(alpha_est, C, length=1.0):
-    """Raise ValueError for an α_est outside [0°, 90°), or a C or length that is not positive."""
-    require_friction_angle("alpha_est", alpha_est)
-    require_positive("C", C, "N·mm²")
-    require_positive("length", length, "mm")
+def _across_slope(m_y, m_z, beta):
+    """Return m_z cos β + m_y sin β: the moment across a surface of slope β."""
+    return m_z * np.cos(beta) + m_y * np.sin(beta)
+
+
+def _across_friction(m_y, m_z, alpha_est):
+    """Return m_z − μ |m_y| with μ = tan α_est: what friction leaves of the moment of the push."""
+    return m_z - np.tan(alpha_est) * np.abs(m_y)
 
 
 def _distance(value, conditions):
     """Return `value` where it is positive and finite and all conditions hold, NaN elsewhere."""
     value = np.where(np.greater(value, 0) & np.isfinite(value), value, np.nan)
     return where_all(conditions, value)
-
-
-def _centred(samples):
-    """Normalise samples (..., n) to mean 0 and largest magnitude 1; return them and the scale
-    (...).
-    """
-    deviation = samples - samples.mean(axis=-1, keepdims=True)
-    scale = np.abs(deviation).max(axis=-1, keepdims=True)
-    return deviation / scale, scale[..., 0]

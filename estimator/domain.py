@@ -62,29 +62,6 @@ def _plain(result):
     return np.asarray(result).item() if np.ndim(result) == 0 else result
 
 
-def quotient(
-    numerator: Sequence[np.ndarray],
-    denominator: Sequence[np.ndarray],
-    exponent: int | np.ndarray = 0,
-) -> np.ndarray:
-    """Return 2^exponent times the numerator's factors over the denominator's, by way of powers of
-    two.
-
-    Significands and exponents go separate ways: only the result itself can leave the range of
-    float64.
-    """
-    value = 1.0
-    for factor in numerator:
-        significand, power = np.frexp(factor)
-        value = value * significand
-        exponent = exponent + power
-    for factor in denominator:
-        significand, power = np.frexp(factor)
-        value = value / significand
-        exponent = exponent - power
-    return np.ldexp(value, exponent)
-
-
 def require_positive(name: str, value: ArrayLike, unit: str) -> None:
     """Raise ValueError unless every `value` is positive and finite."""
     if not _all(value, lambda x: (x > 0) & (x < np.inf)):

@@ -21,7 +21,6 @@ from estimator.domain import (
     Numbers,
     elementwise,
     first_failure,
-    quotient,
     require_friction_angle,
     require_positive,
     where_all,
@@ -62,10 +61,10 @@ def moments(
     """
     _require_settings(alpha, C)
     phi = slip_angle(beta, alpha)
-    denominator = (d_x, np.cos(_held_angle(beta, alpha)))
-    m_y = quotient((C, theta, np.cos(beta), np.sin(phi)), denominator)
-    m_z = quotient((C, theta, np.cos(beta), np.cos(phi)), denominator)
-    return _inside(d_x, theta, beta, m_y), _inside(d_x, theta, beta, m_z)
+    magnitude = _magnitude(d_x, theta, beta, alpha, C)
+    m_y = _inside(d_x, theta, beta, magnitude * np.sin(phi))
+    m_z = _inside(d_x, theta, beta, magnitude * np.cos(phi))
+    return m_y, m_z
 
 
 @elementwise
@@ -77,9 +76,7 @@ def moment_magnitude(
     Raises ValueError for α outside [0°, 90°) or C ≤ 0.
     """
     _require_settings(alpha, C)
-    denominator = (d_x, np.cos(_held_angle(beta, alpha)))
-    magnitude = quotient((C, theta, np.cos(beta)), denominator)
-    return _inside(d_x, theta, beta, magnitude)
+    return _inside(d_x, theta, beta, _magnitude(d_x, theta, beta, alpha, C))
 
 
 @elementwise
@@ -90,7 +87,7 @@ def slip_distance(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike, alpha: Arra
     """
     require_friction_angle("alpha", alpha)
     phi = slip_angle(beta, alpha)
-    slip = quotient((d_x, theta, np.sin(phi)), (np.cos(_held_angle(beta, alpha)),))
+    slip = d_x * theta * np.sin(phi) / np.cos(_held_angle(beta, alpha))
     return _inside(d_x, theta, beta, slip)
 
 
@@ -108,12 +105,8 @@ def moment_from_deflection(
     """
     require_positive("C", C, "N·mm²")
     inside = (d_x > 0) & np.isfinite(d_x)
-    m_y = quotient((C, d_z), (d_x, d_x))
-    m_z = quotient((C, d_y), (d_x, d_x))
-    return (
-        np.where(inside & np.isfinite(m_y), m_y, np.nan),
-        np.where(inside & np.isfinite(m_z), m_z, np.nan),
-    )
+    per_mm = np.where(inside, C / d_x**2, np.nan)
+    return per_mm * d_z, per_mm * d_y
 
 
 @elementwise
@@ -173,6 +166,11 @@ def _inside(d_x, theta, beta, value):
     """Return the value inside the domain and the range of a float, NaN elsewhere."""
     in_range = ("beyond the range of a float", np.isfinite(value))
     return where_all((*_conditions(d_x, theta, beta), in_range), value)
+
+
+def _magnitude(d_x, theta, beta, alpha, C):
+    """Return (Cθ/d_x) cos β / cos(β − φ), the size of the moment, also outside the domain."""
+    return C * theta / d_x * np.cos(beta) / np.cos(_held_angle(beta, alpha))
 
 
 def _held_angle(beta, alpha):

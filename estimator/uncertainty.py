@@ -29,8 +29,9 @@ _STEEPEST_RAD = RIGHT_ANGLE - 1e-9
 
 def gradient_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> np.ndarray:
     """Compute ∂d_x/∂(θ, m_y, m_z, α_est) of (2): d_x (1/θ, 0, −1/m_z, 0)."""
-    d_x = distance.no_slip(theta, m_z, C)
-    return _stack(d_x, _inverse(theta), 0.0, -_inverse(m_z), 0.0)
+    d_x = np.asarray(distance.no_slip(theta, m_z, C))
+    nothing = 0.0 * d_x
+    return np.stack([d_x / theta, nothing, -d_x / m_z, nothing], axis=-1)
 
 
 def gradient_with_friction(
@@ -41,18 +42,9 @@ def gradient_with_friction(
     ∂ln d_x/∂α_est = −tan(φ + α_est) + tan α_est. At m_y = 0, where |m_y| has a kink, it is the
     derivative of the side m_y > 0.
     """
-    d_x = distance.with_friction(theta, m_y, m_z, alpha_est, C)
-    by_theta, by_y, by_z, by_alpha = _log_gradient(theta, m_y, m_z, alpha_est)
-    return _stack(d_x, by_theta, by_y, by_z, by_alpha)
-
-
-def gradient_frictionless(
-    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, C: ArrayLike
-) -> np.ndarray:
-    """Compute ∂d_x/∂(θ, m_y, m_z, α_est) of (11) and (12); the last one is 0."""
-    d_x = distance.frictionless(theta, m_y, m_z, C)
-    by_theta, by_y, by_z, _ = _log_gradient(theta, m_y, m_z, 0.0)
-    return _stack(d_x, by_theta, by_y, by_z, 0.0)
+    d_x = np.asarray(distance.with_friction(theta, m_y, m_z, alpha_est, C))
+    _, gradient = _linear_in_mu(theta, m_y, m_z, alpha_est, C)
+    return np.where(np.isfinite(d_x)[..., None], gradient, np.nan)
 
 
 def slip_angle_sigma(m_y: float, m_z: float, covariance: np.ndarray) -> float:
@@ -76,36 +68,34 @@ def gradient_printed(
     d_x = (m_z / m) / (m / (C * theta) + taper_per_mm)
     shrink = 1 / (1 + taper_per_mm * C * theta / m)  # of a relative error of Cθ/|m|
     by_m = -(1 + shrink) / m**2
-    return _stack(d_x, shrink / theta, by_m * m_y, by_m * m_z + 1 / m_z, 0.0)
+    relative = [shrink / theta, by_m * m_y, by_m * m_z + 1 / m_z, 0.0 * d_x]
+    return d_x[..., None] * np.stack(np.broadcast_arrays(*relative), axis=-1)
 
 
 def sigma(
     gradient: ArrayLike,
     *,
     theta_sigma: ArrayLike = 0.0,
-    touch_sigma: ArrayLike = 0.0,
     covariance: ArrayLike | None = None,
     alpha_est_sigma: ArrayLike = 0.0,
     theta_moment_covariance: ArrayLike | None = None,
 ) -> Numbers:
     """Compute the standard deviation of d_x, in mm, from its gradient (..., 4).
 
-    theta_sigma: of the motor angle, touch_sigma: of the touch, both in rad; covariance (..., 2, 2)
-    of (m_y, m_z) in (N·mm)²; alpha_est_sigma in rad; theta_moment_covariance (..., 2) of the
-    pushing angle with (m_y, m_z). A negative or infinite sigma raises ValueError.
+    theta_sigma: of the pushing angle, in rad; covariance (..., 2, 2) of (m_y, m_z) in (N·mm)²;
+    alpha_est_sigma in rad; theta_moment_covariance (..., 2) of the pushing angle with (m_y, m_z). A
+    negative or infinite sigma raises ValueError.
 
     >>> gradient = gradient_no_slip(0.05, 9.0, 9000.0)
     >>> sigma(gradient, theta_sigma=0.0005)
     0.5
     """
     require_sigma("theta_sigma", theta_sigma)
-    require_sigma("touch_sigma", touch_sigma)
     require_sigma("alpha_est_sigma", alpha_est_sigma)
     by_theta = gradient[..., 0]
     by_moments = gradient[..., 1:3]
     by_alpha = gradient[..., 3]
-    angle = by_theta**2 * (np.square(theta_sigma) + np.square(touch_sigma))
-    variance = angle + (by_alpha * alpha_est_sigma) ** 2
+    variance = (by_theta * theta_sigma) ** 2 + (by_alpha * alpha_est_sigma) ** 2
     if covariance is not None:
         variance = variance + np.einsum("...i,...ij,...j->...", by_moments, covariance, by_moments)
     if theta_moment_covariance is not None:
@@ -139,7 +129,7 @@ def interval_with_friction(
     require_sigma("alpha_est_sigma", alpha_est_sigma)
     require_friction_angle("alpha_est", alpha_est)
     require_positive("C", C, "N·mm²")
-    middle, gradient = _through_zero(theta, m_y, m_z, alpha_est, C)
+    middle, gradient = _linear_in_mu(theta, m_y, m_z, alpha_est, C)
     rest = Z_95 * np.hypot(sigma(gradient, **sigmas), model_sigma * middle)
     half = Z_95 * np.asarray(alpha_est_sigma)
     least, most = _at_alpha_ends(theta, m_y, m_z, alpha_est, C, half)
@@ -153,8 +143,8 @@ def _at_alpha_ends(theta, m_y, m_z, alpha_est, C, half):
     """Compute (10), mm, at the steep and at the flat end of α_est's interval, α_est ± half, rad."""
     steep = np.clip(alpha_est + half, 0.0, _STEEPEST_RAD)
     flat = np.clip(alpha_est - half, 0.0, _STEEPEST_RAD)
-    least, _ = _through_zero(theta, m_y, m_z, steep, C)
-    most, _ = _through_zero(theta, m_y, m_z, flat, C)
+    least, _ = _linear_in_mu(theta, m_y, m_z, steep, C)
+    most, _ = _linear_in_mu(theta, m_y, m_z, flat, C)
     return least, most
 
 
@@ -205,8 +195,10 @@ def _upper_side(change, rest, alpha_est, half):
 
 
 @elementwise
-def _through_zero(theta, m_y, m_z, alpha_est, C):
-    """Compute (10) and its gradient (..., 4), negative where φ + α_est passes 90°."""
+def _linear_in_mu(theta, m_y, m_z, alpha_est, C):
+    """Compute (10) and its gradient (..., 4) from the formula alone, linear in μ_est: below zero where φ + α_est
+    passes 90°.
+    """
     mu = np.copysign(np.tan(alpha_est), m_y)
     square = m_z * m_z + m_y * m_y
     scale = C * theta / square
@@ -219,31 +211,6 @@ def _through_zero(theta, m_y, m_z, alpha_est, C):
 
 
 @elementwise
-def _inverse(x):
-    """Return 1/x, infinite at zero without a warning."""
-    return 1 / x
-
-
-@elementwise
 def _root(variance):
     """Return the standard deviation of a variance, which rounding may have made negative."""
     return np.sqrt(np.maximum(variance, 0.0))
-
-
-@elementwise
-def _log_gradient(theta, m_y, m_z, alpha_est):
-    """Compute ∂ln d_x/∂(θ, m_y, m_z, α_est) of (10)."""
-    mu = np.copysign(np.tan(alpha_est), m_y)
-    share = m_z - mu * m_y
-    square = m_z * m_z + m_y * m_y
-    by_y = -mu / share - 2 * m_y / square
-    by_z = 1 / share - 2 * m_z / square
-    by_alpha = -np.abs(m_y) / (share * np.cos(alpha_est) ** 2)
-    return 1 / theta, by_y, by_z, by_alpha
-
-
-def _stack(d_x, by_theta, by_y, by_z, by_alpha):
-    """Return the gradient (..., 4) of d_x from that of its logarithm."""
-    with np.errstate(all="ignore"):
-        _, *parts = np.broadcast_arrays(d_x, by_theta, by_y, by_z, by_alpha)
-        return np.stack(parts, axis=-1) * np.asarray(d_x)[..., None]

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from estimator import distance, slip
+from estimator.beam import Beam
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -21,6 +22,18 @@ distances = st.floats(1e-3, 1e4)
 pushes = st.floats(1e-9, 0.35)
 rigidities = st.floats(1e-3, 1e6)
 anything = st.floats(allow_nan=True, allow_infinity=True)
+
+
+def cone_distance(theta, m_y, m_z, alpha_est, C, length):
+    """Return d_x of a cone by (10) for its base's cylinder."""
+    as_cylinder = distance.with_friction(theta, m_y, m_z, alpha_est, C)
+    return Beam(C, length, "cone").distance_mm(as_cylinder)
+
+
+def cone_without_slip(C, length):
+    """Return ν of (17)."""
+    beam = Beam(C, length, "cone")
+    return lambda theta, m: beam.distance_mm(C * theta / m)
 
 
 def inversion_tolerance(beta, phi):
@@ -57,7 +70,6 @@ def test_without_slip_every_equation_gives_the_distance(d_x, theta, beta, alpha,
         distance.no_slip(theta, m_z, C),
         distance.with_friction(theta, m_y, m_z, alpha_est, C),
         distance.frictionless(theta, m_y, m_z, C),
-        distance.frictionless_sum(theta, m_y, m_z, C),
     ):
         assert found == pytest.approx(d_x, rel=8 * EPSILON)
 
@@ -67,13 +79,10 @@ def test_frictionless_surface_by_11_and_12(d_x, theta, beta, C):
     m_y, m_z = slip.moments(d_x, theta, beta, 0.0, C)
     tolerance = inversion_tolerance(beta, beta)
     assert distance.frictionless(theta, m_y, m_z, C) == pytest.approx(d_x, rel=tolerance)
-    assert distance.frictionless_sum(theta, m_y, m_z, C) == distance.frictionless(
-        theta, m_y, m_z, C
-    )
     assert distance.felt_slip_angle(m_y, m_z) == pytest.approx(beta, rel=8 * EPSILON)
 
 
-@given(pushes, slopes, st.floats(0.0, 0.3), rigidities, st.integers(-900, 900))
+@given(pushes, slopes, st.floats(0.0, 0.3), rigidities, st.integers(-400, 400))
 def test_scale_invariance(theta, phi, alpha_est, C, power):
     """d_x follows C, and moments against it, exactly: powers of two do not round."""
     assume(abs(phi) + alpha_est < 1.5)
@@ -83,8 +92,8 @@ def test_scale_invariance(theta, phi, alpha_est, C, power):
     assert distance.with_friction(theta, m_y * scale, m_z * scale, alpha_est, C * scale) == d_x
     assert distance.with_friction(theta, m_y, m_z, alpha_est, C * scale) == d_x * scale
     length = 3 * d_x
-    cone = distance.cone(theta, m_y, m_z, alpha_est, C, length)
-    assert distance.cone(theta, m_y, m_z, alpha_est, C * scale, length * scale) == cone * scale
+    cone = cone_distance(theta, m_y, m_z, alpha_est, C, length)
+    assert cone_distance(theta, m_y, m_z, alpha_est, C * scale, length * scale) == cone * scale
 
 
 @pytest.mark.parametrize("m_y", [0.0, 5e-324, 1e-320, 1e-300, 1e-16])
@@ -128,11 +137,7 @@ def test_every_distance_is_positive_and_finite_or_nan(theta, m_y, m_z, beta, C, 
             distance.no_slip(theta, m_z, C),
             distance.known_slope(theta, m_y, m_z, beta, C),
             distance.frictionless(theta, m_y, m_z, C),
-            distance.cone_no_slip(theta, m_z, C, length),
-            distance.cone(theta, m_y, m_z, 0.2, C, length),
-            distance.cone_printed(theta, m_y, m_z, C, length),
             distance.from_compliance(theta, C),
-            distance.taper(theta, length),
             *distance.clamp_to_length([theta], length)[:1],
         ]
         reason = distance.why_not(theta, m_y, m_z, beta=beta, C=C)
@@ -180,7 +185,6 @@ def test_impossible_alpha_est_is_refused_with_name_and_range(alpha_est):
     [
         lambda bad: distance.no_slip(0.05, 1.0, bad),
         lambda bad: distance.known_slope(0.05, 0.1, 1.0, 0.2, bad),
-        lambda bad: distance.cone(0.05, 0.1, 1.0, 0.2, 1.0, bad),
         lambda bad: distance.clamp_to_length(50.0, bad),
     ],
 )
@@ -188,12 +192,6 @@ def test_impossible_alpha_est_is_refused_with_name_and_range(alpha_est):
 def test_impossible_settings_are_refused(call, bad):
     with pytest.raises(ValueError, match="must be positive and finite"):
         call(bad)
-
-
-def test_negative_friction_coefficient_is_refused():
-    assert distance.friction_angle(0.18) == pytest.approx(np.radians(10.2), abs=2e-4)
-    with pytest.raises(ValueError, match=r"mu = -0\.1"):
-        distance.friction_angle(-0.1)
 
 
 # ---- (1): compliance
@@ -246,9 +244,10 @@ def cone_moments(d_x, theta, beta, alpha, C, length):
 def test_cone_against_the_bending_integral(d_x, beta, alpha):
     """quad is good to 1e-12, and the cone's tip magnifies that by L / (L − d_x) = 20 at most."""
     m_y, m_z = cone_moments(d_x, 0.02, beta, alpha, 9000.0, 100.0)
-    assert distance.cone(0.02, m_y, m_z, alpha, 9000.0, 100.0) == pytest.approx(d_x, rel=1e-10)
+    found = cone_distance(0.02, m_y, m_z, alpha, 9000.0, 100.0)
+    assert found == pytest.approx(d_x, rel=1e-10)
     if beta <= alpha:
-        assert distance.cone_no_slip(0.02, m_z, 9000.0, 100.0) == pytest.approx(d_x, rel=1e-10)
+        assert cone_without_slip(9000.0, 100.0)(0.02, m_z) == pytest.approx(d_x, rel=1e-10)
 
 
 def test_general_form_with_the_cylinder_is_10_and_with_the_cone_is_its_own():
@@ -257,20 +256,16 @@ def test_general_form_with_the_cylinder_is_10_and_with_the_cone_is_its_own():
     np.testing.assert_allclose(
         cylinder, distance.with_friction(*arguments, 9000.0), rtol=8 * EPSILON
     )
-    cone = distance.general(
-        *arguments, lambda theta, m: distance.cone_no_slip(theta, m, 9000.0, 100.0)
-    )
-    np.testing.assert_allclose(cone, distance.cone(*arguments, 9000.0, 100.0), rtol=8 * EPSILON)
+    cone = distance.general(*arguments, cone_without_slip(9000.0, 100.0))
+    np.testing.assert_allclose(cone, cone_distance(*arguments, 9000.0, 100.0), rtol=8 * EPSILON)
 
 
 def test_general_form_as_printed_is_17_on_a_cone_and_12_on_a_cylinder():
-    moments = (0.05, [0.0, 1.0, -2.0], 3.0)
-    cone = distance.general_printed(
-        *moments, lambda theta, m: distance.cone_no_slip(theta, m, 9000.0, 100.0)
-    )
-    np.testing.assert_allclose(
-        cone, distance.cone_printed(*moments, 9000.0, 100.0), rtol=8 * EPSILON
-    )
+    moments = (0.05, np.array([0.0, 1.0, -2.0]), 3.0)
+    cone = distance.general_printed(*moments, cone_without_slip(9000.0, 100.0))
+    m = np.hypot(moments[1], 3.0)
+    printed = 9000.0 * 0.05 * 100.0 / (9000.0 * 0.05 + m * 100.0) * (3.0 / m)
+    np.testing.assert_allclose(cone, printed, rtol=8 * EPSILON)
     cylinder = distance.general_printed(
         *moments, lambda theta, m: distance.no_slip(theta, m, 9000.0)
     )
@@ -279,15 +274,8 @@ def test_general_form_as_printed_is_17_on_a_cone_and_12_on_a_cylinder():
 
 @given(pushes, st.floats(-1.2, 1.2), st.floats(0.0, 0.3), rigidities, st.floats(1.0, 1e3))
 def test_cone_never_reaches_beyond_its_tip(theta, phi, alpha_est, C, length):
-    d_x = distance.cone(theta, 1e-3 * np.sin(phi), 1e-3 * np.cos(phi), alpha_est, C, length)
+    d_x = cone_distance(theta, 1e-3 * np.sin(phi), 1e-3 * np.cos(phi), alpha_est, C, length)
     assert 0 < d_x <= length
-
-
-def test_taper_turns_a_cylinders_distance_into_a_cones():
-    d_x = distance.with_friction(0.05, 1.0, 3.0, 0.18, 9000.0)
-    assert distance.taper(d_x, 100.0) == pytest.approx(
-        distance.cone(0.05, 1.0, 3.0, 0.18, 9000.0, 100.0), rel=1e-15
-    )
 
 
 # ---- section VII: the tip, section II: the contact point

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from estimator import curvature, distance
+from estimator.beam import Beam
 
 TEXT = (Path(__file__).parents[2] / "docs" / "equations.md").read_text()
 
@@ -32,6 +33,10 @@ def test_every_named_function_exists():
         assert callable(getattr(importlib.import_module(module), name))
 
 
+def _cone_without_slip(theta, m):
+    return Beam(9000.0, 100.0, "cone").distance_mm(9000.0 * theta / m)
+
+
 def test_table_of_17():
     """A cone's moment without slip is Cθ (1/d_x − 1/L); slip leaves cos β / cos α of θ."""
     for alpha, beta, d_x, printed, scaled in table_after("## How far (17)"):
@@ -44,10 +49,10 @@ def test_table_of_17():
             * (1 / d_x - 1 / 100)
         )
         moments = (theta, m * np.sin(phi), m * np.cos(phi))
-        assert distance.cone_printed(*moments, 9000.0, 100.0) == pytest.approx(printed, abs=0.05)
-        assert distance.cone(*moments, np.radians(alpha), 9000.0, 100.0) == pytest.approx(
-            scaled, abs=0.05
-        )
+        found = distance.general_printed(*moments, _cone_without_slip)
+        assert found == pytest.approx(printed, abs=0.05)
+        found = distance.general(*moments, np.radians(alpha), _cone_without_slip)
+        assert found == pytest.approx(scaled, abs=0.05)
 
 
 def test_table_of_appendix_b():

@@ -6,7 +6,6 @@ Only the friction angles of Fig. 8 are not here: they come from data alone.
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from estimator import distance, slip
 from estimator.curvature import deflection, deflection_printed, distance_error, slope_threshold
@@ -41,11 +40,6 @@ def test_section_4a_error_of_10_with_a_wrong_friction_angle(
     assert abs(found) == pytest.approx(printed_percent, abs=0.55)
     closed_form = 100 * distance_error(angle(beta), angle(alpha), angle(alpha_est))
     assert closed_form == pytest.approx(found, abs=1e-10)
-
-
-def test_section_7_friction_coefficient_of_smooth_surfaces():
-    """μ_est = 0.18 is given as α_est = 10°: 10.2°, to whole degrees."""
-    assert np.degrees(distance.friction_angle(0.18)) == pytest.approx(10, abs=0.5)
 
 
 # ---- section IV-B and Fig. 6: curvature. The recomputed slopes are the first of a grid of 0.05° or 0.1° beyond the
@@ -84,29 +78,6 @@ def test_section_4b_curved_surface_with_friction_of_20_degrees(
         slope_threshold(error, angle(20), angle(20), r_n=1.0, theta=angle(theta), printed=printed)
     )
     assert 0 <= recomputed_deg - found <= 0.1
-
-
-# ---- section VII, (17): the cone of L = 100 mm at θ = 1°
-
-
-def cone_moments(d_x, theta, beta, alpha, C, length):
-    """Moments of a slipping cone, from the integral over its curvature."""
-    phi = max(0.0, beta - alpha)
-    give, _ = quad(lambda s: (d_x - s) ** 2 / (C / 3 * (1 - s / length) ** 4), 0, d_x, epsrel=1e-12)
-    force = d_x * theta * np.cos(beta) / np.cos(beta - phi) / give
-    return force * d_x * np.sin(phi), force * d_x * np.cos(phi)
-
-
-@pytest.mark.parametrize(
-    "alpha, beta, d_x, printed_mm",
-    [(0, 30, 60, 54.9), (0, 60, 30, 23.1), (0, 60, 80, 44.4), (10.5, 60, 80, 57.6)],
-)
-def test_equation_17_as_printed_and_with_the_angle_scaled(alpha, beta, d_x, printed_mm):
-    """The table's cone is exact (large deflections); at θ = 1° small deflections give the same to 0.05 mm."""
-    theta, C, length = angle(1), 9000.0, 100.0
-    m_y, m_z = cone_moments(d_x, theta, angle(beta), angle(alpha), C, length)
-    assert distance.cone_printed(theta, m_y, m_z, C, length) == pytest.approx(printed_mm, abs=0.05)
-    assert distance.cone(theta, m_y, m_z, angle(alpha), C, length) == pytest.approx(d_x, abs=0.005)
 
 
 # ---- Appendix B: as printed it loses all digits near r_n = 1e8

@@ -60,7 +60,7 @@ def test_sigma_of_the_distance_covers_its_scatter(stroke, name):
         C = size * np.degrees(1)
         sigma = uncertainty.sigma(
             uncertainty.gradient_no_slip(THETA, across @ at.values, C),
-            touch_sigma=touch.sigma_rad,
+            theta_sigma=touch.sigma_rad,
             covariance=np.diag([0.0, across @ at.covariance @ across]),
             theta_moment_covariance=[0.0, across @ at.theta_covariance],
         )

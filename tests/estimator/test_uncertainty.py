@@ -25,10 +25,6 @@ def cases():
             lambda t, y, z, a: distance.with_friction(t, y, z, a, C),
             lambda t, y, z, a: uncertainty.gradient_with_friction(t, y, z, a, C),
         ),
-        "frictionless": (
-            lambda t, y, z, a: distance.frictionless(t, y, z, C),
-            lambda t, y, z, a: uncertainty.gradient_frictionless(t, y, z, C),
-        ),
     }
 
 
@@ -62,7 +58,7 @@ def test_sensitivities_of_10_in_the_closed_forms(theta, phi, alpha_est):
 
 
 @pytest.mark.parametrize("beta_deg", [0.0, 20.0, 45.0, 70.0])
-@pytest.mark.parametrize("equation", ["no_slip", "with_friction", "frictionless"])
+@pytest.mark.parametrize("equation", ["no_slip", "with_friction"])
 def test_predicted_sigma_is_the_sampled_scatter(equation, beta_deg):
     """20000 draws give a scatter good to 1/√40000 = 0.5 %; 0.3 % noise leaves curvature below 1 %; 4 · 0.5 % is 2 %.
 
@@ -73,15 +69,14 @@ def test_predicted_sigma_is_the_sampled_scatter(equation, beta_deg):
     rng = np.random.default_rng(42)
     m_y, m_z = slip.moments(60.0, THETA, np.radians(beta_deg), ALPHA, C)
     covariance = (0.003 * np.hypot(m_y, m_z)) ** 2 * np.array([[1.0, 0.4], [0.4, 0.5]])
-    theta_sigma, touch_sigma, alpha_sigma = 1e-4, 1.5e-4, 0.002
+    theta_sigma, alpha_sigma = 1.8e-4, 0.002
     y, z = rng.multivariate_normal([m_y, m_z], covariance, 20000).T
-    theta = THETA + np.hypot(theta_sigma, touch_sigma) * rng.normal(size=20000)
+    theta = THETA + theta_sigma * rng.normal(size=20000)
     alpha = ALPHA + alpha_sigma * rng.normal(size=20000)
     of, gradient = cases()[equation]
     predicted = uncertainty.sigma(
         gradient(THETA, m_y, m_z, ALPHA),
         theta_sigma=theta_sigma,
-        touch_sigma=touch_sigma,
         covariance=covariance,
         alpha_est_sigma=alpha_sigma,
     )
@@ -93,7 +88,7 @@ def test_error_shared_by_angle_and_moment_cancels():
     m_z, offset_sigma = 8.0, 0.05
     rise = m_z / THETA
     sigmas = {
-        "touch_sigma": offset_sigma / rise,
+        "theta_sigma": offset_sigma / rise,
         "covariance": np.diag([0.0, offset_sigma**2]),
         "theta_moment_covariance": [0.0, offset_sigma**2 / rise],
     }
@@ -115,7 +110,7 @@ def test_wrong_modulus_changes_no_distance_where_the_gauges_were_found_with_it()
         d_x = distance.with_friction(THETA, m_y, m_z, ALPHA, stiffness)
         sigma = uncertainty.sigma(
             uncertainty.gradient_with_friction(THETA, m_y, m_z, ALPHA, stiffness),
-            touch_sigma=1e-4,
+            theta_sigma=1e-4,
             covariance=(0.002 * factor) ** 2 * np.eye(2),
         )
         found.append((d_x, sigma))
@@ -132,11 +127,11 @@ def test_friction_doubt_counts_even_where_no_slip_was_felt():
 
 def test_no_distance_has_no_sigma():
     gradient = uncertainty.gradient_with_friction(THETA, 9.0, 1.0, ALPHA, C)
-    assert np.isnan(uncertainty.sigma(gradient, touch_sigma=1e-4))
+    assert np.isnan(uncertainty.sigma(gradient, theta_sigma=1e-4))
 
 
 def test_arrays_broadcast():
-    sigmas = {"touch_sigma": 1e-4, "covariance": np.eye(2) * 1e-4}
+    sigmas = {"theta_sigma": 1e-4, "covariance": np.eye(2) * 1e-4}
     gradient = uncertainty.gradient_with_friction(THETA, np.array([0.0, 1.0, 2.0]), 7.0, ALPHA, C)
     found = uncertainty.sigma(gradient, **sigmas)
     assert found.shape == (3,)
@@ -145,8 +140,8 @@ def test_arrays_broadcast():
 
 
 def test_negative_sigma_is_refused_with_its_name():
-    with pytest.raises(ValueError, match="touch_sigma = -1"):
-        uncertainty.sigma(uncertainty.gradient_no_slip(THETA, 7.0, C), touch_sigma=-1.0)
+    with pytest.raises(ValueError, match="theta_sigma = -1"):
+        uncertainty.sigma(uncertainty.gradient_no_slip(THETA, 7.0, C), theta_sigma=-1.0)
 
 
 @pytest.mark.parametrize("alpha_deg", [0.0, 2.0, 10.5])

@@ -80,24 +80,6 @@ def pushed(rng):
     return (theta_of(rng), *moments_of(rng, alpha), alpha, rigidity(rng))
 
 
-def any_float(rng):
-    """Any positive float, subnormal ones too."""
-    return float(np.ldexp(rng.uniform(1, 2), int(rng.integers(-1070, 1000))))
-
-
-def far_out(rng):
-    """Moments from anywhere in float64, with a C that brings the distance back to where it is a float."""
-    z, alpha = any_float(rng), angle_of(rng, 89.0)
-    y = min(any_float(rng), 0.5 * z / max(np.tan(alpha), 1.0))
-    C = float(np.clip(z * log_uniform(rng, 1e-3, 1e3), 1e-300, 1e300))
-    return theta_of(rng), float(y), z, alpha, C
-
-
-def contact_far_out(rng):
-    beta, alpha = slope_and_friction(rng)
-    return any_float(rng), theta_of(rng), beta, alpha, any_float(rng)
-
-
 def deflected(rng):
     d_x, theta = log_uniform(rng, 1e-3, 1e4), theta_of(rng)
     return (

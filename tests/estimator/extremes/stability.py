@@ -23,14 +23,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from estimator import compliance, curvature, distance, slip
+from estimator.beam import Beam
 from tests.estimator.extremes.draws import (
     angle_of,
     beta_of,
     contact,
-    contact_far_out,
     curved,
     deflected,
-    far_out,
     log_uniform,
     moments_of,
     pushed,
@@ -79,8 +78,9 @@ def _with_settings(draw, *more):
     return lambda rng: (*draw(rng), *(extra(rng) for extra in more))
 
 
-def _cone_nu(theta, m, C, length):
-    return C * theta * length / (C * theta + m * length)
+def _cone_without_slip(C, length):
+    beam = Beam(C, length, "cone")
+    return lambda theta, m: beam.distance_mm(C * theta / m)
 
 
 CASES = [
@@ -133,11 +133,9 @@ CASES = [
         lambda rng: (lambda alpha: (*moments_of(rng, alpha), alpha))(angle_of(rng, 89.0)),
     ),
     Case("with_friction (10)", distance.with_friction, assumed_friction, pushed),
-    Case("with_friction (10), any float", distance.with_friction, assumed_friction, far_out),
-    Case("m_z (13), any float", _nth(slip.moments, 1), m_z, contact_far_out),
     Case(
-        "frictionless_sum (11)",
-        distance.frictionless_sum,
+        "frictionless (11)",
+        distance.frictionless,
         lambda theta, y, z, C: C * theta / (z + y**2 / z),
         lambda rng: (theta_of(rng), *moments_of(rng), rigidity(rng)),
     ),
@@ -150,15 +148,24 @@ CASES = [
     Case(
         "general (16) on a cone",
         lambda theta, y, z, alpha, C, length: distance.general(
-            theta, y, z, alpha, lambda t, m: distance.cone_no_slip(t, m, C, length)
+            theta, y, z, alpha, _cone_without_slip(C, length)
         ),
         cone,
         _with_settings(pushed, rigidity),
     ),
-    Case("cone (17), scaled angle", distance.cone, cone, _with_settings(pushed, rigidity)),
+    Case(
+        "cone (17), by (10)",
+        lambda theta, y, z, alpha, C, length: Beam(C, length, "cone").distance_mm(
+            distance.with_friction(theta, y, z, alpha, C)
+        ),
+        cone,
+        _with_settings(pushed, rigidity),
+    ),
     Case(
         "cone (17) as printed",
-        distance.cone_printed,
+        lambda theta, y, z, C, length: distance.general_printed(
+            theta, y, z, _cone_without_slip(C, length)
+        ),
         cone_printed,
         lambda rng: (theta_of(rng), *moments_of(rng), rigidity(rng), rigidity(rng)),
     ),
