@@ -20,7 +20,6 @@ import numpy as np
 
 from estimator import distance, first_order
 from estimator.beam import Beam
-from estimator.contact_state import felt_covariance
 from estimator.numerics import central_differences
 from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
@@ -155,8 +154,8 @@ def _sigmas(felt: np.ndarray, covariance: np.ndarray, beam: Beam) -> np.ndarray:
 def _covariance(there: Whisk, back: Whisk, shared) -> np.ndarray:
     """Assemble the covariance (6, 6) of (θ, m_y, m_z) there and back."""
     covariance = np.zeros((6, 6))
-    covariance[:3, :3] = felt_covariance(there)
-    covariance[3:, 3:] = felt_covariance(back)
+    covariance[:3, :3] = there.felt_covariance
+    covariance[3:, 3:] = back.felt_covariance
     if shared is not None:
         covariance[1:3, 4:6] = shared[0].T @ shared[1]
         covariance[4:6, 1:3] = covariance[1:3, 4:6].T

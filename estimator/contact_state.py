@@ -95,7 +95,7 @@ class _DistanceError:
     def of(cls, whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> "_DistanceError":
         """Assemble the errors of an estimate; that of α_est is independent of the others."""
         covariance = np.zeros((4, 4))
-        covariance[:3, :3] = felt_covariance(whisk)
+        covariance[:3, :3] = whisk.felt_covariance
         covariance[3, 3] = alpha_sigma**2
         gradient = np.zeros(4)
         if estimate.gradient is not None:
@@ -119,16 +119,6 @@ def _with_own_deflection(contact: Contact, estimate: Estimate) -> Contact:
     d_y, d_z = estimate.deflection_mm
     d_y_sigma, d_z_sigma = estimate.deflection_sigma_mm
     return replace(contact, d_y_mm=d_y, d_z_mm=d_z, d_y_sigma_mm=d_y_sigma, d_z_sigma_mm=d_z_sigma)
-
-
-def felt_covariance(whisk: Whisk) -> np.ndarray:
-    """Assemble the covariance (3, 3) of θ, m_y and m_z at the pushing angle."""
-    covariance = np.zeros((3, 3))
-    covariance[0, 0] = whisk.theta_sigma_rad**2
-    covariance[1:, 1:] = whisk.covariance_at
-    covariance[0, 1:] = whisk.theta_moment_covariance_at
-    covariance[1:, 0] = whisk.theta_moment_covariance_at
-    return covariance
 
 
 def _quantities(d_x: float, inputs: np.ndarray, beam: Beam) -> np.ndarray:

@@ -22,8 +22,6 @@ from estimator.domain import (
 )
 from estimator.reasons import NamedReason
 
-# What a fit may take as its observations: (13) and (14), or |m|² alone.
-READINGS = ("moments", "magnitude")
 # [1] Two sums of squares are the same but for rounding if they differ by less than this share of
 # the data's own.
 _ROUNDING = 1e-14
@@ -91,12 +89,10 @@ class Pushes:
         require_positive("theta", self.theta, "rad")
 
 
-def fit_alpha(pushes: Pushes, *, reading: str = "moments") -> FrictionFit:
-    """Fit the friction cone angle to moments over slopes, as in Fig. 8.
+def fit_alpha(pushes: Pushes) -> FrictionFit:
+    """Fit the friction cone angle to moments over slopes by (13) and (14), as in Fig. 8.
 
-    reading: "moments" takes the residuals of (13) and (14); "magnitude" those of |m|² alone, the
-    other reading of the paper's "LMS fits on the sum of the squares of (13) and (14)". All points
-    weigh alike, as in the paper.
+    All points weigh alike, as in the paper.
 
     With the moments' own sigmas the interval is that of the normal distribution. Without them the
     sigma comes from each residual's square and leverage, so that it also holds for noise that grows
@@ -104,20 +100,18 @@ def fit_alpha(pushes: Pushes, *, reading: str = "moments") -> FrictionFit:
     short. The points of a recording count as one in it. Raises ValueError where a moment or slope
     is NaN, or their numbers differ.
     """
-    if reading not in READINGS:
-        raise ValueError(f"reading = {reading!r}: must be one of {', '.join(READINGS)}")
-    beta, data, scale = _observations(pushes, reading)
-    alpha = _least_squares(beta, data, scale, reading)
-    residuals = data - _model(alpha, beta, scale, reading)
-    slopes = _derivative(alpha, beta, scale, reading)
+    beta, data, scale = _observations(pushes)
+    alpha = _least_squares(beta, data, scale)
+    residuals = data - _model(alpha, beta, scale)
+    slopes = _derivative(alpha, beta, scale)
     if pushes.sigma_y is None or pushes.sigma_z is None:
         sigma, freedom = _sigma_of_residuals(residuals, slopes, pushes.recording)
     else:
-        sigma = _sigma_of_data(pushes, slopes, reading)
+        sigma = _sigma_of_data(pushes, slopes)
         freedom = np.inf
     no_more = (residuals**2).sum(axis=-1) + _ROUNDING * (data**2).sum(axis=-1)
-    never_slipped = _cost(np.abs(beta).max(), beta, data, scale, reading) <= no_more
-    at_zero = _cost(0.0, beta, data, scale, reading) <= no_more
+    never_slipped = _cost(np.abs(beta).max(), beta, data, scale) <= no_more
+    at_zero = _cost(0.0, beta, data, scale) <= no_more
     return _fit(alpha, sigma, freedom, residuals, never_slipped, at_zero)
 
 
@@ -128,8 +122,8 @@ def curves(
     return slip.moment_magnitude(d_x, theta, beta, alpha, C), slip.slip_angle(beta, alpha)
 
 
-def _observations(pushes, reading):
-    """Return slopes (n,), data (..., n) or (..., 2n), and Cθ/d_x (n,).
+def _observations(pushes):
+    """Return slopes (n,), the moments m_y then m_z (..., 2n), and Cθ/d_x (n,).
 
     Raises ValueError for a number that is missing, and for slopes and moments that are not one to
     one.
@@ -144,24 +138,19 @@ def _observations(pushes, reading):
         )
     if not (np.isfinite(moments).all() and np.isfinite(beta).all()):
         raise ValueError("a moment or slope is missing or infinite: leave such points out")
-    if reading == "moments":
-        return beta, moments, scale
-    count = beta.size
-    return beta, moments[..., :count] ** 2 + moments[..., count:] ** 2, scale
+    return beta, moments, scale
 
 
-def _model(alpha, beta, scale, reading):
-    """Predict the observations (..., n) or (..., 2n) for friction angles (...)."""
+def _model(alpha, beta, scale):
+    """Predict the moments (..., 2n) for friction angles (...)."""
     alpha = np.asarray(alpha)[..., None]
     held = np.minimum(np.abs(beta), alpha)
     phi = np.copysign(np.abs(beta) - held, beta)
     magnitude = scale * np.cos(beta) / np.cos(held)
-    if reading == "magnitude":
-        return magnitude**2
     return np.concatenate([magnitude * np.sin(phi), magnitude * np.cos(phi)], axis=-1)
 
 
-def _derivative(alpha, beta, scale, reading):
+def _derivative(alpha, beta, scale):
     """Differentiate `_model` by α; 0 without slip, and where a slope is α itself.
 
     With slip it is (Cθ/d_x)/cos²α times −cos²β for m_y, and times sin β cos β for m_z.
@@ -170,74 +159,59 @@ def _derivative(alpha, beta, scale, reading):
     steepness = np.abs(beta)
     sliding = scale * np.cos(beta) / np.cos(alpha) ** 2
     share = np.where(steepness > alpha, sliding, 0.0)
-    if reading == "magnitude":
-        return 2 * share * scale * np.cos(beta) * np.tan(alpha)
     of_m_y = -np.sign(beta) * share * np.cos(beta)
     of_m_z = share * np.sin(steepness)
     return np.concatenate([of_m_y, of_m_z], axis=-1)
 
 
-def _cost(alpha, beta, data, scale, reading):
+def _cost(alpha, beta, data, scale):
     """Compute the residuals' sum of squares (...) at the friction angles α."""
-    residuals = data - _model(alpha, beta, scale, reading)
+    residuals = data - _model(alpha, beta, scale)
     return (residuals**2).sum(axis=-1)
 
 
-def _least_squares(beta, data, scale, reading):
+def _least_squares(beta, data, scale):
     """Find the global minimum over α.
 
-    Points that slip are predicted linearly in u = tan α (in tan²α where |m|² is read), points that
-    hold by a constant: between two neighbouring slopes the sum of squares is a parabola of u.
+    Points that slip are predicted linearly in tan α, points that hold by a constant: between two
+    neighbouring slopes the sum of squares is a parabola of tan α.
     """
     order = np.argsort(np.abs(beta))
     beta = beta[order]
-    data = data.reshape(*data.shape[:-1], -1, len(beta))[..., order]  # (..., 1 or 2, n)
-    squares, cross, curvature = _parabolas(beta, data, scale[order], reading)
+    data = data.reshape(*data.shape[:-1], 2, len(beta))[..., order]
+    squares, cross, curvature = _parabolas(beta, data, scale[order])
     bounds = np.concatenate([[0.0], np.abs(beta)])  # of the segments, rad
-    low = _u_of(bounds[:-1], reading)
-    high = _u_of(bounds[1:], reading)
+    tangents = np.where(bounds < np.pi / 2, np.tan(bounds), np.inf)
+    low = tangents[:-1]
+    high = tangents[1:]
     vertex = np.divide(cross, curvature, out=low + np.zeros(cross.shape), where=curvature > 0)
-    u = np.clip(vertex, low, high)
-    cost = squares - 2 * u * cross + u**2 * curvature
+    mu = np.clip(vertex, low, high)
+    cost = squares - 2 * mu * cross + mu**2 * curvature
     best = np.argmin(cost, axis=-1)
-    least = np.take_along_axis(u, best[..., None], axis=-1)[..., 0]
-    alpha = np.arctan(np.sqrt(least) if reading == "magnitude" else least)
+    least = np.take_along_axis(mu, best[..., None], axis=-1)[..., 0]
     # At a bound α is that slope itself: whether its point slips is then no matter of rounding.
-    alpha = np.where(least >= high[best], bounds[best + 1], alpha)
+    alpha = np.where(least >= high[best], bounds[best + 1], np.arctan(least))
     return np.where(least <= low[best], bounds[best], alpha)
 
 
-def _parabolas(beta, data, scale, reading):
-    """Return the sum of squares of each segment, squares − 2 cross·u + curvature·u².
+def _parabolas(beta, data, scale):
+    """Return the sum of squares of each segment as squares − 2 cross·tan α + curvature·tan²α, (..., n) each.
 
     In the segment below a slope, its point and those of all steeper ones slip; the others hold. The
-    slopes (n,) are in order, data are (..., 1 or 2, n); each of the three is (..., n).
+    slopes (n,) are in order, data (..., 2, n) are m_y and m_z. By (13) and (14) the moments of points
+    that slip are start + rate·tan α.
     """
-    start, rate = _when_slipping(beta, scale, reading)
+    sliding = scale * np.cos(beta)
+    start = np.stack([sliding * np.sin(beta), sliding * np.cos(beta)])
+    rate = np.stack([-np.sign(beta) * sliding * np.cos(beta), sliding * np.sin(np.abs(beta))])
     residual = data - start
-    held = _model(np.pi / 2, beta, scale, reading).reshape(-1, len(beta))
+    held = np.stack([0.0 * scale, scale * np.ones(len(beta))])
     held_squares = ((data - held) ** 2).sum(axis=-2)
     held_before = np.cumsum(held_squares, axis=-1) - held_squares
     squares = _sum_from_here((residual**2).sum(axis=-2)) + held_before
     cross = _sum_from_here((residual * rate).sum(axis=-2))
     curvature = _sum_from_here((rate**2).sum(axis=-2))
     return squares, cross, curvature
-
-
-def _when_slipping(beta, scale, reading):
-    """Return (start, rate), each (1 or 2, n): points that slip are predicted as start + rate·u."""
-    sliding = scale * np.cos(beta)
-    if reading == "magnitude":
-        return sliding[None] ** 2, sliding[None] ** 2
-    start = np.stack([sliding * np.sin(beta), sliding * np.cos(beta)])
-    rate = np.stack([-np.sign(beta) * sliding * np.cos(beta), sliding * np.sin(np.abs(beta))])
-    return start, rate
-
-
-def _u_of(alpha, reading):
-    """Return tan α, or tan²α where |m|² is read; infinite from a right angle on."""
-    tangent = np.where(alpha < np.pi / 2, np.tan(alpha), np.inf)
-    return tangent**2 if reading == "magnitude" else tangent
 
 
 def _sum_from_here(values):
@@ -267,21 +241,18 @@ def _sigma_of_residuals(residuals, slopes, recording):
 
 
 def _sum_by_recording(values, recording):
-    """Sum values (..., n) or (..., 2n) over the points of each recording (n,)."""
-    names = np.tile(np.asarray(recording), values.shape[-1] // len(recording))
+    """Sum values (..., 2n) over the points of each recording (n,)."""
+    names = np.tile(np.asarray(recording), 2)
     order = np.argsort(names, kind="stable")
     _, begins = np.unique(names[order], return_index=True)
     return np.add.reduceat(values[..., order], begins, axis=-1)
 
 
-def _sigma_of_data(pushes, slopes, reading):
+def _sigma_of_data(pushes, slopes):
     """Return the sigma of α by the moments' own sigmas: √(Σ J² σ²) / Σ J²."""
     given = (pushes.sigma_y, pushes.sigma_z, pushes.m_y, pushes.m_z)
-    sigma_y, sigma_z, m_y, m_z = np.broadcast_arrays(*given)
-    if reading == "magnitude":
-        sigmas = 2 * np.hypot(m_y * sigma_y, m_z * sigma_z)
-    else:
-        sigmas = np.concatenate([sigma_y, sigma_z], axis=-1)
+    sigma_y, sigma_z, _, _ = np.broadcast_arrays(*given)
+    sigmas = np.concatenate([sigma_y, sigma_z], axis=-1)
     with np.errstate(all="ignore"):
         return np.sqrt((slopes**2 * sigmas**2).sum(axis=-1)) / (slopes**2).sum(axis=-1)
 

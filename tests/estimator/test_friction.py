@@ -92,24 +92,11 @@ def test_a_recording_of_one_point_each_differs_by_the_pairing_of_its_moments():
     )
 
 
-def test_the_other_reading_is_as_honest_and_much_less_sure():
-    """|m|² alone hardly changes with α: ∂|m|²/∂α ∝ tan α. Its interval still holds."""
-    alpha = np.radians(12.3)
-    beta = np.repeat(SLOPES, 10)
-    (m_y, m_z), _ = noisy_moments(beta, alpha, "of the largest", np.random.default_rng(7))
-    both, alone = (
-        fit_alpha(Pushes(beta, m_y, m_z, D_X, THETA, C), reading=r) for r in friction.READINGS
-    )
-    assert 0.93 <= coverage(alone, alpha) <= 0.97
-    assert alone.sigma_rad.mean() > 4 * both.sigma_rad.mean()
-
-
-@pytest.mark.parametrize("reading", friction.READINGS)
 @pytest.mark.parametrize("alpha_deg", [4.0, 10.0, 18.7, 40.0])
-def test_exact_moments_give_the_angle_back(reading, alpha_deg):
-    """A parabola's vertex is exact but for rounding, which |m|² at small α enlarges by 1/tan α."""
+def test_exact_moments_give_the_angle_back(alpha_deg):
+    """A parabola's vertex is exact but for rounding."""
     m_y, m_z = slip.moments(D_X, THETA, SLOPES, np.radians(alpha_deg), C)
-    fit = fit_alpha(Pushes(SLOPES, m_y, m_z, D_X, THETA, C), reading=reading)
+    fit = fit_alpha(Pushes(SLOPES, m_y, m_z, D_X, THETA, C))
     assert fit.alpha_rad == pytest.approx(np.radians(alpha_deg), abs=1e-12)
     assert fit.status == ""
     assert type(fit.alpha_rad) is float
@@ -131,19 +118,16 @@ def test_the_fit_finds_the_least_sum_of_squares_of_a_fine_grid():
     for count in range(2, 14):
         beta = np.radians(rng.uniform(-20, 80, count))
         data = rng.normal(size=2 * count)
-        for reading in friction.READINGS:
-            data = data if reading == "moments" else data[:count] ** 2
-            given = (beta, data, np.ones(count), reading)
-            least = friction._cost(friction._least_squares(*given), *given)
-            assert least <= friction._cost(grid, *given).min() * (1 + 1e-12)
+        given = (beta, data, np.ones(count))
+        least = friction._cost(friction._least_squares(*given), *given)
+        assert least <= friction._cost(grid, *given).min() * (1 + 1e-12)
 
 
 def test_derivative_is_the_difference():
     """Central differences of step 1e-6 are good to 1e-9 of the moments."""
-    for reading in friction.READINGS:
-        above, below = (friction._model(0.2 + step, SLOPES, 1.0, reading) for step in (1e-6, -1e-6))
-        derivative = friction._derivative(0.2, SLOPES, 1.0, reading)
-        np.testing.assert_allclose(derivative, (above - below) / 2e-6, atol=1e-9)
+    above, below = (friction._model(0.2 + step, SLOPES, 1.0) for step in (1e-6, -1e-6))
+    derivative = friction._derivative(0.2, SLOPES, 1.0)
+    np.testing.assert_allclose(derivative, (above - below) / 2e-6, atol=1e-9)
 
 
 def test_curves_are_those_of_figure_8():
@@ -174,7 +158,6 @@ def test_friction_at_zero_is_flagged():
     [
         ({"m_y": [0.0, np.nan]}, "missing or infinite"),
         ({"m_y": [0.0, 1.0, 2.0], "m_z": [1.0, 1.0, 1.0]}, "one slope a moment"),
-        ({"reading": "both"}, "reading = 'both'"),
         ({"C": 0.0}, "C = 0"),
     ],
 )
@@ -187,9 +170,8 @@ def test_bad_data_are_refused(change, message):
         "theta": THETA,
         "C": C,
     } | change
-    reading = arguments.pop("reading", "moments")
     with pytest.raises(ValueError, match=message):
-        fit_alpha(Pushes(**arguments), reading=reading)
+        fit_alpha(Pushes(**arguments))
 
 
 # ---- section VII, way 1: tilting the array
