@@ -23,7 +23,7 @@ from numpy.polynomial import polynomial
 from estimator import first_order
 from estimator.beam import Beam
 from estimator.distance import with_friction
-from estimator.numerics import runge_kutta
+from estimator.numerics import differences, runge_kutta, steps_each_way
 from estimator.reasons import NamedReason
 from estimator.vectors import cross, cross_matrices, dot, turned_about_z
 
@@ -163,9 +163,10 @@ class _Rod:
         """Return distance, slope and the distance's gradient where the equations hold."""
         values, by_unknowns = self._by_unknowns(unknowns, inputs)
         moment = np.hypot(inputs[1], inputs[2])
-        steps = _steps(np.array([inputs[0], moment, moment, 1.0]))
-        tried = np.broadcast_to(unknowns, (len(steps), _COUNT))
-        by_inputs = _differences(self._values(tried, inputs + steps), steps)
+        steps = _DIFFERENCE * np.array([inputs[0], moment, moment, 1.0])
+        moved = inputs + steps_each_way(steps)
+        tried = np.broadcast_to(unknowns, (len(moved), _COUNT))
+        by_inputs = differences(self._values(tried, moved), steps)
         change = _solved(by_unknowns[:_COUNT], -by_inputs[:_COUNT])
         gradient = by_inputs[_COUNT] + by_unknowns[_COUNT] @ change
         return float(values[_COUNT]), float(values[_COUNT + 1]), gradient
@@ -174,9 +175,10 @@ class _Rod:
         self, unknowns: np.ndarray, inputs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return residuals, distance and slope (11,), and their derivatives by the unknowns (11, 9)."""
-        steps = _steps(_sizes(unknowns))
-        values = self._values(unknowns + steps, np.broadcast_to(inputs, (len(steps), 4)))
-        return values[:, 0], _differences(values, steps)
+        steps = _DIFFERENCE * _sizes(unknowns)
+        moved = unknowns + steps_each_way(steps)
+        values = self._values(moved, np.broadcast_to(inputs, (len(moved), 4)))
+        return values[:, 0], differences(values, steps)
 
     def _start(self, inputs: np.ndarray) -> np.ndarray:
         """Return a guess (9,) of force, arc and heading by (10), or by its tip or middle where it has none; half of
@@ -313,7 +315,7 @@ class _Rod:
         pose = np.broadcast_to(
             np.eye(3, 4), (len(arc), 3, 4)
         )  # not turned, no way from the contact
-        pose = runge_kutta(gain, pose, _STEPS)[-1]
+        pose = runge_kutta(gain, pose, _STEPS)
         to_hub = np.swapaxes(pose[..., :3], 1, 2)
         found = to_hub @ np.stack([pose[..., 3], force, rest[0, :, :, 0]], axis=2)
         return found[..., 0], found[..., 1], found[..., 2]
@@ -394,20 +396,6 @@ def _sizes(unknowns: np.ndarray) -> np.ndarray:
     strength = np.linalg.norm(unknowns[:3])
     halfway = np.linalg.norm(unknowns[5:8])
     return np.array([*[strength] * 3, unknowns[3], 1.0, *[halfway] * 3, unknowns[8]])
-
-
-def _steps(sizes: np.ndarray) -> np.ndarray:
-    """Return small steps (2k + 1, k) of quantities of these sizes (k,): none, each up, and each down."""
-    steps = np.diag(_DIFFERENCE * sizes)
-    return np.concatenate([np.zeros((1, len(sizes))), steps, -steps])
-
-
-def _differences(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Return central differences (m, k) of values (m, 2k + 1) after `_steps`."""
-    count = steps.shape[1]
-    up = values[:, 1 : count + 1]
-    down = values[:, count + 1 :]
-    return (up - down) / (2 * steps[1 : count + 1].diagonal())
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 
 from estimator import load_cell
 from estimator.beam import Beam
-from estimator.numerics import runge_kutta
+from estimator.numerics import differences, runge_kutta, steps_each_way
 from estimator.reasons import NamedReason
 
 # [1] Steps of Runge and Kutta's fourth order from base to contact: twice as many move a contact at 20° by less than
@@ -27,14 +27,13 @@ NO_END = NamedReason("moment_does_not_vanish", "the moment does not fall to zero
 CURVED = NamedReason("curved_unloaded", "the elastica is of a whisker that is straight unloaded")
 
 
-def whisker_shape(
+def _bent_end(
     moment_Nmm: np.ndarray, across_N: np.ndarray, along_N: np.ndarray, beam: Beam
 ) -> np.ndarray:
-    """Integrate the whisker's shape from base to contact.
+    """Integrate the whisker's shape from base to contact, where the moment has fallen to none.
 
-    moment_Nmm, across_N, along_N (n,): |m|, f and f_x. Returns (steps + 1, 4, n): arc s, x and w, mm, and
-    ψ, rad, where the moment has fallen by equal steps; the last is the contact. NaN where it does not fall, or
-    not within the length.
+    moment_Nmm, across_N, along_N (n,): |m|, f and f_x. Returns (4, n): arc s, x and w, mm, and ψ, rad, of the
+    contact. NaN where the moment does not fall, or not within the length.
     """
     fall = moment_Nmm / _STEPS
 
@@ -69,8 +68,7 @@ def contact_in_hub(felt: np.ndarray, beam: Beam) -> np.ndarray:
     m_y, m_z, f_x, f_y, f_z = felt.T
     moment = np.hypot(m_y, m_z)
     across = load_cell.across(m_y, m_z, f_y, f_z)
-    at_contact = whisker_shape(moment, across, f_x, beam)[-1]
-    _, x, back, _ = at_contact
+    _, x, back, _ = _bent_end(moment, across, f_x, beam)
     y = -back * m_z / moment
     z = back * m_y / moment
     return np.stack([x, y, z], axis=-1)
@@ -91,18 +89,12 @@ def contact(
     why_not = CURVED if beam.is_curved else load_cell.why_not(*felt)
     if why_not:
         return np.full(3, np.nan), np.full((3, 3), np.nan), why_not
-    point = contact_in_hub(felt[None], beam)[0]
-    gradient = _gradient(felt, beam)  # (3, 5)
-    by_moments = gradient[:, :2] @ moment_covariance @ gradient[:, :2].T
-    by_forces = gradient[:, 2:] @ force_covariance @ gradient[:, 2:].T
-    return point, by_moments + by_forces, "" if np.isfinite(point).all() else NO_END
-
-
-def _gradient(felt: np.ndarray, beam: Beam) -> np.ndarray:
-    """Compute the derivatives (3, 5) of the contact by m_y, m_z, f_x, f_y and f_z."""
     moment = np.hypot(felt[0], felt[1])
     force = np.linalg.norm(felt[2:])
     steps = _DIFFERENCE * np.array([moment, moment, force, force, force])
-    above = contact_in_hub(felt + np.diag(steps), beam)
-    below = contact_in_hub(felt - np.diag(steps), beam)
-    return ((above - below) / (2 * steps[:, None])).T
+    points = contact_in_hub(felt + steps_each_way(steps), beam)
+    point = points[0]
+    gradient = differences(points.T, steps)  # (3, 5)
+    by_moments = gradient[:, :2] @ moment_covariance @ gradient[:, :2].T
+    by_forces = gradient[:, 2:] @ force_covariance @ gradient[:, 2:].T
+    return point, by_moments + by_forces, "" if np.isfinite(point).all() else NO_END
