@@ -3,11 +3,11 @@
 
 Lengths are over the contact distance d_x, moments over C/d_x: r_n = r_κ/d_x, and at r_n = ∞ the
 surface is flat. β_0 is the slope at first touch, θ the pushing angle, α the friction cone angle,
-all in rad.
+all in rad. (22) then has m_y = d sin φ and m_z = d cos φ.
 
-Each function exists twice where the paper's (24) matters: as printed, φ = max(0, ζ − α) with ζ
-taken at the virtual point, and exact, where the force leaves the normal at the contact point by α.
-The printed form is right for α = 0 only.
+The slip angle φ and the deflection d are there twice: `printed` by the paper's (24), φ = max(0, ζ −
+α) with ζ taken at the virtual point, and `exact`, where the force leaves the normal at the contact
+point by α. The printed form is right for α = 0 only.
 
 Both are written with q = θ/r_n so that nothing cancels for large r_n: from p² = r_n² − 2 y_c θ +
 θ²,
@@ -15,125 +15,77 @@ Both are written with q = θ/r_n so that nothing cancels for large r_n: from p²
     d = θ (2 cos β_0 − q) / (√(1 − (p/r_n)² sin² u) + (p/r_n) cos u),   u = ζ − φ.
 
 Domain: r_n > 0, 0 ≤ θ < 2 y_c and below 90°, |β_0| < 90°, |φ| < 90°; beyond it the whisker has
-passed the object and the result is NaN; `why_not` says why. β_0 < 0 mirrors β_0 > 0. α outside [0°,
-90°) raises ValueError.
+passed the object and the result is NaN. β_0 < 0 mirrors β_0 > 0. α outside [0°, 90°) raises
+ValueError.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator import circle
-from estimator.domain import (
-    RIGHT_ANGLE,
-    Numbers,
-    elementwise,
-    first_failure,
-    require_friction_angle,
-)
-from estimator.reasons import NamedReason
-from estimator.threshold import distance_error, slope_threshold
-
-SLIP_ANGLE_TOO_LARGE = NamedReason("slip_angle_too_large", "the slip angle reaches 90 degrees")
-
-__all__ = [
-    "curvature_of_slip",
-    "curvature_of_slip_printed",
-    "deflection",
-    "deflection_printed",
-    "distance_error",
-    "initial_contact",
-    "moments",
-    "moments_printed",
-    "normalized_curvature",
-    "normalized_radius",
-    "slip_angle",
-    "slip_angle_printed",
-    "slope_threshold",
-    "virtual_angle",
-    "virtual_radius",
-    "why_not",
-]
-
-
-def normalized_curvature(d_x: ArrayLike, r_kappa: ArrayLike) -> Numbers:
-    """Return κ_n of (15): contact distance over radius of curvature, both in mm; NaN unless both
-    are positive.
-
-    >>> normalized_curvature(50.0, 100.0)
-    0.5
-    """
-    return _positive_ratio(d_x, r_kappa)
-
-
-def normalized_radius(d_x: ArrayLike, r_kappa: ArrayLike) -> Numbers:
-    """Return r_n = 1/κ_n, both arguments in mm; NaN unless both are positive."""
-    return _positive_ratio(r_kappa, d_x)
+from estimator.domain import RIGHT_ANGLE, Numbers, elementwise, require_friction_angle
 
 
 @elementwise
-def initial_contact(r_n: ArrayLike, beta_0: ArrayLike) -> tuple[Numbers, Numbers]:
-    """Return (y_c, z_c) of (26)–(28): the first contact from the centre, r_n (cos β_0, sin β_0)."""
-    return circle.inside(r_n, 0.0, beta_0, r_n * np.cos(beta_0), r_n * np.sin(beta_0))
+def virtual_turn(q: ArrayLike, beta_0: ArrayLike) -> Numbers:
+    """Return ζ − β_0 of (25) and (29), rad: by how much the push turns the virtual point about the centre."""
+    return np.arctan2(q * np.sin(beta_0), 1 - q * np.cos(beta_0))
 
 
 @elementwise
-def virtual_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> Numbers:
-    """Return ζ of (25) and (29), in rad: direction of the virtual point from the centre."""
-    zeta = beta_0 + circle.turn(theta / r_n, beta_0)
-    return circle.inside(r_n, theta, beta_0, zeta)[0]
+def virtual_radius(q: ArrayLike, beta_0: ArrayLike) -> Numbers:
+    """Return p / r_n of (32): the virtual point's distance from the centre, in radii."""
+    return np.hypot(1 - q * np.cos(beta_0), q * np.sin(beta_0))
 
 
 @elementwise
-def virtual_radius(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike) -> Numbers:
-    """Return p of (32): distance of the virtual point from the centre, over d_x."""
-    p = r_n * circle.relative_virtual_radius(theta / r_n, beta_0)
-    return circle.inside(r_n, theta, beta_0, p)[0]
-
-
-def slip_angle(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """Return φ, exact, in rad: (23) with the friction cone at the contact point, ζ − asin(r_n sin α
-    / p).
-    """
-    require_friction_angle("alpha", alpha)
-    return circle.exact(r_n, theta, beta_0, alpha)[0]
-
-
-def slip_angle_printed(
-    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
-) -> Numbers:
-    """Return φ of (24) as printed, in rad: max(0, ζ − α) with ζ at the virtual point."""
-    require_friction_angle("alpha", alpha)
-    return circle.printed(r_n, theta, beta_0, alpha)[0]
-
-
-def deflection(r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike) -> Numbers:
-    """Return d of (31) with the exact φ: the deflection in the sensing plane, over d_x."""
-    require_friction_angle("alpha", alpha)
-    return circle.exact(r_n, theta, beta_0, alpha)[1]
-
-
-def deflection_printed(
-    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
-) -> Numbers:
-    """Return d of (31) with φ of (24) as printed, over d_x."""
-    require_friction_angle("alpha", alpha)
-    return circle.printed(r_n, theta, beta_0, alpha)[1]
-
-
-def moments(
+def exact(
     r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
 ) -> tuple[Numbers, Numbers]:
-    """Return (m_y, m_z) of (22) with the exact φ, over C/d_x: d sin φ, d cos φ."""
+    """Return (φ, d) of (23) and (31) with the friction cone at the contact point, rad.
+
+    Where the contact slides, the surface there is steeper than at first touch by δ, φ = β_0 − α +
+    δ, and the law of sines reads sin α = sin(α − δ) + q sin φ. It is a quadratic in tan(δ/2), whose
+    root is taken without cancellation; its discriminant is the s² = (p/r_n)² − sin² α of d = θ (2
+    cos β_0 − q) / (cos α + s).
+    """
     require_friction_angle("alpha", alpha)
-    return _components(*circle.exact(r_n, theta, beta_0, alpha))
+    slope = np.abs(beta_0)
+    q = theta / r_n
+    flat_phi = np.maximum(0.0, slope - alpha)
+    push = q * np.sin(flat_phi)
+    along = np.cos(alpha) - q * np.cos(flat_phi)
+    denominator = 2 * np.sin(alpha) + push
+    root = np.sqrt(along * along + denominator * push)
+    half_delta = np.where(along >= 0, push / (along + root), (root - along) / denominator)
+    phi = flat_phi + 2 * np.arctan(half_delta)
+    d = theta * (2 * np.cos(slope) - q) / (np.cos(alpha) + root)
+    return _where_valid(r_n, theta, beta_0, phi, d, slope > alpha)
 
 
-def moments_printed(
+@elementwise
+def printed(
     r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike
 ) -> tuple[Numbers, Numbers]:
-    """Return (m_y, m_z) of (22) with φ of (24) as printed, over C/d_x."""
+    """Return (φ, d) of (24) and (31), as printed, rad; (24) takes the friction cone at the virtual point."""
     require_friction_angle("alpha", alpha)
-    return _components(*circle.printed(r_n, theta, beta_0, alpha))
+    slope = np.abs(beta_0)
+    q = theta / r_n
+    phi = np.maximum(0.0, slope - alpha + virtual_turn(q, slope))
+    chord = 2 * np.cos(slope) - q
+    inner = np.hypot(np.cos(alpha), np.sin(alpha) * np.sqrt(q * chord))
+    d = theta * chord / (inner + virtual_radius(q, slope) * np.cos(alpha))
+    return _where_valid(r_n, theta, beta_0, phi, d, phi > 0)
+
+
+def _where_valid(r_n, theta, beta_0, phi, d, slides):
+    """Return (φ, d) inside the domain: φ = 0 and d = θ where nothing slides, NaN outside."""
+    phi = np.where(slides, phi, 0.0)
+    d = np.where(slides, d, theta)
+    pushes = (theta >= 0) & (theta < RIGHT_ANGLE)
+    meets = np.isfinite(beta_0) & (np.abs(beta_0) < RIGHT_ANGLE) & (r_n > 0)
+    valid = pushes & meets & (theta / r_n < 2 * np.cos(beta_0)) & (phi < RIGHT_ANGLE)
+    phi = np.where(valid, np.copysign(phi, beta_0) + 0.0, np.nan)
+    return phi, np.where(valid, d, np.nan)
 
 
 @elementwise
@@ -154,29 +106,3 @@ def curvature_of_slip_printed(rate: ArrayLike, phi_0: ArrayLike, alpha: ArrayLik
     require_friction_angle("alpha", alpha)
     slipping = (np.abs(phi_0) > 0) & (np.abs(phi_0) + alpha < RIGHT_ANGLE)
     return np.where(slipping, rate / np.sin(phi_0 + np.copysign(alpha, phi_0)), np.nan)
-
-
-def why_not(
-    r_n: ArrayLike, theta: ArrayLike, beta_0: ArrayLike, alpha: ArrayLike = 0.0
-) -> str | np.ndarray:
-    """Return a sentence why this module gives NaN for these arguments; empty inside the domain."""
-    require_friction_angle("alpha", alpha)
-    arguments = np.broadcast_arrays(r_n, theta, beta_0, alpha)
-    r_n, theta, beta_0, alpha = (a.astype(float) for a in arguments)
-    with np.errstate(all="ignore"):
-        phi = circle.exact(r_n, theta, beta_0, alpha)[0]
-        passed = (SLIP_ANGLE_TOO_LARGE, np.isfinite(phi))
-        return first_failure((*circle.conditions(r_n, theta, beta_0), passed), r_n.shape)
-
-
-@elementwise
-def _positive_ratio(above, below):
-    """Return above / below; NaN unless both are positive and the ratio is finite."""
-    ratio = above / below
-    return np.where((above > 0) & (below > 0) & np.isfinite(ratio), ratio, np.nan)
-
-
-@elementwise
-def _components(phi, d):
-    """Split a deflection into its components (d sin φ, d cos φ)."""
-    return d * np.sin(phi), d * np.cos(phi)

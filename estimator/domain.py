@@ -17,7 +17,6 @@ from estimator.reasons import NamedReason
 RIGHT_ANGLE = np.pi / 2
 # Why several equations have no result.
 VALUE_MISSING = NamedReason("value_missing", "a measured value is missing or infinite")
-ANGLE_NEGATIVE = NamedReason("angle_negative", "the pushing angle is negative")
 ANGLE_TOO_LARGE = NamedReason("angle_too_large", "the pushing angle is 90 degrees or more")
 SLOPE_TOO_STEEP = NamedReason("slope_too_steep", "the slope beta is 90 degrees or more")
 NOT_PUSHING = NamedReason(

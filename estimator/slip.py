@@ -5,29 +5,20 @@ Written with φ = max(0, |β| − α) in sines and cosines, which stay finite wh
 cot do not. β < 0 mirrors β > 0: φ, m_y and σ change sign. Angles in rad, lengths in mm, C = 3EI in
 N·mm², moments in N·mm.
 
-Domain: |β| < 90°, θ ≥ 0 and below 90°, d_x > 0; outside it the result is NaN, and `why_not` says
-why. A friction cone angle α outside [0°, 90°) or C ≤ 0 raises ValueError.
+Domain: |β| < 90°, θ ≥ 0 and below 90°, d_x > 0; outside it the result is NaN. A friction cone
+angle α outside [0°, 90°) or C ≤ 0 raises ValueError.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator.domain import (
-    ANGLE_NEGATIVE,
-    ANGLE_TOO_LARGE,
     RIGHT_ANGLE,
-    SLOPE_TOO_STEEP,
-    VALUE_MISSING,
     Numbers,
     elementwise,
-    first_failure,
     require_friction_angle,
     require_positive,
-    where_all,
 )
-from estimator.reasons import NamedReason
-
-DISTANCE_NOT_POSITIVE = NamedReason("distance_not_positive", "the distance d_x is not positive")
 
 
 @elementwise
@@ -134,28 +125,6 @@ def slope_from_deflection(
     return np.where(possible & (d_z != 0), beta, np.nan), phi
 
 
-def why_not(d_x: ArrayLike, theta: ArrayLike, beta: ArrayLike) -> str | np.ndarray:
-    """Return why (4), (5), (13) and (14) give NaN for these arguments: a sentence, empty inside the
-    domain.
-    """
-    d_x, theta, beta = np.broadcast_arrays(
-        np.asarray(d_x, float), np.asarray(theta, float), np.asarray(beta, float)
-    )
-    return first_failure(_conditions(d_x, theta, beta), d_x.shape)
-
-
-def _conditions(d_x, theta, beta):
-    """Return pairs (what is wrong, mask of what must hold) of the domain."""
-    finite = np.isfinite(d_x) & np.isfinite(theta) & np.isfinite(beta)
-    return (
-        (VALUE_MISSING, finite),
-        (DISTANCE_NOT_POSITIVE, d_x > 0),
-        (ANGLE_NEGATIVE, theta >= 0),
-        (ANGLE_TOO_LARGE, theta < RIGHT_ANGLE),
-        (SLOPE_TOO_STEEP, np.abs(beta) < RIGHT_ANGLE),
-    )
-
-
 def _require_settings(alpha, C):
     """Raise ValueError for α outside [0°, 90°) or C ≤ 0."""
     require_friction_angle("alpha", alpha)
@@ -164,8 +133,9 @@ def _require_settings(alpha, C):
 
 def _inside(d_x, theta, beta, value):
     """Return the value inside the domain and the range of a float, NaN elsewhere."""
-    in_range = ("beyond the range of a float", np.isfinite(value))
-    return where_all((*_conditions(d_x, theta, beta), in_range), value)
+    pushes = (theta >= 0) & (theta < RIGHT_ANGLE)
+    inside = pushes & (d_x > 0) & np.isfinite(d_x) & (np.abs(beta) < RIGHT_ANGLE)
+    return np.where(inside & np.isfinite(value), value, np.nan)
 
 
 def _magnitude(d_x, theta, beta, alpha, C):

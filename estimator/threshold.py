@@ -1,14 +1,15 @@
 """How steep a surface may be before a distance is wrong by a given share: the curves of Figs 5 and
 6.
 
-Angles in rad; an error of 5 % is 0.05. A flat surface (r_n = ∞) has closed forms, a curved one is
-searched.
+Angles in rad; an error of 5 % is 0.05. A flat surface has closed forms, a curved one is searched.
 """
+
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator import circle
 from estimator.domain import (
     RIGHT_ANGLE,
     Numbers,
@@ -22,60 +23,34 @@ EQUATIONS = ("no_slip", "with_friction")
 SEARCH_STEP = np.radians(0.25)
 # Number of bisections, which is enough for the last bit of a float.
 HALVINGS = 50
+# Appendix B: `estimator.curvature.exact`, or `printed`.
+AppendixB: TypeAlias = Callable[..., tuple[Numbers, Numbers]]
 
 
 def distance_error(
-    beta_0: ArrayLike,
-    alpha: ArrayLike,
-    alpha_est: ArrayLike,
-    *,
-    r_n: ArrayLike = np.inf,
-    theta: ArrayLike = 0.0,
-    equation: str = "with_friction",
-    printed: bool = False,
+    beta: ArrayLike, alpha: ArrayLike, alpha_est: ArrayLike, equation: str = "with_friction"
 ) -> Numbers:
-    """Compute the relative error of (2) or (10), estimate over truth minus one, for a slope β_0 at
-    first touch.
+    """Compute the relative error of (2) or (10), estimate over truth minus one, on a flat surface of slope β.
 
-    α is the true friction cone angle, α_est the assumed one; r_n the normalized radius of curvature
-    (15). `printed` takes Appendix B as printed. −1 where (10) gives no distance because φ + α_est
-    reaches 90°; NaN outside the domain. Raises ValueError for a friction angle outside [0°, 90°) or
-    an unknown equation.
+    α is the true friction cone angle, α_est the assumed one. −1 where (10) gives no distance because
+    φ + α_est reaches 90°; NaN for a slope of 90° or more. Raises ValueError for a friction angle
+    outside [0°, 90°) or an unknown equation.
     """
     _require(alpha, alpha_est, equation)
-    no_slip = equation == "no_slip"
-    if np.all(np.isinf(r_n)):
-        return _flat_error(beta_0, alpha, alpha_est, no_slip)
-    return _curved_error(beta_0, alpha, alpha_est, r_n, theta, no_slip, _form(printed))
+    return (_error_of_2 if equation == "no_slip" else _error_of_10)(beta, alpha, alpha_est)
 
 
 def slope_threshold(
-    error: float,
-    alpha: ArrayLike,
-    alpha_est: ArrayLike = 0.0,
-    *,
-    r_n: ArrayLike = np.inf,
-    theta: ArrayLike = 0.0,
-    equation: str = "with_friction",
-    printed: bool = False,
+    error: ArrayLike, alpha: ArrayLike, alpha_est: ArrayLike, equation: str = "with_friction"
 ) -> Numbers:
-    """Find β_thresh of Figs 5 and 6, in rad: the least slope at which (2) or (10) is wrong by
+    """Find β_thresh of Fig. 5, in rad: the least slope of a flat surface at which (2) or (10) is wrong by
     `error`; NaN if never.
 
-    Fig. 5 is the flat surface, α_est ≠ α; Fig. 6 has α_est = α and r_n and θ > 0. Raises ValueError
-    for a friction angle outside [0°, 90°), an unknown equation, an error ≤ 0, or a curved surface
-    with θ ≤ 0.
-
-    >>> round(slope_threshold(0.05, 0.0, 0.0, r_n=1.0, theta=0.0524) * 180 / 3.14159, 1)
-    62.9
+    Raises ValueError as `distance_error`, and for an error ≤ 0.
     """
     _require(alpha, alpha_est, equation)
     require_positive("error", error, "(a share)")
-    no_slip = equation == "no_slip"
-    if np.all(np.isinf(r_n)):
-        return _flat_threshold(error, alpha, alpha_est, no_slip)
-    require_positive("theta", theta, "rad")
-    return _curved_threshold(error, alpha, alpha_est, r_n, theta, no_slip, _form(printed))
+    return (_slope_of_2 if equation == "no_slip" else _slope_of_10)(error, alpha, alpha_est)
 
 
 def _require(alpha, alpha_est, equation):
@@ -87,61 +62,78 @@ def _require(alpha, alpha_est, equation):
 
 
 @elementwise
-def _flat_error(beta_0, alpha, alpha_est, no_slip):
-    """Compute the relative error on a flat surface; zero up to β = α.
+def _error_of_2(beta, alpha, alpha_est):
+    """Compute the relative error of (2), tan β tan φ."""
+    slope = np.abs(beta)
+    error = np.tan(slope) * np.tan(np.maximum(0.0, slope - alpha))
+    return np.where(slope < RIGHT_ANGLE, error + 0.0 * alpha_est, np.nan)
 
-    It is tan β tan φ for (2), and sin(α − α_est) (tan β − tan α) cos α / cos α_est for (10).
-    """
-    slope = np.abs(beta_0)
+
+@elementwise
+def _error_of_10(beta, alpha, alpha_est):
+    """Compute the relative error of (10), sin(α − α_est) (tan β − tan α) cos α / cos α_est; zero up to β = α."""
+    slope = np.abs(beta)
     phi = np.maximum(0.0, slope - alpha)
-    excess = np.sin(phi) / (np.cos(slope) * np.cos(alpha))
-    of_10 = -np.sin(alpha_est - alpha) * excess * np.cos(alpha) / np.cos(alpha_est)
-    of_2 = np.tan(slope) * np.tan(phi)
-    error = np.where(no_slip, of_2, np.maximum(of_10, -1.0))
-    return np.where(slope < RIGHT_ANGLE, error, np.nan)
+    excess = np.sin(phi) / (np.cos(slope) * np.cos(alpha))  # tan β − tan α
+    error = -np.sin(alpha_est - alpha) * excess * np.cos(alpha) / np.cos(alpha_est)
+    return np.where(slope < RIGHT_ANGLE, np.maximum(error, -1.0), np.nan)
 
 
 @elementwise
-def _flat_threshold(error, alpha, alpha_est, no_slip):
-    """Solve the formulas of `_flat_error` for tan β, and return β."""
-    mu = np.tan(alpha)
+def _slope_of_2(error, alpha, alpha_est):
+    """Solve `_error_of_2` for β."""
+    halfway = np.tan(alpha) * (1 + error) / 2
+    return np.arctan(halfway + np.sqrt(halfway**2 + error) + 0.0 * alpha_est)
+
+
+@elementwise
+def _slope_of_10(error, alpha, alpha_est):
+    """Solve `_error_of_10` for β; NaN where the error is never as large."""
     detour = np.sin(np.abs(alpha_est - alpha))
-    of_10 = mu + error * np.cos(alpha_est) / (detour * np.cos(alpha))
+    tangent = np.tan(alpha) + error * np.cos(alpha_est) / (detour * np.cos(alpha))
     never = (detour == 0) | (alpha_est > alpha) & (error > 1)
-    halfway = mu * (1 + error) / 2
-    of_2 = halfway + np.sqrt(halfway**2 + error)
-    return np.arctan(np.where(no_slip, of_2, np.where(never, np.nan, of_10)))
-
-
-def _form(printed):
-    """Return the function of Appendix B: as printed, or exact."""
-    return circle.printed if printed else circle.exact
+    return np.arctan(np.where(never, np.nan, tangent))
 
 
 @elementwise
-def _curved_error(beta_0, alpha, alpha_est, r_n, theta, no_slip, form):
-    """Compute the relative error on a curved surface."""
-    phi, d = form(r_n, theta, beta_0, alpha)
-    angle = np.abs(phi)
-    assumed = np.where(no_slip, 0.0, alpha_est)
-    of_2 = theta / (d * np.cos(angle)) - 1
-    of_10 = theta * np.maximum(0.0, np.cos(angle + assumed)) / (d * np.cos(assumed)) - 1
-    return np.where(no_slip, of_2, of_10)
+def curved_error(
+    beta_0: ArrayLike, alpha: ArrayLike, r_n: ArrayLike, theta: ArrayLike, form: AppendixB
+) -> Numbers:
+    """Compute the relative error of (10) with the true α on a surface of normalized radius r_n (15).
 
-
-@elementwise
-def _curved_threshold(error, alpha, alpha_est, r_n, theta, no_slip, form):
-    """Find the first slope on a grid at which the error is reached, then bisect back to the
-    crossing.
+    beta_0: slope at first touch. form: Appendix B. NaN outside its domain.
     """
+    phi, d = form(r_n, theta, beta_0, alpha)
+    return theta * np.maximum(0.0, np.cos(np.abs(phi) + alpha)) / (d * np.cos(alpha)) - 1
+
+
+def curved_threshold(
+    error: ArrayLike, alpha: ArrayLike, r_n: ArrayLike, theta: ArrayLike, form: AppendixB
+) -> Numbers:
+    """Find β_thresh of Fig. 6, in rad: the least slope at first touch at which (10) with the true α is wrong by
+    `error`; NaN if never.
+
+    The first slope on a grid at which the error is reached, then bisected back to the crossing.
+    Raises ValueError for a friction angle outside [0°, 90°), an error ≤ 0 or θ ≤ 0.
+
+    >>> from estimator import curvature
+    >>> round(curved_threshold(0.05, 0.0, 1.0, 0.0524, curvature.exact) * 180 / 3.14159, 1)
+    62.9
+    """
+    require_positive("error", error, "(a share)")
+    require_positive("theta", theta, "rad")
+    return _first_crossing(error, alpha, r_n, theta, form)
+
+
+@elementwise
+def _first_crossing(error, alpha, r_n, theta, form):
+    """Find the slope of `curved_threshold`."""
+    conditions = [condition[..., None] for condition in np.broadcast_arrays(alpha, r_n, theta)]
 
     def is_reached(slope):
         """Check whether the error is reached at slopes (..., k)."""
-        found = _curved_error(slope, *conditions, form)
-        return np.abs(found) >= error[..., None]
+        return np.abs(curved_error(slope, *conditions, form)) >= error[..., None]
 
-    conditions = np.broadcast_arrays(alpha, alpha_est, r_n, theta, no_slip)
-    conditions = [condition[..., None] for condition in conditions]
     slopes = np.arange(0.0, RIGHT_ANGLE, SEARCH_STEP)
     reached = is_reached(slopes)  # (..., slopes)
     first = np.argmax(reached, axis=-1, keepdims=True)

@@ -220,9 +220,7 @@ def _draw_prediction(
     if name not in assumed_rad or surface.fit is None:
         return
     equation = "no_slip" if name == "no_slip" else "with_friction"
-    error = distance_error(
-        np.radians(SLOPES_DEG), surface.alpha_rad, assumed_rad[name], equation=equation
-    )
+    error = distance_error(np.radians(SLOPES_DEG), surface.alpha_rad, assumed_rad[name], equation)
     axes.plot(
         SLOPES_DEG + apart_deg,
         100.0 * surface.beam.error_share(surface.common_d_x_mm, error),

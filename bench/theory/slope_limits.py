@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 
 from bench.base.atomic import write_whole
 from bench.base.drawing import publish
-from estimator.curvature import slope_threshold
+from estimator import curvature
+from estimator.threshold import curved_threshold, slope_threshold
 
 NUMBERS = (5, 6)
 ERRORS_PERCENT = (1.0, 5.0, 10.0)
@@ -86,7 +87,7 @@ def figure_5() -> Iterator[ThresholdCurve]:
         for error in ERRORS_PERCENT:
             for name, equation in EQUATIONS.items():
                 alpha_est = np.radians(alpha_est_deg)
-                beta = slope_threshold(error / 100, alpha, alpha_est, equation=equation)
+                beta = slope_threshold(error / 100, alpha, alpha_est, equation)
                 yield ThresholdCurve(
                     panel,
                     {"alpha_est_deg": alpha_est_deg, "error_percent": error, "equation": name},
@@ -104,11 +105,12 @@ def figure_6() -> Iterator[ThresholdCurve]:
     Panels (a) to (c) are of errors of 1, 5, 10 %; α = α_est = 0° is dashed, 20° solid; θ = 1°, 3°,
     5°.
     """
-    for form in ("printed", "exact"):
+    forms = {"printed": curvature.printed, "exact": curvature.exact}
+    for form, appendix_b in forms.items():
         for panel, error in zip("abc", ERRORS_PERCENT):
             for theta_deg in THETA_DEG:
                 for alpha_deg in FRICTION_DEG:
-                    beta = _curved_threshold(error, alpha_deg, theta_deg, form == "printed")
+                    beta = _curved_threshold(error, alpha_deg, theta_deg, appendix_b)
                     yield ThresholdCurve(
                         panel,
                         {
@@ -125,12 +127,12 @@ def figure_6() -> Iterator[ThresholdCurve]:
                     )
 
 
-def _curved_threshold(error_percent, alpha_deg, theta_deg, printed):
+def _curved_threshold(error_percent, alpha_deg, theta_deg, form):
     """Return β_thresh, rad, on curved surfaces of R_N, with the friction angle known."""
     alpha = np.radians(alpha_deg)
     theta = np.radians(theta_deg)
     error = error_percent / 100
-    return slope_threshold(error, alpha, alpha, r_n=R_N, theta=theta, printed=printed)
+    return curved_threshold(error, alpha, R_N, theta, form)
 
 
 def _table(number, curves) -> str:

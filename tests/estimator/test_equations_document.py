@@ -9,6 +9,7 @@ import pytest
 
 from estimator import curvature, distance
 from estimator.beam import Beam
+from estimator.threshold import curved_error
 
 TEXT = (Path(__file__).parents[2] / "docs" / "equations.md").read_text()
 
@@ -60,14 +61,11 @@ def test_table_of_appendix_b():
         "## How far Appendix B"
     ):
         theta, alpha, beta = np.radians(angles)
-        assert np.degrees(curvature.slip_angle_printed(r_n, theta, beta, alpha)) == pytest.approx(
-            phi_printed, abs=0.005
-        )
-        assert np.degrees(curvature.slip_angle(r_n, theta, beta, alpha)) == pytest.approx(
-            phi, abs=0.005
-        )
-        for printed, expected in ((True, error_printed), (False, error)):
-            found = curvature.distance_error(
-                beta, alpha, alpha, r_n=r_n, theta=theta, printed=printed
-            )
-            assert 100 * found == pytest.approx(expected, abs=0.005)
+        for form, expected, expected_error in (
+            (curvature.printed, phi_printed, error_printed),
+            (curvature.exact, phi, error),
+        ):
+            found, _ = form(r_n, theta, beta, alpha)
+            assert np.degrees(found) == pytest.approx(expected, abs=0.005)
+            error_of_10 = 100 * curved_error(beta, alpha, r_n, theta, form)
+            assert error_of_10 == pytest.approx(expected_error, abs=0.005)

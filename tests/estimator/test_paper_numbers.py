@@ -7,9 +7,9 @@ Only the friction angles of Fig. 8 are not here: they come from data alone.
 import numpy as np
 import pytest
 
-from estimator import distance, slip
-from estimator.curvature import deflection, deflection_printed, distance_error, slope_threshold
+from estimator import curvature, distance, slip
 from estimator.friction import Pushes, fit_alpha
+from estimator.threshold import curved_threshold, distance_error
 
 
 def angle(degrees):
@@ -51,32 +51,26 @@ def test_section_4a_error_of_10_with_a_wrong_friction_angle(
     [(3, 0.05, 63, 62.9), (3, 0.10, 74, 74.15), (5, 0.05, 52, 51.5), (5, 0.10, 65, 65.05)],
 )
 def test_section_4b_curved_surface_without_friction(theta, error, printed_deg, recomputed_deg):
-    for printed in (True, False):
-        found = np.degrees(
-            slope_threshold(error, 0.0, 0.0, r_n=1.0, theta=angle(theta), printed=printed)
-        )
+    for form in (curvature.printed, curvature.exact):
+        found = np.degrees(curved_threshold(error, 0.0, 1.0, angle(theta), form))
         assert 0 <= recomputed_deg - found <= 0.1
         assert found == pytest.approx(printed_deg, abs=0.55)
 
 
 @pytest.mark.parametrize(
-    "theta, error, printed, recomputed_deg",
+    "theta, error, form, recomputed_deg",
     [
-        (3, 0.05, True, 63.45),
-        (3, 0.10, True, 74.25),
-        (3, 0.05, False, 68.2),
-        (3, 0.10, False, 76.2),
-        (5, 0.05, False, 60.3),
-        (5, 0.10, False, 69.5),
+        (3, 0.05, curvature.printed, 63.45),
+        (3, 0.10, curvature.printed, 74.25),
+        (3, 0.05, curvature.exact, 68.2),
+        (3, 0.10, curvature.exact, 76.2),
+        (5, 0.05, curvature.exact, 60.3),
+        (5, 0.10, curvature.exact, 69.5),
     ],
 )
-def test_section_4b_curved_surface_with_friction_of_20_degrees(
-    theta, error, printed, recomputed_deg
-):
+def test_section_4b_curved_surface_with_friction_of_20_degrees(theta, error, form, recomputed_deg):
     """ "Friction has negligible impact" holds for (24) as printed, not for the force at the contact point."""
-    found = np.degrees(
-        slope_threshold(error, angle(20), angle(20), r_n=1.0, theta=angle(theta), printed=printed)
-    )
+    found = np.degrees(curved_threshold(error, angle(20), 1.0, angle(theta), form))
     assert 0 <= recomputed_deg - found <= 0.1
 
 
@@ -95,9 +89,10 @@ def test_appendix_b_goes_over_into_the_flat_surface():
     """At r_n = 1e8 an error of ε in p² is 1e-8 in d, a fifth of it; the stable form differs from flat by θ/r_n."""
     theta, beta = 0.05, angle(60)
     flat = theta * np.cos(beta)
-    for stable in (deflection, deflection_printed):
+    for stable in (curvature.exact, curvature.printed):
         for r_n in (1e6, 1e8, 1e12, np.inf):
-            assert stable(r_n, theta, beta, 0.0) == pytest.approx(flat, rel=theta / r_n + 1e-15)
+            _, d = stable(r_n, theta, beta, 0.0)
+            assert d == pytest.approx(flat, rel=theta / r_n + 1e-15)
     lost = [abs(printed_formula(r_n, theta, beta) / flat - 1) for r_n in (1e2, 1e8, 1e16)]
     assert lost[1] > 1e-8
     assert lost[2] > 0.5

@@ -38,7 +38,9 @@ def felt_on_circle(r_n: float, beta_0: float, sigma: float = 1e-4) -> list[FeltA
     scale = WHISKER.C_Nmm2 / D_X
     rows = []
     for theta in THETAS:
-        m_y, m_z = (scale * m for m in curvature.moments(r_n, theta, beta_0, ALPHA))
+        phi, d = curvature.exact(r_n, theta, beta_0, ALPHA)
+        m_y = scale * d * np.sin(phi)
+        m_z = scale * d * np.cos(phi)
         moments = Value(m_y, sigma), Value(m_z, sigma)
         rows.append(FeltAt(float(theta), *moments, 1e-4, sigma**2 * np.eye(2), np.zeros(2)))
     return rows

@@ -170,35 +170,21 @@ CASES = [
         lambda rng: (theta_of(rng), *moments_of(rng), rigidity(rng), rigidity(rng)),
     ),
     Case(
-        "zeta (25)", curvature.virtual_angle, lambda *a: circle(*a)[2], lambda rng: curved(rng)[:3]
-    ),
-    Case("p (32)", curvature.virtual_radius, lambda *a: circle(*a)[3], lambda rng: curved(rng)[:3]),
-    Case("phi exact", curvature.slip_angle, lambda *a: appendix_b(*a, False)[0], curved),
-    Case(
-        "phi (24) as printed",
-        curvature.slip_angle_printed,
-        lambda *a: appendix_b(*a, True)[0],
-        curved,
-    ),
-    Case("d (31) exact", curvature.deflection, lambda *a: appendix_b(*a, False)[1], curved),
-    Case(
-        "d (31) as printed",
-        curvature.deflection_printed,
-        lambda *a: appendix_b(*a, True)[1],
-        curved,
+        "zeta (25)",
+        lambda r_n, theta, beta: beta + curvature.virtual_turn(theta / r_n, beta),
+        lambda *a: circle(*a)[2],
+        lambda rng: curved(rng)[:3],
     ),
     Case(
-        "m_z (22) exact",
-        _nth(curvature.moments, 1),
-        lambda *a: (lambda phi, d: d * mp.cos(phi))(*appendix_b(*a, False)),
-        curved,
+        "p (32)",
+        lambda r_n, theta, beta: r_n * curvature.virtual_radius(theta / r_n, beta),
+        lambda *a: circle(*a)[3],
+        lambda rng: curved(rng)[:3],
     ),
-    Case(
-        "m_y (22) as printed",
-        _nth(curvature.moments_printed, 0),
-        lambda *a: (lambda phi, d: d * mp.sin(phi))(*appendix_b(*a, True)),
-        curved,
-    ),
+    Case("phi (23) exact", _nth(curvature.exact, 0), lambda *a: appendix_b(*a, False)[0], curved),
+    Case("phi (24)", _nth(curvature.printed, 0), lambda *a: appendix_b(*a, True)[0], curved),
+    Case("d (31) exact", _nth(curvature.exact, 1), lambda *a: appendix_b(*a, False)[1], curved),
+    Case("d (31)", _nth(curvature.printed, 1), lambda *a: appendix_b(*a, True)[1], curved),
     Case(
         "distance on a soft object", _nth(compliance.two_distances, 0), two_distances, soft_object
     ),
