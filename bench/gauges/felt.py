@@ -256,18 +256,4 @@ def _lowpass(channels: np.ndarray, rate_Hz: float, cutoff_Hz: float) -> np.ndarr
     """
     if cutoff_Hz >= rate_Hz / 2:
         return channels
-    filtered = zero_phase_lowpass(_bridged(channels), rate_Hz, cutoff_Hz)
-    return np.where(np.isnan(channels), np.nan, filtered)
-
-
-def _bridged(channels: np.ndarray) -> np.ndarray:
-    """Interpolate channels (n, 2) over their gaps; 0 where a channel has no sample."""
-    bridged = channels.copy()
-    place = np.arange(len(channels))
-    for column in bridged.T:
-        finite = np.isfinite(column)
-        if finite.any():
-            column[~finite] = np.interp(place[~finite], place[finite], column[finite])
-        else:
-            column[:] = 0.0
-    return bridged
+    return zero_phase_lowpass(channels, rate_Hz, cutoff_Hz)
