@@ -1,4 +1,4 @@
-"""The rig's parts, built from a protocol's tables."""
+"""Whisker, cameras, board, scene and sensor, built from a protocol's tables."""
 
 import math
 

@@ -1,7 +1,7 @@
 """The laws of friction at one contact: equations in the tangent plane, and their exact derivatives.
 
-A law's `equations(load, beyond)` returns residuals (n,) and their derivatives (n, 4 + beyond),
-by the four unknowns of the contact and the law's own.
+A law's `equations(load, own)` returns residuals (n,) and their derivatives by the contact's four
+unknowns, force and arc length, and the law's own. x_by is the derivative of x by these.
 """
 
 import math
@@ -39,9 +39,9 @@ class Sliding:
     friction: float
     status = "sliding"
 
-    def equations(self, load: ContactLoad, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def equations(self, load: ContactLoad, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals (3,) of shear force and heading, and their derivatives (3, 5)."""
-        (heading,) = beyond
+        (heading,) = own
         forward = np.array([math.cos(heading), math.sin(heading)])
         sideways = np.array([-forward[1], forward[0]])
         limit = self.friction * load.press
@@ -55,15 +55,18 @@ class Sliding:
 
 
 @dataclass(frozen=True)
-class Oiled:
-    """Shear force = −μ · normal force · v/√(v² + give²), v the motion: sliding, softened where the
-    motion is small."""
+class RegularisedSliding:
+    """Shear force = −μ · normal force · v/√(v² + give²), v the motion.
+
+    Coulomb's law, made smooth where the motion is small: it has a solution near any guess, and with
+    ever less give it leads to that of `Sliding`.
+    """
 
     friction: float
     give_mm: float
     status = "sliding"
 
-    def equations(self, load: ContactLoad, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def equations(self, load: ContactLoad, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals (2,) of the shear force, and their derivatives (2, 4)."""
         length = math.hypot(*load.motion, self.give_mm)
         direction = load.motion / length
@@ -87,7 +90,7 @@ class Held:
     give_mm: float
     status = "held"
 
-    def equations(self, load: ContactLoad, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def equations(self, load: ContactLoad, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals (2,) of motion along and force round the object, and their
         derivatives (2, 4)."""
         limit = self.friction * load.press

@@ -49,8 +49,8 @@ class Job:
         for i, run in enumerate(self.protocol.runs()):
             yield SessionPart("trial", i, self.session / "trials" / run.name)
 
-    def papers(self) -> dict[str, str]:
-        """Return the session's own text files by name."""
+    def text_files(self) -> dict[str, str]:
+        """Return the text of the session's own files, by name."""
         stated = build.stated_T_rig_board(self.protocol, self.stream(_POSE))
         measured = {}
         if self.protocol.whisker.widths:

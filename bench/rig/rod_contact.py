@@ -20,7 +20,7 @@ import numpy as np
 
 from bench.rig.bar import UnloadedTouch
 from bench.rig.elastic_rod import Rod
-from bench.rig.friction_laws import ContactLoad, Held, Oiled, Sliding
+from bench.rig.friction_laws import ContactLoad, Held, RegularisedSliding, Sliding
 from bench.rig.kirchhoff_rod import KirchhoffRod
 from bench.rig.linear import across, cross, cross_matrix, rotation_about_z, solve
 from bench.rig.loaded_point import BentRod, LoadedPoint
@@ -100,7 +100,7 @@ class RodContact:
         motor_rad: float,
         old: ContactState,
         unknowns: np.ndarray,
-        law: Sliding | Oiled | Held,
+        law: Sliding | RegularisedSliding | Held,
         tip: bool,
     ) -> ContactState:
         """Find the equilibrium under a law of friction, the material having moved since `old`.
@@ -172,7 +172,7 @@ class _Problem:
     bar_moved_mm: np.ndarray
     rotation: np.ndarray
     old: ContactState
-    law: Sliding | Oiled | Held
+    law: Sliding | RegularisedSliding | Held
     tip: bool
 
     def at(self, unknowns, shape) -> _Equations:

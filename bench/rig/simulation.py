@@ -107,7 +107,7 @@ def _require_renderable(job, name):
 
 def _claim(job):
     """Begin a session; raise BadInput where the folder holds another one, or anything else."""
-    texts = job.papers()
+    texts = job.text_files()
     truth = job.session / "truth.json"
     if truth.exists():
         if truth.read_text(encoding="utf-8") != texts["truth.json"]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.rig.bar import UnloadedTouch
 from bench.rig.elastic_rod import Rod
-from bench.rig.friction_laws import GIVE, Held, Oiled, Sliding
+from bench.rig.friction_laws import GIVE, Held, RegularisedSliding, Sliding
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import ContactState, RodContact
 from bench.rig.touched_object import TouchedObject
@@ -222,8 +222,8 @@ class March:
     def _slide(self, motor_rad, old, guess, heading_rad, tip):
         """Find the sliding state near a guess.
 
-        Where the heading is another (the motor has just turned back), friction is first as soft as
-        oil, then ever stiffer, until it gives way by no more than a held contact.
+        Where the heading is another (the motor has just turned back), friction is first regularised
+        over a long motion, then over ever less, down to that by which a held contact gives way.
         """
         kinetic = self.friction.kinetic
         unknowns = np.append(guess, heading_rad)
@@ -232,7 +232,9 @@ class March:
         except ArithmeticError:
             softest_mm = _SOFTEST * self.contact.rod.length_mm
             for give_mm in np.geomspace(softest_mm, self._give_mm, 16):
-                state = self.contact.solve(motor_rad, old, guess, Oiled(kinetic, give_mm), tip)
+                state = self.contact.solve(
+                    motor_rad, old, guess, RegularisedSliding(kinetic, give_mm), tip
+                )
                 guess = state.unknowns
             return state
 
