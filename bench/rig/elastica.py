@@ -65,6 +65,14 @@ class Nodes:
         weights = from_base[-1]
         return cls(0.5 * (1 + on_circle), values, from_base, weights - from_base, weights)
 
+    def coefficients(self, at_nodes: np.ndarray) -> np.ndarray:
+        """Return the Chebyshev coefficients (n, k) of values (n, k) at the points."""
+        return np.linalg.solve(self.values, at_nodes)
+
+    def interpolate(self, at_nodes: np.ndarray, share: np.ndarray) -> np.ndarray:
+        """Interpolate values (n, k) at the points to shares (m,) of 0…1: (m, k)."""
+        return chebyshev.chebval(2 * share - 1, self.coefficients(at_nodes)).T
+
 
 @dataclass(frozen=True)
 class _Bending:
@@ -142,9 +150,7 @@ class Elastica:
         arc = np.asarray(arc_mm, float)
         directions = np.stack([np.cos(bent.angle), np.sin(bent.angle)], -1)
         at_nodes_mm = bent.arc_mm * self.nodes.from_base @ directions  # (nodes, 2)
-        coefficients = np.linalg.solve(self.nodes.values, at_nodes_mm)
-        share = np.clip(arc / bent.arc_mm, 0, 1)
-        curve_mm = chebyshev.chebval(2 * share - 1, coefficients).T
+        curve_mm = self.nodes.interpolate(at_nodes_mm, np.clip(arc / bent.arc_mm, 0, 1))
         beyond_mm = np.maximum(arc - bent.arc_mm, 0)
         end = np.array([np.cos(bent.slope), np.sin(bent.slope)])
         return curve_mm + beyond_mm[:, None] * end

@@ -109,9 +109,7 @@ class KirchhoffRod(BentRod):
         loaded_mm = float(unknowns[3])
         turns, _, balance = self._equilibrium(unknowns, guess)
         points = loaded_mm * self.nodes.from_base @ balance.tangents  # (nodes, 3)
-        coefficients = np.linalg.solve(self.nodes.values, points)
-        within = np.clip(arc_mm / loaded_mm, 0, 1)
-        curve = chebyshev.chebval(2 * within - 1, coefficients).T
+        curve = self.nodes.interpolate(points, np.clip(arc_mm / loaded_mm, 0, 1))
         rest = self.rod.rest
         beyond = rest.point_mm(np.maximum(arc_mm, loaded_mm)) - rest.point_mm(loaded_mm)
         return curve + turns[-1].apply(beyond)
@@ -213,7 +211,7 @@ class KirchhoffRod(BentRod):
 
     def _check_resolved(self, balance, arc):
         """Raise ArithmeticError where the nodes do not resolve the curvature."""
-        coefficients = np.abs(np.linalg.solve(self.nodes.values, balance.curvature)).max(1)
+        coefficients = np.abs(self.nodes.coefficients(balance.curvature)).max(1)
         if coefficients[-2:].max() > _UNRESOLVED * coefficients.max():
             raise ArithmeticError(
                 f"the whisker is too thin at {arc:.4g} mm for its bend to be resolved"

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.rig.bar import TouchedBar
 from bench.rig.painted_scene import Scene
 from bench.rig.pinhole import PinholeCamera
 from bench.rig.sensor import Sensor
 from bench.rig.studio import Instant, Setting, Studio
+from bench.rig.touched_object import TouchedObject
 
 _FLIP = np.diag([-1.0, 1.0, 1.0])  # a camera's x axis
 
@@ -112,7 +112,7 @@ class MirrorStudio:
         """Draw the board standing on the rig."""
         return self._whole(Studio.rig_brightness)
 
-    def setting(self, bar: TouchedBar, middle_mm: np.ndarray) -> "MirrorSetting":
+    def setting(self, bar: TouchedObject, middle_mm: np.ndarray) -> "MirrorSetting":
         """Draw the still scene of a trial: the rig with a bar whose middle is near a point (3,)."""
         return MirrorSetting(self, [studio.setting(bar, middle_mm) for studio in self._studios])
 

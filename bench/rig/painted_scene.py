@@ -18,6 +18,7 @@ from bench.rig.plate import Plate, Print
 from bench.rig.printed_board import Ink, marker_count, marker_print
 from bench.rig.rays import unit
 from bench.rig.solid import Solid
+from bench.rig.touched_object import TouchedObject
 from bench.rig.tube import Tube, draw_tubes
 from bench.rig.window import Window
 
@@ -144,7 +145,7 @@ class Scene:
         block.draw(window, radiance, light, self._marker(_BLOCK_MARKER), _BLOCK_FRONT)
 
     def draw_round_object(
-        self, window: Window, radiance: np.ndarray, thing: TouchedBar
+        self, window: Window, radiance: np.ndarray, thing: TouchedObject
     ) -> Occluder | None:
         """Draw the posts under the hubs, and a ring, sphere or cone on a rod from behind.
 

@@ -39,8 +39,21 @@ class Print:
         return Print(self.reflectance, self.x_mm + x_mm, self.y_mm + y_mm)
 
     def tone(self, across: "_Footprint", down: "_Footprint") -> np.ndarray:
-        """Return the mean reflectance under each of some spots."""
-        return _tone(self, across, down)
+        """Return the mean reflectance under each of some spots: of its cell and the eight neighbours."""
+        if self.reflectance.size == 1:
+            return np.float32(self.reflectance[0, 0])
+        column = _Cells.find(self.x_mm, across)
+        row = _Cells.find(self.y_mm, down)
+        padded = np.pad(self.reflectance, 2, mode="edge").astype(np.float32)
+        width = padded.shape[1]
+        reflectance = padded.ravel()
+        first = (row.cell + 1) * width + column.cell + 1  # of the nine cells
+        tone = np.zeros_like(across.mm)
+        for j, i in np.ndindex(3, 3):
+            tone += column.weights[i] * row.weights[j] * reflectance[first + (j * width + i)]
+        corner = first + row.is_last_nearer * width + column.is_last_nearer
+        saddle = _saddle(reflectance, corner, width)
+        return tone + saddle * _corner_share(across, down, column.edge_distance, row.edge_distance)
 
     def frame(self, margin_mm: float, reflectance: float) -> "Print":
         """Return the print with a margin of one grey all round."""
@@ -193,24 +206,6 @@ def _inside(edges, spot):
     beyond_first = ndtr((spot.mm - np.float32(edges[0])) / spot.soft_mm)
     before_last = ndtr((np.float32(edges[-1]) - spot.mm) / spot.soft_mm)
     return beyond_first * before_last
-
-
-def _tone(print_, across, down):
-    """Return the mean reflectance of a print under each spot: of its cell and the eight neighbours."""
-    if print_.reflectance.size == 1:
-        return np.float32(print_.reflectance[0, 0])
-    column = _Cells.find(print_.x_mm, across)
-    row = _Cells.find(print_.y_mm, down)
-    padded = np.pad(print_.reflectance, 2, mode="edge").astype(np.float32)
-    width = padded.shape[1]
-    reflectance = padded.ravel()
-    first = (row.cell + 1) * width + column.cell + 1  # of the nine cells
-    tone = np.zeros_like(across.mm)
-    for j, i in np.ndindex(3, 3):
-        tone += column.weights[i] * row.weights[j] * reflectance[first + (j * width + i)]
-    corner = first + row.is_last_nearer * width + column.is_last_nearer
-    saddle = _saddle(reflectance, corner, width)
-    return tone + saddle * _corner_share(across, down, column.edge_distance, row.edge_distance)
 
 
 def _saddle(reflectance, cell, width):

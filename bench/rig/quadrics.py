@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.rig.bar import TouchedBar
 from bench.rig.rays import (
     Hits,
     Rays,
@@ -18,6 +17,7 @@ from bench.rig.rays import (
 )
 from bench.rig.round_objects import TouchedCone, TouchedRing, TouchedSphere
 from bench.rig.torus import VisibleRing
+from bench.rig.touched_object import TouchedObject
 
 # mm along a cone's axis from the height at which it is touched: its base and its upper end
 _CONE_DOWN_MM, _CONE_UP_MM = 30.0, 60.0
@@ -25,7 +25,7 @@ _AROUND = np.linspace(0, 2 * np.pi, 65)  # rad: points about an axis
 
 
 def to_camera_frame(
-    thing: TouchedBar, rotation: np.ndarray, translation_mm: np.ndarray
+    thing: TouchedObject, rotation: np.ndarray, translation_mm: np.ndarray
 ) -> VisibleObject:
     """Convert a ring, sphere or cone of the rig frame to that of a camera."""
     turn = rotation.T

@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.rig.bar import TouchedBar
 from bench.rig.layer import Layer
 from bench.rig.light import Light, Material, shade_surface
 from bench.rig.quadrics import to_camera_frame
 from bench.rig.rays import Rays, VisibleObject, unit
+from bench.rig.touched_object import TouchedObject
 from bench.rig.window import Window
 
 _COVERS = 1e-6  # of a sample: what covers less is not drawn, what covers all but so much is no edge
@@ -22,7 +22,7 @@ _GAUSS = 0.5 / np.sqrt(3)  # Gauss–Legendre's two points across a sample
 class Solid:
     """A ring, sphere or cone in the rig frame, and its material."""
 
-    thing: TouchedBar
+    thing: TouchedObject
     material: Material
 
     def layer(self, window: Window, light: Light) -> Layer | None:

@@ -6,12 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from bench.rig.bar import TouchedBar
 from bench.rig.box import Box
 from bench.rig.layer import Occluder
 from bench.rig.painted_scene import Scene, Stand, draw_floor_and_wall
 from bench.rig.pinhole import PinholeCamera
 from bench.rig.sensor import Sensor
+from bench.rig.touched_object import TouchedObject
 from bench.rig.tube import Tube
 from bench.rig.window import Window
 
@@ -67,7 +67,7 @@ class Studio:
         """Draw the board standing on the rig."""
         return self.crop(self.window.blur_to_pixels(self.backdrop, self.sensor.blur_px))
 
-    def setting(self, bar: TouchedBar, middle_mm: np.ndarray) -> "Setting":
+    def setting(self, bar: TouchedObject, middle_mm: np.ndarray) -> "Setting":
         """Draw the still scene of a trial: the rig with a bar whose middle is near a point (3,), or
         with a ring, sphere or cone."""
         radiance = self.backdrop.copy()

@@ -198,7 +198,6 @@ def _extrapolate(x, at, values):
     """Interpolate values (n,) at places (n,) linearly, and straight on beyond both ends."""
     first_slope = (values[1] - values[0]) / (at[1] - at[0])
     last_slope = (values[-1] - values[-2]) / (at[-1] - at[-2])
-    before = values[0] + first_slope * (x - at[0])
-    beyond = values[-1] + last_slope * (x - at[-1])
-    within = np.interp(x, at, values)
-    return np.where(x < at[0], before, np.where(x > at[-1], beyond, within))
+    before = np.minimum(x - at[0], 0.0)
+    beyond = np.maximum(x - at[-1], 0.0)
+    return np.interp(x, at, values) + first_slope * before + last_slope * beyond
