@@ -16,6 +16,7 @@ from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
+from estimator import first_order
 from estimator.beam import Beam
 from estimator.builtin import corrected, with_friction
 from estimator.whisk import EstimatorSettings, Whisk
@@ -118,20 +119,19 @@ def errors_percent(push: Push) -> tuple[float, float]:
 def predicted_percent(push: Push) -> float:
     """Return the error of (10) to first order in θ, derived in docs/equations.md.
 
-    Slipping sideways (β ≥ α): 100 θ (½ tan ψ sin φ / cos α − ⅜ (R/d_x) cos β / cos² ψ), with
-    φ = β − α and R the radii of bar and whisker together. Held at β = ψ = 0: 100 θ (−⅕ tan α −
-    ⅜ R/d_x). NaN where it is held otherwise: there it depends on how friction is shared between the
-    two directions.
+    Where it slips sideways (β ≥ α) that is leaning, held at β = ψ = 0 dragging; and rolling over the
+    bar. NaN where it is held otherwise: there it depends on how friction is shared between the two
+    directions.
     """
     angles_deg = [push.theta_deg, push.alpha_deg, push.beta_deg, push.psi_deg]
     theta, alpha, beta, psi = np.radians(angles_deg)
     if beta >= alpha:
-        by_friction = 0.5 * np.tan(psi) * np.sin(beta - alpha) / np.cos(alpha)
+        by_friction = first_order.leaning(theta, psi, beta - alpha, alpha)
     else:
-        by_friction = -0.2 * np.tan(alpha) if beta == psi == 0 else np.nan
-    reach = (push.bar_radius_mm + ROD.diameter_mm / 2) / push.d_x_mm
-    by_rolling = 0.375 * reach * np.cos(beta) / np.cos(psi) ** 2
-    return float(100.0 * theta * (by_friction - by_rolling))
+        by_friction = first_order.dragging(theta, alpha) if beta == psi == 0 else np.nan
+    reach_mm = push.bar_radius_mm + ROD.diameter_mm / 2
+    rolling = first_order.rolling_at(theta, reach_mm, beta, push.d_x_mm, 1.0) / np.cos(psi) ** 2
+    return float(100.0 * (by_friction + rolling))
 
 
 def tilt_map(
