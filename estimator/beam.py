@@ -157,8 +157,10 @@ class Beam:
         """
         return _inverse_sum(d_x_mm, -self.taper / self.length_mm)
 
-    def left(self, d_x_mm: ArrayLike) -> Numbers:
-        """Return the share of the base's diameter that is left at d_x."""
+    def thickness(self, d_x_mm: ArrayLike) -> Numbers:
+        """Return the diameter at d_x over the base's; a relative error of the base's cylinder's distance is as
+        much smaller of d_x.
+        """
         return d_x_mm / self.as_cylinder_mm(d_x_mm)
 
     def moment_Nmm(self, theta_rad: ArrayLike, d_x_mm: ArrayLike) -> Numbers:

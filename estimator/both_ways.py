@@ -90,7 +90,7 @@ def there_and_back(
     if not 0 < d_x <= beam.length_mm:
         return ThereAndBack(nan, status=NOWHERE)
     covariance = _covariance(there, back, shared)
-    covariance += _covariance_of_dragging(felt, abs(alpha), float(beam.left(d_x)))
+    covariance += _covariance_of_dragging(felt, abs(alpha), float(beam.thickness(d_x)))
     if not _differs(felt, covariance):
         return ThereAndBack(nan, status=ALIKE)
     sigmas = _sigmas(felt, covariance, beam)
@@ -162,16 +162,16 @@ def _covariance(there: Whisk, back: Whisk, shared) -> np.ndarray:
     return covariance
 
 
-def _covariance_of_dragging(felt: np.ndarray, alpha: float, left: float) -> np.ndarray:
+def _covariance_of_dragging(felt: np.ndarray, alpha: float, thickness: float) -> np.ndarray:
     """Return the covariance (6, 6) that friction along the whisker adds to the moments back.
 
     It is not in the difference of which the slope is made. On the way there the contact slips
     sideways, and friction along with it; on the way back the contact is held until friction has
-    turned round, and no moment determines the share of it that then acts along the whisker. left:
-    share of the base's diameter that is left at the contact.
+    turned round, and no moment determines the share of it that then acts along the whisker.
+    thickness: the diameter at the contact over the base's.
     """
     change = np.zeros(6)
-    relative = first_order.dragging(felt[3], min(alpha, _STEEPEST_FRICTION_RAD)) / left
+    relative = first_order.dragging(felt[3], min(alpha, _STEEPEST_FRICTION_RAD)) / thickness
     change[4:6] = relative * felt[4:6]
     return np.outer(change, change)
 
@@ -195,11 +195,11 @@ def _model_share(
     angles, and the taper.
     """
     theta = whisk.theta_at_rad
-    left = whisk.beam.left(d_x)
+    thickness = whisk.beam.thickness(d_x)
     phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    rolling = first_order.rolling_at(theta, settings.object_reach_mm, beta, d_x, left)
+    rolling = first_order.rolling_at(theta, settings.object_reach_mm, beta, d_x, thickness)
     alpha = min(alpha, _STEEPEST_FRICTION_RAD)
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, phi, alpha)
-    large_angle = theta**2 / (6 * left)
+    large_angle = theta**2 / (6 * thickness)
     by_taper = whisk.beam.share_by_taper(d_x)
     return float(np.sqrt(rolling**2 + leaning**2 + large_angle**2 + by_taper**2))

@@ -45,7 +45,7 @@ def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     d_x = distance.no_slip(theta, m_z, whisk.beam.C_Nmm2)
     gradient = uncertainty.gradient_no_slip(theta, m_z, whisk.beam.C_Nmm2)
     settings = _without_friction(settings)
-    return _estimate(whisk, settings, d_x, gradient, _model_share, m_y=0.0, clamp=False)
+    return _estimate(whisk, settings, d_x, gradient, _share_of_10, m_y=0.0, clamp=False)
 
 
 def with_friction(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
@@ -54,7 +54,7 @@ def with_friction(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     Its interval includes α_est's sigma and exists even where (10) loses its root: then with one
     side only.
     """
-    return _with_friction(whisk, settings, _model_share)
+    return _with_friction(whisk, settings, _share_of_10)
 
 
 def corrected(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
@@ -65,9 +65,9 @@ def corrected(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     has no distance, or the tip's, this is the estimate of (10).
     """
     length = whisk.beam.length_mm
-    estimate = _with_friction(whisk, settings, _share_left)
+    estimate = _with_friction(whisk, settings, _share_of_corrected)
     if not 0 < estimate.d_x_mm < length:
-        return _with_friction(whisk, settings, _model_share)
+        return _with_friction(whisk, settings, _share_of_10)
     factor = 1 - _first_order(whisk, settings, estimate.d_x_mm)
     return replace(
         estimate,
@@ -111,7 +111,7 @@ def _as_of_rod(
     factor = d_x / ten.d_x_mm
     low, high = _wider(ten.low_mm * factor, d_x, ten.high_mm * factor, of_rest)
     high = min(high, whisk.beam.length_mm)
-    model = _share_of_rod(whisk, settings, d_x, whisk.beam.left(d_x))
+    model = _share_of_rod(whisk, settings, d_x, whisk.beam.thickness(d_x))
     model = hypot(model, whisk.beam.share_by_taper(d_x))
     of_inputs = uncertainty.sigma(contact.gradient, **_errors(whisk, settings))
     sigma = hypot(of_inputs, model * d_x, of_rest)
@@ -150,7 +150,7 @@ def _wider(low, d_x, high, sigma):
 
 def frictionless(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Estimate by equation (12): slip accounted for, as if there were no friction."""
-    return _with_friction(whisk, _without_friction(settings), _model_share)
+    return _with_friction(whisk, _without_friction(settings), _share_of_10)
 
 
 def printed_17(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
@@ -200,11 +200,11 @@ def _first_order(whisk, settings, d_x):
     theta = whisk.theta_at_rad
     alpha = settings.alpha_est_rad
     phi = 0.0 if is_held(whisk) else _phi(whisk)
-    left = whisk.beam.left(d_x)
+    thickness = whisk.beam.thickness(d_x)
     reach = settings.object_reach_mm
     if not isnan(settings.object_radius_mm):
-        reach = settings.object_radius_mm + settings.whisker_radius_mm * left
-    rolling = first_order.rolling(theta, reach, phi, alpha, d_x, left)
+        reach = settings.object_radius_mm + settings.whisker_radius_mm * thickness
+    rolling = first_order.rolling(theta, reach, phi, alpha, d_x, thickness)
     if phi != 0:
         return rolling
     return rolling + first_order.HELD_SHARE * first_order.dragging(theta, alpha)
@@ -223,7 +223,7 @@ def _phi(whisk):
 def _with_friction(whisk, settings, model):
     """Estimate by (10), with its friction angle and the slope (9) that follows.
 
-    model: the function of its own relative sigma, such as `_model_share`.
+    model: the function of its own relative sigma, such as `_share_of_10`.
     """
     felt = (
         whisk.theta_at_rad,
@@ -249,18 +249,17 @@ def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
 
     It adds sigma and interval, the taper, the clamp at the tip, and the reason for a NaN. m_y: the
     moment along the surface that the equation takes; (2) takes none. model_share: function of the
-    equation's own relative sigma (`_model_share`). A tapering whisker's distance is not linear over
+    equation's own relative sigma (`_share_of_10`). A tapering whisker's distance is not linear over
     the sigma of α_est: its sigma is no less than the two sides of the interval, in the mean of
     their squares.
     """
     beam = whisk.beam
     tapered = beam.distance_mm(d_x)
-    # Share that is left here of a relative error on the base's cylinder, and the change of d_x with
-    # the distance there.
-    left = beam.left(tapered)
-    by_cylinder = left * tapered / d_x
-    model = hypot(model_share(whisk, settings, tapered, left), beam.share_by_taper(tapered))
-    low, high = _interval(whisk, settings, m_y, model / left if model > 0 else 0.0)
+    # The change of d_x with the distance of the base's cylinder.
+    thickness = beam.thickness(tapered)
+    by_cylinder = thickness * tapered / d_x
+    model = hypot(model_share(whisk, settings, tapered, thickness), beam.share_by_taper(tapered))
+    low, high = _interval(whisk, settings, m_y, model / thickness if model > 0 else 0.0)
     if isnan(d_x):
         return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
     of_inputs = uncertainty.sigma(gradient, **_errors(whisk, settings))
@@ -344,20 +343,20 @@ def _on_this_whisker(end, beam):
     return beam.distance_mm(end) if end > 0 else end
 
 
-def _model_share(whisk, settings, d_x, left):
+def _share_of_10(whisk, settings, d_x, thickness):
     """Return the relative sigma of (10) itself; 0 without a distance or without a thickness to
     allow for.
     """
-    return _share(whisk, settings, d_x, left, settings.object_reach_mm, 1.0)
+    return _model_share(whisk, settings, d_x, thickness, settings.object_reach_mm, 1.0)
 
 
-def _share_left(whisk, settings, d_x, left):
-    """Return the relative sigma that is left of (10) when its first order has been subtracted."""
+def _share_of_corrected(whisk, settings, d_x, thickness):
+    """Return the relative sigma of (10) less its first order."""
     held_spread = first_order.HELD_SPREAD if is_held(whisk) else 1.0
-    return _share(whisk, settings, d_x, left, _unknown_reach_mm(settings), held_spread)
+    return _model_share(whisk, settings, d_x, thickness, _unknown_reach_mm(settings), held_spread)
 
 
-def _share(whisk, settings, d_x, left, reach_mm, held_spread):
+def _model_share(whisk, settings, d_x, thickness, reach_mm, held_spread):
     """Return the relative sigma of (10) by what a reach and a held contact leave open."""
     if isnan(d_x) or settings.object_reach_mm == 0:
         return 0.0
@@ -368,7 +367,7 @@ def _share(whisk, settings, d_x, left, reach_mm, held_spread):
         d_x,
         reach=reach_mm,
         tilt_sigma=settings.tilt_sigma_rad,
-        left=left,
+        thickness=thickness,
         held_spread=held_spread,
     )
 
@@ -378,7 +377,7 @@ def _unknown_reach_mm(settings):
     return settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0
 
 
-def _share_of_rod(whisk, settings, d_x, left):
+def _share_of_rod(whisk, settings, d_x, thickness):
     """Return the relative sigma of the exact rod: the object's lean and radius, and friction's way."""
     if isnan(d_x) or settings.object_reach_mm == 0:
         return 0.0
@@ -386,7 +385,7 @@ def _share_of_rod(whisk, settings, d_x, left):
     alpha = settings.alpha_est_rad
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, _phi(whisk), alpha)
     reach_mm = _unknown_reach_mm(settings)
-    rolling = first_order.rolling(theta, reach_mm, _phi(whisk), alpha, d_x, left)
+    rolling = first_order.rolling(theta, reach_mm, _phi(whisk), alpha, d_x, thickness)
     by_friction = _ROD_BY_FRICTION * tan(alpha)
     held = first_order.HELD_SPREAD * first_order.dragging(theta, alpha) if is_held(whisk) else 0.0
     return hypot(leaning, rolling, by_friction, _ROD_WITHOUT_FRICTION, held)

@@ -35,23 +35,23 @@ def rolling(
     phi: ArrayLike,
     alpha: ArrayLike,
     d_x: ArrayLike,
-    left: ArrayLike,
+    thickness: ArrayLike,
 ) -> Numbers:
     """Return −θ (R/d_x) cos β (½/w − ⅛), β = φ + α: rolling over a round object towards the base.
 
-    reach: R, radii of object and whisker together; left: w, share of the base's diameter that is
-    left at d_x. Where the contact is held (φ = 0), its slope is taken as 0.
+    reach: R, radii of object and whisker together; thickness: w, the diameter at d_x over the
+    base's. Where the contact is held (φ = 0), its slope is taken as 0.
 
     >>> round(rolling(0.05, 3.0, 0.0, 0.0, 60.0, 1.0), 8)
     -0.0009375
     """
     slope = np.minimum(np.abs(phi) + alpha, RIGHT_ANGLE)
-    return rolling_at(theta, reach, np.where(phi == 0, 0.0, slope), d_x, left)
+    return rolling_at(theta, reach, np.where(phi == 0, 0.0, slope), d_x, thickness)
 
 
 @elementwise
 def rolling_at(
-    theta: ArrayLike, reach: ArrayLike, beta: ArrayLike, d_x: ArrayLike, left: ArrayLike
+    theta: ArrayLike, reach: ArrayLike, beta: ArrayLike, d_x: ArrayLike, thickness: ArrayLike
 ) -> Numbers:
     """Return −θ (R/d_x) cos β (½/w − ⅛): rolling at a known slope β, whether the contact is held or
     not.
@@ -59,7 +59,7 @@ def rolling_at(
     >>> round(rolling_at(0.05, 3.0, 0.0, 60.0, 1.0), 8)
     -0.0009375
     """
-    return -theta * reach / d_x * np.cos(beta) * (0.5 / left - 0.125)
+    return -theta * reach / d_x * np.cos(beta) * (0.5 / thickness - 0.125)
 
 
 @elementwise

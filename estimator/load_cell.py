@@ -105,18 +105,18 @@ def relative_gradient(m_y: float, m_z: float, f_y: float, f_z: float) -> np.ndar
 
 @elementwise
 def rolling(
-    theta: ArrayLike, reach: ArrayLike, phi: ArrayLike, d_x: ArrayLike, left: ArrayLike
+    theta: ArrayLike, reach: ArrayLike, phi: ArrayLike, d_x: ArrayLike, thickness: ArrayLike
 ) -> Numbers:
     """Return −½ θ (R/d_x) cos β / w, at most: the share of d_x by which the contact rolls towards
     the base.
 
-    reach: R, radii of object and whisker together; left: w, share of the base's diameter at d_x. β
+    reach: R, radii of object and whisker together; thickness: w, the diameter at d_x over the base's. β
     is at least φ.
 
     >>> round(rolling(0.05, 3.0, 0.0, 60.0, 1.0), 8)
     -0.00125
     """
-    return -0.5 * theta * reach / d_x * np.cos(phi) / left
+    return -0.5 * theta * reach / d_x * np.cos(phi) / thickness
 
 
 @elementwise

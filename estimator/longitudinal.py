@@ -21,9 +21,9 @@ def compliance_with_rolling(whisk: Whisk, settings: EstimatorSettings) -> Estima
     estimate = no_slip(whisk, settings)
     if isnan(estimate.d_x_mm) or isnan(settings.object_radius_mm):
         return estimate
-    left = whisk.beam.left(estimate.d_x_mm)
-    reach = settings.object_radius_mm + settings.whisker_radius_mm * left
-    rolled = first_order.rolling(whisk.theta_at_rad, reach, 0.0, 0.0, estimate.d_x_mm, left)
+    thickness = whisk.beam.thickness(estimate.d_x_mm)
+    reach = settings.object_radius_mm + settings.whisker_radius_mm * thickness
+    rolled = first_order.rolling(whisk.theta_at_rad, reach, 0.0, 0.0, estimate.d_x_mm, thickness)
     return replace(
         estimate,
         d_x_mm=estimate.d_x_mm * (1 - rolled),

@@ -128,7 +128,7 @@ class _SlidingWhisker:
             share = abs(slip) / moved if moved > 0 else 1.0
         along_whisker = copysign(sqrt(1 - share**2), self.u[0])
         dragging = first_order.dragging(self.theta, self.alpha)
-        x *= 1 - along_whisker * dragging / self.beam.left(x)
+        x *= 1 - along_whisker * dragging / self.beam.thickness(x)
         return MovingContact(x - self.u[0] * self.theta, beta, other), slip
 
     def _distances_at(self, beta: float, cone: float) -> tuple[float, float]:
@@ -306,6 +306,6 @@ def _model_share(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float
         d_x,
         reach=settings.object_reach_mm,
         tilt_sigma=settings.tilt_sigma_rad,
-        left=whisk.beam.left(d_x),
+        thickness=whisk.beam.thickness(d_x),
     )
     return float(np.hypot(share, whisk.beam.share_by_taper(d_x)))

@@ -101,10 +101,10 @@ class ProfiledBeam(Beam):
         found = np.where(share <= end, inside, beyond) * self.length_mm
         return np.where(share > 0, found, np.nan)[()]
 
-    def left(self, d_x_mm: ArrayLike) -> Numbers:
-        """Return the share that is left in d_x of a relative error of the base's cylinder's distance.
+    def thickness(self, d_x_mm: ArrayLike) -> Numbers:
+        """Return the relative error of d_x over that of the base's cylinder's distance.
 
-        Of a taper that is the diameter's share that is left.
+        Of a taper that is the diameter at d_x over the base's.
         """
         share = np.asarray(d_x_mm, float) / self.length_mm
         tabled = np.clip(share, 1e-9, 1.0)  # 0/0 at the base

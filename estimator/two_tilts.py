@@ -149,13 +149,13 @@ class _Equations:
         common.
         """
         own, common = self._by_felt(models, solution)
-        left = solution[0] * self.per_mm * [model.own for model in models]
+        by_own_model = solution[0] * self.per_mm * [model.own for model in models]
         # The equations are of the base's cylinder, 1/d = 1/d_x − τ: a change of d_x is one of d times (d/d_x)².
         d_per_d_x = (solution[0] / self.whisks[0].beam.distance_mm(solution[0])) ** 2
         by_place = self.per_mm[:, None] * self.apart_mm * d_per_d_x
         by_model = solution[0] * self.per_mm[:, None] * [model.shared for model in models]
         causes = np.concatenate([common, by_place, by_model], axis=1)
-        return np.diag(own + left**2) + causes @ causes.T
+        return np.diag(own + by_own_model**2) + causes @ causes.T
 
     def _by_felt(self, models, solution) -> tuple[np.ndarray, np.ndarray]:
         """Return the variances (n,) by each whisk's own angle and moments, (N·mm)², and the changes
@@ -263,21 +263,23 @@ def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _
     """Evaluate the errors of (10), docs/maps.md, at the friction and the distance found so far.
 
     Where the object's radius is not known, everything from nothing to the allowed reach is equally
-    probable. A share of d_x is 1/w of that of d, w being the share of the diameter that is left.
+    probable. A share of d_x is 1/w of that of d, w being the diameter there over the base's.
     """
     theta = whisk.theta_at_rad
     alpha = max(atan(solution[1]), 0.0)
     d_x = whisk.beam.distance_mm(solution[0])
-    left = d_x / solution[0]
+    thickness = d_x / solution[0]
     held = is_held(whisk)
     bending = _bending_held(theta, alpha) if held else _bending_slipping(whisk, alpha)
-    large = bending.bent**2 / (6 * left)
-    rolling, rolling_sigma = _rolling(theta, bending.phi, alpha, d_x, left, settings)
+    large = bending.bent**2 / (6 * thickness)
+    rolling, rolling_sigma = _rolling(theta, bending.phi, alpha, d_x, thickness, settings)
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, bending.phi, alpha)
     error = bending.dragging + large + rolling
     by_taper = whisk.beam.share_by_taper(d_x)
     shared = np.array([leaning, rolling_sigma, _LARGE_LEFT * large, by_taper])
-    return _TiltModel(held, error / left, shared / left, bending.dragging_sigma / left)
+    return _TiltModel(
+        held, error / thickness, shared / thickness, bending.dragging_sigma / thickness
+    )
 
 
 @dataclass(frozen=True)
@@ -315,16 +317,16 @@ def _bending_slipping(whisk: Whisk, alpha: float) -> _Bending:
     return _Bending(phi, bent, along * dragging, _DRAGGING_LEFT * along * dragging)
 
 
-def _rolling(theta, phi, alpha, d_x, left, settings) -> tuple[float, float]:
+def _rolling(theta, phi, alpha, d_x, thickness, settings) -> tuple[float, float]:
     """Return the error by rolling over the object, and its sigma: that of a uniform distribution of
     unknown radii.
     """
     radius = settings.object_radius_mm
     if isnan(radius):
-        most = first_order.rolling(theta, settings.object_reach_mm, phi, alpha, d_x, left)
+        most = first_order.rolling(theta, settings.object_reach_mm, phi, alpha, d_x, thickness)
         return 0.5 * most, most / sqrt(12.0)
-    reach = radius + settings.whisker_radius_mm * left
-    return first_order.rolling(theta, reach, phi, alpha, d_x, left), 0.0
+    reach = radius + settings.whisker_radius_mm * thickness
+    return first_order.rolling(theta, reach, phi, alpha, d_x, thickness), 0.0
 
 
 def _contact(whisk: Whisk, solution: np.ndarray, covariance: np.ndarray) -> SharedContact:

@@ -161,21 +161,21 @@ def model_share(
     *,
     reach: ArrayLike = 0.0,
     tilt_sigma: ArrayLike = 0.0,
-    left: ArrayLike = 1.0,
+    thickness: ArrayLike = 1.0,
     held_spread: ArrayLike = 1.0,
 ) -> Numbers:
     """Return the relative sigma of d_x by what (10) leaves out: leading terms in θ, derived in
     docs/maps.md.
 
-    reach: radii of object and whisker together, mm; tilt_sigma: of the object's lean ψ, rad; left:
-    share of the base's diameter that is left at d_x. A held contact drags along the whisker by up
+    reach: radii of object and whisker together, mm; tilt_sigma: of the object's lean ψ, rad;
+    thickness: the diameter at d_x over the base's. A held contact drags along the whisker by up
     to tan α; where it slips, that is far less than the effect of α_est. held_spread: the part of
     that which is not known.
     """
     leaning = first_order.leaning(theta, tilt_sigma, phi, alpha)
-    rolling = first_order.rolling(theta, reach, phi, alpha, d_x, left)
+    rolling = first_order.rolling(theta, reach, phi, alpha, d_x, thickness)
     dragging = held_spread * first_order.dragging(theta, alpha)
-    large = theta**2 / (6 * left)
+    large = theta**2 / (6 * thickness)
     return np.sqrt(leaning**2 + rolling**2 + dragging**2 + large**2)
 
 
@@ -183,14 +183,14 @@ def model_share(
 def _upper_side(change, rest, alpha_est, half):
     """Return the width of the interval's side of small α.
 
-    It is the most of u·whole + √(1 − u²)·rest over what α ≥ 0 leaves of u in 0 to 1, where whole is
-    the change by all of α_est's half interval (rad), of which `change` is the part down to α = 0.
-    Where nothing is cut off, it is the root of the sum of squares.
+    It is the most of u·whole + √(1 − u²)·rest over u from 0 to the part of α_est's half interval (rad)
+    that α ≥ 0 leaves; whole is the change by all of that interval, of which `change` is the part down
+    to α = 0. Where nothing is cut off, it is the root of the sum of squares.
     """
-    left = np.where(alpha_est < half, alpha_est / half, 1.0)
-    whole = np.where(left > 0, change / left, 0.0)
+    part = np.where(alpha_est < half, alpha_est / half, 1.0)
+    whole = np.where(part > 0, change / part, 0.0)
     total = np.hypot(whole, rest)
-    u = np.where(total > 0, np.minimum(whole / total, left), 0.0)
+    u = np.where(total > 0, np.minimum(whole / total, part), 0.0)
     return u * whole + np.sqrt(1 - u**2) * rest
 
 

@@ -96,7 +96,7 @@ def alphas_of(results: Iterable[TrialResult]) -> list[WhiskAlphas]:
     """Return the friction angles of every whisk, in their order."""
     found = []
     for result, seen, felt in whisks(results):
-        left = result.whisker.left(seen.d_x_mm.value)
+        left = result.whisker.thickness(seen.d_x_mm.value)
         alpha_felt = felt_friction(seen, felt, np.radians(result.theta_deg), left)
         found.append(_alphas(result.trial, seen, felt, alpha_felt))
     return found

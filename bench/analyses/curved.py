@@ -363,7 +363,7 @@ def _radius(
     a turn of φ may add, mm/rad. Lean and turn are of the bar, what friction along the whisker adds is of
     all whisks.
     """
-    left = whisker.beam.left(d_x_mm)
+    left = whisker.beam.thickness(d_x_mm)
     per_mm = float(first_order.rolling(1.0, 1.0, phi, alpha.value, 1.0, left))
     dragging = 0.0
     by_alpha = 0.0

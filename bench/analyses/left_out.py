@@ -79,7 +79,7 @@ class WhiskModel:
     def alpha_rad(self) -> float:
         """Return its friction angle, as well as it is known: as seen, as felt, as assumed."""
         seen = self.seen.friction_rad.value
-        left = self.whisker.beam.left(self.seen.d_x_mm.value)
+        left = self.whisker.beam.thickness(self.seen.d_x_mm.value)
         felt, _ = felt_friction(self.seen, self.felt, self.theta_rad, left)
         assumed = self.given.alpha_est_rad if self.given else NAN
         for alpha in (seen, felt):
@@ -110,7 +110,7 @@ class WhiskModel:
     @property
     def left(self) -> float:
         """Return the share of the base's diameter that is left at the contact."""
-        return self.whisker.beam.left(self.d_x_est_mm)
+        return self.whisker.beam.thickness(self.d_x_est_mm)
 
     @property
     def phi_rad(self) -> float:

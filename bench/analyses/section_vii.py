@@ -100,7 +100,7 @@ def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) ->
 def _reach_mm(result: TrialResult) -> float:
     """Return the radii of bar and whisker together where the bar was set up."""
     trial = result.trial
-    whisker_mm = result.whisker.diameter_mm * result.whisker.left(trial.d_x_nominal_mm)
+    whisker_mm = result.whisker.diameter_mm * result.whisker.thickness(trial.d_x_nominal_mm)
     return 0.5 * (trial.bar_diameter_mm + whisker_mm)
 
 

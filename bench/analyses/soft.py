@@ -330,7 +330,7 @@ def _corrected(
     See `estimator.first_order`; a bar whose diameter is not known counts as thin.
     """
     beam = whisker.beam
-    left = beam.left(place.nominal_mm)
+    left = beam.thickness(place.nominal_mm)
     reach_mm = 0.5 * np.nan_to_num(bar_diameter_mm) + 0.5 * whisker.diameter_mm * left
     share = first_order.rolling(theta_rad, reach_mm, 0.0, alpha_rad, place.nominal_mm, left)
     share += first_order.HELD_SHARE * first_order.dragging(theta_rad, alpha_rad)
@@ -343,8 +343,10 @@ def _model_sigma(place: Place, beam: Beam, theta_rad: float, alpha_est: Value) -
     Both places have that alike: the contact is the same, and so is α.
     """
     alpha = alpha_est.value
-    left = beam.left(place.nominal_mm)
-    share = model_share(theta_rad, 0.0, alpha, 1.0, left=left, held_spread=first_order.HELD_SPREAD)
+    left = beam.thickness(place.nominal_mm)
+    share = model_share(
+        theta_rad, 0.0, alpha, 1.0, thickness=left, held_spread=first_order.HELD_SPREAD
+    )
     dragging = first_order.dragging(theta_rad, alpha)
     by_alpha = first_order.dragging(theta_rad, alpha + alpha_est.sigma) - dragging
     relative = float(np.hypot(share, first_order.HELD_SHARE * by_alpha))
@@ -353,7 +355,7 @@ def _model_sigma(place: Place, beam: Beam, theta_rad: float, alpha_est: Value) -
 
 def _compliance_of_distance(beam: Beam, place: Place) -> float:
     """Return the change of k_θ with a relative error of the distance: d_x ∂(d/C)/∂d_x."""
-    return place.nominal_mm / (beam.C_Nmm2 * beam.left(place.nominal_mm) ** 2)
+    return place.nominal_mm / (beam.C_Nmm2 * beam.thickness(place.nominal_mm) ** 2)
 
 
 def _row(soft: Soft) -> dict:

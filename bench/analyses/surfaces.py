@@ -175,7 +175,7 @@ def _felt(recording: int, result: TrialResult, seen: SeenWhisk, felt: FeltWhisk)
         shared_Nmm=felt.shared_Nmm,
         beta_sigma_rad=trial.beta_nominal_sigma_rad if nominal else seen.beta_rad.sigma,
         reach_mm=0.5
-        * (trial.bar_diameter_mm + result.whisker.diameter_mm * result.whisker.left(d_x_mm)),
+        * (trial.bar_diameter_mm + result.whisker.diameter_mm * result.whisker.thickness(d_x_mm)),
     )
 
 

@@ -40,7 +40,7 @@ def as_theory_has_them(
     slope = np.minimum(np.abs(phi) + alpha_rad, _STEEPEST_RAD)
     theta = np.broadcast_to(np.asarray(theta_rad, dtype=float), phi.shape)
     reach = np.where(np.isfinite(reach_mm), reach_mm, OBJECT_REACH_MM)
-    left = beam.left(np.asarray(d_x_mm, dtype=float))
+    left = beam.thickness(np.asarray(d_x_mm, dtype=float))
     bent = theta * np.cos(slope) / np.cos(alpha_rad)
     along = _share_along(phi, bent, alpha_rad)
     rolling = first_order.rolling_at(theta, reach, slope, d_x_mm, left)

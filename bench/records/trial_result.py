@@ -55,7 +55,7 @@ class WhiskerFacts:
     tip_diameter_mm: float | None = None
     widths: tuple[float, ...] = ()
 
-    def left(self, x_mm: float) -> float:
+    def thickness(self, x_mm: float) -> float:
         """Return the diameter at a distance from the base as a share of the base's diameter."""
         if self.widths:
             return float(np.polynomial.polynomial.polyval(x_mm / self.length_mm, self.widths))

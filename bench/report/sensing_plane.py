@@ -55,7 +55,7 @@ class PlanePoints:
             normal=np.array([-np.cos(beta), np.sin(beta)]),
             contact=contact,
             virtual=contact + np.array([whisk.at.d_y_mm.value, -whisk.at.d_z_mm.value]),
-            radius_mm=result.seen.wire_radius_mm * result.whisker.left(whisk.d_x_mm.value),
+            radius_mm=result.seen.wire_radius_mm * result.whisker.thickness(whisk.d_x_mm.value),
             bar_radius_mm=result.seen.bar_radius_mm,
         )
 

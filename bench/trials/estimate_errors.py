@@ -130,7 +130,7 @@ def _covariance_mm2(
     by_share = felt.by_camera_error_Nmm @ moment_Nmm / (moment_Nmm @ moment_Nmm)
     of_truth_mm = shared.d_x_by_camera_error_mm
     d_x_mm = row.d_x_est_mm.value
-    covariance_mm2 = -d_x_mm * result.whisker.left(d_x_mm) * float(by_share @ of_truth_mm)
+    covariance_mm2 = -d_x_mm * result.whisker.thickness(d_x_mm) * float(by_share @ of_truth_mm)
     most_mm2 = row.d_x_est_mm.sigma * seen.d_x_mm.sigma
     return float(np.clip(covariance_mm2, -most_mm2, most_mm2))
 

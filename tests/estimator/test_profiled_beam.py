@@ -25,7 +25,7 @@ def test_a_taper_by_its_widths_is_that_taper():
     assert same.as_cylinder_mm(d_x) == pytest.approx(taper.as_cylinder_mm(d_x), rel=1e-8)
     assert same.distance_mm(taper.as_cylinder_mm(d_x)) == pytest.approx(d_x, rel=1e-8)
     assert same.distance_mm(500.0) == pytest.approx(taper.distance_mm(500.0), rel=1e-8)
-    assert same.left(d_x) == pytest.approx(taper.left(d_x), rel=1e-6)
+    assert same.thickness(d_x) == pytest.approx(taper.thickness(d_x), rel=1e-6)
 
 
 @pytest.mark.parametrize("d_x", [1.3, 17.7, 50.1, 93.3])
@@ -37,7 +37,7 @@ def test_its_compliance_is_the_integral(d_x):
     response = (
         np.log(PROFILED.as_cylinder_mm(d_x + step) / PROFILED.as_cylinder_mm(d_x - step))
     ) / np.log((d_x + step) / (d_x - step))
-    assert PROFILED.left(d_x) == pytest.approx(1 / response, rel=1e-5)
+    assert PROFILED.thickness(d_x) == pytest.approx(1 / response, rel=1e-5)
 
 
 @pytest.mark.parametrize("d_x", [20.0, 50.0, 80.0])
@@ -60,7 +60,7 @@ def test_the_sigma_follows_the_profile():
     found = with_friction(
         Whisk.without_samples(theta, np.array([0.0, m_z]), noise, PROFILED), EstimatorSettings(0.0)
     )
-    assert found.sigma_mm == pytest.approx(1e-3 * PROFILED.left(d_x) * d_x, rel=1e-3)
+    assert found.sigma_mm == pytest.approx(1e-3 * PROFILED.thickness(d_x) * d_x, rel=1e-3)
 
 
 def test_a_rest_shape_that_is_hardly_known_widens_the_exact_rod_s_estimate():

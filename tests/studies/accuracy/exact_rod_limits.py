@@ -57,7 +57,7 @@ def asked(push: CurvedPush) -> tuple[np.ndarray, float]:
         whisker_radius_mm=0.5 * push.rod.diameter_mm,
     )
     found = np.array([one(whisk, settings).d_x_mm for one in (with_friction, exact_rod)])
-    model = builtin._share_of_rod(whisk, settings, found[1], beam.left(found[1]))
+    model = builtin._share_of_rod(whisk, settings, found[1], beam.thickness(found[1]))
     return found / felt.d_x_mm, model
 
 
