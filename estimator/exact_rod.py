@@ -1,14 +1,22 @@
 """The exact model inverted: distance, slope and force of a contact from the moments at the base.
 
-A rod of any unloaded shape and taper, bent by as much as it takes, against a straight bar that stands at
+A rod of any unloaded shape and taper, however far it bends, pushes against a straight bar that stands at
 right angles to the base's direction at first touch. Sections turn by Q from the unloaded shape, of
 tangents t₀: t = Q t₀, Q' = [κ]× Q, κ = (m + ν t (t·m))/EI, m = p × F, with p the way to the contact. From
-the contact, where p = 0, the rod is marched to its base. Five unknowns, the force there, the arc and the
-heading of the motion over the bar, satisfy five equations: both moments; friction is against the motion,
-along the rod too; the bar, whose slope follows from the force and α_est as in (9), is the one that the
-unloaded rod first touched; and the heading is that at the path's end. A curved rod is drawn along itself
-as it begins to slide, a straight one later, so that the path is known by its middle, too: force and arc
-halfway, with friction against the mean motion, touch the same bar; through three points of it goes a parabola.
+the contact, where p = 0, the rod is marched to its base.
+
+Unknown are the force at the contact, its arc, and the heading of the contact's motion over the bar. Five
+equations hold:
+
+- both moments at the base are those felt;
+- along the rod the force is what friction, which is against the motion, and the taper explain;
+- the bar is the one that the unloaded rod first touched; its slope follows from force and α_est as in (9);
+- the heading is that of the path at its end.
+
+A curved rod is drawn along itself as it begins to slide, a straight one later, so that the path is not known
+by its end alone. Force and arc halfway through the push are unknown, too: friction, against the mean motion,
+explains the force along the rod there, and the same bar is touched, with its slope and at its place. The path
+is the parabola through first touch, halfway and the end.
 
 All is solved in the rod's own units: lengths in the whisker's, forces in EI/L², moments in EI/L.
 """
@@ -194,7 +202,9 @@ class _Rod:
         return np.array([*force, arc, 0.0, *halfway, arc])
 
     def _values(self, unknowns: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Return the nine residuals, the distance and the slope (11, n) of n sets of unknowns and inputs."""
+        """Return the residuals of the nine equations, the distance and the slope (11, n) of n sets of unknowns
+        and inputs. Places over θ, so that they count alike however far the push goes.
+        """
         theta, m_y, m_z, alpha = inputs.T
         heading = unknowns[:, 4]
         now, halfway = self._bent(unknowns, theta)
