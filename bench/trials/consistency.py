@@ -3,16 +3,19 @@
 Each check returns NO_REASON where both agree or one of them is unknown.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.special import ndtr
 
+from bench.base.combined import harmonic_mean_chance
 from bench.session.signals import read_signals, stroke_speed_rad_s
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
 from bench.trials.differences import (
+    LEAST_CHANCE,
     Cause,
     Difference,
     are_alike,
@@ -158,27 +161,43 @@ def _time_message(frame: int, speed_rad_s: float) -> Callable[[float], str]:
     )
 
 
-def check_camera_delays(delays: Mapping[str, Value]) -> Reason:
+def check_camera_delays(of_whisks: Iterable[Mapping[str, Value]]) -> Reason:
     """Compare the cameras with each other: does one show each frame some frames later than the rest?
 
-    delays: of each camera if the others have none, frames.
+    of_whisks: for each whisk of a trial, the delay of each camera in frames if the others have none. A
+    camera's clock is the trial's, and so is the light that misleads it: the whisks are tested together,
+    their errors being dependent to an unknown degree (`harmonic_mean_chance`).
     """
-    if len(delays) < 2:
+    by_camera: dict[str, list[Value]] = {}
+    for delays in of_whisks:
+        for name, delay in delays.items():
+            by_camera.setdefault(name, []).append(delay)
+    if len(by_camera) < 2:
         return NO_REASON
-    name = max(delays, key=lambda camera: abs(delays[camera].value) / delays[camera].sigma)
-    late = delays[name].value
-    is_chance = Difference.scalar(late, delays[name].sigma).is_chance
-    if abs(late) < _LEAST_DELAY_FRAMES or is_chance:
+    chances = {name: _chance_of_no_delay(delays) for name, delays in by_camera.items()}
+    name = min(chances, key=chances.__getitem__)
+    late = max(by_camera[name], key=_over_sigma).value
+    if abs(late) < _LEAST_DELAY_FRAMES or chances[name] >= LEAST_CHANCE:
         return NO_REASON
     others = "the others"
-    if len(delays) == 2:
-        others = f"camera {next(other for other in delays if other != name)}"
+    if len(by_camera) == 2:
+        others = f"camera {next(other for other in by_camera if other != name)}"
     frames = counted(max(1, round(abs(late))), "frame")
     found = f"camera {name} looks {frames} {'later' if late > 0 else 'earlier'} than {others}"
     cause = (
         "one of them lost a frame, or its pictures are numbered from another one, or it was moved"
     )
     return Reason("camera_late", f"{found}: {cause}")
+
+
+def _chance_of_no_delay(delays: Sequence[Value]) -> float:
+    """Return the chance of delays as large as a camera's in the whisks of a trial, if it has none."""
+    return harmonic_mean_chance([2.0 * ndtr(-_over_sigma(delay)) for delay in delays])
+
+
+def _over_sigma(delay: Value) -> float:
+    """Return the size of a delay in its sigmas."""
+    return abs(delay.value) / delay.sigma
 
 
 def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board | None) -> Reason:

@@ -211,11 +211,12 @@ def _with_clock(preset: Seeing, clock_sigma_s: float) -> Seeing:
 
 
 def _trial_contradictions(truth: TrialTruth, session: Session, trial: Trial) -> list[Reason]:
-    """Return how the pictures contradict the stated diameters of bar and whisker."""
+    """Return how the pictures contradict the stated diameters of bar and whisker, and each other."""
     wire_looks = next((whisk.widths for whisk in truth.whisks if whisk.widths), {})
     return [
         check_bar_width(truth.bar_widths, trial, session.board),
         check_wire_width(wire_looks, session.whisker),
+        check_camera_delays(whisk.delays for whisk in truth.whisks),
     ]
 
 
@@ -305,7 +306,6 @@ def whisk_record(
     """
     at = truth.at(settings.theta_rad)
     contradictions = list(contradictions)
-    contradictions.append(check_camera_delays(truth.delays))
     if truth.frames:
         contradictions.append(
             check_turns(truth.turns, motor_speed(truth.frames), stated_speed_rad_s)

@@ -338,5 +338,26 @@ def test_reversed_gauges_are_told_without_a_picture(trial):
     ],
 )
 def test_a_camera_late_by_a_frame_is_named(delays, said):
-    found = check_camera_delays(delays)
+    found = check_camera_delays([delays])
     assert found.startswith(said) and bool(found) == bool(said)
+
+
+@pytest.mark.parametrize(
+    ("of_whisks", "is_late"),
+    [
+        # Of 640 simulated whisks the two with the largest delays, and the others of their trials.
+        ([0.31, 0.86, 0.75, 1.04, 0.55, 0.35, 0.98, 1.11, 0.94, 0.27], False),
+        # The same trials with that camera late by a frame: 4.8 sigma in two of ten whisks.
+        ([1.14, 1.39, 1.05, 1.04, 1.48, 1.73, 0.85, 0.50, 1.11, 1.01], True),
+        # A frame lost half-way.
+        ([0.1, 0.2, 0.0, 0.1, 0.3, 1.8, 1.7, 1.6, 1.8, 1.9], True),
+        ([], False),
+    ],
+)
+def test_the_whisks_of_a_trial_are_tested_together(of_whisks, is_late):
+    sigmas = [0.25, 0.43, 0.25, 0.37, 0.28, 0.35, 0.35, 0.276, 0.38, 0.25]
+    delays = [
+        {"high": Value(-0.1, 0.15), "low": Value(value, sigma)}
+        for value, sigma in zip(of_whisks, sigmas)
+    ]
+    assert bool(check_camera_delays([{}, *delays])) == is_late
