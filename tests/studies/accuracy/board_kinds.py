@@ -1,7 +1,7 @@
 """Cameras by each kind of board: are the stated sigmas true, and what does a contact's place lose against ChArUco?
 
     python tests/studies/accuracy/board_kinds.py --count 10
-    python tests/studies/accuracy/board_kinds.py --whisks FOLDER
+    python tests/studies/accuracy/board_kinds.py --whisks FOLDER [--seeds 1]
 
 Each board is painted through the lenses of two known cameras, held at the same random poses and standing on the rig;
 its points are found in the pictures. One calibration is made of these, and `count` more of the true points with noise
@@ -9,10 +9,12 @@ of the sigmas that the pictures gave. Prints RMS of error over stated sigma of p
 calibration by pictures and for all others, and the sigma of x there, which is that of d_x by the cameras.
 
 With --whisks sessions of each kind are simulated in FOLDER and evaluated, boards to verdict: prints errors of d_x (mm)
-and slope (deg), RMS and largest z, and what is warned of. A session that has its row in FOLDER/whisks.csv is not made again.
+and slope (deg), RMS and largest z, how many 95 % intervals hold, and what is warned of. A session that has its row in
+FOLDER/whisks.csv is not made again.
 """
 
 import argparse
+import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,7 +28,7 @@ from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from tests.scenes.board_prints import KINDS, NAMES, picture_of, pose_before
 from tests.studies.accuracy.board_scenes import SIZE_PX, T_RIG_BOARD, WORK_MM, two_cameras
-from tests.studies.accuracy.rows import all_rows
+from tests.studies.accuracy.rows import HALF_WIDTH_95, all_rows
 from tests.studies.accuracy.sessions import errors
 from vision.boards import Corners, find_corners
 from vision.calibration.calibrate import calibrate_cameras
@@ -158,48 +160,66 @@ beta_deg = [0, 25, 50]
 d_x_mm = 58.0
 """
 QUANTITIES = {"d_x": "d_x_mm", "beta": "beta_deg"}
-OF_EACH = ("n", "rms", "rms_z", "most_z", "rms_sigma")
+OF_EACH = ("n", "held", "rms_z", "rms", "rms_sigma", "most_z")
 WHISK_COLUMNS = ("look", *(f"{name}_{what}" for name in QUANTITIES for what in OF_EACH), "status")
+FIRST_SEED = 5
 
 
-def whisks_of(folder: Path, name: str, workers: int = 2) -> dict:
-    """A session by one kind of board, evaluated and reduced."""
-    path = folder / name
-    out = folder / f"{name}_out"
-    protocol = folder / f"{name}.toml"
-    folder.mkdir(parents=True, exist_ok=True)
-    protocol.write_text(PROTOCOL.format(name=name, board=ON_RIG[name]))
-    simulate(path, protocol=protocol, seed=5, workers=workers)
-    run = api.evaluate(path, out, figures=False, workers=workers)
-    row: dict = {"look": name, "status": " ".join(filter(None, run.whisks["status"]))}
-    for quantity, column in QUANTITIES.items():
-        error, sigma, _ = errors(load_session(path), out, run.whisks, column).T
-        z = error / sigma
-        rms, rms_z, rms_sigma = (np.sqrt(np.mean(column**2)) for column in (error, z, sigma))
-        values = (len(z), rms, rms_z, np.abs(z).max(), rms_sigma)
-        row |= {f"{quantity}_{what}": float(value) for what, value in zip(OF_EACH, values)}
+def row_of(folder: Path, name: str, seed: int, workers: int = 2) -> dict:
+    """The row of a session by one kind of board, made where it is not there."""
+    table = folder / "whisks.csv"
+    look = f"{name} {seed}"
+    rows = all_rows(table, WHISK_COLUMNS, [look], lambda _: whisks_of(folder, name, seed, workers))
+    (row,) = (row for row in rows if row["look"] == look)
     return row
 
 
-def print_whisks(folder: Path, only: str) -> None:
-    names = [name for name in ON_RIG if name.startswith(only)]
-    table = folder / "whisks.csv"
-    rows = all_rows(table, WHISK_COLUMNS, names, lambda name: whisks_of(folder, name))
-    for row in rows:
-        print(f"{row['look']}: {row['d_x_n']:.0f} whisks {row['status']}")
-        for name in QUANTITIES:
-            rms, rms_z, most_z = (row[f"{name}_{what}"] for what in OF_EACH[1:4])
-            print(f"  {name} off by {rms:.4f} RMS, z {rms_z:.2f} RMS, {most_z:.1f} at most")
+def whisks_of(folder: Path, name: str, seed: int, workers: int) -> dict:
+    """A session by one kind of board, evaluated and reduced; the pictures go."""
+    path = folder / f"{name}{seed}"
+    out = folder / f"{name}{seed}_out"
+    protocol = folder / f"{name}.toml"
+    folder.mkdir(parents=True, exist_ok=True)
+    protocol.write_text(PROTOCOL.format(name=name, board=ON_RIG[name]))
+    simulate(path, protocol=protocol, seed=seed, workers=workers)
+    run = api.evaluate(path, out, figures=False, workers=workers)
+    status = " ".join(filter(None, run.whisks["status"]))
+    row: dict = {"look": f"{name} {seed}", "status": status}
+    for quantity, column in QUANTITIES.items():
+        error, sigma, _ = errors(load_session(path), out, run.whisks, column).T
+        z = error / sigma
+        held = np.mean(np.abs(z) < HALF_WIDTH_95)
+        rms_z, rms, rms_sigma = (np.sqrt(np.mean(one**2)) for one in (z, error, sigma))
+        values = (len(z), held, rms_z, rms, rms_sigma, np.abs(z).max())
+        row |= {f"{quantity}_{what}": float(value) for what, value in zip(OF_EACH, values)}
+    shutil.rmtree(path)
+    return row
+
+
+def print_whisks(folder: Path, only: str, seeds: int) -> None:
+    for name in ON_RIG:
+        if not name.startswith(only):
+            continue
+        for seed in range(FIRST_SEED, FIRST_SEED + seeds):
+            row = row_of(folder, name, seed)
+            print(f"{row['look']}: {row['d_x_n']:.0f} whisks {row['status']}")
+            for quantity in QUANTITIES:
+                _, held, rms_z, rms, _, most_z = (row[f"{quantity}_{what}"] for what in OF_EACH)
+                print(
+                    f"  {quantity} off by {rms:.4f} RMS, z {rms_z:.2f} RMS, {most_z:.1f} at most, {held:.0%} hold",
+                    flush=True,
+                )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--whisks", type=Path, metavar="FOLDER", help="whole whisks, into FOLDER")
     parser.add_argument("--count", type=int, default=10)
+    parser.add_argument("--seeds", type=int, default=1, help="sessions of each kind, of --whisks")
     parser.add_argument("--only", default="", help="names that begin so")
     options = parser.parse_args()
     if options.whisks:
-        print_whisks(options.whisks, options.only)
+        print_whisks(options.whisks, options.only, options.seeds)
         return
     for board, name in zip(KINDS, NAMES):
         if name.startswith(options.only):

@@ -1,140 +1,184 @@
 """What a lab brings against the native way: d_x of simulated whisks whose truth is known, one table of all ways.
 
-    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/accuracy/brought.py FOLDER [--seeds 1] [--only WAY]
+    OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/accuracy/brought.py FOLDER [--seeds 6] [--only WAY]
 
-Calls the studies of the single ways (stage.py, given_traces.py, mirror.py, board_kinds.py, angles.py) and keeps sessions
-and results in FOLDER: a way that has its rows in FOLDER/brought.csv is not made again. Prints of each way the whisks, RMS
-of d_x's error and of its sigma, both of the native way on the same whisks or at the same places, and whether error and
-sigma are at most what was asked for: twice the native sigma (of a stage its own), of traces 0.05 mm, of a mirror 1.5 times
-what two cameras give.
+Calls the studies of the single ways (stage.py, given_traces.py, mirror.py, board_kinds.py, angles.py). A seed that has its
+row in FOLDER/<way>.csv is not made again. Prints of each way the whisks, how many 95 % intervals hold, and how often
+chance alone would leave so few or so many; RMS of d_x's error and of its sigma, both of the native way on the same whisks
+or at the same places, and whether error and sigma are at most what was asked for: twice the native sigma (of a stage its
+own), of traces 0.05 mm, of a mirror 1.5 times what two cameras give.
 """
 
 import argparse
+import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import binomtest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.session.session import load_session
 from tests.studies.accuracy import angles, board_kinds, given_traces, mirror, stage
-from tests.studies.accuracy.rows import all_rows
+from tests.studies.accuracy.rows import HALF_WIDTH_95, all_rows
 
 MOST_TRACES_MM = 0.05
 MOST_OF_MIRROR = 1.5
 MOST_OF_NATIVE = 2.0
+LASTING_PX = 0.1
 STAGE_WHISKS = 100
-COLUMNS = ("look", "n", "rms", "sigma", "native_rms", "native_sigma", "most")
-Way = tuple[float, float, float]  # whisks, RMS of error and of sigma, mm
+OF_EACH = ("n", "held", "rms_z", "rms", "rms_sigma")
+Figures = dict[str, float]  # OF_EACH
 
 
-def of_whisks(found: list) -> Way:
-    """Whisks and RMS of errors and sigmas (n, 2)."""
+def of_whisks(found: list) -> Figures:
+    """Reduce errors and sigmas (n, 2), mm, of the whisks that have a truth."""
     table = np.array(found)
     table = table[np.isfinite(table).all(axis=1)]
-    return (len(table), *np.sqrt(np.mean(table**2, axis=0)).tolist())
+    error, sigma = table.T
+    z = error / sigma
+    held = np.mean(np.abs(z) < HALF_WIDTH_95)
+    roots = (np.sqrt(np.mean(column**2)) for column in (z, error, sigma))
+    return dict(zip(OF_EACH, (len(z), held, *roots)))
 
 
-def row(look: str, way: Way, native: Way, most_mm: float) -> dict:
-    """The row of a way: most_mm is what error and sigma may be."""
-    return dict(zip(COLUMNS, (look, *way, *native[1:], most_mm)))
+def of_columns(row: dict, name: str) -> Figures:
+    """Return a quantity's figures of another study's row."""
+    return {what: row[f"{name}_{what}"] for what in OF_EACH}
 
 
-def by_stage(folder: Path, seeds: range, workers: int) -> Iterator[dict]:
-    """Yield the row of a bar's place by a stage."""
+def pooled(rows: list[dict]) -> Figures:
+    """Reduce the figures of several sessions to those of all their whisks."""
+    n, held, *roots = np.array([[row[what] for what in OF_EACH] for row in rows]).T
+    squares = (np.sqrt(n @ root**2 / n.sum()) for root in roots)
+    return dict(zip(OF_EACH, (n.sum(), n @ held / n.sum(), *squares)))
+
+
+def by_stage(folder: Path, seed: int, workers: int) -> dict[str, Figures]:
+    """A bar's place by a stage."""
     session = load_session(stage.SESSION)
-    drawn = []
-    for seed in seeds:
-        drawn += stage.drawn_whisks(session, "bar", STAGE_WHISKS, seed + 1)
-    way = of_whisks([(w.d_x_error_mm, w.d_x_sigma_mm) for w in drawn])
-    yield row("stage", way, way, MOST_OF_NATIVE * way[2])
+    drawn = stage.drawn_whisks(session, "bar", STAGE_WHISKS, seed + 1)
+    return {"stage": of_whisks([(w.d_x_error_mm, w.d_x_sigma_mm) for w in drawn])}
 
 
-def by_traces(folder: Path, seeds: range, workers: int) -> Iterator[dict]:
-    """Yield the rows of traces beside pictures and without."""
-    folder.mkdir(parents=True, exist_ok=True)
+def by_traces(folder: Path, seed: int, workers: int) -> dict[str, Figures]:
+    """Traces beside pictures and without, and pictures alone."""
     found: dict[str, list] = {}
-    for seed in seeds:
-        for name, d_x, *_ in given_traces.whisks(folder, seed, 0.1, given_traces.TOO):
-            found.setdefault(name, []).append(d_x)
-    native = of_whisks(found["pictures"])
-    yield row("traces", of_whisks(found["traces"]), native, MOST_TRACES_MM)
-    yield row("traces-only", of_whisks(found["alone"]), native, MOST_TRACES_MM)
+    for name, d_x, *_ in given_traces.whisks(folder, seed, LASTING_PX, given_traces.TOO):
+        found.setdefault(name, []).append(d_x)
+    shutil.rmtree(folder / f"s{seed}")
+    return {name: of_whisks(whisks) for name, whisks in found.items()}
 
 
-def by_mirror(folder: Path, seeds: range, workers: int) -> Iterator[dict]:
-    """Yield the row of one camera and a mirror."""
+def by_mirror(folder: Path, seed: int, workers: int) -> dict[str, Figures]:
+    """One camera and a mirror, and two cameras at the same places."""
     found = {}
-    for kind, rows in mirror.rows_of(folder, seeds, workers).items():
-        n, _, _, rms, rms_sigma = mirror.pooled(rows, "d_x_mm")
-        found[kind] = (n, rms, rms_sigma)
-    most_mm = MOST_OF_MIRROR * max(found["two"][1:])
-    yield row("mirror", found["mirror"], found["two"], most_mm)
+    for kind, rows in mirror.rows_of(folder, range(seed, seed + 1), workers).items():
+        (row,) = (row for row in rows if row["seed"] == seed)
+        found[kind] = of_columns(row, "d_x_mm")
+    return found
 
 
-def by_boards(folder: Path, seeds: range, workers: int) -> Iterator[dict]:
-    """Yield the rows of other boards than ChArUco."""
+def by_boards(folder: Path, seed: int, workers: int) -> dict[str, Figures]:
+    """Each kind of board, ChArUco among them."""
     found = {}
     for name in board_kinds.ON_RIG:
-        one = board_kinds.whisks_of(folder, name, workers)
-        found[name] = tuple(one[f"d_x_{what}"] for what in ("n", "rms", "rms_sigma"))
-    native = found.pop("charuco")
-    for name, way in found.items():
-        yield row(name, way, native, MOST_OF_NATIVE * native[2])
+        row = board_kinds.row_of(folder, name, board_kinds.FIRST_SEED + seed, workers)
+        found[name] = of_columns(row, "d_x")
+    return found
 
 
-def by_angles(folder: Path, seeds: range, workers: int) -> Iterator[dict]:
-    """Yield the rows of angles by pictures."""
-    folder.mkdir(parents=True, exist_ok=True)
+def by_angles(folder: Path, seed: int, workers: int) -> dict[str, Figures]:
+    """Angles by pictures, and by the log."""
     found: dict[str, list] = {}
     for angle_from in ("log", *angles.SEEN):
-        for seed in seeds:
-            for name, d_x in angles.rows_of(folder, seed, angle_from):
-                if name == "d_x_mm":
-                    found.setdefault(angle_from, []).append(d_x)
-    native = of_whisks(found.pop("log"))
-    for angle_from, whisks in found.items():
-        yield row(angle_from, of_whisks(whisks), native, MOST_OF_NATIVE * native[2])
+        for name, d_x in angles.rows_of(folder, seed, angle_from):
+            if name == "d_x_mm":
+                found.setdefault(angle_from, []).append(d_x)
+    for session in folder.glob(f"s{seed}*"):
+        shutil.rmtree(session)
+    return {angle_from: of_whisks(whisks) for angle_from, whisks in found.items()}
 
 
-Rows = Callable[[Path, range, int], Iterator[dict]]
-WAYS: dict[str, tuple[Rows, tuple[str, ...]]] = {
-    "stage": (by_stage, ("stage",)),
-    "traces": (by_traces, ("traces", "traces-only")),
-    "mirror": (by_mirror, ("mirror",)),
-    "boards": (by_boards, tuple(name for name in board_kinds.ON_RIG if name != "charuco")),
-    "angles": (by_angles, angles.SEEN),
+def twice_native(native: Figures) -> float:
+    """What error and sigma may be, mm."""
+    return MOST_OF_NATIVE * native["rms_sigma"]
+
+
+@dataclass(frozen=True)
+class Way:
+    """How whisks of a seed are seen.
+
+    native: the look that the others are held against. most_mm: by its figures, what error and sigma of these may be.
+    """
+
+    figures: Callable[[Path, int, int], dict[str, Figures]]
+    looks: tuple[str, ...]
+    native: str
+    most_mm: Callable[[Figures], float] = twice_native
+
+
+WAYS = {
+    "stage": Way(by_stage, ("stage",), "stage"),
+    "traces": Way(by_traces, ("traces", "alone"), "pictures", lambda _: MOST_TRACES_MM),
+    "mirror": Way(
+        by_mirror,
+        ("mirror",),
+        "two",
+        lambda two: MOST_OF_MIRROR * max(two["rms"], two["rms_sigma"]),
+    ),
+    "boards": Way(by_boards, tuple(k for k in board_kinds.ON_RIG if k != "charuco"), "charuco"),
+    "angles": Way(by_angles, angles.SEEN, "log"),
 }
+
+
+def rows_of(folder: Path, name: str, seeds: int, workers: int) -> dict[str, list[Figures]]:
+    """Return by look the figures of each seed of a way, made where they are not there."""
+    way = WAYS[name]
+    looks = dict.fromkeys((way.native, *way.looks))
+    columns = ("seed", *(f"{look}_{what}" for look in looks for what in OF_EACH))
+
+    def row_of(seed: int) -> dict:
+        """The row of a seed."""
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        row: dict = {"seed": seed}
+        for look, figures in way.figures(folder / name, seed, workers).items():
+            row |= {f"{look}_{what}": value for what, value in figures.items()}
+        return row
+
+    rows = all_rows(folder / f"{name}.csv", columns, range(seeds), row_of)
+    return {look: [of_columns(row, look) for row in rows] for look in looks}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--seeds", type=int, default=6)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", choices=WAYS)
     options = parser.parse_args()
-    rows: list[dict] = []
-    for name, (rows_of, looks) in WAYS.items():
-        made: dict[str, dict] = {}
-
-        def make(look: str, name=name, rows_of=rows_of, made=made) -> dict:
-            """The row of a look, made with all others of its way."""
-            if not made:
-                found = rows_of(options.folder / name, range(options.seeds), options.workers)
-                made |= {one["look"]: one for one in found}
-            return made[look]
-
-        wanted = looks if options.only in (None, name) else ()
-        rows = all_rows(options.folder / "brought.csv", COLUMNS, wanted, make)
-    print("| way | whisks | error, mm | sigma, mm | native error | native sigma | at most | |")
-    print("|---|---|---|---|---|---|---|---|")
-    for one in rows:
-        numbers = " | ".join(f"{one[name]:.4f}" for name in COLUMNS[2:])
-        holds = "holds" if max(one["rms"], one["sigma"]) <= one["most"] else "does not hold"
-        print(f"| {one['look']} | {one['n']:.0f} | {numbers} | {holds} |")
+    print(
+        "| way | whisks | hold | by chance | z | error | sigma | native error | sigma | at most | |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    for name in WAYS if options.only is None else (options.only,):
+        rows = rows_of(options.folder, name, options.seeds, options.workers)
+        native = pooled(rows[WAYS[name].native])
+        most_mm = WAYS[name].most_mm(native)
+        for look, of_seeds in rows.items():
+            way = pooled(of_seeds)
+            n = round(way["n"])
+            chance = binomtest(round(way["held"] * n), n, 0.95).pvalue
+            roots = " | ".join(f"{way[what]:.4f}" for what in ("rms", "rms_sigma"))
+            of_native = f"{native['rms']:.4f} | {native['rms_sigma']:.4f} | {most_mm:.4f}"
+            holds = max(way["rms"], way["rms_sigma"]) <= most_mm
+            print(
+                f"| {look} | {n} | {way['held']:.1%} | {chance:.2f} | {way['rms_z']:.2f} | {roots} | {of_native} "
+                f"| {'holds' if holds else 'does not hold'} |"
+            )
 
 
 if __name__ == "__main__":
