@@ -22,6 +22,9 @@ _WINDOW_RAD = np.radians(1.6)
 # [mm] A slip record that leaves its local fit by more is not smooth: stick and slip. Half or
 # twice it moves nothing on the fixtures. Study: thresholds.py truth.at_angle _JUMP_MM ….
 _JUMP_MM = 0.025
+# [sigma] Of the frames' own scatter about that fit, beyond which it is no chance: 1 in 15 000. Of 0.3 px in traces
+# slip scatters by 0.02 mm. Derived.
+_JUMP_SIGMAS = 4.0
 # [rad] Past the last frame a value is still given. Set by eye. Study: thresholds.py
 # truth.at_angle _BEYOND_RAD ….
 _BEYOND_RAD = np.radians(0.3)
@@ -142,11 +145,14 @@ def _smooth_value(smooth: Smooth, name: str, theta_rad: float) -> Value:
 
 
 def _slip_jumps(smooth: Smooth, theta_rad: float) -> bool:
-    """Return whether the slip in a frame near theta is away from its local fit."""
-    slip = smooth.values["slip"]
+    """Return whether the slip in a frame near theta is away from its local fit, by more than frames scatter."""
+    slip_mm = smooth.values["slip"]
+    by_parameter = smooth.jacobians["slip"]
     for frame in np.flatnonzero(np.abs(smooth.theta_rad - theta_rad) <= _WINDOW_RAD):
         weights, _ = _local_fit(smooth.theta_rad, smooth.theta_rad[frame])
-        if abs(weights @ slip - slip[frame]) > _JUMP_MM:
+        weights[frame] -= 1.0
+        sigma_mm = propagated_sigma(weights @ by_parameter, smooth.covariance)
+        if abs(weights @ slip_mm) > max(_JUMP_MM, _JUMP_SIGMAS * sigma_mm):
             return True
     return False
 

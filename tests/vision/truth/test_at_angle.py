@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from vision.truth.at_angle import Smooth, _between_frames_sigma, at_angle, scatter
+from vision.truth.at_angle import (
+    Smooth,
+    _between_frames_sigma,
+    _slip_jumps,
+    at_angle,
+    scatter,
+)
 from vision.truth.value import FIELDS
 
 THETA_RAD = np.radians(np.arange(0.5, 6.0, 0.5))
@@ -120,3 +126,12 @@ def test_what_jumps_holds_the_jump_in_its_sigma(step_deg):
         off.append([abs(value.value - float(truth)) / value.sigma for value, truth in told])
     assert np.max(off) < 4.0
     assert np.all(np.mean(np.array(off) < 1.96, axis=0) > 0.93)
+
+
+@pytest.mark.parametrize("scatter_mm, jumps", [(0.02, False), (0.004, True)])
+def test_a_slip_off_its_fit_jumps_where_frames_do_not_scatter_as_much(scatter_mm, jumps):
+    """One frame 0.06 mm off a line leaves a residual of 2.4 sigmas as traces scatter, of 12 as pictures do."""
+    slip_mm = 20.0 * THETA_RAD
+    slip_mm[5] += 0.06
+    smooth = frames(scatter_mm**2 * np.eye(len(THETA_RAD)), slip_mm, "slip")
+    assert _slip_jumps(smooth, np.radians(3.0)) is jumps
