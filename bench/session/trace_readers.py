@@ -411,12 +411,12 @@ def _whisk_identities(path: Path, label: str) -> dict[tuple[int, int], int] | No
     """
     if not path.is_file():
         return None
-    found = _read_measurements(path, label)
+    found = read_measurements(path, label)
     is_classified = any(identity >= 0 for identity in found.values())
     return found if is_classified and len(set(found.values())) > 1 else None
 
 
-def _read_measurements(path: Path, label: str) -> dict[tuple[int, int], int]:
+def read_measurements(path: Path, label: str) -> dict[tuple[int, int], int]:
     """Read the identity of each segment by frame and number from Whisk's measurements."""
     content = path.read_bytes()
     row_bytes = {b"measv3\0\0": 41, b"measV1\0\0": 40}.get(content[:8])

@@ -4,7 +4,9 @@
 
 SESSION: tests/data/minimal_session of talmolab/sleap-anipose (GPL-3; at a9274a6, whose cameras made its points), with a
 folder a camera. Prints by camera how many points both files have, how far they are apart, and the median distance of the
-points in space from these, px. CALIBRATION: other files of aniposelib; prints the cameras of each. Needs h5py.
+points in space from these, px. CALIBRATION: other files of aniposelib, of which it prints the cameras, or `.measurements`
+of whisk (ExampleFiles of vncntprvst/whisker_pipeline, at 14a0c72), of which it prints segments, frames and identities.
+Needs h5py.
 """
 
 import sys
@@ -15,7 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from bench.session.trace_readers import DrawnLines, read_lines
+from bench.session.trace_readers import DrawnLines, read_lines, read_measurements
 from vision.calibration import foreign_cameras
 from vision.geometry import Camera
 
@@ -43,7 +45,14 @@ def main() -> None:
         print(f"{camera.name}: {len(one.px)} and {len(other.px)} points, {apart_px:.1g} px apart;")
         print(f"  {median_px:.1f} px from the points in space")
     for path in map(Path, sys.argv[2:]):
-        print(f"{path}: cameras {', '.join(foreign_cameras(path).names)}")
+        if path.suffix == ".measurements":
+            identities = read_measurements(path, path.name)
+            frames = len({frame for frame, _ in identities})
+            print(
+                f"{path}: {len(identities)} segments, {frames} frames, identities {set(identities.values())}"
+            )
+        else:
+            print(f"{path}: cameras {', '.join(foreign_cameras(path).names)}")
 
 
 if __name__ == "__main__":
