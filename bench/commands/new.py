@@ -18,13 +18,13 @@ _NUMBERS = {
     "--origin-sigma-mm": "of the stage's origin against the whisker's base",
     "--speed-deg-s": "of the motor, where its angle is not recorded",
     "--speed-sigma-deg-s": "one standard deviation of it",
+    "--hub-marker": "number of the marker on the motor's hub",
 }
 # Short for an answer: the option, the question, the answer.
 _SHORT = (
     ("--mirror", "cameras", "mirror"),
     ("--traces", "truth", "traces"),
     ("--traces-only", "truth", "traces-only"),
-    ("--no-motor-log", "motor_log", "no"),
 )
 
 

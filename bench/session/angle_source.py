@@ -61,13 +61,14 @@ class AngleSource(ABC):
 
     by: how tables say where the angle is from. has_zero: pictures and angle have one zero, so that
     pictures give truth. is_seen: it is from the trial's own pictures, and so is θ of its estimates.
-    unknown: what cannot be known then, for `check`.
+    unknown: what cannot be known then, for `check`. keys: of [trial], without which it gives no angle.
     """
 
     by: str
     has_zero = True
     is_seen = False
     unknown = ""
+    keys: tuple[str, ...] = ()
 
     def lacks(self, trial: Trial) -> str:
         """Return what is to be done before the angle is known; '' where nothing is."""
@@ -107,6 +108,7 @@ class StatedSpeed(AngleSource):
     by = "the stated speed"
     has_zero = False
     unknown = "touch as pictures have it, changes of speed, and the way back"
+    keys = ("speed_deg_s", "speed_sigma_deg_s")
 
     def of_samples(
         self, table: NumberTable, channels: np.ndarray, trial: Trial, label: str
@@ -124,9 +126,10 @@ class Seen(AngleSource):
         "the motor between frames and outside them, a lag of motor or encoder behind the pictures"
     )
 
-    def __init__(self, by: str):
-        """Take how tables say where the angle is from."""
+    def __init__(self, by: str, key: str):
+        """Take how tables say where the angle is from, and the key without which there is none."""
         self.by = by
+        self.keys = (key,)
 
     def lacks(self, trial: Trial) -> str:
         """Return the verb that makes the file of angles, where it is missing."""
@@ -155,8 +158,8 @@ class Seen(AngleSource):
 SOURCES: dict[str, AngleSource] = {
     "log": Logged(),
     "speed": StatedSpeed(),
-    "marker": Seen("the hub's marker, seen in pictures of the same trial"),
-    "whisker": Seen("the whisker's base, seen in pictures of the same trial"),
+    "marker": Seen("the hub's marker, seen in pictures of the same trial", "hub_marker"),
+    "whisker": Seen("the whisker's base, seen in pictures of the same trial", "speed_deg_s"),
 }
 
 

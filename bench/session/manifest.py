@@ -37,6 +37,7 @@ Rigidity = Annotated[float, plausible.RIGIDITY]
 Angle = Annotated[float, plausible.ANGLE]
 Slope = Annotated[float, plausible.SLOPE]
 Speed = Annotated[float, plausible.SPEED]
+Marker = Annotated[int, plausible.MARKER]
 Rate = Annotated[float, plausible.RATE]
 Exposure = Annotated[float, plausible.EXPOSURE]
 Force = Annotated[float, plausible.FORCE]
@@ -288,7 +289,7 @@ class TrialKeys(GivenKeys):
     # trial's own pictures by `calibrate angles` ([bring.md](bring.md))
     angle_from: Literal["log", "speed", "marker", "whisker"] = "log"
     # number of the marker on the hub, of angle_from = "marker"
-    hub_marker: int | None = None
+    hub_marker: Marker | None = None
     # nominal speed of the motor; signals that say another give a warning; its sigma enters θ of
     # angle_from = "speed" alone
     speed_deg_s: Speed | None = None

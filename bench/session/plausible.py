@@ -72,6 +72,7 @@ NUMBER = PlausibleRange(-1e7, 1e7)
 EXPOSURE = PlausibleRange(1e-7, 1.0, (MILLISECONDS, MICROSECONDS))
 PIXEL_ASPECT = PlausibleRange(0.1, 10.0)
 VELOCITY = PlausibleRange(-1e4, 1e4, (("metres per second", 1e3),))
+MARKER = PlausibleRange(0, 1023)
 FORCE = PlausibleRange(0.0, 1e3)
 SIGMA = PlausibleRange(0.0, math.inf)
 

@@ -11,6 +11,7 @@ import numpy as np
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.session import manifest
+from bench.session.angle_source import SOURCES
 from bench.session.daq import daq_file
 from bench.session.footage import camera_sources, single_pictures, visible
 from bench.session.givens import Given
@@ -304,7 +305,7 @@ def _stated_session(path: Path, tables: dict, problems: InputProblems) -> Stated
     check_part_keys(tables.get("cameras"), problems)
     has_trials = bool(visible(path / "trials"))
     if not has_trials:
-        _check_speed_parts(tables.get("trial"), problems)
+        _check_angle_parts(tables.get("trial"), problems)
     needed = []
     if has_trials:
         needed = ["bar"] if "whiskers" in tables else ["whisker", "bar"]
@@ -324,17 +325,19 @@ def _check_board_parts(board: Any, problems: InputProblems) -> None:
             raise BadInput(line, file=MANIFEST)
 
 
-def _check_speed_parts(trial: Any, problems: InputProblems) -> None:
-    """Report each key that angles by the stated speed need and that [trial] does not have.
+def _check_angle_parts(trial: Any, problems: InputProblems) -> None:
+    """Report each key that angles without a motor log need and that [trial] does not have.
 
     Where there are trials, each of them may have it.
     """
-    if not isinstance(trial, dict) or trial.get("angle_from") != "speed":
+    if not isinstance(trial, dict):
         return
-    for key in ("speed_deg_s", "speed_sigma_deg_s"):
+    angle_from = str(trial.get("angle_from"))
+    for key in SOURCES[angle_from].keys if angle_from in SOURCES else ():
         with problems.guard():
             if key not in trial:
-                raise BadInput(f'[trial] {key} is missing: angle_from = "speed"', file=MANIFEST)
+                found = f'[trial] {key} is missing: angle_from = "{angle_from}"'
+                raise BadInput(found, file=MANIFEST)
 
 
 def _whisker(keys: manifest.WhiskerKeys | None, path: Path) -> Whisker | None:

@@ -3,7 +3,7 @@
 Imports nothing heavy: the command line makes its options of these.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -33,7 +33,12 @@ CHOICES = (
         ("pictures", "traces", "traces-only", "stage"),
     ),
     Choice("board_kind", "kind of board", KIND_NAMES),
-    Choice("motor_log", "is the motor's angle recorded", ("yes", "no")),
+    Choice(
+        "angle_from",
+        "where the motor's angle is from: its log, a marker on its hub or the whisker's base in the pictures, "
+        "or its constant speed",
+        ("log", "marker", "whisker", "speed"),
+    ),
     Choice(
         "gauges",
         "gauges: volts with trials that calibrate them, volts with known gauges, or N·mm",
@@ -49,7 +54,7 @@ class Lab:
     cameras: str
     truth: str
     board_kind: str
-    motor_log: str
+    angle_from: str
     gauges: str
 
     @property
@@ -87,15 +92,31 @@ class Lab:
 
 def _allowed(choice: Choice, known: Mapping[str, str]) -> tuple[str, ...]:
     """Return the answers that go with those known by option, the default first."""
-    if choice.option == "cameras" and known.get("truth") == "stage":
+    if choice.option == "cameras" and (
+        known.get("truth") == "stage" or known.get("angle_from") == "speed"
+    ):
         return tuple(reversed(choice.answers))
     if choice.option == "cameras" and "truth" in known:
         return choice.answers[:-1]  # all but none
-    if choice.option == "truth" and known.get("cameras") == "none":
+    if choice.option == "truth" and (
+        known.get("cameras") == "none" or known.get("angle_from") == "speed"
+    ):
         return ("stage",)
     if choice.option == "board_kind" and known.get("cameras") == "none":
         return ("none",)
+    if choice.option == "angle_from":
+        return tuple(_angles(known["cameras"], known["truth"]))
     return choice.answers
+
+
+def _angles(cameras: str, truth: str) -> Iterator[str]:
+    """Yield where the motor's angle may be from: pictures of trials show it, and give no truth with a stated speed."""
+    yield "log"
+    if cameras != "none" and truth != "traces-only":
+        yield "marker"
+        yield "whisker"
+    if truth == "stage":
+        yield "speed"
 
 
 def _ask_until_allowed(wanted: str, allowed: tuple[str, ...], ask: Ask) -> str:

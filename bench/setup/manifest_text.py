@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import tomli_w
 
+from bench.session.angle_source import SOURCES
 from bench.setup.lab import Lab
 from bench.setup.questions import Question, questions_of
 from vision.boards import CharucoBoard
@@ -35,8 +36,7 @@ def manifest_text(
         tables.append(_MIRROR)
     if lab.gauges == "known":
         tables.append(_GAUGES)
-    speed = "# speed_deg_s = 10.0            # nominal" if lab.motor_log == "yes" else _BY_SPEED
-    tables.append(_TRIAL.format(speed=speed.format(**lines)))
+    tables.append(_TRIAL.format(angle=_angle_lines(lab, lines)))
     tables.append(_FRAMES if lab.has_frames else "")
     tables.append("\n# What to record:\n")
     tables += [f"#   {file.ljust(27)} {what}\n" for file, what in _to_record(lab)]
@@ -65,6 +65,18 @@ def _board_lines(kind: str, squares: tuple[int, int], dictionary: str) -> str:
     return "\n".join(lines)
 
 
+def _angle_lines(lab: Lab, lines: Mapping[str, str]) -> str:
+    """Return the lines of [trial] on the motor's angle. lines: of keys, by the option of their question."""
+    needed = SOURCES[lab.angle_from].keys
+    found = [lines[key] for key in needed]
+    if lab.angle_from in _ANGLE_FROM:
+        source = f'angle_from = "{lab.angle_from}"'.ljust(_LINE)
+        found.insert(0, f"{source}# {_ANGLE_FROM[lab.angle_from]}")
+    if "speed_deg_s" not in needed:
+        found.append("# speed_deg_s = 10.0            # nominal")
+    return "\n".join(found)
+
+
 def _to_record(lab: Lab) -> Iterator[tuple[str, str]]:
     """Yield the files that are to be recorded, and what is in each."""
     if lab.has_cameras:
@@ -76,11 +88,11 @@ def _to_record(lab: Lab) -> Iterator[tuple[str, str]]:
             "trials/<trial>/object_<camera>.csv",
             "likewise, two places or more of the bar's middle (or joints bar_... of the trace)",
         )
-    motor = "motor_deg," if lab.motor_log == "yes" else ""
+    motor = "motor_deg," if lab.angle_from == "log" else ""
     channels = "m_y_Nmm,m_z_Nmm" if lab.gauges == "moments" else "y_V,z_V"
     yield "trials/<trial>/signals.csv", f"time_s,{motor}{channels}"
     yield "trials/<trial>/trial.toml", "surface, speed_deg_s, beta_deg"
-    has_place = lab.truth == "stage" and lab.motor_log == "yes"  # no zero: no touch of a place
+    has_place = lab.truth == "stage" and lab.angle_from == "log"  # no zero: no touch of a place
     if lab.truth == "stage":
         yield "", "beta_sigma_deg; d_x_mm and d_x_sigma_mm, from the base to the"
         yield "", "contact at first touch" + (", or one of the next two" if has_place else "")
@@ -169,15 +181,17 @@ source = "stage"                # d_x, or the object's place, is what trials sta
 
 """
 
-_BY_SPEED = """\
-angle_from = "speed"            # no motor log: one forward stroke at constant speed a recording
-{speed_deg_s}
-{speed_sigma_deg_s}"""
+# Of an angle that is not from a log.
+_ANGLE_FROM = {
+    "speed": "no motor log: one forward stroke at constant speed a recording",
+    "marker": "no motor log: a spare marker of the board's dictionary on the hub, by `calibrate angles`",
+    "whisker": "no motor log: one forward stroke a recording, by `calibrate angles`",
+}
 
 _TRIAL = """\
 [trial]                         # for all trials; a key in trials/<trial>/trial.toml goes before it
 # surface = "steel"             # groups trials in fits and figures
-{speed}
+{angle}
 """
 
 _FRAMES = """\

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from bench.base.errors import BadInput
+from bench.session.angle_source import SOURCES
 from bench.session.givens import Assumed
 from bench.session.manifest import BarKeys, BoardKeys, TrialKeys, TruthKeys, WhiskerKeys
 from bench.session.plausible import SIGMA, PlausibleRange
@@ -80,6 +81,7 @@ QUESTIONS = (
     Question(
         "speed_sigma_deg_s", "trial", "speed_sigma_deg_s", "one standard deviation of it, deg/s"
     ),
+    Question("hub_marker", "trial", "hub_marker", "number of the marker on the hub"),
 )
 
 
@@ -90,9 +92,9 @@ def questions_of(lab: Lab) -> Iterator[Question]:
         tables.add("truth")
     if lab.has_cameras:
         tables.add("board")
-    if lab.motor_log == "no":
-        tables.add("trial")
     for question in QUESTIONS:
         has_table = question.table in tables
         if has_table and (question.option != "marker_mm" or marker_is_part(lab.board_kind)):
+            yield question
+        if question.table == "trial" and question.key in SOURCES[lab.angle_from].keys:
             yield question

@@ -133,14 +133,21 @@ LABS = [
         ("two", "mirror", "none"),
         ("pictures", "traces-only", "stage"),
         ("charuco", "checkerboard"),
-        ("yes", "no"),
-        ("trials", "known", "moments"),
+        ("log", "marker", "whisker", "speed"),
+        ("known", "moments"),
     )
     if answers[0] != "none"
 ]
+LABS = [
+    lab
+    for lab in LABS
+    if lab["angle_from"] == "log"
+    or lab["truth"] == "stage"
+    or (lab["truth"] == "pictures" and lab["angle_from"] != "speed")
+]
 LABS += [
-    {"cameras": "none", "motor_log": log, "gauges": gauges}
-    for log in ("yes", "no")
+    {"cameras": "none", "angle_from": source, "gauges": gauges}
+    for source in ("log", "speed")
     for gauges in ("trials", "known", "moments")
 ]
 
@@ -172,6 +179,7 @@ FILLED = {
     "marker_mm": 11.0,
     "speed_deg_s": 10.0,
     "speed_sigma_deg_s": 0.1,
+    "hub_marker": 98,
     "crop": [0, 0, 640, 490],
     "offset_V": [0.0, 0.0],
     "matrix_Nmm_per_V": [[11.0, 0.0], [0.0, 11.0]],
@@ -195,13 +203,12 @@ def new_at_a_terminal(path, answers, monkeypatch, arguments=()) -> tuple[str, st
 
 
 def test_answers_make_the_same_session_as_options(tmp_path, monkeypatch, capsys):
-    answers = "mirror\ntraces\ncheckerboard\nno\nknown\n100\n1.02\n60\n6\n15.03\n10\n0.1\n"
+    answers = "mirror\ntraces\ncheckerboard\nmarker\nknown\n100\n1.02\n60\n6\n15.03\n98\n"
     asked, by_answers = new_at_a_terminal(tmp_path / "a" / "s", answers, monkeypatch)
     monkeypatch.undo()
-    given = ["--mirror", "--traces", "--board-kind", "checkerboard", "--no-motor-log"]
+    given = ["--mirror", "--traces", "--board-kind", "checkerboard", "--angle-from", "marker"]
     numbers = {name: value for name, value in NUMBERS.items() if name != "marker_mm"}
-    speed = {"speed_deg_s": 10.0, "speed_sigma_deg_s": 0.1}
-    given += ["--gauges", "known", *options(numbers | speed)]
+    given += ["--gauges", "known", *options(numbers | {"hub_marker": 98})]
     assert main(["new", str(tmp_path / "b" / "s"), *given]) == 0
     assert (tmp_path / "b" / "s" / "session.toml").read_text() == by_answers
     assert "one and a mirror" in asked and "3 lines are to be filled in" in asked
@@ -222,7 +229,7 @@ def test_enter_takes_every_default(tmp_path, monkeypatch):
 def test_an_answer_is_requested_until_it_is_one_of_those_allowed(capsys):
     answers = iter(["ring", "c", "ci"])
     lab = Lab.of({"cameras": "two", "truth": "pictures"}, lambda question: next(answers, ""))
-    assert (lab.board_kind, lab.motor_log, lab.gauges) == ("circles", "yes", "trials")
+    assert (lab.board_kind, lab.angle_from, lab.gauges) == ("circles", "log", "trials")
     said = capsys.readouterr().out
     assert "'ring' is none of" in said and "'c' is none of" in said
 
@@ -232,6 +239,7 @@ def test_an_answer_is_requested_until_it_is_one_of_those_allowed(capsys):
     [
         ["--cameras", "none", "--truth", "pictures"],
         ["--cameras", "none", "--board-kind", "circles"],
+        ["--cameras", "none", "--angle-from", "marker"],
     ],
 )
 def test_answers_that_contradict_are_one_line(contradictory, tmp_path, capsys):
@@ -248,10 +256,15 @@ def test_no_question_is_asked_for_what_cannot_be():
     assert options[-1] == "origin_sigma_mm" and not {"square_mm", "speed_deg_s"} & set(options)
 
 
+def test_a_stated_speed_gives_no_truth_by_pictures(tmp_path):
+    assert main(["new", str(tmp_path / "s"), "--truth", "pictures", "--angle-from", "speed"]) == 2
+
+
 def test_without_a_motor_log_the_speed_is_to_be_filled_in(tmp_path):
     path = tmp_path / "session"
-    assert main(["new", str(path), "--no-motor-log", *options(NUMBERS)]) == 0
+    of_whisker = {name: value for name, value in NUMBERS.items() if name[0] in "wyb"}
+    assert main(["new", str(path), "--angle-from", "speed", *options(of_whisker)]) == 0
     text = (path / "session.toml").read_text()
-    assert read(path).trial.angle_from == "speed"
+    assert read(path).trial.angle_from == "speed" and read(path).truth.source == "stage"
     assert text.count("speed") > 2 and "motor_deg" not in text
     assert "# speed_deg_s =        # FILL IN" in text
