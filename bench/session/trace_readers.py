@@ -417,7 +417,7 @@ def _whisk_identities(path: Path, label: str) -> dict[tuple[int, int], int] | No
 
 
 def read_measurements(path: Path, label: str) -> dict[tuple[int, int], int]:
-    """Read the identity of each segment by frame and number from Whisk's measurements."""
+    """Read the identity of each segment by frame and number from Whisk's measurements. Raises BadInput."""
     content = path.read_bytes()
     row_bytes = {b"measv3\0\0": 41, b"measV1\0\0": 40}.get(content[:8])
     if row_bytes is None or len(content) < 16:
