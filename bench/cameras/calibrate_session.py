@@ -1,6 +1,6 @@
 """`whisker-bench calibrate cameras`: cameras.toml from a session's board views, and how far to trust it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,20 +52,23 @@ def calibrate_cameras_command(
     out: Path,
     lenses: Path | None = None,
     *,
+    names: Sequence[str] = (),
     file_format: str = "",
     follow_links: bool = False,
 ) -> int:
     """Calibrate, write `out` (TOML) and its .npz, print the report.
 
     lenses: a camera file of another program, or a folder of them, to take the lenses from; the
-    session then only places the cameras. file_format: another program's, of `WRITERS`, to write in
-    place of ours. Returns 0, or 1 with warnings. Raises BadInput or Refused, saying what to record,
-    before anything is written.
+    session then only places the cameras. names: the session's of that file's cameras, in its order,
+    where it calls them otherwise. file_format: another program's, of `WRITERS`, to write in place of
+    ours. Returns 0, or 1 with warnings. Raises BadInput or Refused, saying what to record, before
+    anything is written.
     """
     loaded = load_session(session, lenses_known=lenses is not None, follow_links=follow_links)
     if lenses is not None:
-        line = f"lenses as in {lenses.name}, taken as exact"
-        return _write(out, place_imported(loaded, lenses), [line], [], file_format)
+        cameras = place_imported(loaded, lenses, names)
+        line = f"lenses of {', '.join(cameras.names)} as in {lenses.name}, taken as exact"
+        return _write(out, cameras, [line], [], file_format)
     views = read_board_views(loaded)
     calibration = calibrate_from(loaded, views)
     cameras = moved_by_file(loaded, calibration.cameras)
@@ -96,16 +99,17 @@ def _write(
     return 1 if warnings else 0
 
 
-def place_imported(session: Session, lenses: Path) -> Cameras:
-    """Return cameras calibrated elsewhere, placed by the board on the rig.
+def place_imported(session: Session, lenses: Path, names: Sequence[str] = ()) -> Cameras:
+    """Return the session's cameras as calibrated elsewhere, placed by the board on the rig.
 
-    They are in their own world where there is no board. Raises BadInput where the file holds none,
-    or the board does not place them.
+    names: the session's of the file's cameras, in its order, where it calls them otherwise. They are in their own
+    world where there is no board. Raises BadInput where the file does not hold the session's cameras, or the
+    board does not place them.
     """
     if not lenses.exists():
         raise BadInput("there is no such file", file=str(lenses))
     with refused_as_bad_input(lenses.name):
-        cameras = import_cameras(lenses)
+        cameras = _of_session(import_cameras(lenses), session, names, lenses.name)
         if session.T_rig_board is None:
             if not are_placed(cameras):
                 found = "does not state where the cameras stand to each other"
@@ -118,6 +122,26 @@ def place_imported(session: Session, lenses: Path) -> Cameras:
         exact = place_on_rig(cameras, views, session.board, session.T_rig_board)
     board = stated_place(session)
     return move_rig_frame(exact, replace(board, covariance=np.zeros((6, 6))), board)
+
+
+def _of_session(cameras: Cameras, session: Session, names: Sequence[str], file: str) -> Cameras:
+    """Return the cameras of a file that are the session's. Raises BadInput where it lacks one.
+
+    names: the session's of the file's cameras, in its order; none where they are alike.
+    """
+    if names:
+        if len(names) != len(cameras.names) or len(set(names)) != len(names):
+            found = f"holds {len(cameras.names)} cameras ({', '.join(cameras.names)})"
+            raise BadInput(f"{found}; --names takes as many, each once", file=file)
+        cameras = Cameras(tuple(replace(camera, name=name) for camera, name in zip(cameras, names)))
+    wanted = session.camera_names or tuple(session.rig_pictures)
+    missing = [name for name in wanted if name not in cameras.names]
+    if missing:
+        found = f"has no camera {missing[0]}, it has {', '.join(cameras.names)}"
+        raise BadInput(
+            f"{found}; give the session's names for these, in this order: --names …", file=file
+        )
+    return cameras.subset(wanted) if wanted else cameras
 
 
 def calibrate_from(session: Session, views: SessionViews) -> Calibration:

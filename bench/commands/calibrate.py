@@ -45,6 +45,12 @@ def _add_cameras(what: Verbs) -> None:
         "lenses are taken as exact and only placed in the rig",
     )
     verb.add_argument(
+        "--names",
+        default="",
+        metavar="NAME,NAME",
+        help="the session's names of that file's cameras, in its order, where it calls them otherwise",
+    )
+    verb.add_argument(
         "--format",
         default="",
         choices=("anipose", "caliscope", "kalibr", "matlab", "mrcal", "opencv"),
@@ -110,6 +116,7 @@ def _run_cameras(options: argparse.Namespace) -> int:
         options.session,
         options.out,
         options.lenses,
+        names=[name for name in options.names.split(",") if name],
         file_format=options.format,
         follow_links=options.follow_links,
     )

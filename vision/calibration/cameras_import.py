@@ -23,6 +23,7 @@ from vision.calibration import (
 from vision.calibration.bundle import N_CAMERA, BundleState, Priors
 from vision.calibration.calibrate import as_cameras
 from vision.calibration.corner_noise import adjust_with_noise
+from vision.calibration.exchanged import check_imported_lenses
 from vision.calibration.first_guess import board_pose
 from vision.calibration.layout import gather
 from vision.calibration.tied import lens_priors, with_print
@@ -113,8 +114,8 @@ def place_on_rig(
     """Place each camera by its view of the board on the rig, its lens held; the covariance is of
     the poses only, with the share of the print's size and stretch.
 
-    Raises Refused where a camera does not see the board, and for a body, whose faces have no places
-    without a calibration.
+    Raises Refused where a camera does not see the board or has another's lens, and for a body, whose faces have
+    no places without a calibration.
     """
     if isinstance(board, Body):
         raise Refused(
@@ -131,6 +132,7 @@ def place_on_rig(
         lenses.append(camera.lens)
         poses.append(compose(T_camera_board, T_board_rig))
         shots.append((k, 0, view))
+    check_imported_lenses(cameras, rig_views, board)
     state = BundleState(np.array(lenses), np.array(poses), np.asarray(T_rig_board)[None])
     priors = with_print(_camera_pose_priors(len(cameras), board), board)
     adjustment = adjust_with_noise(state, gather(shots), board, priors)

@@ -18,6 +18,7 @@ from vision.calibration.first_guess import board_pose
 from vision.calibration.layout import Alone, gather
 from vision.calibration.tied import pose_priors
 from vision.geometry.board import Board
+from vision.geometry.camera import Cameras
 from vision.geometry.refusals import Refused
 
 # [1] Residuals by the camera's own lens over those by another's, in each picture. What is wrong with
@@ -43,16 +44,42 @@ def check_own_lenses(
     names = list(cameras)
     lenses = {name: alone.lens for name, alone in cameras.items()}
     residual_px = lens_residuals_px(lenses, standing, board)
-    own_px = np.diag(residual_px)
-    _, best = linear_sum_assignment(np.log(residual_px))
-    own = np.arange(len(names))
-    best_px = residual_px[own, best]
-    moved = np.flatnonzero(best != own)
-    if len(moved) and np.all(own_px[moved] > _CLEAR_RATIO * best_px[moved]):
-        exchanged = [names[k] for k in moved]
-        found = [_fit_by_both(names, residual_px, k, best[k]) for k in moved]
+    better = _better_lenses(residual_px)
+    if better:
+        exchanged = [names[k] for k in better]
+        found = [_fit_by_both(names, residual_px, *pair) for pair in better.items()]
         raise Refused(_exchanged(exchanged, found, same_in_trials), "boards_exchanged")
     return _notes_on_alike(names, residual_px)
+
+
+def check_imported_lenses(cameras: Cameras, standing: Mapping[str, Corners], board: Board) -> None:
+    """Raise Refused, naming the cameras, where the lenses of a file are exchanged.
+
+    standing: the board on the rig in each camera.
+    """
+    lenses = {camera.name: camera.lens for camera in cameras}
+    names = list(lenses)
+    residual_px = lens_residuals_px(lenses, standing, board)
+    better = _better_lenses(residual_px)
+    if better:
+        exchanged = " and ".join(names[k] for k in better)
+        k, other = next(iter(better.items()))
+        found = (
+            f"camera {names[k]}'s picture of the board on the rig by the lens of {names[other]} to "
+            f"{residual_px[k, other]:.3f} px, by its own to {residual_px[k, k]:.3f} px"
+        )
+        raise Refused(f"the lenses of {exchanged} are exchanged: {found}", "boards_exchanged")
+
+
+def _better_lenses(residual_px: np.ndarray) -> dict[int, int]:
+    """Return by camera the other one whose lens explains its picture, where all of these do so clearly better.
+
+    residual_px (C, C): of each camera's view by each lens.
+    """
+    own, best = linear_sum_assignment(np.log(residual_px))
+    moved = best != own
+    is_clear = np.diag(residual_px) > _CLEAR_RATIO * residual_px[own, best]
+    return dict(zip(own[moved], best[moved])) if np.all(is_clear[moved]) else {}
 
 
 def _fit_by_both(names: list[str], residual_px: np.ndarray, own: int, other: int) -> str:

@@ -79,14 +79,21 @@ translation = [0.0, 0.0, 500.0]
 
 
 def test_lenses_of_another_tool_are_placed_by_the_rig_board(small_session, tmp_path, capsys):
+    """In a file that numbers its cameras, the session's names are given in its order; a wrong order is refused."""
     truth = json.loads((small_session / "truth.json").read_text())["cameras"]
-    text = "".join(LENSES.format(name=n, K=t["K"], dist=t["dist"]) for n, t in truth.items())
-    (tmp_path / "anipose.toml").write_text(text)
+    numbered = enumerate(truth.values())
+    text = "".join(LENSES.format(name=str(k), K=t["K"], dist=t["dist"]) for k, t in numbered)
+    file = tmp_path / "anipose.toml"
+    file.write_text(text)
+    with pytest.raises(BadInput, match=r"has no camera high, it has 0, 1; .* --names"):
+        calibrate_cameras_command(small_session, tmp_path / "c.toml", file)
+    with pytest.raises(BadInput, match=r"the lenses of .* are exchanged"):
+        calibrate_cameras_command(small_session, tmp_path / "c.toml", file, names=list(truth)[::-1])
+    assert not (tmp_path / "c.toml").exists()
     assert (
-        calibrate_cameras_command(small_session, tmp_path / "c.toml", tmp_path / "anipose.toml")
-        == 0
+        calibrate_cameras_command(small_session, tmp_path / "c.toml", file, names=list(truth)) == 0
     )
-    assert "lenses as in anipose.toml" in capsys.readouterr().out
+    assert "lenses of high, low as in anipose.toml" in capsys.readouterr().out
     for camera in read_cameras(tmp_path / "c.toml"):
         # With true lenses a camera's place is known to some hundredths of a millimetre from one picture.
         assert np.abs(camera.T_camera_rig[:, 3] - truth[camera.name]["t"]).max() < 0.3
