@@ -1,4 +1,4 @@
-"""How another program's points may be meant otherwise than they are read: mirrored, turned, exchanged."""
+"""How another program's points may be meant otherwise than they are read: mirrored, turned, exchanged, in other pixels."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -24,6 +24,14 @@ _MISREADINGS: dict[str, _Meant] = {
         h - 1.0 - v,
     ),
     "with u and v exchanged it is: u_px goes to the right, v_px down": lambda u, v, w, h: (v, u),
+    "of pictures half as large it is: give it in pixels of these": lambda u, v, w, h: (
+        2.0 * u + 0.5,
+        2.0 * v + 0.5,
+    ),
+    "of pictures twice as large it is: give it in pixels of these": lambda u, v, w, h: (
+        0.5 * u - 0.25,
+        0.5 * v - 0.25,
+    ),
 }
 
 

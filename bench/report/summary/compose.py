@@ -116,8 +116,7 @@ def _verdict_lines(evaluation: Evaluation, warnings: int) -> Iterator[str]:
     """Yield the lines that the summary begins with. warnings: how many there are."""
     session = evaluation.session
     settings = evaluation.settings
-    has_pictures = any(trial.camera_sources for trial in session.trials)
-    yield from verdict(session.name, has_pictures, evaluation.accuracy, settings, warnings)
+    yield from verdict(session.name, session.is_seen, evaluation.accuracy, settings, warnings)
     yield from angle_lines(session)
     yield from gauge_source_lines(evaluation.gauges)
     yield from preset_lines(evaluation.results, settings)

@@ -28,16 +28,16 @@ _MOST_PANELS = 4
 
 def verdict(
     session: str,
-    has_pictures: bool,
+    is_seen: bool,
     accuracy: RunAccuracy,
     settings: Settings,
     warnings: int,
 ) -> Iterator[str]:
     """Yield the lines of the verdict.
 
-    session: its name. has_pictures: whether it has any. warnings: how many there are.
+    session: its name. is_seen: whether it has pictures or traces. warnings: how many there are.
     """
-    yield _truth_line(session, has_pictures, accuracy.truth, warnings)
+    yield _truth_line(session, is_seen, accuracy.truth, warnings)
     compared = [one for one in accuracy.estimators if one.estimator not in EVALUATED_AGAIN]
     fitted = [one for one in accuracy.estimators if one.estimator == FITTED and one.judged]
     for one in (*compared, *fitted):
@@ -65,7 +65,7 @@ def _withheld(truth: TruthUncertainty, compared: Sequence[Accuracy]) -> str:
     return f"No verdict on the estimators: all whisks have warnings ({why}). To have one: {cure_of(why.codes)}."
 
 
-def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warnings: int) -> str:
+def _truth_line(session: str, is_seen: bool, truth: TruthUncertainty, warnings: int) -> str:
     """Return of how many whisks the truth is known, and how well."""
     count = counted(truth.measured, "measured whisk")
     if truth.known:
@@ -73,7 +73,7 @@ def _truth_line(session: str, has_pictures: bool, truth: TruthUncertainty, warni
         known = f"the true distance is known{by} for {truth.known} of {count}, to {truth.d_x_text}"
         if truth.in_doubt:
             known += _in_doubt(truth)
-    elif not has_pictures:
+    elif not is_seen:
         known = f"no pictures, so the true distance is not known; {count} felt"
     else:
         known = f"the true distance is known for none of {count}"

@@ -61,6 +61,7 @@ def test_the_object_by_points_edges_or_its_place_gives_the_truth(example, place,
         (("low",), lambda px: px * [-1, 1] + [640.0, 0], "camera low: mirrored left to right"),
         (("low",), lambda px: px * [1, -1] + [0, 360.0], "camera low: mirrored top to bottom"),
         (("high", "low"), lambda px: px[:, ::-1], "with u and v exchanged it is"),
+        (("high",), lambda px: 0.5 * px - 0.25, "camera high: of pictures half as large it is"),
         (
             ("high", "low"),
             lambda px: px + np.array([0, 40.0]),
