@@ -248,7 +248,7 @@ def _as_rows(view: View, side: OutlineSide, found: _SidePixels, length_px: int) 
         foot_px=side.px[station],
         normal=side.normal[station],
         source=station,
-        noise_behind=np.full(len(rows.pieces), 1.0 / view.mean_share),
+        noise_behind=np.full(len(numbers), 1.0 / view.mean_share),
     )
 
 

@@ -235,15 +235,6 @@ class Pieces(Rows):
         source = np.zeros(0, dtype=int)
         return Pieces(*[pixels] * 6, values, values, vectors, vectors, source, pixels)
 
-    @staticmethod
-    def none() -> "Pieces":
-        """Return no segments."""
-        pixels = np.zeros((0, 1))
-        values = np.zeros(0)
-        vectors = np.zeros((0, 2))
-        source = np.zeros(0, dtype=int)
-        return Pieces(*[pixels] * 6, values, values, vectors, vectors, source, pixels)
-
     def __len__(self) -> int:
         return len(self.place)
 
