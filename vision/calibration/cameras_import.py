@@ -23,7 +23,7 @@ from vision.calibration import (
 from vision.calibration.bundle import N_CAMERA, BundleState, Priors
 from vision.calibration.calibrate import as_cameras
 from vision.calibration.corner_noise import adjust_with_noise
-from vision.calibration.exchanged import check_imported_lenses
+from vision.calibration.exchanged_boards import check_imported_lenses
 from vision.calibration.first_guess import board_pose
 from vision.calibration.layout import gather
 from vision.calibration.tied import lens_priors, with_print
