@@ -79,7 +79,7 @@ class LivePush:
     def following(self) -> "LivePush":
         """Return the push after this one. Bar and wire are looked for where they were; they may have moved."""
         before = self.whisk
-        bench = replace(before.bench, bar=before.axis, wire=before.wire)
+        bench = replace(before.bench, earlier=before.shown)
         return LivePush(LiveWhisk(bench, before.number + 1))
 
 

@@ -27,7 +27,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from vision.fit.first_bends import SwingPictures, find_bend, find_rest, next_bend
-from vision.fit.problem import rest_shape
 from vision.fit.touch import frames_that_touch
 from vision.geometry.camera import Cameras
 from vision.geometry.number_words import counted
@@ -41,7 +40,7 @@ from vision.pictures.view import View
 from vision.touched.search import SeenBar, find_object, find_object_again
 from vision.touched.search_scene import SearchScene
 from vision.truth.explanations import Explanation, compare_early, unexplained
-from vision.truth.line_source import WhiskPlace
+from vision.truth.line_source import EarlierWhisk, WhiskPlace
 from vision.truth.observe import views_facing, warnings_of, why_failed
 from vision.truth.place_comparison import FRAMES, PlaceComparison
 from vision.truth.records import WhiskTruth
@@ -73,21 +72,12 @@ _DEFAULT = VisionSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class KnownWire:
-    """The wire's rest shape (2, 4), mm, and by camera the lens blur, px, as a whisk has shown them."""
-
-    rest_mm: np.ndarray
-    blur_px: Mapping[str, float]
-
-
-@dataclass(frozen=True, eq=False)
 class LiveBench:
     """What is known before a whisk.
 
     background: by camera the scene (h, w) without whisker and bar. stroke_rad: lowest and highest
     motor angle of the stroke to come. settings: all but picture_scale, every_frame and rounds, which
-    a live whisk does without. bar, wire: where the object was in the whisk before, and the wire; search
-    and fit begin there.
+    a live whisk does without. earlier: what the whisk before has shown.
     """
 
     cameras: Cameras
@@ -95,8 +85,7 @@ class LiveBench:
     background: Mapping[str, np.ndarray | None]
     stroke_rad: tuple[float, float]
     settings: VisionSettings = _DEFAULT
-    bar: Axis | None = None
-    wire: KnownWire | None = None
+    earlier: EarlierWhisk | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +147,8 @@ class LiveWhisk:
     """One whisk that is being recorded.
 
     frames: by camera the pictures so far, by frame. time_s, motor_rad: by frame. refused: why there
-    will be no truth, None as long as nothing says so. axis, wire: the object's and the wire by the truth,
-    None before it and without one.
+    will be no truth, None as long as nothing says so. shown: what the next whisk begins from, None before
+    the truth and without one.
     """
 
     bench: LiveBench
@@ -168,8 +157,7 @@ class LiveWhisk:
     time_s: dict[int, float] = field(default_factory=dict)
     motor_rad: dict[int, float] = field(default_factory=dict)
     refused: Reason | None = None
-    axis: Axis | None = None
-    wire: KnownWire | None = None
+    shown: EarlierWhisk | None = None
     _standing: set[int] = field(default_factory=set)
     _found: _FirstViews | None = None
     _follower: _Follower | None = None
@@ -210,15 +198,15 @@ class LiveWhisk:
         try:
             step()
         except (Refused, np.linalg.LinAlgError) as reason:
-            if self.bench.wire is not None and self._reading is None:
-                self._forget_wire()
+            if self.bench.earlier is not None and self._reading is None:
+                self._forget_earlier()
             else:
                 self.refused = why_failed(reason)
         return True
 
-    def _forget_wire(self) -> None:
-        """Begin again without the wire of the whisk before, which may have slipped in its hub."""
-        self.bench = replace(self.bench, wire=None)
+    def _forget_earlier(self) -> None:
+        """Begin again without the whisk before, since when the wire may have slipped in its hub."""
+        self.bench = replace(self.bench, earlier=None)
         self._follower = None
 
     def finish(self) -> WhiskTruth:
@@ -315,7 +303,10 @@ class LiveWhisk:
             pictures, bench.cameras, bench.rods.wire, stroke_rad
         )
         scene = SearchScene(views, cameras, bench.rods, stroke_rad, bench.settings)
-        bar = find_object(scene) if bench.bar is None else find_object_again(scene, bench.bar)
+        if bench.earlier is None:
+            bar = find_object(scene)
+        else:
+            bar = find_object_again(scene, bench.earlier.axis)
         self._found = _FirstViews(tuple(views), cameras, tuple(left_out), bar)
 
     def _find_rest(self) -> None:
@@ -324,8 +315,10 @@ class LiveWhisk:
         axis = found.bar.axis
         motor = {f: self.motor_rad[f] for f in found.views[0].frames}
         sights = self._sights(found.views, axis)
-        known = self.bench.wire
-        rest_mm = known.rest_mm if known else find_rest(sights, found.cameras, axis, motor)
+        if self.bench.earlier is None:
+            rest_mm = find_rest(sights, found.cameras, axis, motor)
+        else:
+            rest_mm = self.bench.earlier.rest_mm
         self._follower = _Follower(sights, axis, rest_mm)
 
     def _sights(self, views: Sequence[View], axis: Axis) -> list[SwingPictures]:
@@ -376,8 +369,9 @@ class LiveWhisk:
         follower = self._follower
         whisk = self._whisk().during(follower.free_frames(self.motor_rad))
         strategy = strategies(whisk)[0]
-        known = self.bench.wire
-        lines = TracedLines(whisk, strategy.reader, known.blur_px if known else {})
+        lines = TracedLines(whisk, strategy.reader)
+        if self.bench.earlier is not None:
+            lines.begin_as(self.bench.earlier)
         axis, rest_mm = fit_before_touch(whisk, lines, follower.rest_mm)
         self._reading = _LineReading(strategy, lines.blur_px)
         self._found = replace(self._found, bar=replace(self._found.bar, axis=axis))
@@ -439,9 +433,7 @@ class LiveWhisk:
         if elsewhere:
             return self._without_truth(elsewhere)
         truth = to_whisk(whisk, fitted)
-        self.axis = explanation.axis
-        rest_mm = rest_shape(fitted.problem, fitted.state.vector)
-        self.wire = KnownWire(rest_mm, self._reading.blur_px)
+        self.shown = EarlierWhisk(explanation.axis, explanation.rest_mm, self._reading.blur_px)
         return replace(truth, status=joined(truth.status, *warnings_of(whisk, fitted, beam=None)))
 
     def _without_truth(self, status: Reason) -> WhiskTruth:

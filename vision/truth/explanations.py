@@ -15,13 +15,14 @@ from typing import Self
 
 import numpy as np
 
-from vision.fit.problem import bar_axis
+from vision.fit.problem import bar_axis, rest_shape
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.geometry.refusals import Refused
 from vision.geometry.sampling import spread_indices
 from vision.touched.search import SeenBar
+from vision.truth.line_source import EarlierWhisk
 from vision.truth.place_comparison import FRAMES, PlaceComparison
 from vision.truth.whisk_fit import fit_whisk
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
@@ -57,6 +58,17 @@ class Explanation:
         contact = np.array([self.fitted.measured.whisk[name] for name in ("x", "y", "z")])
         along_mm = (contact - axis.point_mm) @ axis.direction
         return BarAxis(axis.point_mm + along_mm * axis.direction, axis.direction)
+
+    @property
+    def rest_mm(self) -> np.ndarray:
+        """Return the rest shape (2, 4) of the fitted wire."""
+        return rest_shape(self.fitted.problem, self.fitted.state.vector)
+
+    @property
+    def as_earlier(self) -> EarlierWhisk:
+        """Return what the next whisk of the trial begins from."""
+        lines = self.fitted.lines
+        return EarlierWhisk(self.axis, self.rest_mm, lines.blur_px, lines.reader)
 
     def place_comparison(self) -> PlaceComparison:
         """Return the comparison of this fit's place with others."""

@@ -15,6 +15,7 @@ from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.refusals import Refused
 from vision.geometry.touched import Axis
+from vision.truth.readers import ObjectReader
 from vision.wire.points import Observed
 
 # [px] A camera whose points scatter by more sees another thing: where a wire is seen at all its
@@ -42,6 +43,20 @@ class WhiskPlace:
         return [camera.project(curve.points_mm) for curve in self.curves.values()]
 
 
+@dataclass(frozen=True, eq=False)
+class EarlierWhisk:
+    """What a whisk has shown, from which the search and the fit of the next one begin.
+
+    axis: of the object. rest_mm (2, 4): rest shape of the wire. blur_px: of each camera's lens. reader: of
+    the object's lines, where both whisks are of one trial and so have the same mean pictures.
+    """
+
+    axis: Axis
+    rest_mm: np.ndarray
+    blur_px: Mapping[str, float]
+    reader: ObjectReader | None = None
+
+
 class LineSource(ABC):
     """What gives the line points of a whisk in all its cameras.
 
@@ -52,9 +67,6 @@ class LineSource(ABC):
     def most_scatter_px(self) -> float:
         """Return by how much a camera's points may scatter about a wire, px."""
         return _MOST_SCATTER_PX
-
-    def begin_as(self, earlier: "LineSource") -> None:  # noqa: B027
-        """Begin from what the lines of an earlier whisk of the same trial have shown."""
 
     @abstractmethod
     def wire_points(self, place: WhiskPlace, *, last: bool) -> dict[str, list[Observed]]:

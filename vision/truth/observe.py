@@ -83,7 +83,7 @@ def observe_trial(
         rows.append(row)
         if explained is not None:
             found = explained.whisk.bar
-            earlier = explained.fitted
+            earlier = explained.as_earlier
     axis = found.axis.as_bar()
     light = [whisk.light for whisk in scene.whisks]
     bars = measure_relative_widths(with_lines(scene.search, found))

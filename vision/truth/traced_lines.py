@@ -7,7 +7,7 @@ import numpy as np
 
 from vision.geometry.optics import known_gamma
 from vision.pictures.view import SATURATED, View
-from vision.truth.line_source import LineSource, WhiskPlace
+from vision.truth.line_source import EarlierWhisk, LineSource, WhiskPlace
 from vision.truth.readers import ObjectReader, WhereAbout
 from vision.truth.whisk_pictures import WhiskPictures
 from vision.wire.bands import Pieces
@@ -48,8 +48,8 @@ class TracedLines(LineSource):
     reader: ObjectReader | None = None
     blur_px: Mapping[str, float] = field(default_factory=dict)
 
-    def begin_as(self, earlier: "TracedLines") -> None:
-        """Begin with the lens blurs and the object's lines of an earlier whisk of the same trial."""
+    def begin_as(self, earlier: EarlierWhisk) -> None:
+        """Begin with the lens blurs of an earlier whisk, and its lines of the object where it kept them."""
         self.blur_px = earlier.blur_px
         if type(self.reader) is type(earlier.reader):
             self.reader.begin_as(earlier.reader)

@@ -65,7 +65,7 @@ def _fit_by(whisk: WhiskPictures, strategy: Strategy) -> FittedWhisk:
     whisk, expected = _expect_coarsely(whisk, strategy.touch)
     lines = whisk.make_lines(whisk, strategy.reader)
     if whisk.earlier is not None:
-        lines.begin_as(whisk.earlier.lines)
+        lines.begin_as(whisk.earlier)
     return fit_lines(whisk, lines, expected, strategy.touch)
 
 
@@ -166,7 +166,7 @@ def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarra
         free = np.array(whisk.frames)[early(whisk.angles_rad)]
         rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
     else:
-        rest = rest_shape(whisk.earlier.problem, whisk.earlier.state.vector)
+        rest = whisk.earlier.rest_mm
     return rest, follow_bends(sights, axis, rest, whisk.motor)
 
 

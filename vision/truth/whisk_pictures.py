@@ -23,7 +23,7 @@ from vision.geometry.touched import Axis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.search import SeenBar
-from vision.truth.line_source import LineSource
+from vision.truth.line_source import EarlierWhisk, LineSource
 from vision.truth.value import Value, propagated_sigma
 from vision.wire.one_sided import WireAppearance
 
@@ -56,8 +56,8 @@ class WhiskPictures:
     filled with how each camera sees the wire. left_out: a line on each camera that is not used.
     stated_velocity: of a bar that moves. gives: of one that gives way. make_lines: makes the source of
     the whisk's lines, by arguments as of `vision.truth.traced_lines.TracedLines`. picture_of: as of
-    `TrialPictures`. stated_place: of an object whose place is known without its lines. earlier: the fit of
-    a whisk of the same trial, from whose rest shape, lens blurs and lines of the object this one begins.
+    `TrialPictures`. stated_place: of an object whose place is known without its lines. earlier: of the
+    whisk before in the same trial.
     """
 
     number: int
@@ -76,7 +76,7 @@ class WhiskPictures:
     make_lines: Callable[..., LineSource] | None = None
     picture_of: Mapping[str, str] = field(default_factory=dict)
     stated_place: AxisPrior | None = None
-    earlier: "FittedWhisk | None" = None
+    earlier: EarlierWhisk | None = None
 
     def axis_prior(self, axis: Axis) -> AxisPrior:
         """Return what is believed of the object's place: what is stated, or that it is about the axis of the pass before."""

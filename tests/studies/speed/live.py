@@ -107,10 +107,11 @@ class Recording:
         stands: pictures of the standing whisker come before them. before: the whisk before.
         """
         live = LiveWhisk(self.bench)
-        if before is not None and before.axis is not None:
-            moved_mm = before.axis.point_mm + np.array([BAR_MOVED_MM, 0.0, 0.0])
-            bar = replace(before.axis, point_mm=moved_mm)
-            live = LiveWhisk(replace(self.bench, bar=bar, wire=before.wire))
+        if before is not None and before.shown is not None:
+            axis = before.shown.axis
+            moved_mm = axis.point_mm + np.array([BAR_MOVED_MM, 0.0, 0.0])
+            earlier = replace(before.shown, axis=replace(axis, point_mm=moved_mm))
+            live = LiveWhisk(replace(self.bench, earlier=earlier))
         clock = Clock()
         resting = self.standing() if stands else []
         for number, pictures in enumerate(resting):

@@ -8,7 +8,8 @@ import pytest
 from tests.scenes.recorded import RODS, Recorded
 from vision.geometry.centreline import REST_POWERS
 from vision.geometry.reasons import NO_REASON
-from vision.live.whisk import KnownWire, LiveBench, LiveWhisk
+from vision.live.whisk import LiveBench, LiveWhisk
+from vision.truth.line_source import EarlierWhisk
 
 # [sigmas] Allowed between two readings of the same pictures, and of errors against the truth.
 ONE, MOST = 1.0, 3.0
@@ -168,7 +169,8 @@ def test_too_few_frames_are_counted(recorded):
 def found_bar(recorded, bar):
     """The bar in the first frames of a whisk, looked for where it was."""
     live = begun(recorded)
-    live.bench = replace(live.bench, bar=bar)
+    if bar is not None:
+        live.bench = replace(live.bench, earlier=EarlierWhisk(bar, np.zeros((2, REST_POWERS)), {}))
     for frame in range(3):
         add(live, recorded, frame)
     live.work()
@@ -190,16 +192,17 @@ def test_a_bar_is_looked_for_where_it_was(recorded, monkeypatch):
 
 def test_a_whisker_that_slipped_in_its_hub_since_the_whisk_before_is_searched_for(recorded):
     """Its rest shape is 6 mm off at the tip; there is no line there, and the whisk begins by itself."""
+    searched = found_bar(recorded, None).axis
     live = begun(recorded)
     slipped_mm = np.zeros((2, REST_POWERS))
     slipped_mm[0, 1] = 6.0
-    wire = KnownWire(slipped_mm, {"high": 1.0, "low": 1.0})
-    live.bench = replace(live.bench, wire=wire)
+    slipped = EarlierWhisk(searched, slipped_mm, {"high": 1.0, "low": 1.0})
+    live.bench = replace(live.bench, earlier=slipped)
     for frame in range(3):
         add(live, recorded, frame)
     while live._reading is None and live.work():
         pass
-    assert live.refused is None and live.bench.wire is None
+    assert live.refused is None and live.bench.earlier is None
     assert np.all(np.abs(live._follower.rest_mm[:, 1]) < 1.0)
 
 
