@@ -16,7 +16,7 @@ from bench.session.session import Session
 from bench.session.table import forward_in_time, read_table, require_columns
 from vision.boards import MIN_VIEWS, Corners, find_corners, fixes_pose, refine_corners
 from vision.calibration import BoardViews, with_turns_resolved
-from vision.geometry import Board
+from vision.geometry import Board, spread
 from vision.pictures import Frames
 
 # [pictures] One before and one after determine how the board moved meanwhile.
@@ -199,8 +199,8 @@ def _views_of(source: Path, most: int, rig_view: Corners, board: Board) -> Itera
     count = frame_count(source)
     if not count:
         return
-    chosen = np.unique(np.linspace(0, count - 1, min(most, count)).astype(int)).tolist()
-    greys = (grey for grey in read_frames(source, chosen).values() if grey is not None)
+    read = read_frames(source, spread(range(count), most))
+    greys = (grey for grey in read.values() if grey is not None)
     views = in_threads(lambda grey: refine_corners(grey, rig_view.px, rig_view.ids, board), greys)
     yield from filter(len, views)
 

@@ -1,9 +1,8 @@
 """The rig's place, where session.toml does not state it, from the strokes of some trials."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
-from typing import TypeVar
 
 import numpy as np
 
@@ -26,9 +25,7 @@ from vision.calibration import (
     first_rig_about,
     moving_lines,
 )
-from vision.geometry import Board, Cameras
-
-Item = TypeVar("Item")
+from vision.geometry import Board, Cameras, spread
 
 # [trials] Strokes of more add little: what they share (light, lenses) no average makes smaller.
 MOST_TRIALS = 6
@@ -42,14 +39,6 @@ _MOST_MARKER_FRAMES = 20
 _SIGMA_RAD = np.radians(5.0)
 # [mm] Error of this first place, likewise.
 _SIGMA_MM = 5.0
-
-
-def spread(items: Sequence[Item], most: int = MOST_TRIALS) -> list[Item]:
-    """Return at most so many of the items, spread over all of them."""
-    if not len(items):
-        return []
-    chosen = np.unique(np.linspace(0, len(items) - 1, most).astype(int))
-    return [items[k] for k in chosen]
 
 
 def by_first_look() -> Placement:
@@ -80,7 +69,7 @@ def first_look(session: Session, cameras: Cameras) -> FirstRig:
 
 def look_at_strokes(session: Session, cameras: Cameras) -> Look:
     """Find what moves in some strokes of some trials."""
-    trials = spread([trial for trial in session.trials if _shows_motor(trial)])
+    trials = spread([trial for trial in session.trials if _shows_motor(trial)], MOST_TRIALS)
     lines: list[MovingLines] = []
     markers: list[MarkerSighting] = []
     looks = in_threads(lambda trial: _look(trial, session.board, cameras), trials)

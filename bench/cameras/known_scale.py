@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.cameras.first_look import spread
 from bench.session.angle_source import angle_source
 from bench.session.footage import read_frames, rig_picture
 from bench.session.frame_times import frame_times
@@ -14,7 +13,7 @@ from bench.session.signals import read_signals
 from bench.session.trial import Trial
 from vision import SIGMA_SHARE, bar_diameter_mm
 from vision.calibration import check_known_lengths
-from vision.geometry import Bar, Cameras, Reason, Refused
+from vision.geometry import Bar, Cameras, Reason, Refused, spread
 
 # [trials] Of which a median is taken, at most: a bound on time. Stated.
 _MOST_TRIALS = 3

@@ -43,6 +43,7 @@ from vision.geometry import (
     counted,
     invert_transform,
     skew,
+    spread,
 )
 
 # [sigmas] A camera whose board stands farther elsewhere than this, and than the next, was moved. Chance alone gives a
@@ -284,9 +285,9 @@ def _median(session: Session, camera: str) -> np.ndarray | None:
     if len(sources) < _FEWEST_FOR_MEDIAN:
         return None
     pictures: list[np.ndarray] = []
-    for k in np.unique(np.linspace(0, len(sources) - 1, _MOST_FOR_MEDIAN).round().astype(int)):
-        last = max(0, frame_count(sources[k]) - 1)
-        read = read_frames(sources[k], {0, last})
+    for source in spread(sources, _MOST_FOR_MEDIAN):
+        last = max(0, frame_count(source) - 1)
+        read = read_frames(source, {0, last})
         pictures += [picture for picture in read.values() if picture is not None]
     return np.median(pictures, axis=0).astype(np.float32) if pictures else None
 

@@ -15,7 +15,7 @@ from bench.rig import build
 from bench.rig.protocol import Protocol
 from bench.rig.protocol_tables import CameraTable
 from vision import predict_truth
-from vision.geometry import Cameras
+from vision.geometry import Cameras, spread
 
 # [deg] Directions of cameras from the contact: azimuth; 0 is beyond the tip, -90 the side that the whisker comes
 # from. Stated.
@@ -39,8 +39,7 @@ def place_cameras(
     """
     if all(camera.position_mm is not None for camera in protocol.cameras):
         return protocol
-    judges = np.unique(np.linspace(0, len(staged) - 1, _TRIALS).round()).astype(int)
-    whisks = [staged[k] for k in judges.tolist()]
+    whisks = spread(staged, _TRIALS)
     places = [_placed_tables(table, protocol, whisks, target_mm) for table in protocol.cameras]
     best = None
     least_mm = np.inf

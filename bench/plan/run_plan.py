@@ -1,6 +1,6 @@
 """The verb `plan`: of a rig that does not stand yet, or of a session as it was recorded."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,7 +34,7 @@ from bench.trials.of_session import placed_units
 from bench.trials.trial_evaluation import see_unit
 from bench.trials.unit import Unit
 from vision.calibration import MeasuredPose
-from vision.geometry import Board, Cameras, Refused
+from vision.geometry import Board, Cameras, Refused, spread
 
 # [bars] In a drawing, at most. A layout.
 _MOST_DRAWN = 12
@@ -256,14 +256,8 @@ def _draw_rig(
     table = painter.protocol.board
     T_rig_board = build.T_rig_board(painter.protocol)
     outline_mm = board_outline(T_rig_board, tuple(table.squares), table.square_mm)
-    write_drawing(out, Bench(cameras, _drawn(staged.values()), outline_mm), painted)
-
-
-def _drawn(staged: Iterable[StagedWhisk]) -> list[StagedWhisk]:
-    """Return as many of the whisks as a drawing holds, spread over all."""
-    whisks = list(staged)
-    places = np.linspace(0, len(whisks) - 1, _MOST_DRAWN).round().astype(int)
-    return [whisks[k] for k in np.unique(places).tolist()]
+    drawn = spread(list(staged.values()), _MOST_DRAWN)
+    write_drawing(out, Bench(cameras, drawn, outline_mm), painted)
 
 
 def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
@@ -280,7 +274,7 @@ def plan_session(path: Path, out: Path, options: Options, pool: Workers) -> Plan
         staged = [stage_again(task) for task, row in zip(tasks, rows) if row.outlook.has_truth]
         if staged:
             outline_mm = _session_outline(session.board, calibration.T_rig_board)
-            write_drawing(out, Bench(calibration.cameras, _drawn(staged), outline_mm))
+            write_drawing(out, Bench(calibration.cameras, spread(staged, _MOST_DRAWN), outline_mm))
     return Plan(
         title=f"{session.name}: {len(rows)} whisks as recorded",
         cameras=tuple(_describe_cameras(calibration.cameras, staged)) if staged else (),

@@ -9,7 +9,7 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.results import hash_of
 from bench.base.workers import Workers
-from bench.cameras.first_look import by_first_look, first_look, look_at_strokes, spread
+from bench.cameras.first_look import MOST_TRIALS, by_first_look, first_look, look_at_strokes
 from bench.cameras.measured_place import both_places, by_board_of, contradiction, stated_place
 from bench.cameras.session_cameras import SessionCalibration
 from bench.records.trial_result import SeenTrial
@@ -28,7 +28,7 @@ from vision.calibration import (
     rescale,
     with_distance,
 )
-from vision.geometry import Reason, Refused, compose, invert_transform
+from vision.geometry import Reason, Refused, compose, invert_transform, spread
 
 # A step beyond this is taken once more from where it led: lines far from where they were expected are read less well.
 _SMALL_STEP = np.repeat([2e-3, 0.2], 3)
@@ -64,7 +64,7 @@ def place_rig(
     if session.measured_rig is not None:
         return _placed_by_file(session, calibration, problems)
     before = _placement_before(session)
-    chosen = spread([unit for unit in units if unit.trial.camera_sources])
+    chosen = spread([unit for unit in units if unit.trial.camera_sources], MOST_TRIALS)
     may_move = session.cameras_toml is None and before.covariance.any()
     try:
         if may_move:

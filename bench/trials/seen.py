@@ -40,7 +40,7 @@ from bench.trials.seen_friction import seen_friction
 from bench.trials.trace_frames import traced_frames
 from bench.trials.trial_frames import TrialFrames
 from vision import FrameTruth, Smooth, TrialTruth, Value, WhiskTruth
-from vision.geometry import Reason, Refused, joined
+from vision.geometry import Reason, Refused, joined, spread
 from vision.pictures import Others
 
 NO_PICTURES = reason("no_pictures")
@@ -340,8 +340,7 @@ def _deflection(truth: WhiskTruth) -> Deflection | None:
     smooth = truth.smooth
     if smooth is None or len(smooth.theta_rad) == 0:
         return None
-    last = len(smooth.theta_rad) - 1
-    chosen = np.unique(np.linspace(0, last, _MOST_DEFLECTIONS).round().astype(int))
+    chosen = np.array(spread(range(len(smooth.theta_rad)), _MOST_DEFLECTIONS))
     frames = truth.frames
     shown = np.flatnonzero(frames.touching)[chosen]
     motor = frames.motor_rad[shown]

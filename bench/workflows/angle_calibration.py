@@ -14,7 +14,6 @@ from bench.base.errors import BadInput
 from bench.base.progress import begin_step
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.cameras.first_look import spread
 from bench.cameras.session_cameras import SessionCalibration, calibrate_session
 from bench.session.angle_source import angle_source
 from bench.session.angles_file import FrameAngles, angles_file, write_angles
@@ -27,7 +26,7 @@ from bench.trials.trial_frames import TrialFrames
 from vision import whisker_angles
 from vision.boards import find_other_markers
 from vision.calibration import MarkerSighting, first_rig_about, marker_turns, moving_lines
-from vision.geometry import Board, Cameras, Refused, counted
+from vision.geometry import Board, Cameras, Refused, counted, spread
 
 # [frames] Of a stroke, in which the free whisker is searched for the angle's zero. Stated.
 _MOST_FRAMES = 60

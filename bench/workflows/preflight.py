@@ -30,7 +30,7 @@ from bench.trials.moment_size import check_moment_size
 from bench.trials.still_scene import evenly_exposed, other_scene
 from vision import FEWEST_FREE
 from vision.boards import estimate_optics
-from vision.geometry import Board, counted
+from vision.geometry import Board, counted, spread
 from vision.pictures import PicturePart
 
 # [1] Frames of a trial whose exposure and scene are compared. Stated.
@@ -212,11 +212,6 @@ def _pushes(strokes: Sequence[FeltStroke]) -> Iterator[np.ndarray]:
             yield at.values
 
 
-def _spread(count: int, wanted: int) -> list[int]:
-    """Return up to `wanted` numbers of 0 to count − 1, from first to last evenly."""
-    return np.unique(np.linspace(0, count - 1, wanted).astype(int)).tolist()
-
-
 def _check_rig_board(picture: Path | PicturePart, board: Board, problems: InputProblems) -> None:
     """Add a warning where a camera's picture of the board on the rig is blurred. Raise BadInput."""
     blur_px = estimate_optics(rig_picture(picture), board).blur_px
@@ -271,7 +266,7 @@ def _scene_warnings(trial: Trial, times: FrameTimes, rig: dict[str, np.ndarray])
     changes."""
     if not len(times):
         return
-    chosen = _spread(len(times), _SCENE_FRAMES)
+    chosen = spread(range(len(times)), _SCENE_FRAMES)
     for name, pictures in read_trial(trial, times, chosen).items():
         fault = "none of its frames can be read"
         if pictures:

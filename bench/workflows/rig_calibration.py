@@ -13,7 +13,7 @@ from bench.base.input_problems import InputProblems
 from bench.base.results import hash_of_files
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.cameras.first_look import spread
+from bench.cameras.first_look import MOST_TRIALS
 from bench.cameras.measured_place import contradiction
 from bench.cameras.session_cameras import SessionCalibration
 from bench.session.rig_file import (
@@ -31,7 +31,7 @@ from bench.trials.of_session import first_units
 from bench.trials.placing import measure_rig, require_swing
 from bench.workflows.rig_picture import draw_rig
 from vision.calibration import Placement
-from vision.geometry import Reason, counted
+from vision.geometry import Reason, counted, spread
 
 # [deg] Axis known worse: 60 mm along the whisker a bar then is 0.5 mm higher or lower than said. Stated.
 _HELPED_AXIS_SIGMA_DEG = 0.5
@@ -139,7 +139,8 @@ def calibrate_rig(session: Session, problems: InputProblems, *, workers: int = 1
     )
     recorded = [trial for trial in trials_with_whisks(alone) if trial.camera_sources]
     touches = [trial for trial in recorded if trial.d_x_sigma_mm]
-    trials = [*spread([trial for trial in recorded if not trial.d_x_sigma_mm]), *touches]
+    without_distance = [trial for trial in recorded if not trial.d_x_sigma_mm]
+    trials = [*spread(without_distance, MOST_TRIALS), *touches]
     with TemporaryDirectory() as folder, Workers(workers) as pool:
         units = first_units(alone, trials, Path(folder), Settings())
         calibration, sources = measure_rig(alone, units, pool, problems)

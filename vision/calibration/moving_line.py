@@ -14,7 +14,7 @@ import numpy as np
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.planes import fit_plane, meet_planes, nearest_along_mm
 from vision.geometry.rows import Rows
-from vision.geometry.sampling import spread_indices
+from vision.geometry.sampling import spread
 from vision.pictures.change import HALF, change_confidence
 from vision.pictures.pixel_noise import Noise, measure_noise
 
@@ -124,8 +124,8 @@ def _planes(
 
 def _change(grey: np.ndarray, others: Sequence[np.ndarray], noise: Noise) -> np.ndarray:
     """Return by how much a picture (h, w) surely differs from a choice of others, the least of all."""
-    chosen = spread_indices(len(others), _MOST_OTHERS)
-    return np.min([change_confidence(grey, others[k], noise) for k in chosen], axis=0)
+    chosen = spread(others, _MOST_OTHERS)
+    return np.min([change_confidence(grey, other, noise) for other in chosen], axis=0)
 
 
 def _strongest_plane(camera: Camera, change: np.ndarray) -> _Plane | None:

@@ -25,7 +25,7 @@ from vision.geometry.contact import closest_arc
 from vision.geometry.newton import cauchy_weights
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods, Wire
-from vision.geometry.sampling import spread_indices
+from vision.geometry.sampling import spread
 from vision.geometry.silhouette import outline
 from vision.geometry.touched import Axis
 from vision.pictures.view import View, median_of
@@ -92,10 +92,10 @@ class SwingPictures:
 
         frames: those of the whisk, in which the wire moves; bar_mm: radius within which the bar is.
         """
-        places = spread_indices(len(frames), _MEDIAN_OF)
-        still = median_of([view.frames[frames[k]] for k in places])
+        chosen = spread(frames, _MEDIAN_OF)
+        still = median_of([view.frames[frame] for frame in chosen])
         bar_px = axis.covering_discs(view.camera, bar_mm)
-        return cls(view, rods, still, 0.5 * np.pi / len(places), bar_px)
+        return cls(view, rods, still, 0.5 * np.pi / len(chosen), bar_px)
 
     @classmethod
     def of_standing(cls, view: View, rods: Rods, axis: Axis, bar_mm: float) -> "SwingPictures":

@@ -28,6 +28,7 @@ NAMES = {
         "unit",
     ),
     "rounded": ("Rounded", "RoundedAxis"),
+    "sampling": ("spread",),
     "touched": ("Axis", "StatedSizes", "Touched"),
     "vision_settings": ("VisionSettings",),
 }

@@ -1,13 +1,19 @@
 """Evenly spread choices: some of a sequence, and all points of a grid."""
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 
+Item = TypeVar("Item")
 
-def spread_indices(length: int, count: int) -> list[int]:
-    """Return so many indices at most, spread evenly over a sequence from its first to its last."""
-    return np.unique(np.linspace(0, length - 1, count).round().astype(int)).tolist()
+
+def spread(items: Sequence[Item], most: int) -> list[Item]:
+    """Return at most so many of the items, spread evenly from the first to the last."""
+    if not len(items):
+        return []
+    places = np.linspace(0, len(items) - 1, most).round().astype(int)
+    return [items[k] for k in np.unique(places).tolist()]
 
 
 def grid_points(*values: Sequence[float] | np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from vision.geometry.camera import Camera
-from vision.geometry.sampling import spread_indices
+from vision.geometry.sampling import spread
 from vision.pictures.others import Others, RodLines, mask_rods
 from vision.pictures.pixel_noise import Noise
 
@@ -43,8 +43,7 @@ class View:
 
     def sample_frames(self, most: int) -> list[int]:
         """Return the indices of at most so many frames, spread over all of them."""
-        frames = list(self.frames)
-        return [frames[k] for k in spread_indices(len(frames), most)]
+        return spread(list(self.frames), most)
 
     def some(self, most: int) -> list[np.ndarray]:
         """Return at most so many of the pictures, spread over all of them."""

@@ -20,7 +20,7 @@ from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.geometry.refusals import Refused
-from vision.geometry.sampling import spread_indices
+from vision.geometry.sampling import spread
 from vision.touched.search import SeenBar
 from vision.truth.line_source import EarlierWhisk
 from vision.truth.place_comparison import FRAMES, PlaceComparison
@@ -148,7 +148,7 @@ def compare_early(whisk: WhiskPictures, curves: Mapping[int, Curves]) -> PlaceCo
     if not _is_comparable(whisk):
         return None
     frames = list(curves)
-    some_curves = {frames[k]: curves[frames[k]] for k in spread_indices(len(frames), FRAMES)}
+    some_curves = {frame: curves[frame] for frame in spread(frames, FRAMES)}
     comparison = PlaceComparison(whisk.views, some_curves, whisk.bar.axis, whisk.rods)
     _ = comparison.best  # the costly part, kept
     return comparison

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from vision.geometry.contact import BarAxis
-from vision.geometry.sampling import spread_indices
+from vision.geometry.sampling import spread
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.truth.readers import BarMiddles, ObjectReader, ReadLine, WhereAbout
@@ -29,7 +29,7 @@ class BarInFrames(ObjectReader):
     def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the middle of the bar in some frames."""
         found: dict[str, list[ReadLine]] = {}
-        for k in spread_indices(len(about.frames), _MOST_FRAMES):
+        for k in spread(range(len(about.frames)), _MOST_FRAMES):
             reader = self._reader(about.frames[k])
             for name, lines in reader.read(_about_frame(about, k), last=last).items():
                 own = found.setdefault(name, [])

@@ -18,7 +18,7 @@ from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
 from vision.geometry.reasons import Reason
 from vision.geometry.rods import Rods
-from vision.geometry.sampling import spread_indices
+from vision.geometry.sampling import spread
 from vision.geometry.touched import Axis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
@@ -208,7 +208,7 @@ class FittedWhisk(Solution):
     def some_curves(self, count: int) -> dict[int, Curves]:
         """Return the centrelines of so many frames spread over the whisk, by frame."""
         curves, _ = curves_of(self.problem, self.state.vector, self.state.arcs_mm)
-        return {self.frames[k]: curves.one(k) for k in spread_indices(len(self.frames), count)}
+        return {self.frames[k]: curves.one(k) for k in spread(range(len(self.frames)), count)}
 
     def of_whisk(self, name: str) -> Value:
         """Return a quantity of the whole whisk by its name."""

@@ -5,6 +5,7 @@ import numpy as np
 from bench.records.trial_result import SeenWhisk
 from bench.report.page.words import WhiskRow
 from bench.report.run_facts import BoardFacts, CameraFacts, RunRecord
+from vision.geometry import spread
 
 ELLIPSOID_FACTOR = 100  # ellipsoids of one sigma are drawn so much larger
 # [frames] A layout: most of a stroke that the slider of the page goes through.
@@ -58,8 +59,7 @@ def _whisk(row: WhiskRow) -> dict:
     seen = row.seen
     trial = row.result.seen
     frames = seen.frames
-    spread = np.linspace(0, len(frames.index) - 1, _MOST_FRAMES)
-    chosen = np.unique(spread.round().astype(int))
+    chosen = spread(range(len(frames.index)), _MOST_FRAMES)
     points = []
     for k in chosen:
         points.append(_rounded(frames.point_mm.value[k]) if frames.touching[k] else None)
