@@ -97,7 +97,7 @@ def alphas_of(results: Iterable[TrialResult]) -> list[WhiskAlphas]:
     found = []
     for result, seen, felt in whisks(results):
         left = result.whisker.thickness(seen.d_x_mm.value)
-        alpha_felt = felt_friction(seen, felt, np.radians(result.theta_deg), left)
+        alpha_felt = felt_friction(seen, felt, result.theta_rad, left)
         found.append(_alphas(result.trial, seen, felt, alpha_felt))
     return found
 
@@ -130,7 +130,7 @@ def _alphas(
 
 def _slope(trial: TrialFacts, seen: SeenWhisk) -> tuple[Value, str]:
     """Return the slope β, rad, as seen or else as the manifest states it, and which of both it is."""
-    if np.isfinite(seen.beta_rad.value):
+    if seen.beta_rad.is_known:
         return seen.beta_rad, seen.source
     stated_rad = float(np.radians(trial.beta_nominal_deg))
     return Value(stated_rad, trial.beta_nominal_sigma_rad), BY_MANIFEST
@@ -138,7 +138,7 @@ def _slope(trial: TrialFacts, seen: SeenWhisk) -> tuple[Value, str]:
 
 def _common_slope(seen: SeenWhisk) -> float:
     """Return the part of β's sigma that all whisks share, rad; of a slope set by hand there is none."""
-    if not np.isfinite(seen.beta_rad.value):
+    if not seen.beta_rad.is_known:
         return 0.0
     shared = seen.truth.shared
     return seen.beta_rad.sigma if shared is None else shared.beta_rad
@@ -184,7 +184,7 @@ def felt_friction(
         if felt.apart or not abs(phi.value) > _SURE_SIGMAS * phi.sigma:
             return UNKNOWN
         return across_rad, sigma_rad
-    if not (slips(seen) and np.isfinite(phi.value)) or felt.apart or turns_with_slip(seen):
+    if not (slips(seen) and phi.is_known) or felt.apart or turns_with_slip(seen):
         return UNKNOWN
     alpha = np.arctan(np.tan(across_rad) / np.cos(heading(seen.deflection, theta_rad)))
     return float(alpha), sigma_rad

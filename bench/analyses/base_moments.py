@@ -214,8 +214,7 @@ def felt_beside(one: WhiskLoads) -> dict | None:
     if not felt.has_moments or felt.covariance_at is None:
         return None
     touch_rad = one.seen.touch_rad
-    theta_rad = float(np.radians(one.result.theta_deg))
-    seen = one.loads.at(touch_rad.value + theta_rad)
+    seen = one.loads.at(touch_rad.value + one.result.theta_rad)
     if seen is None:
         return None
     moments, covariance = seen

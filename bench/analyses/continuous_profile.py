@@ -93,8 +93,7 @@ class ContinuousProfile(Analysis):
             "status": one.status,
         }
         for axis, name in enumerate("xyz"):
-            own = Value(one.point_mm.value[axis], one.point_mm.sigma[axis])
-            cells |= value_cells(f"{name}_est_mm", own)
+            cells |= value_cells(f"{name}_est_mm", one.point_mm.at(axis))
             cells[f"error_{name}_mm"] = float(one.error_mm[axis])
         return cells
 

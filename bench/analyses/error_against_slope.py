@@ -168,13 +168,13 @@ def errors_with_friction(results: Sequence[TrialResult]) -> list[tuple[float, Ju
         if seen.deflection is not None:
             alpha_deg[key] = math.degrees(seen.friction_rad.value)
             continue
-        for row in felt.estimates:
-            if row.estimator == FITTED:
-                alpha_deg[key] = math.degrees(row.alpha_est_rad)
+        fitted = felt.estimate(FITTED)
+        if fitted is not None:
+            alpha_deg[key] = math.degrees(fitted.alpha_est_rad)
     found = []
     for one in measured(results):
         alpha = alpha_deg.get((one.trial, one.whisk), math.nan)
-        if one.estimator == "with_friction" and not one.one_factor and math.isfinite(alpha):
+        if one.is_by_ten and math.isfinite(alpha):
             found.append((alpha, one))
     return found
 

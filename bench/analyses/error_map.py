@@ -165,11 +165,10 @@ def _whisks(
     """Yield (β in degrees, α in rad, error in percent, beam, d_x in mm) of whisks with all known."""
     sound = {}
     for judged in judge(results):
-        if judged.estimator == "with_friction" and not (judged.one_factor or judged.has_warning):
+        if judged.is_by_ten and not judged.has_warning:
             sound[judged.trial, judged.whisk] = judged
     for surface in friction:
-        seen = surface.alpha("seen")[0]
-        alpha = seen if np.isfinite(seen) else surface.alpha("least_squares")[0]
+        alpha = surface.best_alpha_rad
         for whisk in surface.whisks:
             judged = sound.get(whisk.key)
             if judged is None or not alpha >= 0:

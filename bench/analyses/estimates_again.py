@@ -18,6 +18,7 @@ from bench.analyses.turning_phi import sure_turns, turn, with_turn
 from bench.base.progress import count_parts
 from bench.base.settings import Settings
 from bench.records.trial_result import (
+    WITH_FRICTION,
     EstimateRow,
     FeltAt,
     FeltWhisk,
@@ -34,13 +35,12 @@ from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
 from vision import Value
 
-GIVEN = "with_friction"
 FITTED = "with_friction_fitted"
 SEEN = "with_friction_seen"
 KINETIC = "with_friction_kinetic"
 EVALUATED_AGAIN = (FITTED, SEEN, KINETIC)
 ASSUMING = {
-    GIVEN: with_friction,
+    WITH_FRICTION: with_friction,
     "corrected": corrected,
     "exact_rod": exact_rod,
 }  # take α_est as given
@@ -139,9 +139,7 @@ def with_estimates_again(
     turns = _turns(results, settings.alpha_est_rad)
     finished = []
     for result in count_parts(results, "trials by the friction of all", len(results)):
-        again = SecondEvaluation(
-            np.radians(result.theta_deg), whisker.beam, _radii_mm(result), alpha_est
-        )
+        again = SecondEvaluation(result.theta_rad, whisker.beam, result.radii_mm, alpha_est)
         surface = surface_of.get(result.trial.panel)
         felt = []
         for _, seen, of_whisk in whisks([result]):
@@ -231,15 +229,9 @@ def _runs(
             alpha = (max(alpha_rad, 0.0), sigma_rad)
             yield again.evaluate(name, with_friction, whisk, alpha)
     if felt.kinetic is not None:
-        alpha_rad = next(row.alpha_est_rad for row in felt.estimates if row.estimator == GIVEN)
-        alpha = (alpha_rad, again.alpha_est.sigma_rad)
+        alpha = (felt.estimate(WITH_FRICTION).alpha_est_rad, again.alpha_est.sigma_rad)
         kinetic = whisk_of(felt.kinetic, again.theta_rad, again.beam)
         yield again.evaluate(KINETIC, with_friction, kinetic, alpha)
-
-
-def _radii_mm(result: TrialResult) -> tuple[float, float]:
-    """Return the radii of the bar, NaN where the manifest does not say, and of the whisker's base."""
-    return 0.5 * result.trial.bar_diameter_mm, 0.5 * result.whisker.diameter_mm
 
 
 def _rescaled(row: EstimateRow, ratio: float) -> EstimateRow:
@@ -281,4 +273,4 @@ def _rescaled_sensor(row: EstimateRow, beam: Beam, ratio: float) -> EstimateRow:
 
 def settings_without_alpha(result: TrialResult) -> EstimatorSettings:
     """Return what an estimator that assumes no α_est is given of a trial's object."""
-    return assumed_settings(0.0, 0.0, _radii_mm(result))
+    return assumed_settings(0.0, 0.0, result.radii_mm)

@@ -18,7 +18,14 @@ from bench.analyses.pooling import known_rows, value_cells
 from bench.base.drawing import blank
 from bench.base.tables import TRIAL, WHISK, Column, Table, with_sigma
 from bench.gauges.gauge_readings import reference_from_pictures
-from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import (
+    WITH_FRICTION,
+    EstimateRow,
+    FeltWhisk,
+    SeenWhisk,
+    TrialResult,
+    whisks,
+)
 from bench.session.whisker import Whisker
 from bench.trials.estimate_errors import sound_whisks
 from estimator.distance import with_friction
@@ -120,13 +127,13 @@ def _stack_shares(axes: "Axes", place: np.ndarray, rows: Sequence[dict]) -> None
 def explained_rows(results: Iterable[TrialResult], whisker: Whisker) -> Iterator[dict]:
     """Yield the rows of whisks with truth and estimate; cells that cannot be known are NaN."""
     for result, seen, felt in whisks(results):
-        answers = [row for row in felt.estimates if row.estimator == "with_friction"]
-        if not answers or not seen.has_truth:
+        ten = felt.estimate(WITH_FRICTION)
+        if ten is None or not seen.has_truth:
             continue
         alpha_rad = seen.friction_rad.value
-        shares = _shares_by_fit(seen, felt, answers[0])
+        shares = _shares_by_fit(seen, felt, ten)
         if seen.deflection is not None:
-            shares = _shares(result, seen, felt, answers[0], alpha_rad, whisker)
+            shares = _shares(result, seen, felt, ten, alpha_rad, whisker)
         yield {
             "trial": result.trial.name,
             "whisk": seen.whisk,
@@ -139,7 +146,7 @@ def _shares_by_fit(seen: SeenWhisk, felt: FeltWhisk, answer: EstimateRow) -> dic
     """Return the error of (10) and its change by the fitted friction angle, mm; no share is seen."""
     truth = seen.d_x_mm.value
     d_x = answer.d_x_est_mm.value
-    fitted = next((row for row in felt.estimates if row.estimator == FITTED), None)
+    fitted = felt.estimate(FITTED)
     d_x_alpha = np.nan if fitted is None else fitted.d_x_est_mm.value
     return {
         "d_x_mm": truth,
@@ -160,7 +167,7 @@ def _shares(
     whisker: Whisker,
 ) -> dict:
     """Return the error of (10) and the change of d_x by each replacement, mm."""
-    theta = np.radians(result.theta_deg)
+    theta = result.theta_rad
     theta_seen = theta + felt.touch_felt_rad.value - seen.touch_rad.value
     alpha_est = answer.alpha_est_rad
     alpha = max(alpha_seen_rad if np.isfinite(alpha_seen_rad) else alpha_est, 0.0)

@@ -151,6 +151,12 @@ class SurfaceFriction:
                 return way.alpha_rad, way.sigma_rad
         return mean_alpha(self.whisks, name)
 
+    @property
+    def best_alpha_rad(self) -> float:
+        """Return the angle as seen, else by the fit of Fig. 8; NaN where neither has one."""
+        seen, _ = self.alpha("seen")
+        return seen if np.isfinite(seen) else self.surface.alpha_rad
+
 
 @dataclass(frozen=True, eq=False)
 class FrictionResult:
@@ -279,7 +285,7 @@ def _errors_by_10(results: Sequence[TrialResult]) -> dict[tuple[str, int], float
     """Return the error of (10), percent, by trial and number of the whisk."""
     found = {}
     for judged in judge(results):
-        if judged.estimator == "with_friction" and not judged.one_factor:
+        if judged.is_by_ten:
             found[judged.trial, judged.whisk] = judged.error_percent
     return found
 

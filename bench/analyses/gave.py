@@ -121,8 +121,8 @@ def give_seen(result: TrialResult, seen: SeenWhisk, felt: FeltWhisk) -> Value:
 
     NaN where either is not known.
     """
-    way = gave_at(seen, float(np.radians(result.theta_deg)))
-    if not (np.isfinite(way.value) and felt.has_moments and seen.has_truth):
+    way = gave_at(seen, result.theta_rad)
+    if not (way.is_known and felt.has_moments and seen.has_truth):
         return UNKNOWN
     force = normal_force_N(seen, felt)
     give = way.value / force.value
@@ -135,7 +135,7 @@ def _measurement(give: Value, result: TrialResult, seen: SeenWhisk, felt: FeltWh
 
     What whisks share of the way seen is not known: all of it counts as shared.
     """
-    way = gave_at(seen, float(np.radians(result.theta_deg)))
+    way = gave_at(seen, result.theta_rad)
     sin = np.sin(seen.beta_rad.value)
     cos = np.cos(seen.beta_rad.value)
     force_N = normal_force_N(seen, felt).value
@@ -156,7 +156,7 @@ def mean_give(results: Sequence[TrialResult]) -> tuple[Value, int]:
         if not is_sound(seen, felt):
             continue
         give = give_seen(result, seen, felt)
-        if np.isfinite(give.value):
+        if give.is_known:
             gives.append((result.trial.name, _measurement(give, result, seen, felt)))
     if not gives:
         return UNKNOWN, 0

@@ -9,10 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.alphas import felt_friction
-from bench.analyses.estimates_again import GIVEN, KINETIC
+from bench.analyses.estimates_again import KINETIC
 from bench.base.statuses import reason
 from bench.gauges.felt import motor_speed
-from bench.records.trial_result import BY_STAGE, EstimateRow, FeltWhisk, SeenWhisk, TrialResult
+from bench.records.trial_result import (
+    BY_STAGE,
+    WITH_FRICTION,
+    EstimateRow,
+    FeltWhisk,
+    SeenWhisk,
+    TrialResult,
+)
 from bench.session.whisker import Whisker
 from bench.trials.clocks import SharedTouch
 from estimator import first_order
@@ -65,10 +72,8 @@ class WhiskModel:
     @property
     def given(self) -> EstimateRow | None:
         """Return the estimate by (10) with α_est as given; None without moments."""
-        for row in self.felt.estimates:
-            if row.estimator == GIVEN and np.isfinite(row.d_x_est_mm.value):
-                return row
-        return None
+        row = self.felt.estimate(WITH_FRICTION)
+        return row if row is not None and row.d_x_est_mm.is_known else None
 
     @property
     def d_x_est_mm(self) -> float:
@@ -80,7 +85,7 @@ class WhiskModel:
         """Return its friction angle, as well as it is known: as seen, as felt, as assumed."""
         seen = self.seen.friction_rad.value
         left = self.whisker.beam.thickness(self.seen.d_x_mm.value)
-        felt, _ = felt_friction(self.seen, self.felt, self.theta_rad, left)
+        felt, _ = felt_friction(self.seen, self.felt, self.result.theta_rad, left)
         assumed = self.given.alpha_est_rad if self.given else NAN
         for alpha in (seen, felt):
             if np.isfinite(alpha):
@@ -101,11 +106,6 @@ class WhiskModel:
         """Return the motor's speed by its frames; NaN where they do not show it."""
         frames = self.seen.frames
         return motor_speed(frames) if frames is not None and len(frames.time_s) > 1 else NAN
-
-    @property
-    def theta_rad(self) -> float:
-        """Return the wanted pushing angle."""
-        return float(np.radians(self.result.theta_deg))
 
     @property
     def left(self) -> float:
@@ -156,29 +156,33 @@ def effect_on_estimate(name: str, model: WhiskModel) -> EstimateEffect:
 
 
 def _large_bending(model: WhiskModel) -> EstimateEffect:
-    size = model.theta_rad**2 / (6 * model.left)
+    size = model.result.theta_rad**2 / (6 * model.left)
     why = "of the estimate its size alone (docs/maps.md)"
     return EstimateEffect(0.0, size * model.d_x_est_mm, why)
 
 
 def _bar_radius(model: WhiskModel) -> EstimateEffect:
-    bar_mm = 0.5 * model.result.trial.bar_diameter_mm
-    reach_mm = bar_mm + 0.5 * model.whisker.diameter_mm * model.left
+    reach_mm = model.result.reach_mm(model.d_x_est_mm)
     share = first_order.rolling(
-        model.theta_rad, reach_mm, model.phi_rad, model.alpha_rad, model.d_x_est_mm, model.left
+        model.result.theta_rad,
+        reach_mm,
+        model.phi_rad,
+        model.alpha_rad,
+        model.d_x_est_mm,
+        model.left,
     )
     return _share_of_distance(model, share, reason("bar_radius_unknown"))
 
 
 def _psi(model: WhiskModel) -> EstimateEffect:
     psi_rad = model.seen.psi_rad.value
-    share = first_order.leaning(model.theta_rad, psi_rad, model.phi_rad, model.alpha_rad)
+    share = first_order.leaning(model.result.theta_rad, psi_rad, model.phi_rad, model.alpha_rad)
     return _share_of_distance(model, share, reason("tilt_unknown"))
 
 
 def _along(model: WhiskModel) -> EstimateEffect:
-    dragged = model.dragged if np.isfinite(model.seen.beta_rad.value) else NAN
-    share = dragged * first_order.dragging(model.theta_rad, model.alpha_rad)
+    dragged = model.dragged if model.seen.beta_rad.is_known else NAN
+    share = dragged * first_order.dragging(model.result.theta_rad, model.alpha_rad)
     return _share_of_distance(model, share, reason("slope_unknown"))
 
 
@@ -208,7 +212,7 @@ def _delay(model: WhiskModel) -> EstimateEffect:
 
 def _cross_talk(model: WhiskModel) -> EstimateEffect:
     for row in model.felt.one_factor:
-        if row.estimator == GIVEN:
+        if row.estimator == WITH_FRICTION:
             return EstimateEffect(0.0, row.d_x_est_mm.value - model.d_x_est_mm, row.status)
     return EstimateEffect(0.0, NAN, reason("factors_unknown"))
 
@@ -222,10 +226,10 @@ def _drift(model: WhiskModel) -> EstimateEffect:
 
 
 def _kinetic(model: WhiskModel) -> EstimateEffect:
-    for row in model.felt.estimates:
-        if row.estimator == KINETIC:
-            return EstimateEffect(0.0, model.d_x_est_mm - row.d_x_est_mm.value, row.status)
-    return EstimateEffect(why=reason("no_stick_slip"))
+    row = model.felt.estimate(KINETIC)
+    if row is None:
+        return EstimateEffect(why=reason("no_stick_slip"))
+    return EstimateEffect(0.0, model.d_x_est_mm - row.d_x_est_mm.value, row.status)
 
 
 # Refinements that change the estimate: how they do. All others leave it as it is.

@@ -75,7 +75,7 @@ class Microphone(Analysis):
         """Yield a line a speed: how many touches are heard, and how late."""
         for speed, mine in grouped(found, lambda one: one.result.trial.speed_deg_s).items():
             sigmas_s = [one.heard.sigma_s for one in mine if not one.heard.status]
-            delays_s = [one.delay_s.value for one in mine if np.isfinite(one.delay_s.value)]
+            delays_s = [one.delay_s.value for one in mine if one.delay_s.is_known]
             stated = f", to {1e3 * np.mean(sigmas_s):.2g} ms" if sigmas_s else ""
             late = ""
             if delays_s:

@@ -82,8 +82,8 @@ def known_rows(rows: Iterable[Iterable[float]], columns: int) -> tuple[np.ndarra
 
 def value_cells(column: str, value: Value) -> dict[str, float]:
     """Return the cells of a value and of its standard deviation; of an angle, in rad, the degrees."""
-    in_unit = degrees if column.endswith("_deg") else float
-    return {column: in_unit(value.value), sigma_name(column): in_unit(value.sigma)}
+    shown = value.in_degrees() if column.endswith("_deg") else value
+    return {column: float(shown.value), sigma_name(column): float(shown.sigma)}
 
 
 def whisk_cells(result: TrialResult, whisk: int) -> dict:

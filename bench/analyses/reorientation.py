@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.estimates_again import GIVEN
 from bench.analyses.pooling import (
     as_cell,
     degrees,
@@ -23,7 +22,7 @@ from bench.analyses.pooling import (
 )
 from bench.base.settings import Settings
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
-from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
+from bench.records.trial_result import WITH_FRICTION, EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from bench.session.session import Session
 from bench.trials.estimates import answer, assumed_settings, whisk_of
 from estimator.reorientation import next_turn_rad, reoriented, slip_angle
@@ -149,7 +148,7 @@ def _rotation(
 ) -> Rotation:
     """Return one whisk as a rotation of its contact."""
     trial = session.trial(result.trial.name)
-    whisk = whisk_of(felt, float(np.radians(result.theta_deg)), session.whisker.beam)
+    whisk = whisk_of(felt, result.theta_rad, session.whisker.beam)
     alpha_sigma_rad = float(np.radians(settings.first_alpha_est_sigma_deg))
     alpha_rad = settings.alpha_est_rad
     assumed = assumed_settings(alpha_rad, alpha_sigma_rad)
@@ -162,5 +161,5 @@ def _rotation(
         next_turn_rad=next_turn_rad(whisk, assumed),
         d_x_mm=seen.d_x_mm,
         answer=answer("reoriented", reoriented, whisk, alpha_rad, alpha_sigma_rad),
-        one_push=next(row for row in felt.estimates if row.estimator == GIVEN),
+        one_push=felt.estimate(WITH_FRICTION),
     )

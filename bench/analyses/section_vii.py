@@ -86,22 +86,15 @@ def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) ->
         contact = FeltContact(
             np.radians(trial.beta_nominal_deg),
             trial.d_x_nominal_mm,
-            float(np.radians(result.theta_deg)),
+            result.theta_rad,
             felt.m_y_Nmm.value,
             felt.m_z_Nmm.value,
             felt.shared_Nmm,
             trial.name,
-            reach_mm=_reach_mm(result),
+            reach_mm=result.reach_mm(trial.d_x_nominal_mm),
         )
         found.append(contact)
     return found
-
-
-def _reach_mm(result: TrialResult) -> float:
-    """Return the radii of bar and whisker together where the bar was set up."""
-    trial = result.trial
-    whisker_mm = result.whisker.diameter_mm * result.whisker.thickness(trial.d_x_nominal_mm)
-    return 0.5 * (trial.bar_diameter_mm + whisker_mm)
 
 
 def by_tilting(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:

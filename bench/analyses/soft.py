@@ -162,7 +162,7 @@ class Softness(Analysis):
         for soft in found:
             d_x_mm = soft.d_x_mm
             give = soft.give_mm_N
-            if not np.isfinite(give.value):
+            if not give.is_known:
                 continue
             stiffness, low, high = soft.stiffness_N_mm
             if soft.status:
@@ -209,7 +209,7 @@ def soft_objects(run: EvaluatedRun) -> list[Soft]:
     by_panel = grouped(measured(run.results), lambda result: result.trial.panel)
     for results in by_panel.values():
         facts = results[0].trial
-        theta_rad = float(np.radians(results[0].theta_deg))
+        theta_rad = results[0].theta_rad
         seen, whisks_seen = mean_give(results)
         for near, far in pairwise(_places(run.session, results)):
             if far.nominal_mm - near.nominal_mm >= _LEAST_SHIFT_MM:
@@ -259,7 +259,7 @@ def _is_held(felt: FeltWhisk) -> bool:
 
 def _compliance(result: TrialResult, felt: FeltWhisk) -> Measurement:
     """Return k_θ = θ/m_z."""
-    theta = float(np.radians(result.theta_deg))
+    theta = result.theta_rad
     m_z = felt.m_z_Nmm
     k_theta = theta / m_z.value
     shared = felt.shared_Nmm[:, 1] / m_z.value  # (k,) of the moment, relative

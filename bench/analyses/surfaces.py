@@ -161,7 +161,7 @@ def _felt(recording: int, result: TrialResult, seen: SeenWhisk, felt: FeltWhisk)
     return Felt(
         beta_deg,
         d_x_mm,
-        theta_rad=float(np.radians(result.theta_deg)),
+        theta_rad=result.theta_rad,
         m_y_Nmm=felt.m_y_Nmm.value,
         m_z_Nmm=felt.m_z_Nmm.value,
         m_y_sigma_Nmm=felt.m_y_Nmm.sigma,
@@ -174,8 +174,7 @@ def _felt(recording: int, result: TrialResult, seen: SeenWhisk, felt: FeltWhisk)
         whisk=seen.whisk,
         shared_Nmm=felt.shared_Nmm,
         beta_sigma_rad=trial.beta_nominal_sigma_rad if nominal else seen.beta_rad.sigma,
-        reach_mm=0.5
-        * (trial.bar_diameter_mm + result.whisker.diameter_mm * result.whisker.thickness(d_x_mm)),
+        reach_mm=result.reach_mm(d_x_mm),
     )
 
 

@@ -190,9 +190,5 @@ def _alphas_deg(friction: Iterable[SurfaceFriction]) -> dict[str, float]:
     """Return the friction angle by surface: the mean of all its speeds, as seen, else as fitted."""
     found = {}
     for surface, of_speeds in grouped(friction, lambda one: one.surface.name).items():
-        alphas_rad = []
-        for one in of_speeds:
-            seen = one.alpha("seen")[0]
-            alphas_rad.append(seen if np.isfinite(seen) else one.alpha("least_squares")[0])
-        found[surface] = degrees(np.mean(alphas_rad))
+        found[surface] = degrees(np.mean([one.best_alpha_rad for one in of_speeds]))
     return found

@@ -199,7 +199,7 @@ def _solve(session: Session, nominal_mm: float, of_group: Sequence[tuple]) -> Sh
     pushes = []
     shared_Nmm = []
     for result, _, felt in of_group:
-        theta_rad = float(np.radians(result.theta_deg))
+        theta_rad = result.theta_rad
         pushes.append(whisk_of(felt, theta_rad, session.whisker.beam))
         shared_Nmm.append(felt.shared_Nmm)
     return shared_contact(

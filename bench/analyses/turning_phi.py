@@ -95,7 +95,7 @@ def with_turn(
     spread = float(np.hypot(rate.sigma, _rate_by_hand(phi, alpha)))
     d_x_mm = row.d_x_est_mm
     size = abs(rate.value)
-    if not (size > spread and np.isfinite(d_x_mm.value)):
+    if not (size > spread and d_x_mm.is_known):
         return row
     widened = _widened(row, share * float(np.sqrt(size**2 - spread**2)), length_mm)
     if not (is_sure and size * share * d_x_mm.value > _MATTERS * d_x_mm.sigma):

@@ -91,8 +91,8 @@ def contacts(
             yield _compare(contact, stated) if stated else contact
         surface = stated or seen_surface(seen, result.seen.bar_radius_mm, mount.wire, mount.base)
         for estimate in (*felt.estimates, *felt.sensors):
-            is_known = math.isfinite(felt.touch_felt_rad.value)
-            if is_known and math.isfinite(estimate.d_x_est_mm.value):
+            is_known = felt.touch_felt_rad.is_known
+            if is_known and estimate.d_x_est_mm.is_known:
                 contact = _felt_contact(mount, trial.name, seen.whisk, felt, estimate)
                 contact = _to_rig(contact, mount.base)
                 yield _compare(contact, surface) if surface else contact

@@ -88,7 +88,7 @@ def _sound_contacts(cloud: Iterable[ContactPoint], estimator: str) -> list[Conta
     """Return one estimator's contacts near a known surface that carry no status."""
     sound = []
     for contact in cloud:
-        is_known = math.isfinite(contact.distance_mm.value)
+        is_known = contact.distance_mm.is_known
         if contact.estimator == estimator and not contact.status and is_known:
             sound.append(contact)
     return sound

@@ -276,7 +276,7 @@ def size_lines(sizes: Iterable[FeltSize]) -> Iterator[str]:
     """Yield a line a trial."""
     for felt in sizes:
         subject = f"{felt.trial}: {felt.surface.shape}, {counted(felt.contacts, 'contact')}"
-        if not np.isfinite(felt.size.value):
+        if not felt.size.is_known:
             yield f"{subject}: no size; {felt.status}"
             continue
         name, _, unit = felt.column.rpartition("_")

@@ -16,6 +16,8 @@ from vision.geometry import NO_REASON, Reason
 # Where the truth of a whisk comes from.
 BY_PICTURES = "pictures"
 BY_STAGE = "stage"
+# Estimator by equation (10) with α_est as given.
+WITH_FRICTION = "with_friction"
 
 
 @dataclass(frozen=True)
@@ -208,7 +210,7 @@ class SeenWhisk:
     @property
     def has_truth(self) -> bool:
         """Return whether the whisk's distance is known."""
-        return bool(np.isfinite(self.d_x_mm.value))
+        return self.d_x_mm.is_known
 
 
 @dataclass(frozen=True)
@@ -380,10 +382,14 @@ class FeltWhisk:
     with_drift: WithDrift | None = None
     delay_s: Value = UNKNOWN
 
+    def estimate(self, estimator: str) -> EstimateRow | None:
+        """Return the estimate by the estimator of this name; None where there is none."""
+        return next((row for row in self.estimates if row.estimator == estimator), None)
+
     @property
     def has_moments(self) -> bool:
         """Return whether the moments are known."""
-        return bool(np.isfinite(self.m_y_Nmm.value))
+        return self.m_y_Nmm.is_known
 
 
 @dataclass(frozen=True, eq=False)
@@ -413,6 +419,21 @@ class TrialResult:
     felt: FeltTrial
     hash: str = ""
     seen_hash: str = ""
+
+    @property
+    def theta_rad(self) -> float:
+        """Return the wanted pushing angle."""
+        return math.radians(self.theta_deg)
+
+    @property
+    def radii_mm(self) -> tuple[float, float]:
+        """Return the radii of the bar, NaN where it is not stated, and of the whisker's base."""
+        return 0.5 * self.trial.bar_diameter_mm, 0.5 * self.whisker.diameter_mm
+
+    def reach_mm(self, d_x_mm: float) -> float:
+        """Return the radii of bar and whisker together at a distance; NaN where the bar's is not stated."""
+        bar_mm, base_mm = self.radii_mm
+        return bar_mm + base_mm * self.whisker.thickness(d_x_mm)
 
 
 def whisks(results: Iterable[TrialResult]) -> Iterator[tuple[TrialResult, SeenWhisk, FeltWhisk]]:

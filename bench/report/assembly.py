@@ -111,8 +111,8 @@ def status_of(seen: SeenWhisk, felt: FeltWhisk) -> Reason:
 def _point_cells(point_mm: Value) -> dict[str, float]:
     """Return the cells of a point (3,) and of its sigmas; empty where there is none."""
     cells = {}
-    for column, value, sigma in zip(PLACE, point_mm.value, point_mm.sigma):
-        cells |= value_cells(column, Value(value, sigma))
+    for axis, column in enumerate(PLACE):
+        cells |= value_cells(column, point_mm.at(axis))
     return cells
 
 
@@ -177,19 +177,17 @@ def track_rows(result: TrialResult) -> Iterator[dict]:
         if frames is None:
             continue
         for k in range(len(frames.index)):
-            row = {
+            yield {
                 "frame": int(frames.index[k]),
                 "whisk": seen.whisk,
                 "time_s": float(frames.time_s[k]),
                 "motor_deg": degrees(frames.motor_rad[k]),
                 "theta_deg": degrees(frames.theta_rad.value[k]),
                 "touching": int(frames.touching[k]),
-                "slip_mm": float(frames.slip_mm.value[k]),
-                "slip_sigma_mm": float(frames.slip_mm.sigma[k]),
+                **_point_cells(frames.point_mm.at(k)),
+                **value_cells("slip_mm", frames.slip_mm.at(k)),
                 "d_y_mm": float(frames.d_y_mm.value[k]),
                 "d_z_mm": float(frames.d_z_mm.value[k]),
                 "phi_seen_deg": degrees(frames.phi_rad.value[k]),
                 "status": frames.status[k],
             }
-            point_mm = Value(frames.point_mm.value[k], frames.point_mm.sigma[k])
-            yield row | _point_cells(point_mm)

@@ -48,7 +48,6 @@ _LEAST_SIGMAS_AGAIN = 1.0
 _LEAST_SIGMAS_ANEW = 3.0
 _MOST_LISTED = 20  # lines in a terminal
 _MOST_NAMED = 6  # whisks in a line
-_DEGREES = math.degrees(1.0)
 
 WhiskKey = tuple[str, int]  # trial, number of the whisk
 Pair = tuple[SeenWhisk, FeltWhisk]
@@ -170,7 +169,7 @@ def _changes(first: _EvaluatedRun, other: _EvaluatedRun) -> Iterator[QuantityCha
         after = _quantities(other.whisks[key])
         for name, old in _quantities(pair).items():
             new = after.get(name)
-            if new is None or not (math.isfinite(old.value) or math.isfinite(new.value)):
+            if new is None or not (old.is_known or new.is_known):
                 continue
             values = (old.value, new.value)
             yield QuantityChange(
@@ -191,20 +190,15 @@ def _quantities(pair: Pair) -> dict[str, Value]:
     seen, felt = pair
     slip_mm = seen.at.slip_mm if seen.at is not None else UNKNOWN
     quantities = {
-        "d_x_mm": _scaled(seen.d_x_mm, 1.0),
-        "touch_deg": _scaled(seen.touch_rad, _DEGREES),
-        "beta_deg": _scaled(seen.beta_rad, _DEGREES),
-        "slip_mm": _scaled(slip_mm, 1.0),
-        "touch_felt_deg": _scaled(felt.touch_felt_rad, _DEGREES),
+        "d_x_mm": seen.d_x_mm,
+        "touch_deg": seen.touch_rad.in_degrees(),
+        "beta_deg": seen.beta_rad.in_degrees(),
+        "slip_mm": slip_mm,
+        "touch_felt_deg": felt.touch_felt_rad.in_degrees(),
     }
     for estimate in felt.estimates:
         quantities[f"{estimate.estimator}: d_x_est_mm"] = estimate.d_x_est_mm
     return quantities
-
-
-def _scaled(value: Value, scale: float) -> Value:
-    """Return a value and its sigma in another unit."""
-    return Value(scale * float(value.value), scale * float(value.sigma))
 
 
 def _row(change: QuantityChange, reference: Path) -> dict:

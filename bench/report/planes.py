@@ -45,7 +45,7 @@ def draw_planes(
     """Draw planes/<trial>_<whisk>.png of each whisk that was seen to be pushed; return their names."""
     names = []
     for _, seen, felt in whisks([result]):
-        if not (seen.has_truth and np.isfinite(seen.at.d_y_mm.value)):
+        if not (seen.has_truth and seen.at.d_y_mm.is_known):
             continue
         name = plane_name(result.trial.name, seen.whisk)
         names.append(name)

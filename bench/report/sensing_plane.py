@@ -258,16 +258,15 @@ def _write_values(axes: Axes, whisk: SeenWhisk) -> None:
     """Write the whisk's values with one sigma into a corner, a line each."""
     at = whisk.at
     quantities = [
-        ("d$_x$", whisk.d_x_mm, 1.0, "mm", 3),
-        ("σ", at.slip_mm, 1.0, "mm", 3),
-        ("β", whisk.beta_rad, np.degrees(1.0), "°", 2),
-        ("φ", at.phi_rad, np.degrees(1.0), "°", 2),
-        ("α seen", at.alpha_rad, np.degrees(1.0), "°", 2),
+        ("d$_x$", whisk.d_x_mm, "mm", 3),
+        ("σ", at.slip_mm, "mm", 3),
+        ("β", whisk.beta_rad.in_degrees(), "°", 2),
+        ("φ", at.phi_rad.in_degrees(), "°", 2),
+        ("α seen", at.alpha_rad.in_degrees(), "°", 2),
     ]
     lines = []
-    for name, of, scale, unit, digits in quantities:
-        value = f"{scale * of.value:.{digits}f} ± {scale * of.sigma:.{digits}f}"
-        lines.append(f"{name} = {value} {unit}")
+    for name, of, unit, digits in quantities:
+        lines.append(f"{name} = {of.value:.{digits}f} ± {of.sigma:.{digits}f} {unit}")
     axes.text(
         0.98,
         0.02,

@@ -163,7 +163,7 @@ def _strokes(results: Iterable[TrialResult]) -> Iterator[_Stroke]:
         for seen, felt in zip(result.seen.whisks, result.felt.whisks):
             # Frames or motor that are off by themselves have a status of their own.
             is_timed = not _NO_CLOCK.intersection(seen.status.codes)
-            if is_timed and np.isfinite(seen.touch_rad.value):
+            if is_timed and seen.touch_rad.is_known:
                 yield from _forward(name, seen, felt, clock_s)
         if result.seen.back:
             yield from _backward(name, result.seen.back, result.felt, clock_s)
@@ -238,7 +238,7 @@ def with_shared_touch(
 def _with_error(seen: SeenWhisk, shared: SharedTouch) -> SeenWhisk:
     """Return the whisk with the shared error in the sigma of its touch."""
     touch = seen.touch_rad
-    if not np.isfinite(touch.value):
+    if not touch.is_known:
         return seen
     error = abs(shared.at(motor_speed(seen.frames))[0])
     sigma = float(np.hypot(touch.sigma, error))

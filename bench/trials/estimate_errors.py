@@ -15,7 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.base.statuses import has_only_notes
-from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
+from bench.records.trial_result import (
+    WITH_FRICTION,
+    EstimateRow,
+    FeltWhisk,
+    SeenWhisk,
+    TrialResult,
+    whisks,
+)
 from vision.geometry import NO_REASON, Reason, joined
 
 
@@ -45,6 +52,11 @@ class Judged:
     status: str = ""
     whisk_status: Reason = NO_REASON
     d_x_est_sigma_alpha_exact_mm: float = math.nan
+
+    @property
+    def is_by_ten(self) -> bool:
+        """Return whether it is the estimate by equation (10) with α_est as given."""
+        return self.estimator == WITH_FRICTION and not self.one_factor
 
     @property
     def has_warning(self) -> bool:

@@ -20,6 +20,7 @@ from bench.gauges.felt import (
 from bench.gauges.gauge_readings import Pairs, pairs_of
 from bench.records.trial_result import (
     BY_STAGE,
+    WITH_FRICTION,
     EstimateRow,
     FeltAt,
     FeltTrial,
@@ -53,7 +54,6 @@ from vision.geometry import NO_REASON, Reason, joined
 NO_GAUGES = reason("no_gauges")
 SATURATED = reason("gauges_at_rail")
 OWN_GAUGES = reason("own_gauges")
-_TEN = "with_friction"  # equation (10)
 # Pushing angles at which a run says how error and sigma go with θ: steps of a half and less, where
 # errors bend.
 THETAS_DEG = (0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 2.5, 3, 3.5, 4, 5, 6, 8, 10, 12, 15, 20)
@@ -120,7 +120,7 @@ def _against_stated(felt: FeltWhisk, seen: SeenWhisk) -> FeltWhisk:
 
     Nothing is concluded from such a whisk.
     """
-    ten = next(row for row in felt.estimates if row.estimator == _TEN)
+    ten = felt.estimate(WITH_FRICTION)
     unit_name = stated_in_other_unit(seen.d_x_mm.value, ten.d_x_est_mm.value)
     if not unit_name:
         return felt
@@ -172,11 +172,10 @@ class _EstimatedStroke:
 
     def with_estimates(self, felt: FeltWhisk, whisk: Whisk) -> FeltWhisk:
         """Return the felt whisk with all estimates; whisk: at the wanted angle."""
-        rows = self._rows(whisk)
-        ten = next(row for row in rows if row.estimator == _TEN)
+        felt = replace(felt, estimates=self._rows(whisk))
+        ten = felt.estimate(WITH_FRICTION)
         return replace(
             felt,
-            estimates=rows,
             kinetic=kinetic_of(self.stroke, self.touch, self.readout, whisk, ten),
             by_theta=self._by_theta(),
             sensors=self._sensor_rows(whisk, felt.touch_felt_rad.value),
@@ -313,7 +312,7 @@ def _with_drift(unit: Unit, stroke: FeltStroke, readout: Readout) -> WithDrift |
     touch_rad = as_felt(0, touch, None, stroke.speed_rad_s, _delay_s(unit)).touch_felt_rad.value
     if isinstance(whisk, Reason):
         return WithDrift(touch_rad, NAN)
-    (row,) = answers(whisk, {_TEN: ESTIMATORS[_TEN]}, unit.settings)
+    (row,) = answers(whisk, {WITH_FRICTION: ESTIMATORS[WITH_FRICTION]}, unit.settings)
     return WithDrift(touch_rad, row.d_x_est_mm.value)
 
 

@@ -365,7 +365,7 @@ def _by_touches_too(
 
 def _first_known(seen: SeenTrial) -> WhiskTruth | None:
     """Return the first truth of a trial with a distance; the whisks of a trial err alike."""
-    known = (whisk.truth for whisk in seen.whisks if np.isfinite(whisk.truth.d_x_mm.value))
+    known = (whisk.truth for whisk in seen.whisks if whisk.truth.d_x_mm.is_known)
     return next(known, None)
 
 

@@ -246,7 +246,7 @@ def _refine(
         return refined
     truth = observe(whisks=[places[k] for k in coarse], settings=preset.vision)
     for k, whisk in zip(coarse, truth.whisks):
-        if np.isfinite(whisk.d_x_mm.value):
+        if whisk.d_x_mm.is_known:
             refined[k] = preset.name, replace(whisk, whisk=k)
     return refined
 
@@ -263,7 +263,7 @@ def _ways_back(
 
 def _back_stroke(truth: WhiskTruth | None) -> BackStroke | None:
     """Return touch and speed of a back stroke; None where there is none or it has no truth."""
-    if truth is None or not np.isfinite(truth.touch_rad.value):
+    if truth is None or not truth.touch_rad.is_known:
         return None
     return BackStroke(truth.touch_rad, motor_speed(truth.frames))
 
@@ -327,7 +327,7 @@ def _known_deflection(truth: WhiskTruth) -> Deflection | None:
     the wire and across it does.
     """
     d = _deflection(truth)
-    if d is None or np.isfinite(truth.d_x_mm.value):
+    if d is None or truth.d_x_mm.is_known:
         return d
     sigmas_mm = np.sqrt(np.diag(d.covariance)).reshape(-1, 3)
     across_mm = np.hypot(d.across_y_mm, d.across_z_mm)

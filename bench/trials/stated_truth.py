@@ -191,7 +191,7 @@ def stated_whisk(session: Session, trial: Trial, signals: Signals, stroke: slice
         return WhiskTruth(0, status=reason("stage_says_nothing"))
     _check_on_whisker(trial.d_x_mm, session, trial)
     slope = nominal_slope(trial)
-    tilt = Value(0.0, slope.sigma) if np.isfinite(slope.value) else UNKNOWN
+    tilt = Value(0.0, slope.sigma) if slope.is_known else UNKNOWN
     shared_mm = session.truth.origin_sigma_mm
     sigma_mm = float(np.hypot(trial.d_x_sigma_mm, shared_mm))
     return _truth(Value(trial.d_x_mm, sigma_mm), slope, tilt, shared_mm)

@@ -359,7 +359,7 @@ def _look_away(now_s: float, push: LivePush) -> None:
 
 def answer(truth: WhiskTruth) -> str:
     """Return distance, touch and slip of a whisk in words, or why there are none."""
-    if not np.isfinite(truth.d_x_mm.value):
+    if not truth.d_x_mm.is_known:
         return f"no distance: {truth.status}"
     slip = truth.frames.slip_mm
     theta_deg = np.degrees(truth.frames.theta_rad.value[-1])

@@ -171,7 +171,7 @@ def answers_of_trial(task: Task) -> list[Answer]:
 
 def _touch_rad(seen: SeenWhisk, felt: FeltWhisk) -> float:
     """Return the motor angle that times count from: of touch as seen, else as felt."""
-    if np.isfinite(seen.touch_rad.value):
+    if seen.touch_rad.is_known:
         return float(seen.touch_rad.value)
     return float(felt.touch_felt_rad.value)
 

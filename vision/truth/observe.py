@@ -347,7 +347,7 @@ def fitted_truth(explained: Explanation) -> WhiskTruth:
     beam = check_beam(fitted, fitted.covariance) if whisk.settings.check_beam else None
     status = joined(truth.status, explained.warning, *warnings_of(whisk, fitted, beam))
     # Before the free stroke is traced, which changes whisk.light.
-    refinements = _refinements(whisk, fitted) if np.isfinite(truth.d_x_mm.value) else {}
+    refinements = _refinements(whisk, fitted) if truth.d_x_mm.is_known else {}
     free: Solution = fitted
     if len(fitted.frames) < len(whisk.frames):
         free = free_stroke(whisk, fitted)

@@ -47,7 +47,7 @@ class PredictedTruth:
     @property
     def is_known(self) -> bool:
         """Return whether there would be a truth."""
-        return self.fitted is not None and bool(np.isfinite(self.truth.d_x_mm.value))
+        return self.fitted is not None and self.truth.d_x_mm.is_known
 
     def sigmas(self, theta_rad: float) -> dict[str, float]:
         """Return the standard deviations of d_x, touch and beta, and of slip, phi and alpha at a

@@ -149,7 +149,7 @@ class WhiskTruth:
 
     def at(self, theta_rad: float) -> TruthAtAngle:
         """Return the truth at a pushing angle, by a fit over the frames around it."""
-        smooth = self.smooth if np.isfinite(self.d_x_mm.value) else None
+        smooth = self.smooth if self.d_x_mm.is_known else None
         return at_angle(smooth, theta_rad, self.status)
 
 

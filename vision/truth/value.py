@@ -17,6 +17,19 @@ class Value:
     value: float | np.ndarray = NAN
     sigma: float | np.ndarray = NAN
 
+    @property
+    def is_known(self) -> bool:
+        """Return whether every number of it is finite; its sigma need not be."""
+        return bool(np.all(np.isfinite(self.value)))
+
+    def in_degrees(self) -> "Value":
+        """Return an angle that is in rad in degrees."""
+        return Value(np.degrees(self.value), np.degrees(self.sigma))
+
+    def at(self, k: int) -> "Value":
+        """Return one of several values."""
+        return Value(self.value[k], self.sigma[k])
+
 
 def as_values(pairs: Mapping[str, tuple[float, float]]) -> dict[str, Value]:
     """Return values with their sigmas, by name; pairs: of both."""

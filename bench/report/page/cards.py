@@ -10,16 +10,15 @@ from bench.gauges.felt import lateness
 from bench.records.trial_result import BY_STAGE, EstimateRow, SeenWhisk
 from bench.report.assembly import status_of
 from bench.report.page.thumbnails import picture_source
-from bench.report.page.words import MISSING, WhiskRow, distance_text, number, value_text, with_sigma
+from bench.report.page.words import MISSING, WhiskRow, distance_text, number, value_text
 from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
 from vision import UNKNOWN, BeamCheck, TruthAtAngle, Value
 from vision.geometry import counted
 
 SOUND = "sound"
-_DEGREES = math.degrees(1.0)
 
-_Quantity = tuple[str, Value, str]  # name, value (an angle in rad), unit that it is shown in
+_Quantity = tuple[str, Value, str]  # name, value, unit
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ def numbers(row: WhiskRow) -> list[tuple[str, str]]:
         quantities += _beam_changes(beam)
     found = []
     for name, value, unit in quantities:
-        text = value_text(value, degrees=unit == "°")
+        text = value_text(value)
         if text != MISSING:
             found.append((name, f"{text} {unit}"))
     if beam is not None:
@@ -120,14 +119,14 @@ def _quantities(row: WhiskRow) -> list[_Quantity]:
     felt = row.felt
     return [
         ("d_x by a stage" if seen.source == BY_STAGE else "d_x", seen.d_x_mm, "mm"),
-        ("touch seen", seen.touch_rad, "°"),
-        ("touch felt", felt.touch_felt_rad, "°"),
-        ("slope β", seen.beta_rad, "°"),
-        ("tilt ψ", seen.psi_rad, "°"),
+        ("touch seen", seen.touch_rad.in_degrees(), "°"),
+        ("touch felt", felt.touch_felt_rad.in_degrees(), "°"),
+        ("slope β", seen.beta_rad.in_degrees(), "°"),
+        ("tilt ψ", seen.psi_rad.in_degrees(), "°"),
         *(_quantities_at(seen.at) if seen.at is not None else ()),
         ("moment m_y felt", felt.m_y_Nmm, "N·mm"),
         ("moment m_z felt", felt.m_z_Nmm, "N·mm"),
-        ("force angle φ felt", felt.phi_felt_rad, "°"),
+        ("force angle φ felt", felt.phi_felt_rad.in_degrees(), "°"),
     ]
 
 
@@ -138,8 +137,8 @@ def _quantities_at(at: TruthAtAngle) -> list[_Quantity]:
         ("slip along the whisker", at.longitudinal_slip_mm, "mm"),
         ("deflection d_y", at.d_y_mm, "mm"),
         ("deflection d_z", at.d_z_mm, "mm"),
-        ("force angle φ seen", at.phi_rad, "°"),
-        ("friction angle α seen", at.alpha_rad, "°"),
+        ("force angle φ seen", at.phi_rad.in_degrees(), "°"),
+        ("friction angle α seen", at.alpha_rad.in_degrees(), "°"),
     ]
 
 
@@ -152,6 +151,8 @@ def _beam_changes(beam: BeamCheck) -> list[_Quantity]:
         ("slip", beam.slip, "mm"),
     ):
         change = Value(compared.spline - compared.beam, compared.difference_sigma)
+        if unit == "°":
+            change = change.in_degrees()
         changes.append((f"{name} by a spline, less by the beam", change, unit))
     return changes
 
@@ -170,8 +171,8 @@ def _estimate(row: WhiskRow, estimate: EstimateRow) -> tuple[str, ...]:
         label_of(estimate.estimator),
         value_text(estimate.d_x_est_mm),
         interval,
-        with_sigma(error.value, error.sigma, sign=True),
-        with_sigma(percent.value, percent.sigma, sign=True),
+        value_text(error, sign=True),
+        value_text(percent, sign=True),
         estimate.status,
     )
 
@@ -202,15 +203,14 @@ def cells(row: WhiskRow, estimators: list[str]) -> list[Cell]:
     trial = row.result.trial
     speed = math.nan if trial.speed_deg_s is None else trial.speed_deg_s
     slip = seen.at.slip_mm if seen.at is not None else UNKNOWN
-    alpha = seen.friction_rad
     fixed = [
         Cell(trial.surface, wide=True),
         Cell(f"{speed:g}" if math.isfinite(speed) else MISSING, speed, wide=True),
-        _value_cell(seen.beta_rad, degrees=True),
+        _value_cell(seen.beta_rad.in_degrees()),
         _distance_cell(seen),
         _value_cell(slip, wide=True),
-        _value_cell(lateness(seen, row.felt), degrees=True, wide=True),
-        _value_cell(alpha, degrees=True, wide=True),
+        _value_cell(lateness(seen, row.felt).in_degrees(), wide=True),
+        _value_cell(seen.friction_rad.in_degrees(), wide=True),
     ]
     errors = [_error(row, name) for name in estimators]
     return [*fixed, *errors, Cell(status_of(seen, row.felt) or SOUND)]
@@ -223,13 +223,11 @@ def is_flagged(row: WhiskRow) -> bool:
 
 def _error(row: WhiskRow, estimator: str) -> Cell:
     """Return the error of one estimator, per cent of the true distance."""
-    truth = row.seen.d_x_mm
-    for estimate in row.felt.estimates:
-        percent = estimate.error_percent(truth)
-        if estimate.estimator == estimator and math.isfinite(percent.value):
-            text = with_sigma(percent.value, percent.sigma, sign=True)
-            return Cell(text, percent.value)
-    return Cell(MISSING, math.nan)
+    estimate = row.felt.estimate(estimator)
+    if estimate is None:
+        return Cell(MISSING, math.nan)
+    percent = estimate.error_percent(row.seen.d_x_mm)
+    return Cell(value_text(percent, sign=True), percent.value)
 
 
 def _distance_cell(seen: SeenWhisk) -> Cell:
@@ -237,7 +235,6 @@ def _distance_cell(seen: SeenWhisk) -> Cell:
     return Cell(distance_text(seen), float(seen.d_x_mm.value))
 
 
-def _value_cell(value: Value, *, degrees: bool = False, wide: bool = False) -> Cell:
-    """Return the cell of a value with its sigma, sorted by the value; an angle in degrees."""
-    scale = _DEGREES if degrees else 1.0
-    return Cell(value_text(value, degrees=degrees), float(scale * value.value), wide)
+def _value_cell(value: Value, *, wide: bool = False) -> Cell:
+    """Return the cell of a value with its sigma, sorted by the value."""
+    return Cell(value_text(value), float(value.value), wide)

@@ -1,6 +1,5 @@
 """How the page names whisks and writes values."""
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -63,7 +62,6 @@ def distance_text(seen: SeenWhisk) -> str:
     return f"{text} ± {number(seen.d_x_shared_sigma_mm, decimals)}"
 
 
-def value_text(value: Value, *, degrees: bool = False) -> str:
-    """Return a value with its sigma; an angle in degrees."""
-    scale = math.degrees(1.0) if degrees else 1.0
-    return with_sigma(scale * float(value.value), scale * float(value.sigma))
+def value_text(value: Value, *, sign: bool = False) -> str:
+    """Return a value with its sigma."""
+    return with_sigma(float(value.value), float(value.sigma), sign=sign)

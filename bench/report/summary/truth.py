@@ -23,14 +23,14 @@ def truth_lines(results: Iterable[TrialResult]) -> Iterator[str]:
             f"{'felt − seen':>17}"
         )
     for result, seen, felt in known:
-        late = lateness(seen, felt)
+        late = lateness(seen, felt).in_degrees()
         late_deg = "- "
-        if np.isfinite(late.value):
-            late_deg = f"{np.degrees(late.value):+.3f} ± {np.degrees(late.sigma):.3f}°"
+        if late.is_known:
+            late_deg = f"{late.value:+.3f} ± {late.sigma:.3f}°"
         yield (
-            f"{result.trial.name:<18}{seen.whisk:>5}  {_degrees(seen.beta_rad, 2):>15}°  "
+            f"{result.trial.name:<18}{seen.whisk:>5}  {_with_sigma(seen.beta_rad.in_degrees(), 2):>15}°  "
             f"{_with_sigma(seen.d_x_mm, 3):>14} mm  {_with_sigma(seen.at.slip_mm, 3):>14} mm  "
-            f"{_degrees(seen.touch_rad, 3):>16}°  {late_deg:>17}"
+            f"{_with_sigma(seen.touch_rad.in_degrees(), 3):>16}°  {late_deg:>17}"
         )
 
 
@@ -110,11 +110,6 @@ def beam_lines(results: Iterable[TrialResult]) -> Iterator[str]:
 
 def _with_sigma(value: Value, digits: int) -> str:
     """Return a value with its standard deviation; a dash where it is not known."""
-    if not np.isfinite(value.value):
+    if not value.is_known:
         return "-"
     return f"{value.value:.{digits}f} ± {value.sigma:.{digits}f}"
-
-
-def _degrees(angle: Value, digits: int) -> str:
-    """Return an angle in degrees with its standard deviation."""
-    return _with_sigma(Value(np.degrees(angle.value), np.degrees(angle.sigma)), digits)
