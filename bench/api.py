@@ -27,17 +27,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bench.analyses.analysis import EvaluatedRun
 from bench.array.array_results import TABLES as ARRAY_TABLES
 from bench.array.array_results import folder_of, is_array, read_array_record, write_array
 from bench.base.atomic import lock_output
 from bench.base.drawing import style
 from bench.base.settings import Settings
 from bench.base.tables import Table
-from bench.report.evaluation import Finished, finished
 from bench.report.page.write import report_again
-from bench.report.pooled import read_run
 from bench.report.record import read_record
 from bench.report.run_facts import RunRecord
+from bench.report.run_folder import read_run
 from bench.report.run_tables import RUN_TABLES as TABLES
 from bench.report.whisk_tables import TRACK
 from bench.trials.seeing import STANDARD, by_preset
@@ -100,10 +100,11 @@ class Run:
             raise KeyError(f"there is no trial {trial!r}; there are {names}")
         return TRACK.read_file(self.out / "track" / f"{trial}.csv")
 
-    def results(self) -> Finished:
+    def results(self) -> EvaluatedRun:
         """Return everything of every whisk as typed records (`bench.records.trial_result`), and
         the friction of each surface."""
-        return finished(read_run(self.out), self.record.whisker, self.record.settings)
+        _, run = read_run(self.out)
+        return run
 
     def figures(self) -> dict[str, "Figure"]:
         """Return the session's figures by name, to change and save as one likes."""

@@ -22,6 +22,7 @@ from bench.base.tables import Table
 from bench.records.trial_result import BY_STAGE, TrialResult
 from bench.session.session import Session
 from bench.session.whisker import Whisker
+from vision.geometry import NO_REASON, Reason
 
 if TYPE_CHECKING:  # matplotlib is loaded where something is drawn
     from matplotlib.figure import Figure
@@ -35,8 +36,10 @@ _FIGURE_CODE = (*DRAWING, "bench/analyses")  # sources that a figure depends on
 class EvaluatedRun:
     """The results of an evaluated session: all that an analysis is given.
 
-    friction: of each surface and speed. alpha_est_sigma_rad: standard deviation of the assumed
-    friction angle. session: its manifests; None where only the folder of results is there.
+    results: of all trials, brought together (`bench.report.evaluation.evaluated_run`). friction: of each
+    surface and speed. alpha_est_sigma_rad: standard deviation of the assumed friction angle. touch_warning:
+    about an error of touch that all whisks share; empty for none. session: its manifests; None where only
+    the folder of results is there.
     """
 
     whisker: Whisker
@@ -44,6 +47,7 @@ class EvaluatedRun:
     results: tuple[TrialResult, ...]
     friction: tuple["SurfaceFriction", ...]
     alpha_est_sigma_rad: float
+    touch_warning: Reason = NO_REASON
     session: Session | None = None
     _findings: dict["Analysis", Any] = field(default_factory=dict, init=False, repr=False)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from bench.analyses.estimates_again import alpha_est_sigma
+from bench.analyses.analysis import EvaluatedRun
 from bench.analyses.estimator_accuracy import RunAccuracy
 from bench.array.array_page import write_page
 from bench.array.cloud import ContactPoint, Mount, contacts
@@ -21,10 +21,9 @@ from bench.base.tables import WHISKER
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import TrialResult, whisks
 from bench.report.assembly import estimate_rows, whisk_rows
-from bench.report.evaluation import Finished, finished
-from bench.report.pooled import read_run
-from bench.report.record import ARRAY, RUNS, read_record
+from bench.report.record import ARRAY, RUNS
 from bench.report.run_facts import RunRecord, Section
+from bench.report.run_folder import read_run
 from bench.report.summary.compose import SCORE, WARNINGS, Summary
 from bench.report.summary.verdict import verdict
 from bench.report.whisk_tables import ESTIMATES, WHISKS
@@ -62,26 +61,24 @@ class WhiskerRun:
 
     base: Base
     record: RunRecord
-    finished: Finished
+    run: EvaluatedRun
 
     @classmethod
     def read(cls, base: Base, folder: Path) -> "WhiskerRun":
         """Read a whisker's run from its folder. Raises BadInput where there is none."""
-        record = read_record(folder)
-        return cls(base, record, finished(read_run(folder), record.whisker, record.settings))
+        return cls(base, *read_run(folder))
 
     @property
     def results(self) -> Sequence[TrialResult]:
         """Return the results of its trials."""
-        return self.finished.results
+        return self.run.results
 
     @property
     def mount(self) -> Mount:
         """Return the base, wire and friction angle that place its contacts."""
         settings = self.record.settings
-        surfaces = [friction.surface for friction in self.finished.friction]
-        sigma = alpha_est_sigma(surfaces, settings)
-        return Mount(self.base, self.record.whisker.wire, settings.alpha_est_rad, sigma)
+        sigma_rad = self.run.alpha_est_sigma_rad
+        return Mount(self.base, self.record.whisker.wire, settings.alpha_est_rad, sigma_rad)
 
 
 def folder_of(out: Path, whisker: str) -> Path:

@@ -10,10 +10,8 @@ from bench.base.drawing import label_of
 from bench.base.errors import BadInput
 from bench.base.tables import TRIAL, WHISK, Column, Kind, Table
 from bench.records.trial_result import FeltWhisk, SeenWhisk, whisks
-from bench.report.evaluation import finished
 from bench.report.page.words import MISSING, number, with_sigma
-from bench.report.pooled import read_run
-from bench.report.record import read_record
+from bench.report.run_folder import read_run
 from vision import UNKNOWN, Value
 
 COMPARISON = Table(
@@ -119,17 +117,17 @@ def compare_runs(outs: Sequence[Path], table: Path | None = None) -> tuple[list[
     return lines, CHANGED if has_changed else DONE
 
 
-def _read_runs(outs: Sequence[Path]) -> list["_EvaluatedRun"]:
+def _read_runs(outs: Sequence[Path]) -> list["_ComparedRun"]:
     """Read two or more runs. Raises BadInput where there is one alone, one twice, or one is none."""
     if len(outs) < 2:
         raise BadInput("is one run alone; give two or more", file=outs[0])
     if len({Path(out).resolve() for out in outs}) < len(outs):
         raise BadInput("is given twice; give each run once", file=outs[-1])
-    return [_EvaluatedRun.read(Path(out)) for out in outs]
+    return [_ComparedRun.read(Path(out)) for out in outs]
 
 
 @dataclass(frozen=True)
-class _EvaluatedRun:
+class _ComparedRun:
     """A run and its folder. recordings: hash of each trial's files. whisks: seen and felt."""
 
     out: Path
@@ -138,10 +136,9 @@ class _EvaluatedRun:
     whisks: dict[WhiskKey, Pair]
 
     @classmethod
-    def read(cls, out: Path) -> "_EvaluatedRun":
+    def read(cls, out: Path) -> "_ComparedRun":
         """Read the run of a folder. Raises BadInput where it is none."""
-        record = read_record(out)
-        run = finished(read_run(out), record.whisker, record.settings)
+        record, run = read_run(out)
         found = {}
         for result, seen, felt in whisks(run.results):
             found[result.trial.name, seen.whisk] = (seen, felt)
@@ -153,13 +150,13 @@ class _EvaluatedRun:
         sources = {seen.truth_source for seen, _ in self.whisks.values()} - {""}
         return " and ".join(sorted(sources)) or "none"
 
-    def has_recording_of(self, other: "_EvaluatedRun", trial: str) -> bool:
+    def has_recording_of(self, other: "_ComparedRun", trial: str) -> bool:
         """Return whether a trial has the same files in both runs."""
         ours = self.recordings.get(trial)
         return ours is not None and ours == other.recordings.get(trial)
 
 
-def _changes(first: _EvaluatedRun, other: _EvaluatedRun) -> Iterator[QuantityChange]:
+def _changes(first: _ComparedRun, other: _ComparedRun) -> Iterator[QuantityChange]:
     """Yield every quantity of a whisk that stands in both runs, where either knows it."""
     for key, pair in first.whisks.items():
         if key not in other.whisks:
@@ -218,7 +215,7 @@ def _row(change: QuantityChange, reference: Path) -> dict:
 
 
 def _run_lines(
-    first: _EvaluatedRun, other: _EvaluatedRun, changes: Sequence[QuantityChange]
+    first: _ComparedRun, other: _ComparedRun, changes: Sequence[QuantityChange]
 ) -> Iterator[str]:
     """Yield counts of one run against the first, and the quantities that changed most."""
     compared = {change.key for change in changes}
@@ -246,7 +243,7 @@ def _largest_changes(changes: Sequence[QuantityChange]) -> Iterator[str]:
     yield f"  {quiet} of {len(changes)} values moved by {largest:.2f} sigma at most"
 
 
-def _accuracy_lines(runs: Sequence[_EvaluatedRun]) -> Iterator[str]:
+def _accuracy_lines(runs: Sequence[_ComparedRun]) -> Iterator[str]:
     """Yield the RMS error of each estimator in each run."""
     table: dict[str, list[str]] = {}  # by label, a cell a run
     for place, run in enumerate(runs):

@@ -12,24 +12,13 @@ from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.certificate import Certificate
 from bench.gauges.matrix import GaugeCalibration
 from bench.records.trial_result import TrialResult
+from bench.session.session import Session
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_touch, shared_touch_warning, with_shared_touch
-from vision.geometry import Reason
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Finished(EvaluatedRun):
-    """Results of all trials, brought together.
-
-    Each whisk has (10) by the session's friction, and the error of touch that all whisks share.
-    touch_warning: the warning about that error; empty for none.
-    """
-
-    touch_warning: Reason
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Evaluation(Finished):
+@dataclass(frozen=True, eq=False)
+class Evaluation:
     """A run with what its report needs, its results in the folder `out`.
 
     calibration: the cameras as placed in the rig, with its notes. gauges: None where volts cannot become
@@ -37,6 +26,7 @@ class Evaluation(Finished):
     should read, each a Reason where it has a code. recordings: hash of each trial's files, by name.
     """
 
+    run: EvaluatedRun
     out: Path
     gauges: GaugeCalibration | None
     certificate: Certificate | None
@@ -45,19 +35,26 @@ class Evaluation(Finished):
     recordings: Mapping[str, str]
 
 
-def finished(results: Iterable[TrialResult], whisker: Whisker, settings: Settings) -> Finished:
-    """Return the results brought together, as they stand in trials/."""
-    results = tuple(with_estimates_again(results, whisker, settings))
+def evaluated_run(
+    results: Iterable[TrialResult],
+    whisker: Whisker,
+    settings: Settings,
+    session: Session | None = None,
+) -> EvaluatedRun:
+    """Return the run of all trials' results, as they stand in trials/.
+
+    Each whisk has (10) by the session's friction, and the error of touch that all whisks share.
+    """
+    results = with_estimates_again(results, whisker, settings)
     shared = shared_touch(results)
-    warning = shared_touch_warning(shared)
     results = with_shared_touch(results, shared)
     friction = tuple(friction_of(results, whisker, settings.alpha_est_rad))
-    sigma_rad = alpha_est_sigma([one.surface for one in friction], settings)
-    return Finished(
+    return EvaluatedRun(
         whisker=whisker,
         settings=settings,
         results=results,
         friction=friction,
-        alpha_est_sigma_rad=sigma_rad,
-        touch_warning=warning,
+        alpha_est_sigma_rad=alpha_est_sigma([one.surface for one in friction], settings),
+        touch_warning=shared_touch_warning(shared),
+        session=session,
     )

@@ -1,6 +1,5 @@
 """`whisker-bench figures 8`: several evaluated runs, days of one whisker, pooled into one Fig. 8."""
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeAlias
@@ -11,14 +10,11 @@ from bench.analyses.figure_8 import FIGURE_8, figure_8, rows
 from bench.analyses.surfaces import FittedSurface, friction_lines, surfaces
 from bench.base.drawing import publish, style
 from bench.base.errors import BadInput
-from bench.base.results import read_result
-from bench.records.plain import from_plain
 from bench.records.trial_result import TrialResult, WhiskerFacts
+from bench.report.run_folder import read_results
 from estimator.beam import Beam
 from estimator.profiled_beam import ProfiledBeam
 
-TABLE = "whisks.csv"
-_AGAIN = "evaluate the session again into this folder"
 # [1] A whisker's length, diameter and stiffness are written down alike on all days: rounding. Stated.
 _SAME_WHISKER = 1e-3
 Fact: TypeAlias = float | str | tuple[float, ...] | None
@@ -46,7 +42,7 @@ def pooled(outs: Sequence[Path]) -> list[FittedSurface]:
 
     Raises BadInput as `write_figure_8` does.
     """
-    runs = [(Path(out), read_run(Path(out))) for out in outs]
+    runs = [(Path(out), read_results(Path(out))) for out in outs]
     first, reference = runs[0]
     _check_given_once(runs)
     for out, results in runs[1:]:
@@ -71,48 +67,6 @@ def _beam(whisker: WhiskerFacts) -> Beam:
     if whisker.tip_diameter_mm is not None:
         tip = whisker.tip_diameter_mm / whisker.diameter_mm
     return Beam.from_rigidity(whisker.EI_Nmm2, whisker.length_mm, whisker.shape, tip)
-
-
-def read_run(out: Path) -> list[TrialResult]:
-    """Read the results of a run's trials, in the order of its whisks.csv.
-
-    Raises BadInput where it is no finished run, or another one was stopped half-way in the same
-    folder.
-    """
-    if not (out / TABLE).is_file():
-        none = f"is no evaluated run (there is no {TABLE} in it); give the OUT of `evaluate`"
-        raise BadInput(none, file=out)
-    results = [_result(out, trial) for trial in _trials(out / TABLE)]
-    if not results:
-        raise BadInput(f"holds no whisk ({TABLE} has no rows)", file=out)
-    recorded = (read_result(out / "run.json") or {}).get("results", {})
-    for result in results:
-        trial = result.trial.name
-        if result.hash != recorded.get(trial, result.hash):
-            later = f"trials/{trial}.json is of a later run, which was not finished"
-            raise BadInput(f"{later}; {_AGAIN}", file=out)
-    return results
-
-
-def _trials(table: Path) -> list[str | None]:
-    """Return the names in the column `trial`, each once. Raise BadInput where the file is damaged."""
-    try:
-        with table.open(newline="", encoding="utf-8") as file:
-            return list(dict.fromkeys(row.get("trial") for row in csv.DictReader(file)))
-    except (UnicodeDecodeError, csv.Error) as problem:
-        raise BadInput(f"is damaged ({problem}); {_AGAIN}", file=table) from None
-
-
-def _result(out: Path, trial: str | None) -> TrialResult:
-    """Read the result of a trial. Raise BadInput where it is not there, damaged or too old."""
-    name = f"trials/{trial}.json"
-    values = read_result(out / name)
-    if not values:
-        raise BadInput(f"{name} is not there or damaged; {_AGAIN}", file=out)
-    try:
-        return from_plain(TrialResult, values)
-    except ValueError:
-        raise BadInput(f"{name} is of an older version; {_AGAIN}", file=out) from None
 
 
 def _check_given_once(runs: Sequence[tuple[Path, list[TrialResult]]]) -> None:

@@ -27,12 +27,13 @@ _AGAIN = "evaluate the session again into this folder"
 
 def record_of(evaluation: Evaluation, summary: Summary, figures: Sequence[str]) -> RunRecord:
     """Return all that the report needs beyond the trials' results. figures: names of the pictures."""
-    session = evaluation.session
+    run = evaluation.run
+    session = run.session
     calibration = evaluation.calibration
     return RunRecord(
         session=session.name,
         whisker=session.whisker,
-        settings=evaluation.settings,
+        settings=run.settings,
         verdict=summary.verdict,
         warnings=summary.warnings,
         warning_codes=tuple(as_reason(line).codes for line in summary.warnings),
@@ -43,7 +44,7 @@ def record_of(evaluation: Evaluation, summary: Summary, figures: Sequence[str]) 
         board=_board(session, calibration),
         gauges=_gauges(evaluation),
         recordings=dict(evaluation.recordings),
-        results={result.trial.name: result.hash for result in evaluation.results},
+        results={result.trial.name: result.hash for result in run.results},
         versions=versions(),
     )
 

@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bench.analyses.analysis import EvaluatedRun
 from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import PointStyle, blank, draw_whisks, style, whisk_url
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.records.trial_result import SeenWhisk, TrialResult, whisks
-from bench.report.evaluation import Evaluation
 from bench.report.overlays import draw_overlays
 from bench.report.planes import draw_planes
 from bench.report.run_facts import GaugePoints
@@ -49,17 +49,17 @@ class TrialToDraw:
     out: Path
 
 
-def draw_trials(evaluation: Evaluation, pool: Workers) -> list[str]:
+def draw_trials(run: EvaluatedRun, out: Path, pool: Workers) -> list[str]:
     """Draw the figures of each trial; return the names of the files.
 
     A figure is drawn again only where what it shows has changed.
     """
-    fitted = [friction.surface for friction in evaluation.friction]
+    fitted = [friction.surface for friction in run.friction]
     tasks = []
-    for result in evaluation.results:
-        trial = evaluation.session.trial(result.trial.name)
-        friction = _friction_of(result, fitted, evaluation.settings)
-        tasks.append(TrialToDraw(trial, result, evaluation.whisker, friction, evaluation.out))
+    for result in run.results:
+        trial = run.session.trial(result.trial.name)
+        friction = _friction_of(result, fitted, run.settings)
+        tasks.append(TrialToDraw(trial, result, run.whisker, friction, out))
     names = []
     for of_trial in pool.run(draw_trial, tasks, "figures"):
         names += of_trial

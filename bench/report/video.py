@@ -15,9 +15,9 @@ from bench.base.progress import count_parts
 from bench.records.trial_result import SeenTrial, SeenWhisk, TrialResult, WhiskerFacts
 from bench.report.film_curves import with_curves
 from bench.report.painting import as_8_bit, polyline, put_text
-from bench.report.pooled import read_run
 from bench.report.record import SESSION, read_record
 from bench.report.run_facts import CameraFacts
+from bench.report.run_folder import read_results
 from bench.session.footage import read_frames
 from bench.session.frame_times import FrameTimes, frame_times
 from bench.session.session import load_session
@@ -78,7 +78,7 @@ def codec_of(path: Path) -> str:
 
 def _result(out: Path, trial: str) -> TrialResult:
     """Return the result of a trial. Raise BadInput where there is none, or nothing was seen in it."""
-    results = {result.trial.name: result for result in read_run(out)}
+    results = {result.trial.name: result for result in read_results(out)}
     if trial not in results:
         raise BadInput(f"there is no trial {trial!r}; there are {', '.join(results)}", file=out)
     whisks = results[trial].seen.whisks

@@ -29,7 +29,7 @@ from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.records.trial_result import BY_STAGE, TrialResult
-from bench.report.evaluation import finished
+from bench.report.evaluation import evaluated_run
 from bench.session.inside import check_outside
 from bench.session.session_check import checked_session, trials_with_whisks
 from bench.session.signals import read_signals
@@ -90,7 +90,7 @@ def _answers_of_session(
         _, units = placed_units(session, recorded, out, settings, pool, problems)
         *_, units = with_gauges(units, pool, problems)
         chosen = [unit for unit in units if settings.takes(unit.trial.name)]
-        results = finished(evaluate_units(chosen, pool), session.whisker, settings).results
+        results = evaluated_run(evaluate_units(chosen, pool), session.whisker, settings).results
         answers = []
         for of_trial in pool.run(answers_of_trial, _tasks(chosen, results), "answers"):
             answers += of_trial

@@ -10,7 +10,7 @@ from bench.base.progress import begin_step, count_parts
 from bench.base.settings import Settings
 from bench.base.workers import Workers
 from bench.report.assembly import write_tables
-from bench.report.evaluation import Evaluation, finished
+from bench.report.evaluation import Evaluation, evaluated_run
 from bench.report.summary.compose import Summary
 from bench.session.inside import check_outside
 from bench.session.session import Session
@@ -111,20 +111,14 @@ def _evaluate_whisker(
     calibration, units = units_in_rig(session, units, pool, problems)
     gauges, certificate, units = with_gauges(units, pool, problems)
     chosen = [unit for unit in units if settings.takes(unit.trial.name)]
-    whole = finished(evaluate_units(chosen, pool), session.whisker, settings)
-    if whole.touch_warning:
-        problems.warnings.append(whole.touch_warning)
-    problems.warnings += exchanged_signals(chosen, whole.results)
-    problems.warnings += exchanged_pictures(chosen, whole.results)
+    run = evaluated_run(evaluate_units(chosen, pool), session.whisker, settings, session)
+    if run.touch_warning:
+        problems.warnings.append(run.touch_warning)
+    problems.warnings += exchanged_signals(chosen, run.results)
+    problems.warnings += exchanged_pictures(chosen, run.results)
     evaluation = Evaluation(
-        whisker=session.whisker,
-        settings=settings,
-        results=whole.results,
-        friction=whole.friction,
-        alpha_est_sigma_rad=whole.alpha_est_sigma_rad,
-        touch_warning=whole.touch_warning,
-        session=session,
-        out=out,
+        run,
+        out,
         gauges=gauges,
         certificate=certificate,
         calibration=calibration,
@@ -154,25 +148,26 @@ def report(evaluation: Evaluation, pool: Workers, figure_formats: Sequence[str] 
     from bench.report.summary.compose import summary_of
 
     out = evaluation.out
-    write_tables(out, evaluation.results)
+    run = evaluation.run
+    write_tables(out, run.results)
     for analysis in count_parts(ANALYSES, "tables on whisks together", len(ANALYSES)):
-        analysis.write(out, evaluation.found(analysis))
+        analysis.write(out, run.found(analysis))
     figures = []
-    if evaluation.settings.figures:
+    if run.settings.figures:
         from bench.report.trial_figures import draw_trials  # with all of matplotlib
 
-        figures += draw_trials(evaluation, pool)
+        figures += draw_trials(run, out, pool)
         for analysis in count_parts(ANALYSES, "figures on whisks together", len(ANALYSES)):
-            figures += analysis.draw(out, evaluation)
+            figures += analysis.draw(out, run)
     begin_step("report")
-    scores = score(evaluation.session, out, evaluation.gauges)
+    scores = score(run.session, out, evaluation.gauges)
     summary = summary_of(evaluation, scores, figures)
     written = record_of(evaluation, summary, figures)
-    record = write_record(out, written, evaluation.session.path)
-    write_report(out, record, evaluation)
+    record = write_record(out, written, run.session.path)
+    write_report(out, record, run)
     if figure_formats:
         from bench.report.paper import write_paper_figures
 
-        write_paper_figures(out, evaluation, figure_formats)
+        write_paper_figures(out, run, figure_formats)
     write_whole(out / "summary.txt", summary.text)
     return summary

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from bench.analyses.analysis import EvaluatedRun
 from bench.analyses.estimator_accuracy import Accuracy, TruthUncertainty
 from bench.analyses.friction_tables import SurfaceFriction
-from bench.report.evaluation import Finished
 from bench.report.page.words import MISSING, number, with_sigma
 from bench.report.run_facts import CameraFacts, RunRecord
 
@@ -35,7 +35,7 @@ def bibliography(record: RunRecord) -> str:
     return f"{program}\n{_PAPER}"
 
 
-def methods(record: RunRecord, run: Finished) -> str:
+def methods(record: RunRecord, run: EvaluatedRun) -> str:
     """Return two paragraphs and two tables, as Markdown."""
     accuracy_of_all = run.accuracy.estimators
     lines = [
@@ -53,7 +53,7 @@ def methods(record: RunRecord, run: Finished) -> str:
     return "\n".join(lines)
 
 
-def _truth(record: RunRecord, run: Finished) -> Iterator[str]:
+def _truth(record: RunRecord, run: EvaluatedRun) -> Iterator[str]:
     """Yield the sentences on the whisker, the cameras, and how well the truth is known."""
     truth = run.accuracy.truth
     slope = f"slope {number(truth.beta_deg, 3)}°"
@@ -78,7 +78,7 @@ def _sentence_on_distance(truth: TruthUncertainty, source: str, others: str) -> 
     )
 
 
-def _sentence_on_whisker(record: RunRecord, run: Finished) -> str:
+def _sentence_on_whisker(record: RunRecord, run: EvaluatedRun) -> str:
     """Return the sentence on the whisker and how often it was pushed."""
     whisker = record.whisker
     form = {"cylinder": "cylindrical", "cone": "conical", "tapered": "tapered"}[whisker.shape]

@@ -8,22 +8,20 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from bench.analyses.analysis import PageTable
+from bench.analyses.analysis import EvaluatedRun, PageTable
 from bench.analyses.catalogue import ANALYSES
 from bench.base.atomic import lock_output, write_whole
 from bench.base.results import plain
 from bench.base.settings import Seeing, Settings
 from bench.base.statuses import cure_of
-from bench.report.evaluation import Finished, finished
 from bench.report.page.cards import card, cells, columns, is_flagged
 from bench.report.page.drawings import Drawings, draw
 from bench.report.page.gauge_tables import gauge_part
 from bench.report.page.methods import bibliography, methods
 from bench.report.page.rig_in_3d import ELLIPSOID_FACTOR, scene
 from bench.report.page.words import WhiskRow, by_whisk, number, rows_of
-from bench.report.pooled import read_run
-from bench.report.record import read_record
 from bench.report.run_facts import CameraFacts, RunRecord
+from bench.report.run_folder import read_run
 
 REPORT = "report.html"
 METHODS = "methods.md"
@@ -48,8 +46,7 @@ def report_again(out: Path, figure_formats: Sequence[str] = ()) -> list[Path]:
 
     figure_formats: of these. Returns the paths written. Raises BadInput where `out` is no such run.
     """
-    record = read_record(out)
-    run = finished(read_run(out), record.whisker, record.settings)
+    record, run = read_run(out)
     with lock_output(out):
         figures = []
         if figure_formats:
@@ -59,7 +56,7 @@ def report_again(out: Path, figure_formats: Sequence[str] = ()) -> list[Path]:
         return [*write_report(out, record, run), *figures]
 
 
-def write_report(out: Path, record: RunRecord, run: Finished) -> list[Path]:
+def write_report(out: Path, record: RunRecord, run: EvaluatedRun) -> list[Path]:
     """Write report.html, methods.md and results.bib, each whole; return their paths.
 
     The same results give the same bytes.
@@ -74,7 +71,7 @@ def write_report(out: Path, record: RunRecord, run: Finished) -> list[Path]:
     return [out / name for name in written]
 
 
-def page(out: Path, record: RunRecord, run: Finished) -> str:
+def page(out: Path, record: RunRecord, run: EvaluatedRun) -> str:
     """Return the page as HTML. out: the folder of its pictures and of the analyses' tables."""
     rows = rows_of(run.results)
     drawings = draw(record, rows, run) if record.settings.figures else Drawings()
@@ -108,7 +105,7 @@ def _of_whisks(out: Path, rows: Sequence[WhiskRow]) -> dict[str, object]:
     return {"rows": lines, "columns": columns(estimators), "cards": cards}
 
 
-def _of_run(record: RunRecord, run: Finished, rows: Sequence[WhiskRow]) -> dict[str, object]:
+def _of_run(record: RunRecord, run: EvaluatedRun, rows: Sequence[WhiskRow]) -> dict[str, object]:
     """Return what the template shows of the run as a whole: errors, warnings, settings, gauges."""
     row_of = by_whisk(rows)
     accuracies = []

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.analysis import EvaluatedRun
 from bench.analyses.catalogue import ANALYSES
 from bench.report.evaluation import Evaluation
 from bench.report.run_facts import Section
@@ -87,17 +88,18 @@ def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[
 
     scores: lines on a synthetic session's truth. figures: names of the pictures.
     """
-    results = evaluation.results
+    run = evaluation.run
+    results = run.results
     warnings = (
         *evaluation.warnings,
         *damage_warnings(results),
         *scatter_warnings(results),
         *whisk_warnings(results, evaluation.warnings),
     )
-    of_analyses = _sections_of_analyses(evaluation)
+    of_analyses = _sections_of_analyses(run)
     last = [of_analyses.pop(code) for code in _ANALYSES_LAST if code in of_analyses]
     sections = (
-        *_sections_of_errors(evaluation),
+        *_sections_of_errors(run),
         *of_analyses.values(),
         _section("gauges", "Gauges, N·mm/V (± 95 %)", gauge_lines(evaluation.gauges)),
         *last,
@@ -114,12 +116,13 @@ def summary_of(evaluation: Evaluation, scores: Sequence[str], figures: Sequence[
 
 def _verdict_lines(evaluation: Evaluation, warnings: int) -> Iterator[str]:
     """Yield the lines that the summary begins with. warnings: how many there are."""
-    session = evaluation.session
-    settings = evaluation.settings
-    yield from verdict(session.name, session.is_seen, evaluation.accuracy, settings, warnings)
+    run = evaluation.run
+    session = run.session
+    settings = run.settings
+    yield from verdict(session.name, session.is_seen, run.accuracy, settings, warnings)
     yield from angle_lines(session)
     yield from gauge_source_lines(evaluation.gauges)
-    yield from preset_lines(evaluation.results, settings)
+    yield from preset_lines(run.results, settings)
 
 
 def angle_lines(session: Session) -> Iterator[str]:
@@ -135,38 +138,39 @@ def angle_lines(session: Session) -> Iterator[str]:
 def _given_lines(evaluation: Evaluation) -> Iterator[str]:
     """Return lines on how well what was stated is known."""
     cameras = evaluation.calibration.cameras
-    are_brought = cameras is not None and evaluation.session.cameras_toml is not None
+    session = evaluation.run.session
+    are_brought = cameras is not None and session.cameras_toml is not None
     are_exact = are_brought and not np.any(cameras.covariance)
-    return given_lines(evaluation.session, cameras_are_exact=are_exact)
+    return given_lines(session, cameras_are_exact=are_exact)
 
 
 def _sections_of_pictures(evaluation: Evaluation) -> Iterator[Section]:
     """Yield the sections on cameras, light and frames."""
     yield _section("cameras", "Cameras", evaluation.calibration.notes)
-    yield _section("light", "Light from one side", light_lines(evaluation.results))
-    yield _section("frames", "Frames", frame_lines(evaluation.results))
+    yield _section("light", "Light from one side", light_lines(evaluation.run.results))
+    yield _section("frames", "Frames", frame_lines(evaluation.run.results))
 
 
-def _sections_of_errors(evaluation: Evaluation) -> Iterator[Section]:
+def _sections_of_errors(run: EvaluatedRun) -> Iterator[Section]:
     """Yield the sections on truth, clocks and errors, with which the summary begins."""
-    results = evaluation.results
+    results = run.results
     truth = (
         *truth_lines(results),
         *budget_lines(results),
         *shared_lines(results),
         *beam_lines(results),
     )
-    theta_deg = evaluation.settings.theta_deg
+    theta_deg = run.settings.theta_deg
     title = (
         f"Error of d_x at θ = {theta_deg:g}°, estimate less truth, in % of the truth (± one sigma)"
     )
-    source = "by a stage" if evaluation.is_by_stage else "from the pictures"
+    source = "by a stage" if run.is_by_stage else "from the pictures"
     yield _section("truth", f"Truth, {source} (± one sigma)", truth)
     yield _section("clocks", "Clocks", clock_lines(results))
     yield _section("errors", title, [*error_lines(judge(results)), *contact_lines(results)])
 
 
-def _sections_of_analyses(evaluation: Evaluation) -> dict[str, Section]:
+def _sections_of_analyses(run: EvaluatedRun) -> dict[str, Section]:
     """Return the sections of the analyses by their codes, in the summary's order.
 
     Analyses of one code share a section.
@@ -179,7 +183,7 @@ def _sections_of_analyses(evaluation: Evaluation) -> dict[str, Section]:
             continue
         titles[heading.code] = heading.title
         of_section = lines.setdefault(heading.code, [])
-        of_section += analysis.lines(evaluation.found(analysis))
+        of_section += analysis.lines(run.found(analysis))
     sections = {}
     for code, of_section in lines.items():
         if code in titles:

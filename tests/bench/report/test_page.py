@@ -19,7 +19,7 @@ from bench.commands.cli import main
 from bench.report.page import words
 from bench.report.page.thumbnails import MOST_BYTES, MOST_INSIDE, picture_source
 from bench.report.page.write import BIBLIOGRAPHY, METHODS, REPORT, as_script
-from bench.report.pooled import read_run
+from bench.report.run_folder import read_results
 from tests.scenes.results import table
 
 WRITTEN = (REPORT, METHODS, BIBLIOGRAPHY)
@@ -112,7 +112,7 @@ def test_standing_is_that_of_the_tables(exact_run):
     for row in table(exact_run / "estimates.csv"):
         if row["trial"].startswith(("b", "<")) and row["error_percent"]:
             errors.setdefault(row["estimator"], []).append(float(row["error_percent"]))
-    stood = {s.estimator: s for s in accuracies(read_run(exact_run))}
+    stood = {s.estimator: s for s in accuracies(read_results(exact_run))}
     for name in ("no_slip", "with_friction", "frictionless"):
         assert len(stood[name].judged) == len(errors[name])
         assert stood[name].rms_percent == pytest.approx(
@@ -124,12 +124,12 @@ def test_standing_is_that_of_the_tables(exact_run):
 
 
 def test_methods_tell_this_runs_numbers(exact_run):
-    text, sure = (exact_run / METHODS).read_text(), truth_uncertainty(read_run(exact_run))
+    text, sure = (exact_run / METHODS).read_text(), truth_uncertainty(read_results(exact_run))
     assert (
         f"known for {sure.known} of {sure.measured} whisks" in text
         or "No pictures were recorded" in text
     )
-    for s in accuracies(read_run(exact_run)):
+    for s in accuracies(read_results(exact_run)):
         numbers = (words.number(v) for v in (s.bias_percent, s.rms_percent, s.worst_percent))
         assert f"| {s.label} | {len(s.judged)} of {s.with_truth} | {' | '.join(numbers)} |" in text
     assert "doi     = {10.1109/TRO.2008.2002562}" in (exact_run / BIBLIOGRAPHY).read_text()

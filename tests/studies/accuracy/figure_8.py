@@ -30,7 +30,8 @@ from bench.analyses.surfaces import FittedSurface
 from bench.commands import cli
 from bench.commands.options import DONE, WITH_WARNINGS
 from bench.records.trial_result import TrialResult
-from bench.report.pooled import pooled, read_run
+from bench.report.pooled import pooled
+from bench.report.run_folder import read_results
 from bench.rig.protocol import FOLDER as PROTOCOLS
 from estimator.friction import Pushes, fit_alpha
 
@@ -130,7 +131,7 @@ def _require(code: int) -> None:
 def panels(folder: Path) -> list[Panel]:
     """An evaluated session's panels, each with its whisks."""
     found: dict[tuple, list[Whisk]] = {}
-    for result in read_run(folder / "out"):
+    for result in read_results(folder / "out"):
         trial = result.trial
         if trial.purpose == "measure":
             found.setdefault(trial.panel, []).extend(

@@ -23,8 +23,8 @@ from bench.analyses.catalogue import ANALYSES
 from bench.base.settings import Settings
 from bench.records.trial_result import TrialResult
 from bench.report.assembly import write_tables
-from bench.report.evaluation import finished
-from bench.report.pooled import read_run
+from bench.report.evaluation import evaluated_run
+from bench.report.run_folder import read_results
 from bench.session.session import Session, load_session
 from bench.workflows.session_evaluation import evaluate
 
@@ -49,7 +49,7 @@ def steps(results: list[TrialResult], session: Session) -> Iterator[tuple[str, f
     """Yield each step and its seconds."""
     settings = Settings(figures=False)
     begin = time.process_time()
-    run = finished(results, session.whisker, settings)
+    run = evaluated_run(results, session.whisker, settings)
     yield "fits, (10) again", time.process_time() - begin
     for analysis in ANALYSES:
         if not analysis.needs_session:
@@ -79,7 +79,7 @@ def results_of_fixture() -> list[TrialResult]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
         evaluate(STAGE, out, Settings(figures=False), announce=lambda _: None)
-        return read_run(out)
+        return read_results(out)
 
 
 def measured(results: Sequence[TrialResult]) -> tuple[list[int], dict[str, list[float]]]:
@@ -97,7 +97,7 @@ def measured(results: Sequence[TrialResult]) -> tuple[list[int], dict[str, list[
 
 def main() -> None:
     """Print a line a step."""
-    results = read_run(Path(sys.argv[1])) if sys.argv[1:] else results_of_fixture()
+    results = read_results(Path(sys.argv[1])) if sys.argv[1:] else results_of_fixture()
     counts, spent = measured(results)
     for name, of_step in spent.items():
         print(line(name, counts, of_step))
