@@ -3,6 +3,7 @@
 Section VII has θ small, noise has it large: where between them an estimator errs least is read off here.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -117,7 +118,7 @@ def against_theta(results: Sequence[TrialResult]) -> list[AtTheta]:
         if not seen.has_truth:
             continue
         for at in felt.by_theta:
-            theta_deg = round(float(np.degrees(at.theta_rad)), 6)
+            theta_deg = round(math.degrees(at.theta_rad), 6)
             for row in at.estimates:
                 errors = _errors_percent(row, seen.d_x_mm)
                 percent.setdefault((row.estimator, theta_deg), []).append(errors)

@@ -1,5 +1,6 @@
 """The friction angle α of each whisk: seen (no gauge) and felt (β seen, φ from the moments), in rad."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -64,7 +65,7 @@ class WhiskAlphas:
         """Return static or kinetic α by the record "seen" or "felt"; NaN without stick–slip."""
         shared_rad = self.shared_seen_rad if record == "seen" else self.shared_felt_rad
         mean, sigma = self.phases(record).mean(kind)
-        return mean, float(np.hypot(sigma, shared_rad))
+        return mean, math.hypot(sigma, shared_rad)
 
     def angle(self, name: str) -> tuple[float, float]:
         """Return the angle "seen" or "felt", or of a kind and record, such as "static_felt"."""
@@ -121,7 +122,7 @@ def _alphas(
         phases_seen=phases,
         phases_felt=felt.phases,
         shared_seen_rad=beta.sigma,
-        shared_felt_rad=float(np.hypot(beta.sigma, felt.phi_felt_rad.sigma)),
+        shared_felt_rad=math.hypot(beta.sigma, felt.phi_felt_rad.sigma),
         beta_from=beta_from,
         common_seen=(beta_common_rad, _common_seen(seen)),
         common_felt=(beta_common_rad, *_common_felt(felt).tolist()),
@@ -132,7 +133,7 @@ def _slope(trial: TrialFacts, seen: SeenWhisk) -> tuple[Value, str]:
     """Return the slope β, rad, as seen or else as the manifest states it, and which of both it is."""
     if seen.beta_rad.is_known:
         return seen.beta_rad, seen.source
-    stated_rad = float(np.radians(trial.beta_nominal_deg))
+    stated_rad = math.radians(trial.beta_nominal_deg)
     return Value(stated_rad, trial.beta_nominal_sigma_rad), BY_MANIFEST
 
 
@@ -178,7 +179,7 @@ def felt_friction(
         return UNKNOWN
     beta = seen.beta_rad
     phi = felt.phi_felt_rad
-    sigma_rad = float(np.hypot(beta.sigma, phi.sigma))
+    sigma_rad = math.hypot(beta.sigma, phi.sigma)
     across_rad = abs(beta.value) - abs(phi.value) + _turn_of_force(seen, felt, theta_rad, left)
     if seen.deflection is None and seen.has_truth:
         if felt.apart or not abs(phi.value) > _SURE_SIGMAS * phi.sigma:

@@ -4,6 +4,7 @@ They belong to the truth: the exact rod of the stated whisker turns the wire's s
 them, and no estimate reads them. Where moments are felt, the table compares the two.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -197,13 +198,13 @@ def _frame_rows(one: WhiskLoads) -> Iterator[dict]:
             **whisk_cells(one.result, one.seen.whisk),
             "frame": int(frames.index[row]),
             "time_s": float(frames.time_s[row]),
-            "theta_deg": float(np.degrees(frames.theta_rad.value[row])),
+            "theta_deg": math.degrees(frames.theta_rad.value[row]),
         }
         own = np.sqrt(np.maximum(np.diag(loads.covariance[k]), 0.0))
         shared = loads.stiffness_share * np.abs(loads.values[k])
         for name, value, own_sigma, shared_sigma in zip(_NAMES, loads.values[k], own, shared):
             cells[name] = float(value)
-            cells[sigma_name(name)] = float(np.hypot(own_sigma, shared_sigma))
+            cells[sigma_name(name)] = math.hypot(own_sigma, shared_sigma)
             cells[shared_name(name)] = float(shared_sigma)
         yield cells
 
@@ -222,7 +223,7 @@ def felt_beside(one: WhiskLoads) -> dict | None:
     along = moments / size
     seen_sigma = _seen_sigma(one, size, along, covariance)
     felt_moment = _felt_along(felt, along)
-    sigma = float(np.hypot(seen_sigma, felt_moment.sigma))
+    sigma = math.hypot(seen_sigma, felt_moment.sigma)
     return {
         **whisk_cells(one.result, one.seen.whisk),
         "theta_deg": one.result.theta_deg,
@@ -245,7 +246,7 @@ def _seen_sigma(
     cancels.
     """
     stiffness = 0.0 if one.is_by_wire else one.loads.stiffness_share * size
-    return float(np.hypot(np.sqrt(direction @ covariance @ direction), stiffness))
+    return math.hypot(np.sqrt(direction @ covariance @ direction), stiffness)
 
 
 def _felt_along(felt: FeltWhisk, direction: np.ndarray) -> Value:

@@ -6,6 +6,7 @@ plane a straight bar is flat: there φ stays as it is, and what it changes by wi
 Appendix B, by (23) to (25) as printed and by the exact form.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -376,7 +377,7 @@ def _radius(
     return Measurement(
         reach_mm - 0.5 * whisker.diameter_mm * left,
         own=abs(creep.sigma / per_mm),
-        of_setting=float(np.hypot(leaning, turned)) / abs(per_mm),
+        of_setting=math.hypot(leaning, turned) / abs(per_mm),
         common=(spread / per_mm, by_alpha / per_mm),
     )
 

@@ -4,6 +4,7 @@ Only where a trial says that its object gives way (object_gives_way in trial.tom
 only what it is worth in mm/N takes the force that is felt. compliance.csv has that next to section VII's.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -75,7 +76,7 @@ def _rows(results: Sequence[TrialResult]) -> Iterator[dict]:
             yield {
                 **whisk_cells(result, seen.whisk),
                 "frame": int(frame),
-                "theta_deg": float(np.degrees(gave.theta_rad[k])),
+                "theta_deg": math.degrees(gave.theta_rad[k]),
                 "gave_mm": float(gave.normal_mm.value[k]),
                 "gave_sigma_mm": float(gave.normal_mm.sigma[k]),
                 "gave_aside_mm": float(gave.lateral_mm.value[k]),
@@ -111,9 +112,7 @@ def normal_force_N(seen: SeenWhisk, felt: FeltWhisk) -> Value:
     by_slope = (m_y.value * cos - m_z.value * sin) * seen.beta_rad.sigma
     force = moment / d_x.value
     by_distance = force * d_x.sigma / d_x.value
-    return Value(
-        float(force), float(np.hypot(np.hypot(by_moments, by_slope) / d_x.value, by_distance))
-    )
+    return Value(float(force), math.hypot(np.hypot(by_moments, by_slope) / d_x.value, by_distance))
 
 
 def give_seen(result: TrialResult, seen: SeenWhisk, felt: FeltWhisk) -> Value:
@@ -126,7 +125,7 @@ def give_seen(result: TrialResult, seen: SeenWhisk, felt: FeltWhisk) -> Value:
         return UNKNOWN
     force = normal_force_N(seen, felt)
     give = way.value / force.value
-    relative_sigma = float(np.hypot(way.sigma / way.value, force.sigma / force.value))
+    relative_sigma = math.hypot(way.sigma / way.value, force.sigma / force.value)
     return Value(give, abs(give) * relative_sigma)
 
 

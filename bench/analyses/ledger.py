@@ -5,6 +5,7 @@ is less than a tenth of every sigma may be left out: it adds no more than a two-
 so, at every preset.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -173,9 +174,9 @@ def _entry(name: str, model: WhiskModel, sigmas: dict[str, float]) -> Entry:
     estimate = effect_on_estimate(name, model)
     effects = {
         "d_x_mm": float(truth.d_x_mm),
-        "touch_deg": float(np.degrees(truth.touch_rad)),
+        "touch_deg": math.degrees(truth.touch_rad),
         "slip_mm": float(truth.slip_mm),
-        "touch_felt_deg": float(np.degrees(estimate.touch_rad)),
+        "touch_felt_deg": math.degrees(estimate.touch_rad),
         "d_x_est_mm": float(estimate.d_x_est_mm),
     }
     reason = in_one_status(truth.why, estimate.why)
@@ -189,9 +190,9 @@ def _sigmas(model: WhiskModel) -> dict[str, float]:
     slip_sigmas = () if seen.frames is None else seen.frames.slip_mm.sigma[seen.frames.touching]
     return {
         "d_x_mm": float(seen.d_x_mm.sigma),
-        "touch_deg": float(np.degrees(seen.touch_rad.sigma)),
+        "touch_deg": math.degrees(seen.touch_rad.sigma),
         "slip_mm": float(slip_sigmas[-1]) if len(slip_sigmas) else NAN,
-        "touch_felt_deg": float(np.degrees(model.felt.touch_felt_rad.sigma)),
+        "touch_felt_deg": math.degrees(model.felt.touch_felt_rad.sigma),
         "d_x_est_mm": float(d_x_est_mm.sigma),
     }
 

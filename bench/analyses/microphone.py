@@ -3,6 +3,7 @@
 Where signals have its pressure, `estimator.microphone` finds when each forward stroke first touches.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -109,7 +110,7 @@ def heard_whisks(
         speed_rad_s = np.ptp(signals.motor_rad[stroke]) / np.ptp(signals.time_s[stroke])
         touch_rad = float(signals.motor_at(np.array(heard.time_s)))
         late_rad = touch_rad - one.touch_rad.value
-        delay_sigma_s = float(np.hypot(heard.sigma_s, one.touch_rad.sigma / speed_rad_s))
+        delay_sigma_s = math.hypot(heard.sigma_s, one.touch_rad.sigma / speed_rad_s)
         yield Heard(
             result,
             one.whisk,

@@ -1,5 +1,6 @@
 """What analyses have in common: whisks by group, errors pooled over whisks, cells of a row."""
 
+import math
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Sequence
 from operator import attrgetter
 from typing import Any, TypeVar
@@ -115,7 +116,7 @@ def estimate_cells(estimate: EstimateRow, truth: Value) -> dict:
 
 def degrees(angle_rad: float) -> float:
     """Return an angle in degrees as a plain number."""
-    return float(np.degrees(angle_rad))
+    return math.degrees(angle_rad)
 
 
 def as_cell(is_inside: bool | None) -> int | None:

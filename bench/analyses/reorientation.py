@@ -4,6 +4,7 @@ Trials that name one `contact` in trial.toml are rotations against it, the plane
 them. After each of them the distance is that of (2) by the last rotation (`estimator.reorientation`).
 """
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -149,7 +150,7 @@ def _rotation(
     """Return one whisk as a rotation of its contact."""
     trial = session.trial(result.trial.name)
     whisk = whisk_of(felt, result.theta_rad, session.whisker.beam)
-    alpha_sigma_rad = float(np.radians(settings.first_alpha_est_sigma_deg))
+    alpha_sigma_rad = math.radians(settings.first_alpha_est_sigma_deg)
     alpha_rad = settings.alpha_est_rad
     assumed = assumed_settings(alpha_rad, alpha_sigma_rad)
     return Rotation(

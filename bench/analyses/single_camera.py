@@ -4,6 +4,7 @@ These rows see their own trial, so they stand in no table of the gauges' estimat
 Only where `--one-camera` asks for it.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -69,7 +70,7 @@ class ShapeSeen:
     @property
     def error_sigma_mm(self) -> float:
         """Return the stated standard deviation of the error."""
-        return float(np.hypot(self.by_one.d_x_mm.sigma, self.seen.d_x_mm.sigma))
+        return math.hypot(self.by_one.d_x_mm.sigma, self.seen.d_x_mm.sigma)
 
     @property
     def inside(self) -> bool | None:

@@ -5,6 +5,7 @@ The whisker is moved along itself by a known shift, between trials of one surfac
 used; where pictures show the object giving way, that stands in the same row (`bench.analyses.gave`).
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -121,7 +122,7 @@ class Soft:
     @property
     def shift_sigma_mm(self) -> float:
         """Return the standard deviation of that shift."""
-        return float(np.hypot(self.near.nominal_sigma_mm, self.far.nominal_sigma_mm))
+        return math.hypot(self.near.nominal_sigma_mm, self.far.nominal_sigma_mm)
 
     @property
     def stiffness_N_mm(self) -> tuple[float, float, float]:
@@ -349,7 +350,7 @@ def _model_sigma(place: Place, beam: Beam, theta_rad: float, alpha_est: Value) -
     )
     dragging = first_order.dragging(theta_rad, alpha)
     by_alpha = first_order.dragging(theta_rad, alpha + alpha_est.sigma) - dragging
-    relative = float(np.hypot(share, first_order.HELD_SHARE * by_alpha))
+    relative = math.hypot(share, first_order.HELD_SHARE * by_alpha)
     return relative * _compliance_of_distance(beam, place)
 
 

@@ -1,5 +1,6 @@
 """Whisks by surface and speed: the points of Fig. 8 and the friction angle α that (13), (14) fit them with."""
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -53,14 +54,14 @@ class Felt:
     @property
     def m_Nmm(self) -> float:
         """Return |m|."""
-        return float(np.hypot(self.m_y_Nmm, self.m_z_Nmm))
+        return math.hypot(self.m_y_Nmm, self.m_z_Nmm)
 
     @property
     def m_sigma_Nmm(self) -> float:
         """Return the standard deviation of |m|."""
         by_y = self.m_y_Nmm * self.m_y_sigma_Nmm
         by_z = self.m_z_Nmm * self.m_z_sigma_Nmm
-        return float(np.hypot(by_y, by_z)) / self.m_Nmm
+        return math.hypot(by_y, by_z) / self.m_Nmm
 
 
 @dataclass(frozen=True)
@@ -166,8 +167,8 @@ def _felt(recording: int, result: TrialResult, seen: SeenWhisk, felt: FeltWhisk)
         m_z_Nmm=felt.m_z_Nmm.value,
         m_y_sigma_Nmm=felt.m_y_Nmm.sigma,
         m_z_sigma_Nmm=felt.m_z_Nmm.sigma,
-        phi_deg=float(np.degrees(felt.phi_felt_rad.value)),
-        phi_sigma_deg=float(np.degrees(felt.phi_felt_rad.sigma)),
+        phi_deg=math.degrees(felt.phi_felt_rad.value),
+        phi_sigma_deg=math.degrees(felt.phi_felt_rad.sigma),
         nominal=nominal,
         recording=recording,
         trial=trial.name,

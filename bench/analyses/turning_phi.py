@@ -6,6 +6,7 @@ along the whisker as it slips: φ turns by ½ cos β tan ψ a radian, and (10) i
 it is no moment shows, so (10) is not corrected: what it says gets a status.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -92,7 +93,7 @@ def with_turn(
     alpha = row.alpha_est_rad
     beta = min(abs(phi) + alpha, 0.999 * RIGHT_ANGLE)
     share = theta_rad * np.sin(abs(phi)) / (np.cos(alpha) * np.cos(beta))  # of d_x, by a rate
-    spread = float(np.hypot(rate.sigma, _rate_by_hand(phi, alpha)))
+    spread = math.hypot(rate.sigma, _rate_by_hand(phi, alpha))
     d_x_mm = row.d_x_est_mm
     size = abs(rate.value)
     if not (size > spread and d_x_mm.is_known):
@@ -117,12 +118,12 @@ def _widened(row: EstimateRow, share: float, length_mm: float) -> EstimateRow:
     """Return the row with a share of its distance added in squares to sigmas and interval."""
     value = row.d_x_est_mm.value
     more = share * value
-    below = float(np.hypot(row.d_x_est_low_mm - value, Z_95 * more))
-    above = float(np.hypot(row.d_x_est_high_mm - value, Z_95 * more))
+    below = math.hypot(row.d_x_est_low_mm - value, Z_95 * more)
+    above = math.hypot(row.d_x_est_high_mm - value, Z_95 * more)
     return replace(
         row,
-        d_x_est_mm=Value(value, float(np.hypot(row.d_x_est_mm.sigma, more))),
-        d_x_est_sigma_alpha_exact_mm=float(np.hypot(row.d_x_est_sigma_alpha_exact_mm, more)),
+        d_x_est_mm=Value(value, math.hypot(row.d_x_est_mm.sigma, more)),
+        d_x_est_sigma_alpha_exact_mm=math.hypot(row.d_x_est_sigma_alpha_exact_mm, more),
         d_x_est_low_mm=max(value - below, 0.0),
         d_x_est_high_mm=min(value + above, length_mm),
     )

@@ -1,5 +1,6 @@
 """Changes to a bench, each to be tried: a camera elsewhere, a longer lens, more views, a third camera, more light."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -145,8 +146,8 @@ def _places(camera: Camera, target_mm: np.ndarray) -> Iterator[np.ndarray]:
     """Yield places (3,) of a camera round the target to four sides, and nearer."""
     offset_mm = camera.centre_mm - target_mm
     distance_mm = float(np.linalg.norm(offset_mm))
-    azimuth_deg = float(np.degrees(np.arctan2(offset_mm[1], offset_mm[0])))
-    elevation_deg = float(np.degrees(np.arcsin(offset_mm[2] / distance_mm)))
+    azimuth_deg = math.degrees(np.arctan2(offset_mm[1], offset_mm[0]))
+    elevation_deg = math.degrees(np.arcsin(offset_mm[2] / distance_mm))
     for turn, lift in ((_TURN_DEG, 0.0), (-_TURN_DEG, 0.0), (0.0, _TURN_DEG), (0.0, -_TURN_DEG)):
         lifted_deg = elevation_deg + lift
         if 0.0 < lifted_deg < _STEEPEST_DEG:

@@ -1,5 +1,6 @@
 """What a trial would give, in a row: expected sigmas, what limits each, and what stands in the way."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -38,7 +39,7 @@ _LEAST_OF_BAR = 0.7
 
 def in_unit(column: str, value: float) -> float:
     """Return a value in mm or rad in the unit of a column."""
-    return value * float(np.degrees(1.0)) if column.endswith("_deg") else value
+    return value * math.degrees(1.0) if column.endswith("_deg") else value
 
 
 @dataclass(frozen=True)

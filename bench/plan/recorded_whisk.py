@@ -1,5 +1,6 @@
 """A recorded session as a plan: each whisk as the cameras saw it, its expected sigmas and those stated."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -119,8 +120,8 @@ def _facts(task: SeenTask) -> Facts:
         purpose=trial.purpose,
         surface=trial.surface,
         speed_deg_s=speed_deg_s,
-        beta_deg=float(np.degrees(whisk.beta_rad.value)),
-        psi_deg=float(np.degrees(whisk.psi_rad.value)),
+        beta_deg=math.degrees(whisk.beta_rad.value),
+        psi_deg=math.degrees(whisk.psi_rad.value),
         d_x_mm=float(whisk.d_x_mm.value),
     )
 

@@ -1,5 +1,6 @@
 """The verb `plan`: of a rig that does not stand yet, or of a session as it was recorded."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -147,7 +148,7 @@ def _rig_tasks(rig: _PlacedRig, options: Options) -> list[RigTask]:
     changes: Sequence[Change] = ()
     if options.changes:
         changes = list_changes(rig.cameras, rig.work, rig.target_mm, light=True)
-    theta_rad = float(np.radians(options.theta_deg))
+    theta_rad = math.radians(options.theta_deg)
     runs = rig.protocol.runs()
     return [RigTask(rig.protocol, run, rig.cameras, changes, theta_rad) for run in runs]
 
@@ -207,7 +208,7 @@ def _board_work(painter: Painter) -> BoardWork:
     on_rig = MeasuredPose(
         build.T_rig_board(painter.protocol),
         table.pose_sigma_mm,
-        float(np.radians(table.pose_sigma_deg)),
+        math.radians(table.pose_sigma_deg),
     )
     return BoardWork(painter.board, painter.printed, on_rig, table.views, painter.corner_px())
 

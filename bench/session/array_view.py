@@ -129,7 +129,7 @@ def _base(keys: manifest.ArrayWhiskerKeys) -> Base:
     """Return a whisker's base: turned about the rig's x, then y, then z, and shifted."""
     rotation = Rotation.from_euler("xyz", keys.base_deg, degrees=True).as_matrix()
     pose = np.column_stack([rotation, keys.base_mm])
-    return Base(keys.name, pose, keys.base_sigma_mm, float(np.radians(keys.base_sigma_deg)))
+    return Base(keys.name, pose, keys.base_sigma_mm, math.radians(keys.base_sigma_deg))
 
 
 def _check_distances(bases: Sequence[Base], keys: Sequence[manifest.ArrayWhiskerKeys]) -> None:

@@ -1,5 +1,6 @@
 """A session folder, read strictly: what a lab recorded in one sitting (format 1)."""
 
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -185,7 +186,7 @@ def session_of(
         board=board,
         T_rig_board=T_rig_board,
         T_rig_board_sigma_mm=keys.rig.T_rig_board_sigma_mm,
-        T_rig_board_sigma_rad=float(np.radians(keys.rig.T_rig_board_sigma_deg)),
+        T_rig_board_sigma_rad=math.radians(keys.rig.T_rig_board_sigma_deg),
         gauges=given_gauges(keys.gauges),
         camera_names=_camera_names(recorded.board_sources, recorded.trials),
         board_sources=recorded.board_sources,

@@ -10,6 +10,7 @@ determine their sum alone. No truth is moved by what is felt: an error that is m
 warning, and enters the sigma of touch seen.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -174,7 +175,7 @@ def _forward(trial: str, seen: SeenWhisk, felt: FeltWhisk, clock_s: float) -> It
     speed = motor_speed(seen.frames)
     left_out = np.hypot(seen.touch_shared_rad, clock_s * speed)
     touch = Value(felt.touch_felt_rad.value, felt.theta_sigma_rad)
-    delay_s = float(np.hypot(clock_s, felt.delay_s.sigma))
+    delay_s = math.hypot(clock_s, felt.delay_s.sigma)
     shared = None if seen.truth.shared is None else seen.truth.shared.touch_rad
     yield from _known(trial, seen.touch_rad, shared, left_out, touch, speed, delay_s)
 
@@ -183,7 +184,7 @@ def _backward(trial: str, back: BackStroke, felt: FeltTrial, clock_s: float) -> 
     """Yield the back stroke of a trial, if all of it is known. clock_s: sigma of the frames' clock."""
     speed = back.speed_rad_s
     filters_s = [whisk.delay_s.sigma for whisk in felt.whisks]
-    delay_s = float(np.hypot(clock_s, max(filters_s, default=np.nan)))
+    delay_s = math.hypot(clock_s, max(filters_s, default=np.nan))
     touch = felt.back_touch_rad
     yield from _known(trial, back.touch_rad, None, clock_s * speed, touch, speed, delay_s)
 
@@ -241,10 +242,10 @@ def _with_error(seen: SeenWhisk, shared: SharedTouch) -> SeenWhisk:
     if not touch.is_known:
         return seen
     error = abs(shared.at(motor_speed(seen.frames))[0])
-    sigma = float(np.hypot(touch.sigma, error))
+    sigma = math.hypot(touch.sigma, error)
     shared_sigmas = seen.truth.shared
     if shared_sigmas is not None:
-        touch_rad = float(np.hypot(shared_sigmas.touch_rad, error))
+        touch_rad = math.hypot(shared_sigmas.touch_rad, error)
         shared_sigmas = replace(shared_sigmas, touch_rad=touch_rad)
     truth = replace(seen.truth, touch_rad=Value(touch.value, sigma), shared=shared_sigmas)
     return replace(seen, truth=truth, touch_shared_rad=error)

@@ -3,6 +3,7 @@
 Each check returns NO_REASON where both agree or one of them is unknown.
 """
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -118,7 +119,7 @@ def turn_cause(share: float, trials: Iterable[Trial]) -> str:
             continue
         speed_rad_s = stroke_speed_rad_s(read_signals(trial))
         if np.isfinite(speed_rad_s):  # NaN without a forward stroke
-            stated_rad_s.append(float(np.radians(trial.speed_deg_s)))
+            stated_rad_s.append(math.radians(trial.speed_deg_s))
             ratios.append(speed_rad_s / stated_rad_s[-1])
     if ratios:
         speed_rad_s = float(np.median(ratios)) * stated_rad_s[0]
@@ -217,7 +218,7 @@ def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board |
     pairs = {name: (one.value, one.sigma) for name, one in bar_looks.items()}
     factor, factor_sigma = combine_widths(pairs)
     stated = trial.bar_diameter_mm
-    sigma = float(np.hypot(factor_sigma / factor, trial.bar_diameter_sigma_mm / stated))
+    sigma = math.hypot(factor_sigma / factor, trial.bar_diameter_sigma_mm / stated)
     if Difference.scalar(np.log(factor), sigma).is_chance:
         return NO_REASON
     return _bar_width_reason(factor, sigma, stated, board)
@@ -282,7 +283,7 @@ def check_length(ends: Mapping[str, Value], whisker: Whisker) -> Reason:
     sigmas = np.array([end.sigma for end in ends.values()])
     if not are_alike(places, sigmas**2):
         return NO_REASON
-    sigma = float(np.hypot(np.max(sigmas), whisker.length_sigma_mm))
+    sigma = math.hypot(np.max(sigmas), whisker.length_sigma_mm)
     end_mm = float(np.average(places, weights=sigmas**-2.0))
     if Difference.scalar(end_mm - whisker.length_mm, sigma).is_chance:
         return NO_REASON
@@ -297,7 +298,7 @@ def check_slope(beta: Value, trial: Trial) -> Reason:
     apart = beta.value - nominal.value
     if not np.isfinite(apart):
         return NO_REASON
-    difference = Difference.scalar(apart, float(np.hypot(beta.sigma, nominal.sigma)))
+    difference = Difference.scalar(apart, math.hypot(beta.sigma, nominal.sigma))
     if difference.is_chance:
         return NO_REASON
     mirrored = replace(difference, values=np.array([beta.value + nominal.value]))
@@ -319,7 +320,7 @@ def check_friction_cone(phi: Value, beta: Value, source: str) -> Reason:
     angle = _from_normal(phi.value, beta)
     if not np.isfinite(angle) or angle <= _STEEPEST_FRICTION_RAD:
         return NO_REASON
-    sigma = float(np.hypot(phi.sigma, beta.sigma))
+    sigma = math.hypot(phi.sigma, beta.sigma)
     if Difference.scalar(angle - _STEEPEST_FRICTION_RAD, sigma).is_chance:
         return NO_REASON
     reversed_phi = {"y": -phi.value, "z": np.pi - phi.value, "y and z": np.pi + phi.value}
@@ -345,7 +346,7 @@ def nominal_slope(trial: Trial) -> Value:
     """Return β of trial.toml, with a protractor's sigma where none is stated; UNKNOWN without β."""
     if trial.beta_deg is None:
         return UNKNOWN
-    return Value(float(np.radians(trial.beta_deg)), nominal_slope_sigma_rad(trial))
+    return Value(math.radians(trial.beta_deg), nominal_slope_sigma_rad(trial))
 
 
 def nominal_slope_sigma_rad(trial: Trial) -> float:

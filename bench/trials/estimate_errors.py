@@ -107,7 +107,7 @@ def sound_whisks(results: Iterable[TrialResult]) -> set[tuple[str, int]]:
 def slope_deg(result: TrialResult, seen: SeenWhisk) -> float:
     """Return β as seen, or the nominal one where no picture shows it."""
     beta_rad = seen.beta_rad.value
-    return float(np.degrees(beta_rad)) if np.isfinite(beta_rad) else result.trial.beta_nominal_deg
+    return math.degrees(beta_rad) if np.isfinite(beta_rad) else result.trial.beta_nominal_deg
 
 
 def judge(results: Iterable[TrialResult]) -> list[Judged]:

@@ -130,7 +130,7 @@ def answers(
     radii_mm: tuple[float, float] = UNKNOWN_RADII_MM,
 ) -> tuple[EstimateRow, ...]:
     """Return the row of each estimator by name."""
-    alpha_sigma_rad = float(np.radians(settings.first_alpha_est_sigma_deg))
+    alpha_sigma_rad = math.radians(settings.first_alpha_est_sigma_deg)
     rows = []
     for name, estimator in by_name.items():
         rows.append(

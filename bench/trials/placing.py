@@ -1,5 +1,6 @@
 """Place of the rig, from the free strokes of the session's own trials together with T_rig_board."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -352,7 +353,7 @@ def _by_touches_too(
         truth = _first_known(seen)
         if truth is None or stated.d_x_mm is None or not stated.d_x_sigma_mm:
             continue
-        sigma_mm = float(np.hypot(stated.d_x_sigma_mm, truth.d_x_mm.sigma))
+        sigma_mm = math.hypot(stated.d_x_sigma_mm, truth.d_x_mm.sigma)
         placement = with_distance(placement, truth.point_mm.value, stated.d_x_mm, sigma_mm)
         touches.append(f"{stated.name} touching at {stated.d_x_mm:g} ± {sigma_mm:.2g} mm")
     if not touches:

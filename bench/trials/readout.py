@@ -121,7 +121,7 @@ def whisk_at(
         m_y_at_Nmm=float(m_y),
         m_z_at_Nmm=float(m_z),
         covariance_at=readout.covariance(at.values, at.covariance),
-        theta_sigma_rad=float(np.hypot(touch.sigma_rad, of_angles)),
+        theta_sigma_rad=math.hypot(touch.sigma_rad, of_angles),
         beam=beam,
         theta_moment_covariance_at=readout.matrix @ at.theta_covariance,
         unfiltered_Nmm=unfiltered,

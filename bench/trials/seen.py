@@ -1,5 +1,6 @@
 """The seen half of a trial's result: pictures in, truth out. No gauge is read here."""
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -164,7 +165,7 @@ def _whisk_of_trial(
     """
     contradictions = [*of_trial, *_whisk_contradictions(whisk, trial, settings)]
     warnings = [*warnings, check_length(whisk.ends, session.whisker)]
-    speed_rad_s = None if trial.speed_deg_s is None else float(np.radians(trial.speed_deg_s))
+    speed_rad_s = None if trial.speed_deg_s is None else math.radians(trial.speed_deg_s)
     record = whisk_record(whisk, settings, warnings, contradictions, speed_rad_s)
     return replace(
         record,

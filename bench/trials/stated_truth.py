@@ -6,6 +6,7 @@ whisker's centreline. Either it is stated as it is (`d_x_mm`), or it follows fro
 it is clamped, and no stage sees how the contact slips: touch, slip and deflection stay NaN.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -116,7 +117,7 @@ def _why_not_seen(seen: SeenWhisk) -> Reason:
 def _unlike_pictures(stated: WhiskTruth, seen: SeenWhisk) -> Reason:
     """Return how the stage's distance contradicts the one seen; NO_REASON where chance explains it."""
     apart_mm = stated.d_x_mm.value - seen.d_x_mm.value
-    sigma_mm = float(np.hypot(stated.d_x_mm.sigma, seen.d_x_mm.sigma))
+    sigma_mm = math.hypot(stated.d_x_mm.sigma, seen.d_x_mm.sigma)
     if not np.isfinite(apart_mm) or Difference.scalar(apart_mm, sigma_mm).is_chance:
         return NO_REASON
     found = f"d_x by the stage is {apart_mm:+.2f} ± {sigma_mm:.2f} mm from the one seen"
@@ -129,7 +130,7 @@ def _unlike_stated(d_x_mm: Value, trial: Trial) -> Reason:
     if trial.d_x_mm is None:
         return NO_REASON
     apart_mm = d_x_mm.value - trial.d_x_mm
-    sigma_mm = float(np.hypot(d_x_mm.sigma, trial.d_x_sigma_mm or _RULER_MM))
+    sigma_mm = math.hypot(d_x_mm.sigma, trial.d_x_sigma_mm or _RULER_MM)
     if Difference.scalar(apart_mm, sigma_mm).is_chance:
         return NO_REASON
     found = f"d_x by the object's place is {d_x_mm.value:.2f} mm, d_x_mm says {trial.d_x_mm:g}"
@@ -141,7 +142,7 @@ def _other_slope(beta_rad: Value, trial: Trial) -> Reason:
     """Return how a slope by the object's place contradicts beta_deg; NO_REASON where it does not."""
     stated = nominal_slope(trial)
     apart = beta_rad.value - stated.value
-    sigma = float(np.hypot(beta_rad.sigma, stated.sigma))
+    sigma = math.hypot(beta_rad.sigma, stated.sigma)
     if not np.isfinite(apart) or Difference.scalar(apart, sigma).is_chance:
         return NO_REASON
     found = f"the slope by the object's place is {np.degrees(beta_rad.value):.1f}°"
@@ -193,7 +194,7 @@ def stated_whisk(session: Session, trial: Trial, signals: Signals, stroke: slice
     slope = nominal_slope(trial)
     tilt = Value(0.0, slope.sigma) if slope.is_known else UNKNOWN
     shared_mm = session.truth.origin_sigma_mm
-    sigma_mm = float(np.hypot(trial.d_x_sigma_mm, shared_mm))
+    sigma_mm = math.hypot(trial.d_x_sigma_mm, shared_mm)
     return _truth(Value(trial.d_x_mm, sigma_mm), slope, tilt, shared_mm)
 
 
@@ -342,5 +343,5 @@ def _shared_sigmas(session: Session, trial: Trial, touch: Contact) -> np.ndarray
     if session.base is not None:
         turn_rad = session.base.sigma_rad
         of_base_mm = np.hypot(session.base.sigma_mm, turn_rad * touch.d_x_mm)
-        place_mm = float(np.hypot(place_mm, of_base_mm))
+        place_mm = math.hypot(place_mm, of_base_mm)
     return Offsets(np.full(3, place_mm), turn_rad, turn_rad, float(reach_mm), rest_mm).vector

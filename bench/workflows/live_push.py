@@ -6,6 +6,7 @@ picture is the answer. No gauge is read, and no check of the recording as a whol
 with `evaluate`, which the folder can still be given to.
 """
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -66,7 +67,7 @@ class LivePush:
                 f"camera {camera}, frame {frame}: {found} pixels, {height} x {width} are calibrated"
             )
         self.pictures[camera] = picture
-        self.whisk.add(camera, frame, time_s, float(np.radians(motor_deg)), picture)
+        self.whisk.add(camera, frame, time_s, math.radians(motor_deg), picture)
 
     def work(self) -> bool:
         """Take the next step that is due; return whether there was one."""

@@ -3,6 +3,7 @@
 Files are read whole; of pictures some are evaluated: those of the board that calibrate the cameras, five of each trial.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -252,7 +253,7 @@ def _stroke_warnings(
         if touch.status:
             yield f"whisk {number}: {touch.status}"
             continue
-        theta_deg = float(np.degrees(stroke.motor_rad.max() - touch.motor_rad))
+        theta_deg = math.degrees(stroke.motor_rad.max() - touch.motor_rad)
         if theta_deg < usual_deg:
             yield f"whisk {number} goes {theta_deg:.1f}° past touch, {usual_deg:g}° is the usual --theta-deg"
         motor_rad = signals.motor_at(times.time_s[frames[number]])

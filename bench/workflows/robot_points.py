@@ -1,6 +1,7 @@
 """Points of the robot's trade: one estimator through one converter, over all whisks of a speed and
 push, and the front of those that no other beats."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -139,7 +140,7 @@ def _point(answers: Sequence[Answer], speed_deg_s: float) -> Point:
         error_sd_percent=rms(error - mean(error)),
         error_rms_percent=rms(error),
         expected_mean_percent=mean(expected),
-        expected_sd_percent=float(np.hypot(rms(expected - mean(expected)), rms(noise))),
+        expected_sd_percent=math.hypot(rms(expected - mean(expected)), rms(noise)),
         expected_rms_percent=expected_rms.rms,
         expected_low_percent=expected_rms.low,
         expected_high_percent=expected_rms.high,

@@ -6,6 +6,7 @@ frames have in common, the scatter what single points are off by about that. A t
 one edge of the wire has a bias of half its width and little scatter.
 """
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -356,7 +357,7 @@ def _score(name: str, camera: str, scored: Sequence[TrialScores]) -> TraceScore:
         identity_mistakes=_identity_mistakes(scored, camera),
         coverage_percent=_mean([frame.coverage_percent for frame in near]),
         bias_px=bias_px,
-        bias_sigma_px=float(np.hypot(bias_sigma_px, WIRE_OFFSET_PX)),
+        bias_sigma_px=math.hypot(bias_sigma_px, WIRE_OFFSET_PX),
         scatter_px=scatter_px,
         scatter_sigma_px=scatter_sigma_px,
     )

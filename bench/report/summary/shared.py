@@ -1,5 +1,6 @@
 """The error that the whisks of a session share: no mean over whisks makes it less, and no scatter shows it."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -55,7 +56,7 @@ class SharedDistance:
 
         What is a whisk's own may be its bar's, which the whisks of a recording share.
         """
-        return float(np.hypot(self.shared_mm, self.own_mm / np.sqrt(self.settings)))
+        return math.hypot(self.shared_mm, self.own_mm / np.sqrt(self.settings))
 
     @property
     def is_too_narrow(self) -> bool:
