@@ -5,20 +5,13 @@ Only where a trial asks for it (both_ways in trial.toml).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import degrees
 
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import (
-    column,
-    coverage,
-    degrees,
-    estimate_cells,
-    grouped,
-    rms,
-    value_cells,
-    whisk_cells,
-)
+from bench.analyses.cells import estimate_cells, value_cells, whisk_cells
+from bench.analyses.pooling import column, coverage, grouped, rms
 from bench.base.drawing import label_of
 from bench.base.input_problems import in_one_status
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma

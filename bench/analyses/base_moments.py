@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import whisk_cells
+from bench.analyses.cells import whisk_cells
 from bench.base.tables import TRIAL, WHISK, Column, Kind, Table, shared_name, sigma_name, with_sigma
 from bench.gauges.gauge_readings import frames_with_moments, loads_from_pictures
 from bench.records.trial_result import Deflection, FeltWhisk, SeenWhisk, TrialResult, whisks

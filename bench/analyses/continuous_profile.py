@@ -6,20 +6,14 @@ these contacts are a profile of the object.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import degrees
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, Scored, TrueRun
-from bench.analyses.pooling import (
-    column,
-    degrees,
-    grouped,
-    rms,
-    sound_measured_whisks,
-    value_cells,
-    whisk_cells,
-)
+from bench.analyses.cells import value_cells, whisk_cells
+from bench.analyses.pooling import column, grouped, rms, sound_measured_whisks
 from bench.base.drawing import blank
 from bench.base.tables import TRIAL, WHISK, Table, alike, status, with_sigma
 from bench.records.trial_result import FeltAt, FeltWhisk, SeenWhisk, TrialResult

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun
+from bench.analyses.cells import value_cells, whisk_cells
 from bench.analyses.gave import OBJECT
-from bench.analyses.pooling import column, sound_measured_whisks, value_cells, whisk_cells
+from bench.analyses.pooling import column, sound_measured_whisks
 from bench.base.combined import Combined, Measurement, Measurements, holm
 from bench.base.settings import TILT_SIGMA_RAD
 from bench.base.statuses import reason

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun
+from bench.analyses.cells import panel_title
 from bench.analyses.estimates_again import FITTED
-from bench.analyses.pooling import grouped, panel_title
+from bench.analyses.pooling import grouped
 from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import (
     SLOPES_DEG,

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun
+from bench.analyses.cells import value_cells
 from bench.analyses.estimates_again import FITTED
-from bench.analyses.pooling import known_rows, value_cells
+from bench.analyses.pooling import known_rows
 from bench.base.drawing import blank
 from bench.base.tables import TRIAL, WHISK, Column, Table, with_sigma
 from bench.gauges.gauge_readings import reference_from_pictures

@@ -1,12 +1,14 @@
 """Fig. 8 of the paper: |m| in EI/metre and φ against β, whisks of a surface and speed together, and the α that fits."""
 
 from collections.abc import Iterator, Sequence
+from math import degrees
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun
-from bench.analyses.pooling import column, degrees, value_cells
+from bench.analyses.cells import value_cells
+from bench.analyses.pooling import column
 from bench.analyses.surfaces import FittedSurface, SlopePoint
 from bench.base.drawing import SLOPES_DEG, add_legend, blank, colour_of, whisk_url
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma

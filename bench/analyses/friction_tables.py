@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from math import degrees
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,8 @@ from bench.analyses.analysis import (
     TrueRun,
     read_rows,
 )
-from bench.analyses.page_cells import cell_with_sigma, panel_cell
-from bench.analyses.pooling import column, degrees, measured, value_cells
+from bench.analyses.cells import cell_with_sigma, panel_cell, value_cells
+from bench.analyses.pooling import column, measured
 from bench.analyses.section_vii import (
     Way,
     by_consistency,

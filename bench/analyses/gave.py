@@ -10,7 +10,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import grouped, panel_title, whisk_cells
+from bench.analyses.cells import panel_title, whisk_cells
+from bench.analyses.pooling import grouped
 from bench.base.combined import Measurement, Measurements
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks

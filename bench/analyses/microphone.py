@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, Scored, TrueRun
-from bench.analyses.pooling import grouped, sound_measured_whisks, value_cells, whisk_cells
+from bench.analyses.cells import value_cells, whisk_cells
+from bench.analyses.pooling import grouped, sound_measured_whisks
 from bench.base.tables import SPEED, TRIAL, WHISK, Column, Table, status, with_sigma
 from bench.records.trial_result import SeenWhisk, TrialResult
 from bench.session.session import Session

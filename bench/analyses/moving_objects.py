@@ -5,12 +5,14 @@ Only where a trial says how its object moves (object_velocity_mm_s).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import degrees
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import column, coverage, degrees, estimate_cells, grouped, rms
+from bench.analyses.cells import estimate_cells
+from bench.analyses.pooling import column, coverage, grouped, rms
 from bench.base.drawing import add_legend, blank, colour_of, label_of
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, status, with_sigma
 from bench.gauges.felt import motor_speed

@@ -8,19 +8,13 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import degrees
 
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import (
-    as_cell,
-    degrees,
-    estimate_cells,
-    grouped,
-    rms,
-    sound_measured_whisks,
-    value_cells,
-)
+from bench.analyses.cells import as_cell, estimate_cells, value_cells
+from bench.analyses.pooling import grouped, rms, sound_measured_whisks
 from bench.base.settings import Settings
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import WITH_FRICTION, EstimateRow, FeltWhisk, SeenWhisk, TrialResult

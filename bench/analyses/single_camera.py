@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import as_cell, column, coverage, grouped, rms, value_cells, whisk_cells
+from bench.analyses.cells import as_cell, value_cells, whisk_cells
+from bench.analyses.pooling import column, coverage, grouped, rms
 from bench.base.input_problems import in_one_status
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, status, with_sigma
 from bench.records.trial_result import ByOneCamera, SeenWhisk, TrialResult, whisks

@@ -14,15 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, PageTable, read_rows
+from bench.analyses.cells import cell_with_sigma, panel_cell, panel_title, value_cells
 from bench.analyses.gave import OBJECT, mean_give
-from bench.analyses.page_cells import cell_with_sigma, panel_cell
-from bench.analyses.pooling import (
-    grouped,
-    measured,
-    panel_title,
-    sound_measured_whisks,
-    value_cells,
-)
+from bench.analyses.pooling import grouped, measured, sound_measured_whisks
 from bench.base.combined import Measurement, Measurements
 from bench.base.numbers import MISSING, number_range
 from bench.base.statuses import reason

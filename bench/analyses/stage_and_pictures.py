@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.pooling import value_cells
+from bench.analyses.cells import value_cells
 from bench.base.tables import TRIAL, WHISK, Column, Table, status, with_sigma
 from bench.records.trial_result import PicturedContact, SeenWhisk, whisks
 from vision import Value

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bench.analyses.pooling import by_slope, column, measured, panel_title
+from bench.analyses.cells import panel_title
+from bench.analyses.pooling import by_slope, column, measured
 from bench.analyses.theory_left import as_theory_has_them
 from bench.base.combined import add_common, student_factor
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks

@@ -5,13 +5,14 @@ Only where a load cell was recorded: then each whisk is judged by all of them.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from math import degrees
 from pathlib import Path
 
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading, PageTable, read_rows
 from bench.analyses.friction_tables import SurfaceFriction
-from bench.analyses.pooling import degrees, grouped, known_rows, mean, rms, sound_measured_whisks
+from bench.analyses.pooling import grouped, known_rows, mean, rms, sound_measured_whisks
 from bench.base.drawing import label_of
 from bench.base.numbers import MISSING, number, number_range
 from bench.base.tables import SURFACE, WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike

@@ -6,15 +6,16 @@ solved together for that distance and α (`estimator.two_tilts`). No picture is 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import degrees
 from pathlib import Path
 
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, PageTable, read_rows
+from bench.analyses.cells import cell_with_sigma, panel_cell, panel_title
 from bench.analyses.estimates_again import settings_without_alpha
 from bench.analyses.friction_tables import FRICTION_ANGLE
-from bench.analyses.page_cells import cell_with_sigma, panel_cell
-from bench.analyses.pooling import degrees, panel_title, sound_measured_whisks
+from bench.analyses.pooling import sound_measured_whisks
 from bench.base.numbers import MISSING, number, number_range
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, status, with_sigma
 from bench.gauges.gauge_readings import NOMINAL_SHARE

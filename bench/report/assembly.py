@@ -1,11 +1,12 @@
 """Rows of the tables on whisks, estimates and tracks from the trials' results."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from math import degrees
 from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.pooling import degrees, estimate_cells, value_cells, whisk_cells
+from bench.analyses.cells import estimate_cells, value_cells, whisk_cells
 from bench.base.input_problems import in_one_status
 from bench.base.tables import shared_name
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks

@@ -10,9 +10,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 from bench.analyses.accuracy_line import accuracy_line
+from bench.analyses.cells import panel_title
 from bench.analyses.estimates_again import EVALUATED_AGAIN, FITTED
 from bench.analyses.estimator_accuracy import Accuracy, RunAccuracy, TruthUncertainty
-from bench.analyses.pooling import grouped, panel_title, rms
+from bench.analyses.pooling import grouped, rms
 from bench.base.settings import Seeing, Settings
 from bench.base.statuses import cure_of
 from bench.gauges.matrix import FROM_ALL, GaugeCalibration

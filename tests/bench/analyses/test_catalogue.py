@@ -6,7 +6,7 @@ import pytest
 
 from bench.analyses.analysis import Analysis, Heading, PageTable
 from bench.analyses.catalogue import ANALYSES
-from bench.analyses.pooling import estimate_cells, whisk_cells
+from bench.analyses.cells import estimate_cells, whisk_cells
 from bench.base.settings import Settings
 from bench.base.tables import Column, Kind, Table
 from bench.records.trial_result import EstimateRow
