@@ -19,18 +19,17 @@ from bench.records.trial_result import (
 )
 from bench.trials.seen_friction import heading, slips, turns_with_slip
 from bench.trials.stick_slip_phases import seen_phases
-from vision import Value
+from vision import UNKNOWN, Value
 
 # [sigmas] Of the slip angle felt, from which on a contact slips for sure: one at rest has as much in one whisk of
 # 400. Derived.
 _SURE_SIGMAS = 3.0
-UNKNOWN = (np.nan, np.nan)
 BY_MANIFEST = "manifest"
 
 
 @dataclass(frozen=True)
 class WhiskAlphas:
-    """Friction angles of one whisk, each a pair (value, sigma) in rad; NaN where it shows none.
+    """Friction angles of one whisk, rad; UNKNOWN where it shows none.
 
     shared_seen_rad, shared_felt_rad: sigma that all angles of this whisk share, of β, and felt also of
     the moments. beta_from: where β comes from, a truth's source or BY_MANIFEST. common_seen,
@@ -42,8 +41,8 @@ class WhiskAlphas:
     surface: str
     speed_deg_s: float | None
     beta_rad: float
-    seen: tuple[float, float]
-    felt: tuple[float, float]
+    seen: Value
+    felt: Value
     phases_seen: Phases
     phases_felt: Phases
     shared_seen_rad: float
@@ -61,26 +60,26 @@ class WhiskAlphas:
         """Return rests and jumps as "seen" or "felt"."""
         return self.phases_seen if record == "seen" else self.phases_felt
 
-    def apart(self, kind: str, record: str) -> tuple[float, float]:
+    def apart(self, kind: str, record: str) -> Value:
         """Return static or kinetic α by the record "seen" or "felt"; NaN without stick–slip."""
         shared_rad = self.shared_seen_rad if record == "seen" else self.shared_felt_rad
-        mean, sigma = self.phases(record).mean(kind)
-        return mean, math.hypot(sigma, shared_rad)
+        mean = self.phases(record).mean(kind)
+        return Value(mean.value, math.hypot(mean.sigma, shared_rad))
 
-    def angle(self, name: str) -> tuple[float, float]:
+    def angle(self, name: str) -> Value:
         """Return the angle "seen" or "felt", or of a kind and record, such as "static_felt"."""
         kind, _, record = name.partition("_")
         return self.apart(kind, record) if record else getattr(self, name)
 
     def measurement(self, name: str) -> Measurement:
         """Return an angle with its sigma in parts: of the whisk, of its trial's bar, of all whisks."""
-        value, sigma = self.angle(name)
+        angle = self.angle(name)
         common = self.common_seen if name.endswith("seen") else self.common_felt
         of_setting = 0.0 if self.beta_from == BY_PICTURES else self.shared_seen_rad
-        own = np.sqrt(max(sigma**2 - of_setting**2 - np.sum(np.square(common)), 0.0))
-        if not sigma > 0:
+        own = np.sqrt(max(angle.sigma**2 - of_setting**2 - np.sum(np.square(common)), 0.0))
+        if not angle.sigma > 0:
             own = np.nan
-        return Measurement(value, float(own), of_setting, common)
+        return Measurement(angle.value, float(own), of_setting, common)
 
     @property
     def panel(self) -> tuple[str, float | None]:
@@ -103,9 +102,7 @@ def alphas_of(results: Iterable[TrialResult]) -> list[WhiskAlphas]:
     return found
 
 
-def _alphas(
-    trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, alpha_felt: tuple[float, float]
-) -> WhiskAlphas:
+def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, alpha_felt: Value) -> WhiskAlphas:
     """Return the friction angles of one whisk, of which that felt is given."""
     beta, beta_from = _slope(trial, seen)
     phases = NO_PHASES
@@ -117,7 +114,7 @@ def _alphas(
         seen.whisk,
         *trial.panel,
         beta_rad=beta.value,
-        seen=(seen.friction_rad.value, seen.friction_rad.sigma),
+        seen=seen.friction_rad,
         felt=alpha_felt,
         phases_seen=phases,
         phases_felt=felt.phases,
@@ -165,10 +162,8 @@ def _common_felt(felt: FeltWhisk) -> np.ndarray:
     return -np.copysign(1.0, felt.phi_felt_rad.value) * by_cause
 
 
-def felt_friction(
-    seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: float
-) -> tuple[float, float]:
-    """Return α and its sigma by |β| − |φ|: the slope as seen, the slip angle by the moments at θ.
+def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: float) -> Value:
+    """Return α, rad, by |β| − |φ|: the slope as seen, the slip angle by the moments at θ.
 
     left: share of the base's diameter that the whisker has at the contact. Of a whisk that was seen to
     slip; NaN where the moments are not those of the seen shape, the slope at θ is not that at touch, or
@@ -184,11 +179,11 @@ def felt_friction(
     if seen.deflection is None and seen.has_truth:
         if felt.apart or not abs(phi.value) > _SURE_SIGMAS * phi.sigma:
             return UNKNOWN
-        return across_rad, sigma_rad
+        return Value(across_rad, sigma_rad)
     if not (slips(seen) and phi.is_known) or felt.apart or turns_with_slip(seen):
         return UNKNOWN
     alpha = np.arctan(np.tan(across_rad) / np.cos(heading(seen.deflection, theta_rad)))
-    return float(alpha), sigma_rad
+    return Value(float(alpha), sigma_rad)
 
 
 def _turn_of_force(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: float) -> float:
@@ -206,11 +201,11 @@ def _turn_of_force(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: flo
     return float(turned_rad + 0.5 * theta_rad * np.cos(slope_rad) * lean / left)
 
 
-def mean_alpha(alphas: Iterable[WhiskAlphas], name: str) -> tuple[float, float]:
-    """Return the mean of an angle (`WhiskAlphas.angle`) over whisks and its sigma, rad.
+def mean_alpha(alphas: Iterable[WhiskAlphas], name: str) -> Value:
+    """Return the mean of an angle (`WhiskAlphas.angle`) over whisks, rad.
 
     NaN where no whisk has it. How the shared error of β goes with the sign of the slope is not known, so
     that it counts as one for all.
     """
     mean = Measurements.of((whisk.trial, whisk.measurement(name)) for whisk in alphas).mean()
-    return mean.value, mean.sigma
+    return Value(mean.value, mean.sigma)

@@ -14,7 +14,6 @@ from bench.base.drawing import SLOPES_DEG, add_legend, blank, colour_of, whisk_u
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma
 from estimator.beam import moment_in_EI_per_metre
 from estimator.friction import curves
-from vision import UNKNOWN, Value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -111,8 +110,6 @@ def rows(fitted: Sequence[FittedSurface]) -> Iterator[dict]:
     for number, surface in enumerate(fitted):
         points = surface.points()
         EI = surface.beam.rigidity_Nmm2
-        fit = surface.fit
-        alpha = UNKNOWN if fit is None else Value(fit.alpha_rad, fit.sigma_rad)
         m_fit, phi_fit_deg = _fitted_curves(surface, column(points, "beta_deg"))
         for k, point in enumerate(points):
             yield {
@@ -121,7 +118,7 @@ def rows(fitted: Sequence[FittedSurface]) -> Iterator[dict]:
                 "speed_deg_s": surface.speed_deg_s,
                 "theta_deg": degrees(surface.theta_rad),
                 "d_x_mm": surface.common_d_x_mm,
-                **value_cells("alpha_deg", alpha),
+                **value_cells("alpha_deg", surface.alpha),
                 "beta_deg": point.beta_deg,
                 "whisks": point.whisks,
                 "m_EI_per_metre": moment_in_EI_per_metre(point.m_Nmm, EI),
@@ -209,8 +206,8 @@ def _draw_fit(top: "Axes", bottom: "Axes", surface: FittedSurface) -> str:
     colour = colour_of("with_friction")
     top.plot(SLOPES_DEG, m_fit, color=colour, lw=1.4, label="(13), (14) with the fitted α")
     bottom.plot(SLOPES_DEG, phi_fit_deg, color=colour, lw=1.4)
-    alpha_deg, sigma_deg = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
-    return f"α = {alpha_deg:.2f} ± {sigma_deg:.2f}°\n"
+    alpha_deg = surface.alpha.in_degrees()
+    return f"α = {alpha_deg.value:.2f} ± {alpha_deg.sigma:.2f}°\n"
 
 
 def _meaning(points: Sequence[SlopePoint]) -> str:

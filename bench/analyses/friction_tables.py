@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.alphas import UNKNOWN, WhiskAlphas, alphas_of, mean_alpha
+from bench.analyses.alphas import WhiskAlphas, alphas_of, mean_alpha
 from bench.analyses.analysis import (
     Analysis,
     EvaluatedRun,
@@ -38,6 +38,8 @@ from vision import Value
 FRICTION_ANGLE = Heading("friction", "Friction angle α (± one sigma)")
 RECORDS = ("seen", "felt")
 WAYS = ("tilting", "consistency", "smoothness")
+# Angles of a whisk, by their names in the columns and in `WhiskAlphas.angle`.
+_ANGLES = (*RECORDS, *(f"{kind}_{record}" for kind in (STATIC, KINETIC) for record in RECORDS))
 FRICTION = Table(
     "friction",
     "A row a whisk: friction angles α, each with its sigma.",
@@ -142,21 +144,20 @@ class SurfaceFriction:
     error_rms_percent: float
     error_rms_weighted_percent: float
 
-    def alpha(self, name: str) -> tuple[float, float]:
-        """Return (value, sigma) in rad by the name in the columns of SURFACES; NaN if not known."""
+    def alpha(self, name: str) -> Value:
+        """Return α, rad, by its name in the columns of SURFACES; NaN if not known."""
         if name == "least_squares":
-            fit = self.surface.fit
-            return (fit.alpha_rad, fit.sigma_rad) if fit else UNKNOWN
+            return self.surface.alpha
         for way in self.ways:
             if way.name == name:
-                return way.alpha_rad, way.sigma_rad
+                return way.alpha
         return mean_alpha(self.whisks, name)
 
     @property
     def best_alpha_rad(self) -> float:
         """Return the angle as seen, else by the fit of Fig. 8; NaN where neither has one."""
-        seen, _ = self.alpha("seen")
-        return seen if np.isfinite(seen) else self.surface.alpha_rad
+        seen = self.alpha("seen")
+        return seen.value if seen.is_known else self.surface.alpha_rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,10 +315,9 @@ def _whisk_row(whisk: WhiskAlphas, confidence: float | None) -> dict:
     }
     for record in RECORDS:
         phases = whisk.phases(record)
-        row |= _alpha_cells(record, getattr(whisk, record))
-        row |= _alpha_cells(f"{STATIC}_{record}", whisk.apart(STATIC, record))
-        row |= _alpha_cells(f"{KINETIC}_{record}", whisk.apart(KINETIC, record))
         row |= {f"rests_{record}": phases.rests, f"jumps_{record}": phases.jumps}
+    for name in _ANGLES:
+        row |= value_cells(f"alpha_{name}_deg", whisk.angle(name))
     return row
 
 
@@ -346,15 +346,9 @@ def _surface_row(one: SurfaceFriction) -> dict:
         "error_rms_weighted_percent": one.error_rms_weighted_percent,
         "notes": "; ".join(f"{way.name}: {way.status}" for way in one.ways if way.status),
     }
-    phases = [f"{kind}_{record}" for kind in (STATIC, KINETIC) for record in RECORDS]
-    for name in (*RECORDS, *phases, "least_squares", *WAYS):
-        row |= _alpha_cells(name, one.alpha(name))
+    for name in (*_ANGLES, "least_squares", *WAYS):
+        row |= value_cells(f"alpha_{name}_deg", one.alpha(name))
     return row
-
-
-def _alpha_cells(name: str, alpha: tuple[float, float]) -> dict:
-    """Return the cells of a friction angle (value, sigma) in rad."""
-    return value_cells(f"alpha_{name}_deg", Value(*alpha))
 
 
 def _stick_slip_lines(one: SurfaceFriction) -> Iterator[str]:
@@ -379,10 +373,9 @@ def _stick_slip_lines(one: SurfaceFriction) -> Iterator[str]:
 def _section_vii_lines(one: SurfaceFriction) -> Iterator[str]:
     """Yield α by the ways of section VII, and the error of (10) weighted by confidence."""
     for way in one.ways:
-        if np.isfinite(way.alpha_rad):
+        if way.alpha.is_known:
             status = f"; {way.status}" if way.status else ""
-            alpha = _alpha_text((way.alpha_rad, way.sigma_rad))
-            yield f"by {way.name} (section VII) α = {alpha}{status}"
+            yield f"by {way.name} (section VII) α = {_alpha_text(way.alpha)}{status}"
     if np.isfinite(one.error_rms_weighted_percent) and len(one.whisks) > 1:
         yield (
             f"RMS error of (10), α_est given: {one.error_rms_percent:.2f} %, weighted by confidence "
@@ -390,7 +383,7 @@ def _section_vii_lines(one: SurfaceFriction) -> Iterator[str]:
         )
 
 
-def _alpha_text(alpha: tuple[float, float]) -> str:
-    """Return a friction angle (value, sigma) in degrees; a dash where it is not known."""
-    value, sigma = np.degrees(alpha)
-    return f"{value:.2f} ± {sigma:.2f}°" if np.isfinite(value) else "-"
+def _alpha_text(alpha: Value) -> str:
+    """Return a friction angle in degrees; a dash where it is not known."""
+    alpha_deg = alpha.in_degrees()
+    return f"{alpha_deg.value:.2f} ± {alpha_deg.sigma:.2f}°" if alpha.is_known else "-"

@@ -83,13 +83,12 @@ class WhiskModel:
     @property
     def alpha_rad(self) -> float:
         """Return its friction angle, as well as it is known: as seen, as felt, as assumed."""
-        seen = self.seen.friction_rad.value
         left = self.whisker.beam.thickness(self.seen.d_x_mm.value)
-        felt, _ = felt_friction(self.seen, self.felt, self.result.theta_rad, left)
+        felt = felt_friction(self.seen, self.felt, self.result.theta_rad, left)
         assumed = self.given.alpha_est_rad if self.given else NAN
-        for alpha in (seen, felt):
-            if np.isfinite(alpha):
-                return max(alpha, 0.0)
+        for alpha in (self.seen.friction_rad, felt):
+            if alpha.is_known:
+                return max(alpha.value, 0.0)
         return max(assumed, 0.0)
 
     @property

@@ -24,6 +24,7 @@ from bench.records.trial_result import TrialResult, whisks
 from bench.session.whisker import Whisker
 from estimator.distance import felt_slip_angle
 from estimator.friction import alpha_from_tilts, confidence
+from vision import UNKNOWN, Value
 
 _ALPHA_EST_SIGMA_RAD = np.radians(ALPHA_EST_SIGMA_DEG)
 _FEWEST = 3  # whisks, or recordings: the least that scatter about a mean and a slope
@@ -35,17 +36,11 @@ _LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under an
 
 @dataclass(frozen=True)
 class Way:
-    """One way on one surface: α with its standard deviation, rad; NaN where status says why."""
+    """One way on one surface: α, rad; UNKNOWN where status says why."""
 
     name: str
-    alpha_rad: float
-    sigma_rad: float
+    alpha: Value = UNKNOWN
     status: str = ""
-
-
-def _unknown(name: str, status: str) -> Way:
-    """Return a way that has no result."""
-    return Way(name, np.nan, np.nan, status)
 
 
 @dataclass(frozen=True)
@@ -102,7 +97,7 @@ def by_tilting(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
     known = [contact for contact in of_surface if np.isfinite(contact.beta_rad)]
     slopes = [contact.beta_rad for contact in known]
     if not (slopes and min(slopes) < 0 < max(slopes)):
-        return _unknown("tilting", reason("slopes_one_sided"))
+        return Way("tilting", status=reason("slopes_one_sided"))
 
     def fit(recordings: Sequence[FeltContact]) -> _AlphaFit:
         """Fit the slip angles of tilts."""
@@ -117,7 +112,7 @@ def by_consistency(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
     """Return α by way 2: that under which distances scatter least in parts of their mean."""
     nominal = {contact.d_x_nominal_mm for contact in of_surface}
     if len(of_surface) < _FEWEST or len(nominal) != 1 or not np.isfinite(list(nominal)).all():
-        return _unknown("consistency", reason("whisks_few", least=_FEWEST))
+        return Way("consistency", status=reason("whisks_few", least=_FEWEST))
     return _by_object("consistency", of_surface, whisker, 0)
 
 
@@ -129,16 +124,16 @@ def by_smoothness(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
     """
     nominal = {contact.d_x_nominal_mm for contact in of_surface}
     if len(nominal) < 2 or not np.isfinite(list(nominal)).all():
-        return _unknown("smoothness", reason("one_nominal_distance"))
+        return Way("smoothness", status=reason("one_nominal_distance"))
     return _by_object("smoothness", of_surface, whisker, 1)
 
 
 def _by_object(name: str, of_surface: Sequence[FeltContact], whisker: Whisker, degree: int) -> Way:
     """Return α by way 2 with an object whose distance is a polynomial of this degree in height."""
     if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
-        return _unknown(name, reason("no_push_on_object"))
+        return Way(name, status=reason("no_push_on_object"))
     if np.ptp([abs(np.tan(contact.phi_rad)) for contact in of_surface]) < _LEAST_SPREAD:
-        return _unknown(name, reason("slip_angles_alike"))
+        return Way(name, status=reason("slip_angles_alike"))
 
     def fit(recordings: Sequence[FeltContact]) -> _AlphaFit:
         """Fit the distances of contacts to the object."""
@@ -173,7 +168,7 @@ def _with_shared(
     recordings = [_mean(some) for some in of_trials.values()]
     fit = fit_to(recordings)
     if fit.status or fit.freedom < 1:
-        return _unknown(name, fit.status or reason("recordings_few"))
+        return Way(name, status=fit.status or reason("recordings_few"))
     alphas_rad = []  # with each shared cause off by its sigma
     for cause in range(len(known[0].shared_Nmm)):
         moved = fit_to([contact.moved(cause) for contact in recordings])
@@ -182,7 +177,7 @@ def _with_shared(
     alphas_rad.append(in_theory.alpha_rad)
     total = add_common(fit.sigma_rad, fit.freedom, np.array(alphas_rad) - fit.alpha_rad)
     sigma_rad = float(np.sqrt(total.variance)) * student_factor(total.freedom)
-    return Way(name, fit.alpha_rad, sigma_rad)
+    return Way(name, Value(fit.alpha_rad, sigma_rad))
 
 
 def _as_theory_has_them(

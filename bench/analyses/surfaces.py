@@ -15,6 +15,7 @@ from bench.trials.estimate_errors import slope_deg
 from estimator.beam import Beam
 from estimator.friction import FrictionFit, Pushes, fit_alpha
 from estimator.uncertainty import Z_95
+from vision import UNKNOWN, Value
 from vision.geometry import counted
 
 # From so many recordings that slip on, the fit's own sigma is that of its residuals, the whisks of a recording counting
@@ -101,9 +102,14 @@ class FittedSurface:
         return panel_title(self.name, self.speed_deg_s)
 
     @property
+    def alpha(self) -> Value:
+        """Return the fitted α, rad; UNKNOWN where there is none."""
+        return UNKNOWN if self.fit is None else Value(self.fit.alpha_rad, self.fit.sigma_rad)
+
+    @property
     def alpha_rad(self) -> float:
         """Return the fitted α, NaN where there is none."""
-        return self.fit.alpha_rad if self.fit is not None else np.nan
+        return self.alpha.value
 
     @property
     def common_d_x_mm(self) -> float:
@@ -147,9 +153,9 @@ def friction_lines(fitted: Iterable[FittedSurface]) -> Iterator[str]:
         if surface.fit is None:
             yield f"{surface.title}: {count} cannot hold it (two slopes above α are needed)"
             continue
-        alpha_deg, sigma_deg = np.degrees([surface.fit.alpha_rad, surface.fit.sigma_rad])
+        alpha_deg = surface.alpha.in_degrees()
         status = f"; {surface.fit.status}" if surface.fit.status else ""
-        yield f"{surface.title}: α = {alpha_deg:.2f} ± {sigma_deg:.2f}° over {count}{status}"
+        yield f"{surface.title}: α = {alpha_deg.value:.2f} ± {alpha_deg.sigma:.2f}° over {count}{status}"
 
 
 def _felt(recording: int, result: TrialResult, seen: SeenWhisk, felt: FeltWhisk) -> Felt | None:

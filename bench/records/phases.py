@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.base.combined import independent
-from vision import NAN
+from vision import UNKNOWN, Value
 
 STATIC = "static"
 KINETIC = "kinetic"
@@ -31,18 +31,18 @@ class Phases:
     jumps: int
     angles: tuple[Angle, ...]
 
-    def mean(self, kind: str) -> tuple[float, float]:
-        """Return the weighted mean of the angles of one kind and its sigma from their scatter, rad.
+    def mean(self, kind: str) -> Value:
+        """Return the weighted mean of the angles of one kind, rad, its sigma from their scatter.
 
-        Both are NaN with less than two angles.
+        It is UNKNOWN with less than two angles.
         """
         chosen = [angle for angle in self.angles if angle.kind == kind]
         if len(chosen) < 2:
-            return NAN, NAN
+            return UNKNOWN
         values = np.array([angle.alpha_rad for angle in chosen])
         sigmas = np.array([angle.sigma_rad for angle in chosen])
         mean = independent(values, sigmas).mean()
-        return mean.value, mean.sigma
+        return Value(mean.value, mean.sigma)
 
 
 NO_PHASES = Phases(0, 0, ())

@@ -2,12 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from bench.analyses.analysis import EvaluatedRun
 from bench.analyses.estimator_accuracy import Accuracy, TruthUncertainty
 from bench.analyses.friction_tables import SurfaceFriction
-from bench.report.page.words import MISSING, number, with_sigma
+from bench.report.page.words import MISSING, number, value_text
 from bench.report.run_facts import CameraFacts, RunRecord
 
 _PAPER = """@article{solomon2008artificial,
@@ -160,8 +158,7 @@ def _friction_table(friction: Sequence[SurfaceFriction]) -> Iterator[str]:
     for of_surface in friction:
         cells = [_escaped(of_surface.surface.title), str(len(of_surface.surface.felt))]
         for way in ("seen", "felt", "least_squares"):
-            alpha_deg, sigma_deg = np.degrees(of_surface.alpha(way)).tolist()
-            cells.append(with_sigma(alpha_deg, sigma_deg))
+            cells.append(value_text(of_surface.alpha(way).in_degrees()))
         yield f"| {' | '.join(cells)} |"
     yield ""
 

@@ -108,7 +108,7 @@ def test_every_way_finds_the_friction_angle(tmp_path):
     found = friction_of(results, WHISKER, np.radians(10.0))
     (surface,) = found
     for name in ("seen", "felt", "least_squares", "tilting", "consistency"):
-        assert np.degrees(surface.alpha(name)[0]) == pytest.approx(14.0, abs=0.06), name
+        assert np.degrees(surface.alpha(name).value) == pytest.approx(14.0, abs=0.06), name
     assert surface.error_rms_weighted_percent < 0.5 * surface.error_rms_percent
     of_run = FrictionAngles().compute(run_of(*results))
     FrictionAngles().write(tmp_path, of_run)
@@ -147,7 +147,7 @@ def test_friction_along_the_whisker_counts():
     d = seen.deflection
     fast = d.slip_mm[-1] / d.theta_rad[-1] / (2.0 * THETA)
     wandering = replace(d, past_mm=-fast * d.theta_rad**2)
-    found = felt_friction(replace(seen, deflection=wandering), felt, THETA, 1.0)[0]
+    found = felt_friction(replace(seen, deflection=wandering), felt, THETA, 1.0).value
     assert found == pytest.approx(np.arctan(np.sqrt(2.0) * np.tan(ALPHA)), abs=1e-6)
 
 
@@ -167,13 +167,13 @@ def test_intervals_of_way_2_hold_as_often_as_they_say(way, places_mm):
             share = 1 + 0.4 / c.d_x_nominal_mm * rng.normal()
             drawn.append(replace(c, m_y_Nmm=c.m_y_Nmm * share, m_z_Nmm=c.m_z_Nmm * share))
         found = way(drawn, WHISKER)
-        held += abs(found.alpha_rad - ALPHA) < Z_95 * found.sigma_rad
+        held += abs(found.alpha.value - ALPHA) < Z_95 * found.alpha.sigma
     assert 0.9 < held / 150 < 0.99
 
 
 def test_a_fit_without_a_spare_recording_has_no_sigma():
     found = by_consistency([along(b, 60.0, WHISKER) for b in (40, 60)] * 2, WHISKER)
-    assert np.isnan(found.alpha_rad) and found.status.codes == ("recordings_few",)
+    assert np.isnan(found.alpha.value) and found.status.codes == ("recordings_few",)
 
 
 def test_bars_that_agree_exactly_leave_what_gauges_share():
@@ -181,11 +181,11 @@ def test_bars_that_agree_exactly_leave_what_gauges_share():
     shared = np.array([[0.0, 0.05]])
     bars = [replace(contact(b), shared_Nmm=shared) for b in (20, 40, 55, 65)]
     way = by_consistency(bars, WHISKER)
-    moved = by_consistency([c.moved(0) for c in bars], WHISKER).alpha_rad
-    by_gauges = abs(moved - way.alpha_rad)
+    moved = by_consistency([c.moved(0) for c in bars], WHISKER).alpha.value
+    by_gauges = abs(moved - way.alpha.value)
     by_theory = by_consistency([replace(c, shared_Nmm=NOTHING_SHARED) for c in bars], WHISKER)
-    assert way.sigma_rad == pytest.approx(np.hypot(by_gauges, by_theory.sigma_rad), rel=1e-3)
-    assert by_gauges > 0 and 0 < by_theory.sigma_rad < np.radians(0.5)
+    assert way.alpha.sigma == pytest.approx(np.hypot(by_gauges, by_theory.alpha.sigma), rel=1e-3)
+    assert by_gauges > 0 and 0 < by_theory.alpha.sigma < np.radians(0.5)
 
 
 def test_no_mean_is_surer_than_what_all_whisks_share():
@@ -199,13 +199,13 @@ def test_no_mean_is_surer_than_what_all_whisks_share():
         felt = replace(felt, shared_Nmm=by_gauges, phi_felt_rad=phi)
         results.append(replace(whole, felt=replace(whole.felt, whisks=(felt,))))
     whisks = alphas_of(results)
-    value, sigma = mean_alpha(whisks, "felt")
-    assert value == pytest.approx(ALPHA, abs=1e-6)
+    mean = mean_alpha(whisks, "felt")
+    assert mean.value == pytest.approx(ALPHA, abs=1e-6)
     shared = np.hypot(np.radians(0.1), 0.01)
-    assert sigma == pytest.approx(np.hypot(shared, 0.001 / np.sqrt(len(SLOPES))), rel=1e-6)
-    many = mean_alpha(whisks * 10, "felt")[1]
-    assert shared < many < sigma
-    assert np.isnan(mean_alpha(whisks, "static_felt")).all()  # it only slides
+    assert mean.sigma == pytest.approx(np.hypot(shared, 0.001 / np.sqrt(len(SLOPES))), rel=1e-6)
+    many = mean_alpha(whisks * 10, "felt").sigma
+    assert shared < many < mean.sigma
+    assert not mean_alpha(whisks, "static_felt").is_known  # it only slides
 
 
 def test_repeats_of_one_recording_are_no_independent_ones():
@@ -216,9 +216,9 @@ def test_repeats_of_one_recording_are_no_independent_ones():
     sizes = 1.004, 0.996, 1.003, 0.998
     bars = [replace(c, m_y_Nmm=c.m_y_Nmm * k, m_z_Nmm=c.m_z_Nmm * k) for c, k in zip(bars, sizes)]
     one, ten = by_consistency(bars, WHISKER), by_consistency(bars * 10, WHISKER)
-    assert ten.alpha_rad == pytest.approx(one.alpha_rad, abs=1e-5)
-    assert ten.sigma_rad == pytest.approx(one.sigma_rad, rel=1e-2)
-    assert abs(one.alpha_rad - ALPHA) < 2 * one.sigma_rad < np.radians(6.0)
+    assert ten.alpha.value == pytest.approx(one.alpha.value, abs=1e-5)
+    assert ten.alpha.sigma == pytest.approx(one.alpha.sigma, rel=1e-2)
+    assert abs(one.alpha.value - ALPHA) < 2 * one.alpha.sigma < np.radians(6.0)
 
 
 OFF = {20: 0.3, 40: -0.4, 55: 0.2, 65: -0.2}
@@ -231,7 +231,7 @@ def test_at_the_bound_of_the_search_there_is_no_angle():
         for c, k in ((contact(20), 1.0), (contact(40), 2.0), (contact(60), 4.0))
     ]
     way = by_consistency(bars, WHISKER)
-    assert np.isnan([way.alpha_rad, way.sigma_rad]).all() and way.status.codes == (
+    assert np.isnan([way.alpha.value, way.alpha.sigma]).all() and way.status.codes == (
         "friction_at_bound",
     )
 
@@ -245,8 +245,8 @@ def test_smoothness_finds_the_friction_of_bars_along_one_edge(shape):
         for k, beta in enumerate((-60, -45, -20, 0, 30, 50, 65))
     ]
     way = by_smoothness(bars, whisker)
-    assert way.alpha_rad == pytest.approx(ALPHA, abs=1e-6)
-    assert way.status == "" and way.sigma_rad < np.radians(1.0)
+    assert way.alpha.value == pytest.approx(ALPHA, abs=1e-6)
+    assert way.status == "" and way.alpha.sigma < np.radians(1.0)
     level = [replace(b, d_x_nominal_mm=60.0) for b in bars]
     assert by_smoothness(level, whisker).status.codes == ("one_nominal_distance",)
 

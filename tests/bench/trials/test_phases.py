@@ -89,7 +89,8 @@ def test_moments_tell_static_from_kinetic(seed, mirror):
     teeth = np.count_nonzero(np.diff(slip[theta > np.radians(2.3)]) > 0.02)
     assert teeth <= found.jumps <= teeth + 6  # earlier, smaller ones may drown in the noise
     for kind, true in ((STATIC, ALPHA_STATIC), (KINETIC, ALPHA_KINETIC)):
-        mean, sigma = found.mean(kind)
+        angle = found.mean(kind)
+        mean, sigma = angle.value, angle.sigma
         assert abs(np.degrees(mean - true)) < 1.0
         assert abs(mean - true) < 4 * sigma
 
@@ -107,8 +108,8 @@ def test_ringing_after_a_jump_is_no_jump():
     felt = moments(theta, slip - ringing, np.random.default_rng(1))
     found = felt_phases(time, theta, felt, BETA, D_X, Beam(C, 100.0))
     assert found.jumps <= len(rung)
-    assert np.degrees(found.mean(STATIC)[0]) == pytest.approx(23.0, abs=1.0)
-    assert np.degrees(found.mean(KINETIC)[0]) == pytest.approx(18.5, abs=1.0)
+    assert np.degrees(found.mean(STATIC).value) == pytest.approx(23.0, abs=1.0)
+    assert np.degrees(found.mean(KINETIC).value) == pytest.approx(18.5, abs=1.0)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -162,7 +163,7 @@ def test_frames_tell_static_from_kinetic_where_they_are_close():
     found = from_plain(Phases, to_plain(seen_phases(frames(theta, slip), BETA, D_X)))
     assert found.jumps >= 5
     for kind, true in ((STATIC, 23.0), (KINETIC, 18.5)):
-        assert np.degrees(found.mean(kind)[0]) == pytest.approx(true, abs=0.5)
+        assert np.degrees(found.mean(kind).value) == pytest.approx(true, abs=0.5)
 
 
 def test_frames_too_far_apart_show_no_phases():
@@ -196,7 +197,7 @@ def test_the_rig_s_sandpaper(tmp_path):
         found = felt_phases(stroke.time_s, theta, felt, beta, told["d_x_mm"], session.whisker.beam)
         assert found.jumps >= 7
         for kind, mu in ((STATIC, told["mu_static"]), (KINETIC, told["mu_kinetic"])):
-            assert np.degrees(found.mean(kind)[0] - np.arctan(mu)) == pytest.approx(0.0, abs=1.0)
+            assert np.degrees(found.mean(kind).value - np.arctan(mu)) == pytest.approx(0.0, abs=1.0)
 
 
 def test_without_pictures_the_nominal_slope_serves(tmp_path):

@@ -313,9 +313,14 @@ def judge(session: DrawnSession, table: Table, shape: str) -> None:
         names = ["seen", "felt", "least_squares", "tilting"]
         names.append("consistency" if one.surface.name == "one distance" else "smoothness")
         for name in names:
-            value, sigma = np.degrees(one.alpha(name))
+            alpha_deg = one.alpha(name).in_degrees()
             status = next((way.status for way in one.ways if way.name == name), "")
-            table.add(f"α {name}, {one.surface.name} [°]", value - true_deg, sigma, status)
+            table.add(
+                f"α {name}, {one.surface.name} [°]",
+                alpha_deg.value - true_deg,
+                alpha_deg.sigma,
+                status,
+            )
     run = replace(run_of(), whisker=session.whisker, results=session.results)
     curved = Curvature().compute(run)
     radius = mean_radius_error(curved)

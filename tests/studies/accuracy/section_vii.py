@@ -135,7 +135,7 @@ def study(count: int, seed: int) -> dict[str, tuple[Score, Counter]]:
             by_consistency(upward, WHISKER),
             by_smoothness(along, WHISKER),
         ):
-            found.setdefault(way.name, []).append((np.degrees(way.alpha_rad) - alpha_deg, way))
+            found.setdefault(way.name, []).append((np.degrees(way.alpha.value) - alpha_deg, way))
     return {
         name: (_score(name, rows), Counter(w.status for _, w in rows if w.status))
         for name, rows in found.items()
@@ -143,7 +143,7 @@ def study(count: int, seed: int) -> dict[str, tuple[Score, Counter]]:
 
 
 def _score(name: str, rows) -> Score:
-    known = [(error, np.degrees(way.sigma_rad)) for error, way in rows if np.isfinite(error)]
+    known = [(error, np.degrees(way.alpha.sigma)) for error, way in rows if np.isfinite(error)]
     return Score(name, "deg", *np.array(known).T)
 
 
