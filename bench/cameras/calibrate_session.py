@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
+from bench.base.exit_codes import print_written
 from bench.base.input_problems import refused_as_bad_input
 from bench.cameras.board_views import SessionViews, read_board_views, rig_view
 from bench.cameras.cameras_toml import write_cameras
@@ -91,12 +92,11 @@ def _write(
             files = WRITERS[file_format](cameras, out.stem)
         for name, content in files.items():
             write_whole(out.parent / name, content)
-        written = f"written, without uncertainties: {', '.join(files)} in {out.parent}"
+        written = f", without uncertainties: {', '.join(files)} in {out.parent}"
     else:
         write_cameras(out, cameras)
-        written = f"written: {out} and {out.with_suffix('.npz').name}"
-    print(*lines, *(f"warning: {line}" for line in warnings), written, sep="\n")
-    return 1 if warnings else 0
+        written = f": {out} and {out.with_suffix('.npz').name}"
+    return print_written(lines, warnings, written)
 
 
 def place_imported(session: Session, lenses: Path, names: Sequence[str] = ()) -> Cameras:

@@ -2,8 +2,9 @@
 
 import argparse
 
+from bench.base.exit_codes import DONE
 from bench.base.progress import begin_step
-from bench.commands.options import DONE, Verbs, add_out, add_verb, parse_squares
+from bench.commands.options import Verbs, add_out, add_verb, parse_squares
 from bench.setup.lab import KIND_NAMES
 
 

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from bench.base.errors import BadInput
+from bench.base.exit_codes import BAD_INPUT, DONE, FAULT_OF_OURS, INTERRUPTED
 from bench.base.progress import show_progress
-from bench.commands.options import BAD_INPUT, DONE, FAULT_OF_OURS, INTERRUPTED
 from vision.geometry import Refused
 
 # Names of the verbs and, with _ for -, of their modules, in the order of --help.

@@ -3,8 +3,9 @@
 import argparse
 
 from bench.base.errors import BadInput
+from bench.base.exit_codes import DONE
 from bench.base.progress import begin_step
-from bench.commands.options import DONE, Verbs, add_out, add_verb
+from bench.commands.options import Verbs, add_out, add_verb
 
 Range = tuple[float, float]
 

@@ -4,8 +4,9 @@ error of (10)."""
 import argparse
 from pathlib import Path
 
+from bench.base.exit_codes import DONE
 from bench.base.progress import begin_step
-from bench.commands.options import DONE, Run, Verbs, add_out, add_verb, add_workers
+from bench.commands.options import Run, Verbs, add_out, add_verb, add_workers
 
 _MAPS = {
     "tilt": "map of the error of (10) over slope and tilt of the bar, by exact mechanics, as PNG, SVG and CSV",

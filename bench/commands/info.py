@@ -2,7 +2,8 @@
 
 import argparse
 
-from bench.commands.options import DONE, Verbs, add_verb
+from bench.base.exit_codes import DONE
+from bench.commands.options import Verbs, add_verb
 
 
 def add(verbs: Verbs) -> None:

@@ -3,15 +3,9 @@
 import argparse
 from pathlib import Path
 
+from bench.base.exit_codes import DONE, WITH_WARNINGS
 from bench.base.progress import begin_step
-from bench.commands.options import (
-    DONE,
-    WITH_WARNINGS,
-    Verbs,
-    add_out,
-    add_recorded,
-    add_verb,
-)
+from bench.commands.options import Verbs, add_out, add_recorded, add_verb
 
 
 def add(verbs: Verbs) -> None:

@@ -5,7 +5,8 @@ import sys
 from collections.abc import Iterable
 from typing import Any
 
-from bench.commands.options import DONE, Verbs, add_session, add_verb, parse_squares
+from bench.base.exit_codes import DONE
+from bench.commands.options import Verbs, add_session, add_verb, parse_squares
 from bench.setup.lab import CHOICES, Lab
 
 _NUMBERS = {

@@ -1,15 +1,9 @@
-"""What the verbs share: how each is added, exit codes, and options that several of them have."""
+"""What the verbs share: how each is added, and options that several of them have."""
 
 import argparse
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
-
-DONE = 0
-WITH_WARNINGS = 1
-BAD_INPUT = 2
-INTERRUPTED = 130
-FAULT_OF_OURS = 70  # EX_SOFTWARE: neither a result nor the user's input
 
 Run = Callable[[argparse.Namespace], int]
 Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"

@@ -4,15 +4,9 @@ import argparse
 from pathlib import Path
 
 from bench.base.errors import BadInput
+from bench.base.exit_codes import DONE, WITH_WARNINGS
 from bench.base.progress import begin_step
-from bench.commands.options import (
-    DONE,
-    WITH_WARNINGS,
-    Verbs,
-    add_follow_links,
-    add_verb,
-    add_workers,
-)
+from bench.commands.options import Verbs, add_follow_links, add_verb, add_workers
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "plan" / "example.toml"
 

@@ -2,8 +2,9 @@
 
 import argparse
 
+from bench.base.exit_codes import DONE
 from bench.base.progress import begin_step
-from bench.commands.options import DONE, Verbs, add_figure_format, add_run, add_verb
+from bench.commands.options import Verbs, add_figure_format, add_run, add_verb
 
 
 def add(verbs: Verbs) -> None:

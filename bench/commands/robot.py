@@ -2,9 +2,9 @@
 
 import argparse
 
+from bench.base.exit_codes import DONE
 from bench.base.progress import begin_step
 from bench.commands.options import (
-    DONE,
     Verbs,
     add_alpha_est,
     add_out,

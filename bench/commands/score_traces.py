@@ -4,17 +4,9 @@ import argparse
 import sys
 from pathlib import Path
 
+from bench.base.exit_codes import DONE, WITH_WARNINGS
 from bench.base.progress import begin_step
-from bench.commands.options import (
-    DONE,
-    WITH_WARNINGS,
-    Verbs,
-    add_out,
-    add_recorded,
-    add_trials,
-    add_verb,
-    add_workers,
-)
+from bench.commands.options import Verbs, add_out, add_recorded, add_trials, add_verb, add_workers
 
 
 def add(verbs: Verbs) -> None:

@@ -3,8 +3,9 @@
 import argparse
 from functools import partial
 
+from bench.base.exit_codes import DONE
 from bench.base.progress import begin_step
-from bench.commands.options import DONE, Verbs, add_session, add_verb, add_workers
+from bench.commands.options import Verbs, add_session, add_verb, add_workers
 from bench.rig.built_in import protocol_names
 
 

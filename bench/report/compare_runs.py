@@ -8,6 +8,7 @@ from pathlib import Path
 from bench.analyses.estimator_accuracy import Accuracy
 from bench.base.drawing import label_of
 from bench.base.errors import BadInput
+from bench.base.exit_codes import DONE, WITH_WARNINGS
 from bench.base.tables import TRIAL, WHISK, Column, Kind, Table
 from bench.records.trial_result import FeltWhisk, SeenWhisk, whisks
 from bench.report.page.words import MISSING, number, with_sigma
@@ -38,8 +39,7 @@ COMPARISON = Table(
         Column("same_recording", "1 where the trial's files are the same, else 0"),
     ),
 )
-DONE = 0
-CHANGED = 1
+CHANGED = WITH_WARNINGS
 # [sigma] A whisk evaluated again that moves by more has another truth, or another estimate. Stated.
 _LEAST_SIGMAS_AGAIN = 1.0
 # [sigma] Of another recording's whisk, by chance once in 370. Derived.

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import make_smoothing_spline
 
 from bench.base.errors import BadInput
+from bench.base.exit_codes import DONE
 from bench.base.progress import begin_step
 from bench.base.settings import Settings
 from bench.base.workers import Workers
@@ -84,7 +85,7 @@ def calibrate_angles_command(session: Path, *, workers: int = 1, follow_links: b
         print(
             f"{counted(kept, 'trial')} with angles already: kept; remove the file to measure anew"
         )
-    return 0
+    return DONE
 
 
 def _line(trial: Trial, angles: FrameAngles) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
+from bench.base.exit_codes import print_written
 from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
 from bench.base.workers import Workers
@@ -45,11 +46,7 @@ def calibrate_gauges_command(
     with whole_file(out.with_suffix(".pdf")) as temporary:
         undated = {"CreationDate": None, "Producer": None, "Creator": None}
         page(certificate).savefig(temporary, metadata=undated)
-    print(*header, "", sep="\n")
-    for warning in problems.warnings:
-        print(f"warning: {warning}")
-    print(f"written: {out}, {out.stem}.pdf")
-    return 1 if problems.warnings else 0
+    return print_written([*header, ""], problems.warnings, f": {out}, {out.stem}.pdf")
 
 
 def trials_to_use(session: Session, every_trial: bool) -> list[Trial]:

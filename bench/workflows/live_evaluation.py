@@ -14,12 +14,13 @@ from functools import partial
 from pathlib import Path
 
 from bench.base.errors import BadInput
+from bench.base.exit_codes import DONE
 from bench.base.settings import Settings
 from bench.session.footage import visible
 from bench.session.inside import check_outside
 from bench.session.session_check import checked_views
 from bench.trials.estimates import own_estimators
-from bench.workflows.session_evaluation import DONE, evaluate
+from bench.workflows.session_evaluation import evaluate
 from vision.geometry import Refused
 
 _HINT = (

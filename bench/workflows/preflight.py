@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
+from bench.base.exit_codes import BAD_INPUT, DONE, WITH_WARNINGS
 from bench.base.input_problems import InputProblems
 from bench.base.progress import count_parts
 from bench.base.settings import Settings
@@ -67,18 +68,18 @@ def check(path: Path, *, follow_links: bool = False) -> int:
     if assumed:
         print(f"assumed: {assumed}")
     if problems.refusals:
-        return 2
+        return BAD_INPUT
     if placed:
         print(f"rig: {placed}")
     for line in ability_lines(session):
         print(line)
     if problems.warnings:
-        return 1
+        return WITH_WARNINGS
     whiskers = f", {counted(len(views), 'whisker')}" if session.base else ""
     trials = counted(len(session.trials), "trial")
     print(f"{session.whole_name}{whiskers}: {trials}, no error, no warning")
     print(f"then run: whisker-bench evaluate {path} --out OUT")
-    return 0
+    return DONE
 
 
 def _print_problems(problems: InputProblems) -> None:

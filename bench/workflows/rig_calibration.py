@@ -9,6 +9,7 @@ import numpy as np
 
 from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
+from bench.base.exit_codes import print_written
 from bench.base.input_problems import InputProblems
 from bench.base.results import hash_of_files
 from bench.base.settings import Settings
@@ -92,11 +93,8 @@ def calibrate_rig_command(
     picture = target.with_suffix(".png")
     _write(target, picture, found, lines)
     advice = [f"to know it better: {line}" for line in what_would_help(found)]
-    print(*lines, *advice, "", sep="\n")
-    for warning in problems.warnings:
-        print(f"warning: {warning}")
-    print(f"written: {target}, {picture.name}")
-    return 1 if problems.warnings else 0
+    written = f": {target}, {picture.name}"
+    return print_written([*lines, *advice, ""], problems.warnings, written)
 
 
 def _write(target: Path, picture: Path, found: RigCalibration, lines: list[str]) -> None:

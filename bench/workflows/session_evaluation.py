@@ -5,6 +5,7 @@ from pathlib import Path
 
 from bench.analyses.catalogue import ANALYSES
 from bench.base.atomic import lock_output, write_whole
+from bench.base.exit_codes import DONE, WITH_WARNINGS
 from bench.base.input_problems import InputProblems
 from bench.base.progress import begin_step, count_parts
 from bench.base.settings import Settings
@@ -24,9 +25,6 @@ from bench.trials.of_session import first_units, require_some, units_in_rig, wit
 from bench.trials.one_camera import require_camera
 from bench.trials.side_by_side import array_units
 from bench.trials.unit import Unit
-
-DONE = 0
-WITH_WARNINGS = 1
 
 
 def evaluate(

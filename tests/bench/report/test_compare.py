@@ -7,8 +7,9 @@ import shutil
 import numpy as np
 import pytest
 
+from bench.base.exit_codes import DONE
 from bench.commands.cli import main
-from bench.report.compare_runs import CHANGED, DONE, compare_runs
+from bench.report.compare_runs import CHANGED, compare_runs
 
 KEY = "b60_4"
 

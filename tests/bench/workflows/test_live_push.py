@@ -9,8 +9,8 @@ import pytest
 
 from bench import api
 from bench.base.errors import BadInput
+from bench.base.exit_codes import BAD_INPUT, DONE
 from bench.commands.cli import main
-from bench.commands.options import BAD_INPUT, DONE
 from bench.workflows import live_push
 from bench.workflows.live_film import FILM_HZ, LiveFilm
 from vision import WhiskTruth

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
+from bench.base.exit_codes import DONE
 from bench.base.settings import Settings
 from bench.session.session import load_session
 from bench.session.signals import read_signals
-from bench.workflows.session_evaluation import DONE, evaluate
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import table
 
 BRING = Path(__file__).parents[3] / "fixtures" / "bring"

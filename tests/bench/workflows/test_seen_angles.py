@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
+from bench.base.exit_codes import DONE
 from bench.base.settings import Settings
 from bench.cameras.cameras_toml import write_cameras
 from bench.commands import cli
@@ -17,7 +18,7 @@ from bench.session.angles_file import FrameAngles
 from bench.session.manifest import TrialKeys
 from bench.session.session import load_session
 from bench.session.signals import read_signals
-from bench.workflows.session_evaluation import DONE, evaluate
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.no_motor_log import without_log
 from tests.scenes.recorded import exact_cameras
 from tests.scenes.results import table

@@ -7,13 +7,14 @@ from pathlib import Path
 import pytest
 import tomli_w
 
+from bench.base.exit_codes import DONE
 from bench.base.settings import Settings
 from bench.commands.cli import main
 from bench.report.record import read_record
 from bench.session.session import load_session
 from bench.setup.lab import Lab
 from bench.setup.new_session import new_session
-from bench.workflows.session_evaluation import DONE, evaluate
+from bench.workflows.session_evaluation import evaluate
 from tests.scenes.results import codes, table
 
 ROOT = Path(__file__).parents[3]

@@ -27,8 +27,8 @@ from PIL import Image
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.analyses.surfaces import FittedSurface
+from bench.base.exit_codes import DONE, WITH_WARNINGS
 from bench.commands import cli
-from bench.commands.options import DONE, WITH_WARNINGS
 from bench.records.trial_result import TrialResult
 from bench.report.pooled import pooled
 from bench.report.run_folder import read_results
