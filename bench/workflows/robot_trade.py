@@ -8,13 +8,13 @@ choices are ranked and drawn, since of many that few whisks measure the best is 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bench.base.atomic import lock_output
 from bench.base.drawing import (
     colour_of,
     label_logarithmic,
@@ -25,17 +25,13 @@ from bench.base.drawing import (
     style,
 )
 from bench.base.errors import BadInput
-from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
-from bench.base.workers import Workers
 from bench.records.trial_result import BY_STAGE, TrialResult
 from bench.report.evaluation import evaluated_run
-from bench.session.inside import check_outside
-from bench.session.session_check import checked_session, trials_with_whisks
 from bench.session.signals import read_signals
 from bench.trials.lost import evaluate_units
-from bench.trials.of_session import placed_units, require_some, with_gauges
 from bench.trials.unit import Unit
+from bench.workflows.opened_session import opened_session
 from bench.workflows.robot_answers import Answer, Converter, Task, answers_of_trial, range_of
 from bench.workflows.robot_points import ROBOT_TRADE, Point, front, pool_answers
 
@@ -58,7 +54,6 @@ def robot_trade(
     `out` holds the session's evaluation, too: what of it is there already is not made again. Raise
     BadInput, also where no whisk has both a truth and moments.
     """
-    check_outside(out, session_path)
     answers = _answers_of_session(session_path, out, settings, workers)
     if not answers:
         raise BadInput(
@@ -82,19 +77,10 @@ def _answers_of_session(
     session_path: Path, out: Path, settings: Settings, workers: int
 ) -> list[Answer]:
     """Evaluate the session into `out`; return all answers about its whisks. Raise BadInput."""
-    problems = InputProblems()
-    session = checked_session(session_path, problems, follow_links=settings.follow_links)
-    recorded = trials_with_whisks(session)
-    require_some(recorded, settings)
-    with lock_output(out), Workers(workers) as pool:
-        _, units = placed_units(session, recorded, out, settings, pool, problems)
-        *_, units = with_gauges(units, pool, problems)
-        chosen = [unit for unit in units if settings.takes(unit.trial.name)]
-        results = evaluated_run(evaluate_units(chosen, pool), session.whisker, settings).results
-        answers = []
-        for of_trial in pool.run(answers_of_trial, _tasks(chosen, results), "answers"):
-            answers += of_trial
-    return answers
+    with opened_session(session_path, out, settings, workers) as (session, units, pool):
+        results = evaluated_run(evaluate_units(units, pool), session.whisker, settings).results
+        of_trials = pool.run(answers_of_trial, _tasks(units, results), "answers")
+    return list(chain.from_iterable(of_trials))
 
 
 def _tasks(units: Sequence[Unit], results: Sequence[TrialResult]) -> list[Task]:

@@ -17,25 +17,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bench.base.atomic import lock_output, write_whole
+from bench.base.atomic import write_whole
 from bench.base.drawing import label_logarithmic, publish, style
 from bench.base.errors import BadInput
-from bench.base.input_problems import InputProblems
 from bench.base.progress import begin_step
 from bench.base.settings import Seeing, Settings
 from bench.base.tables import Column, Kind, Table, alike
 from bench.base.workers import Workers
 from bench.report.score import truth_of
-from bench.session.inside import check_outside
 from bench.session.session import Session
-from bench.session.session_check import checked_session, trials_with_whisks
 from bench.session.signals import forward_strokes, read_signals
-from bench.session.trial import Trial
-from bench.trials.of_session import placed_units, with_gauges
 from bench.trials.seeing import PRESETS, STANDARD, as_toml, by_preset
 from bench.trials.trial_evaluation import trial_result
 from bench.trials.unit import Unit
 from bench.workflows.expected_error import ExpectedRms, interval_of_rms
+from bench.workflows.opened_session import opened_session
 from bench.workflows.pareto import pareto_front
 from bench.workflows.seeing_times import draw_all, play_all, see_all, time_work
 from estimator.uncertainty import Z_95
@@ -197,15 +193,10 @@ def tradeoff(
     timed. workers: so many settings are timed at once, each by a process of one thread; they share
     the machine's memory, so times are longest with many. Raise BadInput.
     """
-    check_outside(out, path)
-    problems = InputProblems()
-    session = checked_session(path, problems, follow_links=settings.follow_links)
-    recorded = trials_with_whisks(session)
-    wanted = {trial.name for trial in _trials_to_time(recorded, settings)}
-    with lock_output(out), Workers(workers) as pool:
-        _, units = placed_units(session, recorded, out, settings, pool, problems)
-        *_, units = with_gauges(units, pool, problems)
-        chosen = [unit for unit in units if unit.trial.name in wanted]
+    with opened_session(path, out, settings, workers) as (session, units, pool):
+        chosen = [unit for unit in units if unit.trial.camera_sources]
+        if not chosen:
+            raise BadInput(f"--trials {settings.trials}: no trial of such a name has pictures")
         trades = _with_errors(session, chosen, _time_all(chosen, repeats, pool))
     return _write(out, trades)
 
@@ -220,14 +211,6 @@ def _time_all(units: Sequence[Unit], repeats: int, pool: Workers) -> list[Trade]
     begin_step("figures")
     trades.append(_time_drawing(units, _standard(trades), repeats))
     return trades
-
-
-def _trials_to_time(recorded: Sequence[Trial], settings: Settings) -> list[Trial]:
-    """Return the trials with pictures that the settings name. Raise BadInput where none is."""
-    wanted = [trial for trial in recorded if settings.takes(trial.name) and trial.camera_sources]
-    if not wanted:
-        raise BadInput(f"--trials {settings.trials}: no trial with pictures has such a name")
-    return wanted
 
 
 def settings_to_try(cameras: Sequence[str]) -> Iterator[Seeing]:

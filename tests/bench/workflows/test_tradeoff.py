@@ -110,7 +110,7 @@ def test_a_table_and_files_to_give_back(tmp_path, monkeypatch):
 
 
 def test_no_trial_of_that_name(tmp_path):
-    with pytest.raises(BadInput, match=r"--trials c\*: no trial with pictures has such a name"):
+    with pytest.raises(BadInput, match=r"--trials c\*: no trial has such a name"):
         seeing_trade.tradeoff(RING, tmp_path, Settings(trials="c*"))
 
 
