@@ -1,6 +1,7 @@
-"""Numbers as a reader takes them: as many digits as their standard deviation makes sense of."""
+"""Numbers as a reader takes them: as many digits as their standard deviation makes sense of; lists of names."""
 
 import math
+from collections.abc import Iterable
 
 MISSING = "–"
 _SIGMA_DIGITS = 2  # of a standard deviation: a third would be noise
@@ -37,3 +38,14 @@ def number_range(low: float, high: float, digits: int) -> str:
     if not (math.isfinite(low) and math.isfinite(high)):
         return MISSING
     return f"{number(low, digits)} to {number(high, digits)}"
+
+
+def first_names(names: Iterable[object], most: int) -> str:
+    """Return the first names in one line, and how many more there are; "none" where there is none.
+
+    >>> first_names(["b30", "b45", "b60"], 2)
+    'b30, b45 and 1 more'
+    """
+    listed = list(map(str, names))
+    text = ", ".join(listed[:most]) or "none"
+    return f"{text} and {len(listed) - most} more" if len(listed) > most else text

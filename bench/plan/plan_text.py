@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from bench.base.numbers import first_names
 from bench.plan.outlook import QUANTITIES, WORDS
 from bench.plan.plan_rows import Plan, Row
 
@@ -162,10 +163,7 @@ def _stated_lines(rows: Sequence[Row]) -> Iterator[str]:
         worse = [row.name for row, own in zip(both, ratio) if own < 1.0 / _WORSE]
         if not worse:
             continue
-        named = ", ".join(worse[:_MOST_NAMED])
-        if len(worse) > _MOST_NAMED:
-            named += ", …"
         yield (
-            f"{_SYMBOLS[name]} of {named} is stated wider than rods, cameras and lines ask for: look "
+            f"{_SYMBOLS[name]} of {first_names(worse, _MOST_NAMED)} is stated wider than rods, cameras and lines ask for: look "
             "at the frames (a slip in jumps, a lost frame)."
         )

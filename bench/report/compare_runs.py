@@ -9,6 +9,7 @@ from bench.analyses.estimator_accuracy import Accuracy
 from bench.base.drawing import label_of
 from bench.base.errors import BadInput
 from bench.base.exit_codes import DONE, WITH_WARNINGS
+from bench.base.numbers import first_names
 from bench.base.tables import TRIAL, WHISK, Column, Kind, Table
 from bench.records.trial_result import FeltWhisk, SeenWhisk, whisks
 from bench.report.page.words import MISSING, number, with_sigma
@@ -226,7 +227,8 @@ def _run_lines(
     for run, rest in ((first, other), (other, first)):
         alone = sorted(run.whisks.keys() - rest.whisks.keys())
         if alone:
-            yield f"  only in {run.out}: {_names(alone)}"
+            names = first_names((f"{trial} {whisk}" for trial, whisk in alone), _MOST_NAMED)
+            yield f"  only in {run.out}: {names}"
     yield from _largest_changes(changes)
 
 
@@ -267,10 +269,3 @@ def _change_line(change: QuantityChange) -> str:
         return f"{where} {'is no longer known' if math.isfinite(before) else 'has become known'}"
     difference = with_sigma(change.difference, change.sigma, sign=True)
     return f"{where} {before:.4g} → {after:.4g} {unit}, {difference}, {change.sigmas:+.1f} sigma"
-
-
-def _names(keys: Sequence[WhiskKey]) -> str:
-    """Return the first whisks by trial and number, and how many more there are."""
-    names = ", ".join(f"{trial} {whisk}" for trial, whisk in keys[:_MOST_NAMED])
-    more = len(keys) - _MOST_NAMED
-    return f"{names} and {more} more" if more > 0 else names

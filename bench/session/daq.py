@@ -14,6 +14,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
+from bench.base.numbers import first_names
 from bench.session import manifest
 from bench.session.manifest import ChannelKeys
 from bench.session.strict_toml import values
@@ -128,10 +129,8 @@ def _scaled(series: Any, channel: ChannelKeys, label: str) -> np.ndarray:
 
 def _no_channel(name: str, names: Iterable[str], label: str) -> BadInput:
     """Return the error of a channel that is not among the names of a file."""
-    names = list(names)
-    more = ", …" if len(names) > _MOST_LISTED else ""
-    listed = ", ".join(names[:_MOST_LISTED]) or "none"
-    return BadInput(f"has no channel {name}; it has {listed}{more}", file=label)
+    found = f"has no channel {name}; it has {first_names(names, _MOST_LISTED)}"
+    return BadInput(found, file=label)
 
 
 def _csv(path: Path, names: list[str], label: str) -> list:

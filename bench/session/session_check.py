@@ -9,6 +9,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems, refused_as_bad_input
+from bench.base.numbers import first_names
 from bench.base.progress import count_parts
 from bench.base.results import hash_of_files
 from bench.base.statuses import reason
@@ -307,10 +308,9 @@ def find_damage(session: Session, problems: InputProblems) -> None:
 def _damage(source: Path) -> str:
     """Decode all frames of a source; return which cannot be read, '' where all can."""
     try:
-        damaged = [str(index) for index, grey in Frames.open(source).read() if grey is None]
+        damaged = [index for index, grey in Frames.open(source).read() if grey is None]
     except Refused as problem:
         return str(problem)
     if not damaged:
         return ""
-    more = f" and {len(damaged) - _MOST_NAMED} more" if len(damaged) > _MOST_NAMED else ""
-    return f"frame {', '.join(damaged[:_MOST_NAMED])}{more} cannot be read (damaged or cut short)"
+    return f"frame {first_names(damaged, _MOST_NAMED)} cannot be read (damaged or cut short)"

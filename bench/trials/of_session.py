@@ -3,9 +3,9 @@
 `evaluate` and `calibrate gauges` share them.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from bench.base.digests import Digests
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.base.numbers import first_names
 from bench.base.progress import begin_step
 from bench.base.results import hash_of_files
 from bench.base.settings import Settings
@@ -47,21 +48,13 @@ _MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
 def require_some(trials: Sequence[Trial], settings: Settings) -> None:
     """Raise BadInput where the settings choose none of the trials, or a camera without pictures."""
     if not any(settings.takes(trial.name) for trial in trials):
-        names = _first_names(trial.name for trial in trials)
+        names = first_names((trial.name for trial in trials), _MOST_NAMED)
         raise BadInput(f"--trials {settings.trials}: no trial has such a name; there are {names}")
     cameras = dict.fromkeys(name for trial in trials for name in trial.cameras)
     for name in settings.seeing.cameras:
         if name not in cameras:
-            found = f"there is no camera {name}; there are {_first_names(cameras)}"
+            found = f"there is no camera {name}; there are {first_names(cameras, _MOST_NAMED)}"
             raise BadInput(f"cameras of {settings.seeing.name}: {found}")
-
-
-def _first_names(names: Iterable[str]) -> str:
-    """Return the first names in one line, with an ellipsis where there are more."""
-    first = list(islice(names, _MOST_NAMED + 1))
-    if len(first) > _MOST_NAMED:
-        first[_MOST_NAMED] = "…"
-    return ", ".join(first)
 
 
 def placed_units(

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from bench.base.input_problems import in_one_status
+from bench.base.numbers import first_names
 from bench.base.settings import Seeing, Settings
 from bench.base.statuses import reason
 from bench.cameras.session_cameras import SessionCalibration
@@ -284,9 +285,9 @@ def _damaged_frames(frames: Mapping[str, Mapping], times: FrameTimes) -> Iterato
     count = len(times)
     for name, pictures in frames.items():
         is_recorded = times.picture[name] >= 0
-        damaged = [str(k) for k in np.flatnonzero(is_recorded) if k not in pictures]
+        damaged = [k for k in np.flatnonzero(is_recorded) if k not in pictures]
         if damaged:
-            named = ", ".join(damaged[:_MOST_NAMED])
+            named = first_names(damaged, _MOST_NAMED)
             found = f"camera {name}: {len(damaged)} of {count} frames damaged ({named})"
             yield Reason("frames_damaged", found)
 

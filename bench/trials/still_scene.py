@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bench.base.numbers import first_names
 from bench.session.session import Session
 from vision.geometry import Reason
 from vision.pictures import Likeness, exposures, is_blank, likeness, texture
@@ -174,9 +175,7 @@ def _which_frames(changed: Collection[int], indices: Sequence[int]) -> str:
             return f"from frame {frames[0]} on"
         if frames == list(indices[: len(frames)]):
             return f"up to frame {frames[-1]}"
-    label = ", ".join(map(str, frames[:_MOST_NAMED]))
-    more = ", …" if len(frames) > _MOST_NAMED else ""
-    return f"{'frame' if len(frames) == 1 else 'frames'} {label}{more}"
+    return f"{'frame' if len(frames) == 1 else 'frames'} {first_names(frames, _MOST_NAMED)}"
 
 
 def _divided(grey: np.ndarray, gain: float) -> np.ndarray:

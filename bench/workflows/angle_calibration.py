@@ -12,6 +12,7 @@ from scipy.interpolate import make_smoothing_spline
 
 from bench.base.errors import BadInput
 from bench.base.exit_codes import DONE
+from bench.base.numbers import first_names
 from bench.base.progress import begin_step
 from bench.base.settings import Settings
 from bench.base.workers import Workers
@@ -173,7 +174,7 @@ def _by_marker(task: _Task, time_s: np.ndarray, pictures: Pictures) -> SeenTurns
     trial = task.trial
     sightings = list(_sightings(pictures, task.session.board))
     seen = sorted({one.number for one in sightings})
-    named = ", ".join(map(str, seen[:_MOST_NAMED])) or "none"
+    named = first_names(seen, _MOST_NAMED)
     own = [one for one in sightings if one.number == trial.hub_marker]
     if not own:
         raise Refused(
