@@ -12,8 +12,9 @@ import numpy as np
 
 from vision.boards.corners import MIN_CORNERS, Corners, is_found, to_8_bit
 from vision.boards.discs import cut_discs, fit_discs
+from vision.boards.homography import map_places
 from vision.boards.saddle import Saddles
-from vision.boards.saddle_board import local_frames
+from vision.boards.saddle_board import is_undisturbed, is_usual, local_frames
 from vision.boards.symmetry import possible_labels, turns_onto_itself, upper_left_first
 from vision.geometry.board import Board, grid_mm
 from vision.geometry.checks import require, require_length
@@ -22,9 +23,6 @@ from vision.geometry.checks import require, require_length
 _LEAST_AREA = 20.0
 # [1] Largest area of a spot, of the picture's. Stated.
 _MOST_AREA = 0.02
-# [1] Blur, contrast and misfit against the board's medians: as of saddles
-# (vision/boards/saddle_board.py). Stated.
-_ODD_FACTOR, _DISTURBED_RATIO = 2.0, 1.8
 # [1] Of a circle's radius: a fit that runs farther found another. Stated.
 _MOST_SHIFT = 0.3
 # [pixels] Four times the ten parameters. Derived.
@@ -161,10 +159,10 @@ def _is_disc(discs: Saddles, px_guess: np.ndarray, axes: np.ndarray) -> np.ndarr
     shift_px = np.linalg.norm(discs.px - px_guess, axis=1)
     good &= shift_px < _MOST_SHIFT * np.linalg.norm(axes, axis=1).min(axis=1)
     good &= discs.contrast > 0
-    median = np.median(discs.contrast[good]) if good.any() else 1.0
-    ratio = discs.contrast / median
-    good &= (ratio < _ODD_FACTOR) & (ratio > 1.0 / _ODD_FACTOR)
-    return good & (discs.misfit < _DISTURBED_RATIO * np.median(discs.misfit[good]))
+    if not good.any():
+        return good
+    good &= is_usual(discs.contrast, good)
+    return good & is_undisturbed(discs.misfit, good)
 
 
 def perspective_shift(px: np.ndarray, places_mm: np.ndarray, radius_mm: float) -> np.ndarray:
@@ -177,7 +175,6 @@ def perspective_shift(px: np.ndarray, places_mm: np.ndarray, radius_mm: float) -
     shift_px = np.zeros_like(px)
     for _ in range(2):
         H, _ = cv2.findHomography(places_mm, px - shift_px, 0)
-        of_centre = centres @ H.T
         of_picture = (H @ circles @ H.T)[:, :, 2]
-        shift_px = of_picture[:, :2] / of_picture[:, 2:] - of_centre[:, :2] / of_centre[:, 2:]
+        shift_px = of_picture[:, :2] / of_picture[:, 2:] - map_places(H, places_mm)[0]
     return shift_px

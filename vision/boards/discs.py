@@ -17,12 +17,10 @@ from scipy.special import erf
 from vision.boards.edge_pixels import Windows, cut_where
 from vision.boards.saddle import (
     CONTRAST,
-    LEVEL,
-    LINEAR,
     PLACE,
-    SLOPE,
     Saddles,
     fit_windows,
+    in_light,
     report_fit,
     with_linear_part,
 )
@@ -101,14 +99,10 @@ def predict_discs(windows: DiscWindows, p: np.ndarray) -> tuple[np.ndarray, np.n
     J = np.empty((len(p), 10, windows.offset.shape[2]))
     offset = windows.offset - p[:, PLACE, None]
     J[:, CONTRAST] = _edge(windows, p)
-    J[:, LEVEL] = 1.0
-    J[:, SLOPE] = offset
     contrast = p[:, CONTRAST, None]
     for column in range(*_CURVED.indices(10)):
         J[:, column] = contrast * _edge_difference(windows, p, column) / (2.0 * _STEP)
-    J[:, PLACE] -= p[:, SLOPE, None]
-    grey = p[:, None, LINEAR] @ J[:, LINEAR]
-    return grey[:, 0], J
+    return in_light(offset, p, J), J
 
 
 def _edge(windows: DiscWindows, p: np.ndarray) -> np.ndarray:

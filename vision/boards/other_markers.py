@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 from scipy.special import ndtr
 
 from vision.boards.corners import marker_dictionary, to_8_bit
+from vision.boards.homography import map_places, slopes_of
 from vision.geometry.board import Board
 
 # [px] Pixels about a marker that are cut out with it: what OpenCV's corners are off by. Stated.
@@ -184,28 +185,15 @@ def _homography(parameters: np.ndarray) -> np.ndarray:
     return np.append(parameters[_TO_PRINT], 1.0).reshape(3, 3)
 
 
-def _on_print(places: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where places (n, 2) are on the print, (n, 2), and the denominators (n,) of that."""
-    H = _homography(parameters)
-    mapped = np.column_stack([places, np.ones(len(places))]) @ H.T
-    return mapped[:, :2] / mapped[:, 2:], mapped[:, 2]
-
-
-def _slopes(uv: np.ndarray, depth: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Return the derivatives (n, 2, 2) of u and v by the place in the picture."""
-    H = _homography(parameters)
-    return (H[:2, :2] - uv[:, :, None] * H[2, :2]) / depth[:, None, None]
-
-
 def _blur_on_print(uv: np.ndarray, depth: np.ndarray, parameters: np.ndarray) -> np.ndarray:
     """Return the blur (n, 2) along u and v, in modules."""
-    rate = np.linalg.norm(_slopes(uv, depth, parameters), axis=2)
+    rate = np.linalg.norm(slopes_of(_homography(parameters), uv, depth), axis=2)
     return rate * np.exp(parameters[_BLUR])
 
 
 def _shows_pattern(places: np.ndarray, parameters: np.ndarray, modules: int) -> np.ndarray:
     """Return which places (n, 2) show the marker and its rim, and not what is beyond, (n,) bool."""
-    uv, depth = _on_print(places, parameters)
+    uv, depth = map_places(_homography(parameters), places)
     clear = np.minimum(_CLEAR_OF_SURROUND * _blur_on_print(uv, depth, parameters), _RIM)
     return np.all((uv > clear) & (uv < modules - clear), axis=1) & (depth > 0)
 
@@ -267,7 +255,7 @@ class _Pattern:
 
     def _by_homography(self, parameters: np.ndarray, by_uv: np.ndarray) -> np.ndarray:
         """Return derivatives (n, 8) by the homography, from those by u and v (n, 2)."""
-        uv, depth = _on_print(self.places, parameters)
+        uv, depth = map_places(_homography(parameters), self.places)
         by_numerator = by_uv / depth[:, None]  # (n, 2)
         by_denominator = -np.einsum("ni,ni->n", by_numerator, uv)
         xy1 = self._light[:, [1, 2, 0]]
@@ -277,9 +265,10 @@ class _Pattern:
 
     def _white_share(self, parameters: np.ndarray) -> "_WhiteShare":
         """Return how white the print is at each place, under the blur there."""
-        uv, depth = _on_print(self.places, parameters)
+        H = _homography(parameters)
+        uv, depth = map_places(H, self.places)
         blur = _blur_on_print(uv, depth, parameters)
-        cosine = _cosine_of_sides(_slopes(uv, depth, parameters))
+        cosine = _cosine_of_sides(slopes_of(H, uv, depth))
         return _WhiteShare(
             self.pattern,
             _BlurredModules.at(uv[:, 0], blur[:, 0], len(self.pattern)),

@@ -127,14 +127,25 @@ def predict_saddles(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.nda
     offset = windows.offset - p[:, PLACE, None]  # (n, 2, k) px from the corner
     crossing, by_edge = _crossing(offset, p)
     J = np.empty((len(p), 10, offset.shape[2]))
-    J[:, PLACE] = by_edge[:, :, :2].sum(axis=1) - p[:, SLOPE, None]
+    J[:, PLACE] = by_edge[:, :, :2].sum(axis=1)
     J[:, TURN] = by_edge[:, :, 2]
     J[:, BLUR] = by_edge[:, :, 3]
     J[:, CONTRAST] = crossing
+    return in_light(offset, p, J), J
+
+
+def in_light(offset: np.ndarray, p: np.ndarray, J: np.ndarray) -> np.ndarray:
+    """Return the grey (n, k) of marks in light with a slope, and complete its Jacobian (n, 10, k) in
+    place.
+
+    offset (n, 2, k): px from the mark. J: of marks in even light; its column of the contrast is the
+    mark itself.
+    """
+    J[:, PLACE] -= p[:, SLOPE, None]
     J[:, LEVEL] = 1.0
     J[:, SLOPE] = offset
     grey = p[:, None, LINEAR] @ J[:, LINEAR]
-    return grey[:, 0], J
+    return grey[:, 0]
 
 
 def _crossing(offset: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

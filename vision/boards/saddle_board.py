@@ -9,6 +9,7 @@ import numpy as np
 
 from vision.boards.corners import MIN_CORNERS, Corners
 from vision.boards.edge_pixels import Windows, cut_windows
+from vision.boards.homography import map_places, slopes_of
 from vision.boards.saddle import Saddles, fit_saddles
 from vision.geometry.board import Board, grid_mm
 from vision.geometry.checks import require, require_length
@@ -76,10 +77,8 @@ class SaddleBoard(Board):
         good = saddles.converged
         contrast = np.where(self.is_dark_first[ids], saddles.contrast, -saddles.contrast)
         alike = np.sign(contrast) == np.sign(np.median(contrast[good]))
-        for value in (np.abs(contrast), saddles.blur_px):
-            ratio = value / np.median(value[good])
-            alike &= (ratio < _ODD_FACTOR) & (ratio > 1 / _ODD_FACTOR)
-        return alike & (saddles.misfit < _DISTURBED_RATIO * np.median(saddles.misfit[good]))
+        alike &= is_usual(np.abs(contrast), good) & is_usual(saddles.blur_px, good)
+        return alike & is_undisturbed(saddles.misfit, good)
 
 
 @dataclass(frozen=True)
@@ -112,6 +111,17 @@ def require_marker_fits(marker_mm: float, square_mm: float) -> None:
     )
 
 
+def is_usual(values: np.ndarray, good: np.ndarray) -> np.ndarray:
+    """Return which values (n,) are near the median of the good ones, (n,) bool, within _ODD_FACTOR."""
+    ratio = values / np.median(values[good])
+    return (ratio < _ODD_FACTOR) & (ratio > 1 / _ODD_FACTOR)
+
+
+def is_undisturbed(misfit: np.ndarray, good: np.ndarray) -> np.ndarray:
+    """Return which misfits (n,) are not much larger than the median of the good ones, (n,) bool."""
+    return misfit < _DISTURBED_RATIO * np.median(misfit[good])
+
+
 def local_frames(px: np.ndarray, places: np.ndarray) -> np.ndarray | None:
     """Return one unit along board x and y in the picture at each point: (n, 2, 2) px, columns x
     and y.
@@ -124,5 +134,4 @@ def local_frames(px: np.ndarray, places: np.ndarray) -> np.ndarray | None:
     H, _ = cv2.findHomography(places, px, 0)
     if H is None or not np.all(np.isfinite(H)) or abs(np.linalg.det(H)) < 1e-12:
         return None
-    depth = places @ H[2, :2] + H[2, 2]
-    return (H[:2, :2] - px[:, :, None] * H[2, :2]) / depth[:, None, None]
+    return slopes_of(H, px, map_places(H, places)[1])

@@ -22,13 +22,11 @@ from vision.fit.covariance import chance_of
 from vision.fit.problem import (
     WANDER_PX,
     Problem,
-    State,
     bends,
     columns_of_camera,
-    curves_of,
     wandering,
 )
-from vision.fit.reshaped import by_contacts, by_lines
+from vision.fit.reshaped import reshape
 from vision.fit.solution import Solution
 from vision.geometry.centreline import Curves, rotation_z
 
@@ -177,14 +175,7 @@ def _estimate_departure(fit: Solution) -> tuple[_Departure, np.ndarray]:
     Returns with it the change (k,) of the slip in the last frame by the departure, the parameters
     standing still.
     """
-    problem = fit.problem
-    state = fit.state
-    curves, _ = curves_of(problem, state.vector, state.arcs_mm)
-    moves = _moves(problem, state, curves)
-    on_contacts, slip_by = by_contacts(
-        problem, state, curves, moves, fit.last_frame, _STEP_MM_PER_RAD
-    )
-    by_departure = np.concatenate([by_lines(problem, curves, moves), on_contacts])
+    by_departure, slip_by = reshape(fit, _moves(fit), _STEP_MM_PER_RAD)
     return _fit_added(_wandering(fit), fit.linear.weigh(by_departure)), slip_by
 
 
@@ -224,21 +215,23 @@ def _fit_added(problem: _LeastSquares, rows: np.ndarray) -> _Departure:
     )
 
 
-def _moves(problem: Problem, state: State, curves: Curves) -> Curves:
+def _moves(fit: Solution) -> Curves:
     """Return how a unit of each departure moves the centrelines: points and tangents (k, f, m, 3)
     per mm/rad.
     """
     # Brings in all of scipy.optimize, which the reading of a session does without.
     from scipy.interpolate import CubicSpline
 
+    problem = fit.problem
+    arc_mm = fit.curves.arc_mm
     knots = np.linspace(0.0, problem.wire.length_mm, KNOTS + 1)
     spline = CubicSpline(knots, np.eye(KNOTS + 1)[:, 1:], bc_type="natural")
     bend = np.zeros((len(problem.motor_rad), 3))
-    bend[:, 1:] = bends(problem, state.vector)
+    bend[:, 1:] = bends(problem, fit.state.vector)
     direction = np.einsum("fij,fj->fi", rotation_z(problem.motor_rad), bend)
-    points = np.einsum("mk,fi->kfmi", spline(curves.arc_mm, 0), direction)
-    tangents = np.einsum("mk,fi->kfmi", spline(curves.arc_mm, 1), direction)
-    return Curves(curves.arc_mm, points, tangents)
+    points = np.einsum("mk,fi->kfmi", spline(arc_mm, 0), direction)
+    tangents = np.einsum("mk,fi->kfmi", spline(arc_mm, 1), direction)
+    return Curves(arc_mm, points, tangents)
 
 
 def _wander_rows(problem: Problem) -> np.ndarray:

@@ -156,6 +156,15 @@ class State:
     arcs_mm: np.ndarray
 
 
+def at_rest(problem: Problem, rest_mm: np.ndarray) -> np.ndarray:
+    """Return the parameters (size,) of an unbent wire of this rest shape (2, 4), mm, and an object where
+    it is counted from.
+    """
+    vector = np.zeros(problem.size)
+    vector[problem.blocks.rest_shape.slice] = np.ravel(rest_mm)
+    return vector
+
+
 def bar_axis(problem: Problem, vector: np.ndarray) -> Axis:
     """Return the object's axis by parameters (…, size): shifted and tilted, and shifted along
     itself where the object has a parameter for that.

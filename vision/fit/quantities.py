@@ -24,7 +24,7 @@ from vision.fit.touch import FirstTouch, first_touch
 from vision.geometry.centreline import Curves, rotation_z
 from vision.geometry.contact import BarAxis, clearance, contact_frame_angles
 from vision.geometry.rods import Wire
-from vision.geometry.rotation import unit
+from vision.geometry.rotation import across, unit
 
 # [rounds] Of Newton's method for the virtual point: the resting whisker is nearly straight.
 # Derived.
@@ -160,9 +160,9 @@ def _force_direction(
     along = unit(tangent[..., 0, :])
     to_rig = rotation_z(touch.motor_rad)[..., None, :, :]  # from the contact frame
     deflection = d_z[..., None] * to_rig[..., 2] - d_y[..., None] * to_rig[..., 1]
-    across = deflection - np.sum(deflection * along, axis=-1, keepdims=True) * along
-    size = np.linalg.norm(across, axis=-1) * wire.radius_by_arc(arc_mm)
-    return across + size[..., None] * along
+    bent = across(deflection, along)
+    size = np.linalg.norm(bent, axis=-1) * wire.radius_by_arc(arc_mm)
+    return bent + size[..., None] * along
 
 
 def _angle_to_normal(

@@ -21,7 +21,7 @@ import numpy as np
 from vision.fit.blocks import columns_of
 from vision.fit.problem import Problem, State, bar_axes, bends, curves_of
 from vision.fit.quantities import measure
-from vision.fit.reshaped import by_contacts, by_lines
+from vision.fit.reshaped import reshape
 from vision.fit.solution import Solution
 from vision.fit.solve import residuals
 from vision.geometry.camera import N_PARAMETERS, PARAMETERS
@@ -119,8 +119,7 @@ def _large_bending(fit: Solution) -> LeftOut:
     curves, arcs = curves_of(problem, state.vector, state.arcs_mm)
     contacts_mm = _contacts_of_small_angles(problem, state, curves, arcs)
     moves = _in_rig(problem, curves, _small_angles(problem, state, curves, contacts_mm))
-    on_contacts, slip = by_contacts(problem, state, curves, moves, fit.last_frame)
-    rows = np.concatenate([by_lines(problem, curves, moves), on_contacts])
+    rows, slip = reshape(fit, moves)
     return _followed(fit, rows[:, 0], float(slip[0]))
 
 

@@ -7,13 +7,24 @@ those of the f frames.
 
 import numpy as np
 
-from vision.fit.problem import CONTACT_SIGMA_MM, Problem, State, bar_axes
+from vision.fit.problem import CONTACT_SIGMA_MM, Problem
+from vision.fit.solution import Solution
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import clearance
 from vision.wire.points import Observed
 
 
-def by_lines(problem: Problem, curves: Curves, moves: Curves) -> np.ndarray:
+def reshape(fit: Solution, moves: Curves, step: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return the change (n, k) of the residuals of line points and touching frames, and of the slip in
+    the last frame (k,).
+
+    The parameters stay as they are; contacts by differences over `step` of each change.
+    """
+    on_contacts, slip = _by_contacts(fit, moves, step)
+    return np.concatenate([_by_lines(fit.problem, fit.curves, moves), on_contacts]), slip
+
+
+def _by_lines(problem: Problem, curves: Curves, moves: Curves) -> np.ndarray:
     """Return the change (n, k) of the line points' residuals; the bar's do not change."""
     rows = []
     for seen in problem.seen:
@@ -36,23 +47,21 @@ def _across_line(problem: Problem, seen: Observed, curves: Curves, moves: Curves
     return np.einsum("ni,nij,knj->nk", seen.points.normal, by_point, moves_mm)
 
 
-def by_contacts(
-    problem: Problem, state: State, curves: Curves, moves: Curves, frame: int, step: float = 1.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the change of the touching frames' residuals (t, k), and of the slip in one frame
+def _by_contacts(fit: Solution, moves: Curves, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the change of the touching frames' residuals (t, k), and of the slip in the last frame
     (k,).
-
-    The parameters stay as they are; by differences over `step` of each change.
     """
+    curves = fit.curves
+    frame = fit.last_frame
     points = _with_moves(curves.points_mm, step * moves.points_mm)
     tangents = _with_moves(curves.tangents, step * moves.tangents)
-    axis = bar_axes(problem, state.vector)
+    axis = fit.axes
     moved = Curves(curves.arc_mm, points, tangents)
-    distance, _, contact = clearance(moved, axis, problem.wire)
+    distance, _, contact = clearance(moved, axis, fit.problem.wire)
     by_change = (distance[1:] - distance[0]) / step / CONTACT_SIGMA_MM
     along = axis.bar_at(contact[0, frame]).direction[0]
     slip = (contact[1:, frame] - contact[0, frame]) @ along / step
-    return by_change[:, problem.touching].T, slip
+    return by_change[:, fit.problem.touching].T, slip
 
 
 def _with_moves(still: np.ndarray, moves: np.ndarray) -> np.ndarray:

@@ -7,11 +7,12 @@ import numpy as np
 from scipy.ndimage import correlate1d
 
 from vision.fit.object_rows import object_rows
-from vision.fit.problem import Problem, State, curves_of, point_rows
+from vision.fit.problem import Problem, State, bar_axes, bar_axis, curves_of, point_rows
 from vision.fit.quantities import Jacobians, Measured, jacobians
 from vision.fit.solve import Linear, linearise
 from vision.geometry.camera import N_PARAMETERS
 from vision.geometry.centreline import Curves
+from vision.geometry.touched import Axis
 from vision.wire.points import Observed
 
 # [points] Beyond, nothing is shared: at the highest correlation that `_MOST_ALIKE` allows, 7/9,
@@ -25,6 +26,21 @@ class Solution:
 
     problem: Problem
     state: State
+
+    @cached_property
+    def curves(self) -> Curves:
+        """Return the wire's centrelines in all frames."""
+        return curves_of(self.problem, self.state.vector, self.state.arcs_mm)[0]
+
+    @property
+    def axis(self) -> Axis:
+        """Return the object's axis, from which one that moves is counted."""
+        return bar_axis(self.problem, self.state.vector)
+
+    @property
+    def axes(self) -> Axis:
+        """Return the object's axis (f, 3) in each frame, (1, 3) where it stands."""
+        return bar_axes(self.problem, self.state.vector)
 
     @cached_property
     def linear(self) -> Linear:
@@ -49,9 +65,9 @@ class Solution:
         """Return derivatives (points, 15 cameras) of the line points' residuals by the cameras'
         parameters.
         """
-        curves, _ = curves_of(self.problem, self.state.vector, self.state.arcs_mm)
         seen = self.problem.seen
-        return np.concatenate([_by_camera(self.problem, one, self.state, curves) for one in seen])
+        by_camera = [_by_camera(self.problem, one, self.state, self.curves) for one in seen]
+        return np.concatenate(by_camera)
 
     @cached_property
     def weighted_by_camera(self) -> np.ndarray:

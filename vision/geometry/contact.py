@@ -16,7 +16,7 @@ from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.polyline import normals
 from vision.geometry.rods import Wire
-from vision.geometry.rotation import cross, unit
+from vision.geometry.rotation import across, cross, unit
 from vision.geometry.silhouette import outline
 from vision.geometry.touched import Axis
 
@@ -110,7 +110,7 @@ class BarAxis(Axis):
     def _across(self, vectors: np.ndarray) -> np.ndarray:
         """Return vectors (..., k, 3) without their part along the axis."""
         a = np.asarray(self.direction)[..., None, :]
-        return vectors - np.sum(vectors * a, axis=-1, keepdims=True) * a
+        return across(vectors, a)
 
 
 def contact_frame_angles(direction: np.ndarray, touch_rad: float) -> tuple[float, float]:

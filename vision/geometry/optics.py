@@ -71,10 +71,19 @@ def probable_gammas(cameras: Iterable[Optics]) -> dict[float, float]:
     """
     known = [one.deviance_of_gammas() for one in cameras if np.isfinite(one.log_gamma_sigma)]
     deviance = np.mean(known, axis=0) if known else np.zeros(len(GAMMAS))
+    return probable(GAMMAS, deviance, LEAST_PROBABILITY)
+
+
+def probable(gammas: Iterable[float], deviance: np.ndarray, least: float) -> dict[float, float]:
+    """Return the probability of each transfer curve (n,) that has more than `least`, by its gamma; they
+    add up to 1.
+
+    deviance (n,): minus twice its log likelihood.
+    """
     probabilities = softmax(-0.5 * deviance)
-    kept = np.where(probabilities > LEAST_PROBABILITY, probabilities, 0.0)
+    kept = np.where(probabilities > least, probabilities, 0.0)
     kept = kept / kept.sum()
-    return {gamma: float(share) for gamma, share in zip(GAMMAS, kept) if share > 0.0}
+    return {gamma: float(share) for gamma, share in zip(gammas, kept) if share > 0.0}
 
 
 def known_gamma(cameras: Iterable[Optics]) -> float:

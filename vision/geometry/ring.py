@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from vision.geometry.checks import require, require_length, require_sigma
-from vision.geometry.rotation import unit
+from vision.geometry.rotation import turned_about, unit
 from vision.geometry.rounded import (
     AboutAxis,
     Balls,
@@ -123,7 +123,7 @@ class Ring(Rounded):
             most = min(reach_mm / self.ring_radius_mm, _MOST_TURN_RAD)
         turn = np.linspace(-most, most, stations)[:, None]
         begin = unit(at.spot_foot_mm - point)
-        outward = np.cos(turn) * begin + np.sin(turn) * np.cross(axis, begin)
+        outward = turned_about(axis, begin, turn)
         middle = point + self.ring_radius_mm * outward
         radii = np.full((*middle.shape[:-1], 1), radius_mm)
         return Balls(middle, np.cross(axis, outward), radii, 0.0)
@@ -138,7 +138,7 @@ class Ring(Rounded):
         """Return where rings stand that are touched at spots (n, 3). free (n, 2): tilt and turn."""
         psi, turn = free.T[..., None]
         tangent = np.cos(psi) * along + np.sin(psi) * _X
-        towards = np.cos(turn) * inwards + np.sin(turn) * np.cross(tangent, inwards)
+        towards = turned_about(tangent, inwards, turn)
         point = spot_mm + self.radius_mm * inwards + self.ring_radius_mm * towards
         return RoundedAxis(point, np.cross(tangent, towards), self, spot_mm)
 

@@ -40,6 +40,16 @@ def unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY)
 
 
+def across(vectors: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Return vectors (..., 3) without their part along unit directions (..., 3)."""
+    return vectors - np.sum(vectors * directions, axis=-1, keepdims=True) * directions
+
+
+def turned_about(axis: np.ndarray, begin: np.ndarray, turn_rad: np.ndarray) -> np.ndarray:
+    """Return vectors (..., 3) turned about axes (..., 3) at right angles to them."""
+    return np.cos(turn_rad) * begin + np.sin(turn_rad) * np.cross(axis, begin)
+
+
 def exp_rotation(w: np.ndarray) -> np.ndarray:
     """Return the rotation matrices (..., 3, 3) by the angles |w| about the axes w (..., 3)."""
     w = np.asarray(w, dtype=float)

@@ -9,7 +9,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.polyline import normals
-from vision.geometry.rotation import cross
+from vision.geometry.rotation import across, cross
 
 
 def outline(
@@ -48,8 +48,7 @@ def grazed(
     points = np.atleast_2d(points_mm)
     directions = np.atleast_2d(directions)
     radius = np.asarray(radius_mm)[..., None]
-    sight = points - camera.centre_mm
-    sight = sight - np.sum(sight * directions, axis=-1, keepdims=True) * directions
+    sight = across(points - camera.centre_mm, directions)
     distance = np.linalg.norm(sight, axis=-1, keepdims=True)
     sideways = cross(directions, sight / distance)
     near = points - radius**2 / distance**2 * sight

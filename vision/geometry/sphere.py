@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vision.geometry.rotation import unit
+from vision.geometry.rotation import turned_about, unit
 from vision.geometry.rounded import Balls, Local, Rounded, RoundedAxis
 from vision.geometry.touched import OneDiameter
 
@@ -59,7 +59,7 @@ class Sphere(OneDiameter, Rounded):
         ahead = unit(sight)
         right = unit(np.cross(ahead, _UP + _SKEWED))
         turn = ((np.arange(2 * stations) + 0.5) * np.pi / stations)[:, None]
-        ring = np.cos(turn) * right + np.sin(turn) * np.cross(ahead, right)
+        ring = turned_about(ahead, right, turn)
         cosine = radius_mm / np.linalg.norm(sight, axis=-1, keepdims=True)
         normals = -cosine * ahead + np.sqrt(1.0 - cosine**2) * ring
         normals = normals.reshape(*normals.shape[:-2], 2, stations, 3)

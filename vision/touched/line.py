@@ -14,10 +14,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import softmax
 
 from vision.geometry.contact import BarAxis
-from vision.geometry.optics import LEAST_PROBABILITY, Optics, probable_gammas
+from vision.geometry.optics import LEAST_PROBABILITY, Optics, probable, probable_gammas
 from vision.geometry.rotation import unit
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
@@ -276,10 +275,7 @@ def _probable_gammas(
         bounded = -2.0 * np.logaddexp(-0.5 * excess, -0.5 * _LARGEST_DEVIANCE)
         volume = [one.volume_deviance for one in posteriors.values()]
         total = total + bounded.mean(axis=1) + volume
-    probabilities = softmax(-0.5 * total)
-    kept = np.where(probabilities > least, probabilities, 0.0)
-    kept = kept / kept.sum()
-    return {gamma: float(share) for gamma, share in zip(gammas, kept) if share > 0.0}
+    return probable(gammas, total, least)
 
 
 def _average_posteriors(

@@ -17,7 +17,7 @@ from vision.geometry.centreline import resting_lines, rotation_z
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods, Wire
-from vision.geometry.rotation import unit
+from vision.geometry.rotation import turned_about, unit
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.axis import sight_planes
@@ -72,7 +72,7 @@ def _axes_across_sight(hypotheses: np.ndarray, camera: Camera, motor_rad: float)
     point = camera.centre_mm + (1.0 + farther) * sight
     ahead = unit(sight)
     right = unit(np.cross(ahead, [0.0, 0.0, 1.0]))
-    return BarAxis(point, np.cos(turn) * right + np.sin(turn) * np.cross(right, ahead))
+    return BarAxis(point, turned_about(-ahead, right, turn))
 
 
 def see_bar_alone(

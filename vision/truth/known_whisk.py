@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vision.fit.problem import Problem, State
+from vision.fit.problem import Problem, State, at_rest
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, centrelines
 from vision.geometry.contact import BarAxis
@@ -111,8 +111,7 @@ class KnownWhisk:
     def state(self, problem: Problem) -> State:
         """Return the parameters of a fit to the frames that make the truth."""
         frames = self.frames_to_fit
-        vector = np.zeros(problem.size)
-        vector[problem.blocks.rest_shape.slice] = np.ravel(self.rest_mm)
+        vector = at_rest(problem, self.rest_mm)
         vector[problem.first_bend :] = self.bend_rad[frames][problem.bent].ravel()
         return State(vector, self.arc_mm[frames])
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from vision.fit.covariance import shared_covariance, variance_by_cause
 from vision.fit.line_noise import line_noise
-from vision.fit.problem import bar_axes, bar_axis, bends, curves_of, rest_shape, shifts_mm
+from vision.fit.problem import bends, rest_shape, shifts_mm
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import whole_rest_mm
 from vision.geometry.reasons import Reason, joined
@@ -142,7 +142,7 @@ def _seen_object(touched: Touched, fitted: FittedWhisk) -> SeenObject | None:
 @_seen_object.register
 def _seen_rounded(touched: Rounded, fitted: FittedWhisk) -> SeenObject:
     """Return where an object that is no straight bar is, with its stated sizes."""
-    axis = bar_axis(fitted.problem, fitted.state.vector)
+    axis = fitted.axis
     sizes = touched.sizes
     return SeenObject(
         touched.name,
@@ -169,7 +169,7 @@ def _gave(fitted: FittedWhisk) -> GaveWay:
     It is counted away from the contact and across that.
     """
     touching = fitted.problem.touching
-    axis = bar_axes(fitted.problem, fitted.state.vector)
+    axis = fitted.axes
     direction = axis.direction[0]
     across_bar = np.eye(3) - np.outer(direction, direction)
     normal = unit((axis.point_mm - _contacts_mm(fitted)) @ across_bar)
@@ -367,16 +367,14 @@ def _overlay_in(
 ) -> list[dict[str, np.ndarray]]:
     """Return what `_overlay` draws in one camera, by frame of the fit, in px of the full picture."""
     scale = whisk.settings.picture_scale
-    curves, _ = curves_of(fitted.problem, fitted.state.vector, fitted.state.arcs_mm)
-    axes = bar_axes(fitted.problem, fitted.state.vector)
-    edges_px = _edges_px(axes, camera, whisk.rods.bar.radius_mm)
+    edges_px = _edges_px(fitted.axes, camera, whisk.rods.bar.radius_mm)
     contacts_px = camera.project(_contacts_mm(fitted))
     drawn = []
     for k in range(len(fitted.frames)):
         left, right = edges_px[min(k, len(edges_px) - 1)]
         drawn.append(
             {
-                "wire": full_px(camera.project(curves.points_mm[k]), scale),
+                "wire": full_px(camera.project(fitted.curves.points_mm[k]), scale),
                 "bar_left": full_px(left, scale),
                 "bar_right": full_px(right, scale),
                 "contact": full_px(contacts_px[k], scale),

@@ -6,7 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit.first_bends import SwingPictures, contact_arc, find_rest, follow_bends
-from vision.fit.problem import Problem, State, bar_axis, bends, curves_of, rest_shape, shifts_mm
+from vision.fit.problem import (
+    Problem,
+    State,
+    at_rest,
+    bar_axis,
+    bends,
+    curves_of,
+    rest_shape,
+    shifts_mm,
+)
 from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solution import Solution
 from vision.fit.solve import LAST_SCALE, solve
@@ -284,9 +293,7 @@ def fit_before_touch(
         seen=seen,
     )
     middle_mm = np.full(len(nothing), 0.5 * whisk.rods.wire.length_mm)
-    vector = np.zeros(problem.size)
-    vector[problem.blocks.rest_shape.slice] = np.ravel(rest_mm)
-    state, _ = solve(problem, State(vector, middle_mm))
+    state, _ = solve(problem, State(at_rest(problem, rest_mm), middle_mm))
     check_scatter(problem, state, lines.most_scatter_px)
     return bar_axis(problem, state.vector).upward(), rest_shape(problem, state.vector)
 
@@ -320,8 +327,7 @@ def _fitted_place(whisk: WhiskPictures, problem: Problem, state: State) -> Whisk
 
 def _begin(problem: Problem, expected: ExpectedWhisk) -> State:
     """Return the state that is expected, the object where the problem counts it from."""
-    vector = np.zeros(problem.size)
-    vector[problem.blocks.rest_shape.slice] = np.ravel(expected.rest_mm)
+    vector = at_rest(problem, expected.rest_mm)
     if problem.motion is not None and problem.motion.from_touch:
         vector[problem.blocks.motion.slice] = problem.motion.values(expected.place.came_mm)
     vector[problem.first_bend :] = expected.bend_rad[problem.bent].ravel()

@@ -11,7 +11,7 @@ from vision.fit.blocks import BAR_PRIOR
 from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
-from vision.fit.problem import Problem, State, curves_of, shifts_mm
+from vision.fit.problem import Problem, State, shifts_mm
 from vision.fit.solution import Solution
 from vision.fit.touch import first_touch
 from vision.geometry.camera import Cameras
@@ -207,8 +207,7 @@ class FittedWhisk(Solution):
 
     def some_curves(self, count: int) -> dict[int, Curves]:
         """Return the centrelines of so many frames spread over the whisk, by frame."""
-        curves, _ = curves_of(self.problem, self.state.vector, self.state.arcs_mm)
-        return {self.frames[k]: curves.one(k) for k in spread(range(len(self.frames)), count)}
+        return {self.frames[k]: self.curves.one(k) for k in spread(range(len(self.frames)), count)}
 
     def of_whisk(self, name: str) -> Value:
         """Return a quantity of the whole whisk by its name."""

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from vision.fit.problem import bar_axis
 from vision.truth.line_source import WhiskPlace
 from vision.truth.traced_lines import clear_pieces, wire_knots
 from vision.truth.value import Value
@@ -21,8 +20,7 @@ def wire_widths(whisk: WhiskPictures, fitted: FittedWhisk) -> dict[str, Value]:
     left out.
     """
     some = fitted.some_curves(_FRAMES)
-    axis = bar_axis(fitted.problem, fitted.state.vector)
-    place = WhiskPlace(axis, some, whisk.bar_swept_mm)
+    place = WhiskPlace(fitted.axis, some, whisk.bar_swept_mm)
     knots = wire_knots(whisk.during(list(some)))
     widths = {}
     for view in whisk.views:

@@ -258,6 +258,10 @@ class Pieces(Rows):
         names = ("offset_px", "grey", "background", "slope", "curvature", "weight")
         return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
 
+    def thinned(self, most: int) -> "Pieces":
+        """Return every so-and-so-many-th segment, so that they are `most` or fewer."""
+        return self.select(slice(None, None, 1 + len(self) // most))
+
     def show_rod(self, margin_px: float) -> np.ndarray:
         """Return which segments (s,) lack no pixel of the expected rod, nor within a margin of it."""
         needed = np.abs(self.offset_px) <= self.radius_px[:, None] + margin_px

@@ -40,7 +40,7 @@ def log_width_of(pieces: Pieces, blur_px: float) -> float:
     The segments lie where the object was found, and are wide enough to show what is behind an object
     half as thick again. Its light changes linearly from the first to the last.
     """
-    some = pieces.select(slice(None, None, 1 + len(pieces) // _MOST_SEGMENTS))
+    some = pieces.thinned(_MOST_SEGMENTS)
     widest = replace(some, radius_px=some.radius_px * np.exp(_LOG_WIDTHS[-1]))
     noise = noise_beside(widest, blur_px)
     blurs_px = blur_px * np.exp(_LOG_BLURS)

@@ -42,7 +42,7 @@ def log_width(pieces: Pieces, blur_px: float, knots: Knots) -> tuple[float, floa
     The given width is not refined where it is the most probable of a coarse grid. None where the
     most probable is half or nearly twice as thick: that is another thing, or a shadow along the rod.
     """
-    some = pieces.select(slice(None, None, 1 + len(pieces) // _MOST_SEGMENTS))
+    some = pieces.thinned(_MOST_SEGMENTS)
     averaged, _ = binned(some, BIN_PX)
     task = ShadedSegments(averaged, WIRE_WAVES, knots, blur_px).tempered()
     coarse = _evidences_of_widths(task, _LOG_WIDTHS, np.zeros(1), NO_CHANCE)

@@ -168,7 +168,7 @@ def trace(
     last: this is the last pass. Averaged pixels serve for all but the last step of the last pass.
     """
     if not last:
-        pieces = pieces.select(slice(None, None, 1 + len(pieces) // _FIRST_SEGMENTS))
+        pieces = pieces.thinned(_FIRST_SEGMENTS)
     averaged, variance_px2 = binned(pieces, BIN_PX)
     blur_px, blur_sigma = optics.blur_with(_BLUR_PX, BLUR_SIGMA)
     prior_px = float(np.hypot(blur_px, np.sqrt(variance_px2)))
