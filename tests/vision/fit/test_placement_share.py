@@ -89,6 +89,25 @@ def test_the_budget_tells_rig_board_from_lenses(loose):
     assert 0.05 < np.sqrt(told["placement"]) < 0.3
 
 
+def test_a_rig_frame_that_is_elsewhere_moves_the_fit_as_its_derivatives_say(loose):
+    """Slip hardly moves, since all cameras move together: what cancels must be of one state. With an inverse of the
+    step before, slip moved by 0.003 to 0.004 mm."""
+    scene = scene_of(0.1)
+    rng = np.random.default_rng(2)
+    problem = as_problem(scene, loose, *given(scene, rng), line_points(scene, rng))
+    fit = Solution(problem, solve(problem, begin(problem), scales=SCALES)[0])
+    last = fit.last_frame
+    for k in (1, 4):  # a turn, a shift
+        off = np.sqrt(loose.placement[k, k]) * loose.by_placement[:, k]
+        moved = replace(problem, cameras=loose.moved(off))
+        again = Solution(moved, solve(moved, fit.state, scales=SCALES)[0]).measured
+        step = fit.parameters_by_camera @ off
+        slip = again.frame["slip"][last] - fit.measured.frame["slip"][last]
+        assert fit.by_parameter.frame["slip"][last] @ step == pytest.approx(slip, abs=5e-5)
+        d_x = again.whisk["d_x"] - fit.measured.whisk["d_x"]
+        assert fit.by_parameter.whisk["d_x"] @ step == pytest.approx(d_x, abs=3e-4)
+
+
 def test_what_whisks_share_is_diameters_light_cameras_and_placement(loose):
     """The causes of the budget add up to it, for d_x and for the contact; a rig board known to 0.1 mm shifts the
     contact by as much, which all whisks have in common."""
