@@ -23,12 +23,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from vision.geometry.optics import UNKNOWN, Optics
-from vision.geometry.robust import mean_and_sigma
 from vision.geometry.sampling import grid_points
 from vision.touched.evidence import Evidence, LitRod, compute_evidence
 from vision.touched.pieces import ARM_MM
 from vision.touched.profiles import STEP_PX, Profiles, compute_profiles
 from vision.wire.bands import Pieces
+from vision.wire.rod_width import mean_and_sigma_between
 
 # [segments] Of the bar, each with its own light: two for a line, four left over to show one that
 # shows something else. Study: thresholds.py touched.posterior SEGMENTS ….
@@ -241,9 +241,7 @@ def estimate_log_width(pieces: Pieces) -> tuple[float, float]:
         deviance = _evaluate_widths(pieces, log_widths)
         if 0 < np.argmin(deviance) < len(log_widths) - 1:
             break
-    fine = np.linspace(log_widths[0], log_widths[-1], 10 * len(log_widths))
-    fine_deviance = CubicSpline(log_widths, deviance)(fine)
-    return mean_and_sigma(fine, np.exp(-0.5 * (fine_deviance - deviance.min())))
+    return mean_and_sigma_between(log_widths, deviance)
 
 
 def _evaluate_widths(pieces: Pieces, log_widths: np.ndarray) -> np.ndarray:

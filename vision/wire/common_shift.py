@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
+from scipy.interpolate import CubicSpline, RectBivariateSpline
 from scipy.linalg.lapack import dtrtri
 
 from vision.wire.bands import Pieces
@@ -96,6 +96,25 @@ def common_shift(task: ShadedSegments, robust: np.ndarray, blur_px: float) -> Co
     mean_px = float(of_shift @ shift)
     variance_px2 = float(of_shift @ (shift - mean_px) ** 2)
     return CommonShift(mean_px, variance_px2**0.5, float(probability.sum(axis=0) @ log_blur))
+
+
+def best_evidences(
+    task: ShadedSegments,
+    shifts_px: np.ndarray,
+    blurs_px: np.ndarray,
+    *,
+    wider: Sequence[float] = (1.0,),
+    no_chance: float = np.inf,
+) -> np.ndarray:
+    """Return minus twice the log evidence (w,) of widths, at the best common shift and blur of each.
+
+    Arguments as of `evidences_of`; here the prior of the blur is counted.
+    """
+    every = np.ones(len(task.pieces))
+    evidences = evidences_of(task, every, shifts_px, blurs_px, wider=wider, no_chance=no_chance)
+    evidences += task.blur_deviation(np.log(blurs_px)) ** 2
+    fine = np.linspace(shifts_px[0], shifts_px[-1], _FINE)
+    return np.min(CubicSpline(shifts_px, evidences, axis=1)(fine), axis=(1, 2))
 
 
 def evidences_of(

@@ -8,13 +8,12 @@ light from one side leaves open which it is.
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from vision.pictures.pixel_noise import Noise
 from vision.wire.bands import Pieces
 from vision.wire.binned import binned
-from vision.wire.common_shift import EVIDENCE_COUNTS, NO_CHANCE, evidences_of
-from vision.wire.rod_width import mean_and_sigma_between
+from vision.wire.common_shift import NO_CHANCE, best_evidences
+from vision.wire.rod_width import weigh_widths
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import Knots
 from vision.wire.strip import noise_beside, with_background
@@ -30,8 +29,6 @@ _SHIFTS_PX = np.linspace(-1.2, 1.2, 5)
 _LOG_BLURS = np.array([-0.4, 0.0, 0.4])
 # [segments] By which the width of a part of the line is found. Set by eye. Study: real_wires.py.
 _MOST_SEGMENTS = 16
-# [nodes] Of the spline through common shifts. Derived.
-_FINE = 301
 
 
 def log_width_of(pieces: Pieces, blur_px: float) -> float:
@@ -48,10 +45,7 @@ def log_width_of(pieces: Pieces, blur_px: float) -> float:
     best = float(_LOG_WIDTHS[np.argmin(coarse)])
     logs = best + _NEAR
     evidences = _evidences(some, logs, noise, blurs_px)
-    pixels = max(int(np.sum(some.weight > 0)), 1)
-    misfit = max(1.0, evidences.min() / pixels)
-    mean, _ = mean_and_sigma_between(logs, EVIDENCE_COUNTS / misfit * (evidences - evidences.min()))
-    return mean
+    return weigh_widths(logs, evidences, some)[0]
 
 
 def _evidences(pieces: Pieces, logs: np.ndarray, noise: Noise, blurs_px: np.ndarray) -> np.ndarray:
@@ -71,9 +65,4 @@ def _evidence(pieces: Pieces, blurs_px: np.ndarray) -> float:
     averaged, _ = binned(pieces, BIN_PX)
     knots = Knots(pieces.place[[0, -1]])
     task = ShadedSegments(averaged, WIRE_WAVES, knots, float(np.median(blurs_px))).tempered()
-    evidences = evidences_of(task, np.ones(len(pieces)), _SHIFTS_PX, blurs_px, no_chance=NO_CHANCE)[
-        0
-    ]
-    evidences = evidences + task.blur_deviation(np.log(blurs_px)) ** 2
-    fine = np.linspace(_SHIFTS_PX[0], _SHIFTS_PX[-1], _FINE)
-    return float(np.min(CubicSpline(_SHIFTS_PX, evidences)(fine)))
+    return float(best_evidences(task, _SHIFTS_PX, blurs_px, no_chance=NO_CHANCE)[0])

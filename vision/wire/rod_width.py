@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from vision.geometry.robust import mean_and_sigma
 from vision.wire.bands import Pieces
 from vision.wire.binned import binned
-from vision.wire.common_shift import EVIDENCE_COUNTS, NO_CHANCE, evidences_of
+from vision.wire.common_shift import EVIDENCE_COUNTS, NO_CHANCE, best_evidences
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import Knots
 from vision.wire.trace import BIN_PX, WIRE_WAVES
@@ -45,15 +45,27 @@ def log_width(pieces: Pieces, blur_px: float, knots: Knots) -> tuple[float, floa
     some = pieces.thinned(_MOST_SEGMENTS)
     averaged, _ = binned(some, BIN_PX)
     task = ShadedSegments(averaged, WIRE_WAVES, knots, blur_px).tempered()
-    coarse = _evidences_of_widths(task, _LOG_WIDTHS, np.zeros(1), NO_CHANCE)
+    blurs_px = task.blur_px * np.exp(_LOG_BLURS)
+    coarse = best_evidences(
+        task, _SHIFTS_PX, blurs_px[1:2], wider=np.exp(_LOG_WIDTHS), no_chance=NO_CHANCE
+    )
     best = float(_LOG_WIDTHS[np.argmin(coarse)])
     if best in _LOG_WIDTHS[[0, -1]]:
         return None
     if best == 0.0:
         return 0.0, 0.5 * _STEP
     logs = best + _NEAR
-    evidences = _evidences_of_widths(task, logs, _LOG_BLURS, np.inf)
-    misfit = max(1.0, evidences.min() / max(int(np.sum(task.pieces.weight > 0)), 1))
+    evidences = best_evidences(task, _SHIFTS_PX, blurs_px, wider=np.exp(logs))
+    return weigh_widths(logs, evidences, task.pieces)
+
+
+def weigh_widths(logs: np.ndarray, evidences: np.ndarray, pieces: Pieces) -> tuple[float, float]:
+    """Return mean and sigma of the logarithm of a width, by the evidences (w,) of some (w,).
+
+    What no width explains of the segments' pixels is counted as noise.
+    """
+    pixels = max(int(np.sum(pieces.weight > 0)), 1)
+    misfit = max(1.0, evidences.min() / pixels)
     return mean_and_sigma_between(logs, EVIDENCE_COUNTS / misfit * (evidences - evidences.min()))
 
 
@@ -64,21 +76,3 @@ def mean_and_sigma_between(places: np.ndarray, evidences: np.ndarray) -> tuple[f
     fine = np.linspace(places[0], places[-1], _FINE)
     values = CubicSpline(places, evidences)(fine)
     return mean_and_sigma(fine, np.exp(-0.5 * (values - values.min())))
-
-
-def _evidences_of_widths(
-    task: ShadedSegments, logs: np.ndarray, log_blurs: np.ndarray, no_chance: float
-) -> np.ndarray:
-    """Return minus twice the log evidence (w,) of widths, at the best common shift and blur of
-    each.
-
-    logs (w,): logarithms of widths. log_blurs (b,): of blurs over the expected one.
-    """
-    every = np.ones(len(task.pieces))
-    blurs_px = task.blur_px * np.exp(log_blurs)
-    evidences = evidences_of(
-        task, every, _SHIFTS_PX, blurs_px, wider=np.exp(logs), no_chance=no_chance
-    )
-    evidences += (log_blurs / task.blur_sigma) ** 2
-    fine = np.linspace(_SHIFTS_PX[0], _SHIFTS_PX[-1], _FINE)
-    return np.min(CubicSpline(_SHIFTS_PX, evidences, axis=1)(fine), axis=(1, 2))
