@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri
 
-from vision.calibration.place import FALSE_ALARM, Placement
+from vision.calibration.place import FALSE_ALARM, Placement, gain_of
 
 
 def with_distance(
@@ -24,21 +24,23 @@ def with_distance(
     from_centre_mm = contact_mm - placement.step[3:]
     seen_mm = float(np.linalg.norm(from_centre_mm))
     by_step = np.append(np.zeros(3), -from_centre_mm / seen_mm)  # of the distance
-    spread = placement.covariance @ by_step
-    variance = float(by_step @ spread) + sigma_mm**2
-    gain = spread / variance
-    farther_mm = distance_mm - seen_mm
-    kept = np.eye(6) - np.outer(gain, by_step)
-    alarm = placement.alarm
-    if alarm is None and farther_mm**2 / variance > chdtri(1, FALSE_ALARM):
-        alarm = (
-            f"{placement.source} and a stated distance disagree: d_x is stated as {distance_mm:g} mm, and seen as "
-            f"{seen_mm:.2f} ± {np.sqrt(variance):.2f} mm; check d_x_mm, which goes from the base to the contact, and square_mm"
-        )
+    gain, covariance = gain_of(placement.covariance, by_step[None], np.array([[sigma_mm**2]]))
+    kept = np.eye(6) - gain @ by_step[None]
+    variance = float(by_step @ placement.covariance @ by_step) + sigma_mm**2
     return replace(
         placement,
-        step=placement.step + gain * farther_mm,
-        covariance=kept @ placement.covariance @ kept.T + sigma_mm**2 * np.outer(gain, gain),
+        step=placement.step + gain[:, 0] * (distance_mm - seen_mm),
+        covariance=covariance,
         shared=None if placement.shared is None else kept @ placement.shared @ kept.T,
-        alarm=alarm,
+        alarm=placement.alarm or _alarm(placement.source, distance_mm, seen_mm, variance),
+    )
+
+
+def _alarm(source: str, stated_mm: float, seen_mm: float, variance_mm2: float) -> str | None:
+    """Return how a stated distance and the one that is seen disagree; None where chance explains it."""
+    if (stated_mm - seen_mm) ** 2 / variance_mm2 <= chdtri(1, FALSE_ALARM):
+        return None
+    return (
+        f"{source} and a stated distance disagree: d_x is stated as {stated_mm:g} mm, and seen as "
+        f"{seen_mm:.2f} ± {np.sqrt(variance_mm2):.2f} mm; check d_x_mm, which goes from the base to the contact, and square_mm"
     )

@@ -278,18 +278,24 @@ def common_modes(board: Board, seen: np.ndarray) -> np.ndarray:
     modes = []
     for face in faces:
         points = np.flatnonzero(is_seen & (board.face_of == face))
-        if len(points) < _FEWEST_POINTS:
-            continue
-        away = board.corners_mm[points] - board.corners_mm[points].mean(axis=0)
-        shifts = np.broadcast_to(np.eye(3), (len(points), 3, 3))
-        motions = np.zeros((*board.corners_mm.shape, N_VIEW))
-        motions[points] = np.concatenate([shifts, -skew(away)], axis=2)
-        modes.append(motions)
+        if len(points) >= _FEWEST_POINTS:
+            modes.append(_motions(board, points))
     if len(faces) == 1:
         by_size = board.printed(board.stated_terms)[1][:, :, _SIZES]
         modes.append(is_seen[:, None, None] * by_size)
     columns = np.concatenate(modes, axis=2).reshape(board.corners_mm.size, -1)
     return np.linalg.qr(columns)[0]
+
+
+def _motions(board: Board, points: np.ndarray) -> np.ndarray:
+    """Return how the board's points (m, 3, 6) change as some of them move as one: shifts, then turns
+    about their middle.
+    """
+    away = board.corners_mm[points] - board.corners_mm[points].mean(axis=0)
+    shifts = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+    motions = np.zeros((*board.corners_mm.shape, N_VIEW))
+    motions[points] = np.concatenate([shifts, -skew(away)], axis=2)
+    return motions
 
 
 def _with_priors(

@@ -165,6 +165,21 @@ def by_board(
     return Placement(np.zeros(6), lever @ np.diag(variances) @ lever.T, scale=scale)
 
 
+def gain_of(
+    covariance: np.ndarray, by_step: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return by how much (6, k) a step follows what is observed besides, and the covariance (6, 6) that
+    is left.
+
+    covariance (6, 6): of the step before. by_step (k, 6): derivatives of what is observed, with the
+    covariance noise (k, k).
+    """
+    spread = by_step @ covariance
+    gain = np.linalg.solve(spread @ by_step.T + noise, spread).T
+    kept = np.eye(6) - gain @ by_step
+    return gain, kept @ covariance @ kept.T + gain @ noise @ gain.T
+
+
 def combine(board: Placement, swing: Placement) -> Placement:
     """Combine two placements by their covariances; with an alarm where they disagree by more than
     chance allows.
@@ -174,8 +189,7 @@ def combine(board: Placement, swing: Placement) -> Placement:
     """
     difference = swing.step - board.step
     Sigma = board.covariance + swing.covariance  # covariance of the difference
-    gain = np.linalg.solve(Sigma, board.covariance).T
-    covariance = board.covariance - gain @ board.covariance
+    gain, covariance = gain_of(board.covariance, np.eye(6), swing.covariance)
     chi2 = float(difference @ np.linalg.solve(Sigma, difference))
     scale = _seen_scale(difference, Sigma, board.scale, chi2)
     is_scale = scale is not None and scale.is_why
@@ -187,7 +201,7 @@ def combine(board: Placement, swing: Placement) -> Placement:
     combined = replace(
         swing,
         step=board.step + gain @ difference,
-        covariance=0.5 * (covariance + covariance.T),
+        covariance=covariance,
         shared=None if swing.shared is None else gain @ swing.shared @ gain.T,
         alarm=alarm,
         turn_share=turn_share,

@@ -21,9 +21,16 @@ def distort(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
     """Return normalised picture coordinates (n, 2) as the lens distorts them, (n, 2)."""
     _, _, p1, p2, _ = distortion
     a, b = ab.T
-    r2 = a * a + b * b
-    scale = _radial(r2, distortion) + 2.0 * (p1 * b + p2 * a)
+    r2, scale = _scale(ab, distortion)
     return _as_rows(scale * a + r2 * p2, scale * b + r2 * p1)
+
+
+def _scale(ab: np.ndarray, distortion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return r² (n,), and by what (n,) coordinates (n, 2) are multiplied."""
+    _, _, p1, p2, _ = distortion
+    a, b = ab.T
+    r2 = a * a + b * b
+    return r2, _radial(r2, distortion) + 2.0 * (p1 * b + p2 * a)
 
 
 def distort_jacobian(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
@@ -31,9 +38,7 @@ def distort_jacobian(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
     potential.
     """
     k1, k2, p1, p2, k3 = distortion
-    a, b = ab.T
-    r2 = a * a + b * b
-    scale = _radial(r2, distortion) + 2.0 * (p1 * b + p2 * a)
+    r2, scale = _scale(ab, distortion)
     slope = k1 + r2 * (2 * k2 + 3 * r2 * k3)  # d radial / d r²
     half = (slope[:, None] * ab + [2 * p2, 2 * p1])[:, :, None] * ab[:, None]  # (n, 2, 2)
     return scale[:, None, None] * np.eye(2) + half + np.swapaxes(half, 1, 2)

@@ -202,22 +202,11 @@ def _unexplained(pieces: Pieces, background: np.ndarray, variance_share: float) 
     weight = pieces.weight
     behind = background * weight
     grey = pieces.grey * weight
-    # normal equations of gain and offset, two unknowns a segment
-    gains = _sums_of_products(behind, behind) + _WEAK
-    mixed = _sums_of_products(behind, weight)
-    offsets = _sums_of_products(weight, weight) + _WEAK
-    gain_right = _sums_of_products(behind, grey)
-    offset_right = _sums_of_products(weight, grey)
-    determinant = gains * offsets - mixed**2
-    gain = (offsets * gain_right - mixed * offset_right) / determinant
-    offset = (gains * offset_right - mixed * gain_right) / determinant
+    design = np.stack([behind, weight], axis=1)  # (s, 2, p)
+    normal = design @ np.swapaxes(design, 1, 2) + _WEAK * np.eye(2)
+    gain, offset = np.linalg.solve(normal, design @ grey[:, :, None])[:, :, 0].T
     is_plain = np.abs(gain - 1.0) < _PLAIN_GAIN
     gain = np.where(is_plain, gain, 1.0)[:, None]
     offset = np.where(is_plain, offset, 0.0)[:, None]
     residual = grey - gain * behind - offset * weight
     return residual / np.sqrt(1.0 + variance_share * gain**2)
-
-
-def _sums_of_products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the sums (s,) over the pixels of each segment of the products of values (s, p)."""
-    return np.einsum("sp,sp->s", one, other)
