@@ -1,4 +1,4 @@
-"""Boards that look the same after a turn: their points named alike in all cameras.
+"""Boards that are the same after a turn: their points named alike in all cameras.
 
 Each camera names the points from the upper left of its own picture. Where cameras saw the board at
 once, their place relative to each other is the same in all views with the right names, and another

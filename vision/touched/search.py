@@ -105,7 +105,7 @@ def find_object_again(scene: SearchScene, axis: Axis) -> SeenBar:
 def with_lines(scene: SearchScene, bar: SeenBar) -> SeenBar:
     """Return a straight bar with its lines about its axis, where that is from elsewhere than the search.
 
-    A camera that looks along the axis, or has it behind it, ends this: the bar stays as it is.
+    A camera that sees the axis end on, or has it behind it, ends this: the bar stays as it is.
     """
     if not bar.lines and isinstance(bar.axis, BarAxis) and isinstance(scene.rods.bar, Bar):
         with suppress(Refused):

@@ -142,7 +142,7 @@ def _resting_points(
     motor_rad: Mapping[int, float],
     rest_mm: np.ndarray,
 ) -> list[Observed]:
-    """Return coarse points of all traces beside a wire of a rest shape."""
+    """Return coarse points of all traces near a wire of a rest shape."""
     curves = unbent_curves(rest_mm, motor_rad, rods.wire)
     seen: list[Observed] = []
     for number, camera in enumerate(cameras):

@@ -114,7 +114,7 @@ class _Line:
     def is_strip(self) -> bool:
         """Return whether the silhouette is longer than it may be shifted.
 
-        Where a camera looks along the bar it is shorter, and changes that end beside it count as much as
+        Where a camera sees the bar end on it is shorter, and changes that end near it count as much as
         those that follow it.
         """
         length_px = np.linalg.norm(self.foot_px[-1] - self.foot_px[0])

@@ -133,7 +133,7 @@ def closest_lines(beside: BesideWire) -> BesideWire:
 
 def distances_px(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> np.ndarray:
     """Return for each of the frames with a trace, (n,), the median distance of its points from the
-    wire, of the line with the least; infinite where none has a point beside the wire.
+    wire, of the line with the least; infinite where none has a point near the wire.
     """
     closest = closest_lines(beside_wire(trace, camera, curves))
     found = []
