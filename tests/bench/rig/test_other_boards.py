@@ -21,9 +21,14 @@ KINDS = {
 
 
 def protocol_of(kind):
-    """The protocol quick with this kind of board."""
+    """The first camera of the protocol quick, at half its resolution, with this kind of board."""
     board = msgspec.structs.replace(QUICK.board, kind=kind, **KINDS[kind])
-    return msgspec.structs.replace(QUICK, board=board)
+    camera = QUICK.cameras[0]
+    width, height = camera.size_px
+    half = msgspec.structs.replace(
+        camera, size_px=(width // 2, height // 2), focal_px=camera.focal_px / 2, centre_px=None
+    )
+    return msgspec.structs.replace(QUICK, board=board, cameras=[half])
 
 
 def errors_px(board, camera, T_rig_board, picture):

@@ -36,6 +36,7 @@ from tests.studies.accuracy.renderer import (
 )
 
 QUICK = load("quick")
+SHARP_AND_SOFT = (min(BLURS_PX), max(BLURS_PX))
 
 
 def studio(camera, blur_px=0.9, protocol=QUICK):
@@ -43,7 +44,7 @@ def studio(camera, blur_px=0.9, protocol=QUICK):
 
 
 @pytest.mark.parametrize("bent", [False, True])
-@pytest.mark.parametrize("width_px, blur_px", list(itertools.product(WIDTHS_PX, BLURS_PX)))
+@pytest.mark.parametrize("width_px, blur_px", list(itertools.product(WIDTHS_PX, SHARP_AND_SOFT)))
 def test_wire_is_where_projection_says(width_px, blur_px, bent):
     """Allowed: bias 0.005 px, of each orientation too; RMS 0.01 px."""
     seen, centreline = wire_errors_px(width_px, blur_px, bent)
@@ -114,7 +115,7 @@ def test_drawing_finer_changes_nothing(off_px, largest, whole):
     assert difference.sum(0).max() < whole
 
 
-@pytest.mark.parametrize("blur_px", BLURS_PX)
+@pytest.mark.parametrize("blur_px", SHARP_AND_SOFT)
 def test_board_corners_are_where_projection_says(blur_px):
     """Allowed: bias 0.005 px, RMS 0.01 px; in the rig's picture (fine samples) and in held views (edges at once)."""
     pictures = corner_errors_px(blur_px)
