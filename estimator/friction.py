@@ -179,19 +179,24 @@ def _least_squares(beta, data, scale):
     order = np.argsort(np.abs(beta))
     beta = beta[order]
     data = data.reshape(*data.shape[:-1], 2, len(beta))[..., order]
-    squares, cross, curvature = _parabolas(beta, data, scale[order])
     bounds = np.concatenate([[0.0], np.abs(beta)])  # of the segments, rad
     tangents = np.where(bounds < np.pi / 2, np.tan(bounds), np.inf)
-    low = tangents[:-1]
-    high = tangents[1:]
+    best, mu = _lowest(_parabolas(beta, data, scale[order]), tangents[:-1], tangents[1:])
+    # At a bound α is that slope itself: whether its point slips is then no matter of rounding.
+    alpha = np.where(mu >= tangents[best + 1], bounds[best + 1], np.arctan(mu))
+    return np.where(mu <= tangents[best], bounds[best], alpha)
+
+
+def _lowest(parabolas, low, high):
+    """Find the segment (...), and μ (...) in it, of the least sum of squares.
+
+    parabolas: of `_parabolas`. low, high (n,): bounds of the segments.
+    """
+    squares, cross, curvature = parabolas
     vertex = np.divide(cross, curvature, out=low + np.zeros(cross.shape), where=curvature > 0)
     mu = np.clip(vertex, low, high)
-    cost = squares - 2 * mu * cross + mu**2 * curvature
-    best = np.argmin(cost, axis=-1)
-    least = np.take_along_axis(mu, best[..., None], axis=-1)[..., 0]
-    # At a bound α is that slope itself: whether its point slips is then no matter of rounding.
-    alpha = np.where(least >= high[best], bounds[best + 1], np.arctan(least))
-    return np.where(least <= low[best], bounds[best], alpha)
+    best = np.argmin(squares - 2 * mu * cross + mu**2 * curvature, axis=-1)
+    return best, np.take_along_axis(mu, best[..., None], axis=-1)[..., 0]
 
 
 def _parabolas(beta, data, scale):
