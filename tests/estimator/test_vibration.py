@@ -17,9 +17,9 @@ from estimator.vibration import (
     ringing,
     shares_of_ratio,
     vibration,
-    without_ringing,
 )
 from estimator.whisk import EstimatorSettings, Whisk
+from tests.scenes.without_ringing import without_ringing
 
 BEAM = Beam.from_modulus(60.0, 1.0, 100.0)
 SETTINGS = EstimatorSettings(np.radians(10.0))

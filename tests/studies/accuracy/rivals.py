@@ -5,7 +5,7 @@
     python tests/studies/accuracy/rivals.py --curved [--count 6] [--seed 0]
 
 Each contact is pushed at 90°/s by the exact mechanics of the rig, with ringing, noise, hum and a load cell; its
-ringing is taken out (`estimator.vibration.without_ringing`) before any but the vibration is read. Drawn anew are its
+ringing is taken out (`tests/scenes/without_ringing.py`) before any but the vibration is read. Drawn anew are its
 distance (30 to 80 mm) and the lean of the bar (N(0, 5°)); the bar is 6 mm thick, θ is 3°, α_est = 10 ± 4°. By friction
 angle and slope (the figure has five of them): RMS error and stated sigma (RMS) of d_x in % of the truth, and over all
 contacts how often the 95 % interval holds, and error over sigma. Reorientation turns the plane of rotation until the
@@ -42,8 +42,9 @@ from estimator.longitudinal import compliance_with_rolling
 from estimator.reorientation import next_turn_rad, reoriented
 from estimator.sensors import SENSORS
 from estimator.uncertainty import Z_95
-from estimator.vibration import vibration, without_ringing
+from estimator.vibration import vibration
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
+from tests.scenes.without_ringing import without_ringing
 from tests.studies.accuracy.sensors import felt_whisk, recorded_stroke
 
 ALPHAS_DEG = (3.0, 10.0, 20.0)
