@@ -7,9 +7,8 @@ import numpy as np
 from bench.rig.elastic_rod import Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import moments_Nmm
-from bench.rig.stick_slip import FrictionCoefficients, March
 from estimator.beam import Beam
-from tests.scenes.marches import touched_bar
+from tests.scenes.marches import whisk
 
 E_GPA, LENGTH_MM = 60.0, 100.0
 
@@ -41,17 +40,18 @@ def pushed(
     theta_deg: float = 3.0,
 ) -> Push:
     """A straight whisker pushed against a bar. Raises ArithmeticError where it finds no hold."""
-    rod = Rod(
-        shape, LENGTH_MM, 1.0, E_GPA, **({"tip_diameter_mm": 0.4} if shape == "tapered" else {})
+    tip = {"tip_diameter_mm": 0.4} if shape == "tapered" else {}
+    _, touch, states = whisk(
+        theta_deg * np.arange(1, 7) / 6,
+        rod=Rod(shape, LENGTH_MM, 1.0, E_GPA, **tip),
+        d_x=d_x_mm,
+        beta=beta_deg,
+        psi=psi_deg,
+        mu=np.tan(np.radians(alpha_deg)),
+        radius=radius_mm,
     )
-    beta, psi, theta, mu = (
-        *np.radians([beta_deg, psi_deg, theta_deg]),
-        np.tan(np.radians(alpha_deg)),
-    )
-    bar, touch = touched_bar(rod, d_x_mm, beta_rad=beta, psi_rad=psi, radius_mm=radius_mm)
-    march = March(rod, bar, FrictionCoefficients(mu, mu), touch)
-    *_, state = march.along(touch.motor_rad + theta * np.arange(1, 7) / 6)[1]
+    state = states[-1]
     if state is None:
         raise ArithmeticError("no contact")
     point = rotate_about_z(state.point_mm, -state.motor_rad)
-    return Push(theta, touch.d_x_mm, moments_Nmm(state), -state.force_hub_N, point)
+    return Push(np.radians(theta_deg), touch.d_x_mm, moments_Nmm(state), -state.force_hub_N, point)
