@@ -10,6 +10,7 @@ All is solved in the rod's own units: lengths in the chord c from the clamp to t
 EI/c², with EI at the clamp.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -194,8 +195,7 @@ class CurvedRods:
         turn, way = self._turn_and_way(arc, chord, force)
         to_hub = np.swapaxes(turn, -1, -2)
         tangent = self.rest.tangent(arc * chord)
-        in_hub = [np.einsum("...ij,...j->...i", to_hub, own) for own in (way, force, tangent)]
-        return _Marched(*in_hub)
+        return _Marched(_product(to_hub, way), _product(to_hub, force), _product(to_hub, tangent))
 
     def _force_on_end(
         self, unknowns: np.ndarray, friction: np.ndarray, chord: np.ndarray
@@ -215,25 +215,30 @@ class CurvedRods:
         """
         from scipy.integrate import solve_ivp  # it takes longer than reading a session
 
-        lead = arc.shape
+        rods = arc.shape
 
-        def change(left, state):
-            """Return the change of turns and ways by the share of the arc that lies behind, 0 to 1."""
-            turn, way = _unpacked(state, lead)
-            at_mm = (1.0 - left) * arc * chord
-            tangent = (turn @ self.rest.tangent(at_mm)[..., None])[..., 0]
-            moment = (_cross_matrices(way) @ force[..., None])[..., 0]
-            turned = _cross_matrices(self._bend(arc, at_mm, tangent, moment)) @ turn
-            return np.concatenate([-turned.ravel(), (arc[..., None] * tangent).ravel()])
+        def rate(share, state):
+            """Return the derivatives of turns and ways by the share of the arc that lies behind, 0 to 1."""
+            turn, way = _turns_and_ways(state, rods)
+            at_mm = (1.0 - share) * arc * chord
+            tangent = _product(turn, self.rest.tangent(at_mm))
+            moment = np.cross(way, force)
+            bend = self._bend(arc, at_mm, tangent, moment)
+            return _state(-_cross_matrices(bend) @ turn, arc[..., None] * tangent)
 
-        begin = np.concatenate(
-            [np.broadcast_to(np.eye(3), (*lead, 3, 3)).ravel(), np.zeros(force.size)]
+        not_turned = np.broadcast_to(np.eye(3), (*rods, 3, 3))
+        marched = solve_ivp(
+            rate,
+            (0.0, 1.0),
+            _state(not_turned, np.zeros_like(force)),
+            t_eval=[1.0],
+            method="DOP853",
+            rtol=_MARCH_ERROR,
+            atol=_MARCH_ERROR,
         )
-        how = {"method": "DOP853", "rtol": _MARCH_ERROR, "atol": _MARCH_ERROR}
-        marched = solve_ivp(change, (0.0, 1.0), begin, t_eval=[1.0], **how)
         if not marched.success:
             raise ArithmeticError("no equilibrium found of a curved rod that is bent so far")
-        return _unpacked(marched.y[:, -1], lead)
+        return _turns_and_ways(marched.y[:, -1], rods)
 
     def _bend(
         self, arc: np.ndarray, at_mm: np.ndarray, tangent: np.ndarray, moment: np.ndarray
@@ -256,7 +261,17 @@ def _cross_matrices(vectors: np.ndarray) -> np.ndarray:
     return matrices
 
 
-def _unpacked(state: np.ndarray, lead: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return turns (*lead, 3, 3) and ways to the contact (*lead, 3) of a state."""
-    count = 9 * int(np.prod(lead))
-    return state[:count].reshape(*lead, 3, 3), state[count:].reshape(*lead, 3)
+def _product(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Return the products (..., 3) of matrices (..., 3, 3) and vectors (..., 3)."""
+    return (matrices @ vectors[..., None])[..., 0]
+
+
+def _state(turns: np.ndarray, ways: np.ndarray) -> np.ndarray:
+    """Return turns (..., 3, 3) and ways (..., 3) as one vector, for the integration."""
+    return np.concatenate([turns.ravel(), ways.ravel()])
+
+
+def _turns_and_ways(state: np.ndarray, rods: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return turns (*rods, 3, 3) and ways to the contact (*rods, 3) of a state."""
+    count = 9 * math.prod(rods)
+    return state[:count].reshape(*rods, 3, 3), state[count:].reshape(*rods, 3)
