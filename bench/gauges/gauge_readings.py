@@ -248,22 +248,19 @@ def _seen_loads(
     loads_of: which loads of a rod. Raises ArithmeticError where no rod is bent so.
     """
     across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
-    along = d.along_mm[good]
-    contacts = SeenContacts(along, across, d.theta_rad[good], d.d_x_mm)
-    share = _share_along_rod(across, along, d.slip_mm[good], d.slip_sigma_mm[good])
+    contacts = SeenContacts(d.along_mm[good], across, d.theta_rad[good], d.d_x_mm)
+    share = _share_along_rod(contacts, d.slip_mm[good], d.slip_sigma_mm[good])
     loads = loads_of(rod_of(whisker))
-    values, by_friction = _with_friction(contacts, share.value, loads)
-    by_place = _by_place(contacts, share.value, loads)
-    by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
-    causes = [_FRICTION_SIGMA * by_friction, by_share]
-    for rest_mm in whisker.beam.other_rests_mm():
-        other = loads_of(rod_of(whisker.with_rest(rest_mm)))
-        moved, _ = _with_friction(contacts, share.value, other)
-        causes.append(moved - values)
+    values = loads(contacts, -_FRICTION * share.value)
+    by_place = _by_place(contacts, share.value, loads, values)
     by_camera_error_mm, of_places = _errors_of_places(d, good)
     by_arc, own_covariance = _common_and_own(by_place, of_places)
-    for cause in causes:
-        own_covariance = own_covariance + _common_cause(cause)
+    by_friction = (values - loads(contacts, 0.0)) / _FRICTION
+    by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
+    own_covariance += _common_cause(_FRICTION_SIGMA * by_friction) + _common_cause(by_share)
+    for rest_mm in whisker.beam.other_rests_mm():
+        other = loads_of(rod_of(whisker.with_rest(rest_mm)))
+        own_covariance += _common_cause(other(contacts, -_FRICTION * share.value) - values)
     return _SeenLoads(values, by_arc, own_covariance, by_place @ by_camera_error_mm)
 
 
@@ -285,19 +282,20 @@ def source_of(seen: SeenWhisk) -> str:
     return SEEN if seen.has_truth else WIRE_ALONE
 
 
-def _by_place(contacts: SeenContacts, share: np.ndarray, loads: Loads) -> np.ndarray:
+def _by_place(
+    contacts: SeenContacts, share: np.ndarray, loads: Loads, here: np.ndarray
+) -> np.ndarray:
     """Return the derivatives (kn, 3n) of k loads by where contacts are along, across z and across y.
 
     Further along the wire the deflection grows too; what is left of both is in the covariance of
-    the places.
+    the places. here (n, k): the loads of the contacts where they are.
     """
     n = len(contacts.along_mm)
     frames = np.arange(n)
     step_mm = _STEP_SHARE * float(contacts.along_mm.max())
-    here, _ = _with_friction(contacts, share, loads)
     rows = np.zeros((*here.shape, n, 3))
     for k, step in enumerate(step_mm * np.eye(3)):
-        moved, _ = _with_friction(contacts.moved(step), share, loads)
+        moved = loads(contacts.moved(step), -_FRICTION * share)
         rows[frames, :, frames, k] = (moved - here) / step_mm
     return rows.reshape(-1, 3 * n)
 
@@ -318,30 +316,19 @@ def _common_and_own(by_place: np.ndarray, of_places: np.ndarray) -> tuple[np.nda
     return common.reshape(frames, -1), covariance - np.outer(common, common)
 
 
-def _share_along_rod(
-    across: np.ndarray, along: np.ndarray, slip: np.ndarray, slip_sigma: np.ndarray
-) -> Value:
+def _share_along_rod(contacts: SeenContacts, slip: np.ndarray, slip_sigma: np.ndarray) -> Value:
     """Return the share (n,) of the sliding that goes along the rod, with its sigma.
 
     It is the arc's excess over its chord, 0.6 w²/x; the slip across is the rest. It is the mean of
     three slips that have the mean and the variance of the one seen: where the slope of the bar is
     hardly known, nor is the slip along it.
     """
-    drawn = 0.6 * np.sum(across**2, axis=1) / along
+    drawn = 0.6 * np.sum(contacts.across_mm**2, axis=1) / contacts.along_mm
     slips = slip + np.sqrt(3.0) * np.outer([-1.0, 0.0, 1.0], slip_sigma)  # (3, n)
     shares = drawn / np.hypot(drawn, slips)
     weights = np.array([1.0, 4.0, 1.0]) / 6.0
     mean = weights @ shares
     return Value(mean, np.sqrt(weights @ (shares - mean) ** 2))
-
-
-def _with_friction(
-    contacts: SeenContacts, share: np.ndarray, loads: Loads
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return loads (n, k) in the hub's axes, and their change per unit of the friction coefficient."""
-    rough = loads(contacts, -_FRICTION * share)
-    smooth = loads(contacts, 0.0)
-    return rough, (rough - smooth) / _FRICTION
 
 
 def _common_cause(effect: np.ndarray) -> np.ndarray:
@@ -364,9 +351,9 @@ def reference_from_nominal(
     radii_mm = 0.5 * trial.bar_diameter_mm + float(whisker.wire.radius_mm(trial.d_x_mm))
     along, across = _nominal_contacts(theta, trial.d_x_mm, radii_mm)
     contacts = SeenContacts(along, across, theta, trial.d_x_mm)
-    moments, by_friction = _with_friction(
-        contacts, np.ones_like(theta), rod_of(whisker).moments_Nmm
-    )
+    rod = rod_of(whisker)
+    moments = rod.moments_Nmm(contacts, -_FRICTION)
+    by_friction = (moments - rod.moments_Nmm(contacts, 0.0)) / _FRICTION
     by_touch = touch.sigma_rad * moments / theta[:, None]
     return ReferenceMoments(
         touch.motor_rad,

@@ -19,6 +19,7 @@ from bench.gauges.gauge_readings import (
     reference_from_nominal,
     reference_from_pictures,
 )
+from bench.gauges.whisker_rods import SeenContacts
 from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
@@ -108,9 +109,8 @@ def test_a_badly_known_place_along_the_wire_counts_little_and_not_nothing(sessio
 def test_slip_that_is_hardly_known_leaves_open_how_much_friction_acts_along_the_rod():
     """A rod drawn along itself by 0.6 · 2² / 50 mm: all of its sliding without slip, and anything down to a tenth of it
     where half a millimetre of slip is possible."""
-    across = np.array([[0.0, 2.0]] * 3)
-    along = np.full(3, 50.0)
-    share = _share_along_rod(across, along, np.array([0.0, 0.048, 0.0]), np.array([0.0, 0.0, 0.5]))
+    contacts = SeenContacts(np.full(3, 50.0), np.array([[0.0, 2.0]] * 3), np.full(3, 0.04), 50.0)
+    share = _share_along_rod(contacts, np.array([0.0, 0.048, 0.0]), np.array([0.0, 0.0, 0.5]))
     assert share.value[:2] == pytest.approx([1.0, np.sqrt(0.5)])
     assert share.sigma[:2] == pytest.approx([0.0, 0.0])
     assert share.value[2] - share.sigma[2] > 0.2 and share.value[2] + 1.5 * share.sigma[2] > 1.0
