@@ -154,7 +154,9 @@ BUDGET = Table(
         Column("wire_percent", "scatter of the wire's line points"),
         Column("bar_percent", "scatter of the bar's line points"),
         Column("touch_percent", "roundness of bar and whisker"),
-        Column("diameters_percent", "the diameters' sigmas"),
+        Column(
+            "diameters_percent", "the diameters' sigmas, and the length's of a whisker that tapers"
+        ),
         Column("light_percent", "light that shifts a line as a whole"),
         Column("priors_percent", "priors of rest shape and bend"),
         Column("cameras_percent", "lenses, and poses towards the rig board"),

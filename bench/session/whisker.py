@@ -77,7 +77,7 @@ class Whisker(WhiskerKeys):
             self.tip_diameter_mm,
             self.unloaded_mm,
         )
-        return ProfiledWire(*stated, self.widths) if self.widths else Wire(*stated)
+        return ProfiledWire(*stated, widths=self.widths) if self.widths else Wire(*stated)
 
     @property
     def EI_Nmm2(self) -> float:
@@ -106,7 +106,7 @@ class Whisker(WhiskerKeys):
                 self.widths,
                 self.unloaded_mm,
                 self.rest_shape_sigma_mm,
-                self._taper_sigma_per_mm,
+                self.wire.taper_sigma_per_mm,
                 self.length_sigma_mm,
             )
         tip_share = None
@@ -119,22 +119,9 @@ class Whisker(WhiskerKeys):
             tip_share,
             self.unloaded_mm,
             self.rest_shape_sigma_mm,
-            self._taper_sigma_per_mm,
+            self.wire.taper_sigma_per_mm,
             self.length_sigma_mm,
         )
-
-    @property
-    def _taper_sigma_per_mm(self) -> float:
-        """Return one sigma of the share of the diameter that is lost per mm, by length and diameters.
-
-        The point of a cone is one, and a cylinder is drawn, as thick at both ends.
-        """
-        if self.shape == "cylinder":
-            return 0.0
-        left = (self.tip_diameter_mm or 0.0) / self.diameter_mm
-        by_length = (1.0 - left) * self.length_sigma_mm / self.length_mm
-        by_diameter = self.diameter_sigma_mm / self.diameter_mm if left else 0.0
-        return math.hypot(by_length, by_diameter, left * by_diameter) / self.length_mm
 
     @property
     def C_sigma_Nmm2(self) -> float:

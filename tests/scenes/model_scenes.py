@@ -35,7 +35,7 @@ def camera(name, centre, target=(55.0, 5.0, 0.0), focal=2000.0):
 CAMERAS = Cameras((camera("one", (38, -175, 335)), camera("two", (130, -325, 120))))
 
 
-def scene(beta_deg=40.0, touch_deg=2.3, d_x=60.0, frames=7, motion=None):
+def scene(beta_deg=40.0, touch_deg=2.3, d_x=60.0, frames=7, motion=None, rods=RODS):
     """A problem without line points and the state that is its truth: a whisk whose contact keeps the reach. motion: of
     the bar; its parameters are off by 0.1 each."""
     motor = np.radians(0.7 + 0.9 * np.arange(frames))
@@ -46,7 +46,7 @@ def scene(beta_deg=40.0, touch_deg=2.3, d_x=60.0, frames=7, motion=None):
         turn @ np.array([0.0, np.sin(beta), np.cos(beta)]),
     )
     touching = motor > touch
-    problem = Problem(CAMERAS, RODS, axis, motor, touching, touching, [], motion=motion)
+    problem = Problem(CAMERAS, rods, axis, motor, touching, touching, [], motion=motion)
     vector = np.zeros(problem.size)
     vector[4:12] = [0.05, 0.1, -0.2, 0.0, -0.05, 0.1, -0.3, 0.0]
     vector[problem.blocks.motion.slice] = 0.1

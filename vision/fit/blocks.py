@@ -56,6 +56,8 @@ _STEP_MM = 1e-4
 _STEP_TILT_RAD = 1e-6
 # [rad] Step of differences of a bend. Study: gradients.py.
 _STEP_BEND_RAD = 1e-5
+# [1/mm] Step of differences of the taper: of 100 mm a ten-thousandth of the diameter. Derived.
+_STEP_TAPER_PER_MM = 1e-6
 # [1] Step of differences of the friction. Study: gradients.py.
 _STEP_FRICTION = 1e-3
 
@@ -90,7 +92,8 @@ class Blocks:
 
     bar_axis: two shifts in mm and two tilts in rad across the bar's axis. rest_shape: mm at the
     tip, four powers in y, then in z. reach: error of the distance from axis to centreline at the
-    contact, mm. wire_offsets, bar_offsets: by camera, px by which its lines of wire and bar are off
+    contact, mm. taper: error of the share of its diameter that a whisker loses for each mm, of one that
+    tapers. wire_offsets, bar_offsets: by camera, px by which its lines of wire and bar are off
     as a whole (of the wire the shapes of `wire_modes`, then what its points share). motion: of a
     bar that does not stand still. shift_along: of the object along its axis, mm. outline_bias: by
     camera, px by which the object's outline is read too far out. friction: along the whisker, over
@@ -100,6 +103,7 @@ class Blocks:
     bar_axis: Block
     rest_shape: Block
     reach: Block
+    taper: Block
     wire_offsets: tuple[Block, ...]
     bar_offsets: tuple[Block, ...]
     motion: Block
@@ -114,6 +118,7 @@ class Blocks:
         cls,
         *,
         reach_sigma_mm: float,
+        taper_sigma_per_mm: float,
         offset_sigma_px: np.ndarray,
         motion_sigma: Sequence[float],
         touched: Touched,
@@ -128,12 +133,14 @@ class Blocks:
         bar_axis = layout.add(axis_sigma, axis_step)
         rest_shape = layout.add(np.tile(REST_PRIOR_MM, 2), _STEP_MM)
         reach = layout.add([max(reach_sigma_mm, _LEAST_REACH_MM)], _STEP_MM)
+        taper = layout.add([taper_sigma_per_mm] if taper_sigma_per_mm else [], _STEP_TAPER_PER_MM)
         wire_offsets, bar_offsets = _add_line_offsets(layout, offset_sigma_px)
         outline_sigma = touched.outline_sigma_px * len(offset_sigma_px)
         return cls(
             bar_axis=bar_axis,
             rest_shape=rest_shape,
             reach=reach,
+            taper=taper,
             wire_offsets=wire_offsets,
             bar_offsets=bar_offsets,
             motion=layout.add(motion_sigma, _STEP_MM),

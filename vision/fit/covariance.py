@@ -29,7 +29,8 @@ def shared_covariance(fit: Solution) -> np.ndarray:
     common: by the object's stated place, diameters, light, cameras and placement.
     """
     blocks = fit.problem.blocks
-    in_common = [blocks.bar_axis, blocks.reach, *blocks.wire_offsets, *blocks.bar_offsets]
+    of_lines = [*blocks.wire_offsets, *blocks.bar_offsets]
+    in_common = [blocks.bar_axis, blocks.reach, blocks.taper, *of_lines]
     priors = fit.weighted.jacobian[fit.problem.prior_rows]
     rows = priors[columns_of(*in_common)]
     by_row = fit.inverse_normal @ rows.T
@@ -40,12 +41,12 @@ def variance_by_cause(fit: Solution, gradient: np.ndarray) -> dict[str, float]:
     """Return the variance that each cause adds to a quantity with this gradient (size,); the parts
     add up to it.
 
-    wire, bar: scatter of their line points, and of the bar its stated place; touch: roundness of bar and wire; diameters: their
-    sigmas; light: lines off as a whole; priors: those of rest shape and bend; cameras: lenses, and
-    poses towards the rig board; placement: where the rig frame is, by rig board and free strokes
-    (NaN where the cameras do not distinguish it: it is in `cameras` then). An observation's part is
-    its row's sensitivity times the row's covariance with all others. The placement errs apart from
-    corners and lenses, so that there are no cross-terms.
+    wire, bar: scatter of their line points, and of the bar its stated place; touch: roundness of bar and wire;
+    diameters: their sigmas, and the length's of a whisker that tapers; light: lines off as a whole; priors: those
+    of rest shape and bend; cameras: lenses, and poses towards the rig board; placement: where the rig frame
+    is, by rig board and free strokes (NaN where the cameras do not distinguish it: it is in `cameras` then).
+    An observation's part is its row's sensitivity times the row's covariance with all others. The placement
+    errs apart from corners and lenses, so that there are no cross-terms.
     """
     by_row = fit.weighted.jacobian @ (fit.inverse_normal @ gradient)
     parts = by_row * times_residual_covariance(fit.problem, by_row[None])[0]
@@ -65,14 +66,13 @@ def _sum_by_cause(problem: Problem, parts: np.ndarray) -> dict[str, float]:
     is_wire = np.repeat(on_wire, [len(seen.points) for seen in problem.seen])
     by_point = parts[: len(is_wire)]
     priors = parts[problem.prior_rows.start :]
-    reach = blocks.reach.start
     behind_light = blocks.motion.start
     return {
         "wire": np.sum(by_point[is_wire]),
         "bar": np.sum(by_point[~is_wire]) + np.sum(priors[blocks.bar_axis.slice]),
         "touch": np.sum(parts[problem.contact_rows]),
-        "diameters": priors[reach],
-        "light": np.sum(priors[reach + 1 : behind_light]),
+        "diameters": np.sum(priors[columns_of(blocks.reach, blocks.taper)]),
+        "light": np.sum(priors[blocks.taper.slice.stop : behind_light]),
         "priors": np.sum(priors[blocks.rest_shape.slice]) + np.sum(priors[behind_light:]),
     }
 

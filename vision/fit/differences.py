@@ -77,7 +77,7 @@ def perturb(problem: Problem, vector: np.ndarray, *, reach: bool = False) -> Per
     objects = [blocks.motion, blocks.shift_along, blocks.outline_bias]
     steps = blocks.steps
     moves = []
-    for k in columns_of(*geometry, *objects, blocks.friction):
+    for k in columns_of(*geometry, *objects, blocks.taper, blocks.friction):
         moves.append(Perturbation(steps[k], np.full(frames, k), is_shared=True))
     order = np.cumsum(problem.bent) - 1  # (f,) number of each bent frame
     for first in (blocks.bends.start, blocks.bends.start + 1):

@@ -68,6 +68,7 @@ class Problem:
         """Return the blocks of the parameter vector."""
         return Blocks.laid_out(
             reach_sigma_mm=self.rods.reach_sigma_mm,
+            taper_sigma_per_mm=self.wire.taper_sigma_per_mm,
             offset_sigma_px=self._offset_sigma_px(),
             motion_sigma=() if self.motion is None else self.motion.sigma,
             touched=self.rods.bar,
@@ -209,6 +210,20 @@ def rest_shape(problem: Problem, vector: np.ndarray) -> np.ndarray:
     return own.reshape(*vector.shape[:-1], 2, REST_POWERS)
 
 
+def wire_of(problem: Problem, vector: np.ndarray, axes: int) -> Wire:
+    """Return the whisker by parameters (…, size), to be asked at arc lengths of so many axes more."""
+    taper = vector[..., problem.blocks.taper.slice]  # (…, 1), or (…, 0) of one that does not taper
+    if not taper.shape[-1]:
+        return problem.wire
+    return replace(problem.wire, taper_error_per_mm=taper.reshape(*vector.shape[:-1], *[1] * axes))
+
+
+def reach_mm(problem: Problem, vector: np.ndarray, arc_mm: np.ndarray) -> np.ndarray:
+    """Return the distance (…) of the two axes where they touch at arc lengths (…), by parameters."""
+    wire = wire_of(problem, vector, arc_mm.ndim - vector.ndim + 1)
+    return replace(problem.rods, wire=wire).reach_mm(arc_mm)
+
+
 def bends(problem: Problem, vector: np.ndarray) -> np.ndarray:
     """Return tangent angles at the contact (…, f, 2), rad; zero in frames that may not bend."""
     batch = vector.shape[:-1]
@@ -231,10 +246,11 @@ def curves_of(
     motor = np.broadcast_to(problem.motor_rad, shape)
     rest = rest_shape(problem, vector)[..., None, :, :]  # one for all frames
     friction = np.broadcast_to(vector[..., problem.blocks.friction.slice], shape)
+    wire = wire_of(problem, vector, 2)
     for _ in range(rounds):
-        curves = centrelines(rest, angles, arcs, motor, problem.wire, friction)
-        arcs = np.clip(closest_arc(curves, axis, problem.wire, arcs), 1.0, problem.wire.length_mm)
-    return centrelines(rest, angles, arcs, motor, problem.wire, friction), arcs
+        curves = centrelines(rest, angles, arcs, motor, wire, friction)
+        arcs = np.clip(closest_arc(curves, axis, wire, arcs), 1.0, wire.length_mm)
+    return centrelines(rest, angles, arcs, motor, wire, friction), arcs
 
 
 def resting_curves(problem: Problem, vector: np.ndarray, motor_rad: np.ndarray) -> Curves:

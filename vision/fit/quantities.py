@@ -19,6 +19,7 @@ from vision.fit.problem import (
     resting_curves,
     shift_at_mm,
     shifts_mm,
+    wire_of,
 )
 from vision.fit.touch import FirstTouch, first_touch
 from vision.geometry.centreline import Curves, rotation_z
@@ -50,13 +51,13 @@ def measure(problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray) -> Measur
     touch = first_touch(problem, vector)
     each = bar_axes(problem, vector)
     curves, _ = curves_of(problem, vector, arcs_mm)
-    _, arc, point = clearance(curves, each, problem.wire)
+    _, arc, point = clearance(curves, each, wire_of(problem, vector, 2))
     touched = bar_axis(problem, vector).bar_at(touch.point_mm)
     beta, psi = contact_frame_angles(touched.direction, touch.motor_rad)
     contact_moved = _contact_moved_mm(problem, vector, touch, point)
     d_y, d_z = _deflection(problem, vector, touch, point)
     along, across_y = _in_hub(problem, touch, point, d_y)
-    force = _force_direction(curves, problem.wire, touch, arc, d_y, d_z)
+    force = _force_direction(curves, wire_of(problem, vector, 1), touch, arc, d_y, d_z)
     frame = {
         "slip": np.sum(contact_moved * touched.direction[..., None, :], axis=-1),
         "longitudinal_slip": arc - touch.arc_mm[..., None],

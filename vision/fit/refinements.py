@@ -167,8 +167,13 @@ def _taper(fit: Solution) -> LeftOut:
     if problem.wire.is_uniform:
         return LeftOut(why="the whisker does not taper")
     cylinder = replace(problem, rods=replace(problem.rods, wire=_cylinder(problem.wire)))
-    by_lines_moved = _followed(fit, residuals(cylinder, state) - fit.linear.residual)
-    there = measure(cylinder, state.vector, state.arcs_mm)
+    own = columns_of(problem.blocks.taper)  # (1,), or (0,) where the taper is exact
+    plain = replace(state, vector=np.delete(state.vector, own))
+    with_taper = fit.linear.residual
+    priors = problem.prior_rows.start + own
+    without = np.insert(residuals(cylinder, plain), priors, with_taper[priors])
+    by_lines_moved = _followed(fit, without - with_taper)
+    there = measure(cylinder, plain.vector, plain.arcs_mm)
     here = fit.measured
     slip = there.frame["slip"] - here.frame["slip"]
     return LeftOut(

@@ -25,8 +25,10 @@ from vision.fit.problem import (
     bar_axes,
     bar_axis,
     curves_of,
+    reach_mm,
     resting_curves,
     wire_modes,
+    wire_of,
 )
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import clearance
@@ -157,10 +159,10 @@ def _contact_part(
     """Return residuals and Jacobian rows of touching frames: distance from axis to centreline is
     reach + its error.
     """
-    distance, arc, _ = clearance(
-        curves, bar_axes(problem, perturbed.vectors), problem.wire, arcs_mm
-    )
-    gap = (distance - problem.rods.reach_mm(arc))[:, problem.touching]  # (copies, touching) mm
+    vectors = perturbed.vectors
+    axes = bar_axes(problem, vectors)
+    distance, arc, _ = clearance(curves, axes, wire_of(problem, vectors, 2), arcs_mm)
+    gap = (distance - reach_mm(problem, vectors, arc))[:, problem.touching]  # (copies, touching) mm
     reach = problem.blocks.reach.start
     jacobian = perturbed.jacobian(gap[1:] - gap[0], np.flatnonzero(problem.touching))
     jacobian[:, reach] = -1.0
@@ -175,8 +177,9 @@ def _onset_part(problem: Problem, onset: Onset, perturbed: Perturbed) -> Part:
     vectors = perturbed.vectors
     motor_rad = np.full(len(vectors), onset.motor_rad) + _later_rad(problem, vectors)
     curves = resting_curves(problem, vectors, motor_rad)
-    distance, arc, _ = clearance(curves, bar_axis(problem, vectors), problem.wire)
-    gap = distance - problem.rods.reach_mm(arc)  # (copies,) mm
+    axis = bar_axis(problem, vectors)
+    distance, arc, _ = clearance(curves, axis, wire_of(problem, vectors, 1))
+    gap = distance - reach_mm(problem, vectors, arc)  # (copies,) mm
     sigma_mm = onset.sigma_rad * arc[0]
     reach = problem.blocks.reach.start
     gradient = perturbed.shared_gradient(gap[1:] - gap[0])

@@ -6,7 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vision.fit.problem import Problem, State, bar_axis, bends, resting_curves, shift_at_mm
+from vision.fit.problem import (
+    Problem,
+    State,
+    bar_axis,
+    bends,
+    reach_mm,
+    resting_curves,
+    shift_at_mm,
+    wire_of,
+)
 from vision.fit.solve import Linear, linearise
 from vision.geometry.contact import clearance
 from vision.geometry.rotation import unit
@@ -107,7 +116,7 @@ def touch_and_sigma(
     This is what it takes to part the frames. covariance (size, size): the second result of `solve`.
     """
     blocks = problem.blocks
-    columns = np.append(np.arange(blocks.reach.start + 1), blocks.placement)
+    columns = np.append(np.arange(blocks.taper.slice.stop), blocks.placement)
     here = float(first_touch(problem, vector).motor_rad)
     moved = vector + _STEP * np.eye(len(vector))[columns]
     slope = (first_touch(problem, moved).motor_rad - here) / _STEP
@@ -125,9 +134,9 @@ def _gap(
     shift_mm = shift_at_mm(problem, vector, motor_rad)
     there = replace(axis, point_mm=axis.point_mm + shift_mm)
     curves = resting_curves(problem, vector, motor_rad)
-    distance, arc, point = clearance(curves, there, problem.wire)
+    distance, arc, point = clearance(curves, there, wire_of(problem, vector, 1))
     wider_mm = vector[..., problem.blocks.reach.start]
-    return distance - problem.rods.reach_mm(arc) - wider_mm, arc, point
+    return distance - reach_mm(problem, vector, arc) - wider_mm, arc, point
 
 
 def frames_that_touch(motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,5 +1,6 @@
 """The two rods in front of the cameras: the whisker, and the bar or other object that it touches."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -25,8 +26,9 @@ class Wire:
     """The whisker: a cylinder, a cone with its point at its length, or one cut off there (tapered).
 
     rest_mm: as it is without load, as far as it is stated; a fit's own rest shape adds to that.
-    Refused where a length is not > 0, and where a tapered wire has no tip thinner than its base or
-    another one has.
+    taper_error_per_mm: by how much more of the base's diameter is lost for each mm than is stated, one number
+    or an array that broadcasts with the arc lengths asked for. Refused where a length is not > 0, and
+    where a tapered wire has no tip thinner than its base or another one has.
     """
 
     shape: str
@@ -36,6 +38,7 @@ class Wire:
     diameter_sigma_mm: float = 0.0
     tip_diameter_mm: float | None = None
     rest_mm: RestShape = ((0.0,), (0.0,))
+    taper_error_per_mm: np.ndarray | float = 0.0
 
     def __post_init__(self):
         """Raise Refused where there is no such wire."""
@@ -66,7 +69,7 @@ class Wire:
 
     def radius_by_arc(self, arc_mm: np.ndarray | float) -> np.ndarray | float:
         """Return the change of the radius per arc length at arc lengths (...), below 0 where it tapers."""
-        return -0.5 * self.diameter_mm * self.taper_per_mm
+        return -0.5 * self.diameter_mm * (self.taper_per_mm + self.taper_error_per_mm)
 
     def width(self, arc_mm: np.ndarray) -> np.ndarray:
         """Return the diameter (...) at arc lengths (...) over the base's, `LEAST_WIDTH` beyond a point."""
@@ -90,7 +93,7 @@ class Wire:
 
     def _share_left(self, arc_mm: np.ndarray) -> np.ndarray:
         """Return the diameter (...) at arc lengths (...) over the base's, below 0 beyond a point."""
-        return 1.0 - self.taper_per_mm * arc_mm
+        return 1.0 - (self.taper_per_mm + self.taper_error_per_mm) * arc_mm
 
     @property
     def taper_per_mm(self) -> float:
@@ -101,6 +104,19 @@ class Wire:
         if self.shape == "tapered":
             return (1.0 - self.tip_diameter_mm / self.diameter_mm) / self.length_mm
         return 1.0 / self.length_mm if self.shape == "cone" else 0.0
+
+    @property
+    def taper_sigma_per_mm(self) -> float:
+        """Return one sigma of the share of the base's diameter that is lost for each mm, by length and diameters.
+
+        The point of a cone is one, and a cylinder is drawn, as thick at both ends.
+        """
+        if self.shape == "cylinder":
+            return 0.0
+        left = (self.tip_diameter_mm or 0.0) / self.diameter_mm
+        by_length = (1.0 - left) * self.length_sigma_mm / self.length_mm
+        by_diameter = self.diameter_sigma_mm / self.diameter_mm if left else 0.0
+        return math.hypot(by_length, by_diameter, left * by_diameter) / self.length_mm
 
 
 @dataclass(frozen=True)
@@ -125,7 +141,7 @@ class ProfiledWire(Wire):
         """Return the change of the radius per arc length at arc lengths (...)."""
         share = np.asarray(arc_mm) / self.length_mm
         per_share = polynomial.polyval(share, polynomial.polyder(self.widths))
-        return 0.5 * self.diameter_mm / self.length_mm * per_share
+        return 0.5 * self.diameter_mm * (per_share / self.length_mm - self.taper_error_per_mm)
 
     @property
     def is_uniform(self) -> bool:
@@ -134,7 +150,8 @@ class ProfiledWire(Wire):
 
     def _share_left(self, arc_mm: np.ndarray) -> np.ndarray:
         """Return the diameter (...) at arc lengths (...) over the base's."""
-        return polynomial.polyval(np.asarray(arc_mm) / self.length_mm, self.widths)
+        stated = polynomial.polyval(np.asarray(arc_mm) / self.length_mm, self.widths)
+        return stated - self.taper_error_per_mm * arc_mm
 
 
 @dataclass(frozen=True)

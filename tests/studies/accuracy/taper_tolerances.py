@@ -3,8 +3,9 @@
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/accuracy/taper_tolerances.py [TRIAL ...]
 
 Trials of the protocol `polymer-cone` (steel_b00_v10_1 and steel_b60_v10_1, or those named) are drawn and seen by exact
-cameras, with the whisker as it is, half a millimetre longer (the ± of a length that nobody states) and 0.02 mm thicker.
-Printed: by how many of its stated sigmas each quantity moves, and the sigma.
+cameras, with the whisker as it is, half a millimetre longer (the ± of a length that nobody states), the same where that ±
+is stated, and 0.02 mm thicker. Printed: by how many of its sigmas without that ± each quantity moves, and how many its
+own sigma is.
 """
 
 import sys
@@ -18,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from bench.rig.parts import Job, render_frames
 from bench.rig.protocol import FOLDER, load
 from tests.scenes.drawn_traces import exact_cameras, recorded_run
-from vision import TrialPictures, observe_trial
+from vision import TrialPictures, Value, observe_trial
 from vision.geometry import Bar, Cameras, Rods, VisionSettings, Wire
 
 TRIALS = ("steel_b00_v10_1", "steel_b60_v10_1")
@@ -28,6 +29,7 @@ BAR = Bar(6.0)
 THETA_RAD = np.radians(3.0)
 OFF = {
     "0.5 mm longer": replace(WIRE, length_mm=100.5),
+    "0.5 mm longer, ± 0.5 mm": replace(WIRE, length_mm=100.5, length_sigma_mm=0.5),
     "0.02 mm thicker": replace(WIRE, diameter_mm=1.52),
 }
 
@@ -61,6 +63,7 @@ def seen(pictures: TrialPictures, cameras: Cameras, wire: Wire) -> dict:
         "slope": whisk.beta_rad,
         "slip": at.slip_mm,
         "phi": at.phi_rad,
+        "z": Value(whisk.point_mm.value[2], whisk.point_mm.sigma[2]),
     }
 
 
@@ -71,9 +74,10 @@ def main() -> None:
         for name, wire in OFF.items():
             moved = []
             for quantity, value in seen(pictures, cameras, wire).items():
-                by = (value.value - right[quantity].value) / right[quantity].sigma
-                moved.append(f"{quantity} {by:+.2f}")
-            print(f"{trial}, {name}: {', '.join(moved)} of its sigma", flush=True)
+                sigma = right[quantity].sigma
+                by = (value.value - right[quantity].value) / sigma
+                moved.append(f"{quantity} {by:+.2f} ± {value.sigma / sigma:.2f}")
+            print(f"{trial}, {name}: {', '.join(moved)}", flush=True)
 
 
 if __name__ == "__main__":
