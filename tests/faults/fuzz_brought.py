@@ -24,8 +24,8 @@ from bench.session.angles_file import read_angles
 from bench.session.frame_times import frame_times
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
-from bench.session.trace_files import trace_files
-from bench.session.traces import read_traces
+from bench.session.trace_files import OBJECT, trace_files
+from bench.session.traces import read_traces, read_traces_alone
 from bench.trials.stated_truth import stated_whisk
 from tests.faults.fuzz import FRAMES, TRIAL, small_base
 from tests.faults.fuzz_stated import fuzz
@@ -34,7 +34,8 @@ from vision.geometry import Camera, Cameras
 
 _TRACES = "traces"  # folders of a trial's traces, one a tracker
 _LENSES = "lenses"  # folders of cameras, one a program
-_POINTS = 4  # of a line in each frame
+_JOINTS = ("j0", "j1", "bar_0", "bar_1")  # of a line in each frame, of wire and object
+_POINTS = len(_JOINTS)
 _TARGET = """target_type: 'aprilgrid'
 tagCols: 6
 tagRows: 5
@@ -129,21 +130,22 @@ def _traces() -> dict[str, dict[str, bytes]]:
     """Return by tracker the files that need no library."""
     px = _px()
     rows = [(frame, *point, 0.3, 0) for frame in range(FRAMES) for point in px[frame]]
+    own = _table("frame,u_px,v_px,sigma_px,line", rows).encode()
     heads = [["scorer"], ["bodyparts"], ["coords"]]
-    for joint in range(_POINTS):
+    for joint in _JOINTS:
         for axis in ("x", "y", "likelihood"):
-            for head, name in zip(heads, ("net", f"j{joint}", axis)):
+            for head, name in zip(heads, ("net", joint, axis)):
                 head.append(name)
     table = [",".join(head) for head in heads]
     for frame in range(FRAMES):
         table.append(",".join([str(frame), *(f"{u:.2f},{v:.2f},0.9" for u, v in px[frame])]))
-    names = [f"j{joint}_{axis}" for joint in range(_POINTS) for axis in "xyz"]
+    names = [f"{joint}_{axis}" for joint in _JOINTS for axis in "xyz"]
     names += [f"M_{i}{j}" for i in range(3) for j in range(3)] + [f"center_{i}" for i in range(3)]
     spots = [(20.0 * joint, 1.0, 0.0) for joint in range(_POINTS)]
     turned = [*np.ravel(spots), *np.eye(3).ravel(), 0.0, 0.0, 0.0]
     in_space = [(*turned, frame) for frame in range(FRAMES)]
     return {
-        "ours": {"trace_high.csv": _table("frame,u_px,v_px,sigma_px,line", rows).encode()},
+        "ours": {"trace_high.csv": own, "object_high.csv": own, "object_low.csv": own},
         "deeplabcut": {"trace_low.csv": "\n".join(table).encode()},
         "whisk": {"trace_high.whiskers": _whiskers(px), "trace_high.measurements": _measurements()},
         "anipose": {"trace_3d.csv": _table(",".join([*names, "fnum"]), in_space).encode()},
@@ -191,7 +193,7 @@ def _hdf5(folder: Path) -> None:
     px = _px()
     for name in ("deeplabcut-h5", "sleap"):
         (folder / name).mkdir()
-    names = [("net", f"j{joint}", axis) for joint in range(_POINTS) for axis in "xy"]
+    names = [("net", joint, axis) for joint in _JOINTS for axis in "xy"]
     rows = np.array(
         [(frame, px[frame].ravel()) for frame in range(FRAMES)],
         dtype=[("index", "<i8"), ("values_block_0", "<f8", (2 * _POINTS,))],
@@ -201,7 +203,7 @@ def _hdf5(folder: Path) -> None:
         table.attrs["values_block_0_kind"] = np.bytes_(pickle.dumps(names, 0))
     with h5py.File(folder / "sleap" / "trace_low.h5", "w") as file:
         file["tracks"] = np.transpose(px, (2, 1, 0))[None]
-        file["node_names"] = np.array([b"a", b"b", b"c", b"d"])
+        file["node_names"] = np.array([joint.encode() for joint in _JOINTS])
     with h5py.File(folder / "sleap" / "trace_high.slp", "w") as file:
         _sleap_labels(file, px)
 
@@ -227,7 +229,7 @@ def _sleap_labels(file, px: np.ndarray) -> None:
     file["instances"] = np.array(rows, dtype=instance)
     group = file.create_group("metadata")
     group.attrs["format_id"] = 1.2
-    nodes = [{"name": f"n{k}"} for k in range(_POINTS)]
+    nodes = [{"name": joint} for joint in _JOINTS]
     skeleton = {"nodes": [{"id": k} for k in range(_POINTS)]}
     group.attrs["json"] = json.dumps({"nodes": nodes, "skeletons": [skeleton]})
 
@@ -288,10 +290,13 @@ class Reader:
             yield from _stated(load_session(place, problems))
 
     def _traced(self, folder: Path) -> Iterator[tuple[str, np.ndarray]]:
-        """Yield the numbers of a tracker's lines."""
+        """Yield the numbers of a tracker's lines, beside pictures and alone with points of the object."""
         files = trace_files(folder, folder.name)
-        read = read_traces(files, self.trial.camera_sources, self.picture, folder.name)
-        for traced in read.values():
+        objects = trace_files(folder, folder.name, OBJECT)
+        beside = read_traces(files, self.trial.camera_sources, self.picture, folder.name)
+        trial = replace(self.trial, folder=folder, trace_files=files, object_files=objects)
+        alone = read_traces_alone(trial, FRAMES, {"high": (160, 90), "low": (160, 90)})
+        for traced in (*beside.values(), *alone.wire.values(), *alone.object_points.values()):
             yield folder.name, traced.trace.px
             yield folder.name, traced.trace.frame
 

@@ -83,11 +83,12 @@ def _tables(path: Path) -> dict[str, dict]:
 
 def _name(key: str, table: dict) -> str:
     """Return the camera's name: aniposelib states it; caliscope numbers cameras and calls the video
-    of camera 0 cam_0.
+    of camera 0 cam_0. Raise Refused where it cannot be printed.
     """
-    if "name" in table:
-        return str(table["name"])
-    return f"cam_{key}" if key.isdigit() else key
+    name = str(table.get("name", f"cam_{key}" if key.isdigit() else key))
+    if not name.isprintable():
+        raise Refused(f"the name of camera {name!r} holds what cannot be printed")
+    return name
 
 
 def _camera(name: str, table: dict, unit_mm: float) -> Camera:

@@ -63,6 +63,7 @@ def test_both_files_of_caliscope_give_the_same_cameras(real):
     "text, words",
     [
         (anipose_text("fisheye = true"), "fisheye"),
+        (anipose_text().replace('"high"', '"a\\u0000b"'), "cannot be printed"),
         (anipose_text().replace("rotation", "turn"), "rotation missing"),
         (anipose_text().replace("-0.11, 0.14, 0.0006", "-2.91, 0.011, -0.278"), "over-fitted"),
         (anipose_text().replace("2012.4", "1700.0"), "differ by 18 %"),
