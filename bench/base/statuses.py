@@ -244,6 +244,13 @@ _TABLE = (
         reaches=(TRUTH,),
     ),
     Status(
+        "stage_unlike_felt",
+        WARNING,
+        "touch felt is {apart}° from touch by the stage, as the other whisks have it: is the place of another trial?",
+        "compare stage.csv or point_mm with those of its neighbours, and its unit and axes",
+        reaches=(TRUTH,),
+    ),
+    Status(
         "distance_unlike_stated",
         WARNING,
         "the object's place and d_x_mm have the contact in different places",

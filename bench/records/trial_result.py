@@ -128,6 +128,19 @@ class PicturedContact:
 
 
 @dataclass(frozen=True, eq=False)
+class StageTouch:
+    """First touch of the unbent whisker on an object where a stage has it.
+
+    motor_rad: the motor's angle. own_rad: its sigma by what is the trial's own. shared_rad (p,): how it changes with one
+    sigma of each error that all whisks share.
+    """
+
+    motor_rad: float
+    own_rad: float
+    shared_rad: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class SeenWhisk:
     """The truth of one whisk: as the cameras show it, or with distance and slopes of another source.
 
@@ -139,7 +152,8 @@ class SeenWhisk:
     disagree (`bench.trials.consistency`). deflection: also of a whisk whose distance or slope is
     not known; None where no frame is seen to touch. by_one_camera: only where the settings name one.
     source: of d_x, β and ψ, BY_PICTURES or BY_STAGE. pictured: what pictures show of these where they
-    are another source's. friction_rad: the angle α by pictures alone (`bench.trials.seen_friction`).
+    are another source's. stage_touch: first touch by the object's stated place. friction_rad: the angle α
+    by pictures alone (`bench.trials.seen_friction`).
     """
 
     truth: WhiskTruth
@@ -154,6 +168,7 @@ class SeenWhisk:
     by_one_camera: ByOneCamera | None = None
     source: str = BY_PICTURES
     pictured: PicturedContact | None = None
+    stage_touch: StageTouch | None = None
 
     @property
     def truth_source(self) -> str:

@@ -3,7 +3,8 @@
 d_x is what an estimator estimates: the distance from the base to the contact at first touch, on the
 whisker's centreline. Either it is stated as it is (`d_x_mm`), or it follows from the object's place
 (`[object]`, `stage.csv`). When the whisker touches by the motor's angle is known no better than how
-it is clamped, and no stage sees how the contact slips: touch, slip and deflection stay NaN.
+it is clamped, and no stage sees how the contact slips: touch, slip and deflection stay NaN. Over the
+whisks of a session that angle is held against touch felt (`bench.trials.stage_touches`).
 """
 
 import math
@@ -15,7 +16,13 @@ import numpy as np
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
 from bench.base.statuses import reason
-from bench.records.trial_result import BY_STAGE, PicturedContact, SeenTrial, SeenWhisk
+from bench.records.trial_result import (
+    BY_STAGE,
+    PicturedContact,
+    SeenTrial,
+    SeenWhisk,
+    StageTouch,
+)
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
 from bench.session.stage import StageLog
@@ -68,7 +75,9 @@ def by_stage(
     whisks = []
     for whisk, stroke in zip(seen.whisks, strokes):
         stated = stated_whisk(session, trial, signals, stroke)
-        whisks.append(_with_stated(whisk, stated, settings))
+        with_stated = _with_stated(whisk, stated, settings)
+        touch = stage_touch(session, trial, signals, stroke)
+        whisks.append(replace(with_stated, stage_touch=touch))
     return replace(seen, whisks=tuple(whisks))
 
 
@@ -210,7 +219,7 @@ def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -
     touch = push.touch(Offsets.none())
     if touch is None:
         return _without_touch(push, trial)
-    rows = _derivatives(push, touch)
+    rows = _derivatives(push, touch)[1:]
     own = rows * _own_sigmas(trial, signals, stroke, touch)
     shared = rows * _shared_sigmas(session, trial, touch)
     shared_mm = float(np.linalg.norm(shared[0]))
@@ -221,6 +230,22 @@ def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -
     return replace(
         truth, status=joined(_unlike_stated(values[0], trial), _other_slope(values[1], trial))
     )
+
+
+def stage_touch(
+    session: Session, trial: Trial, signals: Signals, stroke: slice
+) -> StageTouch | None:
+    """Return the motor's angle at first touch by the object's place; None where none is stated, or it is not touched."""
+    if not trial.states_place:
+        return None
+    push = _push(session, trial, signals, stroke)
+    touch = push.touch(Offsets.none())
+    if touch is None:
+        return None
+    by_offset = _derivatives(push, touch)[0]
+    own_rad = np.linalg.norm(by_offset * _own_sigmas(trial, signals, stroke, touch))
+    shared_rad = by_offset * _shared_sigmas(session, trial, touch)
+    return StageTouch(touch.motor_rad, float(own_rad), shared_rad)
 
 
 def stated_place(session: Session, trial: Trial, signals: Signals) -> tuple[Axis, np.ndarray]:
@@ -303,7 +328,7 @@ def _upward(axis: Sequence[float]) -> np.ndarray:
 
 
 def _derivatives(push: StatedPush, touch: Contact) -> np.ndarray:
-    """Return the derivatives (3, p) of d_x, β and ψ by all offsets; NaN where no touch is left."""
+    """Return the derivatives (4, p) of motor angle, d_x, β and ψ by all offsets; NaN where no touch is left."""
     rows = []
     for k, step in enumerate(_STEPS):
         ends = []
@@ -311,7 +336,8 @@ def _derivatives(push: StatedPush, touch: Contact) -> np.ndarray:
             moved = np.zeros(len(_STEPS))
             moved[k] = sign * step
             at = push.moved_touch(touch, Offsets.from_vector(moved))
-            ends.append([NAN] * 3 if at is None else [at.d_x_mm, at.beta_rad, at.psi_rad])
+            numbers = None if at is None else [at.motor_rad, at.d_x_mm, at.beta_rad, at.psi_rad]
+            ends.append(numbers or [NAN] * 4)
         rows.append((np.array(ends[0]) - np.array(ends[1])) / (2.0 * step))
     return np.stack(rows, axis=-1)
 
