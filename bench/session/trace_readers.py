@@ -370,6 +370,8 @@ def _whisk(path: Path, label: str) -> DrawnLines:
     px = []
     for in_frame, number, points in segments:
         identity = number if identities is None else identities.get((in_frame, number), -1)
+        if identity < 0:  # whisk knows it for no whisker: a line of its own
+            identity = -1 - number
         frame.append(np.full(len(points), in_frame))
         line.append(np.full(len(points), identity))
         px.append(points)
