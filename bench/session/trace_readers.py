@@ -10,6 +10,7 @@ import io
 import json
 import pickle
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -300,13 +301,19 @@ def _sleap_labels(file: Mapping) -> DrawnLines:
     line = []
     px = []
     on_object = []
+    untracked: Counter[int] = Counter()
     for instance in file["instances"][()]:
         own = points[int(instance["instance_type"])][_points_of(instance)]
         is_seen = own["visible"] & np.isfinite(own["x"])
         own = own[is_seen]
         named = skeletons[int(instance["skeleton"])][is_seen]
-        frame += [number_of[int(instance["frame_id"])]] * len(own)
-        line += np.where(named, 0, int(instance["track"])).tolist()
+        in_frame = number_of[int(instance["frame_id"])]
+        track = int(instance["track"])
+        if track < 0:  # tracked by no one: the next line of its frame that is none
+            untracked[in_frame] += 1
+            track = -untracked[in_frame]
+        frame += [in_frame] * len(own)
+        line += np.where(named, 0, track).tolist()
         px += list(zip(own["x"] - corner_px, own["y"] - corner_px))
         on_object += named.tolist()
     return DrawnLines(

@@ -191,20 +191,21 @@ def test_joints_named_for_the_object_are_no_points_of_the_wire(tmp_path):
         file["node_names"] = np.array([b"w1", b"Bar_top", b"object2"])
     with h5py.File(project, "w") as file:
         sleap_project(file, PX[0], names=["object2", "w1", "Bar_top"], order=[1, 2, 0])
-    for path in (analysis, project):
+    # instances that SLEAP does not track are each a line
+    for path, numbers in ((analysis, [0, 1]), (project, [-1, -2])):
         lines = read_lines(path, "x")
         np.testing.assert_allclose(lines.of_wire.px, PX[0, :, 0])
-        assert lines.of_wire.line.tolist() == [0, 1]
+        assert lines.of_wire.line.tolist() == numbers
         np.testing.assert_allclose(lines.of_object.px, PX[0, :, 1:].reshape(-1, 2))
         assert set(lines.of_object.line.tolist()) == {0}
 
 
 def sleap_project(file, px, names, order):
-    """Write SLEAP's project of one frame: two predicted instances with points px (instances, joints, 2)."""
+    """Write SLEAP's project of one frame: predicted instances without a track, with points px (instances, joints, 2)."""
     point = [("x", "f8"), ("y", "f8"), ("visible", "?")]
     instance = ("instance_type", "frame_id", "skeleton", "track", "point_id_start", "point_id_end")
     joints = len(names)
-    rows = [(1, 0, 0, k, joints * k, joints * (k + 1)) for k in range(len(px))]
+    rows = [(1, 0, 0, -1, joints * k, joints * (k + 1)) for k in range(len(px))]
     file["pred_points"] = np.array([(*p, True) for own in px for p in own], dtype=point)
     file["points"] = np.zeros(0, dtype=point)
     file["frames"] = np.array([(0, 4)], dtype=[("frame_id", "u8"), ("frame_idx", "u8")])
