@@ -237,9 +237,18 @@ def _calibrated_sizes(session: Session) -> dict[str, Size]:
 
 
 def _check_camera_sizes(session: Session, camera: str, calibrated_size: Size | None) -> None:
-    """Raise BadInput where a picture of a camera has another size than the first."""
+    """Raise BadInput where a picture of a camera has another size than the first.
+
+    calibrated_size: by cameras.toml, of a part of a picture that part's.
+    """
     first_file = "cameras.toml"
     first_size = calibrated_size
+    crop = session.crops.get(camera)
+    if crop is not None:
+        if calibrated_size not in (None, crop.size_px):
+            found = f"has {camera} as {_px(calibrated_size)}, but its part of {crop.of}'s picture is {_px(crop.size_px)}"
+            raise BadInput(f"{found}; is it of another crop?", file=first_file)
+        first_size = None
     for file in _files_of_camera(session, camera):
         label = file.relative_to(session.path).as_posix()
         _check_stack(file, camera, label)

@@ -19,8 +19,8 @@ from bench.session.trace_files import IN_SPACE
 from bench.session.trace_readers import DrawnLines, read_lines
 from bench.session.trial import Trial
 from vision import Trace
-from vision.geometry import counted
-from vision.pictures import Frames
+from vision.geometry import Crop, counted
+from vision.pictures import Frames, PicturePart
 
 # [1] Of the points: a tracker may draw a line a little beyond the picture's edge; more are of other
 # pictures. Stated.
@@ -34,20 +34,23 @@ class TracedCamera:
     """What a camera's trace is of.
 
     count: of its pictures, in words `pictures`. size_px: width, height; None where no file says it.
-    picture (n,): index of its picture in each frame, −1 where it dropped that.
+    picture (n,): index of its picture in each frame, −1 where it dropped that. crop: of a camera that is a
+    part of a picture, whose traces are in that whole picture.
     """
 
     count: int
     size_px: tuple[int, int] | None
     picture: np.ndarray
     pictures: str
+    crop: Crop | None = None
 
     @classmethod
-    def of_pictures(cls, source: Path, picture: np.ndarray, camera: str) -> Self:
+    def of_pictures(cls, source: Path | PicturePart, picture: np.ndarray, camera: str) -> Self:
         """Return what a trace in a folder of pictures or a video is of."""
         count = frame_count(source)
         has = f"camera {camera} has {counted(count, 'picture')}"
-        return cls(count, Frames.open(source).size_px, picture, has)
+        crop = source.crop if isinstance(source, PicturePart) else None
+        return cls(count, Frames.open(source).size_px, picture, has, crop)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +63,7 @@ class Traced:
 
 def read_traces(
     files: Mapping[str, Path],
-    sources: Mapping[str, Path],
+    sources: Mapping[str, Path | PicturePart],
     pictures: Mapping[str, np.ndarray],
     label: str,
 ) -> dict[str, Traced]:
@@ -162,17 +165,21 @@ def _drawn(
 def _checked(drawn: DrawnLines, name: str, camera: TracedCamera, label: str) -> Traced:
     """Return a camera's lines as a trace. Raise BadInput where they are not of its pictures."""
     _require_frames(drawn.frame, camera, label)
-    is_inside = np.ones(len(drawn.px), dtype=bool)
-    if camera.size_px is not None:
-        is_inside = _inside(drawn.px, name, camera.size_px, label)
-    _require_span(drawn.px, label)
+    px = drawn.px
+    is_inside = np.ones(len(px), dtype=bool)
+    if camera.crop is not None:
+        px = camera.crop.in_part(px)
+        is_inside = _inside_part(px, name, camera.crop, label)
+    elif camera.size_px is not None:
+        is_inside = _inside(px, name, camera.size_px, label)
+    _require_span(px, label)
     picture = camera.picture
     frame_of = np.full(int(np.max(picture, initial=0)) + 1, -1)
     recorded = np.flatnonzero(picture >= 0)
     frame_of[picture[recorded]] = recorded
     number = drawn.frame.astype(int)
     frame = np.where(number < len(frame_of), frame_of[np.minimum(number, len(frame_of) - 1)], -1)
-    trace = Trace(frame, drawn.px, drawn.line, drawn.sigma_px)
+    trace = Trace(frame, px, drawn.line, drawn.sigma_px)
     return Traced(trace.select(is_inside & (frame >= 0)), drawn.has_identity)
 
 
@@ -197,6 +204,15 @@ def _require_span(px: np.ndarray, label: str) -> None:
     if span_px < _LEAST_SPAN_PX:
         found = f"all of its points are within {span_px:.2g} px"
         raise BadInput(f"{found}; are u_px and v_px in pixels, and of a line?", file=label)
+
+
+def _inside_part(px: np.ndarray, camera: str, crop: Crop, label: str) -> np.ndarray:
+    """Return which points (n, 2) are in a part of a picture; others may be of another part. Raise BadInput for none."""
+    is_inside = _are_in(px, crop.size_px)
+    if not np.any(is_inside):
+        found = f"none of its points is in camera {camera}'s part of {crop.of}'s picture"
+        raise BadInput(f"{found}; give them in pixels of the whole picture", file=label)
+    return is_inside
 
 
 def _inside(px: np.ndarray, camera: str, size_px: tuple[int, int], label: str) -> np.ndarray:

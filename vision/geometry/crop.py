@@ -47,6 +47,13 @@ class Crop:
         part = grey[self.top : self.top + self.height, self.left : self.left + self.width]
         return np.ascontiguousarray(part[:, ::-1] if self.mirrored else part)
 
+    def in_part(self, px: np.ndarray) -> np.ndarray:
+        """Return points (n, 2) of the whole picture as this part has them."""
+        u, v = px.T
+        if self.mirrored:
+            u = self.whole_px[0] - 1.0 - u
+        return np.stack([u, v], axis=1) - self.offset_px
+
     @property
     def offset_px(self) -> np.ndarray:
         """Return where (0, 0) lies (2,) in the whole picture, flipped as a whole where mirrored."""

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
+from bench.base.input_problems import InputProblems
+from bench.cameras.cameras_toml import write_cameras
 from bench.session.footage import read_frames, rig_picture
 from bench.session.session import load_session
+from bench.session.session_check import check_sizes
+from bench.session.traces import read_traces
+from vision.geometry import Camera, Cameras
 
 
 @pytest.fixture
@@ -60,6 +65,39 @@ def test_the_rest_beside_two_mirrors_is_the_largest_rectangle(one_camera):
     state(one_camera, MIRROR, other)
     rest = load_session(one_camera).crops["high"]
     assert (rest.left, rest.top, rest.width, rest.height) == (200, 300, 1080, 420)
+
+
+def test_a_trace_of_the_whole_picture_serves_all_its_parts(one_camera):
+    """Lines of 11 points down the picture: one in the mirror's part, one in the rest."""
+    state(one_camera, MIRROR)
+    trial = load_session(one_camera).trials[0]
+    down = np.arange(20.0, 131.0, 11.0)
+    rows = [f"0,{u},{v + top}" for u, top in ((100.0, 0.0), (200.0, 400.0)) for v in down]
+    for name in ("high", "mirrored"):
+        table = "\n".join(["frame,u_px,v_px", *rows]) + "\n"
+        trial.own(f"trace_{name}.csv").write_text(table)
+    trial = load_session(one_camera).trial(trial.name)
+    pictures = {name: np.zeros(1, dtype=int) for name in trial.camera_sources}
+    read = read_traces(trial.trace_files, trial.camera_sources, pictures, "t")
+    found = {name: traced.trace.px for name, traced in read.items()}
+    np.testing.assert_allclose(found["mirrored"], np.column_stack([np.full(11, 1179.0), down]))
+    np.testing.assert_allclose(found["high"], np.column_stack([np.full(11, 200.0), down + 100.0]))
+
+
+@pytest.mark.parametrize("height, is_same", [(300, True), (310, False)])
+def test_cameras_brought_along_are_of_the_parts(one_camera, height, is_same):
+    """As `calibrate cameras` writes them; of another crop they are refused."""
+    state(one_camera, MIRROR)
+    cameras = []
+    for name, size in (("high", (1280, 420)), ("mirrored", (1280, height))):
+        matrix = [[1500.0, 0.0, 640.0], [0.0, 1500.0, 200.0], [0.0, 0.0, 1.0]]
+        pose = np.column_stack([np.eye(3), [0.0, 0.0, 500.0]])
+        cameras.append(Camera(name, size, matrix, np.zeros(5), pose))
+    write_cameras(one_camera / "cameras.toml", Cameras(tuple(cameras)))
+    problems = InputProblems(stop_at_first=False)
+    check_sizes(load_session(one_camera), problems)
+    said = [str(refusal) for refusal in problems.refusals]
+    assert said == [] if is_same else "is it of another crop?" in said[0]
 
 
 @pytest.mark.parametrize(
