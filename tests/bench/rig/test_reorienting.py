@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
+from bench.rig.parts import Job
 from bench.rig.protocol import load
 from bench.rig.reorienting import turned_plane
-from bench.rig.simulation import simulate
+from bench.rig.simulation import make_part, simulate
 from bench.session.session import load_session
 
 ALPHA_DEG = 10.0
@@ -44,9 +45,11 @@ def test_after_one_turn_the_slope_is_the_friction_angle(protocol):
     assert abs(turned_plane(loaded, third, np.random.default_rng).beta_deg) < ALPHA_DEG + 0.5
 
 
-def test_a_session_says_what_was_turned_for_any_number_of_workers(protocol, tmp_path):
+def test_a_trial_says_what_was_turned_whatever_was_made_before_it(protocol, tmp_path):
     simulate(tmp_path / "one", protocol=protocol, signals_only=True)
-    simulate(tmp_path / "two", protocol=protocol, signals_only=True, workers=2)
+    job = Job(tmp_path / "two", load(protocol), 0, True)
+    for part in reversed(list(job.parts())):
+        make_part(job, part)
     names = sorted(folder.name for folder in (tmp_path / "one" / "trials").iterdir())
     assert names == ["steel_b40_v10_r1", "steel_b40_v10_r2", "steel_b40_v10_r3"]
     for name in names:
