@@ -9,4 +9,4 @@ from tests.scenes.rig_sessions import TINY, protocol_file
 @pytest.fixture(scope="session")
 def tiny(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tiny")
-    return simulate(folder / "session", protocol=protocol_file(folder, TINY), seed=5, workers=1)
+    return simulate(folder / "session", protocol=protocol_file(folder, TINY), seed=5)

@@ -184,7 +184,6 @@ def test_the_rig_s_sandpaper(tmp_path):
         protocol=protocol,
         signals_only=True,
         seed=5,
-        workers=1,
     )
     session = load_session(tmp_path / "session")
     true = json.loads((tmp_path / "session" / "truth.json").read_text())

@@ -237,7 +237,6 @@ def test_the_way_back_tells_hysteresis_return_and_repeatability(calibrate, tmp_p
         protocol=tmp_path / "protocol.toml",
         signals_only=True,
         seed=2,
-        workers=1,
     )
     capsys.readouterr()
     calibrate(session, tmp_path / "gauges.toml")
