@@ -14,9 +14,14 @@ from tests.scenes.rig_sessions import TINY, protocol_file
 @pytest.mark.parametrize(
     "change, message",
     [
-        (('name = "tiny"', 'nome = "tiny"'), "unknown field `nome`"),
+        (('name = "tiny"', 'nome = "tiny"'), "no key is `nome`"),
+        (("[[trials]]", "[[trails]]"), "no key is `trails`"),
+        (("views = 2", 'views = "two"'), "board.views: expected is a whole number, got text"),
         (("beta_deg = [20, 50]", "beta_deg = [20, 95]"), "±89"),
-        (("beta_deg = [20, 50]", 'beta_deg = "steep"'), "beta_deg"),
+        (
+            ("beta_deg = [20, 50]", 'beta_deg = "steep"'),
+            "trials[0].beta_deg: expected is a number or a list, got text",
+        ),
         (("friction = 0.2\n", "friction = -0.2\n"), "friction"),
         (("static_friction = 0.3", "static_friction = 0.1"), "below friction"),
         (("d_x_mm = 50.0", "d_x_mm = 0.05"), "d_x_mm"),
