@@ -46,7 +46,7 @@ _CONVERGED_PX = 0.5
 _SAME_LINE_PX = 1.5
 # [log] A bar whose score is so much less than another's is none: two measurements about the same
 # axis differ by 0.5. Study: bar_scenes.py.
-_CLEARER = 1.0
+CLEARER = 1.0
 # [passes] Most measurements of one axis: each moves a line by up to 3 px, so all of them by 36 px, more
 # than the width of most bars. Derived.
 _MOST_PASSES = 12
@@ -213,7 +213,7 @@ class BarSearch:
     def best_by_all_cameras(self) -> SeenBar:
         """Find the bar by its lines in all cameras: that with the highest detection score.
 
-        Pairs of lines are measured until they converge, as long as they could come within _CLEARER
+        Pairs of lines are measured until they converge, as long as they could come within CLEARER
         of the best so far. Where none converges, the bar is where edges are the strongest.
         """
         scene = self.scene
@@ -223,7 +223,7 @@ class BarSearch:
         found: list[SeenBar] = []
         for highest, one, other in _pairs_of(self._candidates(axes)):
             clearest = max(map(_detection_score, found), default=-np.inf)
-            if highest < clearest - _CLEARER:
+            if highest < clearest - CLEARER:
                 break
             axis = meeting_axis(one.camera, one.axis, other.camera, other.axis)
             if can_touch(axis, scene.rods, scene.motor_range_rad):
@@ -325,7 +325,7 @@ def _detection_score(bar: SeenBar) -> float:
 def _clearest_of(bars: Sequence[SeenBar]) -> SeenBar:
     """Return the bar with the highest detection score, with those that are as clear as its rivals."""
     clearest = max(bars, key=_detection_score)
-    least = clearest.detection_score - _CLEARER
+    least = clearest.detection_score - CLEARER
     rivals = [bar.axis for bar in bars if bar is not clearest and bar.detection_score > least]
     return replace(clearest, rivals=tuple(rivals))
 

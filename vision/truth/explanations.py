@@ -21,7 +21,8 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.geometry.refusals import Refused
 from vision.geometry.sampling import spread
-from vision.touched.search import SeenBar
+from vision.touched.search import CLEARER, SeenBar, with_lines
+from vision.touched.search_scene import SearchScene
 from vision.truth.line_source import EarlierWhisk
 from vision.truth.place_comparison import FRAMES, PlaceComparison
 from vision.truth.whisk_fit import fit_whisk
@@ -75,6 +76,14 @@ class Explanation:
         curves = self.fitted.some_curves(FRAMES)
         return PlaceComparison(self.whisk.views, curves, self.axis, self.whisk.rods)
 
+    def detection_score(self) -> float:
+        """Return how clearly the cameras see a bar about the fitted axis, as the search scores it."""
+        whisk = self.whisk
+        scene = SearchScene(
+            whisk.views, whisk.cameras, whisk.rods, whisk.angles_rad, whisk.settings
+        )
+        return with_lines(scene, SeenBar(self.axis, {})).detection_score
+
     def from_place(self, axis: BarAxis) -> Self:
         """Return the fit that begins from another place. Raises Refused where there is none."""
         begin = replace(self.whisk, bar=SeenBar(axis, {}), light={}, earlier=None)
@@ -107,22 +116,20 @@ def best_explanation(first: Explanation) -> Explanation:
             break
     else:
         best = replace(best, warning=_unconverged_warning(best.place_comparison(), best))
-    if best.fitted is first.fitted:
-        return best
-    light = first.whisk.light
-    light.clear()
-    light.update(best.whisk.light)
-    return replace(best, whisk=replace(best.whisk, bar=SeenBar(best.axis, {}), light=light))
+    return _in_place_of(first, best)
 
 
-def _weigh_rivals(best: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
-    """Return a fit, with a warning where one from another bar explains the pictures as well.
+def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
+    """Return a fit, or that from another bar which is clearer, with a warning where it hardly is.
 
-    rivals: axes that the search found as clear. Raises Refused where their distances differ.
+    rivals: axes that the search found as clear. Where a whisk fits at one of them and changes as
+    much of the pictures, detection scores about the two fitted axes decide. Raises Refused where
+    these are alike and the distances differ.
     """
-    comparison = _comparison(best) if rivals else None
+    comparison = _comparison(first) if rivals else None
     if comparison is None:
-        return best
+        return first
+    best = first
     for axis in rivals:
         if comparison.apart_px(axis, best.axis) <= _APART_PX:
             continue
@@ -133,10 +140,25 @@ def _weigh_rivals(best: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
         away_px = comparison.apart_px(other.axis, best.axis)
         if away_px <= _APART_PX or _is_better(comparison, best.axis, other.axis, _LIKELY_SIGMAS):
             continue
-        _require_one(best, other)
-        sentence = f"the bar may be elsewhere: a place up to {away_px:.0f} px away explains the pictures as well"
-        return replace(best, warning=Reason("bar_elsewhere", sentence))
-    return best
+        more_score = other.detection_score() - best.detection_score()
+        if more_score > 0.0:
+            best, other = other, best
+        if abs(more_score) < CLEARER:
+            _require_one(best, other)
+            sentence = f"the bar may be elsewhere: a place up to {away_px:.0f} px away explains the pictures as well"
+            best = replace(best, warning=Reason("bar_elsewhere", sentence))
+            break
+    return _in_place_of(first, best)
+
+
+def _in_place_of(first: Explanation, best: Explanation) -> Explanation:
+    """Return the best fit as that of the first one's whisk, whose record of light it fills."""
+    if best.fitted is first.fitted:
+        return best
+    light = first.whisk.light
+    light.clear()
+    light.update(best.whisk.light)
+    return replace(best, whisk=replace(best.whisk, bar=SeenBar(best.axis, {}), light=light))
 
 
 def compare_early(whisk: WhiskPictures, curves: Mapping[int, Curves]) -> PlaceComparison | None:

@@ -322,3 +322,4 @@ def test_a_bar_and_its_shadow_that_are_equally_clear_are_told():
     (whisk,) = observe_trial(pictures, whole, cameras, rods, VisionSettings()).whisks
     assert "bar_elsewhere" in whisk.status.codes
     assert abs(whisk.d_x_mm.value - 49.704) < 2.0 * whisk.d_x_mm.sigma  # truth.toml
+    assert abs(whisk.beta_rad.value - np.radians(-1.503)) < 2.0 * whisk.beta_rad.sigma
