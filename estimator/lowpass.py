@@ -1,4 +1,7 @@
-"""A low-pass filter without delay, for the samples of a whole stroke."""
+"""A low-pass filter without delay, for the samples of a whole stroke.
+
+As `scipy.signal.sosfiltfilt`, which takes longer to load than a session to read.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike

@@ -106,7 +106,7 @@ class _Marched:
 
 
 @dataclass(frozen=True, eq=False)
-class CurvedRods:
+class KirchhoffRods:
     """Rods of one whisker, held at contacts (n, 3), mm, in the hub's axes.
 
     rest: of the whisker. width: the diameter over the clamp's as a function of shares of the length.
@@ -117,10 +117,6 @@ class CurvedRods:
     width: Callable
     clamp_rigidity_Nmm2: float
     contacts_mm: np.ndarray
-
-    def moments_Nmm(self, friction: np.ndarray, deflection_mm: np.ndarray) -> np.ndarray:
-        """Return m_y and m_z (n, 2) of the clamp on the rods, N·mm; arguments and errors as of `held`."""
-        return self.held(friction, deflection_mm).moments_Nmm
 
     def held(self, friction: np.ndarray, deflection_mm: np.ndarray) -> HeldRod:
         """Return what holds the rods at their contacts.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.gauges.clamped_rod import load_at_clamp
-from bench.gauges.curved_rod import CurvedRods, UnloadedRod
+from bench.gauges.curved_rod import KirchhoffRods, UnloadedRod
 from bench.gauges.held_rod import HeldRod
 from bench.session.whisker import Whisker
 
@@ -103,7 +103,7 @@ class CurvedRod(WhiskerRod):
         whisker = self.whisker
         rest = UnloadedRod(whisker.unloaded_mm, whisker.length_mm)
         unbent, deflection = _in_hub(rest, contacts)
-        rods = CurvedRods(rest, whisker.beam.width, whisker.EI_Nmm2, unbent + deflection)
+        rods = KirchhoffRods(rest, whisker.beam.width, whisker.EI_Nmm2, unbent + deflection)
         return rods.held(_pull(whisker, contacts, friction), deflection)
 
 

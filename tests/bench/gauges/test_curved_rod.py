@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.gauges.curved_rod import CurvedRods, UnloadedRod
+from bench.gauges.curved_rod import KirchhoffRods, UnloadedRod
 from bench.gauges.whisker_rods import CurvedRod, SeenContacts, StraightRod, rod_of
 from bench.session.whisker import Whisker
 from tests.scenes.curved_pushes import PROFILED, VIBRISSA, CurvedPush, feel, whisker_of
@@ -95,7 +95,7 @@ def test_the_answer_is_the_same_in_every_unit(
         rest = UnloadedRod(tuple((0.0, 0.0, unit * length * tip) for tip in sets), unit * length)
         unbent = rest.point_mm(np.array([part * unit * length]))
         deflection = part * unit * length * np.array([[-0.5 * theta**2, -theta, 0.3 * theta]])
-        rods = CurvedRods(
+        rods = KirchhoffRods(
             rest, lambda share: 1.0 - taper * share, rigidity * force * unit**2, unbent + deflection
         )
         held = rods.held(np.array([-0.1]), deflection)
@@ -109,13 +109,13 @@ def test_a_contact_at_the_point_of_a_cone_has_no_moment():
     rest = UnloadedRod(((0.0, 0.0, 3.0), (0.0,)), 45.0)
     contact = rest.point_mm(np.array([44.9])) - [0.0, 2.0, 0.0]
     with pytest.raises(ArithmeticError, match="too near the end"):
-        rods = CurvedRods(rest, lambda share: 1.0 - share, 0.24, contact)
-        rods.moments_Nmm(np.zeros(1), np.array([[0.0, -2.0, 0.0]]))
+        rods = KirchhoffRods(rest, lambda share: 1.0 - share, 0.24, contact)
+        rods.held(np.zeros(1), np.array([[0.0, -2.0, 0.0]]))
 
 
 def test_a_contact_far_beyond_the_end_is_refused_and_not_marched_for_ever():
     """Beyond its end the shape's slope exceeds 1, whose tangent is no number: no step of a march ends."""
     rest = UnloadedRod(((0.0, 0.0, 40.0), (0.0,)), 100.0)
-    rods = CurvedRods(rest, np.ones_like, 100.0, np.array([[130.0, 10.0, 5.0]]))
+    rods = KirchhoffRods(rest, np.ones_like, 100.0, np.array([[130.0, 10.0, 5.0]]))
     with pytest.raises(ArithmeticError, match="beyond the end"):
-        rods.moments_Nmm(np.zeros(1), np.array([[0.0, 10.0, 5.0]]))
+        rods.held(np.zeros(1), np.array([[0.0, 10.0, 5.0]]))
