@@ -21,6 +21,7 @@ from bench.rig.recording import (
     Exposures,
     GaugedWhisker,
     Recording,
+    channel_names,
     place_object,
     plan_stroke,
     sample_signals,
@@ -34,7 +35,6 @@ _FARTHEST_RAD = math.radians(25.0)
 # origin would touch
 _SWEPT_RAD = np.radians(np.arange(-60.0, 60.0, 0.25))
 _ARCS = 200  # points of a whisker in that search; a bar is thicker than their distance
-_CHANNELS = ("y_V", "z_V", "f_x_N", "f_y_N", "f_z_N")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,8 @@ class ArrayRecording:
                 protocol, run, whisker, bar, touches[whisker.name], stroke, frame_times_s, rng
             )
             recordings[whisker.name] = recording
-            _add_channels(channels, whisker, signals, len(strokes) > 1)
+            columns = dict(zip(channel_names(protocol), signals.T))
+            _add_channels(channels, whisker, columns, len(strokes) > 1)
         return cls(run, bar, recordings, strokes, channels, frame_times_s)
 
 
@@ -223,13 +224,16 @@ def _exposures(stroke, frame_times_s) -> Exposures:
     return Exposures(times, stroke.angle_rad(times), whisk, np.zeros(len(times), bool))
 
 
-def _add_channels(channels, whisker, signals, several_motors):
-    """Add a whisker's columns of signals.csv; time and its motor's, where they are not there
+def _add_channels(channels, whisker, columns, several_motors):
+    """Add a whisker's columns of signals.csv, by name; time and its motor's, where they are not there
     yet."""
-    channels.setdefault("time_s", signals[:, 0])
-    channels.setdefault(motor_channel(whisker, several_motors), signals[:, 1])
-    for name, column in zip(_CHANNELS, signals[:, 2:].T):
-        channels[f"{name}@{whisker.name}"] = column
+    for name, column in columns.items():
+        if name == "time_s":
+            channels.setdefault(name, column)
+        elif name == "motor_deg":
+            channels.setdefault(motor_channel(whisker, several_motors), column)
+        else:
+            channels[f"{name}@{whisker.name}"] = column
 
 
 def motor_channel(whisker: MountedWhisker, several_motors: bool) -> str:

@@ -56,8 +56,7 @@ class Exposures:
 class Recording:
     """A trial of one whisker.
 
-    signals (n, 4): time_s, motor_deg, y_V, z_V; three more of a load cell, f_x_N, f_y_N, f_z_N; one more of
-    a microphone, p_Pa.
+    signals (n, k): columns of signals.csv, of the names in channels.
     stated_velocity_mm_s (3,): of the object, as trial.toml has it; None where it stands still.
     """
 
@@ -69,6 +68,7 @@ class Recording:
     whisks: tuple[WhiskMechanics, ...]
     frames: Exposures
     signals: np.ndarray
+    channels: tuple[str, ...]
     stated_velocity_mm_s: np.ndarray | None = None
 
     @classmethod
@@ -124,8 +124,18 @@ class Recording:
             )
         whisks = tuple(mechanics[friction] for friction in frictions)
         signals = sample_signals(protocol, run, stroke, whisks, whisker.gauges, rng)
-        velocity = _state_velocity(run, rng)
-        return cls(run, whisker.rod, bar, touch, stroke, whisks, frames, signals, velocity)
+        return cls(
+            run,
+            whisker.rod,
+            bar,
+            touch,
+            stroke,
+            whisks,
+            frames,
+            signals,
+            channel_names(protocol),
+            _state_velocity(run, rng),
+        )
 
 
 def place_object(
@@ -183,6 +193,14 @@ def plan_stroke(protocol: Protocol, run: ProtocolRun, low_rad: float, high_rad: 
     )
 
 
+def channel_names(protocol: Protocol) -> tuple[str, ...]:
+    """Return the names of the columns that the DAQ writes, in the order of `sample_signals`."""
+    names = ("time_s", "motor_deg", "y_V", "z_V")
+    if protocol.load_cell:
+        names += ("f_x_N", "f_y_N", "f_z_N")
+    return (*names, "p_Pa") if protocol.microphone else names
+
+
 def sample_signals(
     protocol: Protocol,
     run: ProtocolRun,
@@ -191,7 +209,7 @@ def sample_signals(
     gauges: GaugesTable,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Return what the DAQ writes, as `Recording.signals`; without whisks, of a whisker that
+    """Return what the DAQ writes (n, k), of the columns `channel_names`; without whisks, of a whisker that
     touches nothing."""
     fine_s = fine_times_s(gauges, stroke.end_s)
     moments = quasi_static_Nmm(stroke, whisks, fine_s)

@@ -34,8 +34,8 @@ def turned_plane(
 
 def felt_slip_deg(protocol: Protocol, recording: Recording) -> float:
     """Return the direction of the deflection, degrees from the plane of rotation, by the gauges."""
-    motor_deg = recording.signals[:, 1]
-    volts = recording.signals[:, 2:4]
+    _, motor_deg, y_V, z_V = recording.signals.T[:4]
+    volts = np.stack([y_V, z_V], axis=-1)
     touch_deg = np.degrees(recording.touch.motor_rad)
     free = motor_deg < touch_deg
     pushing = motor_deg > motor_deg.max() - _SHARE_TAKEN * (motor_deg.max() - touch_deg)

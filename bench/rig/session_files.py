@@ -15,9 +15,6 @@ from bench.rig.touched_object import TouchedObject
 
 # [points] Of a whisker's measured diameters. Stated.
 _PROFILE_POINTS = 16
-_GAUGES = ("time_s", "motor_deg", "y_V", "z_V")
-_FORCES = ("f_x_N", "f_y_N", "f_z_N")
-_PRESSURE = ("p_Pa",)
 
 
 def board_keys(table: BoardTable) -> dict:
@@ -211,11 +208,8 @@ def frames_csv(times_s: Iterable[float], clock_offset_s: float) -> str:
 
 
 def signals_csv(recording: Recording) -> str:
-    """Return signals.csv of a recording: gauges, V, a load cell's forces, N, and a microphone's
-    pressure, Pa, where there are these."""
-    count = recording.signals.shape[1]
-    names = _GAUGES + (_FORCES if count >= 7 else ()) + (_PRESSURE if count in (5, 8) else ())
-    return _signals_csv(names, recording.signals)
+    """Return signals.csv of a recording."""
+    return _signals_csv(recording.channels, recording.signals)
 
 
 def array_signals_csv(recording: ArrayRecording) -> str:
