@@ -12,7 +12,7 @@ from bench.plan.plan_rows import Facts, Row, changed_sigmas
 from bench.plan.staged import StagedWhisk, stage_on_bar
 from bench.records.trial_result import SeenTrial, SeenWhisk
 from bench.rig.bar import TouchedBar, find_first_touch
-from bench.rig.elastic_rod import ProfiledRod, Rod
+from bench.rig.elastic_rod import Rod
 from bench.session.session import Session
 from bench.session.trial import Trial
 from bench.session.whisker import Whisker
@@ -104,9 +104,8 @@ def _friction(whisk: SeenWhisk) -> float:
 def _rod(whisker: Whisker) -> Rod:
     """Return the rig's rod of a session's whisker."""
     sizes = (whisker.shape, whisker.length_mm, whisker.diameter_mm, whisker.implied_modulus_GPa)
-    if whisker.widths and whisker.shape == "tapered":
-        return ProfiledRod(*sizes, tip_diameter_mm=whisker.tip_diameter_mm, widths=whisker.widths)
-    return Rod(*sizes, tip_diameter_mm=whisker.tip_diameter_mm)
+    widths = whisker.widths if whisker.shape == "tapered" else ()
+    return Rod(*sizes, tip_diameter_mm=whisker.tip_diameter_mm, widths=widths)
 
 
 def _facts(task: SeenTask) -> Facts:

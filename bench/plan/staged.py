@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from bench.rig.bar import TouchedBar, UnloadedTouch
-from bench.rig.elastic_rod import ProfiledRod, Rod
+from bench.rig.elastic_rod import Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.protocol import Protocol, ProtocolRun
 from bench.rig.recording import Recording
@@ -113,7 +113,7 @@ def as_staged(marched: WhiskMechanics, motor_rad: np.ndarray, time_s: np.ndarray
 def _wire(rod: Rod) -> Wire:
     """Return a rod of the rig as cameras see it; its rest shape stands elsewhere."""
     tip = {"tip_diameter_mm": rod.tip_diameter_mm}
-    if isinstance(rod, ProfiledRod):
+    if rod.widths:
         return ProfiledWire(rod.shape, rod.length_mm, rod.diameter_mm, **tip, widths=rod.widths)
     return Wire(rod.shape, rod.length_mm, rod.diameter_mm, **tip)
 

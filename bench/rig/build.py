@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 
-from bench.rig.elastic_rod import ProfiledRod, RestShape, Rod
+from bench.rig.elastic_rod import RestShape, Rod
 from bench.rig.light import Light, Material
 from bench.rig.linear import compose, rotation_about_z
 from bench.rig.mirror import MirrorStudio, Part, direct_part, mirrored_part
@@ -28,25 +28,16 @@ def rod(protocol: Protocol) -> Rod:
     """Build the whisker."""
     table = protocol.whisker
     rest = RestShape(table.length_mm, table.sag_mm, table.set_y_mm, table.set_z_mm)
-    if table.widths:
-        return ProfiledRod(
-            "tapered",
-            table.length_mm,
-            table.diameter_mm,
-            table.youngs_modulus_GPa,
-            table.density_kg_m3,
-            rest,
-            sum(table.widths) * table.diameter_mm,
-            table.widths,
-        )
+    tip_mm = sum(table.widths) * table.diameter_mm if table.widths else table.tip_diameter_mm
     return Rod(
-        table.shape,
+        "tapered" if table.widths else table.shape,
         table.length_mm,
         table.diameter_mm,
         table.youngs_modulus_GPa,
         table.density_kg_m3,
         rest,
-        table.tip_diameter_mm,
+        tip_mm,
+        table.widths or (),
     )
 
 

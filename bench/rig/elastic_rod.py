@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -98,9 +99,10 @@ class Rod:
     """A whisker of one material.
 
     shape: "cylinder", "cone" (from the base's diameter to a point at `length_mm`), or "tapered"
-    (to `tip_diameter_mm` there). rest: straight where it is None.
-    Raises ValueError for another shape, a size that is not positive, or a tip that is not thinner
-    than the base.
+    (to `tip_diameter_mm` there). rest: straight where it is None. widths: of a "tapered" whisker that is
+    no cone, the diameter over the base's, a polynomial in the share of the length, lowest power first.
+    Raises ValueError for another shape, a size that is not positive, a tip that is not thinner
+    than the base, or widths that are not 1 at the base and positive all along.
     """
 
     shape: str
@@ -110,6 +112,7 @@ class Rod:
     density_kg_m3: float = 6450.0  # Nitinol
     rest: RestShape | None = None
     tip_diameter_mm: float | None = None
+    widths: tuple[float, ...] = ()
 
     def __post_init__(self):
         if self.shape not in ("cylinder", "cone", "tapered"):
@@ -131,6 +134,17 @@ class Rod:
                 raise ValueError(f"a whisker's {name} is positive, not {getattr(self, name)}")
         if self.rest is None:
             object.__setattr__(self, "rest", RestShape(self.length_mm))
+        if self.widths:
+            self._check_widths()
+
+    def _check_widths(self):
+        """Raise ValueError for widths that are not 1 at the base and positive all along."""
+        along = self.width(np.linspace(0.0, self.length_mm, 201))
+        if not (self.widths[0] == 1.0 and along.min() > 0):
+            raise ValueError(
+                "a whisker's widths are 1 at its base and above 0 all along, "
+                f"not {along[0]:g} and {along.min():g}"
+            )
 
     @property
     def rigidity_Nmm2(self) -> float:
@@ -150,14 +164,28 @@ class Rod:
             return 1 - self.tip_diameter_mm / self.diameter_mm
         return 1.0 if self.shape == "cone" else 0.0
 
+    @cached_property
+    def _polynomials(self) -> list[tuple[float, ...]]:
+        """Return the coefficients of the width by the share of the length, and of its first two derivatives."""
+        widths = self.widths or (1.0, -self.diameter_loss)
+        slope = polynomial.polyder(widths)
+        return [tuple(widths), tuple(slope.tolist()), tuple(polynomial.polyder(slope).tolist())]
+
     def width(self, arc_mm: float | np.ndarray) -> np.ndarray:
         """Return the diameter at arc length over the base's."""
-        share = np.asarray(arc_mm, float) / self.length_mm
-        return np.maximum(1 - self.diameter_loss * share, 0.0)
+        return np.maximum(self._evaluate(0, arc_mm), 0.0)
 
     def width_by_arc(self, arc_mm: float | np.ndarray) -> float | np.ndarray:
         """Return the derivative of the width by arc length at arc lengths, 1/mm."""
-        return -self.diameter_loss / self.length_mm
+        return self._evaluate(1, arc_mm) / self.length_mm
+
+    def _evaluate(self, order, arc_mm):
+        """Return a derivative of the width, of this order by the share of the length, at arc lengths."""
+        share = np.asarray(arc_mm, float) / self.length_mm
+        *lower, value = self._polynomials[order]
+        for coefficient in reversed(lower):
+            value = coefficient + value * share
+        return value
 
     def radius_mm(self, arc_mm: float | np.ndarray) -> np.ndarray:
         """Return the radius at arc length."""
@@ -169,40 +197,4 @@ class Rod:
 
     def taper_by_arc(self, arc_mm: float) -> float:
         """Return the change of the taper per arc length at an arc length, 1/mm."""
-        return 0.0
-
-
-@dataclass(frozen=True)
-class ProfiledRod(Rod):
-    """A "tapered" whisker that is no cone.
-
-    widths: polynomial in the share of the length of the diameter over the base's, lowest power first.
-    Raises ValueError as `Rod` does, and unless it is 1 at the base and positive all along.
-    """
-
-    widths: tuple[float, ...] = (1.0,)
-
-    def __post_init__(self):
-        super().__post_init__()
-        along = self.width(np.linspace(0.0, self.length_mm, 201))
-        if not (self.widths[0] == 1.0 and along.min() > 0):
-            raise ValueError(
-                "a whisker's widths are 1 at its base and above 0 all along, "
-                f"not {along[0]:g} and {along.min():g}"
-            )
-
-    def width(self, arc_mm: float | np.ndarray) -> np.ndarray:
-        """Return the diameter at arc length over the base's."""
-        share = np.asarray(arc_mm, float) / self.length_mm
-        return np.maximum(polynomial.polyval(share, self.widths), 0.0)
-
-    def width_by_arc(self, arc_mm: float | np.ndarray) -> float | np.ndarray:
-        """Return the derivative of the width by arc length at arc lengths, 1/mm."""
-        share = np.asarray(arc_mm, float) / self.length_mm
-        return polynomial.polyval(share, polynomial.polyder(self.widths)) / self.length_mm
-
-    def taper_by_arc(self, arc_mm: float) -> float:
-        """Return the change of the taper per arc length at an arc length, 1/mm."""
-        share = arc_mm / self.length_mm
-        twice = polynomial.polyval(share, polynomial.polyder(self.widths, 2))
-        return 0.5 * self.diameter_mm * float(twice) / self.length_mm**2
+        return 0.5 * self.diameter_mm * float(self._evaluate(2, arc_mm)) / self.length_mm**2

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from bench.rig.bar import TouchedBar, find_first_touch, unloaded_curve
-from bench.rig.elastic_rod import ProfiledRod, RestShape, Rod
+from bench.rig.elastic_rod import RestShape, Rod
 from bench.rig.linear import rotate_about_z
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
@@ -16,7 +16,7 @@ from bench.session.whisker import Whisker
 # A rat's vibrissa, as `simulate --protocol vibrissa` has it.
 VIBRISSA = Rod("cone", 45.0, 0.2, 3.0, rest=RestShape(45.0, 0.0, -3.0, -4.0))
 # One that is thicker at its root than a cone.
-PROFILED = ProfiledRod(
+PROFILED = Rod(
     "tapered",
     45.0,
     0.2,
