@@ -37,7 +37,9 @@ def distance_error(
     outside [0°, 90°) or an unknown equation.
     """
     _require(alpha, alpha_est, equation)
-    return (_error_of_2 if equation == "no_slip" else _error_of_10)(beta, alpha, alpha_est)
+    if equation == "no_slip":
+        return _error_of_2(beta, alpha)
+    return _error_of_10(beta, alpha, alpha_est)
 
 
 def slope_threshold(
@@ -50,7 +52,9 @@ def slope_threshold(
     """
     _require(alpha, alpha_est, equation)
     require_positive("error", error, "(a share)")
-    return (_slope_of_2 if equation == "no_slip" else _slope_of_10)(error, alpha, alpha_est)
+    if equation == "no_slip":
+        return _slope_of_2(error, alpha)
+    return _slope_of_10(error, alpha, alpha_est)
 
 
 def _require(alpha, alpha_est, equation):
@@ -62,11 +66,11 @@ def _require(alpha, alpha_est, equation):
 
 
 @elementwise
-def _error_of_2(beta, alpha, alpha_est):
+def _error_of_2(beta, alpha):
     """Compute the relative error of (2), tan β tan φ."""
     slope = np.abs(beta)
     error = np.tan(slope) * np.tan(np.maximum(0.0, slope - alpha))
-    return np.where(slope < RIGHT_ANGLE, error + 0.0 * alpha_est, np.nan)
+    return np.where(slope < RIGHT_ANGLE, error, np.nan)
 
 
 @elementwise
@@ -80,10 +84,10 @@ def _error_of_10(beta, alpha, alpha_est):
 
 
 @elementwise
-def _slope_of_2(error, alpha, alpha_est):
+def _slope_of_2(error, alpha):
     """Solve `_error_of_2` for β."""
     halfway = np.tan(alpha) * (1 + error) / 2
-    return np.arctan(halfway + np.sqrt(halfway**2 + error) + 0.0 * alpha_est)
+    return np.arctan(halfway + np.sqrt(halfway**2 + error))
 
 
 @elementwise
