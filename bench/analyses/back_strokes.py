@@ -58,7 +58,7 @@ class WayBack:
     """One estimate of one way back.
 
     d_x_mm: distance of the contact as seen on the way back, else on the way there. felt, felt_there:
-    moments of the way back and of the way there. answer: the estimate, with a status alone where
+    moments of the way back and of the way there. estimate: with a status alone where
     there is none.
     """
 
@@ -67,17 +67,17 @@ class WayBack:
     d_x_mm: Value
     felt: FeltWhisk
     felt_there: FeltWhisk
-    answer: EstimateRow
+    estimate: EstimateRow
 
     @property
     def error_percent(self) -> float:
         """Return estimate less truth, percent of the truth."""
-        return self.answer.error_percent(self.d_x_mm).value
+        return self.estimate.error_percent(self.d_x_mm).value
 
     @property
     def inside(self) -> bool | None:
         """Return whether the 95 % interval holds the truth; None where either is not known."""
-        return self.answer.holds(self.d_x_mm.value)
+        return self.estimate.holds(self.d_x_mm.value)
 
 
 class BothWays(Analysis):
@@ -95,11 +95,11 @@ class BothWays(Analysis):
         """Return the row of a way back and estimator."""
         seen = one.seen
         felt = one.felt
-        answer = one.answer
+        estimate = one.estimate
         phi_seen_rad = np.nan if seen.at is None else seen.at.phi_rad.value
         return {
             **whisk_cells(one.result, seen.whisk),
-            **estimate_cells(answer, one.d_x_mm),
+            **estimate_cells(estimate, one.d_x_mm),
             **value_cells("touch_deg", seen.touch_rad),
             **value_cells("touch_felt_deg", felt.touch_felt_rad),
             **value_cells("beta_deg", seen.beta_rad),
@@ -108,13 +108,13 @@ class BothWays(Analysis):
             "phi_there_deg": degrees(one.felt_there.phi_felt_rad.value),
             "m_y_Nmm": felt.m_y_Nmm.value,
             "m_z_Nmm": felt.m_z_Nmm.value,
-            "status": in_one_status(seen.status, felt.status, answer.status),
+            "status": in_one_status(seen.status, felt.status, estimate.status),
         }
 
     def lines(self, found: Sequence[WayBack]) -> Iterator[str]:
         """Yield a line an estimator, over the ways back whose truth is known."""
         known = [one for one in found if np.isfinite(one.error_percent)]
-        for name, mine in grouped(known, lambda one: one.answer.estimator).items():
+        for name, mine in grouped(known, lambda one: one.estimate.estimator).items():
             error_percent = rms(column(mine, "error_percent"))
             held = coverage(mine, "way")
             yield f"{label_of(name)}: error of d_x {error_percent:.2g} % RMS; {held} back"
@@ -132,6 +132,6 @@ def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
             seen_back, result.seen.whisks, felt_back, result.felt.whisks
         ):
             d_x_mm = seen.d_x_mm if seen.has_truth else seen_there.d_x_mm
-            for answer in felt.estimates or (EstimateRow("", UNKNOWN),):
-                found.append(WayBack(result, seen, d_x_mm, felt, felt_there, answer))
+            for estimate in felt.estimates or (EstimateRow("", UNKNOWN),):
+                found.append(WayBack(result, seen, d_x_mm, felt, felt_there, estimate))
     return found

@@ -27,7 +27,7 @@ from bench.records.trial_result import (
     whisks,
 )
 from bench.session.whisker import Whisker
-from bench.trials.estimates import Estimator, answer, assumed_settings, whisk_of
+from bench.trials.estimates import Estimator, assumed_settings, run_estimator, whisk_of
 from estimator.beam import Beam
 from estimator.builtin import corrected, exact_rod, with_friction
 from estimator.friction import FrictionFit
@@ -103,7 +103,9 @@ class SecondEvaluation:
 
         exact_sigma_mm: its sigma as if that angle were right, where that is known already.
         """
-        return answer(name, estimator, whisk, *alpha, self.radii_mm, exact_sigma_mm=exact_sigma_mm)
+        return run_estimator(
+            name, estimator, whisk, *alpha, self.radii_mm, exact_sigma_mm=exact_sigma_mm
+        )
 
     def given(self, felt: FeltAt | FeltWhisk, theta_rad: float) -> tuple[EstimateRow, ...]:
         """Return the estimates, those that assume α_est with the session's sigma of it."""

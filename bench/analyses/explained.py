@@ -143,10 +143,10 @@ def explained_rows(results: Iterable[TrialResult], whisker: Whisker) -> Iterator
         }
 
 
-def _shares_by_fit(seen: SeenWhisk, felt: FeltWhisk, answer: EstimateRow) -> dict:
+def _shares_by_fit(seen: SeenWhisk, felt: FeltWhisk, ten: EstimateRow) -> dict:
     """Return the error of (10) and its change by the fitted friction angle, mm; no share is seen."""
     truth = seen.d_x_mm.value
-    d_x = answer.d_x_est_mm.value
+    d_x = ten.d_x_est_mm.value
     fitted = felt.estimate(FITTED)
     d_x_alpha = np.nan if fitted is None else fitted.d_x_est_mm.value
     return {
@@ -163,14 +163,14 @@ def _shares(
     result: TrialResult,
     seen: SeenWhisk,
     felt: FeltWhisk,
-    answer: EstimateRow,
+    ten: EstimateRow,
     alpha_seen_rad: float,
     whisker: Whisker,
 ) -> dict:
     """Return the error of (10) and the change of d_x by each replacement, mm."""
     theta = result.theta_rad
     theta_seen = theta + felt.touch_felt_rad.value - seen.touch_rad.value
-    alpha_est = answer.alpha_est_rad
+    alpha_est = ten.alpha_est_rad
     alpha = max(alpha_seen_rad if np.isfinite(alpha_seen_rad) else alpha_est, 0.0)
     m_felt = (felt.m_y_Nmm.value, felt.m_z_Nmm.value)
     m_seen = _moments_seen(seen, theta_seen, whisker)

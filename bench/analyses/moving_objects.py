@@ -69,21 +69,21 @@ class Moved:
 
     trial: Trial
     seen: SeenWhisk
-    answer: EstimateRow
+    estimate: EstimateRow
     share_percent: float
     is_sound: bool
 
     @property
     def error_percent(self) -> float:
         """Return estimate less truth, percent of the truth."""
-        return self.answer.error_percent(self.seen.d_x_mm).value
+        return self.estimate.error_percent(self.seen.d_x_mm).value
 
     @property
     def inside(self) -> bool | None:
         """Return whether the 95 % interval holds the truth; None where there is no interval."""
         if not np.isfinite(self.error_percent):
             return None
-        return self.answer.holds(self.seen.d_x_mm.value)
+        return self.estimate.holds(self.seen.d_x_mm.value)
 
 
 class MovingObjects(Analysis):
@@ -103,24 +103,24 @@ class MovingObjects(Analysis):
             if trial.object_velocity_mm_s is None or not (seen.has_truth and felt.has_moments):
                 continue
             share = _share_percent(trial, seen, felt)
-            for answer in (*felt.estimates, *felt.sensors):
-                found.append(Moved(trial, seen, answer, share, is_sound(seen, felt)))
+            for estimate in (*felt.estimates, *felt.sensors):
+                found.append(Moved(trial, seen, estimate, share, is_sound(seen, felt)))
         return found
 
     def row(self, one: Moved) -> dict:
         """Return the row of a whisk and estimator."""
         trial = one.trial
         seen = one.seen
-        answer = one.answer
+        estimate = one.estimate
         row = {
             "trial": trial.name,
             "whisk": seen.whisk,
             "surface": trial.surface,
-            **estimate_cells(answer, seen.d_x_mm),
+            **estimate_cells(estimate, seen.d_x_mm),
             "beta_deg": degrees(seen.beta_rad.value),
             "velocity_share_percent": one.share_percent,
             "velocity_sigma_mm_s": trial.object_velocity_sigma_mm_s,
-            "status": answer.status,
+            "status": estimate.status,
         }
         for k, axis in enumerate(_AXES):
             row[f"velocity_{axis}_mm_s"] = float(trial.object_velocity_mm_s[k])
@@ -140,7 +140,7 @@ class MovingObjects(Analysis):
             f"{counted(number, 'whisk')} against objects that moved along the push at "
             f"{min(shares):+.0f} to {max(shares):+.0f} % of the whisker's speed; error of d_x, RMS:"
         )
-        for name, mine in grouped(known, lambda one: one.answer.estimator).items():
+        for name, mine in grouped(known, lambda one: one.estimate.estimator).items():
             error_percent = rms(column(mine, "error_percent"))
             yield f"  {label_of(name)}: {error_percent:.2g} %; {coverage(mine, 'whisk')}"
 
@@ -150,7 +150,7 @@ class MovingObjects(Analysis):
             return None
         drawing = blank(6.0, 4.0)
         axes = drawing.subplots()
-        by_estimator = grouped(found, lambda one: one.answer.estimator)
+        by_estimator = grouped(found, lambda one: one.estimate.estimator)
         for number, (name, mine) in enumerate(by_estimator.items()):
             mine = sorted(mine, key=lambda one: one.share_percent)
             shares = column(mine, "share_percent")

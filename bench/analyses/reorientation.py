@@ -19,7 +19,7 @@ from bench.base.settings import Settings
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import WITH_FRICTION, EstimateRow, FeltWhisk, SeenWhisk, TrialResult
 from bench.session.session import Session
-from bench.trials.estimates import answer, assumed_settings, whisk_of
+from bench.trials.estimates import assumed_settings, run_estimator, whisk_of
 from estimator.reorientation import next_turn_rad, reoriented, slip_angle
 from vision import Value
 from vision.geometry import counted
@@ -61,7 +61,7 @@ class Rotation:
     """One rotation of a contact: a row of REORIENTATION.
 
     phi_felt_rad: against the turned plane. next_turn_rad: 0 where what slip is left does not matter.
-    answer: by (2). one_push: by (10).
+    estimate: by (2). one_push: by (10).
     """
 
     contact: str
@@ -71,7 +71,7 @@ class Rotation:
     phi_felt_rad: Value
     next_turn_rad: float
     d_x_mm: Value
-    answer: EstimateRow
+    estimate: EstimateRow
     one_push: EstimateRow
 
 
@@ -89,11 +89,11 @@ class Reorientation(Analysis):
 
     def row(self, one: Rotation) -> dict:
         """Return the row of a rotation."""
-        answer = one.answer
+        estimate = one.estimate
         return {
             "trial": one.result.trial.name,
             "surface": one.result.trial.surface,
-            **estimate_cells(answer, one.d_x_mm),
+            **estimate_cells(estimate, one.d_x_mm),
             "contact": one.contact,
             "rotation": one.rotation,
             "plane_turn_deg": one.plane_turn_deg,
@@ -101,16 +101,16 @@ class Reorientation(Analysis):
             "next_turn_deg": degrees(one.next_turn_rad),
             "error_with_friction_mm": one.one_push.error_mm(one.d_x_mm).value,
             "inside_with_friction": as_cell(one.one_push.holds(one.d_x_mm.value)),
-            "status": answer.status,
+            "status": estimate.status,
         }
 
     def lines(self, found: Sequence[Rotation]) -> Iterator[str]:
         """Yield a line a number of rotations, over the contacts whose distance is known."""
-        known = [one for one in found if np.isfinite(one.answer.error_mm(one.d_x_mm).value)]
+        known = [one for one in found if np.isfinite(one.estimate.error_mm(one.d_x_mm).value)]
         for rotation, mine in sorted(grouped(known, lambda one: one.rotation).items()):
-            by_2 = rms(one.answer.error_percent(one.d_x_mm).value for one in mine)
+            by_2 = rms(one.estimate.error_percent(one.d_x_mm).value for one in mine)
             by_10 = rms(one.one_push.error_percent(one.d_x_mm).value for one in mine)
-            held = sum(bool(one.answer.holds(one.d_x_mm.value)) for one in mine)
+            held = sum(bool(one.estimate.holds(one.d_x_mm.value)) for one in mine)
             settled = sum(one.next_turn_rad == 0.0 for one in mine)
             yield (
                 f"after {counted(rotation, 'rotation')}: (2) is off by {by_2:.2g} % RMS, its 95 % interval "
@@ -155,6 +155,6 @@ def _rotation(
         phi_felt_rad=Value(*slip_angle(whisk)),
         next_turn_rad=next_turn_rad(whisk, assumed),
         d_x_mm=seen.d_x_mm,
-        answer=answer("reoriented", reoriented, whisk, alpha_rad, alpha_sigma_rad),
+        estimate=run_estimator("reoriented", reoriented, whisk, alpha_rad, alpha_sigma_rad),
         one_push=felt.estimate(WITH_FRICTION),
     )

@@ -135,11 +135,11 @@ def sensor_errors(
     for result, seen, felt in sound_measured_whisks(results):
         if not (felt.sensors and seen.has_truth):
             continue
-        answers = {row.estimator: row for row in (*felt.estimates, *felt.sensors)}
+        by_name = {row.estimator: row for row in (*felt.estimates, *felt.sensors)}
         middle_deg = _middle_deg(slope_deg(result, seen))
         for order, name in enumerate(_ESTIMATORS):
             key = (result.trial.surface, middle_deg, order)
-            percent.setdefault(key, []).append(_error_percent(answers[name], seen.d_x_mm))
+            percent.setdefault(key, []).append(_error_percent(by_name[name], seen.d_x_mm))
     alphas_deg = _alphas_deg(friction)
     found = []
     for (surface, middle_deg, order), errors in sorted(percent.items()):

@@ -123,18 +123,18 @@ def whisk_of(felt: FeltWhisk | FeltAt, theta_rad: float, beam: Beam) -> Whisk:
     )
 
 
-def answers(
+def run_estimators(
     whisk: Whisk,
     by_name: Mapping[str, Estimator],
     settings: Settings,
     radii_mm: tuple[float, float] = UNKNOWN_RADII_MM,
 ) -> tuple[EstimateRow, ...]:
-    """Return the row of each estimator by name."""
+    """Run estimators on a whisk; return the row of each, by name."""
     alpha_sigma_rad = math.radians(settings.first_alpha_est_sigma_deg)
     rows = []
     for name, estimator in by_name.items():
         rows.append(
-            answer(name, estimator, whisk, settings.alpha_est_rad, alpha_sigma_rad, radii_mm)
+            run_estimator(name, estimator, whisk, settings.alpha_est_rad, alpha_sigma_rad, radii_mm)
         )
     return tuple(rows)
 
@@ -142,12 +142,12 @@ def answers(
 def assumed_settings(
     alpha_est_rad: float, sigma_rad: float, radii_mm: tuple[float, float] = UNKNOWN_RADII_MM
 ) -> EstimatorSettings:
-    """Return what estimators assume of friction and object. radii_mm: as `answer` has them."""
+    """Return what estimators assume of friction and object. radii_mm: as `run_estimator` has them."""
     reach_mm = OBJECT_REACH_MM if math.isnan(radii_mm[0]) else sum(radii_mm)
     return EstimatorSettings(alpha_est_rad, float(sigma_rad), reach_mm, TILT_SIGMA_RAD, *radii_mm)
 
 
-def answer(
+def run_estimator(
     name: str,
     estimator: Estimator,
     whisk: Whisk,
@@ -156,7 +156,7 @@ def answer(
     radii_mm: tuple[float, float] = UNKNOWN_RADII_MM,
     exact_sigma_mm: float | None = None,
 ) -> EstimateRow:
-    """Return one estimator's row under a friction angle and its sigma.
+    """Run one estimator under a friction angle and its sigma; return its row.
 
     radii_mm: of the bar, NaN where it is unknown, and of the whisker's base. exact_sigma_mm: the
     estimate's sigma as if the friction angle were exact; computed where it is None. Raises BadInput

@@ -33,7 +33,7 @@ from bench.session.signals import Signals
 from bench.trials.agreement import MomentAgreement, OtherReading, agreement, other_units
 from bench.trials.consistency import check_friction_cone, nominal_slope
 from bench.trials.contradictions import against_estimates
-from bench.trials.estimates import answers, as_felt, estimators, felt_at
+from bench.trials.estimates import as_felt, estimators, felt_at, run_estimators
 from bench.trials.gate import kinetic_of
 from bench.trials.moment_size import check_moment_size
 from bench.trials.object_motion import MOTION_ESTIMATORS, with_motion
@@ -186,7 +186,9 @@ class _EstimatedStroke:
         own = self.unit.settings.estimators
         if own and whisk.others is None:
             whisk = self._with_sensors(whisk)
-        return answers(whisk, estimators(own, whisk.beam), self.unit.settings, _radii_mm(self.unit))
+        return run_estimators(
+            whisk, estimators(own, whisk.beam), self.unit.settings, _radii_mm(self.unit)
+        )
 
     def _by_theta(self) -> tuple[FeltAt, ...]:
         """Return moments and estimates at THETAS_DEG, as far as the stroke goes."""
@@ -206,10 +208,10 @@ class _EstimatedStroke:
         radii_mm = _radii_mm(self.unit)
         rows: tuple[EstimateRow, ...] = ()
         if self.stroke.forces_N is not None:
-            rows += answers(self._with_sensors(whisk), SENSORS, settings, radii_mm)
+            rows += run_estimators(self._with_sensors(whisk), SENSORS, settings, radii_mm)
         if self.unit.trial.object_velocity_mm_s is not None:
             moving = with_motion(whisk, self.unit.trial, self.stroke, touch_rad)
-            rows += answers(moving, MOTION_ESTIMATORS, settings, radii_mm)
+            rows += run_estimators(moving, MOTION_ESTIMATORS, settings, radii_mm)
         return rows
 
     def _with_sensors(self, whisk: Whisk) -> Whisk:
@@ -312,7 +314,7 @@ def _with_drift(unit: Unit, stroke: FeltStroke, readout: Readout) -> WithDrift |
     touch_rad = as_felt(0, touch, None, stroke.speed_rad_s, _delay_s(unit)).touch_felt_rad.value
     if isinstance(whisk, Reason):
         return WithDrift(touch_rad, NAN)
-    (row,) = answers(whisk, {WITH_FRICTION: ESTIMATORS[WITH_FRICTION]}, unit.settings)
+    (row,) = run_estimators(whisk, {WITH_FRICTION: ESTIMATORS[WITH_FRICTION]}, unit.settings)
     return WithDrift(touch_rad, row.d_x_est_mm.value)
 
 
@@ -328,7 +330,7 @@ def _one_factor(unit: Unit, kind: str, stroke: FeltStroke) -> tuple[EstimateRow,
     if not np.isfinite(factors.matrix).all():
         return ()
     _, whisk = _felt_whisk(unit, stroke, Readout.of(unit.trial, factors))
-    return answers(whisk, ESTIMATORS, unit.settings, _radii_mm(unit))
+    return run_estimators(whisk, ESTIMATORS, unit.settings, _radii_mm(unit))
 
 
 def _radii_mm(unit: Unit) -> tuple[float, float]:

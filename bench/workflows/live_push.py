@@ -169,7 +169,7 @@ def play_trial(
             late = f"{played.late_s:.2f} s after the last frame"
             if film:
                 shown.end(played.clock.now_s(), played.pictures, truth, late)
-            yield f"{name}, whisk {truth.whisk}: {answer(truth)}; {late}", truth.status
+            yield f"{name}, whisk {truth.whisk}: {truth_text(truth)}; {late}", truth.status
         if film:
             with whole_file(film) as temporary:
                 write_pictures(temporary, iter(shown.pictures), code, FILM_HZ)
@@ -358,7 +358,7 @@ def _look_away(now_s: float, push: LivePush) -> None:
     """Watch nothing."""
 
 
-def answer(truth: WhiskTruth) -> str:
+def truth_text(truth: WhiskTruth) -> str:
     """Return distance, touch and slip of a whisk in words, or why there are none."""
     if not truth.d_x_mm.is_known:
         return f"no distance: {truth.status}"

@@ -17,7 +17,7 @@ from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialR
 from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.trials.estimate_errors import is_sound
-from bench.trials.estimates import answers, estimators
+from bench.trials.estimates import estimators, run_estimators
 from bench.trials.felt_trial import readout_of
 from bench.trials.readout import Readout, felt_whisk
 from bench.trials.unit import Unit
@@ -274,7 +274,9 @@ def _measured_rows(
 def _estimate(whisk: _ConvertedWhisk, felt: Whisk) -> tuple[EstimateRow, ...]:
     """Return each estimator's row."""
     settings = whisk.task.unit.settings
-    return answers(felt, estimators(settings.estimators, felt.beam), settings, whisk.radii_mm)
+    return run_estimators(
+        felt, estimators(settings.estimators, felt.beam), settings, whisk.radii_mm
+    )
 
 
 def _error_percent(row: EstimateRow, d_x_mm: float) -> float:

@@ -15,7 +15,7 @@ SILENT = {"no_pictures", "slip_not_seen", "own_gauges"}
 # (10) run again repeats what it said first; what the others miss is the result, no fault of the run.
 _EXPECTED = ("no_slip", "frictionless", *EVALUATED_AGAIN)
 
-# Codes of answers that are a fault of the estimator's code, not a limit of its model.
+# Codes of estimates that are a fault of the estimator's code, not a limit of its model.
 FAILURES = {"estimator_raised", "no_distance_given", "distance_impossible", "sigma_impossible"}
 
 
@@ -52,7 +52,7 @@ def whisk_warnings(
             warned = _Warned(name, one, _sigma_mm(seen))
             by_cause.setdefault(one.codes, []).append(warned)
     yield from map(_cause_line, by_cause.values())
-    for estimator, warned in _answers(results):
+    for estimator, warned in _warned_estimates(results):
         if FAILURES.intersection(warned[0].status.codes):
             yield _cause_line(warned, f", {estimator}")
 
@@ -77,21 +77,21 @@ def _without(said: Collection[tuple[str, str]], status: Reason) -> Reason:
 
 def estimator_limits(results: Iterable[TrialResult]) -> Iterator[Reason]:
     """Yield a line for each limit that estimators met: they question neither the truth nor the recording."""
-    for estimator, warned in _answers(results):
+    for estimator, warned in _warned_estimates(results):
         if not FAILURES.intersection(warned[0].status.codes):
             yield _cause_line(warned, f", {estimator}")
 
 
-def _answers(results: Iterable[TrialResult]) -> Iterator[tuple[str, list[_Warned]]]:
-    """Yield estimator and whisks of alike status of its answers, where that is not the result itself."""
+def _warned_estimates(results: Iterable[TrialResult]) -> Iterator[tuple[str, list[_Warned]]]:
+    """Yield estimator and whisks of alike status of its estimates, where that is not the result itself."""
     alike: dict[tuple[str, ...], list[_Warned]] = {}
     for result, seen, felt in whisks(results):
         name = f"{result.trial.name}, whisk {seen.whisk}"
-        for answer in felt.estimates:
-            if answer.status and answer.estimator not in _EXPECTED:
-                status = as_reason(answer.status)
+        for estimate in felt.estimates:
+            if estimate.status and estimate.estimator not in _EXPECTED:
+                status = as_reason(estimate.status)
                 warned = _Warned(name, status, _sigma_mm(seen))
-                alike.setdefault((answer.estimator, *status.codes), []).append(warned)
+                alike.setdefault((estimate.estimator, *status.codes), []).append(warned)
     for (estimator, *_), warned in alike.items():
         yield estimator, warned
 

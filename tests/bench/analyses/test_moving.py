@@ -72,7 +72,7 @@ def drawn(row):
         name: float(row[f"{long}_percent"])
         for name, long in (("share_percent", "velocity_share"), ("error_percent", "error"))
     }
-    return SimpleNamespace(answer=SimpleNamespace(estimator=row["estimator"]), **numbers)
+    return SimpleNamespace(estimate=SimpleNamespace(estimator=row["estimator"]), **numbers)
 
 
 def test_a_push_and_its_way_back_need_no_friction_angle(tmp_path, exact_vision):

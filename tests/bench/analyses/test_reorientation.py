@@ -39,9 +39,9 @@ def test_trials_of_a_contact_are_its_rotations(found):
 
 def test_the_second_is_right_and_the_first_says_that_it_slips(found, tmp_path):
     first, second = found
-    assert abs(first.answer.error_percent(first.d_x_mm).value) > 10 and first.answer.status
-    sigma_mm = second.answer.d_x_est_mm.sigma
-    assert second.answer.error_mm(second.d_x_mm).value == pytest.approx(0.0, abs=2 * sigma_mm)
+    assert abs(first.estimate.error_percent(first.d_x_mm).value) > 10 and first.estimate.status
+    sigma_mm = second.estimate.d_x_est_mm.sigma
+    assert second.estimate.error_mm(second.d_x_mm).value == pytest.approx(0.0, abs=2 * sigma_mm)
     assert first.next_turn_rad > 0 and second.next_turn_rad == 0
     Reorientation().write(tmp_path, found)
     rows = list(csv.DictReader((tmp_path / REORIENTATION.file).read_text().splitlines()))

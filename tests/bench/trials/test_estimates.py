@@ -10,7 +10,7 @@ from bench.base.settings import Settings
 from bench.gauges.drift import allow_drift
 from bench.gauges.felt import FeltStroke, gauge_delay
 from bench.gauges.matrix import GaugeMatrix
-from bench.trials.estimates import answer, answers, as_felt, own_estimators
+from bench.trials.estimates import as_felt, own_estimators, run_estimator, run_estimators
 from bench.trials.readout import Readout, felt_whisk
 from estimator import slip
 from estimator.beam import Beam
@@ -46,7 +46,10 @@ def test_a_turned_follicle_feels_the_same_whisk(rng, roll_deg):
 
 def test_answers_carry_what_they_assumed(rng):
     touch, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
-    rows = {row.estimator: row for row in answers(whisk, ESTIMATORS, Settings(alpha_est_deg=10.0))}
+    rows = {
+        row.estimator: row
+        for row in run_estimators(whisk, ESTIMATORS, Settings(alpha_est_deg=10.0))
+    }
     assert np.isnan([rows["no_slip"].alpha_est_rad, rows["no_slip"].beta_est_rad]).all()
     assert rows["frictionless"].alpha_est_rad == 0.0
     assert rows["with_friction"].d_x_est_mm.value == pytest.approx(60.0, rel=5e-3)
@@ -62,7 +65,7 @@ def test_sigma_of_10_is_its_scatter(rng):
         _, whisk = felt_whisk(
             stroke(rng, noise=0.01), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA
         )
-        row = answers(whisk, {"with_friction": ESTIMATORS["with_friction"]}, Settings())[0]
+        row = run_estimators(whisk, {"with_friction": ESTIMATORS["with_friction"]}, Settings())[0]
         stated.append(row.d_x_est_sigma_alpha_exact_mm)
         found.append(row.d_x_est_mm.value)
     assert np.mean(stated) == pytest.approx(np.std(found), rel=0.25)
@@ -104,7 +107,9 @@ def test_sigma_of_10_holds_how_thick_the_object_is_said_to_be(rng):
         stroke(rng, noise=1e-5), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA
     )
     untold, thin, thick = (
-        answer("with_friction", with_friction, whisk, ALPHA, 0.0, (radius, 0.5)).d_x_est_mm.sigma
+        run_estimator(
+            "with_friction", with_friction, whisk, ALPHA, 0.0, (radius, 0.5)
+        ).d_x_est_mm.sigma
         for radius in (np.nan, 3.0, 20.0)
     )
     assert untold == pytest.approx(thin)
@@ -136,7 +141,7 @@ def test_estimators_that_cannot_be_had(name):
 def test_an_answer_must_be_an_estimate(rng):
     _, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
     with pytest.raises(BadInput, match="must return an Estimate"):
-        answers(whisk, {"mine:f": lambda *_: 60.0}, Settings())
+        run_estimators(whisk, {"mine:f": lambda *_: 60.0}, Settings())
 
 
 def test_an_estimator_that_fails_on_a_whisk_is_a_row_that_says_so(rng):
@@ -144,14 +149,16 @@ def test_an_estimator_that_fails_on_a_whisk_is_a_row_that_says_so(rng):
         raise ZeroDivisionError("no slope")
 
     _, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
-    row = next(r for r in answers(whisk, {"mine:f": fails}, Settings()) if r.estimator == "mine:f")
+    row = next(
+        r for r in run_estimators(whisk, {"mine:f": fails}, Settings()) if r.estimator == "mine:f"
+    )
     assert np.isnan(row.d_x_est_mm.value) and row.status.codes == ("estimator_raised",)
 
 
 def asked(rng, function) -> dict:
     """The row of one's own estimator on a whisk at 60 mm."""
     _, whisk = felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)
-    return answers(whisk, {"mine:f": function}, Settings())[0]
+    return run_estimators(whisk, {"mine:f": function}, Settings())[0]
 
 
 @pytest.mark.parametrize(
@@ -183,7 +190,7 @@ def test_past_a_cones_point_there_is_no_contact(rng):
         felt_whisk(stroke(rng), Readout(GaugeMatrix(MATRIX)), np.zeros(2), BEAM, THETA)[1],
         beam=Beam(8835.7, 100.0, "cone"),
     )
-    row = answers(whisk, {"mine:f": lambda *_: Estimate(130.0, 1.0)}, Settings())[0]
+    row = run_estimators(whisk, {"mine:f": lambda *_: Estimate(130.0, 1.0)}, Settings())[0]
     assert "past_whisker" in row.status.codes and np.isnan(row.d_y_est_mm.value)
 
 

@@ -24,7 +24,7 @@ from bench.records.trial_result import EstimateRow
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
-from bench.trials.estimates import answer
+from bench.trials.estimates import run_estimator
 from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import Whisk
@@ -142,7 +142,9 @@ def sample(shape: str, count: int, seed: int) -> Sample:
         if (whisk := draw(shape, rng)) is not None:
             found.append(whisk)
     angles = np.radians(ALPHA_EST_DEG), np.radians(ALPHA_SIGMA_DEG)
-    rows = [answer("with_friction", with_friction, d.whisk, *angles, d.radii_mm) for d in found]
+    rows = [
+        run_estimator("with_friction", with_friction, d.whisk, *angles, d.radii_mm) for d in found
+    ]
     return Sample(rows, np.array([d.d_x_mm for d in found]))
 
 

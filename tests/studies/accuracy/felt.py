@@ -26,7 +26,7 @@ from bench.report.score import Score
 from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
-from bench.trials.estimates import answer, as_felt
+from bench.trials.estimates import as_felt, run_estimator
 from bench.trials.readout import Readout, felt_whisk
 from estimator.builtin import with_friction
 
@@ -88,7 +88,7 @@ def felt_rows(session_path: Path, thetas_deg: Sequence[float]) -> Iterator[dict]
                 felt = as_felt(0, touch, whisk, stroke.speed_rad_s, delay).touch_felt_rad
                 row["touch"] = np.degrees(felt.value) - truth["touch_deg"]
                 row["touch_sigma"] = np.degrees(felt.sigma)
-                said = answer("with_friction", with_friction, whisk, alpha, 0.0).d_x_est_mm
+                said = run_estimator("with_friction", with_friction, whisk, alpha, 0.0).d_x_est_mm
                 yield row | {"d_x": said.value - truth["d_x_mm"], "d_x_sigma": said.sigma}
 
 

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.base.drawing import blank, colour_of, label_of, save, style
 from bench.base.settings import TILT_SIGMA_RAD
-from bench.trials.estimates import answer
+from bench.trials.estimates import run_estimator
 from estimator.builtin import ESTIMATORS
 from estimator.moving import known_motion
 from estimator.whisk import EstimatorSettings, ObjectMotion, Whisk
@@ -133,7 +133,9 @@ def drawn(shape: str, rng: np.random.Generator):
     motion = ObjectMotion(per_rad + told_mm * rng.normal(size=3), told_mm**2 * np.eye(3))
     whisk = Whisk(*(np.zeros(0),) * 4, theta, *felt, sigma_m**2 * np.eye(2), sigma_touch, beam)
     told = np.radians(ALPHA_EST_DEG), np.radians(ALPHA_SIGMA_DEG), (np.nan, DIAMETER_MM / 2)
-    return touch.d_x_mm, answer("", known_motion, replace(whisk, object_motion=motion), *told)
+    return touch.d_x_mm, run_estimator(
+        "", known_motion, replace(whisk, object_motion=motion), *told
+    )
 
 
 def coverage(shape: str, count: int, seed: int) -> str:

@@ -39,7 +39,7 @@ from bench.rig.protocol_tables import (
 )
 from bench.rig.recording import Recording
 from bench.session.signals import Signals
-from bench.trials.estimates import answers
+from bench.trials.estimates import run_estimators
 from bench.trials.readout import Readout, whisk_at
 from bench.trials.sensor_readings import with_others
 from estimator.beam import Beam
@@ -161,7 +161,7 @@ def answered(one: Drawn, stroke: FeltStroke, settings: Settings) -> dict[str, Es
     whisk = felt_whisk(stroke, np.radians(one.theta_deg))
     if whisk is None:
         return {}
-    return {row.estimator: row for row in answers(whisk, NAMED, settings, RADII_MM)}
+    return {row.estimator: row for row in run_estimators(whisk, NAMED, settings, RADII_MM)}
 
 
 def sample(wanted: Iterator[Drawn], settings: Settings, rng: np.random.Generator) -> list[tuple]:

@@ -25,7 +25,7 @@ from bench.rig.bar import TouchedBar, find_first_touch
 from bench.rig.elastic_rod import Rod
 from bench.rig.rod_contact import moments_Nmm
 from bench.rig.stick_slip import FrictionCoefficients, March
-from bench.trials.estimates import answer
+from bench.trials.estimates import run_estimator
 from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.distance import felt_slip_angle
@@ -122,7 +122,7 @@ def answers(push: Push, draws: int, rng: np.random.Generator) -> list[EstimateRo
         whisk = Whisk(
             *(np.zeros(0),) * 4, theta, *felt.tolist(), covariance, TOUCH_SIGMA_RAD, true.beam
         )
-        row = answer("with_friction", with_friction, whisk, float(alpha), ALPHA_SIGMA_RAD)
+        row = run_estimator("with_friction", with_friction, whisk, float(alpha), ALPHA_SIGMA_RAD)
         stroke = true.stroke_Nmm + sigma * rng.standard_normal(true.stroke_Nmm.shape)
         rate = turn(
             [
