@@ -199,7 +199,7 @@ def _draw_lines(
         polyline(picture, project(edge), _BAR)
     path_mm = _contact_path(whisk, k)
     contact_mm = path_mm[-1] if whisk.frames.touching[k] else None
-    polyline(picture, project(_wire(result, whisk, k, contact_mm)), _WIRE)
+    polyline(picture, project(_wire(result, whisk, k)), _WIRE)
     if len(path_mm) > 1:
         polyline(picture, project(path_mm), _PATH)
     if contact_mm is not None:
@@ -223,15 +223,11 @@ def _bar_edges(camera: Camera, seen: SeenTrial, whisk: SeenWhisk) -> list[np.nda
     return [axis - across, axis + across]
 
 
-def _wire(
-    result: TrialResult, whisk: SeenWhisk, k: int, contact_mm: np.ndarray | None
-) -> np.ndarray:
+def _wire(result: TrialResult, whisk: SeenWhisk, k: int) -> np.ndarray:
     """Return the whisker (n, 3), mm, as it was fitted in frame k; unbent in frames that are not in the fit."""
     facts = result.whisker
     shape = whisk.truth.shape
     motor_rad = float(whisk.frames.motor_rad[k])
-    if shape is None:
-        return wire_between(motor_rad, contact_mm, facts.length_mm)
     wire = _wire_of(facts)
     bend_rad = np.zeros(2)
     arc_mm = facts.length_mm
@@ -245,23 +241,6 @@ def _wire_of(facts: WhiskerFacts) -> Wire:
     """Return the wire of a whisker whose unloaded shape stands elsewhere."""
     sizes = (facts.shape, facts.length_mm, facts.diameter_mm, 0.0, 0.0, facts.tip_diameter_mm)
     return ProfiledWire(*sizes, widths=facts.widths) if facts.widths else Wire(*sizes)
-
-
-def wire_between(motor_rad: float, contact_mm: np.ndarray | None, length_mm: float) -> np.ndarray:
-    """Return the whisker (n, 3), mm, as a beam with a point load, for where no fitted curve is kept.
-
-    It is clamped at the base along the motor's angle, goes through the contact (3,), and is straight
-    beyond it.
-    """
-    along = np.array([np.cos(motor_rad), np.sin(motor_rad), 0.0])
-    if contact_mm is None:
-        return np.linspace(0.0, length_mm, 30)[:, None] * along
-    reach_mm = float(contact_mm @ along)
-    s = np.linspace(0.0, length_mm / reach_mm, 40)  # 1 at the contact
-    loaded = 0.5 * (3 * s**2 - s**3)
-    straight = 1 + 1.5 * (s - 1)
-    bend = np.where(s < 1, loaded, straight)
-    return (s * reach_mm)[:, None] * along + bend[:, None] * (contact_mm - reach_mm * along)
 
 
 def _side_by_side(pictures: Sequence[np.ndarray]) -> np.ndarray:
