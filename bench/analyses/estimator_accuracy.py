@@ -26,8 +26,6 @@ LEAST_CHANCE = 0.05
 # [sigmas] By how much the sums of squared errors of two estimators must differ to rank them. Stated.
 RANKING_SIGMAS = 2.0
 
-Key = tuple[str, int, str]  # trial, whisk, estimator
-
 
 @dataclass(frozen=True)
 class Accuracy:
@@ -190,32 +188,16 @@ class Accuracy:
 
 def accuracies(results: Iterable[TrialResult]) -> list[Accuracy]:
     """Return the accuracy of each estimator, in the order in which the results name them."""
-    results = list(results)
-    holding = _intervals_holding(results)
     judged = []
     for one in judge(results):
         if one.purpose == "measure" and not one.one_factor and math.isfinite(one.d_x_mm):
             judged.append(one)
     by_estimator = grouped(judged, lambda one: one.estimator)
-    return [_accuracy(name, mine, holding) for name, mine in by_estimator.items()]
+    return [_accuracy(name, mine) for name, mine in by_estimator.items()]
 
 
-def _intervals_holding(results: Sequence[TrialResult]) -> dict[Key, bool]:
-    """Return whether the 95 % interval of each estimate holds the truth, where both are known."""
-    holding = {}
-    for result, seen, felt in whisks(results):
-        for estimate in felt.estimates:
-            holds = estimate.holds(seen.d_x_mm.value)
-            if holds is not None:
-                holding[result.trial.name, seen.whisk, estimate.estimator] = holds
-    return holding
-
-
-def _accuracy(name: str, mine: Sequence[Judged], holding: dict[Key, bool]) -> Accuracy:
-    """Return the accuracy of one estimator from its whisks with a truth.
-
-    holding: whether the interval of an estimate holds the truth.
-    """
+def _accuracy(name: str, mine: Sequence[Judged]) -> Accuracy:
+    """Return the accuracy of one estimator from its whisks with a truth."""
     judged: list[Judged] = []
     left_out: list[Judged] = []
     without_distance: list[Judged] = []
@@ -231,9 +213,8 @@ def _accuracy(name: str, mine: Sequence[Judged], holding: dict[Key, bool]) -> Ac
             judged.append(one)
         if has_distance and one.status:
             warned.append(one)
-        key = (one.trial, one.whisk, name)
-        if key in holding and not one.has_warning:
-            intervals.append(holding[key])
+        if one.inside is not None and not one.has_warning:
+            intervals.append(one.inside)
     return Accuracy(
         estimator=name,
         with_truth=len(mine),

@@ -33,7 +33,8 @@ class Judged:
     beta_deg: the slope as seen, else the nominal one. covariance_mm2: of estimate and truth, by the
     errors of the cameras. one_factor: made with one gauge factor a channel. status: the estimate's.
     whisk_status: of the whisk, seen and felt. d_x_est_sigma_alpha_exact_mm: the estimate's sigma as
-    if the friction angle were exact.
+    if the friction angle were exact. inside: whether its 95 % interval holds the truth, None where
+    either is not known.
     """
 
     trial: str
@@ -52,6 +53,7 @@ class Judged:
     status: str = ""
     whisk_status: Reason = NO_REASON
     d_x_est_sigma_alpha_exact_mm: float = math.nan
+    inside: bool | None = None
 
     @property
     def is_by_ten(self) -> bool:
@@ -167,4 +169,5 @@ def _judged(
         status=row.status,
         whisk_status=whisk_status,
         d_x_est_sigma_alpha_exact_mm=float(row.d_x_est_sigma_alpha_exact_mm),
+        inside=row.holds(seen.d_x_mm.value),
     )
