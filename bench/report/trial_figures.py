@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bench.analyses.analysis import EvaluatedRun
+from bench.analyses.pooling import grouped
 from bench.analyses.surfaces import FittedSurface
 from bench.base.drawing import PointStyle, blank, draw_whisks, style, whisk_url
 from bench.base.results import DRAWING, hash_of, hash_of_code
@@ -149,9 +150,7 @@ def gauge_residuals(points: Sequence[GaugePoints]) -> Figure:
     """
     figure = blank(9.6, 4.3)
     every = 1 + sum(len(p.moments_Nmm) for p in points) // _MOST_POINTS
-    by_trial: dict[str, list[GaugePoints]] = {}
-    for of_whisk in points:
-        by_trial.setdefault(of_whisk.trial, []).append(of_whisk)
+    by_trial = grouped(points, lambda of_whisk: of_whisk.trial)
     for channel, axes in enumerate(figure.subplots(1, 2)):
         _draw_residuals(axes, by_trial, channel, every)
         name = ("m$_y$", "m$_z$")[channel]

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.analyses.pooling import mean, rms
+from bench.analyses.pooling import grouped, mean, rms
 from bench.base.drawing import label_of
 from bench.base.tables import TRUTH_SOURCE, WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
 from bench.workflows.expected_error import ExpectedRms
-from bench.workflows.robot_answers import Answer
+from bench.workflows.robot_answers import Answer, Converter
 from vision.geometry import counted
 
 # [1] Least share of all whisks that an estimator on the front has a distance for: with fewer its
@@ -112,12 +112,14 @@ ROBOT_TRADE = Table(
 
 def pool_answers(answers: Sequence[Answer]) -> list[Point]:
     """Return a point for each estimator, speed (to two digits), converter and push."""
-    groups: dict[tuple, list[Answer]] = {}
-    for one in answers:
-        speed_deg_s = float(f"{one.speed_deg_s:.2g}")
-        key = (one.estimator, speed_deg_s, one.converter, one.push_deg)
-        groups.setdefault(key, []).append(one)
-    return [_point(group, key[1]) for key, group in groups.items()]
+    groups = grouped(answers, _conditions)
+    return [_point(group, speed_deg_s) for (speed_deg_s, *_), group in groups.items()]
+
+
+def _conditions(answer: Answer) -> tuple[float, str, Converter, float]:
+    """Return speed, to two digits, estimator, converter and push."""
+    speed_deg_s = float(f"{answer.speed_deg_s:.2g}")
+    return speed_deg_s, answer.estimator, answer.converter, answer.push_deg
 
 
 def _point(answers: Sequence[Answer], speed_deg_s: float) -> Point:
