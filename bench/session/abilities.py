@@ -1,6 +1,6 @@
 """What a recording can give, by the files and keys of its session, and what one thing more would give."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from bench.session.angle_source import SOURCES, angle_source
@@ -38,9 +38,12 @@ class Ability:
 def abilities(session: Session) -> tuple[Ability, ...]:
     """Return what the measured trials of a session can give."""
     measured = [trial for trial in session.trials if trial.purpose != "weight"]
-    seen = [trial for trial in measured if not _lacks_of_pictures(trial, session)]
-    felt = [trial for trial in measured if has_moments(trial) or _has_gauges(session)]
-    to_see = _first(_lacks_of_pictures(trial, session) for trial in measured)
+    lacks = {trial.name: _lacks_of_pictures(trial, session) for trial in measured}
+    of_gauges = [lacks[trial.name] for trial in measured if trial.purpose == "gauge"]
+    has_gauges = _has_gauges(session, of_gauges)
+    seen = [trial for trial in measured if not lacks[trial.name]]
+    felt = [trial for trial in measured if has_gauges or has_moments(trial)]
+    to_see = _first(lacks.values())
     true = seen
     to_know = f'{to_see}; or a stage: [truth] source = "stage"'
     if session.truth is not None:
@@ -56,7 +59,7 @@ def abilities(session: Session) -> tuple[Ability, ...]:
         _ability("estimates of d_x", felt, of, _TO_FEEL),
         _ability("errors", both, of, _TO_COMPARE),
         _ability("Fig. 8", drawn, of, _TO_DRAW),
-        *_of_gauges(session),
+        *_of_gauges(of_gauges, has_gauges=has_gauges),
     )
 
 
@@ -72,14 +75,15 @@ def _has_slopes(trials: Sequence[Trial], session: Session) -> bool:
     return len(stated) >= _FEWEST_SLOPES or (is_seen and len(trials) >= _FEWEST_SLOPES)
 
 
-def _of_gauges(session: Session) -> Iterator[Ability]:
-    """Yield the row of the gauge trials, where there are any or volts need them."""
-    gauge_trials = [trial for trial in session.trials if trial.purpose == "gauge"]
-    usable = sum(not _lacks_of_pictures(trial, session) for trial in gauge_trials)
-    of = max(len(gauge_trials), _FEWEST_GAUGE_TRIALS)
-    if gauge_trials or not _has_gauges(session):
-        lacks = _first(_lacks_of_pictures(trial, session) for trial in gauge_trials)
-        missing = lacks or "gauge trials in two positions of the follicle"
+def _of_gauges(lacks: Sequence[str], *, has_gauges: bool) -> Iterator[Ability]:
+    """Yield the row of the gauge trials, where there are any or volts need them.
+
+    lacks: what pictures of each of them need more.
+    """
+    usable = lacks.count("")
+    of = max(len(lacks), _FEWEST_GAUGE_TRIALS)
+    if lacks or not has_gauges:
+        missing = _first(lacks) or "gauge trials in two positions of the follicle"
         yield Ability("gauges", usable, of, "" if usable == of else missing)
 
 
@@ -129,17 +133,15 @@ def _lacks_of_pictures(trial: Trial, session: Session) -> str:
     return ""
 
 
-def _has_gauges(session: Session) -> bool:
-    """Return whether the session has gauges, or gauge trials that calibrate them."""
-    if session.gauges is not None or session.gauges_toml is not None:
-        return True
-    gauge_trials = []
-    for trial in session.trials:
-        if trial.purpose == "gauge" and not _lacks_of_pictures(trial, session):
-            gauge_trials.append(trial)
-    return len(gauge_trials) >= _FEWEST_GAUGE_TRIALS
+def _has_gauges(session: Session, lacks: Sequence[str]) -> bool:
+    """Return whether the session has gauges, or gauge trials that calibrate them.
+
+    lacks: what pictures of each gauge trial need more.
+    """
+    are_brought = session.gauges is not None or session.gauges_toml is not None
+    return are_brought or lacks.count("") >= _FEWEST_GAUGE_TRIALS
 
 
-def _first(lacks: Sequence[str] | Iterator[str]) -> str:
+def _first(lacks: Iterable[str]) -> str:
     """Return the first of some lacks that is one; '' where nothing lacks."""
     return next(filter(None, lacks), "")
