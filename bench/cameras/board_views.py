@@ -11,6 +11,7 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
 from bench.base.progress import count_parts
 from bench.base.threads import in_threads
+from bench.session.file_names import SESSION_TOML
 from bench.session.footage import frame_count, read_frames, rig_picture
 from bench.session.session import Session
 from bench.session.table import forward_in_time, read_table, require_columns
@@ -78,7 +79,7 @@ def _require_board(session: Session) -> None:
     """Raise BadInput where the session states no board, or has no picture of it."""
     if session.board is None:
         found = "[board] is missing: the cameras are calibrated from it"
-        raise BadInput(found, file="session.toml")
+        raise BadInput(found, file=SESSION_TOML)
     if not session.board_sources:
         raise BadInput("there is no folder of pictures nor a video of the board", file="boards")
 

@@ -10,6 +10,7 @@ from bench.base.input_problems import refused_as_bad_input
 from bench.base.progress import count_parts
 from bench.base.threads import in_threads
 from bench.session.angle_source import angle_source
+from bench.session.file_names import SESSION_TOML
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
@@ -62,7 +63,7 @@ def first_look(session: Session, cameras: Cameras) -> FirstRig:
     Raises BadInput where nothing turns.
     """
     look = look_at_strokes(session, cameras)
-    with refused_as_bad_input("session.toml"):
+    with refused_as_bad_input(SESSION_TOML):
         axis = first_axis(look.markers, cameras)
         return first_rig(look.lines) if axis is None else first_rig_about(axis, look.lines)
 

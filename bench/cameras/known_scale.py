@@ -6,6 +6,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.session.angle_source import angle_source
+from bench.session.file_names import SESSION_TOML
 from bench.session.footage import read_frames, rig_picture
 from bench.session.frame_times import frame_times
 from bench.session.session import Session
@@ -57,7 +58,7 @@ def _scatter_warning(shares: np.ndarray, scatter: float) -> Reason:
     )
     if scatter > _MOST_SCATTER:
         cure = "measure a square of the board and enter it, then check T_rig_board"
-        raise BadInput(f"{seen}: {cure}", file="session.toml")
+        raise BadInput(f"{seen}: {cure}", file=SESSION_TOML)
     return Reason("scale_unconfirmed", f"A second length: {seen}: check both")
 
 
@@ -83,7 +84,7 @@ def _check_bar_diameter(
         found = (
             f"square_mm is {square_mm:g}, some {square_mm / share:.3g} would fit the bar, or {bar}"
         )
-        raise BadInput(f"{reason}; {found}", file="session.toml") from None
+        raise BadInput(f"{reason}; {found}", file=SESSION_TOML) from None
 
 
 def _seen_over_given(session: Session, cameras: Cameras, trials: list[Trial]) -> Iterator[float]:

@@ -13,6 +13,7 @@ import numpy as np
 from bench.base.combined import Measurements
 from bench.base.errors import BadInput
 from bench.gauges.matrix import GaugeMatrix, to_follicle
+from bench.session.file_names import TRIAL_TOML
 from bench.session.signals import read_signals
 from bench.session.trial import Trial
 
@@ -78,7 +79,7 @@ def _factor(
         raise BadInput(
             f"{hung} should give {moment_Nmm:.3g} N·mm; the gauges say {felt_Nmm:.3g}. Does it "
             "hang along rig −z, and is follicle_roll_deg right?",
-            file=trial.label("trial.toml"),
+            file=trial.label(TRIAL_TOML),
         )
     by_force = trial.force_sigma_N / trial.force_N
     by_place = trial.at_sigma_mm / trial.at_mm

@@ -27,8 +27,9 @@ from bench.plan.staged import StagedWhisk, stage_run
 from bench.records.trial_result import SeenTrial
 from bench.rig import build
 from bench.rig.protocol import Protocol, load
+from bench.session.file_names import SESSION_TOML
 from bench.session.inside import check_outside
-from bench.session.session import MANIFEST, Session
+from bench.session.session import Session
 from bench.session.session_check import checked_session, trials_with_whisks
 from bench.session.trial import Trial
 from bench.trials.of_session import placed_units
@@ -155,7 +156,7 @@ def _rig_tasks(rig: _PlacedRig, options: Options) -> list[RigTask]:
 
 def _load_rig(path: Path) -> Protocol:
     """Load the protocol of a rig that can be planned. Raises BadInput."""
-    if path.name == MANIFEST:
+    if path.name == SESSION_TOML:
         raise BadInput(
             "is a recorded session's; give the session's folder, or a RIG.toml", file=path
         )

@@ -18,10 +18,10 @@ from bench.base.input_problems import InputProblems
 from bench.session import manifest
 from bench.session.angle_source import MOTOR, TIME
 from bench.session.daq import DaqFile
+from bench.session.file_names import SESSION_TOML
 from bench.session.manifest import ChannelKeys
 from bench.session.rig_file import RIG_FILE
 from bench.session.session import (
-    MANIFEST,
     Base,
     Session,
     given_gauges,
@@ -77,7 +77,7 @@ def _check_placed(session: Session) -> None:
     """Raise BadInput for pictures of an array without T_rig_board or cameras.toml."""
     if session.has_pictures and session.T_rig_board is None and session.cameras_toml is None:
         cure = "measure it, or bring cameras.toml: of several wires it says which is whose"
-        raise BadInput(f"[rig] T_rig_board is missing; {cure}", file=MANIFEST)
+        raise BadInput(f"[rig] T_rig_board is missing; {cure}", file=SESSION_TOML)
 
 
 def _trials_of_all(
@@ -103,9 +103,9 @@ def _trials_of_all(
 def _check_tables(session: Session, keys: manifest.SessionKeys) -> None:
     """Raise BadInput for what one whisker alone has."""
     if keys.whisker is not None:
-        raise BadInput("has [whisker] and [[whiskers]]; keep one of them", file=MANIFEST)
+        raise BadInput("has [whisker] and [[whiskers]]; keep one of them", file=SESSION_TOML)
     if keys.gauges is not None:
-        raise BadInput(f"[gauges] are one whisker's; {_OWN_GAUGES}", file=MANIFEST)
+        raise BadInput(f"[gauges] are one whisker's; {_OWN_GAUGES}", file=SESSION_TOML)
     if session.gauges_toml is not None:
         raise BadInput(f"is one whisker's; {_OWN_GAUGES}", file="gauges.toml")
     if session.measured_rig is not None:
@@ -119,9 +119,9 @@ def _check_names(names: Sequence[str]) -> None:
     for name in names:
         if name.startswith(".") or not all(c.isalnum() or c in "_.-" for c in name):
             fix = "letters, digits, '_', '-' and '.' are allowed"
-            raise BadInput(f"[[whiskers]] name {name!r}: {fix}", file=MANIFEST)
+            raise BadInput(f"[[whiskers]] name {name!r}: {fix}", file=SESSION_TOML)
         if name.casefold() in taken:
-            raise BadInput(f"[[whiskers]] name {name!r} is used twice", file=MANIFEST)
+            raise BadInput(f"[[whiskers]] name {name!r} is used twice", file=SESSION_TOML)
         taken.add(name.casefold())
 
 
@@ -141,7 +141,7 @@ def _check_distances(bases: Sequence[Base], keys: Sequence[manifest.ArrayWhisker
             sizes = f"{distance_mm:.3g} mm apart, radii {radii_mm:.3g} mm"
             found = f"the bases of {one.name} and {other.name} touch: {sizes}"
             fix = "base_mm is each one's own, in the rig frame"
-            raise BadInput(f"[[whiskers]] {found}; {fix}", file=MANIFEST)
+            raise BadInput(f"[[whiskers]] {found}; {fix}", file=SESSION_TOML)
 
 
 def _channels_of_all(
@@ -159,7 +159,7 @@ def _channels_of_all(
                 if owner == name:
                     found_twice = f"{name} has the channel {channel!r} twice"
                 fix = "[whiskers.channels] names each one's own"
-                raise BadInput(f"[[whiskers]] {found_twice}; {fix}", file=MANIFEST)
+                raise BadInput(f"[[whiskers]] {found_twice}; {fix}", file=SESSION_TOML)
             owners[channel] = name
     return found
 
@@ -210,7 +210,7 @@ def _check_motors(bases: Sequence[Base], channels: Mapping[str, DaqFile]) -> Non
             angle = f"their axes {np.degrees(np.arccos(cosine)):.3g}° apart"
             found = f"{one.name} and {other.name} are on one motor ({motor.channel}), {angle}"
             fix = "name each one's own motor_deg in [whiskers.channels]"
-            raise BadInput(f"[[whiskers]] {found}; {fix}", file=MANIFEST)
+            raise BadInput(f"[[whiskers]] {found}; {fix}", file=SESSION_TOML)
 
 
 def _check_stated_place(trial: Trial) -> None:

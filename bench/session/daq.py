@@ -16,6 +16,7 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
 from bench.base.numbers import first_names
 from bench.session import manifest
+from bench.session.file_names import SESSION_TOML
 from bench.session.manifest import ChannelKeys
 from bench.session.strict_toml import values
 from bench.session.table import NumberTable, column_names, read_table
@@ -46,7 +47,7 @@ class DaqFile:
     channels: dict[str, ChannelKeys]
 
 
-def daq_file(keys: manifest.SignalKeys | None, label: str) -> DaqFile | None:
+def daq_file(keys: manifest.SignalKeys | None) -> DaqFile | None:
     """Return the file of [signals] of session.toml; None without that table.
 
     Raises BadInput for a file that is not in the trial's folder, or of no known kind.
@@ -56,10 +57,10 @@ def daq_file(keys: manifest.SignalKeys | None, label: str) -> DaqFile | None:
     name = Path(keys.file)
     if name.name != keys.file or keys.file in ("", ".", ".."):
         fix = "must be the name of a file in each trial's folder"
-        raise BadInput(f"[signals] file {keys.file!r} {fix}", file=label)
+        raise BadInput(f"[signals] file {keys.file!r} {fix}", file=SESSION_TOML)
     if name.suffix.lower() not in _READERS:
         known = f"is of no kind that is read; these are: {', '.join(_READERS)}"
-        raise BadInput(f"[signals] file {keys.file!r} {known}", file=label)
+        raise BadInput(f"[signals] file {keys.file!r} {known}", file=SESSION_TOML)
     channels = {}
     for column, channel in values(keys, leave_out=("file", "rate_Hz")).items():
         if channel is not None:
@@ -82,7 +83,7 @@ def read_daq(path: Path, daq: DaqFile, label: str) -> NumberTable:
     if _TIME not in columns:
         if daq.rate_Hz is None:
             found = "[signals] has neither a time_s channel nor rate_Hz"
-            raise BadInput(found, file="session.toml")
+            raise BadInput(found, file=SESSION_TOML)
         columns = {_TIME: np.arange(count) / daq.rate_Hz} | columns
     return NumberTable(columns, np.arange(1, count + 1))
 

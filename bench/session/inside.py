@@ -11,6 +11,7 @@ from pathlib import Path, PurePath
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.session.file_names import SESSION_TOML, TRIAL_TOML
 from vision.pictures import FILM_SUFFIXES, PICTURE_SUFFIXES
 
 _MOST_NAMED = 3  # names in one line
@@ -19,7 +20,7 @@ _FOOTAGE = PICTURE_SUFFIXES | FILM_SUFFIXES
 _CAMERA_DEPTH = {"boards": 2, "trials": 3}
 # Names that a session gives to files, and to no folder.
 _FILES = {
-    *("session.toml", "trial.toml", "signals.csv", "frames.csv", "stage.csv"),
+    *(SESSION_TOML, TRIAL_TOML, "signals.csv", "frames.csv", "stage.csv"),
     *("gauges.toml", "cameras.toml", "rig.toml"),
 }
 _NOT_REGULAR = "is no regular file (a pipe, socket or device)"

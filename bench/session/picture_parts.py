@@ -7,11 +7,11 @@ from typing import Any
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems, refused_as_bad_input
+from bench.session.file_names import SESSION_TOML
 from bench.session.manifest import CameraKeys
 from vision.geometry import Crop
 from vision.pictures import Frames, PicturePart
 
-_FILE = "session.toml"
 _NEEDED_OF_PART = {
     "of": "the camera in whose picture this part is",
     "crop": "[left, top, width, height] of the part, px",
@@ -131,4 +131,4 @@ def _rest(crops: list[Crop]) -> Crop | None:
 
 def _bad(name: str, found: str) -> BadInput:
     """Return the fault of a camera of session.toml."""
-    return BadInput(f'[[cameras]] "{name}": {found}', file=_FILE)
+    return BadInput(f'[[cameras]] "{name}": {found}', file=SESSION_TOML)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from bench.base.errors import BadInput
+from bench.session.file_names import SESSION_TOML
 from bench.session.table import NumberTable, read_table, require_columns
 
 # Coefficients in y and z, mm, lowest power first.
@@ -77,7 +78,7 @@ def check_is_beside(session: Path, name: str, key: str) -> None:
     """Raise BadInput where the file that a key of [whisker] names is not in the session's folder."""
     if name not in {file.name for file in session.iterdir() if file.is_file()}:
         found = f"{key} = {name!r}: there is no such file beside session.toml"
-        raise BadInput(f"[whisker] {found}", file="session.toml")
+        raise BadInput(f"[whisker] {found}", file=SESSION_TOML)
 
 
 def _check_points(table: NumberTable, name: str, length_mm: float) -> None:

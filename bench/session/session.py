@@ -14,6 +14,7 @@ from bench.base.input_problems import InputProblems
 from bench.session import manifest
 from bench.session.angle_source import SOURCES
 from bench.session.daq import daq_file
+from bench.session.file_names import SESSION_TOML
 from bench.session.footage import camera_sources, single_pictures, visible
 from bench.session.givens import Given
 from bench.session.inside import check_inside
@@ -32,7 +33,6 @@ from vision.geometry import Board, Crop, Reason, invert_transform
 from vision.pictures import PicturePart, natural_order
 
 FORMAT = 1  # of session.toml; another one is refused
-MANIFEST = "session.toml"
 # [N·mm² in a N·m²] For a guess at the unit.
 NMM2_PER_NM2 = 1e6
 # [1], [mm] A T_rig_board of session.toml this near to rig.toml's was copied from there: no two measurements
@@ -160,7 +160,7 @@ def load_session(
     stated = read_manifest(path, problems, follow_links)
     if stated.keys.whiskers:
         found = "has several whiskers ([[whiskers]]); evaluate and check alone take them"
-        raise BadInput(found, file=MANIFEST)
+        raise BadInput(found, file=SESSION_TOML)
     return session_of(path, stated, problems, lenses_known=lenses_known, trials=trials)
 
 
@@ -289,19 +289,19 @@ def read_manifest(path: Path, problems: InputProblems, follow_links: bool) -> St
     """Read session.toml of a folder that holds nothing else than a session may. Raises BadInput."""
     if not path.is_dir():
         raise BadInput("there is no such folder; give the session's folder", file=str(path))
-    if not (path / MANIFEST).is_file():
-        found = f"there is no {MANIFEST} in this folder, so it is not a session"
+    if not (path / SESSION_TOML).is_file():
+        found = f"there is no {SESSION_TOML} in this folder, so it is not a session"
         raise BadInput(found, file=str(path))
     check_inside(path, problems, follow_links)
-    return _stated_session(path, read_toml(path / MANIFEST, MANIFEST), problems)
+    return _stated_session(path, read_toml(path / SESSION_TOML, SESSION_TOML), problems)
 
 
 def _stated_session(path: Path, tables: dict, problems: InputProblems) -> StatedSession:
     """Return what session.toml states in its tables. Raises BadInput where that is no session."""
     if tables.get("format", FORMAT) != FORMAT:
         found = f"format is {tables['format']!r}; this version reads format {FORMAT}"
-        raise BadInput(found, file=MANIFEST)
-    tables = with_kalibr_target(tables, path, MANIFEST)
+        raise BadInput(found, file=SESSION_TOML)
+    tables = with_kalibr_target(tables, path)
     _check_board_parts(tables.get("board"), problems)
     check_part_keys(tables.get("cameras"), problems)
     has_trials = bool(visible(path / "trials"))
@@ -310,7 +310,7 @@ def _stated_session(path: Path, tables: dict, problems: InputProblems) -> Stated
     needed = []
     if has_trials:
         needed = ["bar"] if "whiskers" in tables else ["whisker", "bar"]
-    as_keys(tables, manifest.SessionKeys, MANIFEST, problems, needed)
+    as_keys(tables, manifest.SessionKeys, SESSION_TOML, problems, needed)
     return StatedSession.of(tables)
 
 
@@ -323,7 +323,7 @@ def _check_board_parts(board: Any, problems: InputProblems) -> None:
         return
     for line in missing_parts(board.get("kind", CharucoBoard.kind), board):
         with problems.guard():
-            raise BadInput(line, file=MANIFEST)
+            raise BadInput(line, file=SESSION_TOML)
 
 
 def _check_angle_parts(trial: Any, problems: InputProblems) -> None:
@@ -338,7 +338,7 @@ def _check_angle_parts(trial: Any, problems: InputProblems) -> None:
         with problems.guard():
             if key not in trial:
                 found = f'[trial] {key} is missing: angle_from = "{angle_from}"'
-                raise BadInput(found, file=MANIFEST)
+                raise BadInput(found, file=SESSION_TOML)
 
 
 def _whisker(keys: manifest.WhiskerKeys | None, path: Path) -> Whisker | None:
@@ -359,7 +359,7 @@ def stated_whisker(keys: manifest.WhiskerKeys, table: str, path: Path) -> Whiske
             sizes |= profiled_sizes(keys, read_profile(path, keys.profile, keys.length_mm))
         whisker = Whisker(**sizes)
     except ValueError as problem:
-        raise BadInput(f"{table} {problem}", file=MANIFEST) from None
+        raise BadInput(f"{table} {problem}", file=SESSION_TOML) from None
     _check_rigidity(whisker, table)
     return whisker
 
@@ -374,19 +374,21 @@ def _check_rigidity(whisker: Whisker, table: str) -> None:
         hint = f" Is it in N m2? Then write {whisker.EI_Nmm2 * NMM2_PER_NM2:.6g}."
     keys = "flexural_rigidity_Nmm2 and diameter_mm"
     found = f"{keys} amount to a Young's modulus of {modulus_GPa:.3g} GPa"
-    raise BadInput(f"{table} {found}; {YOUNGS_MODULUS.allowed} is allowed.{hint}", file=MANIFEST)
+    raise BadInput(
+        f"{table} {found}; {YOUNGS_MODULUS.allowed} is allowed.{hint}", file=SESSION_TOML
+    )
 
 
 def _board(keys: manifest.BoardKeys | None) -> Board | None:
     """Return the board of [board]; None without that table. Raise BadInput for an impossible one."""
     if keys is None:
         return None
-    return stated_board(keys, MANIFEST)
+    return stated_board(keys, SESSION_TOML)
 
 
 def _board_pose(rows: list[list[float]] | None) -> np.ndarray | None:
     """Return T_rig_board (3, 4) of [rig]; None without rows. Raise BadInput for an impossible one."""
-    return None if rows is None else exact_pose(rows, "[rig] T_rig_board", MANIFEST)
+    return None if rows is None else exact_pose(rows, "[rig] T_rig_board", SESSION_TOML)
 
 
 def given_gauges(keys: manifest.GaugeKeys | None) -> GivenGauges | None:
@@ -408,7 +410,7 @@ def _trials(
     found = []
     daq = None
     with problems.guard():
-        daq = daq_file(stated.keys.signals, MANIFEST)
+        daq = daq_file(stated.keys.signals)
     for entry in visible(path / "trials"):
         if entry.is_dir() and (names is None or entry.name in names):
             with problems.guard():
@@ -433,7 +435,7 @@ def _warn_of_unused_surfaces(
     for name in order:
         if recorded and name not in recorded:
             found = f"surfaces has {name!r}, which is no trial's; there are {_listed(recorded)}"
-            problems.warn(Reason("surface_unused", f"{MANIFEST}: {found}"))
+            problems.warn(Reason("surface_unused", f"{SESSION_TOML}: {found}"))
 
 
 def _one_source_each(board_sources: Mapping[str, Path], trials: Iterable[Trial]) -> dict[str, Path]:
@@ -460,7 +462,7 @@ def _warn_of_unused_cameras(
     for camera in cameras:
         if session.camera_names and camera.name not in known and camera.of is None:
             found = f"[[cameras]] {camera.name!r} has no pictures in boards/ or trials/"
-            problems.warn(Reason("camera_unused", f"{MANIFEST}: {found}"))
+            problems.warn(Reason("camera_unused", f"{SESSION_TOML}: {found}"))
 
 
 def _check_cameras(session: Session, problems: InputProblems, lenses_known: bool) -> None:
@@ -489,7 +491,7 @@ def _check_trial_cameras(trial: Trial, names: tuple[str, ...]) -> None:
 def _check_camera_boards(session: Session, name: str) -> None:
     """Raise BadInput where a camera has no board views to be calibrated from."""
     if session.board is None:
-        raise BadInput("[board] is missing, and there is no cameras.toml", file=MANIFEST)
+        raise BadInput("[board] is missing, and there is no cameras.toml", file=SESSION_TOML)
     if name not in session.board_sources:
         found = f"there are no board views of camera {name}, and no cameras.toml"
         raise BadInput(found, file=f"boards/{name}")

@@ -9,6 +9,7 @@ from bench.base.errors import BadInput
 from bench.session import strokes
 from bench.session.angle_source import EXACT, TIME, TURN_DEG, AngleSigma, angle_source
 from bench.session.daq import read_daq
+from bench.session.file_names import TRIAL_TOML
 from bench.session.plausible import (
     DEGREES_PER_RADIAN,
     MICROSECONDS,
@@ -254,7 +255,7 @@ def _speed_warnings(speed_deg_s: float, trial: Trial, label: str) -> tuple[str, 
     if _agree(speed_deg_s / DEGREES_PER_RADIAN, stated):
         found = f"speed_deg_s is {stated:g}, but the motor goes at {speed_deg_s:.3g}°/s"
         cure = f"Is it in rad/s? Then write {speed_deg_s:.3g}."
-        raise BadInput(f"{found}. {cure}", file=trial.label("trial.toml"))
+        raise BadInput(f"{found}. {cure}", file=trial.label(TRIAL_TOML))
     found = f"the motor goes at {speed_deg_s:.3g}°/s, speed_deg_s says {stated:g}"
     return (Reason("speed_unlike_stated", f"{label}: {found}"),)
 

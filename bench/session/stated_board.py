@@ -8,6 +8,7 @@ from typing import Any
 from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
 from bench.session import manifest
+from bench.session.file_names import SESSION_TOML
 from bench.session.strict_toml import values
 from vision.boards import AprilGrid, AsymmetricCircles, Body, CharucoBoard, Checkerboard, CircleGrid
 from vision.calibration import read_kalibr_target
@@ -21,7 +22,7 @@ KINDS: dict[str, type[Board]] = {
 _OF_THE_TABLE = ("kind", "kalibr_target", "marker_sigma_mm", "exact")
 
 
-def with_kalibr_target(tables: dict[str, Any], session: Path, label: str) -> dict[str, Any]:
+def with_kalibr_target(tables: dict[str, Any], session: Path) -> dict[str, Any]:
     """Return a session's tables with the keys of [board] that its file of Kalibr states.
 
     Raises BadInput where there is no such file, or both state a key.
@@ -32,12 +33,14 @@ def with_kalibr_target(tables: dict[str, Any], session: Path, label: str) -> dic
         return tables
     path = session / name
     if Path(name).name != name or not path.is_file():
-        found = f"[board] kalibr_target = {name!r}: there is no such file beside {label}"
-        raise BadInput(found, file=label)
-    with refused_as_bad_input(label):
+        found = f"[board] kalibr_target = {name!r}: there is no such file beside {SESSION_TOML}"
+        raise BadInput(found, file=SESSION_TOML)
+    with refused_as_bad_input(SESSION_TOML):
         stated = read_kalibr_target(path)
     if both := sorted(stated.keys() & table.keys()):
-        raise BadInput(f"[board] {', '.join(both)} and {name} state the same: keep one", file=label)
+        raise BadInput(
+            f"[board] {', '.join(both)} and {name} state the same: keep one", file=SESSION_TOML
+        )
     return tables | {"board": table | stated}
 
 

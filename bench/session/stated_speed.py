@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from bench.base.errors import BadInput
+from bench.session.file_names import TRIAL_TOML
 from bench.session.trial import Trial
 
 # [1] Of the recording's samples, for the level at its start and for the mean that finds its crest. Stated.
@@ -39,10 +40,10 @@ def by_stated_speed(
         found = (
             f'angle_from = "speed" needs speed_deg_s and speed_sigma_deg_s; {missing} is missing'
         )
-        raise BadInput(found, file=trial.label("trial.toml"))
+        raise BadInput(found, file=trial.label(TRIAL_TOML))
     if trial.both_ways:
         found = 'both_ways needs motor_deg: angle_from = "speed" knows the way there alone'
-        raise BadInput(found, file=trial.label("trial.toml"))
+        raise BadInput(found, file=trial.label(TRIAL_TOML))
     crest = _crest(channels, label)
     elapsed_s = np.minimum(time_s, time_s[crest]) - time_s[0]
     return speed_deg_s * elapsed_s, trial.speed_sigma_deg_s / speed_deg_s

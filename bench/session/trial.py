@@ -9,6 +9,7 @@ from bench.base.input_problems import InputProblems
 from bench.base.statuses import reason
 from bench.session import manifest
 from bench.session.daq import DaqFile
+from bench.session.file_names import TRIAL_TOML
 from bench.session.footage import camera_sources, single_pictures
 from bench.session.givens import Given, with_sigmas
 from bench.session.stage import STAGE, StageLog, read_stage
@@ -17,7 +18,6 @@ from bench.session.strict_toml import as_keys, convert, read_toml, values
 from bench.session.trace_files import IN_SPACE, OBJECT, trace_files
 from vision.pictures import PicturePart
 
-MANIFEST = "trial.toml"
 SIGNALS = "signals.csv"
 # Of a trial of traces alone whose object is placed by a stage or a board on it.
 PLACE_UNCHECKED = (
@@ -119,7 +119,7 @@ def load_trial(
     daq: of [signals].
     """
     place = f"trials/{folder.name}"
-    label = f"{place}/{MANIFEST}"
+    label = f"{place}/{TRIAL_TOML}"
     table = _trial_table(folder, session.trial_table, label, problems)
     table, givens = with_sigmas(table, manifest.TrialKeys, "[trial]", exact=session.keys.exact)
     keys = convert(table, manifest.TrialKeys)
@@ -211,7 +211,7 @@ def _warn_of_unread_object(trial: Trial, problems: InputProblems) -> None:
 
 def _check_stated_truth(trial: Trial, table: dict[str, Any]) -> None:
     """Raise BadInput where what trial.toml states is no truth. table: the keys that it states."""
-    label = trial.label(MANIFEST)
+    label = trial.label(TRIAL_TOML)
     moves = trial.object_velocity_mm_s is not None and any(trial.object_velocity_mm_s)
     if trial.states_place:
         _check_place(trial, label)
@@ -256,7 +256,7 @@ def _trial_table(
 
     A sigma comes from where its value comes from.
     """
-    file = folder / MANIFEST
+    file = folder / TRIAL_TOML
     if not file.is_file():
         return defaults
     own = read_toml(file, label)

@@ -6,7 +6,8 @@ from pathlib import Path
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
-from bench.session.session import MANIFEST, load_session
+from bench.session.file_names import SESSION_TOML
+from bench.session.session import load_session
 from bench.setup.lab import Ask, Lab
 from bench.setup.manifest_text import TO_FILL_IN, WHOLE_CAMERA, manifest_text
 from bench.setup.questions import questions_of
@@ -41,14 +42,14 @@ def new_session(
     for folder in _folders(lab):
         (path / folder).mkdir(parents=True, exist_ok=True)
     text = manifest_text(name or path.resolve().name, numbers, lab, squares, dictionary)
-    write_whole(path / MANIFEST, text)
+    write_whole(path / SESSION_TOML, text)
     return list(_next_steps(path, lab))
 
 
 def require_no_session(path: Path) -> None:
     """Raise BadInput where there is a session already."""
-    if (path / MANIFEST).exists():
-        raise BadInput(f"there is a {MANIFEST} already; nothing was written", file=path)
+    if (path / SESSION_TOML).exists():
+        raise BadInput(f"there is a {SESSION_TOML} already; nothing was written", file=path)
 
 
 def _folders(lab: Lab) -> Iterator[str]:
@@ -70,7 +71,7 @@ def _missing(path: Path) -> int:
 
 def _next_steps(path: Path, lab: Lab) -> Iterator[str]:
     """Yield lines on what to do next with a new session."""
-    yield f"written: {path / MANIFEST}"
+    yield f"written: {path / SESSION_TOML}"
     missing = _missing(path)
     if missing:
         lines = "line is" if missing == 1 else "lines are"

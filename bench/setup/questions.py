@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from bench.base.errors import BadInput
 from bench.session.angle_source import SOURCES
+from bench.session.file_names import SESSION_TOML
 from bench.session.givens import Assumed
 from bench.session.manifest import BarKeys, BoardKeys, TrialKeys, TruthKeys, WhiskerKeys
 from bench.session.plausible import SIGMA, PlausibleRange
@@ -49,7 +50,7 @@ class Question:
         default = "fill in later" if self.assumed is None else f"{self.assumed:g} is assumed"
         while text := ask(f"{self.wanted} (Enter: {default}): ").strip():
             try:
-                self.plausible_range.check(float(text), self.key, "session.toml")
+                self.plausible_range.check(float(text), self.key, SESSION_TOML)
                 return {self.option: float(text)}
             except ValueError:
                 print(f"  {text!r} is no number; a decimal point, no unit")

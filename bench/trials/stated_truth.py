@@ -23,10 +23,11 @@ from bench.records.trial_result import (
     SeenWhisk,
     StageTouch,
 )
+from bench.session.file_names import TRIAL_TOML
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
 from bench.session.stage import StageLog
-from bench.session.trial import MANIFEST, Trial
+from bench.session.trial import Trial
 from bench.trials.consistency import nominal_slope, nominal_slope_sigma_rad
 from bench.trials.differences import Difference
 from bench.trials.stage_contact import (
@@ -164,7 +165,7 @@ def _check_on_whisker(d_x_mm: float, session: Session, trial: Trial) -> None:
     if d_x_mm > length_mm:
         found = f"d_x_mm is {d_x_mm:g}, beyond the whisker's length of {length_mm:g} mm"
         hint = _in_other_unit(d_x_mm, 1.0, length_mm)
-        raise BadInput(f"{found}{hint}", file=trial.label(MANIFEST))
+        raise BadInput(f"{found}{hint}", file=trial.label(TRIAL_TOML))
 
 
 def _check_place(push: StatedPush, trial: Trial) -> None:
@@ -180,7 +181,7 @@ def _check_place(push: StatedPush, trial: Trial) -> None:
     if is_near:
         why = f"nearer than its radius of {least_mm:g} mm"
     hint = _in_other_unit(base_mm, least_mm, most_mm)
-    label = trial.label(MANIFEST) if trial.stage is None else trial.stage.label
+    label = trial.label(TRIAL_TOML) if trial.stage is None else trial.stage.label
     raise BadInput(f"{found}, {why}{hint}", file=label)
 
 

@@ -19,6 +19,7 @@ from bench.base.workers import Workers
 from bench.cameras.session_cameras import SessionCalibration, calibrate_session
 from bench.session.angle_source import angle_source
 from bench.session.angles_file import FrameAngles, angles_file, write_angles
+from bench.session.file_names import SESSION_TOML, TRIAL_TOML
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.session import Session, load_session
 from bench.session.signals import Signals, read_signals
@@ -73,7 +74,7 @@ def calibrate_angles_command(session: Path, *, workers: int = 1, follow_links: b
     asked = [t for t in loaded.trials if angle_source(t).is_seen and t.purpose != "weight"]
     if not asked:
         found = 'no trial has angle_from = "marker" or "whisker" in [trial]'
-        raise BadInput(found, file="session.toml")
+        raise BadInput(found, file=SESSION_TOML)
     wanted = [trial for trial in asked if angle_source(trial).lacks(trial)]
     for trial in wanted:
         _check(loaded, trial)
@@ -100,13 +101,13 @@ def _line(trial: Trial, angles: FrameAngles) -> str:
 
 def _check(session: Session, trial: Trial) -> None:
     """Raise BadInput where a trial's pictures cannot give its angles."""
-    label = trial.label("trial.toml")
+    label = trial.label(TRIAL_TOML)
     if len(trial.camera_sources) < 2:
         found = f'angle_from = "{trial.angle_from}" needs pictures by two cameras'
         raise BadInput(f"{found}; there are {len(trial.camera_sources)}", file=label)
     if session.cameras_toml is None and session.T_rig_board is None and not session.measured_rig:
         found = "where the motor's axis is must be known: state T_rig_board, or bring rig.toml or cameras.toml"
-        raise BadInput(found, file="session.toml")
+        raise BadInput(found, file=SESSION_TOML)
     if trial.angle_from == "whisker" and trial.both_ways:
         found = 'both_ways needs the way back: angle_from = "whisker" knows the way there alone'
         raise BadInput(found, file=label)
@@ -117,7 +118,7 @@ def _check(session: Session, trial: Trial) -> None:
         found = 'angle_from = "marker" needs hub_marker, the number of the marker on the hub'
         raise BadInput(f"{found}; it is missing", file=label)
     if trial.angle_from == "marker" and session.board is None:
-        raise BadInput("[board] is missing; its dictionary is the marker's", file="session.toml")
+        raise BadInput("[board] is missing; its dictionary is the marker's", file=SESSION_TOML)
 
 
 def _nominal_signals(trial: Trial) -> Signals:

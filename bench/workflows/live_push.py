@@ -23,6 +23,7 @@ from bench.cameras.session_cameras import SessionCalibration, calibrate_session
 from bench.report.overlays import last_frame
 from bench.report.video import codec_of, write_pictures
 from bench.session.angle_source import angle_source
+from bench.session.file_names import TRIAL_TOML
 from bench.session.frame_times import FrameTimes, frame_times, read_trial
 from bench.session.inside import check_outside
 from bench.session.session import Session, load_session
@@ -132,10 +133,10 @@ def live_bench(
         found = (
             "the object moves; while it is recorded, a push is evaluated against one that stands"
         )
-        raise BadInput(found, file=trial.label("trial.toml"))
+        raise BadInput(found, file=trial.label(TRIAL_TOML))
     if not angle_source(trial).has_zero:
         found = "the motor's angle has no zero that pictures share; evaluate gives estimates alone"
-        raise BadInput(found, file=trial.label("trial.toml"))
+        raise BadInput(found, file=trial.label(TRIAL_TOML))
     if known.cameras is None:
         raise BadInput("has no pictures, so no camera could be calibrated", file=session.path)
     cameras = known.cameras.subset(list(trial.camera_sources) or known.cameras.names)
