@@ -44,9 +44,10 @@ def abilities(session: Session) -> tuple[Ability, ...]:
     seen = [trial for trial in measured if not lacks[trial.name]]
     felt = [trial for trial in measured if has_gauges or has_moments(trial)]
     to_see = _first(lacks.values())
-    true = seen
-    to_know = f'{to_see}; or a stage: [truth] source = "stage"'
-    if session.truth is not None:
+    if session.truth is None:
+        true = seen
+        to_know = f'{to_see}; or a stage: [truth] source = "stage"'
+    else:
         true = [trial for trial in measured if _is_stated(trial)]
         to_know = _TO_STATE
     both = [trial for trial in true if trial in felt]

@@ -284,12 +284,12 @@ def _converge(
     return _with_scale(_moved(here, exact, both), both), both
 
 
-def _of_swing(unit: Unit, calibration: SessionCalibration, stage: str) -> Unit:
+def _of_swing(unit: Unit, calibration: SessionCalibration, step: str) -> Unit:
     """Return a unit of which the free stroke is read, without checks of what bends: nothing reads them."""
     seeing = unit.settings.seeing
     vision = replace(seeing.vision, check_beam=False)
     settings = replace(unit.settings, seeing=replace(seeing, vision=vision))
-    return replace(unit, calibration=calibration, settings=settings, stage=stage)
+    return replace(unit, calibration=calibration, settings=settings, calibration_step=step)
 
 
 def _with_scale(calibration: SessionCalibration, placed: Placement) -> SessionCalibration:

@@ -50,7 +50,7 @@ def array_units(
         whiskers.append(first_units(view, trials, folder, settings, placed))
     for number in range(_PASSES + 1):
         seen = [unit for units in whiskers for unit in units if _is_seen(unit)]
-        staged = [replace(unit, stage=f"wires{number}") for unit in seen]
+        staged = [replace(unit, calibration_step=f"wires{number}") for unit in seen]
         job = _write_traced if number else _write_straight
         pool.run(job, staged, "wires side by side")
         whiskers = [_with_wires(units, staged, is_first=number == 0) for units in whiskers]
@@ -74,8 +74,8 @@ def _with_wires(units: Sequence[Unit], staged: Sequence[Unit], *, is_first: bool
             files = tuple((one.session.base.name, one.seen_path) for one in same)
             hashes = [hash_of_files([path]) for _, path in files]
             wires_hash = hash_of([name for name, _ in files], hashes)
-            straight = files if is_first else unit.straight
-            unit = replace(unit, wires=files, wires_hash=wires_hash, straight=straight)
+            straight = files if is_first else unit.straight_wires
+            unit = replace(unit, wires=files, wires_hash=wires_hash, straight_wires=straight)
         known.append(unit)
     return known
 
@@ -124,5 +124,5 @@ def _traced(unit: Unit) -> dict[str, RodLines]:
         return wire_lines(frames.pictures, whisks, cameras, frames.rods, vision)
     except Refused:
         own = unit.session.base.name
-        straight = lines_in(unit.straight)
+        straight = lines_in(unit.straight_wires)
         return {camera: wires[own] for camera, wires in straight.items() if own in wires}

@@ -37,7 +37,7 @@ def _see(unit: Unit, signals: Signals) -> SeenTrial:
     seen = contradicted(seen, unit.contradictions)
     if not unit.wires:
         return seen
-    return with_whose(seen, lines_in(unit.straight), wires, unit.session.base.name)
+    return with_whose(seen, lines_in(unit.straight_wires), wires, unit.session.base.name)
 
 
 def kept_seen(unit: Unit) -> SeenTrial | None:

@@ -22,11 +22,12 @@ class Unit:
     """All inputs of one trial's result.
 
     files: hash of the trial's files. drift_rate (2,): of the channels per second, and
-    force_drift_rate (3,) of a load cell. gauges: None where volts cannot become moments. stage:
-    folder of a seen half that is part of the session's calibration. wires: of an array, by the
-    names of its whiskers, files with the places of their wires in the pictures, and wires_hash of
-    all of them. straight: the same were all wires straight. contradictions: warnings about the
-    session or the trial that question its truth or its estimates.
+    force_drift_rate (3,) of a load cell. gauges: None where volts cannot become moments.
+    calibration_step: of the session's calibration, what it is seen for; names the folder of that
+    seen half. wires: of an array, by the names of its whiskers, files with the places of their wires
+    in the pictures, and wires_hash of all of them. straight_wires: files with the places that the
+    wires would have if all were straight. contradictions: warnings about the session or the trial
+    that question its truth or its estimates.
     """
 
     session: Session
@@ -37,11 +38,11 @@ class Unit:
     out: Path
     drift_rate: np.ndarray | None = None
     gauges: GaugeCalibration | None = None
-    stage: str = "seen"
+    calibration_step: str = "seen"
     force_drift_rate: np.ndarray | None = None
     wires: tuple[tuple[str, Path], ...] = ()
     wires_hash: str = ""
-    straight: tuple[tuple[str, Path], ...] = ()
+    straight_wires: tuple[tuple[str, Path], ...] = ()
     contradictions: Reason = NO_REASON
 
     @property
@@ -52,7 +53,7 @@ class Unit:
     @property
     def seen_path(self) -> Path:
         """Return the file of a seen half that is part of the session's calibration."""
-        return self.out / "calibration" / self.stage / f"{self.trial.name}.json"
+        return self.out / "calibration" / self.calibration_step / f"{self.trial.name}.json"
 
     @property
     def seen_hash(self) -> str:

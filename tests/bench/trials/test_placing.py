@@ -38,7 +38,7 @@ def place(small_copy, monkeypatch):
         rng, stages, lines = np.random.default_rng(5), [], {}
 
         def see(unit):
-            stages.append(unit.stage)
+            stages.append(unit.calibration_step)
             now = (
                 unit.calibration.cameras["one"].T_camera_rig[:, 3]
                 - CAMERAS["one"].T_camera_rig[:, 3]
@@ -47,7 +47,9 @@ def place(small_copy, monkeypatch):
             made = some_lines(
                 width_deg, left, across_mm=0.01, turn_rad=5e-4, frames=frames or 1, rng=rng
             )
-            base = lines.setdefault((unit.stage, unit.trial.name), made if frames else None)
+            base = lines.setdefault(
+                (unit.calibration_step, unit.trial.name), made if frames else None
+            )
             return SeenTrial(
                 (
                     seen_whisk(0, base=base),
