@@ -20,12 +20,12 @@ from bench.base.errors import BadInput
 from bench.base.tables import WHISKER
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import TrialResult, whisks
-from bench.report.assembly import estimate_rows, whisk_rows
 from bench.report.record import ARRAY, RUNS
 from bench.report.run_facts import RunRecord, Section
 from bench.report.run_folder import read_run
 from bench.report.summary.compose import SCORE, WARNINGS, Summary
 from bench.report.summary.verdict import verdict
+from bench.report.whisk_rows import estimate_rows, whisk_rows
 from bench.report.whisk_tables import ESTIMATES, WHISKS
 from bench.session.session import Base, Session
 from vision.geometry import counted

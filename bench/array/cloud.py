@@ -10,7 +10,7 @@ import numpy as np
 from bench.array.surface import ObjectSurface, seen_surface
 from bench.base.input_problems import in_one_status
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
-from bench.report.assembly import Z_C_MM
+from bench.report.whisk_rows import Z_C_MM
 from bench.session.session import Base
 from estimator.distance import cartesian, contact_point
 from vision import NAN, UNKNOWN, Value

@@ -10,9 +10,9 @@ from bench.base.input_problems import InputProblems
 from bench.base.progress import begin_step, count_parts
 from bench.base.settings import Settings
 from bench.base.workers import Workers
-from bench.report.assembly import write_tables
 from bench.report.evaluation import Evaluation, evaluated_run
 from bench.report.summary.compose import Summary
+from bench.report.whisk_rows import write_tables
 from bench.session.inside import check_outside
 from bench.session.session import Session
 from bench.session.session_check import checked_views, trials_with_whisks

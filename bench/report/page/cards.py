@@ -8,11 +8,11 @@ from bench.base.drawing import label_of
 from bench.base.statuses import cure_of
 from bench.gauges.felt import lateness
 from bench.records.trial_result import BY_STAGE, EstimateRow, SeenWhisk
-from bench.report.assembly import status_of
 from bench.report.page.thumbnails import picture_source
 from bench.report.page.words import MISSING, WhiskRow, distance_text, number, value_text
 from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
+from bench.report.whisk_rows import status_of
 from vision import UNKNOWN, BeamCheck, TruthAtAngle, Value
 from vision.geometry import counted
 

@@ -7,7 +7,7 @@ import numpy as np
 from bench.analyses.pooling import grouped, rms
 from bench.base.drawing import label_of
 from bench.records.trial_result import TrialResult
-from bench.report.assembly import estimate_rows
+from bench.report.whisk_rows import estimate_rows
 from bench.trials.estimate_errors import Judged, sound_whisks
 
 _NARROWEST = 17  # letters of a column

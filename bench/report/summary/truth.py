@@ -7,7 +7,7 @@ import numpy as np
 
 from bench.gauges.felt import gauge_delay, lateness
 from bench.records.trial_result import TrialResult, whisks
-from bench.report.assembly import BEAM_UNITS, beam_rows, budget_rows
+from bench.report.whisk_rows import BEAM_UNITS, beam_rows, budget_rows
 from bench.trials.clocks import shared_touch
 from vision import CAUSES, Value
 

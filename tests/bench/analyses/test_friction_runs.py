@@ -18,7 +18,7 @@ from bench.analyses.section_vii import (
 )
 from bench.base.settings import Settings
 from bench.records.trial_result import EstimateRow
-from bench.report.assembly import estimate_rows
+from bench.report.whisk_rows import estimate_rows
 from bench.session.whisker import Whisker
 from estimator import slip
 from estimator.uncertainty import Z_95

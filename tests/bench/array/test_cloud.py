@@ -11,7 +11,7 @@ from bench.records.trial_result import (
     FeltWhisk,
     TrialResult,
 )
-from bench.report.assembly import Z_C_MM
+from bench.report.whisk_rows import Z_C_MM
 from bench.session.session import Base
 from tests.scenes.results import trial_result
 from vision.geometry.rods import Wire

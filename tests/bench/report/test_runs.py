@@ -12,8 +12,8 @@ from bench.base.results import plain, write_result
 from bench.commands import cli
 from bench.records.plain import from_plain
 from bench.records.trial_result import TrialResult
-from bench.report.assembly import write_tables
 from bench.report.pooled import pooled
+from bench.report.whisk_rows import write_tables
 from estimator import slip
 
 EI = 2945.2

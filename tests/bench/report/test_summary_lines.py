@@ -12,7 +12,6 @@ from bench.base.statuses import cure_of
 from bench.gauges.felt import gauge_delay, lateness
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import Clock, EstimateRow, FeltWhisk, SeenTrial, TrialResult
-from bench.report.assembly import beam_rows, budget_rows
 from bench.report.run_facts import Section
 from bench.report.summary.compose import Summary
 from bench.report.summary.truth import beam_lines, budget_lines, clock_lines
@@ -23,6 +22,7 @@ from bench.report.summary.warning_lines import (
     light_lines,
     whisk_warnings,
 )
+from bench.report.whisk_rows import beam_rows, budget_rows
 from bench.trials.estimates import as_felt
 from estimator.signal import FeltTouch
 from tests.scenes.results import seen_whisk, trial_result

@@ -22,9 +22,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from bench.analyses.catalogue import ANALYSES
 from bench.base.settings import Settings
 from bench.records.trial_result import TrialResult
-from bench.report.assembly import write_tables
 from bench.report.evaluation import evaluated_run
 from bench.report.run_folder import read_results
+from bench.report.whisk_rows import write_tables
 from bench.session.session import Session, load_session
 from bench.workflows.session_evaluation import evaluate
 
