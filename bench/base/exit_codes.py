@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable, Sequence
 
-DONE = 0
-WITH_WARNINGS = 1
-BAD_INPUT = 2
-INTERRUPTED = 130
+DONE = 0  # without a warning
+WITH_WARNINGS = 1  # done all the same
+BAD_INPUT = 2  # or wrong usage, as argparse has it
+INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 FAULT_OF_OURS = 70  # EX_SOFTWARE: neither a result nor the user's input
 
 
