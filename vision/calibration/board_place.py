@@ -30,13 +30,8 @@ def place_board(
     T_first = _first_pose(cameras, seen, board)
 
     def residuals(step: np.ndarray) -> np.ndarray:
-        """Return how far (n,) corners are off, over their sigma."""
-        off = []
-        for name, view in seen.items():
-            T_rig_board = moved_pose(T_first, step)
-            px = cameras[name].project(apply(T_rig_board, board.corners_mm[view.ids]))
-            off.append(((px - view.px) / view.sigma_px[:, None]).ravel())
-        return np.concatenate(off)
+        """Return how far (n,) corners are off, over their sigma, after a step (6,)."""
+        return _corners_off(cameras, seen, board, moved_pose(T_first, step))
 
     found = least_squares(residuals, np.zeros(6), x_scale=[1e-3] * 3 + [0.1] * 3)
     rms = float(np.sqrt(np.mean(found.fun**2)))
@@ -48,6 +43,17 @@ def place_board(
         )
     covariance = max(rms, 1.0) ** 2 * np.linalg.inv(found.jac.T @ found.jac)
     return moved_pose(T_first, found.x), covariance
+
+
+def _corners_off(
+    cameras: Cameras, seen: Mapping[str, Corners], board: Board, T_rig_board: np.ndarray
+) -> np.ndarray:
+    """Return how far (n,) the corners of a board in a pose (3, 4) are off, over their sigma."""
+    off = []
+    for name, view in seen.items():
+        px = cameras[name].project(apply(T_rig_board, board.corners_mm[view.ids]))
+        off.append(((px - view.px) / view.sigma_px[:, None]).ravel())
+    return np.concatenate(off)
 
 
 def _first_pose(cameras: Cameras, seen: Mapping[str, Corners], board: Board) -> np.ndarray:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.fit.blocks import REST_PRIOR_MM, WIRE_MODES_PX
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import (
     WANDER_PX,
     Problem,
@@ -22,7 +23,6 @@ from vision.fit.problem import (
     point_rows,
     wandering,
 )
-from vision.fit.solution import Solution
 from vision.geometry.base_lines import BaseLines
 from vision.geometry.centreline import REST_POWERS, rotation_z
 from vision.geometry.rotation import unit
@@ -69,7 +69,7 @@ class _FrameRows:
     by_shared: np.ndarray
 
 
-def base_lines(fit: Solution) -> BaseLines | None:
+def base_lines(fit: ConvergedFit) -> BaseLines | None:
     """Return the whisker's base as a line in each frame before touch.
 
     None where fewer than two frames are free and well seen.
@@ -113,7 +113,7 @@ def _well_seen_frames(rows: list[_FrameRows]) -> np.ndarray:
     return np.flatnonzero(counts >= _FEWEST_POINTS)
 
 
-def _free_rows(fit: Solution) -> list[_FrameRows]:
+def _free_rows(fit: ConvergedFit) -> list[_FrameRows]:
     """Return the rows of the wire in all frames that do not bend."""
     found = []
     for seen, rows in point_rows(fit.problem):
@@ -122,7 +122,7 @@ def _free_rows(fit: Solution) -> list[_FrameRows]:
     return found
 
 
-def _rows_of(fit: Solution, seen: Observed, rows: slice) -> _FrameRows:
+def _rows_of(fit: ConvergedFit, seen: Observed, rows: slice) -> _FrameRows:
     """Return the rows of one observation, without the offsets that the whole fit gave the line, and
     counted from a straight whisker in its place.
     """

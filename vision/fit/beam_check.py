@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.covariance import chance_of
 from vision.fit.problem import (
     WANDER_PX,
@@ -27,7 +28,6 @@ from vision.fit.problem import (
     wandering,
 )
 from vision.fit.reshaped import reshape
-from vision.fit.solution import Solution
 from vision.geometry.centreline import Curves, rotation_z
 
 # [chance] By which a wire that is a beam departs from it so far, a whisk. Study: chosen.
@@ -101,7 +101,7 @@ class BeamCheck:
         )
 
 
-def check_beam(fit: Solution, covariance: np.ndarray) -> BeamCheck:
+def check_beam(fit: ConvergedFit, covariance: np.ndarray) -> BeamCheck:
     """Check the beam in a whisk that touches. covariance (size, size): of its parameters, as stated."""
     measured = fit.measured
     by = fit.by_parameter
@@ -169,7 +169,7 @@ class _Comparison:
         return Compared(beam, beam + float(row @ departure.values), difference_sigma, sigma)
 
 
-def _estimate_departure(fit: Solution) -> tuple[_Departure, np.ndarray]:
+def _estimate_departure(fit: ConvergedFit) -> tuple[_Departure, np.ndarray]:
     """Estimate the departure (k,) by one linear step from the fit.
 
     Returns with it the change (k,) of the slip in the last frame by the departure, the parameters
@@ -179,7 +179,7 @@ def _estimate_departure(fit: Solution) -> tuple[_Departure, np.ndarray]:
     return _fit_added(_wandering(fit), fit.linear.weigh(by_departure)), slip_by
 
 
-def _wandering(fit: Solution) -> _LeastSquares:
+def _wandering(fit: ConvergedFit) -> _LeastSquares:
     """Return the fit with lines that may wander."""
     wander = fit.linear.weigh(_wander_rows(fit.problem))
     jacobian = np.hstack([fit.weighted.jacobian, wander])
@@ -215,7 +215,7 @@ def _fit_added(problem: _LeastSquares, rows: np.ndarray) -> _Departure:
     )
 
 
-def _moves(fit: Solution) -> Curves:
+def _moves(fit: ConvergedFit) -> Curves:
     """Return how a unit of each departure moves the centrelines: points and tangents (k, f, m, 3)
     per mm/rad.
     """

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from vision.fit.converged_fit import ConvergedFit, times_residual_covariance
 from vision.fit.problem import Problem, point_rows
-from vision.fit.solution import Solution, times_residual_covariance
 from vision.fit.turns import by_turn
 
 # [frames⁻²] Information on the delay of a camera that shows no wire, which would run away. Stated.
@@ -20,7 +20,7 @@ _PRIOR = 1e-4
 
 
 def camera_delays(
-    fit: Solution, picture_of: Mapping[str, str] | None = None
+    fit: ConvergedFit, picture_of: Mapping[str, str] | None = None
 ) -> dict[str, tuple[float, float]]:
     """Return the delay of each camera in frames, the others having none, and its sigma.
 

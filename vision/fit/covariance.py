@@ -6,8 +6,8 @@ import numpy as np
 from scipy.special import chdtrc
 
 from vision.fit.blocks import columns_of
+from vision.fit.converged_fit import ConvergedFit, times_residual_covariance
 from vision.fit.problem import Problem
-from vision.fit.solution import Solution, times_residual_covariance
 
 CAUSES = ("wire", "bar", "touch", "diameters", "light", "priors", "cameras", "placement")
 
@@ -24,7 +24,7 @@ def chance_of(values: np.ndarray, covariance: np.ndarray) -> float:
     return float(chdtrc(len(z), z @ np.linalg.pinv(correlation, hermitian=True) @ z))
 
 
-def shared_covariance(fit: Solution) -> np.ndarray:
+def shared_covariance(fit: ConvergedFit) -> np.ndarray:
     """Return the part (size, size) of a fit's covariance that all whisks of a session have in
     common: by the object's stated place, diameters, light, cameras and placement.
     """
@@ -37,7 +37,7 @@ def shared_covariance(fit: Solution) -> np.ndarray:
     return by_row @ by_row.T + fit.lens
 
 
-def variance_by_cause(fit: Solution, gradient: np.ndarray) -> dict[str, float]:
+def variance_by_cause(fit: ConvergedFit, gradient: np.ndarray) -> dict[str, float]:
     """Return the variance that each cause adds to a quantity with this gradient (size,); the parts
     add up to it.
 
@@ -77,7 +77,7 @@ def _sum_by_cause(problem: Problem, parts: np.ndarray) -> dict[str, float]:
     }
 
 
-def _placement_variance(fit: Solution, gradient: np.ndarray) -> float:
+def _placement_variance(fit: ConvergedFit, gradient: np.ndarray) -> float:
     """Return the variance by the rig frame's placement; NaN where the cameras do not distinguish
     it.
     """

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import Problem, point_rows
-from vision.fit.solution import Solution
 from vision.fit.solve import Linear
 from vision.geometry.robust import robust_sigma
 
@@ -36,7 +36,7 @@ class Exposure:
     covariance: np.ndarray
 
 
-def slip_in_exposure(fit: Solution) -> Exposure:
+def slip_in_exposure(fit: ConvergedFit) -> Exposure:
     """Return the slip while the shutter was open, by the blur of the lines."""
     problem = fit.problem
     frames = np.flatnonzero(problem.touching)

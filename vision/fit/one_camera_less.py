@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit.blocks import Blocks, columns_of
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.covariance import chance_of
 from vision.fit.problem import point_rows
-from vision.fit.solution import Solution
 
 # [cameras] With one fewer nothing is left over to compare. Derived.
 FEWEST_CAMERAS = 3
@@ -81,7 +81,7 @@ class OneLess:
         return f"without {self.camera} {name} is {by} elsewhere, {lines} (chance {self.chance:.1g})"
 
 
-def leave_out_each(fit: Solution) -> list[OneLess]:
+def leave_out_each(fit: ConvergedFit) -> list[OneLess]:
     """Return the fit without each of its cameras; none where there are fewer than three."""
     cameras = range(len(fit.problem.cameras))
     if len(cameras) < FEWEST_CAMERAS:
@@ -89,7 +89,7 @@ def leave_out_each(fit: Solution) -> list[OneLess]:
     return [_leave_out(fit, camera) for camera in cameras]
 
 
-def _leave_out(fit: Solution, camera: int) -> OneLess:
+def _leave_out(fit: ConvergedFit, camera: int) -> OneLess:
     """Return the fit without one camera."""
     by = fit.by_parameter
     whisk = [by.whisk[name] for name in ("d_x", "touch", "beta")]
@@ -114,7 +114,7 @@ def _leave_out(fit: Solution, camera: int) -> OneLess:
     return replace(one, spread=fit.spread(change)) if one.contradicts else one
 
 
-def _step_without(fit: Solution, camera: int) -> tuple[np.ndarray, np.ndarray]:
+def _step_without(fit: ConvergedFit, camera: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the step (size,) to the fit without one camera, and its derivatives (size, n) by the
     errors of the observations.
     """
@@ -124,7 +124,7 @@ def _step_without(fit: Solution, camera: int) -> tuple[np.ndarray, np.ndarray]:
     return -inverse_normal @ (kept.T @ fit.weighted.residual), change
 
 
-def _rows_without(fit: Solution, camera: int) -> np.ndarray:
+def _rows_without(fit: ConvergedFit, camera: int) -> np.ndarray:
     """Return the weighted Jacobian (n, size) with zeros for the line points of a camera."""
     others = np.ones(len(fit.weighted.residual))
     for seen, rows in point_rows(fit.problem):
@@ -153,7 +153,7 @@ class _LinesOff:
     px_per_value: np.ndarray
 
     @classmethod
-    def of(cls, fit: Solution, camera: int) -> "_LinesOff":
+    def of(cls, fit: ConvergedFit, camera: int) -> "_LinesOff":
         """Return how far one camera's lines are off."""
         problem = fit.problem
         off = _offset_columns(problem.blocks, camera)

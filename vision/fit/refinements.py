@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.fit.blocks import columns_of
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import Problem, State, bar_axes, bends, curves_of
 from vision.fit.quantities import measure
 from vision.fit.reshaped import reshape
-from vision.fit.solution import Solution
 from vision.fit.solve import residuals
 from vision.geometry.camera import N_PARAMETERS, PARAMETERS
 from vision.geometry.centreline import (
@@ -55,7 +55,7 @@ class LeftOut:
     why: str = ""
 
 
-def _after(fit: Solution, step: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
+def _after(fit: ConvergedFit, step: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
     """Return what a step (size,) of the parameters moves, with slip_mm added to the slip."""
     by = fit.by_parameter
     return LeftOut(
@@ -65,7 +65,7 @@ def _after(fit: Solution, step: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
     )
 
 
-def _held(fit: Solution, rows: np.ndarray, values: np.ndarray) -> LeftOut:
+def _held(fit: ConvergedFit, rows: np.ndarray, values: np.ndarray) -> LeftOut:
     """Return what it moves to change functions of the parameters by values (k,).
 
     rows (k, size): derivatives of these functions.
@@ -74,19 +74,19 @@ def _held(fit: Solution, rows: np.ndarray, values: np.ndarray) -> LeftOut:
     return _after(fit, gain @ np.linalg.lstsq(rows @ gain, values, rcond=None)[0])
 
 
-def _held_parameters(fit: Solution, columns: np.ndarray, changes: np.ndarray) -> LeftOut:
+def _held_parameters(fit: ConvergedFit, columns: np.ndarray, changes: np.ndarray) -> LeftOut:
     """Return what it moves to change the parameters of these columns (k,) by changes (k,)."""
     return _held(fit, np.eye(fit.problem.size)[columns], changes)
 
 
-def _followed(fit: Solution, residual: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
+def _followed(fit: ConvergedFit, residual: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
     """Return what a change (n,) of the first n residuals moves, with slip_mm added to the slip."""
     change = fit.linear.weigh(residual[:, None])[:, 0]
     step = -fit.inverse_normal @ (fit.weighted.jacobian.T @ change)
     return _after(fit, step, slip_mm)
 
 
-def left_out(fit: Solution, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut]:
+def left_out(fit: ConvergedFit, light: Mapping[str, WireAppearance]) -> dict[str, LeftOut]:
     """Return the effect of each refinement of the truth by name. light: how each camera sees the
     wire.
     """
@@ -110,7 +110,7 @@ def left_out(fit: Solution, light: Mapping[str, WireAppearance]) -> dict[str, Le
     return found
 
 
-def _large_bending(fit: Solution) -> LeftOut:
+def _large_bending(fit: ConvergedFit) -> LeftOut:
     """Return the effect of a beam of small angles, with no more friction along the whisker than it
     has.
     """
@@ -160,7 +160,7 @@ def _contacts_of_small_angles(
     return closest_arc(Curves(curves.arc_mm, points, tangents), axis, problem.wire, arcs_mm)
 
 
-def _taper(fit: Solution) -> LeftOut:
+def _taper(fit: ConvergedFit) -> LeftOut:
     """Return the effect of the whisker as a cylinder of its base's diameter."""
     problem = fit.problem
     state = fit.state
@@ -195,7 +195,7 @@ def _cylinder(wire: Wire) -> Wire:
     )
 
 
-def _lens(fit: Solution, terms: Sequence[str]) -> LeftOut:
+def _lens(fit: ConvergedFit, terms: Sequence[str]) -> LeftOut:
     """Return the effect of cameras that are calibrated without these terms."""
     cameras = fit.problem.cameras
     own = [PARAMETERS.index(term) for term in terms]
@@ -213,7 +213,7 @@ def _lens(fit: Solution, terms: Sequence[str]) -> LeftOut:
     return _after(fit, fit.parameters_by_camera @ moved)
 
 
-def _one_sided(fit: Solution, light: Mapping[str, WireAppearance]) -> LeftOut:
+def _one_sided(fit: ConvergedFit, light: Mapping[str, WireAppearance]) -> LeftOut:
     """Return the effect of the wire's axis in the middle of what is seen, in cameras that do not
     see both its edges.
     """

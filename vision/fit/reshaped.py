@@ -7,14 +7,14 @@ those of the f frames.
 
 import numpy as np
 
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import CONTACT_SIGMA_MM, Problem
-from vision.fit.solution import Solution
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import clearance
 from vision.wire.points import Observed
 
 
-def reshape(fit: Solution, moves: Curves, step: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+def reshape(fit: ConvergedFit, moves: Curves, step: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the change (n, k) of the residuals of line points and touching frames, and of the slip in
     the last frame (k,).
 
@@ -47,7 +47,7 @@ def _across_line(problem: Problem, seen: Observed, curves: Curves, moves: Curves
     return np.einsum("ni,nij,knj->nk", seen.points.normal, by_point, moves_mm)
 
 
-def _by_contacts(fit: Solution, moves: Curves, step: float) -> tuple[np.ndarray, np.ndarray]:
+def _by_contacts(fit: ConvergedFit, moves: Curves, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the change of the touching frames' residuals (t, k), and of the slip in the last frame
     (k,).
     """

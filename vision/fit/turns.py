@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import Problem, point_rows
-from vision.fit.solution import Solution
 from vision.fit.solve import residuals
 
 # [rad] Of differences: the tip moves by 0.01 mm. Derived.
@@ -35,7 +35,7 @@ class Turns:
     covariance: np.ndarray
 
 
-def frame_turns(fit: Solution, index: Sequence[int]) -> Turns:
+def frame_turns(fit: ConvergedFit, index: Sequence[int]) -> Turns:
     """Return the turns of a fit's frames (f,)."""
     linear = fit.linear
     problem = fit.problem
@@ -50,13 +50,13 @@ def frame_turns(fit: Solution, index: Sequence[int]) -> Turns:
     return Turns(np.asarray(index), problem.motor_rad, turn_rad, covariance[-count:, -count:])
 
 
-def by_turn(fit: Solution) -> np.ndarray:
+def by_turn(fit: ConvergedFit) -> np.ndarray:
     """Return derivatives (n,) of all residuals by the turn of the frame that each is of."""
     turned = replace(fit.problem, motor_rad=fit.problem.motor_rad + _STEP_RAD)
     return (residuals(turned, fit.state) - fit.linear.residual) / _STEP_RAD
 
 
-def _by_turns(fit: Solution) -> np.ndarray:
+def _by_turns(fit: ConvergedFit) -> np.ndarray:
     """Return derivatives (n, f) of all residuals by the turn of each frame."""
     own = by_turn(fit)
     frames = np.arange(len(fit.problem.motor_rad))

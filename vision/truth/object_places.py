@@ -187,19 +187,14 @@ def _middle(points: Trace, camera: Camera, axis: BarAxis) -> LinePoints:
     the number of points.
     """
     beside = _beside_axis(points, camera, axis)
-    place_mm = float(np.mean(beside.place_mm)) + float(np.std(beside.place_mm)) * np.array(
-        [-1.0, 1.0]
-    )
+    place_mm = np.mean(beside.place_mm) + np.std(beside.place_mm) * np.array([-1.0, 1.0])
     offsets_px = []
     scatters_px = []
     for line in np.unique(beside.line):
         offset_px, scatter_px = _straight_line(beside.select(beside.line == line), place_mm)
         offsets_px.append(offset_px)
         scatters_px.append(scatter_px)
-    sigma_px = float(np.mean(beside.sigma_px))  # NaN where it is not stated
-    if not np.isfinite(sigma_px):
-        sigma_px = float(np.sqrt(np.mean(np.square(scatters_px))))
-    sigma_px = max(sigma_px, _LEAST_SIGMA_PX) / np.sqrt(len(offsets_px))
+    sigma_px = _sigma_px(beside.sigma_px, scatters_px) / np.sqrt(len(offsets_px))
     foot_px, normal = _at_places(camera, axis, place_mm)
     return LinePoints(
         px=foot_px + np.mean(offsets_px, axis=0)[:, None] * normal,
@@ -207,6 +202,16 @@ def _middle(points: Trace, camera: Camera, axis: BarAxis) -> LinePoints:
         sigma_px=np.full(len(place_mm), sigma_px),
         place=place_mm,
     )
+
+
+def _sigma_px(stated_px: np.ndarray, scatters_px: Sequence[float]) -> float:
+    """Return the sigma of one line: the mean of its points' (n,), or their scatter about the lines where
+    none is stated (NaN).
+    """
+    sigma_px = float(np.mean(stated_px))
+    if not np.isfinite(sigma_px):
+        sigma_px = float(np.sqrt(np.mean(np.square(scatters_px))))
+    return max(sigma_px, _LEAST_SIGMA_PX)
 
 
 def _straight_line(beside: _BesideAxis, place_mm: np.ndarray) -> tuple[np.ndarray, float]:

@@ -15,10 +15,10 @@ import numpy as np
 from vision.fit.base_line import base_lines
 from vision.fit.beam_check import BeamCheck, check_beam
 from vision.fit.camera_delays import camera_delays
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.motion import Gives, StatedVelocity
 from vision.fit.one_camera_less import contradiction
 from vision.fit.refinements import LeftOut, left_out
-from vision.fit.solution import Solution
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before
@@ -348,7 +348,7 @@ def fitted_truth(explained: Explanation) -> WhiskTruth:
     status = joined(truth.status, explained.warning, *warnings_of(whisk, fitted, beam))
     # Before the free stroke is traced, which changes whisk.light.
     refinements = _refinements(whisk, fitted) if truth.d_x_mm.is_known else {}
-    free: Solution = fitted
+    free: ConvergedFit = fitted
     if len(fitted.frames) < len(whisk.frames):
         free = free_stroke(whisk, fitted)
     return replace(

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.covariance import variance_by_cause
 from vision.fit.line_noise import LineNoise
 from vision.fit.problem import Problem, State
-from vision.fit.solution import Solution
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import is_before
 from vision.geometry.reasons import Reason
@@ -158,7 +158,7 @@ def _fit(lines: PredictedLines) -> FittedWhisk:
 def _part_by_clearance(problem: Problem, known: KnownWhisk) -> tuple[Problem, State]:
     """Return the problem with the frames that a fit would know to touch or to be free."""
     state = known.state(problem)
-    covariance = Solution(problem, state).inverse_normal
+    covariance = ConvergedFit(problem, state).inverse_normal
     touching, free = TouchByClearance().part_by_fit(problem, state, covariance)
     problem = replace(problem, touching=touching, bent=~free)
     return problem, known.state(problem)
@@ -169,4 +169,4 @@ def _part_by_onset(problem: Problem, known: KnownWhisk) -> tuple[Problem, State]
     free = early(problem.motor_rad)
     problem = replace(problem, touching=problem.touching & ~free, bent=~free)
     state = known.state(problem)
-    return TouchByOnset().with_touch(problem, state, Solution(problem, state).inverse_normal)
+    return TouchByOnset().with_touch(problem, state, ConvergedFit(problem, state).inverse_normal)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.first_bends import SwingPictures, contact_arc, find_rest, follow_bends
 from vision.fit.problem import (
     Problem,
@@ -17,7 +18,6 @@ from vision.fit.problem import (
     shifts_mm,
 )
 from vision.fit.scatter import inflated_by_residuals, scatter_px
-from vision.fit.solution import Solution
 from vision.fit.solve import LAST_SCALE, solve
 from vision.geometry.centreline import Curves, centrelines, unbent_curves
 from vision.geometry.contact import clearance
@@ -249,7 +249,7 @@ def check_scatter(problem: Problem, state: State, most_px: float) -> None:
         )
 
 
-def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> Solution:
+def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> ConvergedFit:
     """Fit all frames before touch, about the object and the rest shape of a fit."""
     problem = fitted.problem
     vector = fitted.state.vector
@@ -269,7 +269,7 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> Solution:
     middle_mm = np.full(len(place.curves), 0.5 * whisk.rods.wire.length_mm)
     state = State(vector[: problem.first_bend], middle_mm)
     state, _ = solve(alone, state, scales=[LAST_SCALE] * 3)
-    return Solution(inflated_by_residuals(alone, state, FREE_SHARED), state)
+    return ConvergedFit(inflated_by_residuals(alone, state, FREE_SHARED), state)
 
 
 def fit_before_touch(

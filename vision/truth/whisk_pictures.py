@@ -8,11 +8,11 @@ import numpy as np
 
 from vision.fit.bend_onset import Onset
 from vision.fit.blocks import BAR_PRIOR
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
 from vision.fit.problem import Problem, State, shifts_mm
-from vision.fit.solution import Solution
 from vision.fit.touch import first_touch
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
@@ -181,7 +181,7 @@ class WhiskPictures:
 
 
 @dataclass(frozen=True, eq=False)
-class FittedWhisk(Solution):
+class FittedWhisk(ConvergedFit):
     """The fit to a whisk's pictures: frames are those in it. lines: the source of its lines."""
 
     frames: list[int]

@@ -29,8 +29,8 @@ from tests.scenes.model_scenes import begun, scene, with_points
 from tests.scenes.results import seen_whisk
 from vision.boards.charuco import CharucoBoard
 from vision.calibration.place import FALSE_ALARM, Placement, by_board, combine
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.scatter import inflated_by_residuals
-from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.fit.turns import frame_turns
 from vision.truth.value import UNKNOWN, Value
@@ -55,7 +55,7 @@ def warning(rng, spoil=None, kept=None) -> str:
     state, _ = solve(problem, begun(problem, truth))
     problem = inflated_by_residuals(problem, state)
     state, _ = solve(problem, state)
-    return check_turns(frame_turns(Solution(problem, state), np.arange(FRAMES)), SPEED)
+    return check_turns(frame_turns(ConvergedFit(problem, state), np.arange(FRAMES)), SPEED)
 
 
 @pytest.mark.parametrize("draw", range(4))

@@ -32,9 +32,9 @@ from tests.studies.accuracy.scenes import (
     line_points,
 )
 from vision.fit.beam_check import BeamCheck, check_beam
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import Problem
 from vision.fit.scatter import inflated_by_residuals
-from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.wire.points import Observed
 
@@ -126,7 +126,7 @@ def check_of(problem: Problem) -> BeamCheck:
     """The check of line points, fitted as those of a trial."""
     state, _ = solve(problem, begin(problem), scales=SCALES)
     problem = inflated_by_residuals(problem, state)
-    fit = Solution(problem, solve(problem, state, scales=(4.0, 4.0, 4.0))[0])
+    fit = ConvergedFit(problem, solve(problem, state, scales=(4.0, 4.0, 4.0))[0])
     return check_beam(fit, fit.fit_covariance)
 
 

@@ -39,9 +39,9 @@ from tests.studies.accuracy.scenes import (
     hard_light,
     line_points,
 )
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import Problem, State
 from vision.fit.scatter import inflated_by_residuals
-from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
@@ -93,7 +93,7 @@ def see_lines(problem: Problem, start: State, scales=SCALES) -> Seen:
         state, _ = solve(problem, state)
     problem = inflated_by_residuals(problem, state)
     state, _ = solve(problem, state, scales=(4.0, 4.0, 4.0))
-    fit = Solution(problem, state)
+    fit = ConvergedFit(problem, state)
     covariance = fit.fit_covariance
     measured, by = fit.measured, fit.by_parameter
     sigma = {name: float(np.sqrt(j @ covariance @ j)) for name, j in by.whisk.items()}

@@ -58,10 +58,10 @@ from vision.calibration import (
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.views import BoardViews
 from vision.fit.base_line import base_lines
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.covariance import shared_covariance
 from vision.fit.problem import Problem, State
 from vision.fit.scatter import inflated_by_residuals
-from vision.fit.solution import Solution
 from vision.fit.solve import LAST_SCALE, solve
 from vision.geometry.base_lines import BaseLines
 from vision.geometry.board import Board, printed_corners
@@ -243,7 +243,7 @@ def calibrated(bench: Bench) -> Cameras:
 class Fitted:
     """A whisk's fit, and the lines of its free stroke."""
 
-    fit: Solution
+    fit: ConvergedFit
     base: BaseLines | None
 
 
@@ -258,8 +258,8 @@ def fit_whisk(bench: Bench, scene: Scene, seen: Sequence, cameras: Cameras) -> F
     state, _ = solve(problem, start, scales=SCALES)
     problem = inflated_by_residuals(problem, state)
     state, _ = solve(problem, state, scales=CLIPPED)
-    fit = Solution(problem, state)
-    free = fit if np.all(near) else Solution(*_free_stroke(whole, problem, state))
+    fit = ConvergedFit(problem, state)
+    free = fit if np.all(near) else ConvergedFit(*_free_stroke(whole, problem, state))
     return Fitted(fit, base_lines(free))
 
 

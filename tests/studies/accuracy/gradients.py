@@ -18,9 +18,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from tests.studies.accuracy.scenes import Scene, as_problem, begin, draw_scene, line_points
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import Problem, State
 from vision.fit.quantities import jacobians, measure
-from vision.fit.solution import Solution
 from vision.fit.solve import linearise, solve
 
 # Steps of about 1e-4 px: rounding leaves 1e-8 of the residual, curvature 1e-6.
@@ -102,7 +102,7 @@ def of_cameras(problem: Problem, state: State) -> float:
         return linear.residual[linear.is_point]
 
     return _difference(
-        Solution(problem, state).by_camera, _central(residual, np.zeros(len(sizes)), sizes)
+        ConvergedFit(problem, state).by_camera, _central(residual, np.zeros(len(sizes)), sizes)
     )
 
 

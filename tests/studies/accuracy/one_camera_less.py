@@ -19,9 +19,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from tests.studies.accuracy.error_parts import fit_scene
 from vision.calibration.cameras_file import read_cameras
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.one_camera_less import contradiction, covariance_of, leave_out_each
 from vision.fit.problem import Problem, State
-from vision.fit.solution import Solution
 from vision.fit.solve import solve
 
 SHIFT_PX = 2.0
@@ -51,7 +51,7 @@ def shifted(problem: Problem, camera: int, which: str) -> Problem:
 
 def asked(problem: Problem, state: State, d_x_mm: float):
     """Least chance, what is told, and d_x's error in stated sigmas, before and after."""
-    fit = Solution(problem, solve(problem, state)[0])
+    fit = ConvergedFit(problem, solve(problem, state)[0])
     found, gradient = leave_out_each(fit), fit.by_parameter.whisk["d_x"]
     wider = fit.fit_covariance + covariance_of(found, problem.size)
     z = [

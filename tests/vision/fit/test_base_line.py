@@ -8,8 +8,8 @@ import pytest
 from tests.scenes.model_scenes import CAMERAS, scene, with_points
 from vision.calibration.swing import by_swing
 from vision.fit.base_line import base_lines, drift_sigma_px
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import State, wire_modes
-from vision.fit.solution import Solution
 from vision.geometry.camera import Cameras
 from vision.geometry.rotation import compose, exp_rotation, invert_transform
 
@@ -31,13 +31,13 @@ def a_whisk(step=STEP, touch_deg=9.0, rng=None, sigma=0.02):
 
 def test_only_frames_before_touch_give_lines():
     problem, state = a_whisk()
-    lines = base_lines(Solution(problem, state))
+    lines = base_lines(ConvergedFit(problem, state))
     np.testing.assert_allclose(lines.motor_rad, problem.motor_rad[~problem.touching])
 
 
 def test_the_step_is_found_again():
     problem, state = a_whisk()
-    made = by_swing(base_lines(Solution(problem, state)))
+    made = by_swing(base_lines(ConvergedFit(problem, state)))
     # The lines may be off as a whole by 0.25 px (0.05 mm); what prior and light share is a few per cent of the step.
     np.testing.assert_allclose(made.step[4:], STEP[4:], atol=0.02)
     assert made.step[2] == pytest.approx(STEP[2], rel=0.15)
@@ -46,7 +46,7 @@ def test_the_step_is_found_again():
 @pytest.mark.slow
 def test_noise_scatters_as_each_frame_says(rng):
     """Along the whisker the fan alone decides: its own sigma must be the sampled one."""
-    strokes = [base_lines(Solution(p, s)) for p, s in (a_whisk(rng=rng) for _ in range(40))]
+    strokes = [base_lines(ConvergedFit(p, s)) for p, s in (a_whisk(rng=rng) for _ in range(40))]
     placed = [by_swing(lines) for lines in strokes]
     own = [placement.covariance - placement.shared for placement in placed]
     along = np.array([[placement.step[3], np.sqrt(c[3, 3])] for placement, c in zip(placed, own)])
@@ -63,7 +63,7 @@ def test_cameras_that_err_together_shift_and_turn_the_swing_as_much():
         problem, cameras=replace(problem.cameras, covariance=covariance, by_error=None)
     )
     still, moved = (
-        by_swing(base_lines(Solution(one, state))).covariance for one in (problem, moving)
+        by_swing(base_lines(ConvergedFit(one, state))).covariance for one in (problem, moving)
     )
     scale = np.outer(sigma, sigma)
     # To first order exact; the step that is found, 4 mrad and 0.3 mm at 50 mm, is what is left out.
@@ -90,13 +90,15 @@ def drifting(problem, camera, drift, share):
 def test_what_drifts_as_the_whisker_turns_is_in_the_sigma_of_the_axis_s_lean_and_the_centre_along():
     """In the others a line that wanders, alike in all frames, counts for more."""
     problem, state = a_whisk()
-    lines = base_lines(Solution(problem, state))
+    lines = base_lines(ConvergedFit(problem, state))
     placement = by_swing(lines)
     share = 0.01
     steps = []
     for camera in range(len(problem.cameras)):
         for drift in range(4):
-            moved = by_swing(base_lines(Solution(drifting(problem, camera, drift, share), state)))
+            moved = by_swing(
+                base_lines(ConvergedFit(drifting(problem, camera, drift, share), state))
+            )
             steps.append((moved.step - placement.step) / share)
     sigma = np.sqrt(np.diag(placement.shared - lines.shared_covariance))
     leans_and_along = [0, 1, 3]
@@ -107,4 +109,4 @@ def test_what_drifts_as_the_whisker_turns_is_in_the_sigma_of_the_axis_s_lean_and
 
 def test_no_free_frame_gives_no_line():
     problem, state = a_whisk(touch_deg=0.1)
-    assert base_lines(Solution(problem, state)) is None
+    assert base_lines(ConvergedFit(problem, state)) is None

@@ -7,8 +7,8 @@ import pytest
 
 from tests.scenes.model_scenes import CAMERAS, begun, camera, scene, with_points
 from vision.fit.camera_delays import camera_delays
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.scatter import inflated_by_residuals
-from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
 
@@ -34,7 +34,7 @@ def delays(rng, cameras, late=(), picture_of=None):
     state, _ = solve(problem, begun(problem, replace(true, vector=vector)))
     problem = inflated_by_residuals(problem, state)
     state, _ = solve(problem, state)
-    return camera_delays(Solution(problem, state), picture_of)
+    return camera_delays(ConvergedFit(problem, state), picture_of)
 
 
 @pytest.mark.parametrize("late", THREE.names)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.exposure import slip_in_exposure
 from vision.fit.problem import bar_axis, curves_of
-from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.geometry.contact import BarAxis, clearance
 
@@ -21,7 +21,7 @@ def fitted():
     scene = draw_scene(0)
     problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
     state, _ = solve(problem, begin(problem), scales=(1e9,) * 8)
-    return Solution(problem, state)
+    return ConvergedFit(problem, state)
 
 
 def slipped_px(fit, frame):
@@ -72,7 +72,7 @@ def test_the_frame_that_jumped_is_told_and_its_slip_alone_is_less_sure(fitted, r
             above += VARIANCE_MM2 * mine**2
         widened = np.stack([above, np.full(count, SIGMA_PX2)], axis=1)
         seen.append(replace(one, points=replace(one.points, widened_px2=widened)))
-    found = slip_in_exposure(Solution(replace(problem, seen=seen), state))
+    found = slip_in_exposure(ConvergedFit(replace(problem, seen=seen), state))
     assert np.flatnonzero(found.variance_mm2).tolist() == [frame]
     assert found.variance_mm2[frame] == pytest.approx(VARIANCE_MM2, rel=0.15)
     slip = fitted.by_parameter.frame["slip"]

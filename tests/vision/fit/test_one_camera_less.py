@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import CAMERAS, begun, camera, scene, with_points
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.one_camera_less import contradiction, covariance_of, leave_out_each
 from vision.fit.quantities import jacobians
 from vision.fit.scatter import inflated_by_residuals
-from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
 
@@ -31,7 +31,7 @@ def left_out(rng, cameras=THREE, off_px=0.0):
     state, _ = solve(problem, begun(problem, _of(problem, true, cameras)))
     problem = inflated_by_residuals(problem, state)
     state, _ = solve(problem, state)
-    fit = Solution(problem, state)
+    fit = ConvergedFit(problem, state)
     return problem, state, fit, fit.measured, fit.by_parameter, leave_out_each(fit)
 
 

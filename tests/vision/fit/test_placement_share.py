@@ -18,8 +18,8 @@ from tests.studies.accuracy.scenes import (
     line_points,
 )
 from vision.calibration.cameras_file import read_cameras
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.covariance import shared_covariance, variance_by_cause
-from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.geometry.camera import Cameras
 
@@ -66,11 +66,11 @@ def test_the_budget_tells_rig_board_from_lenses(loose):
     scene, rng = scene_of(0.1), np.random.default_rng(2)
     problem = as_problem(scene, loose, *given(scene, rng), line_points(scene, rng))
     state, _ = solve(problem, begin(problem), scales=SCALES)
-    fit = Solution(problem, state)
+    fit = ConvergedFit(problem, state)
     gradient = fit.by_parameter.whisk["d_x"]
 
     def budget(cameras):
-        asked = Solution(replace(problem, cameras=cameras), state)
+        asked = ConvergedFit(replace(problem, cameras=cameras), state)
         whole = float(gradient @ asked.fit_covariance @ gradient)
         return variance_by_cause(asked, gradient), whole
 
@@ -95,12 +95,12 @@ def test_a_rig_frame_that_is_elsewhere_moves_the_fit_as_its_derivatives_say(loos
     scene = scene_of(0.1)
     rng = np.random.default_rng(2)
     problem = as_problem(scene, loose, *given(scene, rng), line_points(scene, rng))
-    fit = Solution(problem, solve(problem, begin(problem), scales=SCALES)[0])
+    fit = ConvergedFit(problem, solve(problem, begin(problem), scales=SCALES)[0])
     last = fit.last_frame
     for k in (1, 4):  # a turn, a shift
         off = np.sqrt(loose.placement[k, k]) * loose.by_placement[:, k]
         moved = replace(problem, cameras=loose.moved(off))
-        again = Solution(moved, solve(moved, fit.state, scales=SCALES)[0]).measured
+        again = ConvergedFit(moved, solve(moved, fit.state, scales=SCALES)[0]).measured
         step = fit.parameters_by_camera @ off
         slip = again.frame["slip"][last] - fit.measured.frame["slip"][last]
         assert fit.by_parameter.frame["slip"][last] @ step == pytest.approx(slip, abs=5e-5)
@@ -114,7 +114,7 @@ def test_what_whisks_share_is_diameters_light_cameras_and_placement(loose):
     scene = scene_of(0.1)
     rng = np.random.default_rng(2)
     problem = as_problem(scene, loose, *given(scene, rng), line_points(scene, rng))
-    fit = Solution(problem, solve(problem, begin(problem), scales=SCALES)[0])
+    fit = ConvergedFit(problem, solve(problem, begin(problem), scales=SCALES)[0])
     by = fit.by_parameter
     shared = shared_covariance(fit)
     for name in ("d_x", "touch", "beta", "x", "y", "z"):

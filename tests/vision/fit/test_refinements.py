@@ -12,9 +12,9 @@ from tests.studies.accuracy.coverage import SCALES
 from tests.studies.accuracy.scenes import as_problem, begin, draw_scene, line_points
 from vision.fit import blocks, solve
 from vision.fit import problem as model
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import Problem
 from vision.fit.refinements import left_out
-from vision.fit.solution import Solution
 from vision.geometry import centreline
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
@@ -25,22 +25,22 @@ WHISKER = {"sag_mm": 0.3, "set_y_mm": 0.5, "set_z_mm": -0.4}
 
 
 @cache
-def drawn(seed: int, shape: str = "cylinder") -> Solution:
+def drawn(seed: int, shape: str = "cylinder") -> ConvergedFit:
     """The fit to a drawn scene with noisy points and exact cameras."""
     scene = draw_scene(seed, whisker=WhiskerTable(shape=shape, **WHISKER))
     seen = line_points(scene, np.random.default_rng([seed, 30]))
     return fitted(as_problem(scene, scene.cameras, scene.wire, scene.bar, seen))
 
 
-def fitted(problem: Problem) -> Solution:
+def fitted(problem: Problem) -> ConvergedFit:
     state, _ = solve.solve(problem, begin(problem), scales=SCALES)
     state, _ = solve.solve(problem, state, scales=(4.0, 4.0, 4.0))
-    fit = Solution(problem, state)
+    fit = ConvergedFit(problem, state)
     _ = fit.measured, fit.by_parameter, fit.linear, fit.inverse_normal  # by the model as it is now
     return fit
 
 
-def moved(before: Solution, after: Solution) -> np.ndarray:
+def moved(before: ConvergedFit, after: ConvergedFit) -> np.ndarray:
     """d_x, touch and slip at the end of the stroke, one less the other."""
     values = (
         [f.measured.whisk["d_x"], f.measured.whisk["touch"], f.measured.frame["slip"][f.last_frame]]
@@ -49,12 +49,12 @@ def moved(before: Solution, after: Solution) -> np.ndarray:
     return np.subtract(*values)
 
 
-def told(fit: Solution, name: str, light=()) -> np.ndarray:
+def told(fit: ConvergedFit, name: str, light=()) -> np.ndarray:
     found = left_out(fit, dict(light))[name]
     return np.array([found.d_x_mm, found.touch_rad, found.slip_mm])
 
 
-def sigmas(fit: Solution) -> np.ndarray:
+def sigmas(fit: ConvergedFit) -> np.ndarray:
     """By noise alone, of the same three."""
     rows = (
         fit.by_parameter.whisk["d_x"],
@@ -153,7 +153,7 @@ def test_lens_terms_answer_by_the_calibration_s_covariance():
     assert "exact" in left_out(fit, {})["lens k1 k2"].why and np.isnan(told(fit, "lens k1 k2")[0])
     cameras = fit.problem.cameras
     free = Cameras(cameras.cameras, 1e-8 * np.eye(len(cameras.covariance)))
-    loose = Solution(replace(fit.problem, cameras=free), fit.state)
+    loose = ConvergedFit(replace(fit.problem, cameras=free), fit.state)
     step = np.zeros((len(cameras), 15))
     step[:, 4:6] = [-camera.lens[4:6] for camera in cameras]
     other = fitted(replace(fit.problem, cameras=cameras.moved(step.ravel())))

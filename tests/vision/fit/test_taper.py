@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.scenes.model_scenes import scene, with_points
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import State
-from vision.fit.solution import Solution
 from vision.fit.solve import solve
 from vision.geometry.rods import Bar, ProfiledWire, Rods, Wire
 
@@ -33,7 +33,7 @@ def fitted(drawn, wire):
     vector[:12] = true.vector[:12]
     vector[problem.first_bend :] = bends
     state, _ = solve(problem, State(vector, true.arcs_mm))
-    fit = Solution(problem, state)
+    fit = ConvergedFit(problem, state)
     measured, by = fit.measured, fit.by_parameter
     found = {"touch": (float(measured.whisk["touch"]), by.whisk["touch"])}
     for name in ("slip", "phi"):

@@ -13,8 +13,8 @@ from tests.studies.accuracy.scenes import (
     draw_scene,
     line_points,
 )
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.scatter import inflated_by_residuals
-from vision.fit.solution import Solution
 from vision.fit.solve import solve
 
 ALIKE = 0.6  # with the next point, 0.36 with the one after …: (1 + 0.6)/(1 - 0.6) times the variance of a mean
@@ -27,7 +27,7 @@ def fitted():
     problem = as_problem(scene, scene.cameras, scene.wire, scene.bar, line_points(scene))
     problem = replace(problem, neighbour_correlation=[ALIKE] * len(scene.cameras))
     state, _ = solve(problem, begin(problem), scales=(1e9,) * 8)
-    return Solution(problem, state)
+    return ConvergedFit(problem, state)
 
 
 def test_what_neighbours_share_spreads_parameters_as_stated(fitted, rng):

@@ -16,9 +16,9 @@ from tests.studies.accuracy.bar_lines import (
 )
 from tests.studies.accuracy.lines import squares
 from vision.fit.bend_onset import Onset, onset
+from vision.fit.converged_fit import ConvergedFit
 from vision.fit.covariance import variance_by_cause
 from vision.fit.problem import State, bar_axis
-from vision.fit.solution import Solution
 from vision.fit.solve import linearise, solve
 from vision.fit.touch_by_onset import touch_by_onset
 from vision.geometry.camera import Cameras
@@ -144,7 +144,7 @@ def test_edges_tell_how_far_away_the_bar_is():
     away = axis.point_mm - problem.axis.point_mm
     away = away - (away @ axis.direction) * axis.direction
     assert np.linalg.norm(away) < 0.3
-    fit = Solution(near, found)
+    fit = ConvergedFit(near, found)
     gradient = fit.by_parameter.whisk["d_x"]
     parts = variance_by_cause(fit, gradient)
     assert sum(parts.values()) == pytest.approx(gradient @ fit.fit_covariance @ gradient, rel=1e-6)

@@ -21,7 +21,7 @@ _FARTHEST = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class ConvergedFit:
     """A problem and the state in which its fit has converged."""
 
     problem: Problem
