@@ -125,6 +125,16 @@ def contact_frame_angles(direction: np.ndarray, touch_rad: float) -> tuple[float
     return np.arctan2(a_y, direction[..., 2]), np.arcsin(np.clip(a_x, -1.0, 1.0))
 
 
+def directions_at_slope(beta_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the directions (..., 3) along bars without tilt, and from a whisker along x to them, by their
+    slopes (...).
+    """
+    sin = np.sin(beta_rad)
+    cos = np.cos(beta_rad)
+    zero = np.zeros_like(sin)
+    return np.stack([zero, sin, cos], axis=-1), np.stack([zero, cos, -sin], axis=-1)
+
+
 def closest_arc(
     curves: Curves, axis: Axis, wire: Wire, near_mm: np.ndarray | None = None
 ) -> np.ndarray:

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import rotation_z
-from vision.geometry.contact import BarAxis
+from vision.geometry.contact import BarAxis, directions_at_slope
 from vision.geometry.rods import Rods
 from vision.geometry.rotation import unit
 from vision.pictures.change import HALF
@@ -214,9 +214,7 @@ def axis_from_angles(
     All arguments (n,). reach_mm: distance between the axes of bar and whisker where they touch.
     """
     x, touch, beta, psi, reach = np.broadcast_arrays(x_mm, touch_rad, beta_rad, psi_rad, reach_mm)
-    zero = np.zeros(x.shape)
-    upright = np.stack([zero, np.sin(beta), np.cos(beta)], axis=-1)
-    normal = np.stack([zero, np.cos(beta), -np.sin(beta)], axis=-1)
+    upright, normal = directions_at_slope(beta)
     along_x = np.array([1.0, 0.0, 0.0])
     direction = np.sin(psi)[..., None] * along_x + np.cos(psi)[..., None] * upright
     point = x[..., None] * along_x + reach[..., None] * normal

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.geometry.centreline import rotation_z
+from vision.geometry.contact import directions_at_slope
 from vision.geometry.rods import Rods
 from vision.geometry.rounded import RoundedAxis
 from vision.touched.grid_search import SearchPass, coarse_to_fine, half_steps, touch_angles
@@ -77,10 +78,8 @@ def touched_first(rods: Rods, hypotheses: np.ndarray) -> RoundedAxis:
     numbers.
     """
     x, touch, beta = hypotheses[:, :3].T
-    zero = np.zeros_like(x)
-    along = np.stack([zero, np.sin(beta), np.cos(beta)], axis=-1)
-    inwards = np.stack([zero, np.cos(beta), -np.sin(beta)], axis=-1)
-    on_whisker = np.stack([x, zero, zero], axis=-1)
+    along, inwards = directions_at_slope(beta)
+    on_whisker = x[:, None] * np.array([1.0, 0.0, 0.0])
     spot = on_whisker + rods.wire.radius_mm(x)[:, None] * inwards
     place = rods.bar.at_contact(spot, inwards, along, hypotheses[:, 3:])
     return place.turned(rotation_z(touch))
