@@ -30,7 +30,7 @@ NAMES = {
         "BesideWire",
         "Trace",
         "beside_wire",
-        "nearest_lines",
+        "lines_along_wire",
         "points_of_wire",
     ),
     "truth.trial_pictures": ("TrialPictures",),

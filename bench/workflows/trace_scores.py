@@ -43,7 +43,7 @@ from vision import (
     BesideWire,
     WhiskTruth,
     beside_wire,
-    nearest_lines,
+    lines_along_wire,
     points_of_wire,
 )
 from vision.geometry import Camera, Wire, centrelines, counted, unbent_curves
@@ -271,7 +271,7 @@ def _score_whisk(
     beside = beside_wire(traced.trace, camera, curves)
     beyond_hub = beside.select(beside.place_mm > NEAR_CLAMP_MM)
     near = points_of_wire(beyond_hub)
-    line = nearest_lines(beyond_hub)
+    line = lines_along_wire(beyond_hub)
     with_trace = set(traced.trace.frame.tolist())
     of_frame = partial(FrameScore, unit.trial.name, truth.whisk, camera.name)
     rows = []

@@ -102,7 +102,7 @@ def _nearest_nodes(px: np.ndarray, curve_px: np.ndarray) -> np.ndarray:
     return np.argmin(np.sum(apart**2, axis=2), axis=1)
 
 
-def nearest_lines(beside: BesideWire) -> dict[int, int]:
+def lines_along_wire(beside: BesideWire) -> dict[int, int]:
     """Return by frame the line with the most points near the wire; frames without any are absent."""
     is_near = np.abs(beside.offset_px) < NEAR_PX
     found = {}
@@ -115,8 +115,8 @@ def nearest_lines(beside: BesideWire) -> dict[int, int]:
 
 def points_of_wire(beside: BesideWire) -> BesideWire:
     """Return the points near the wire of the line that is nearest to it in each frame."""
-    nearest = nearest_lines(beside)
-    line = np.array([nearest.get(frame, np.nan) for frame in beside.frame.tolist()])
+    along = lines_along_wire(beside)
+    line = np.array([along.get(frame, np.nan) for frame in beside.frame.tolist()])
     is_near = np.abs(beside.offset_px) < NEAR_PX
     return beside.select(is_near & (beside.line == line))
 

@@ -8,7 +8,7 @@ import pytest
 from tests.scenes.model_scenes import CAMERAS, WIRE
 from tests.scenes.traced_example import Example
 from vision.geometry.centreline import REST_POWERS, unbent_curves
-from vision.truth.trace_points import Trace, averaged, beside_wire, nearest_lines, points_of_wire
+from vision.truth.trace_points import Trace, averaged, beside_wire, lines_along_wire, points_of_wire
 
 CAMERA = CAMERAS.cameras[0]
 CURVES = unbent_curves(np.zeros((2, REST_POWERS)), {3: 0.05, 4: 0.1}, WIRE)
@@ -39,7 +39,7 @@ def test_the_nearest_line_is_the_wires():
         [trace_beside(9.0, line=1), trace_beside(2.0, line=5), trace_beside(4.0, 2, 4)]
     )
     beside = beside_wire(lines, CAMERA, CURVES)
-    assert nearest_lines(beside) == {3: 5, 4: 2}
+    assert lines_along_wire(beside) == {3: 5, 4: 2}
     near = points_of_wire(beside)
     np.testing.assert_allclose(np.unique(near.offset_px.round(1)), [2.0, 4.0])
 
