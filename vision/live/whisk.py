@@ -40,7 +40,7 @@ from vision.pictures.view import View
 from vision.touched.search import SeenBar, find_object, find_object_again
 from vision.touched.search_scene import SearchScene
 from vision.truth.explanations import Explanation, compare_early, unexplained
-from vision.truth.line_source import EarlierWhisk, WhiskPlace
+from vision.truth.line_source import EarlierWhisk
 from vision.truth.observe import views_facing, warnings_of, why_failed
 from vision.truth.place_comparison import FRAMES, PlaceComparison
 from vision.truth.records import WhiskTruth
@@ -57,6 +57,7 @@ from vision.truth.whisk_fit import (
     require_cameras,
 )
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.whisk_place import WhiskPlace
 
 # [frames] With which work begins: two give the noise, a third what moves. In fifteen path-traced
 # scenes the bar was as near by three frames as by all. Study: tests/studies/speed/live.py.

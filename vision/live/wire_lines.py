@@ -6,9 +6,9 @@ from typing import Self
 
 import numpy as np
 
-from vision.truth.line_source import WhiskPlace
 from vision.truth.traced_lines import TracedLines, clear_pieces, trace_camera, wire_knots
 from vision.truth.whisk_pictures import WhiskPictures
+from vision.truth.whisk_place import WhiskPlace
 from vision.wire.carried import carry_on
 from vision.wire.one_sided import WireAppearance
 from vision.wire.points import Observed

@@ -18,7 +18,6 @@ from vision.geometry.centreline import Curves
 from vision.geometry.refusals import Refused
 from vision.geometry.robust import robust_sigma
 from vision.pictures.view import View
-from vision.truth.line_source import WhiskPlace
 from vision.truth.misread_traces import misreadings
 from vision.truth.object_places import ObjectPlace
 from vision.truth.trace_points import (
@@ -31,6 +30,7 @@ from vision.truth.trace_points import (
     points_of_wire,
 )
 from vision.truth.traced_lines import BESIDE_BAR_PX, TracedLines
+from vision.truth.whisk_place import WhiskPlace
 from vision.wire.points import SHARED, LinePoints, Observed
 from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, observed
 

@@ -13,9 +13,9 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
-from vision.truth.line_source import WhiskPlace
 from vision.truth.strategies import TouchByClearance
 from vision.truth.whisk_pictures import WhiskPictures
+from vision.truth.whisk_place import WhiskPlace
 from vision.wire.points import Observed
 
 # [rad] A camera whose line of sight is nearer to the bar's axis than this has it a third as long. Stated.

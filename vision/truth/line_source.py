@@ -7,15 +7,14 @@ A pass of the fit needs points near the curves of the pass before. They are trac
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from vision.geometry.camera import Camera
-from vision.geometry.centreline import Curves
 from vision.geometry.refusals import Refused
 from vision.geometry.touched import Axis
 from vision.truth.readers import ObjectReader
+from vision.truth.whisk_place import WhiskPlace
 from vision.wire.points import Observed
 
 # [px] A camera whose points scatter by more sees another thing: where a wire is seen at all its
@@ -23,24 +22,6 @@ from vision.wire.points import Observed
 # truth.line_source _MOST_SCATTER_PX ….
 _MOST_SCATTER_PX = 0.7
 _HIDDEN = "no camera shows enough of the {}"
-
-
-@dataclass(frozen=True, eq=False)
-class WhiskPlace:
-    """Where object and wire are in f frames, by the pass before.
-
-    axis: of the object. curves: of the wire, by frame. swept_mm: radius about the axis within which
-    the object stays. came_mm (f, 3): how far it is from the axis in each frame, if it moves.
-    """
-
-    axis: Axis
-    curves: Mapping[int, Curves]
-    swept_mm: float
-    came_mm: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
-
-    def wire_px(self, camera: Camera) -> list[np.ndarray]:
-        """Return the wire's centreline (m, 2) in each frame of a camera."""
-        return [camera.project(curve.points_mm) for curve in self.curves.values()]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from vision.geometry.contact import BarAxis
 from vision.geometry.sampling import spread
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
-from vision.truth.readers import BarMiddles, ObjectReader, ReadLine, WhereAbout
+from vision.truth.readers import BarMiddles, ObjectReader, ReadLine
+from vision.truth.whisk_place import WhiskPlace
 
 # [frames] Of a whisk, in which the line of a bar that moves is read: it is then known as well as
 # the wire is. Study: chosen.
@@ -26,12 +26,12 @@ class BarInFrames(ObjectReader):
     settings: VisionSettings
     readers: dict[int, BarMiddles] = field(default_factory=dict)
 
-    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+    def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the middle of the bar in some frames."""
         found: dict[str, list[ReadLine]] = {}
-        for k in spread(range(len(about.frames)), _MOST_FRAMES):
-            reader = self._reader(about.frames[k])
-            for name, lines in reader.read(_about_frame(about, k), last=last).items():
+        for k, frame in spread(list(enumerate(place.curves)), _MOST_FRAMES):
+            seen = self._reader(frame).read(place.in_frame(k), last=last)
+            for name, lines in seen.items():
                 own = found.setdefault(name, [])
                 own += [replace(line, frame=k) for line in lines]
         return found
@@ -42,13 +42,6 @@ class BarInFrames(ObjectReader):
             views = in_one_frame(self.views, frame)
             self.readers[frame] = BarMiddles(views, self.radius_mm, self.settings)
         return self.readers[frame]
-
-
-def _about_frame(about: WhereAbout, k: int) -> WhereAbout:
-    """Return where bar and wires are in the k-th frame."""
-    axis = BarAxis(about.axis.point_mm + about.came_mm[k], about.axis.direction)
-    wires_px = {name: [lines[k]] for name, lines in about.wires_px.items()}
-    return replace(about, axis=axis, wires_px=wires_px)
 
 
 def in_one_frame(views: Sequence[View], frame: int) -> list[View]:

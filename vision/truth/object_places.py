@@ -25,9 +25,10 @@ from vision.geometry.silhouette import outline
 from vision.geometry.touched import Axis
 from vision.touched.one_view import seen_from_one_side
 from vision.truth.line_source import require_wire
-from vision.truth.readers import ObjectReader, ReadLine, WhereAbout
+from vision.truth.readers import ObjectReader, ReadLine
 from vision.truth.trace_points import Trace, beside_curve
 from vision.truth.whisk_pictures import AxisPrior
+from vision.truth.whisk_place import WhiskPlace
 from vision.wire.points import LinePoints, Observed
 
 # [mm] Of a bar to either side of its point, on which its points may be. Stated.
@@ -90,7 +91,7 @@ class PlacedObject(ObjectPlace):
 class _NoLines(ObjectReader):
     """The reader of an object whose place is stated."""
 
-    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+    def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return no line."""
         return {}
 
@@ -145,12 +146,12 @@ class _TrackedMiddle(ObjectReader):
     points: Mapping[str, Trace]
     cameras: Cameras
 
-    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+    def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the two points."""
         found = {}
         for camera in self.cameras:
             if camera.name in self.points:
-                line = _middle(self.points[camera.name], camera, about.axis)
+                line = _middle(self.points[camera.name], camera, place.axis)
                 found[camera.name] = [ReadLine(line, 0)]
         return found
 

@@ -11,8 +11,9 @@ from vision.geometry.polyline import normals
 from vision.geometry.silhouette import outline
 from vision.touched.pieces import ARM_MM
 from vision.truth.known_whisk import KnownWhisk
-from vision.truth.line_source import LineSource, WhiskPlace
+from vision.truth.line_source import LineSource
 from vision.truth.sight import Sight
+from vision.truth.whisk_place import WhiskPlace
 from vision.wire.points import LinePoints, Observed
 from vision.wire.trace import observed
 

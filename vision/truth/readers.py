@@ -7,18 +7,16 @@ in `vision.truth.strategies`.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from vision.geometry.refusals import Refused
-from vision.geometry.touched import Axis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.edges import measure_edges
 from vision.touched.line import BarLineEstimate, measure_bars
 from vision.touched.silhouette_edges import SilhouetteEdges, measure_silhouette_edges
+from vision.truth.whisk_place import WhiskPlace
 from vision.wire.points import LinePoints
 
 # [px] How far off a silhouette may be that was fitted to coarse edges. Stated.
@@ -44,20 +42,6 @@ class ReadLine:
     frame: int = 0
 
 
-@dataclass(frozen=True)
-class WhereAbout:
-    """Where object and wire are by the pass before.
-
-    axis: of the object. came_mm (f, 3): how far it is from there in each frame. frames: numbers of
-    the whisk's frames. wires_px: by camera, lines (m, 2) of the wire in each frame.
-    """
-
-    axis: Axis
-    came_mm: np.ndarray
-    frames: Sequence[int]
-    wires_px: Mapping[str, Sequence[np.ndarray]]
-
-
 class ObjectReader(ABC):
     """What reads the touched object's edges in all views of a whisk."""
 
@@ -65,7 +49,7 @@ class ObjectReader(ABC):
         """Begin from what a reader of the same form has read in an earlier whisk of the same trial."""
 
     @abstractmethod
-    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+    def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the lines of the object.
 
         last: no pass follows, so that even a first measurement is refined. Raises Refused where the
@@ -96,14 +80,19 @@ class BarMiddles(ObjectReader):
             self.lines = earlier.lines
             self.are_fine = earlier.are_fine
 
-    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+    def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the middle of the bar, where there is one."""
         is_only = last and not self.lines
         passes = 2 if is_only else 1
         for _ in range(0 if self.are_fine else passes):
             self.are_fine = bool(self.lines)
             self.lines = measure_bars(
-                self.views, about.axis, self.radius_mm, about.wires_px, self.settings, self.lines
+                self.views,
+                place.axis,
+                self.radius_mm,
+                place.wires_px(self.views),
+                self.settings,
+                self.lines,
             )
         return {
             name: [ReadLine(line.points, 0)] for name, line in self.lines.items() if line.is_bar
@@ -113,13 +102,13 @@ class BarMiddles(ObjectReader):
 class BarEdges(BarMiddles):
     """A straight bar, read by its two edges; by its middle where they are not seen."""
 
-    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+    def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the two edges of the bar, sides -1 and 1, or its middle."""
-        found = super().read(about, last=last)
+        found = super().read(place, last=last)
         for view in self.views:
             name = view.camera.name
-            wires_px = about.wires_px[name]
-            edges = measure_edges(view, about.axis, self.radius_mm, wires_px, self.settings)
+            wires_px = place.wire_px(view.camera)
+            edges = measure_edges(view, place.axis, self.radius_mm, wires_px, self.settings)
             if edges:
                 found[name] = [ReadLine(points, side) for side, points in edges.items()]
         return found
@@ -137,7 +126,7 @@ class SilhouetteReader(ObjectReader):
     settings: VisionSettings
     silhouettes: dict[str, SilhouetteEdges] = field(default_factory=dict)
 
-    def read(self, about: WhereAbout, *, last: bool) -> dict[str, list[ReadLine]]:
+    def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the edges of the silhouette, all on side 1.
 
         Raises Refused where no silhouette is clear, or a camera contradicts the others.
@@ -146,9 +135,9 @@ class SilhouetteReader(ObjectReader):
         for _ in range(2 if is_only else 1):
             self.silhouettes = measure_silhouette_edges(
                 self.views,
-                about.axis,
+                place.axis,
                 self.radius_mm,
-                about.wires_px,
+                place.wires_px(self.views),
                 self.settings,
                 _OFF_PX,
                 self.silhouettes,

@@ -7,9 +7,10 @@ import numpy as np
 
 from vision.geometry.optics import known_gamma
 from vision.pictures.view import SATURATED, View
-from vision.truth.line_source import EarlierWhisk, LineSource, WhiskPlace
-from vision.truth.readers import ObjectReader, WhereAbout
+from vision.truth.line_source import EarlierWhisk, LineSource
+from vision.truth.readers import ObjectReader
 from vision.truth.whisk_pictures import WhiskPictures
+from vision.truth.whisk_place import WhiskPlace
 from vision.wire.bands import Pieces
 from vision.wire.one_sided import WireAppearance, seen_width
 from vision.wire.points import Observed
@@ -67,11 +68,9 @@ class TracedLines(LineSource):
 
     def object_points(self, place: WhiskPlace, *, last: bool) -> dict[str, list[Observed]]:
         """Return by camera the object's lines. Raises Refused where it is not seen clearly."""
-        wires_px = {view.camera.name: place.wire_px(view.camera) for view in self.whisk.views}
-        about = WhereAbout(place.axis, place.came_mm, list(place.curves), wires_px)
         names = self.whisk.cameras.names
         found = {}
-        for name, lines in self.reader.read(about, last=last).items():
+        for name, lines in self.reader.read(place, last=last).items():
             number = names.index(name)
             found[name] = [
                 Observed(-1, number, line.points, line.side, line.frame) for line in lines

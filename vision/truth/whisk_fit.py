@@ -24,10 +24,11 @@ from vision.geometry.contact import clearance
 from vision.geometry.refusals import Misled, Refused
 from vision.geometry.rotation import unit
 from vision.geometry.touched import Axis
-from vision.truth.line_source import LineSource, WhiskPlace
+from vision.truth.line_source import LineSource
 from vision.truth.strategies import Strategy, Touch, early, strategies
 from vision.truth.traced_lines import blurs_px
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.whisk_place import WhiskPlace
 from vision.wire.points import Observed
 
 # [1] Least factor on the variances of the free stroke that places the rig. An error that changes

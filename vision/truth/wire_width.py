@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from vision.truth.line_source import WhiskPlace
 from vision.truth.traced_lines import clear_pieces, wire_knots
 from vision.truth.value import Value
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
+from vision.truth.whisk_place import WhiskPlace
 from vision.wire.rod_width import log_width
 
 # [frames] From which the width is measured: the wire is before another background in each. Derived.

@@ -6,6 +6,7 @@ import pytest
 
 from vision.geometry.vision_settings import VisionSettings
 from vision.truth import readers
+from vision.truth.whisk_place import WhiskPlace
 
 
 @pytest.mark.parametrize("rounds", [0, 1, 2, 3])
@@ -18,8 +19,8 @@ def test_the_last_measurement_is_a_fine_one_and_the_only_one(rounds, monkeypatch
 
     monkeypatch.setattr(readers, "measure_bars", measure_bars)
     reader = readers.BarMiddles((), 3.0, VisionSettings(rounds=rounds))
-    about = readers.WhereAbout(None, None, (), {})
+    place = WhiskPlace(None, {}, 0.0)
     for _ in range(rounds):
-        reader.read(about, last=False)
-    assert reader.read(about, last=True) == {"high": [readers.ReadLine("finely", 0)]}
+        reader.read(place, last=False)
+    assert reader.read(place, last=True) == {"high": [readers.ReadLine("finely", 0)]}
     assert measured == ["coarsely", "finely"]

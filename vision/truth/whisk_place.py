@@ -1,0 +1,40 @@
+"""Where object and wire of a whisk are by the pass before: near there their lines are read."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+
+from vision.geometry.camera import Camera
+from vision.geometry.centreline import Curves
+from vision.geometry.touched import Axis
+from vision.pictures.view import View
+
+
+@dataclass(frozen=True, eq=False)
+class WhiskPlace:
+    """Where object and wire are in f frames, by the pass before.
+
+    axis: of the object. curves: of the wire, by frame. swept_mm: radius about the axis within which
+    the object stays. came_mm (f, 3): how far it is from the axis in each frame, if it moves.
+    """
+
+    axis: Axis
+    curves: Mapping[int, Curves]
+    swept_mm: float
+    came_mm: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
+
+    def wire_px(self, camera: Camera) -> list[np.ndarray]:
+        """Return the wire's centreline (m, 2) in each frame of a camera."""
+        return [camera.project(curve.points_mm) for curve in self.curves.values()]
+
+    def wires_px(self, views: Iterable[View]) -> dict[str, list[np.ndarray]]:
+        """Return the wire's centreline (m, 2) in each frame, by the camera of each view."""
+        return {view.camera.name: self.wire_px(view.camera) for view in views}
+
+    def in_frame(self, number: int) -> Self:
+        """Return where object and wire are in one of the frames, by its position among the curves."""
+        frame, curve = list(self.curves.items())[number]
+        axis = replace(self.axis, point_mm=self.axis.point_mm + self.came_mm[number])
+        return replace(self, axis=axis, curves={frame: curve}, came_mm=np.zeros((1, 3)))
