@@ -282,14 +282,8 @@ def see_whisk(
     """
     while True:
         whisk = whisk.without_gaps()
-        if len(whisk.frames) < _FEWEST_FRAMES:
-            few = (
-                f"{counted(len(whisk.frames), 'frame')} seen by every camera, "
-                f"{_FEWEST_FRAMES} are needed"
-            )
-            status = joined(Reason("too_few_frames", few), *whisk.left_out)
-            return WhiskTruth(whisk.number, None, status=status), None
         try:
+            _require_frames(whisk)
             explained = explain_by(whisk)
             break
         except (Refused, np.linalg.LinAlgError) as reason:
@@ -298,6 +292,14 @@ def see_whisk(
                 return _refused(whisk, why_failed(reason)), None
             whisk = begins_anew
     return truth_of(explained), explained
+
+
+def _require_frames(whisk: WhiskPictures) -> None:
+    """Raise Refused where too few frames are seen by every camera."""
+    seen = len(whisk.frames)
+    if seen < _FEWEST_FRAMES:
+        few = f"{counted(seen, 'frame')} seen by every camera, {_FEWEST_FRAMES} are needed"
+        raise Refused(few, code="too_few_frames")
 
 
 def why_failed(error: Refused | np.linalg.LinAlgError) -> Reason:
