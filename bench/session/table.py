@@ -67,6 +67,8 @@ def column_names(path: Path, label: str) -> list[str]:
     """Read the names of a CSV file's columns. Raises BadInput as `read_table` does."""
     with path.open("rb") as file:
         first = file.readline(_MOST_BYTES)
+    if not first:
+        raise BadInput("is empty", file=label)
     return _column_names(decode(first, _EXPORT, label).rstrip("\r\n"), label)
 
 
