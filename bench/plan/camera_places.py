@@ -1,12 +1,13 @@
 """Places for cameras that a RIG.toml does not place: those from which d_x is known best, found by trying."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import msgspec
 import numpy as np
 
 from bench.base.errors import BadInput
+from bench.base.progress import count_parts
 from bench.plan.changes import USUAL, direction_of
 from bench.plan.painter import Clamp
 from bench.plan.planned_cameras import as_seen_camera
@@ -43,19 +44,25 @@ def place_cameras(
     places = [_placed_tables(table, protocol, whisks, target_mm) for table in protocol.cameras]
     best = None
     least_mm = np.inf
-    for tables in itertools.product(*places):
-        if _are_apart(tables) and _are_in_order(tables, protocol):
-            candidate = msgspec.structs.replace(protocol, cameras=list(tables))
-            sigma_mm = _largest_sigma_mm(candidate, whisks)
-            if sigma_mm < least_mm:
-                best = candidate
-                least_mm = sigma_mm
+    candidates = list(_candidates(protocol, places))
+    for candidate in count_parts(candidates, "places of cameras", len(candidates)):
+        sigma_mm = _largest_sigma_mm(candidate, whisks)
+        if sigma_mm < least_mm:
+            best = candidate
+            least_mm = sigma_mm
     if best is None:
         raise BadInput(
             "no place tried for the cameras without position_mm gives a truth; "
             "give them places, or other lenses"
         )
     return best
+
+
+def _candidates(protocol: Protocol, places: Sequence[Sequence[CameraTable]]) -> Iterator[Protocol]:
+    """Yield the protocol with each choice of places for its cameras that are apart and in order."""
+    for tables in itertools.product(*places):
+        if _are_apart(tables) and _are_in_order(tables, protocol):
+            yield msgspec.structs.replace(protocol, cameras=list(tables))
 
 
 def _placed_tables(

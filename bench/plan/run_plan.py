@@ -135,7 +135,6 @@ def _place_rig(protocol: Protocol, whisks: Sequence[StagedWhisk]) -> _PlacedRig:
     Raises BadInput, Refused, ValueError or cv2.error where that cannot be.
     """
     target_mm = _mean_contact_mm(whisks)
-    begin_step("places of cameras")
     placed = place_cameras(protocol, whisks, target_mm)
     begin_step("pictures of the board")
     painter = painter_of(placed)
