@@ -164,7 +164,7 @@ def _recommendation(
     text = f"Use {best.label} here, at a pushing angle of {theta_deg:g}°"
     if alike:
         whisks_text = counted(len(best.judged), "whisk")
-        text += f"; {whisks_text} do not show whether {' or '.join(alike)} is better or worse"
+        text += f"; {whisks_text} cannot show whether {' or '.join(alike)} is better or worse"
     if not best.is_covered:
         text += "; but its stated uncertainty is too small"
     for one in fitted:
