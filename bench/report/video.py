@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
-from bench.base.progress import count_parts
+from bench.base.progress import begin_step, count_parts
 from bench.records.trial_result import SeenTrial, SeenWhisk, TrialResult, WhiskerFacts
 from bench.report.film_curves import with_curves
 from bench.report.painting import as_8_bit, polyline, put_text
@@ -109,6 +109,7 @@ def write_pictures(path: Path, pictures: Iterator[np.ndarray], code: str, rate_H
     writer.write(first)
     for picture in pictures:
         writer.write(picture)
+    begin_step("encoding the film")  # its last frames all at once
     writer.release()
 
 
