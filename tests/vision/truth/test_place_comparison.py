@@ -310,16 +310,39 @@ def test_a_whisk_fitted_from_a_wrong_place_has_the_truth(small_session, monkeypa
         assert abs(width.value - 1.0) < 3.0 * width.sigma
 
 
-def test_a_bar_and_its_shadow_that_are_equally_clear_are_told():
-    """In one camera the shadow is darker than the polished bar, and both are as wide: the slope was false by 18 sigma."""
+def shadowed():
+    """Return the arguments of `observe_trial` for a polished bar beside its shadow, which is darker and as wide in one
+    camera: its slope was false by 18 sigma."""
     scene = Path(__file__).parents[3] / "fixtures" / "scenes" / "sun"
     views, cameras, rods, motor_rad, _ = read_scene(scene)
     frames = {view.camera.name: view.frames for view in views}
     background = {view.camera.name: view.background for view in views}
     time_s = 0.05 * np.arange(len(motor_rad))
     pictures = TrialPictures(frames, time_s, motor_rad, background)
-    whole = [slice(0, len(motor_rad))]
-    (whisk,) = observe_trial(pictures, whole, cameras, rods, VisionSettings()).whisks
-    assert "bar_elsewhere" in whisk.status.codes
-    assert abs(whisk.d_x_mm.value - 49.704) < 2.0 * whisk.d_x_mm.sigma  # truth.toml
+    return pictures, [slice(0, len(motor_rad))], cameras, rods, VisionSettings()
+
+
+def assert_right(whisk):
+    """Assert that d_x and slope are those of the scene's truth.toml."""
+    assert abs(whisk.d_x_mm.value - 49.704) < 2.0 * whisk.d_x_mm.sigma
     assert abs(whisk.beta_rad.value - np.radians(-1.503)) < 2.0 * whisk.beta_rad.sigma
+
+
+def test_a_bar_beside_its_shadow_is_found():
+    (whisk,) = observe_trial(*shadowed()).whisks
+    assert_right(whisk)
+
+
+def test_of_a_bar_and_its_shadow_the_clearer_one_is_the_truth_and_the_other_is_told(monkeypatch):
+    """The search takes the shadow, and finds the bar as clear."""
+
+    def find_shadow(scene):
+        found = find_object(scene)
+        direction = np.array([0.01306, -0.19837, 0.98004])
+        shadow = BarAxis(np.array([49.785, 1.701, 0.652]), direction)
+        return replace(found, axis=shadow, lines={}, rivals=(found.axis,))
+
+    monkeypatch.setattr(observe, "find_object", find_shadow)
+    (whisk,) = observe_trial(*shadowed()).whisks
+    assert_right(whisk)
+    assert "bar_elsewhere" in whisk.status.codes
