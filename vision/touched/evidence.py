@@ -231,6 +231,7 @@ class LitRod:
         beyond = ndtr((self.profiles.offset_px - edge_px[:, None]) / blur_px)
 
         def on_both_sides(columns: np.ndarray) -> np.ndarray:
+            """Return columns (n, k, b) twice, each as far as it is visible on one side."""
             return np.concatenate([(1.0 - beyond) * columns, beyond * columns])
 
         columns = on_both_sides(self._background_columns)
