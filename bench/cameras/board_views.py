@@ -17,7 +17,7 @@ from bench.session.session import Session
 from bench.session.table import forward_in_time, read_table, require_columns
 from vision.boards import MIN_VIEWS, Corners, find_corners, fixes_pose, refine_corners
 from vision.calibration import BoardViews, with_turns_resolved
-from vision.geometry import Board, spread
+from vision.geometry import Board
 from vision.pictures import Frames
 
 # [pictures] One before and one after determine how the board moved meanwhile.
@@ -200,7 +200,9 @@ def _views_of(source: Path, most: int, rig_view: Corners, board: Board) -> Itera
     count = frame_count(source)
     if not count:
         return
-    read = read_frames(source, spread(range(count), most))
+    # Cut off, not rounded as `spread` does: the cameras of sessions evaluated before stay what they are.
+    chosen = np.unique(np.linspace(0, count - 1, min(most, count)).astype(int)).tolist()
+    read = read_frames(source, chosen)
     greys = (grey for grey in read.values() if grey is not None)
     views = in_threads(lambda grey: refine_corners(grey, rig_view.px, rig_view.ids, board), greys)
     yield from filter(len, views)
