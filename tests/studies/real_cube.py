@@ -69,13 +69,13 @@ class Measured(NamedTuple):
 
 
 def by_faces(
-    of_pair: Callable[[np.ndarray, int, int], float], made: Calibration, a: int, b: int
+    of_pair: Callable[[Body, np.ndarray, int, int], float], made: Calibration, a: int, b: int
 ) -> Measured:
-    """Return what a function says of two faces, by their poses (F, 3, 4), with the sigma by the covariance of these."""
+    """Return what a function says of two faces of a body, by its terms (B,), with the sigma by the covariance of these."""
 
     def value(terms: np.ndarray) -> float:
         """Return the value at terms (B,) of the body."""
-        return of_pair(made.placed_board.faces_at(terms), a, b)
+        return of_pair(made.placed_board, terms, a, b)
 
     steps = np.maximum(1e-3 * np.sqrt(np.diag(made.board_covariance)), 1e-12)
     gradient = np.empty(len(steps))
@@ -84,24 +84,28 @@ def by_faces(
     return Measured(value(made.board), float(np.sqrt(gradient @ made.board_covariance @ gradient)))
 
 
-def distance_mm(faces: np.ndarray, a: int, b: int) -> float:
-    """Return the distance of two opposite faces at their middles, along their mean normal."""
-    middle_mm = 0.5 * CUBE.squares[0] * CUBE.square_mm * np.array([[1.0, 1.0, 0.0]])
-    between = apply(faces[b], middle_mm)[0] - apply(faces[a], middle_mm)[0]
+def distance_mm(body: Body, terms: np.ndarray, a: int, b: int) -> float:
+    """Return the distance of two opposite faces between the means of their points, along their mean normal.
+
+    A face that is bent lies beside its own plane, by as much as it is found to be bent.
+    """
+    faces = body.faces_at(terms)
+    middles_mm = body.printed(terms)[0].reshape(len(faces), -1, 3).mean(axis=1)
+    between = middles_mm[b] - middles_mm[a]
     normal = faces[a, :, 2] - faces[b, :, 2]
     return abs(float(between @ normal)) / float(np.linalg.norm(normal))
 
 
-def angle_deg(faces: np.ndarray, a: int, b: int) -> float:
+def angle_deg(body: Body, terms: np.ndarray, a: int, b: int) -> float:
     """Return the angle between the normals of two faces."""
+    faces = body.faces_at(terms)
     return float(np.degrees(np.arccos(np.clip(faces[a, :, 2] @ faces[b, :, 2], -1.0, 1.0))))
 
 
 def sizes_of(made: Calibration) -> dict[tuple[int, int], Measured]:
     """Return the distance of each opposite pair of faces, mm, and the angle of each other pair, degrees."""
-    faces = made.placed_board.faces_at(made.board)
     sizes = {}
-    for a, b in combinations(range(len(faces)), 2):
+    for a, b in combinations(range(len(CUBE.first_ids)), 2):
         of_pair = distance_mm if is_opposite(made, a, b) else angle_deg
         sizes[a, b] = by_faces(of_pair, made, a, b)
     return sizes
@@ -109,7 +113,7 @@ def sizes_of(made: Calibration) -> dict[tuple[int, int], Measured]:
 
 def is_opposite(made: Calibration, a: int, b: int) -> bool:
     """Return whether two faces are opposite ones."""
-    return angle_deg(made.placed_board.faces_at(made.board), a, b) > 135.0
+    return angle_deg(made.placed_board, made.board, a, b) > 135.0
 
 
 def body_poses(made: Calibration, views: BoardViews) -> np.ndarray:

@@ -146,7 +146,7 @@ def _without_outliers(
     for _ in range(2):
         fitted = solution.fitted_points
         error = _error_by_mean(residual_px, seen, kept, error, priors, fitted)
-        priors = _with_print_errors(priors, solution, board)
+        priors = _with_print_errors(priors, solution)
         weighted = seen.with_error(error)
         solution = adjust_bundle(solution.state, weighted.select(kept), board, priors)
         residual_px = seen.px - predict(solution.state, seen, board)[0]
@@ -175,14 +175,10 @@ def _with_lateness(priors: Priors, state: BundleState, seen: Sightings) -> Prior
     return replace(priors, late_sigma_s=np.maximum(np.sqrt(variances), least))
 
 
-def _with_print_errors(priors: Priors, solution: Solution, board: Board) -> Priors:
-    """Return the priors with the scatter of a plane's points as the fitted points have it (MacKay,
-    Neural Computation 4, 415, 1992).
-
-    That of a body's points stays as stated: by a fitted one halves of a cube's views differ by 2.8
-    sigma in its sizes, by the stated one by 0.2.
-    """
-    if np.any(board.face_of) or solution.fitted_points < _LEAST_FITTED_POINTS:
+def _with_print_errors(priors: Priors, solution: Solution) -> Priors:
+    """Return the priors with the scatter of the board's points as the fitted points have it (MacKay,
+    Neural Computation 4, 415, 1992)."""
+    if solution.fitted_points < _LEAST_FITTED_POINTS:
         return priors
     squared_mm2 = np.sum(solution.state.points_mm**2) / solution.fitted_points
     return replace(priors, point_sigma_mm=max(float(np.sqrt(squared_mm2)), _LEAST_POINT_SIGMA_MM))
