@@ -73,16 +73,13 @@ def sum_pattern(
     patches beyond the pixels' noise. noise_behind: variance of the background's noise over that of
     the light.
     """
-    number = np.maximum(membership @ np.sum(differences.weight > 0.0, axis=1), 1)
-    variance = membership @ np.sum(differences.weight * differences.background**2, axis=1)
-    share = np.clip(1.0 - _SHARED * noise_behind * number / np.maximum(variance, TINY), 0.0, 1.0)
-    pattern_share = membership.T @ share[:, None]
+    share = membership.T @ _pattern_share(differences, membership, noise_behind)[:, None]
     light = differences.light
-    background = pattern_share * differences.background
-    slope = pattern_share * differences.background_slope
-    texture_share = 1.5 * differences.weight * (membership.T @ texture)
-    inflation = 1.0 + _SHARED * noise_behind * pattern_share + texture_share
-    weight = _INDEPENDENT * differences.weight / inflation
+    background = share * differences.background
+    slope = share * differences.background_slope
+    by_texture = 1.5 * differences.weight * (membership.T @ texture)
+    variance = 1.0 + _SHARED * noise_behind * share + by_texture  # over that of the light's noise
+    weight = _INDEPENDENT * differences.weight / variance
 
     def total(values: np.ndarray) -> np.ndarray:
         """Return the weighted sums (k, b) of values of the differences."""
@@ -95,3 +92,13 @@ def sum_pattern(
         power=np.sum(power, axis=1),
         least_chi2=np.sum(np.minimum(power, total(differences.residual**2)), axis=1),
     )
+
+
+def _pattern_share(
+    differences: PatchDifferences, membership: np.ndarray, noise_behind: float
+) -> np.ndarray:
+    """Return λ (k,): the part of the background's variance in each segment that is no noise."""
+    squares = differences.weight * differences.background**2  # over the light's own noise
+    number = np.maximum(membership @ np.sum(differences.weight > 0.0, axis=1), 1)
+    variance = membership @ np.sum(squares, axis=1) / number
+    return np.clip(1.0 - _SHARED * noise_behind / np.maximum(variance, TINY), 0.0, 1.0)
