@@ -215,7 +215,8 @@ def wire_of(problem: Problem, vector: np.ndarray, axes: int) -> Wire:
     taper = vector[..., problem.blocks.taper.slice]  # (…, 1), or (…, 0) of one that does not taper
     if not taper.shape[-1]:
         return problem.wire
-    return replace(problem.wire, taper_error_per_mm=taper.reshape(*vector.shape[:-1], *[1] * axes))
+    shape = (*vector.shape[:-1], *[1] * axes)
+    return replace(problem.wire, taper_error_per_mm=taper.reshape(shape))
 
 
 def reach_mm(problem: Problem, vector: np.ndarray, arc_mm: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from tests.scenes.model_scenes import scene, with_points
 from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import State
 from vision.fit.solve import solve
+from vision.fit.touch import first_touch, touch_and_sigma
 from vision.geometry.rods import Bar, ProfiledWire, Rods, Wire
 
 EXACT = Wire("cone", 100.0, 1.5)
@@ -54,6 +55,14 @@ def test_what_the_pictures_leave_of_the_lengths_sigma_is_in_touch_slip_and_phi(d
         added = gradient @ covariance @ gradient - without @ exact @ without
         assert np.sqrt(added) == pytest.approx(left * abs(moved[name][0] - before), rel=0.05)
         assert value == pytest.approx(before, abs=1e-3 * np.sqrt(added))
+
+
+def test_touch_of_one_vector_is_that_of_a_batch(drawn):
+    problem, state, covariance, _ = fitted(drawn, STATED)
+    touch_rad, sigma_rad = touch_and_sigma(problem, state.vector, covariance)
+    batch = first_touch(problem, np.stack([state.vector, state.vector])).motor_rad
+    assert batch == pytest.approx([touch_rad, touch_rad], abs=1e-9)
+    assert 0.0 < sigma_rad < 1e-3
 
 
 def test_a_length_off_by_its_sigma_is_partly_seen(drawn):
