@@ -69,7 +69,9 @@ class Explanation:
     def as_earlier(self) -> EarlierWhisk:
         """Return what the next whisk of the trial begins from."""
         lines = self.fitted.lines
-        return EarlierWhisk(self.axis, self.rest_mm, lines.blur_px, lines.reader)
+        return EarlierWhisk(
+            self.axis, self.rest_mm, lines.blur_px, lines.reader, self.fitted.stroke_bends
+        )
 
     def place_comparison(self) -> PlaceComparison:
         """Return the comparison of this fit's place with others."""

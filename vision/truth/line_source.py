@@ -25,17 +25,50 @@ _HIDDEN = "no camera shows enough of the {}"
 
 
 @dataclass(frozen=True, eq=False)
+class StrokeBends:
+    """The wire's bends in the frames of a stroke.
+
+    frames: numbers of f frames. motor_rad (f,), bend_rad (f, 2): motor angle and bend in each.
+    """
+
+    frames: Sequence[int]
+    motor_rad: np.ndarray
+    bend_rad: np.ndarray
+
+    def at(self, frames: Sequence[int], motor_rad: np.ndarray) -> np.ndarray | None:
+        """Return the bends (n, 2), rad, in other frames at motor angles (n,), to a pixel where the whisker
+        is pushed alike again.
+
+        None where it is not: on the way back friction turns round, and no bend is known more than a
+        frame's step beyond the largest angle.
+        """
+        goes_on = frames[-1] > frames[0]
+        went_on = self.frames[-1] > self.frames[0]
+        order = np.argsort(self.motor_rad)
+        known_rad = self.motor_rad[order]
+        next_rad = 2.0 * known_rad[-1] - known_rad[-2]
+        if goes_on != went_on or np.max(motor_rad) > next_rad:
+            return None
+        bend_rad = self.bend_rad[order]
+        known_rad = np.append(known_rad, next_rad)
+        bend_rad = np.vstack([bend_rad, 2.0 * bend_rad[-1] - bend_rad[-2]])
+        return np.stack([np.interp(motor_rad, known_rad, one) for one in bend_rad.T], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
 class EarlierWhisk:
     """What a whisk has shown, from which the search and the fit of the next one begin.
 
-    axis: of the object. rest_mm (2, 4): rest shape of the wire. blur_px: of each camera's lens. reader: of
-    the object's lines, where both whisks are of one trial and so have the same mean pictures.
+    axis: of the object. rest_mm (2, 4): rest shape of the wire. blur_px: of each camera's lens. Where both
+    whisks are of one trial, reader: of the object's lines, for they have the same mean pictures; and
+    bends: the wire's, for they have the same object.
     """
 
     axis: Axis
     rest_mm: np.ndarray
     blur_px: Mapping[str, float]
     reader: ObjectReader | None = None
+    bends: StrokeBends | None = None
 
 
 class LineSource(ABC):

@@ -168,16 +168,28 @@ def coarse_shapes(whisk: WhiskPictures) -> tuple[np.ndarray, dict[int, np.ndarra
     Raises Refused where no whisker is seen to swing.
     """
     axis = whisk.bar.axis
-    sights = [
-        SwingPictures.of(view, whisk.rods, axis, whisk.frames, whisk.bar_swept_mm)
-        for view in whisk.views
-    ]
-    if whisk.earlier is None:
+    earlier = whisk.earlier
+    if earlier is None:
+        sights = _sights(whisk)
         free = np.array(whisk.frames)[early(whisk.angles_rad)]
         rest = find_rest(sights, whisk.cameras, axis, whisk.during(free.tolist()).motor)
-    else:
-        rest = whisk.earlier.rest_mm
-    return rest, follow_bends(sights, axis, rest, whisk.motor)
+        return rest, follow_bends(sights, axis, rest, whisk.motor)
+    bend_rad = None
+    if earlier.bends is not None and whisk.motion is None:
+        bend_rad = earlier.bends.at(whisk.frames, whisk.angles_rad)
+    if bend_rad is None:
+        return earlier.rest_mm, follow_bends(_sights(whisk), axis, earlier.rest_mm, whisk.motor)
+    return earlier.rest_mm, dict(zip(whisk.frames, bend_rad))
+
+
+def _sights(whisk: WhiskPictures) -> list[SwingPictures]:
+    """Return each camera's pictures of a whisk with what stands still in them."""
+    sights = []
+    for view in whisk.views:
+        sights.append(
+            SwingPictures.of(view, whisk.rods, whisk.bar.axis, whisk.frames, whisk.bar_swept_mm)
+        )
+    return sights
 
 
 def coarse_curves(

@@ -12,7 +12,7 @@ from vision.fit.converged_fit import ConvergedFit
 from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
-from vision.fit.problem import Problem, State, shifts_mm
+from vision.fit.problem import Problem, State, bends, shifts_mm
 from vision.fit.touch import first_touch
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
@@ -23,7 +23,7 @@ from vision.geometry.touched import Axis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
 from vision.touched.search import SeenBar
-from vision.truth.line_source import EarlierWhisk, LineSource
+from vision.truth.line_source import EarlierWhisk, LineSource, StrokeBends
 from vision.truth.value import Value, propagated_sigma
 from vision.wire.one_sided import WireAppearance
 
@@ -208,6 +208,12 @@ class FittedWhisk(ConvergedFit):
     def some_curves(self, count: int) -> dict[int, Curves]:
         """Return the centrelines of so many frames spread over the whisk, by frame."""
         return {self.frames[k]: self.curves.one(k) for k in spread(range(len(self.frames)), count)}
+
+    @property
+    def stroke_bends(self) -> StrokeBends:
+        """Return the wire's bends over its stroke."""
+        bends_rad = bends(self.problem, self.state.vector)
+        return StrokeBends(self.frames, self.problem.motor_rad, bends_rad)
 
     def of_whisk(self, name: str) -> Value:
         """Return a quantity of the whole whisk by its name."""

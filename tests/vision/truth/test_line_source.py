@@ -8,6 +8,7 @@ import pytest
 from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
 from vision.geometry.refusals import Refused
 from vision.geometry.vision_settings import VisionSettings
+from vision.truth.line_source import StrokeBends
 from vision.truth.predicted_lines import PredictedLines
 from vision.truth.sight import blank_view, find_sight
 from vision.truth.strategies import TouchByClearance
@@ -60,3 +61,17 @@ def test_lines_without_wire_or_bar_are_refused(bench):
     for noise in (replace(LINES, wire_px=np.nan), replace(LINES, bar_px=np.zeros((0, 3)))):
         with pytest.raises(Refused, match="no camera shows enough of the"):
             predicted_lines(known, cameras, noise).all_points(known.place, last=True)
+
+
+def test_bends_are_those_of_a_like_stroke_at_the_same_angles_and_no_others():
+    """The bend grows by 2 rad a rad from an angle of 0.1 on, its other part by half of that."""
+    motor_rad = np.array([0.0, 0.1, 0.2, 0.3])
+    grown = np.clip(motor_rad - 0.1, 0.0, None)
+    stroke = StrokeBends([3, 4, 5, 6], motor_rad, np.column_stack([2.0 * grown, grown]))
+    frames = [10, 11, 12]
+    asked_rad = np.array([-0.5, 0.25, 0.39])
+    assert stroke.at(frames, asked_rad) == pytest.approx(
+        np.array([[0, 0], [0.3, 0.15], [0.58, 0.29]])
+    )
+    assert stroke.at(frames, asked_rad + 0.02) is None
+    assert stroke.at(frames[::-1], asked_rad) is None
