@@ -130,11 +130,12 @@ def _records(
     trial: Trial,
     frames: TrialFrames,
     settings: Settings,
-    whisks: Iterable[Evaluated],
+    whisks: Sequence[Evaluated],
     of_trial: Sequence[Reason],
 ) -> Iterator[SeenWhisk]:
     """Yield the records of whisks. of_trial: contradictions of the trial as a whole."""
-    warnings = frames.scene.left_out.values()
+    ends = next((whisk.ends for _, whisk in whisks if whisk.ends), {})
+    warnings = [*frames.scene.left_out.values(), check_length(ends, session.whisker)]
     for name, whisk in whisks:
         whisk = _with_angles_sigma(whisk, frames.motor_sigma_rad)
         if whisk.status:  # what the missing frames may have cost comes with their cause
@@ -165,7 +166,6 @@ def _whisk_of_trial(
     warnings: of the recording. of_trial: contradictions of the trial as a whole.
     """
     contradictions = [*of_trial, *_whisk_contradictions(whisk, trial, settings)]
-    warnings = [*warnings, check_length(whisk.ends, session.whisker)]
     speed_rad_s = None if trial.speed_deg_s is None else math.radians(trial.speed_deg_s)
     record = whisk_record(whisk, settings, warnings, contradictions, speed_rad_s)
     return replace(

@@ -330,14 +330,18 @@ def _refused(whisk: WhiskPictures, status: Reason) -> WhiskTruth:
 
 
 def _truth(explained: Explanation) -> WhiskTruth:
-    """Return the truth of a whisk fitted to pictures, with what they show of the wire's end and width."""
+    """Return the truth of a whisk fitted to pictures.
+
+    The first of a trial has what they show of the wire's end and width: the others have the same wire.
+    """
     truth = fitted_truth(explained)
     whisk = explained.whisk
-    checks_width = whisk.settings.check_beam and whisk.number == 0
+    if whisk.earlier is not None:
+        return truth
     return replace(
         truth,
         ends=wire_ends(whisk, explained.fitted),
-        widths=wire_widths(whisk, explained.fitted) if checks_width else {},
+        widths=wire_widths(whisk, explained.fitted) if whisk.settings.check_beam else {},
     )
 
 

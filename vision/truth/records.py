@@ -109,8 +109,8 @@ class WhiskTruth:
     turns: the whisker's rotation in each frame of the fit beyond the motor's. delays: by camera, by how
     many frames it shows the whisker later than the others. refinements: what the
     truth would be without each part of the model, by name. lines: the precision of each camera's
-    lines. ends: by camera how far from its base, mm, the whisker is seen to end; widths: its width
-    in the pictures over the stated one, of a trial's first whisk. point_covariance_mm2 (3, 3): of
+    lines. Of a trial's first whisk, by camera: ends, how far from its base, mm, the whisker is seen to end;
+    widths, its width in the pictures over the stated one. point_covariance_mm2 (3, 3): of
     point_mm. shared: parts of the sigmas. shape: the wire's curve in each frame of the fit. velocity_mm_s (3,): of an object
     that moves, as seen; None where it stands. gave: of one that gives way. rounded: one that is no
     straight bar. problem: what was fitted, from which `sights_of` takes one camera's share.
