@@ -50,6 +50,9 @@ class EvaluatedRun:
     touch_warning: Reason = NO_REASON
     session: Session | None = None
     _findings: dict["Analysis", Any] = field(default_factory=dict, init=False, repr=False)
+    _figures: dict["Analysis", "Figure | None"] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @cached_property
     def accuracy(self) -> RunAccuracy:
@@ -66,6 +69,16 @@ class EvaluatedRun:
         if analysis not in self._findings:
             self._findings[analysis] = analysis.compute(self)
         return self._findings[analysis]
+
+    def figure(self, analysis: "Analysis") -> "Figure | None":
+        """Return an analysis's figure, which its file and the page share; it is drawn at first use.
+
+        None where it has nothing to show.
+        """
+        if analysis not in self._figures:
+            with style():
+                self._figures[analysis] = analysis.figure_of(self)
+        return self._figures[analysis]
 
 
 @dataclass(frozen=True)
@@ -194,10 +207,10 @@ class Analysis(ABC):
         hashes = [result.hash for result in run.results]
         stamp = hash_of(hashes, run.settings, hash_of_code(_FIGURE_CODE))
         if not is_drawn(path, stamp):
+            figure = run.figure(self)
+            if figure is None:
+                return []
             with style():
-                figure = self.figure_of(run)
-                if figure is None:
-                    return []
                 save(figure, path, stamp)
         return [path.name]
 

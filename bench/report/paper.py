@@ -1,13 +1,13 @@
 """The session's figures as Matplotlib has them, and at the width of a journal's column (`--figure-format`)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 
-from bench.analyses.analysis import EvaluatedRun
+from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.catalogue import ANALYSES
 from bench.base.drawing import paper_style, publish
 
@@ -28,13 +28,18 @@ class SessionFigure:
     drawing: Figure
 
 
-def session_figures(run: EvaluatedRun) -> list[SessionFigure]:
-    """Draw all figures that results without a session allow."""
+def session_figures(
+    run: EvaluatedRun, draw: Callable[[Analysis], Figure | None] | None = None
+) -> list[SessionFigure]:
+    """Return all figures that results without a session allow.
+
+    draw: returns the figure of an analysis; without it each is drawn anew.
+    """
     figures = []
     for analysis in ANALYSES:
         if not analysis.figure_name or analysis.needs_session:
             continue
-        drawing = analysis.figure_of(run)
+        drawing = draw(analysis) if draw else analysis.figure_of(run)
         if drawing is not None:
             title = analysis.figure_title
             caption = analysis.caption_of(run)

@@ -53,7 +53,7 @@ def draw(record: RunRecord, rows: Sequence[WhiskRow], run: EvaluatedRun) -> Draw
     figures = []
     variance = residuals = None
     with style():
-        for one in session_figures(run):
+        for one in session_figures(run, run.figure):
             is_broad = one.drawing.get_size_inches()[0] > _WIDE_IN
             drawing = inside(one.drawing, one.name, one.title, rows)
             figures.append(PageFigure(one.title, one.caption, drawing, is_broad))
