@@ -180,15 +180,20 @@ def check_camera_delays(of_whisks: Iterable[Mapping[str, Value]]) -> Reason:
     late = max(by_camera[name], key=_over_sigma).value
     if abs(late) < _LEAST_DELAY_FRAMES or chances[name] >= LEAST_CHANCE:
         return NO_REASON
+    return Reason("camera_late", _late_camera_message(name, late, list(by_camera)))
+
+
+def _late_camera_message(name: str, late_frames: float, cameras: Sequence[str]) -> str:
+    """Return the message on a camera that shows each frame later than the others; earlier if negative."""
     others = "the others"
-    if len(by_camera) == 2:
-        others = f"camera {next(other for other in by_camera if other != name)}"
-    frames = counted(max(1, round(abs(late))), "frame")
-    found = f"camera {name} looks {frames} {'later' if late > 0 else 'earlier'} than {others}"
-    cause = (
-        "one of them lost a frame, or its pictures are numbered from another one, or it was moved"
+    if len(cameras) == 2:
+        others = f"camera {next(other for other in cameras if other != name)}"
+    frames = counted(max(1, round(abs(late_frames))), "frame")
+    order = "later" if late_frames > 0 else "earlier"
+    return (
+        f"camera {name} looks {frames} {order} than {others}: one of them lost a frame,"
+        " or its pictures are numbered from another one, or it was moved"
     )
-    return Reason("camera_late", f"{found}: {cause}")
 
 
 def _chance_of_no_delay(delays: Sequence[Value]) -> float:
