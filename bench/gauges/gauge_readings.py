@@ -247,21 +247,36 @@ def _seen_loads(
 
     loads_of: which loads of a rod. Raises ArithmeticError where no rod is bent so.
     """
-    across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
-    contacts = SeenContacts(d.along_mm[good], across, d.theta_rad[good], d.d_x_mm)
+    contacts = _contacts(d, good)
     share = _share_along_rod(contacts, d.slip_mm[good], d.slip_sigma_mm[good])
     loads = loads_of(rod_of(whisker))
     values = loads(contacts, -_FRICTION * share.value)
     by_place = _by_place(contacts, share.value, loads, values)
     by_camera_error_mm, of_places = _errors_of_places(d, good)
     by_arc, own_covariance = _common_and_own(by_place, of_places)
-    by_friction = (values - loads(contacts, 0.0)) / _FRICTION
-    by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
-    own_covariance += _common_cause(_FRICTION_SIGMA * by_friction) + _common_cause(by_share)
+    own_covariance += _covariance_by_friction(contacts, share, loads, values)
     for rest_mm in whisker.beam.other_rests_mm():
         other = loads_of(rod_of(whisker.with_rest(rest_mm)))
         own_covariance += _common_cause(other(contacts, -_FRICTION * share.value) - values)
     return _SeenLoads(values, by_arc, own_covariance, by_place @ by_camera_error_mm)
+
+
+def _contacts(d: Deflection, good: np.ndarray) -> SeenContacts:
+    """Return the contacts of a deflection in the frames `good` (f,)."""
+    across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
+    return SeenContacts(d.along_mm[good], across, d.theta_rad[good], d.d_x_mm)
+
+
+def _covariance_by_friction(
+    contacts: SeenContacts, share: Value, loads: Loads, here: np.ndarray
+) -> np.ndarray:
+    """Return the covariance (nk, nk) of k loads by friction: its size, and its share along the rod.
+
+    share (n,): that share. here (n, k): the loads of the contacts where they are.
+    """
+    by_friction = (here - loads(contacts, 0.0)) / _FRICTION
+    by_share = _FRICTION * by_friction * (share.sigma / share.value)[:, None]
+    return _common_cause(_FRICTION_SIGMA * by_friction) + _common_cause(by_share)
 
 
 def _errors_of_places(d: Deflection, good: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
