@@ -11,7 +11,7 @@ import json
 import pickle
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -293,29 +293,21 @@ def _sleap_analysis(file: Mapping) -> DrawnLines:
 
 def _sleap_labels(file: Mapping) -> DrawnLines:
     """Read SLEAP's project file: of each instance its frame, track and points."""
-    corner_px = _sleap_corner_px(file)
-    number_of = {int(row["frame_id"]): int(row["frame_idx"]) for row in file["frames"][()]}
-    points = {0: file["points"][()], 1: file["pred_points"][()]}  # by hand, predicted
+    points_px = {0: _sleap_px(file, "points"), 1: _sleap_px(file, "pred_points")}
     skeletons = [named_for_object(names) for names in _sleap_joints(file)]
     frame = []
     line = []
     px = []
     on_object = []
-    untracked: Counter[int] = Counter()
-    for instance in file["instances"][()]:
-        own = points[int(instance["instance_type"])][_points_of(instance)]
-        is_seen = own["visible"] & np.isfinite(own["x"])
-        own = own[is_seen]
-        named = skeletons[int(instance["skeleton"])][is_seen]
-        in_frame = number_of[int(instance["frame_id"])]
-        track = int(instance["track"])
-        if track < 0:  # tracked by no one: the next line of its frame that is none
-            untracked[in_frame] += 1
-            track = -untracked[in_frame]
-        frame += [in_frame] * len(own)
-        line += np.where(named, 0, track).tolist()
-        px += list(zip(own["x"] - corner_px, own["y"] - corner_px))
-        on_object += named.tolist()
+    instances = file["instances"][()]
+    for instance, (in_frame, track) in zip(instances, _frames_and_tracks(file, instances)):
+        joints_px = _joints_px(instance, points_px)
+        is_seen = np.isfinite(joints_px[:, 0])
+        is_of_object = skeletons[int(instance["skeleton"])][is_seen]
+        frame += [in_frame] * len(is_of_object)
+        line += np.where(is_of_object, 0, track).tolist()
+        px += joints_px[is_seen].tolist()
+        on_object += is_of_object.tolist()
     return DrawnLines(
         np.array(frame),
         np.array(px),
@@ -325,6 +317,30 @@ def _sleap_labels(file: Mapping) -> DrawnLines:
     )
 
 
+def _sleap_px(file: Mapping, table: str) -> np.ndarray:
+    """Return the points (n, 2) in a table of SLEAP's project, px; NaN where they are not seen."""
+    points = file[table][()]
+    px = np.column_stack([points["x"], points["y"]]) - _sleap_corner_px(file)
+    px[~points["visible"]] = np.nan
+    return px
+
+
+def _frames_and_tracks(file: Mapping, instances: Iterable[np.void]) -> Iterator[tuple[int, int]]:
+    """Yield the frame and the track of each instance of SLEAP's project.
+
+    Those that are on no track have −1, −2, … in their frame: each is a line of its own.
+    """
+    number_of = {int(row["frame_id"]): int(row["frame_idx"]) for row in file["frames"][()]}
+    untracked: Counter[int] = Counter()
+    for instance in instances:
+        frame = number_of[int(instance["frame_id"])]
+        track = int(instance["track"])
+        if track < 0:
+            untracked[frame] += 1
+            track = -untracked[frame]
+        yield frame, track
+
+
 def _sleap_joints(file: Mapping) -> list[list[str]]:
     """Return of each skeleton of SLEAP's project the names of its joints, in the order of its points."""
     stated = json.loads(file["metadata"].attrs["json"])
@@ -332,9 +348,10 @@ def _sleap_joints(file: Mapping) -> list[list[str]]:
     return [[names[node["id"]] for node in one["nodes"]] for one in stated["skeletons"]]
 
 
-def _points_of(instance: np.void) -> slice:
-    """Return which rows of SLEAP's table of points an instance has."""
-    return slice(int(instance["point_id_start"]), int(instance["point_id_end"]))
+def _joints_px(instance: np.void, points_px: Mapping[int, np.ndarray]) -> np.ndarray:
+    """Return the joints (n, 2) of an instance of SLEAP's project, px. points_px: by the instance's type."""
+    own = slice(int(instance["point_id_start"]), int(instance["point_id_end"]))
+    return points_px[int(instance["instance_type"])][own]
 
 
 def _sleap_corner_px(file: Mapping) -> float:
