@@ -173,14 +173,20 @@ def _checked(drawn: DrawnLines, name: str, camera: TracedCamera, label: str) -> 
     elif camera.size_px is not None:
         is_inside = _inside(px, name, camera.size_px, label)
     _require_span(px, label)
-    picture = camera.picture
+    frame = _frames_of(drawn.frame.astype(int), camera.picture)
+    trace = Trace(frame, px, drawn.line, drawn.sigma_px)
+    return Traced(trace.select(is_inside & (frame >= 0)), drawn.has_identity)
+
+
+def _frames_of(number: np.ndarray, picture: np.ndarray) -> np.ndarray:
+    """Return the frames (n,) of pictures by their numbers; −1 for a picture that no frame has.
+
+    picture: as of `TracedCamera`.
+    """
     frame_of = np.full(int(np.max(picture, initial=0)) + 1, -1)
     recorded = np.flatnonzero(picture >= 0)
     frame_of[picture[recorded]] = recorded
-    number = drawn.frame.astype(int)
-    frame = np.where(number < len(frame_of), frame_of[np.minimum(number, len(frame_of) - 1)], -1)
-    trace = Trace(frame, px, drawn.line, drawn.sigma_px)
-    return Traced(trace.select(is_inside & (frame >= 0)), drawn.has_identity)
+    return np.where(number < len(frame_of), frame_of[np.minimum(number, len(frame_of) - 1)], -1)
 
 
 def _require_frames(frame: np.ndarray, camera: TracedCamera, label: str) -> None:
