@@ -190,17 +190,26 @@ class _Rods:
         angle = unknowns[:, :count]
         force = unknowns[:, count, None]
         arc = unknowns[:, count + 1, None]
-        softness, softness_by_arc = self._softness(arc, nodes)
-        lever, lever_by = self._lever(np.cos(angle), np.sin(angle), nodes)
-        bend = (lever * softness) @ nodes.from_clamp.T
-        bend_by = nodes.from_clamp @ (softness[:, :, None] * lever_by)
-        bend_by_arc = 2.0 * arc * bend + arc**2 * ((lever * softness_by_arc) @ nodes.from_clamp.T)
+        bend, bend_by_angle, bend_by_arc = self._unit_bend(angle, arc, nodes)
         scale = force * arc**2
         derivatives = np.empty((*angle.shape, count + 2))
-        derivatives[:, :, :count] = np.eye(count) - scale[:, :, None] * bend_by
+        derivatives[:, :, :count] = np.eye(count) - scale[:, :, None] * bend_by_angle
         derivatives[:, :, count] = -(arc**2) * bend
-        derivatives[:, :, count + 1] = -force * bend_by_arc
+        derivatives[:, :, count + 1] = -force * (2.0 * arc * bend + arc**2 * bend_by_arc)
         return angle - scale * bend, derivatives
+
+    def _unit_bend(
+        self, angle: np.ndarray, arc: np.ndarray, nodes: _Nodes
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the bend (n, nodes) for each unit of force · arc², and its derivatives by the
+        angles (n, nodes, nodes) and by the arc (n, nodes).
+        """
+        softness, softness_by_arc = self._softness(arc, nodes)
+        lever, lever_by_angle = self._lever(np.cos(angle), np.sin(angle), nodes)
+        bend = (lever * softness) @ nodes.from_clamp.T
+        by_angle = nodes.from_clamp @ (softness[:, :, None] * lever_by_angle)
+        by_arc = (lever * softness_by_arc) @ nodes.from_clamp.T
+        return bend, by_angle, by_arc
 
     def _closure(self, unknowns: np.ndarray, nodes: _Nodes) -> tuple[np.ndarray, np.ndarray]:
         """Return how far (n, 2) the rod's end is from the contact, along and across, and the
