@@ -38,8 +38,7 @@ def manifest_text(
         tables.append(_GAUGES)
     tables.append(_TRIAL.format(angle=_angle_lines(lab, lines)))
     tables.append(_FRAMES if lab.has_frames else "")
-    tables.append("\n# What to record:\n")
-    tables += [f"#   {file.ljust(27)} {what}\n" for file, what in _to_record(lab)]
+    tables.append(_recording_text(lab))
     return "".join(tables)
 
 
@@ -75,6 +74,12 @@ def _angle_lines(lab: Lab, lines: Mapping[str, str]) -> str:
     if "speed_deg_s" not in needed:
         found.append("# speed_deg_s = 10.0            # nominal")
     return "\n".join(found)
+
+
+def _recording_text(lab: Lab) -> str:
+    """Return the comment on what is to be recorded."""
+    rows = [f"#   {file.ljust(27)} {what}\n" for file, what in _to_record(lab)]
+    return "".join(["\n# What to record:\n", *rows])
 
 
 def _to_record(lab: Lab) -> Iterator[tuple[str, str]]:
