@@ -75,11 +75,16 @@ def check(path: Path, *, follow_links: bool = False) -> int:
         print(line)
     if problems.warnings:
         return WITH_WARNINGS
-    whiskers = f", {counted(len(views), 'whisker')}" if session.base else ""
-    trials = counted(len(session.trials), "trial")
-    print(f"{session.whole_name}{whiskers}: {trials}, no error, no warning")
+    _print_sound(session, len(views))
     print(f"then run: whisker-bench evaluate {path} --out OUT")
     return DONE
+
+
+def _print_sound(session: Session, whiskers: int) -> None:
+    """Print that a session of so many whiskers has no error and no warning."""
+    of_whiskers = f", {counted(whiskers, 'whisker')}" if session.base else ""
+    trials = counted(len(session.trials), "trial")
+    print(f"{session.whole_name}{of_whiskers}: {trials}, no error, no warning")
 
 
 def _print_problems(problems: InputProblems) -> None:
