@@ -140,13 +140,12 @@ def read_signals(trial: Trial) -> Signals:
     stand still or go back, and values of another unit (milliseconds, radians,
     millivolts).
     """
-    path = trial.signals_path
-    label = trial.label(path.name)
-    table = read_table(path, label) if trial.daq is None else read_daq(path, trial.daq, label)
+    label = trial.label(trial.signals_path.name)
+    table = _read_samples(trial, label)
     kind, channels = _kind_and_channels(table, label)
     forces = _force_columns(table, label)
     table, duplicates = forward_in_time(table, TIME, label)
-    _check_units(table, VOLTAGE if kind == "V" else MOMENT, channels, label)
+    _check_units(table, kind, channels, label)
     pair = np.column_stack([table[name] for name in channels])
     angle = angle_source(trial).of_samples(table, pair, trial, label)
     table = angle.table
@@ -159,10 +158,17 @@ def read_signals(trial: Trial) -> Signals:
         kind=kind,
         dropped={cause: count for cause, count in mended.items() if count},
         warnings=_motor_warnings(table[TIME], angle.motor_deg, trial, label),
-        forces_N=_forces_N(table, forces, label) if forces else None,
+        forces_N=_forces_N(table, forces, label),
         angle_sigma=angle.sigma,
-        pressure_Pa=table[PRESSURE] if PRESSURE in table.columns else None,
+        pressure_Pa=table.columns.get(PRESSURE),
     )
+
+
+def _read_samples(trial: Trial, label: str) -> NumberTable:
+    """Read the columns of a trial's signals.csv, or of its own DAQ's file. Raises BadInput."""
+    if trial.daq is None:
+        return read_table(trial.signals_path, label)
+    return read_daq(trial.signals_path, trial.daq, label)
 
 
 def has_moments(trial: Trial) -> bool:
@@ -189,8 +195,10 @@ def _kind_and_channels(table: NumberTable, label: str) -> tuple[str, tuple[str, 
     return kind, channels
 
 
-def _forces_N(table: NumberTable, names: Sequence[str], label: str) -> np.ndarray:
-    """Return the forces (n, 3). Raise BadInput where one seems to be in another unit."""
+def _forces_N(table: NumberTable, names: Sequence[str], label: str) -> np.ndarray | None:
+    """Return the forces (n, 3); None of no names. Raise BadInput for what seems another unit."""
+    if not names:
+        return None
     for name in names:
         FORCE.check(_extreme(table[name]), f"the largest {name}", label)
     return np.column_stack([table[name] for name in names])
@@ -204,13 +212,12 @@ def _force_columns(table: NumberTable, label: str) -> tuple[str, ...]:
     return FORCES
 
 
-def _check_units(
-    table: NumberTable, channel_range: PlausibleRange, channels: tuple[str, str], label: str
-) -> None:
-    """Raise BadInput where times or channels seem to be in another unit."""
+def _check_units(table: NumberTable, kind: str, channels: tuple[str, str], label: str) -> None:
+    """Raise BadInput where times or channels, of a kind "V" or "Nmm", seem to be in another unit."""
     if len(table) < 2:
         raise BadInput("has one row; a recording has many", file=label)
     SAMPLING_STEP.check(float(np.median(np.diff(table[TIME]))), f"the usual step of {TIME}", label)
+    channel_range = VOLTAGE if kind == "V" else MOMENT
     for name in channels:
         channel_range.check(_extreme(table[name]), f"the largest {name}", label)
 
