@@ -53,7 +53,7 @@ def write_video(
     record = read_record(out)
     result = _result(out, trial)
     path = out / "video" / f"{trial}.webm" if path is None else path
-    code = codec_of(path)
+    codec_of(path)
     if not (math.isfinite(rate_Hz) and 0.1 <= rate_Hz <= 240.0):
         raise BadInput(f"--rate-Hz is {rate_Hz:g}; from 0.1 to 240 is allowed")
     source = _session_folder(out) if session is None else session
@@ -63,8 +63,7 @@ def write_video(
     if not cameras:
         raise BadInput("has no pictures of this trial; give --session", file=source)
     pictures = _film(recorded, cameras, result)
-    with whole_file(path) as temporary:
-        write_pictures(temporary, pictures, code, rate_Hz)
+    write_pictures(path, pictures, rate_Hz)
     return path
 
 
@@ -96,21 +95,26 @@ def _session_folder(out: Path) -> Path:
         raise BadInput("does not say where its session is; give --session", file=out) from None
 
 
-def write_pictures(path: Path, pictures: Iterator[np.ndarray], code: str, rate_Hz: float) -> None:
-    """Write pictures as a film. Raise BadInput where there are none, or OpenCV cannot."""
+def write_pictures(path: Path, pictures: Iterator[np.ndarray], rate_Hz: float) -> None:
+    """Write pictures as a film, whole. Raise BadInput where there are none, or OpenCV cannot."""
     first = next(pictures, None)
     if first is None:
         raise BadInput("no camera has a picture of these frames; give --session")
     height, width, _ = first.shape
-    with _quiet_ffmpeg():
-        writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*code), rate_Hz, (width, height))
-    if not writer.isOpened():
-        raise BadInput(f"this OpenCV writes no {code} film; try --out with .avi", file=path.name)
-    writer.write(first)
-    for picture in pictures:
-        writer.write(picture)
-    begin_step("encoding the film")  # its last frames all at once
-    writer.release()
+    code = codec_of(path)
+    fourcc = cv2.VideoWriter_fourcc(*code)
+    with whole_file(path) as temporary:
+        with _quiet_ffmpeg():
+            writer = cv2.VideoWriter(str(temporary), fourcc, rate_Hz, (width, height))
+        if not writer.isOpened():
+            raise BadInput(
+                f"this OpenCV writes no {code} film; try --out with .avi", file=path.name
+            )
+        writer.write(first)
+        for picture in pictures:
+            writer.write(picture)
+        begin_step("encoding the film")  # its last frames all at once
+        writer.release()
 
 
 @contextmanager

@@ -8,10 +8,9 @@ import cv2
 import numpy as np
 
 from bench.report.painting import as_8_bit, polyline, put_text
-from vision import WhiskTruth
 
 if TYPE_CHECKING:
-    from bench.workflows.live_push import LivePush
+    from bench.workflows.live_push import LivePush, Played
 
 FILM_HZ = 25.0
 _HELD_S = 2.0  # so long the answer is shown
@@ -42,16 +41,16 @@ class LiveFilm:
             title = f"{now_s - self._begin_s:.2f} s"
             self._shown = _drawn(push.pictures, push.whisk.lines_px(), title, "")
 
-    def end(
-        self, now_s: float, pictures: Mapping[str, np.ndarray], truth: WhiskTruth, late: str
-    ) -> None:
-        """Show the truth of a push, which came at a time, and begin anew. late: how late, in words."""
+    def end(self, played: "Played") -> None:
+        """Show the truth of a push when it came, and begin anew."""
+        now_s = played.clock.now_s()
         self._show_until(now_s)
+        truth = played.truth
         lines = truth.overlay[max(truth.overlay)] if truth.overlay else {}
         d_x = truth.d_x_mm
         answer = f"d_x {d_x.value:.3f} +- {d_x.sigma:.3f} mm" if lines else "no distance"
-        title = f"{now_s - self._begin_s:.2f} s, {late}"
-        self._shown = _drawn(pictures, lines, title, answer)
+        title = f"{now_s - self._begin_s:.2f} s, {played.late}"
+        self._shown = _drawn(played.pictures, lines, title, answer)
         self._show_until(now_s + _HELD_S)
         self._shown = None
 

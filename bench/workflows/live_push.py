@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from bench.base.atomic import lock_output, whole_file
+from bench.base.atomic import lock_output
 from bench.base.drawing import save_picture
 from bench.base.errors import BadInput
 from bench.base.results import hash_of
@@ -153,10 +153,9 @@ def play_trial(
     of a film of it, in which work takes its processor time; without one the clock is that on the wall.
     Raises BadInput where the trial has no pictures or no push.
     """
-    code = ""
     if film:
         check_outside(film, session, "--film")
-        code = codec_of(film)
+        codec_of(film)
     recorded, trial = _recorded(session, out, name, follow_links=follow_links)
     recording = RecordedPush.read(trial)
     settings = VisionSettings(clock_sigma_s=recording.times.clock_sigma_s)
@@ -166,14 +165,12 @@ def play_trial(
         clock = ProcessorClock if film else WallClock
         for played in recording.play_all(bench, clock, watch=shown.watch if film else None):
             truth = played.truth
-            _save_last_frame(played, out / "live" / f"{name}_{truth.whisk}.png")
-            late = f"{played.late_s:.2f} s after the last frame"
+            _save_last_frame(played, out / f"live/{name}_{truth.whisk}.png")
             if film:
-                shown.end(played.clock.now_s(), played.pictures, truth, late)
-            yield f"{name}, whisk {truth.whisk}: {truth_text(truth)}; {late}", truth.status
+                shown.end(played)
+            yield f"{name}, whisk {truth.whisk}: {truth_text(truth)}; {played.late}", truth.status
         if film:
-            with whole_file(film) as temporary:
-                write_pictures(temporary, iter(shown.pictures), code, FILM_HZ)
+            write_pictures(film, iter(shown.pictures), FILM_HZ)
 
 
 def _save_last_frame(played: "Played", path: Path) -> None:
@@ -269,6 +266,11 @@ class Played:
     late_s: float
     pictures: dict[str, np.ndarray]
     clock: PushClock
+
+    @property
+    def late(self) -> str:
+        """Return how late its truth came, for people."""
+        return f"{self.late_s:.2f} s after the last frame"
 
 
 @dataclass(frozen=True, eq=False)

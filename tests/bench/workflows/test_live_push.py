@@ -13,6 +13,7 @@ from bench.base.exit_codes import BAD_INPUT, DONE
 from bench.commands.cli import main
 from bench.workflows import live_push
 from bench.workflows.live_film import FILM_HZ, LiveFilm
+from bench.workflows.live_push import Played, ProcessorClock
 from vision import WhiskTruth
 
 SIZE = (720, 1280)
@@ -70,7 +71,7 @@ def test_a_film_lasts_as_long_as_the_push_and_its_answer_is_held():
     film = LiveFilm()
     film.watch(5.0, SimpleNamespace(pictures={"a": dark, "b": dark}, whisk=shows))
     film.watch(5.1, SimpleNamespace(pictures={"a": bright, "b": dark}, whisk=shows))
-    film.end(5.2, {"a": bright, "b": bright}, WhiskTruth(0), "0.10 s after the last frame")
+    film.end(Played(WhiskTruth(0), 0.1, {"a": bright, "b": bright}, ProcessorClock(5.2)))
     assert len(film.pictures) == pytest.approx(2.2 * FILM_HZ, abs=1)
     assert all(picture.shape == (405, 1440, 3) for picture in film.pictures)
     changes = [np.any(one != next_) for one, next_ in zip(film.pictures, film.pictures[1:])]
