@@ -47,7 +47,7 @@ def measure(small_copy, monkeypatch):
             T_now_true = compose(T_now_first, T_FIRST_TRUE)
             left = np.append(log_rotation(T_now_true[:, :3]), T_now_true[:, 3])
             lines = some_lines(width_deg, left, across_mm=0.01, turn_rad=5e-4, rng=rng)
-            base = drawn.setdefault((unit.stage, unit.trial.name, width_deg), lines)
+            base = drawn.setdefault((unit.calibration_step, unit.trial.name, width_deg), lines)
             point = T_now_true[:, :3] @ contact_mm + T_now_true[:, 3]
             distance = Value(float(np.linalg.norm(point)), 0.01)
             touch = {"d_x_mm": distance, "point_mm": Value(point, np.full(3, 0.01))}

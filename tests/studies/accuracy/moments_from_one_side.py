@@ -111,9 +111,9 @@ def seen_whisk(scene: Scene) -> tuple[SeenWhisk, float]:
     problem = as_problem(scene, cameras, wire, bar, line_points(scene, rng))
     state, _ = solve(problem, begin(problem), scales=SCALES)
     problem = inflated_by_residuals(problem, state)
-    state, covariance = solve(problem, state, scales=(4.0, 4.0, 4.0))
+    state, _ = solve(problem, state, scales=(4.0, 4.0, 4.0))
     frames = list(range(len(scene.motor_rad)))
-    fitted = FittedWhisk.of(problem, state, covariance, frames)
+    fitted = FittedWhisk(problem, state, frames)
     time_s = scene.recording.frames.time_s
     whisk = WhiskPictures(
         0,
