@@ -210,15 +210,10 @@ class _Rod:
         now, halfway = self._bent(unknowns, theta)
         friction = self._friction(alpha, heading)
         beta = _slope(now.force, friction.sideways)
-        bar = np.stack([0.0 * beta, np.sin(beta), np.cos(beta)], axis=1)
-        across = np.stack([0.0 * beta, -np.cos(beta), np.sin(beta)], axis=1)
+        bar, across = _bar_directions(beta)
         axis = self._axis(now, bar)
         first = self._first_touch(axis[:, 0], bar, now.arc)
-        side = np.copysign(1.0, m_y)
-        way_halfway = _way(halfway, first, bar, side)
-        mean_heading, latest = _headings(way_halfway, _way(now, first, bar, side))
-        friction_halfway = self._friction(alpha, mean_heading)
-        off_halfway = (self._axis(halfway, bar) - first.axis) / theta[:, None]
+        heading_halfway, latest = _headings(halfway, now, first, bar, np.copysign(1.0, m_y))
         moment = np.hypot(m_y, m_z)
         residuals = [
             (now.moment[:, 1] - m_y) / moment,
@@ -226,12 +221,31 @@ class _Rod:
             self._unexplained_along(now, bar, alpha, friction),
             dot(axis - first.axis, across) / theta,
             heading if self.held else _wrapped(heading - latest),
-            _slope(halfway.force, friction_halfway.sideways) - beta,
-            self._unexplained_along(halfway, bar, alpha, friction_halfway),
-            dot(off_halfway, across),
-            off_halfway[:, 0],
+            *self._residuals_halfway(halfway, first, heading_halfway, beta, theta, alpha),
         ]
         return np.stack([*residuals, np.linalg.norm(first.point, axis=1), beta])
+
+    def _residuals_halfway(
+        self,
+        halfway: "_Bent",
+        first: "_FirstTouch",
+        heading: np.ndarray,
+        beta: np.ndarray,
+        theta: np.ndarray,
+        alpha: np.ndarray,
+    ) -> list[np.ndarray]:
+        """Return the residuals (n,) of the four equations halfway: the bar's slope, the force along the
+        rod, and the place of the bar's axis across the bar and along the whisker.
+        """
+        bar, across = _bar_directions(beta)
+        friction = self._friction(alpha, heading)
+        off = (self._axis(halfway, bar) - first.axis) / theta[:, None]
+        return [
+            _slope(halfway.force, friction.sideways) - beta,
+            self._unexplained_along(halfway, bar, alpha, friction),
+            dot(off, across),
+            off[:, 0],
+        ]
 
     def _bent(self, unknowns: np.ndarray, theta: np.ndarray) -> tuple["_Bent", "_Bent"]:
         """Return the rods of n sets of unknowns at the end of the push, and halfway."""
@@ -377,6 +391,13 @@ class _Friction:
     lengthways: np.ndarray
 
 
+def _bar_directions(beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the directions (n, 3) of bars at slopes beta (n,), and of what is across them and the whisker."""
+    along = np.stack([0.0 * beta, np.sin(beta), np.cos(beta)], axis=1)
+    across = np.stack([0.0 * beta, -np.cos(beta), np.sin(beta)], axis=1)
+    return along, across
+
+
 def _way(bent: _Bent, first: _FirstTouch, bar: np.ndarray, side: np.ndarray) -> np.ndarray:
     """Return how far rods have moved along bars since first touch, and have been drawn along themselves (2, n).
 
@@ -388,10 +409,17 @@ def _way(bent: _Bent, first: _FirstTouch, bar: np.ndarray, side: np.ndarray) -> 
     return np.stack([side * moved, bent.arc - first.arc - past])
 
 
-def _headings(halfway: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the heading (n,) of the motion halfway, and now, of the parabola through two ways (2, n) and none."""
-    latest = 3 * now - 4 * halfway
-    return np.arctan2(now[1], now[0]), np.arctan2(latest[1], latest[0])
+def _headings(
+    halfway: _Bent, now: _Bent, first: _FirstTouch, bar: np.ndarray, side: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the headings (n,) of the motion halfway, and now: of the parabola through both ways and none.
+
+    bar, side: as of `_way`.
+    """
+    way_halfway = _way(halfway, first, bar, side)
+    way = _way(now, first, bar, side)
+    latest = 3 * way - 4 * way_halfway
+    return np.arctan2(way[1], way[0]), np.arctan2(latest[1], latest[0])
 
 
 def _along(bent: _Bent, bar: np.ndarray) -> np.ndarray:
