@@ -151,13 +151,25 @@ def compute_profiles(pieces: Pieces, segments: int, reach_px: float, gamma: floa
     is_used = (position >= 0) & (position < 2 * half)
     is_used &= np.abs(offset_px) > radius_px - reach_px - _INSIDE_PX
     patches = PatchSums.along_bar(pieces, is_used, position, 2 * half + 1, gamma)
-    number = max(1, min(segments, len(pieces) // 2))
-    place_mm = np.array_split(np.sort(pieces.place), number)  # of the patches of each segment
+    place_mm = _places_by_segment(pieces, segments)
     grid_px = STEP_PX * np.arange(-half, half + 1)
-    is_bright = np.nan_to_num(pieces.grey) >= SATURATED * FULL_SCALE
-    is_saturated = bool(np.any(is_bright & (np.abs(offset_px) < radius_px)))
+    is_saturated = _is_saturated(pieces, np.abs(offset_px) < radius_px)
     noise_behind = float(np.median(pieces.noise_behind))
     return _average_patches(patches, place_mm, grid_px, radius_px, is_saturated, noise_behind)
+
+
+def _places_by_segment(pieces: Pieces, segments: int) -> list[np.ndarray]:
+    """Return the places of the patches of each segment, mm; fewer segments than asked for where there
+    are less than two patches for each.
+    """
+    number = max(1, min(segments, len(pieces) // 2))
+    return np.array_split(np.sort(pieces.place), number)
+
+
+def _is_saturated(pieces: Pieces, is_inside: np.ndarray) -> bool:
+    """Return whether a pixel inside the bar is saturated. is_inside: as the pieces' pixels."""
+    is_bright = np.nan_to_num(pieces.grey) >= SATURATED * FULL_SCALE
+    return bool(np.any(is_bright & is_inside))
 
 
 def _average_patches(
