@@ -51,6 +51,10 @@ class BarAxis(Axis):
         """Return the same bar with that of its two directions which has positive z."""
         return self if self.direction[2] >= 0 else BarAxis(self.point_mm, -self.direction)
 
+    def angle_to(self, other: "BarAxis") -> float:
+        """Return the angle between two bars' directions, rad, at most a right one."""
+        return float(np.arccos(min(abs(float(self.direction @ other.direction)), 1.0)))
+
     def bar_at(self, points_mm: np.ndarray) -> "BarAxis":
         """Return the bar itself, on which all contacts act."""
         return self

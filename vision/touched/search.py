@@ -56,8 +56,8 @@ _MOST_PASSES = 12
 class SeenBar:
     """The axis of the touched object, and by camera the bar's lines that it passes through.
 
-    Of a rounded object there are no lines. rivals: axes of other bars that are as clear, as far as
-    detection scores tell.
+    Of a rounded object there are no lines. rivals: axes of other bars that may be the one that is
+    touched: as clear ones, or where all cameras stand on one side of it, that by all of them.
     """
 
     axis: Axis
@@ -141,14 +141,16 @@ def _search_bar(touched: Bar, scene: SearchScene) -> SeenBar:
     is_seen = bool(by_all.seen_by)
     if is_seen and not seen_from_one_side(scene.cameras, by_all.axis):
         return by_all
-    found = search.bars_of_single_cameras() or [by_all] * is_seen
-    if not found:
-        raise Refused(
-            f"no {touched.label} is seen near the whisker; "
-            "record with the bar in view of every camera",
-            code="no_bar_seen",
-        )
-    return max(found, key=_detection_score)
+    alone = search.bars_of_single_cameras()
+    if alone:
+        clearest = max(alone, key=_detection_score)
+        return replace(clearest, rivals=(by_all.axis,)) if is_seen else clearest
+    if is_seen:
+        return by_all
+    raise Refused(
+        f"no {touched.label} is seen near the whisker; record with the bar in view of every camera",
+        code="no_bar_seen",
+    )
 
 
 @dataclass

@@ -40,6 +40,9 @@ _LIKELY_SIGMAS = 2.0
 # [px] Places that are nearer to each other in all cameras are one, a lens blur or two; true fits end
 # within 1.4 px of where they began, others 2.9 to 8 px away. Study: last_question.py.
 _APART_PX = 2.0
+# [rad] Bars nearer to each other in direction are one where the pictures cannot tell: a slope known
+# worse than this is no truth. Stated.
+_APART_RAD = np.radians(20.0)
 # [fits] From other places, at most; more than one are needed where the first ends on the way. Stated.
 _MOST_FITS = 3
 
@@ -124,33 +127,49 @@ def best_explanation(first: Explanation) -> Explanation:
 def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
     """Return a fit, or that from another bar which is clearer, with a warning where it hardly is.
 
-    rivals: axes that the search found as clear. Where a whisk fits at one of them and changes as
-    much of the pictures, detection scores about the two fitted axes decide. Raises Refused where
-    these are alike and the distances differ.
+    rivals: axes of bars that the search has not excluded. Where a whisk fits at one of them and
+    changes as much of the pictures, detection scores about the two fitted axes decide. Raises
+    Refused where these are alike and the distances differ.
     """
     comparison = _comparison(first) if rivals else None
-    if comparison is None:
-        return first
     best = first
     for axis in rivals:
-        if comparison.apart_px(axis, best.axis) <= _APART_PX:
+        if not _are_apart(comparison, axis, best.axis):
             continue
         try:
             other = best.from_place(axis)
         except Refused:
             continue
-        away_px = comparison.apart_px(other.axis, best.axis)
-        if away_px <= _APART_PX or _is_better(comparison, best.axis, other.axis, _LIKELY_SIGMAS):
+        if not _are_apart(comparison, other.axis, best.axis):
+            continue
+        if comparison and _is_better(comparison, best.axis, other.axis, _LIKELY_SIGMAS):
             continue
         more_score = other.detection_score() - best.detection_score()
         if more_score > 0.0:
             best, other = other, best
         if abs(more_score) < CLEARER:
             _require_one(best, other)
-            sentence = f"the bar may be elsewhere: a place up to {away_px:.0f} px away explains the pictures as well"
-            best = replace(best, warning=Reason("bar_elsewhere", sentence))
+            best = replace(best, warning=_rival_warning(comparison, other.axis, best.axis))
             break
     return _in_place_of(first, best)
+
+
+def _are_apart(comparison: PlaceComparison | None, place: BarAxis, other: BarAxis) -> bool:
+    """Return whether two places are not one: in some camera, or by their directions where the
+    pictures cannot be compared."""
+    if comparison is not None:
+        return comparison.apart_px(place, other) > _APART_PX
+    return place.angle_to(other) > _APART_RAD
+
+
+def _rival_warning(comparison: PlaceComparison | None, place: BarAxis, drawn: BarAxis) -> Reason:
+    """Return the warning that another place is as clear as that of a fit."""
+    if comparison is not None:
+        away = f"up to {comparison.apart_px(place, drawn):.0f} px away"
+    else:
+        away = f"turned by {np.degrees(place.angle_to(drawn)):.0f}°"
+    sentence = f"the bar may be elsewhere: a place {away} explains the pictures as well"
+    return Reason("bar_elsewhere", sentence)
 
 
 def _in_place_of(first: Explanation, best: Explanation) -> Explanation:

@@ -137,7 +137,9 @@ def test_single_cameras_find_what_all_together_do_not_and_how_far_away_a_bar_is(
     monkeypatch.setattr(search.BarSearch, "best_by_all_cameras", lambda _: by_all)
     monkeypatch.setattr(search.BarSearch, "bars_of_single_cameras", lambda _: alone)
     monkeypatch.setattr(search, "seen_from_one_side", lambda *_: from_one_side)
-    assert search.find_object(scene) is alone[1]
+    found = search.find_object(scene)
+    assert found.lines is alone[1].lines
+    assert found.rivals == ((by_all.axis,) if is_seen else ())
 
 
 def test_a_bar_that_does_not_converge_competes_with_none_that_does(lamp, monkeypatch):
