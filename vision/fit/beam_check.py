@@ -23,7 +23,6 @@ from vision.fit.covariance import chance_of
 from vision.fit.problem import (
     WANDER_PX,
     Problem,
-    bends,
     columns_of_camera,
     wandering,
 )
@@ -227,7 +226,7 @@ def _moves(fit: ConvergedFit) -> Curves:
     knots = np.linspace(0.0, problem.wire.length_mm, KNOTS + 1)
     spline = CubicSpline(knots, np.eye(KNOTS + 1)[:, 1:], bc_type="natural")
     bend = np.zeros((len(problem.motor_rad), 3))
-    bend[:, 1:] = bends(problem, fit.state.vector)
+    bend[:, 1:] = fit.bend_rad
     direction = np.einsum("fij,fj->fi", rotation_z(problem.motor_rad), bend)
     points = np.einsum("mk,fi->kfmi", spline(arc_mm, 0), direction)
     tangents = np.einsum("mk,fi->kfmi", spline(arc_mm, 1), direction)

@@ -7,7 +7,16 @@ import numpy as np
 from scipy.ndimage import correlate1d
 
 from vision.fit.object_rows import object_rows
-from vision.fit.problem import Problem, State, bar_axes, bar_axis, curves_of, point_rows
+from vision.fit.problem import (
+    Problem,
+    State,
+    bar_axes,
+    bar_axis,
+    bends,
+    curves_of,
+    point_rows,
+    rest_shape,
+)
 from vision.fit.quantities import Jacobians, Measured, jacobians
 from vision.fit.solve import Linear, linearise
 from vision.geometry.camera import N_PARAMETERS
@@ -36,6 +45,16 @@ class ConvergedFit:
     def axis(self) -> Axis:
         """Return the object's axis, from which one that moves is counted."""
         return bar_axis(self.problem, self.state.vector)
+
+    @property
+    def rest_mm(self) -> np.ndarray:
+        """Return the wire's rest shape (2, 4), mm."""
+        return rest_shape(self.problem, self.state.vector)
+
+    @property
+    def bend_rad(self) -> np.ndarray:
+        """Return the wire's bends (f, 2) in all frames, rad."""
+        return bends(self.problem, self.state.vector)
 
     @property
     def axes(self) -> Axis:

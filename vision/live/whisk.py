@@ -434,7 +434,7 @@ class LiveWhisk:
         if elsewhere:
             return self._without_truth(elsewhere)
         truth = to_whisk(whisk, fitted)
-        self.shown = EarlierWhisk(explanation.axis, explanation.rest_mm, self._reading.blur_px)
+        self.shown = EarlierWhisk(explanation.axis, fitted.rest_mm, self._reading.blur_px)
         return replace(truth, status=joined(truth.status, *warnings_of(whisk, fitted, beam=None)))
 
     def _without_truth(self, status: Reason) -> WhiskTruth:

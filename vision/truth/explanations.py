@@ -15,7 +15,6 @@ from typing import Self
 
 import numpy as np
 
-from vision.fit.problem import bar_axis, rest_shape
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis
 from vision.geometry.reasons import NO_REASON, Reason
@@ -58,22 +57,18 @@ class Explanation:
     @property
     def axis(self) -> BarAxis:
         """Return the axis of the fitted bar, its point opposite the first contact."""
-        axis = bar_axis(self.fitted.problem, self.fitted.state.vector).upward()
+        axis = self.fitted.axis.upward()
         contact = np.array([self.fitted.measured.whisk[name] for name in ("x", "y", "z")])
         along_mm = (contact - axis.point_mm) @ axis.direction
         return BarAxis(axis.point_mm + along_mm * axis.direction, axis.direction)
 
     @property
-    def rest_mm(self) -> np.ndarray:
-        """Return the rest shape (2, 4) of the fitted wire."""
-        return rest_shape(self.fitted.problem, self.fitted.state.vector)
-
-    @property
     def as_earlier(self) -> EarlierWhisk:
         """Return what the next whisk of the trial begins from."""
-        lines = self.fitted.lines
+        fitted = self.fitted
+        lines = fitted.lines
         return EarlierWhisk(
-            self.axis, self.rest_mm, lines.blur_px, lines.reader, self.fitted.stroke_bends
+            self.axis, fitted.rest_mm, lines.blur_px, lines.reader, fitted.stroke_bends
         )
 
     def place_comparison(self) -> PlaceComparison:
@@ -105,6 +100,8 @@ def explain(whisk: WhiskPictures) -> Explanation:
     fit, or two places explain the pictures equally well.
     """
     best = best_explanation(Explanation(whisk, fit_whisk(whisk)))
+    if whisk.motion is not None:  # its mean picture has no score
+        return best
     return _weigh_rivals(best, whisk.bar.rivals)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from vision.fit.covariance import shared_covariance, variance_by_cause
 from vision.fit.line_noise import line_noise
-from vision.fit.problem import bends, rest_shape, shifts_mm
+from vision.fit.problem import shifts_mm
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import whole_rest_mm
 from vision.geometry.reasons import Reason, joined
@@ -211,13 +211,11 @@ def _clock_sigma_rad(whisk: WhiskPictures, fitted: FittedWhisk) -> float:
 
 def _shape(fitted: FittedWhisk) -> WireShape:
     """Return the shape of the wire at rest, and its bends."""
-    problem = fitted.problem
-    state = fitted.state
     return WireShape(
-        whole_rest_mm(rest_shape(problem, state.vector), problem.wire),
+        whole_rest_mm(fitted.rest_mm, fitted.problem.wire),
         np.array(fitted.frames),
-        bends(problem, state.vector),
-        state.arcs_mm,
+        fitted.bend_rad,
+        fitted.state.arcs_mm,
     )
 
 

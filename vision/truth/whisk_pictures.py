@@ -12,7 +12,7 @@ from vision.fit.converged_fit import ConvergedFit
 from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
-from vision.fit.problem import Problem, State, bends, shifts_mm
+from vision.fit.problem import Problem, State, shifts_mm
 from vision.fit.touch import first_touch
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
@@ -212,8 +212,7 @@ class FittedWhisk(ConvergedFit):
     @property
     def stroke_bends(self) -> StrokeBends:
         """Return the wire's bends over its stroke."""
-        bends_rad = bends(self.problem, self.state.vector)
-        return StrokeBends(self.frames, self.problem.motor_rad, bends_rad)
+        return StrokeBends(self.frames, self.problem.motor_rad, self.bend_rad)
 
     def of_whisk(self, name: str) -> Value:
         """Return a quantity of the whole whisk by its name."""
