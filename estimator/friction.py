@@ -210,7 +210,7 @@ def _parabolas(beta, data, scale):
     start = np.stack([sliding * np.sin(beta), sliding * np.cos(beta)])
     rate = np.stack([-np.sign(beta) * sliding * np.cos(beta), sliding * np.sin(np.abs(beta))])
     residual = data - start
-    held = np.stack([0.0 * scale, scale * np.ones(len(beta))])
+    held = np.stack([np.zeros_like(scale), scale])
     held_squares = ((data - held) ** 2).sum(axis=-2)
     held_before = np.cumsum(held_squares, axis=-1) - held_squares
     squares = _sum_from_here((residual**2).sum(axis=-2)) + held_before

@@ -22,7 +22,7 @@ RECORD = "run.json"
 SESSION = ".session"
 ARRAY = "array.json"  # of several whiskers
 RUNS = "whiskers"  # folder of theirs, in which each has a run of its own
-_AGAIN = "evaluate the session again into this folder"
+AGAIN = "evaluate the session again into this folder"
 
 
 def record_of(evaluation: Evaluation, summary: Summary, figures: Sequence[str]) -> RunRecord:
@@ -115,4 +115,4 @@ def read_record(out: Path) -> RunRecord:
     try:
         return from_plain(RunRecord, json.loads((out / RECORD).read_text(encoding="utf-8")))
     except (ValueError, BadInput):
-        raise BadInput(f"is damaged or of an older version; {_AGAIN}", file=out / RECORD) from None
+        raise BadInput(f"is damaged or of an older version; {AGAIN}", file=out / RECORD) from None

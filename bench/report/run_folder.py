@@ -9,11 +9,10 @@ from bench.base.results import read_result
 from bench.records.plain import from_plain
 from bench.records.trial_result import TrialResult
 from bench.report.evaluation import evaluated_run
-from bench.report.record import read_record
+from bench.report.record import AGAIN, RECORD, read_record
 from bench.report.run_facts import RunRecord
 
 _TABLE = "whisks.csv"
-_AGAIN = "evaluate the session again into this folder"
 
 
 def read_run(out: Path) -> tuple[RunRecord, EvaluatedRun]:
@@ -34,12 +33,12 @@ def read_results(out: Path) -> list[TrialResult]:
     results = [_result(out, trial) for trial in _trials(out / _TABLE)]
     if not results:
         raise BadInput(f"holds no whisk ({_TABLE} has no rows)", file=out)
-    recorded = (read_result(out / "run.json") or {}).get("results", {})
+    recorded = (read_result(out / RECORD) or {}).get("results", {})
     for result in results:
         trial = result.trial.name
         if result.hash != recorded.get(trial, result.hash):
             later = f"trials/{trial}.json is of a later run, which was not finished"
-            raise BadInput(f"{later}; {_AGAIN}", file=out)
+            raise BadInput(f"{later}; {AGAIN}", file=out)
     return results
 
 
@@ -49,7 +48,7 @@ def _trials(table: Path) -> list[str | None]:
         with table.open(newline="", encoding="utf-8") as file:
             return list(dict.fromkeys(row.get("trial") for row in csv.DictReader(file)))
     except (UnicodeDecodeError, csv.Error) as problem:
-        raise BadInput(f"is damaged ({problem}); {_AGAIN}", file=table) from None
+        raise BadInput(f"is damaged ({problem}); {AGAIN}", file=table) from None
 
 
 def _result(out: Path, trial: str | None) -> TrialResult:
@@ -57,8 +56,8 @@ def _result(out: Path, trial: str | None) -> TrialResult:
     name = f"trials/{trial}.json"
     values = read_result(out / name)
     if not values:
-        raise BadInput(f"{name} is not there or damaged; {_AGAIN}", file=out)
+        raise BadInput(f"{name} is not there or damaged; {AGAIN}", file=out)
     try:
         return from_plain(TrialResult, values)
     except ValueError:
-        raise BadInput(f"{name} is of an older version; {_AGAIN}", file=out) from None
+        raise BadInput(f"{name} is of an older version; {AGAIN}", file=out) from None

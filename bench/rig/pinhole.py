@@ -107,12 +107,17 @@ class PinholeCamera:
         return [of_rows @ x @ of_columns, of_rows @ y @ of_columns]
 
     def _undistort(self, px):
-        """Return x/z and y/z (n, 2) that OpenCV projects to pixels (n, 2)."""
-        ends = (cv2.TERM_CRITERIA_COUNT, _PASSES, 0.0)
-        rays = cv2.undistortPoints(
-            px.reshape(-1, 1, 2), self.matrix, self.distortion, None, None, None, ends
-        )
-        return rays[:, 0]
+        """Return x/z and y/z (n, 2) that OpenCV projects to pixels (n, 2).
+
+        The pinhole's rays are corrected by what their projection is off by, until it is off by
+        nothing. OpenCV's own function with so many passes has another name in each major version.
+        """
+        focal = np.diag(self.matrix)[:2]
+        rays = (px - self.matrix[:2, 2]) / focal
+        for _ in range(_PASSES):
+            points = np.column_stack([rays, np.ones(len(rays))])
+            rays = rays + (px - self._project(points, np.zeros(3), np.zeros(3))) / focal
+        return rays
 
 
 def _aim(position, target, roll):

@@ -11,8 +11,6 @@ from vision.wire.bands import Pieces
 
 # [grey] Largest value of a picture of 8 bit. Stated.
 FULL_SCALE = 255.0
-# [1] Median of the square of a standard Gaussian variable. Derived.
-MEDIAN_SQUARED = 0.455
 # [1] Divisor in place of zero. Derived.
 TINY = 1e-100
 
@@ -81,12 +79,12 @@ class PatchDifferences:
     @classmethod
     def of(cls, patches: PatchSums) -> "PatchDifferences":
         """Return the differences of patches along the bar."""
-        variance = sum_variances(1.0 / np.maximum(patches.weight, TINY))
+        variance = _sum_variances(1.0 / np.maximum(patches.weight, TINY))
         return cls(
-            light=second_difference(patches.mean(patches.light)),
-            background=second_difference(patches.mean(patches.background)),
-            background_slope=second_difference(patches.mean(patches.background_slope)),
-            noise=sum_variances(patches.mean(patches.mean(patches.variance_share))),
+            light=_second_difference(patches.mean(patches.light)),
+            background=_second_difference(patches.mean(patches.background)),
+            background_slope=_second_difference(patches.mean(patches.background_slope)),
+            noise=_sum_variances(patches.mean(patches.mean(patches.variance_share))),
             weight=np.where(variance < 0.1 / TINY, 1.0 / variance, 0.0),
         )
 
@@ -145,13 +143,13 @@ class _SharedPixels:
         return np.bincount(self.cell, weighted, self.shape[0] * self.shape[1]).reshape(self.shape)
 
 
-def second_difference(values: np.ndarray) -> np.ndarray:
+def _second_difference(values: np.ndarray) -> np.ndarray:
     """Return each row but the outermost two of values (s, b) minus the mean of its two
     neighbours."""
     return values[1:-1] - 0.5 * (values[:-2] + values[2:])
 
 
-def sum_variances(variance: np.ndarray) -> np.ndarray:
-    """Return the variance (s - 2, b) of `second_difference` from those of independent rows (s,
+def _sum_variances(variance: np.ndarray) -> np.ndarray:
+    """Return the variance (s - 2, b) of `_second_difference` from those of independent rows (s,
     b)."""
     return variance[1:-1] + 0.25 * (variance[:-2] + variance[2:])

@@ -26,7 +26,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from vision.pictures.view import SATURATED
-from vision.touched.patches import FULL_SCALE, MEDIAN_SQUARED, TINY, PatchDifferences, PatchSums
+from vision.touched.patches import FULL_SCALE, TINY, PatchDifferences, PatchSums
 from vision.touched.pattern import Pattern, sum_pattern
 from vision.wire.bands import Pieces
 
@@ -48,6 +48,8 @@ _MODEL_ERROR_SHARE = 0.001
 _CORRELATION_PX = 1.0
 # [steps] Window over which the texture is averaged: the distance of correlated errors. Derived.
 _TEXTURE_WINDOW = 5
+# [1] Median of the square of a standard Gaussian variable. Derived.
+_MEDIAN_SQUARED = 0.455
 # [1] Largest texture over the one that the median gives: the edge of a bar that is tilted against
 # its expected axis passes a few patches only, and is no texture. Study: bar_scenes.py.
 _LARGEST_OVER_MEDIAN = 3.0
@@ -277,7 +279,7 @@ def _estimate_texture(membership, differences: PatchDifferences) -> tuple[np.nda
     background leaves only rounding, compared with which any other segment would be rough.
     """
     squares = differences.residual**2
-    by_median = _weighted_median(squares, differences.weight) / (1.5 * MEDIAN_SQUARED)
+    by_median = _weighted_median(squares, differences.weight) / (1.5 * _MEDIAN_SQUARED)
     spread = np.minimum(differences.patch_variance(squares), _LARGEST_OVER_MEDIAN * by_median)
     spread = uniform_filter1d(spread, _TEXTURE_WINDOW)
     noise = uniform_filter1d(differences.patch_variance(differences.noise), _TEXTURE_WINDOW)

@@ -79,9 +79,7 @@ class Explanation:
     def detection_score(self) -> float:
         """Return how clearly the cameras see a bar about the fitted axis, as the search scores it."""
         whisk = self.whisk
-        scene = SearchScene(
-            whisk.views, whisk.cameras, whisk.rods, whisk.angles_rad, whisk.settings
-        )
+        scene = SearchScene(whisk.views, whisk.cameras, whisk.rods, whisk.motor_rad, whisk.settings)
         return with_lines(scene, SeenBar(self.axis, {})).detection_score
 
     def from_place(self, axis: BarAxis) -> Self:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vision.fit.first_bends import next_bend
 from vision.geometry.refusals import Refused
 from vision.geometry.touched import Axis
 from vision.truth.readers import ObjectReader
@@ -51,7 +52,7 @@ class StrokeBends:
             return None
         bend_rad = self.bend_rad[order]
         known_rad = np.append(known_rad, next_rad)
-        bend_rad = np.vstack([bend_rad, 2.0 * bend_rad[-1] - bend_rad[-2]])
+        bend_rad = np.vstack([bend_rad, next_bend(bend_rad)])
         return np.stack([np.interp(motor_rad, known_rad, one) for one in bend_rad.T], axis=1)
 
 
@@ -112,7 +113,7 @@ class LineSource(ABC):
     def require_rods(self, seen: Sequence[Observed]) -> None:
         """Raise Refused where wire or bar is seen in no camera."""
         require_wire(seen)
-        if not any(not one.on_wire for one in seen):
+        if all(one.on_wire for one in seen):
             raise Refused(_HIDDEN.format("bar clear of the wire"), code="rod_hidden")
 
 

@@ -135,7 +135,7 @@ class TrackedObject(ObjectPlace):
     def require_rods(self, seen: Sequence[Observed]) -> None:
         """Raise Refused where wire or object is seen in no camera."""
         require_wire(seen)
-        if not any(not one.on_wire for one in seen):
+        if all(one.on_wire for one in seen):
             raise Refused("no camera has points of the object", code="rod_hidden")
 
 

@@ -79,7 +79,8 @@ def observe_trial(
     found = scene.found
     earlier = None
     for whisk in scene.whisks:
-        row, explained = see_whisk(replace(whisk, bar=found, earlier=earlier), explain, _truth)
+        truth_of = _first_truth if earlier is None else fitted_truth
+        row, explained = see_whisk(replace(whisk, bar=found, earlier=earlier), explain, truth_of)
         rows.append(row)
         if explained is not None:
             found = explained.whisk.bar
@@ -329,17 +330,13 @@ def _refused(whisk: WhiskPictures, status: Reason) -> WhiskTruth:
     )
 
 
-def _truth(explained: Explanation) -> WhiskTruth:
-    """Return the truth of a whisk fitted to pictures.
-
-    The first of a trial has what they show of the wire's end and width: the others have the same wire.
+def _first_truth(explained: Explanation) -> WhiskTruth:
+    """Return the truth of a trial's first whisk, with what its pictures show of the wire's end and
+    width: the others have the same wire.
     """
-    truth = fitted_truth(explained)
     whisk = explained.whisk
-    if whisk.earlier is not None:
-        return truth
     return replace(
-        truth,
+        fitted_truth(explained),
         ends=wire_ends(whisk, explained.fitted),
         widths=wire_widths(whisk, explained.fitted) if whisk.settings.check_beam else {},
     )

@@ -265,10 +265,9 @@ def check_scatter(problem: Problem, state: State, most_px: float) -> None:
 def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> ConvergedFit:
     """Fit all frames before touch, about the object and the rest shape of a fit."""
     problem = fitted.problem
-    vector = fitted.state.vector
     bent = {f for f, is_bent in zip(fitted.frames, problem.bent) if is_bent}
     whisk = whisk.during([f for f in whisk.frames if f not in bent])
-    place = _resting_place(whisk, bar_axis(problem, vector), rest_shape(problem, vector))
+    place = _resting_place(whisk, fitted.axis, fitted.rest_mm)
     seen = _wire_points(whisk, place)
     nothing = np.zeros(len(place.curves), dtype=bool)
     alone = replace(
@@ -280,7 +279,7 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> ConvergedFit:
         motion=whisk.motion,
     )
     middle_mm = np.full(len(place.curves), 0.5 * whisk.rods.wire.length_mm)
-    state = State(vector[: problem.first_bend], middle_mm)
+    state = State(fitted.state.vector[: problem.first_bend], middle_mm)
     state, _ = solve(alone, state, scales=[LAST_SCALE] * 3)
     return ConvergedFit(inflated_by_residuals(alone, state, FREE_SHARED), state)
 

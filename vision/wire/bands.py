@@ -48,13 +48,10 @@ class Band(Rows):
     place: np.ndarray
     radius_px: np.ndarray
     still: np.ndarray | None = None
-    noise_behind: np.ndarray | None = None
 
     def __post_init__(self):
         if self.still is None:
             object.__setattr__(self, "still", np.zeros((len(self.place), 0)))
-        if self.noise_behind is None:
-            object.__setattr__(self, "noise_behind", np.ones(len(self.place)))
 
 
 def read_band(

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 from bench.rig.parts import Job, render_frames
 from bench.rig.protocol import FOLDER, load
 from tests.scenes.drawn_traces import exact_cameras, recorded_run
-from vision import TrialPictures, Value, observe_trial
+from vision import TrialPictures, observe_trial
 from vision.geometry import Bar, Cameras, Rods, VisionSettings, Wire
 
 TRIALS = ("steel_b00_v10_1", "steel_b60_v10_1")
@@ -63,7 +63,7 @@ def seen(pictures: TrialPictures, cameras: Cameras, wire: Wire) -> dict:
         "slope": whisk.beta_rad,
         "slip": at.slip_mm,
         "phi": at.phi_rad,
-        "z": Value(whisk.point_mm.value[2], whisk.point_mm.sigma[2]),
+        "z": whisk.point_mm.at(2),
     }
 
 
