@@ -107,7 +107,8 @@ def _see(
     presets = [_with_clock(preset, clock_sigma_s) for preset in presets_for(settings)]
     truth, whisks = _observe(frames, calibration, presets, settings.accuracy_mm)
     back = dict(zip(frames.back, truth.whisks[len(whisks) :]))
-    of_trial = _trial_contradictions(truth, session, trial)
+    late = check_camera_delays(whisk.delays for whisk in truth.whisks)
+    of_trial = [*_contradicted_diameters(truth, session, trial), late]
     return SeenTrial(
         tuple(_records(session, trial, frames, settings, whisks, of_trial)),
         notes=_notes(frames),
@@ -121,7 +122,7 @@ def _see(
         bar_looks=truth.bar_widths,
         one_sided_light=truth.one_sided_light,
         back=_back_stroke(back.get(0)),
-        ways_back=_ways_back(back, len(whisks), settings) if trial.both_ways else (),
+        ways_back=_ways_back(back, len(whisks), settings, late) if trial.both_ways else (),
     )
 
 
@@ -212,13 +213,12 @@ def _with_clock(preset: Seeing, clock_sigma_s: float) -> Seeing:
     return replace(preset, vision=replace(preset.vision, clock_sigma_s=clock_sigma_s))
 
 
-def _trial_contradictions(truth: TrialTruth, session: Session, trial: Trial) -> list[Reason]:
-    """Return how the pictures contradict the stated diameters of bar and whisker, and each other."""
+def _contradicted_diameters(truth: TrialTruth, session: Session, trial: Trial) -> list[Reason]:
+    """Return how the pictures contradict the stated diameters of bar and whisker."""
     wire_looks = next((whisk.widths for whisk in truth.whisks if whisk.widths), {})
     return [
         check_bar_width(truth.bar_widths, trial, session.board),
         check_wire_width(wire_looks, session.whisker),
-        check_camera_delays(whisk.delays for whisk in truth.whisks),
     ]
 
 
@@ -254,12 +254,15 @@ def _refine(
 
 
 def _ways_back(
-    truths: Mapping[int, WhiskTruth], count: int, settings: Settings
+    truths: Mapping[int, WhiskTruth], count: int, settings: Settings, late: Reason
 ) -> tuple[SeenWhisk, ...]:
-    """Return the record of each whisk's way back, from truths by the number of the whisk."""
+    """Return the record of each whisk's way back, from truths by the number of the whisk.
+
+    late: that a camera's frames are late in the trial.
+    """
     seen = list(unseen(count, NO_PICTURES).whisks)
     for k, truth in truths.items():
-        seen[k] = whisk_record(replace(truth, whisk=k), settings)
+        seen[k] = whisk_record(replace(truth, whisk=k), settings, contradictions=[late])
     return tuple(seen)
 
 

@@ -124,12 +124,6 @@ class _ConvertedWhisk:
         """Return the time of touch; NaN where the motor does not come so far."""
         return _time_at(self.stroke, self.touch_rad)
 
-    @property
-    def radii_mm(self) -> tuple[float, float]:
-        """Return the radii of bar and whisker."""
-        bar_mm = 0.5 * self.task.result.trial.bar_diameter_mm
-        return bar_mm, 0.5 * self.task.unit.session.whisker.diameter_mm
-
 
 def range_of(signals: Signals) -> np.ndarray:
     """Return the range (2,) of the channels."""
@@ -275,7 +269,7 @@ def _estimate(whisk: _ConvertedWhisk, felt: Whisk) -> tuple[EstimateRow, ...]:
     """Return each estimator's row."""
     settings = whisk.task.unit.settings
     return run_estimators(
-        felt, estimators(settings.estimators, felt.beam), settings, whisk.radii_mm
+        felt, estimators(settings.estimators, felt.beam), settings, whisk.task.result.radii_mm
     )
 
 
@@ -311,7 +305,7 @@ def _share_left_out(whisk: _ConvertedWhisk, theta_rad: float, alpha_rad: float) 
     """Return by what share leaning and rolling lower the moments, to first order."""
     seen = whisk.seen
     beam = whisk.task.unit.session.whisker.beam
-    reach_mm = sum(whisk.radii_mm)  # NaN where the bar's diameter is not known
+    reach_mm = sum(whisk.task.result.radii_mm)  # NaN where the bar's diameter is not known
     d_x_mm = seen.d_x_mm.value
     phi_rad = float(slip_angle(seen.beta_rad.value, alpha_rad))
     share = first_order.leaning(theta_rad, seen.psi_rad.value, phi_rad, alpha_rad)
