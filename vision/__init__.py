@@ -9,7 +9,6 @@ command that sees no picture starts without what sees.
 from vision.geometry.lazy_names import lazy_names
 
 NAMES = {
-    "fit.beam_check": ("BeamCheck",),
     "fit.blocks": ("REST_PRIOR_MM", "WIRE_OFFSET_PX"),
     "fit.covariance": ("CAUSES",),
     "fit.line_noise": ("LineNoise",),
@@ -19,6 +18,7 @@ NAMES = {
     "touched.find": ("axis_from_angles",),
     "touched.width": ("SIGMA_SHARE", "bar_diameter_mm", "combine_widths"),
     "truth.at_angle": ("Smooth", "TruthAtAngle"),
+    "truth.kept_fit": ("KeptFit",),
     "truth.known_whisk": ("KnownWhisk",),
     "truth.noise_in_pictures": ("CameraPictures", "line_noise_in_pictures"),
     "truth.observe": ("observe_trial", "wire_lines"),

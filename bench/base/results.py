@@ -26,6 +26,7 @@ SEEING = (
         "bench/trials/consistency.py",
         "bench/trials/contradictions.py",
         "bench/trials/differences.py",
+        "bench/trials/kept_fits.py",
         "bench/trials/placing.py",
         "bench/trials/still_scene.py",
         "bench/trials/trace_frames.py",

@@ -4,7 +4,7 @@ Kept in OUT/calibration with the hash of what it was made from, and made again o
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +68,8 @@ class SessionCalibration:
     there is no such picture. hash: of both. notes: lines on what they rest on. T_rig_board: where
     the board on the rig stands in the cameras' frame, (3, 4) mm, None where not known. board_mm:
     the board's points as calibrated, (m, 3), None where they are as stated. warnings: where the board's views or the bars' widths
-    contradict what is stated.
+    contradict what is stated. placed_by: name of the pass over free strokes that placed the rig, hashes_before: by
+    trial the hash of what was seen in it; none where the cameras are as they were, or moved far.
     """
 
     cameras: Cameras | None
@@ -78,6 +79,8 @@ class SessionCalibration:
     T_rig_board: np.ndarray | None = None
     board_mm: np.ndarray | None = None
     warnings: tuple[Reason, ...] = ()
+    placed_by: str = ""
+    hashes_before: Mapping[str, str] = field(default_factory=dict)
 
     def with_notes(self, *notes: str) -> "SessionCalibration":
         """Return the calibration with more notes."""

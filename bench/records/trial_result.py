@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
-from vision import NAN, UNKNOWN, FrameTruth, SeenWidth, TruthAtAngle, Value, WhiskTruth
+from vision import NAN, UNKNOWN, FrameTruth, KeptFit, SeenWidth, TruthAtAngle, Value, WhiskTruth
 from vision.geometry import NO_REASON, Reason
 
 # Where the truth of a whisk comes from.
@@ -272,7 +272,7 @@ class SeenTrial:
     bar's apparent to its stated diameter, by camera. one_sided_light: the width of the wire that is
     seen, by camera that sees light from one side. back: the first back stroke, where it was recorded
     and has a truth. ways_back: the way back of each whisk, run backwards, where the trial evaluates
-    them.
+    them. fits: of the whisks, kept where these are seen again by cameras that moved with the rig.
     """
 
     whisks: tuple[SeenWhisk, ...]
@@ -286,6 +286,7 @@ class SeenTrial:
     one_sided_light: dict[str, SeenWidth] = field(default_factory=dict)
     back: BackStroke | None = None
     ways_back: tuple[SeenWhisk, ...] = ()
+    fits: tuple[KeptFit, ...] = field(default=(), metadata={"optional": True})
 
 
 @dataclass(frozen=True)

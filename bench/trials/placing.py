@@ -277,6 +277,8 @@ def _converge(
         units = [_of_swing(unit, here, f"swing{round_number}") for unit in chosen]
         both = place(board, units, see_units(units, pool, "free strokes", problems))
         if np.all(np.abs(both.step) < _SMALL_STEP):
+            hashes = {unit.trial.name: unit.seen_hash for unit in units}
+            here = replace(here, placed_by=units[0].calibration_step, hashes_before=hashes)
             break
         here = _moved(here, exact, _as_exact(both))
         board = replace(board, step=board.step - both.step)
@@ -289,7 +291,13 @@ def _of_swing(unit: Unit, calibration: SessionCalibration, step: str) -> Unit:
     seeing = unit.settings.seeing
     vision = replace(seeing.vision, check_beam=False)
     settings = replace(unit.settings, seeing=replace(seeing, vision=vision))
-    return replace(unit, calibration=calibration, settings=settings, calibration_step=step)
+    return replace(
+        unit,
+        calibration=calibration,
+        settings=settings,
+        calibration_step=step,
+        places_rig=True,
+    )
 
 
 def _with_scale(calibration: SessionCalibration, placed: Placement) -> SessionCalibration:

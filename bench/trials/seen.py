@@ -41,7 +41,7 @@ from bench.trials.seeing import presets_for
 from bench.trials.seen_friction import seen_friction
 from bench.trials.trace_frames import traced_frames
 from bench.trials.trial_frames import TrialFrames
-from vision import FrameTruth, Smooth, TrialTruth, Value, WhiskTruth
+from vision import FrameTruth, KeptFit, Smooth, TrialTruth, Value, WhiskTruth
 from vision.geometry import Reason, Refused, joined, spread
 from vision.pictures import Others
 
@@ -66,10 +66,11 @@ def see_trial(
     calibration: SessionCalibration,
     settings: Settings,
     wires: Mapping[str, Others] | None = None,
+    fits: Sequence[KeptFit] = (),
 ) -> SeenTrial:
     """Return the whisks of a trial as the cameras show them.
 
-    wires: by camera and name, the wires of an array's whiskers. A trial that cannot be evaluated
+    wires: by camera and name, the wires of an array's whiskers. fits: see `TrialFrames.read`. A trial that cannot be evaluated
     has whisks whose status says why.
     """
     count = len(forward_strokes(signals))
@@ -81,7 +82,9 @@ def see_trial(
         if trial.is_traced_alone:
             frames = traced_frames(session, trial, signals, calibration, settings)
         else:
-            frames = TrialFrames.read(session, trial, signals, calibration, settings, wires or {})
+            frames = TrialFrames.read(
+                session, trial, signals, calibration, settings, wires or {}, fits
+            )
         return _see(session, trial, frames, calibration, settings)
     except Refused as refusal:
         return unseen(count, refusal.reason)
@@ -123,6 +126,7 @@ def _see(
         one_sided_light=truth.one_sided_light,
         back=_back_stroke(back.get(0)),
         ways_back=_ways_back(back, len(whisks), settings, late) if trial.both_ways else (),
+        fits=truth.fits,
     )
 
 

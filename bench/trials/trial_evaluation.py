@@ -4,6 +4,8 @@ The result stands whole in OUT/trials/<trial>.json with the hash of all of these
 interruption, resuming, and redoing only what changed are this one mechanism.
 """
 
+from dataclasses import replace
+
 from bench.base.results import read_result, write_result
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import SeenTrial, TrialFacts, TrialResult, WhiskerFacts
@@ -34,6 +36,8 @@ def _see(unit: Unit, signals: Signals) -> SeenTrial:
     """
     wires = lines_in(unit.wires)
     seen = truth_source(unit.session).truth(unit, signals, wires)
+    if not unit.places_rig:
+        seen = replace(seen, fits=())
     seen = contradicted(seen, unit.contradictions)
     if not unit.wires:
         return seen

@@ -2,8 +2,9 @@
 by whisks.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from bench.session.signals import Signals, forward_strokes, ways_back
 from bench.session.traces import read_traces
 from bench.session.trial import Trial
 from bench.trials.still_scene import StillScene, still_scene
-from vision import Trace, TrialPictures, TrialTraces, TrialTruth, observe_trial
+from vision import KeptFit, Trace, TrialPictures, TrialTraces, TrialTruth, observe_trial
 from vision.geometry import Bar, Rods, StatedSizes, Touched, touched_object
 from vision.pictures import Others, RodLines
 
@@ -51,10 +52,12 @@ class TrialFrames:
         calibration: SessionCalibration,
         settings: Settings,
         wires: Mapping[str, Others],
+        fits: Sequence[KeptFit] = (),
     ) -> "TrialFrames":
         """Read the frames of a trial.
 
-        wires: by camera and name, the wires of an array's whiskers, its own among them. Raises
+        wires: by camera and name, the wires of an array's whiskers, its own among them. fits: of its whisks, by
+        cameras that stood a little elsewhere. Raises
         BadInput where pictures and times do not match.
         """
         times = frame_times(trial)
@@ -80,7 +83,8 @@ class TrialFrames:
         back = back_frames(trial, signals, times)
         rods = Rods(session.whisker.wire, stated_object(trial))
         motor_sigma_rad = signals.motor_sigma_at(times.time_s)
-        return cls(times, by_camera, scene, places, back, pictures, rods, motor_sigma_rad)
+        observe = partial(observe_trial, fits=fits)
+        return cls(times, by_camera, scene, places, back, pictures, rods, motor_sigma_rad, observe)
 
 
 def _traces(trial: Trial, times: FrameTimes) -> dict[str, Trace]:

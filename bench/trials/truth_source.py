@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from bench.records.trial_result import SeenTrial
 from bench.session.session import Session
 from bench.session.signals import Signals
+from bench.trials.kept_fits import kept_fits
 from bench.trials.seen import see_trial
 from bench.trials.stated_truth import by_stage
 from bench.trials.unit import Unit
@@ -31,7 +32,10 @@ class Pictures(TruthSource):
 
     def truth(self, unit: Unit, signals: Signals, wires: Wires) -> SeenTrial:
         """Return what the cameras show of each whisk of a trial."""
-        return see_trial(unit.session, unit.trial, signals, unit.calibration, unit.settings, wires)
+        fits = kept_fits(unit)
+        return see_trial(
+            unit.session, unit.trial, signals, unit.calibration, unit.settings, wires, fits
+        )
 
 
 class Stage(Pictures):

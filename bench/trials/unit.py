@@ -24,9 +24,10 @@ class Unit:
     files: hash of the trial's files. drift_rate (2,): of the channels per second, and
     force_drift_rate (3,) of a load cell. gauges: None where volts cannot become moments.
     calibration_step: of the session's calibration, what it is seen for; names the folder of that
-    seen half. wires: of an array, by the names of its whiskers, files with the places of their wires
-    in the pictures, and wires_hash of all of them. straight_wires: files with the places that the
-    wires would have if all were straight. contradictions: warnings about the session or the trial
+    seen half. places_rig: whether that is to place the rig. wires: of an array, by the names of its
+    whiskers, files with the places of their wires in the pictures, and wires_hash of all of them.
+    straight_wires: files with the places that the wires would have if all were straight.
+    contradictions: warnings about the session or the trial
     that question its truth or its estimates.
     """
 
@@ -39,6 +40,7 @@ class Unit:
     drift_rate: np.ndarray | None = None
     gauges: GaugeCalibration | None = None
     calibration_step: str = "seen"
+    places_rig: bool = False
     force_drift_rate: np.ndarray | None = None
     wires: tuple[tuple[str, Path], ...] = ()
     wires_hash: str = ""
@@ -56,6 +58,13 @@ class Unit:
         return self.out / "calibration" / self.calibration_step / f"{self.trial.name}.json"
 
     @property
+    def placing_pass(self) -> tuple[Path, str]:
+        """Return the file of the trial as it was seen to place the rig, and its hash; '' where it was not."""
+        name = self.trial.name
+        folder = self.out / "calibration" / self.calibration.placed_by
+        return folder / f"{name}.json", self.calibration.hashes_before.get(name, "")
+
+    @property
     def seen_hash(self) -> str:
         """Return the hash of all inputs of the seen half."""
         session = self.session
@@ -68,6 +77,7 @@ class Unit:
             session.T_rig_board,
             session.truth,
             self.calibration.hash,
+            self.calibration.hashes_before.get(self.trial.name, ""),
             self.settings.seen(),
             self.wires_hash,
             self.contradictions.parts,

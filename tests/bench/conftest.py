@@ -109,7 +109,7 @@ def _smooth(theta, touching, values, d_x) -> Smooth:
     )
 
 
-def see_exactly(session, trial, signals, calibration, settings, wires=None) -> SeenTrial:
+def see_exactly(session, trial, signals, calibration, settings, *_) -> SeenTrial:
     """In place of `see_trial`: what perfect pictures would show, from the truth files."""
     strokes = forward_strokes(signals)
     time_s = read_csv(trial.folder / "truth.csv")["time_s"]

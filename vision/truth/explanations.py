@@ -15,15 +15,19 @@ from typing import Self
 
 import numpy as np
 
+from vision.fit.problem import Problem, State
+from vision.fit.solve import LAST_SCALE, solve
 from vision.geometry.centreline import Curves
 from vision.geometry.contact import BarAxis
-from vision.geometry.reasons import NO_REASON, Reason
+from vision.geometry.reasons import NO_REASON, Reason, joined
 from vision.geometry.refusals import Refused
 from vision.geometry.sampling import spread
 from vision.touched.search import CLEARER, SeenBar, with_lines
 from vision.touched.search_scene import SearchScene
+from vision.truth.kept_fit import KeptFit
 from vision.truth.line_source import EarlierWhisk
 from vision.truth.place_comparison import FRAMES, PlaceComparison
+from vision.truth.traced_lines import blurs_px
 from vision.truth.whisk_fit import fit_whisk
 from vision.truth.whisk_pictures import FittedWhisk, WhiskPictures
 
@@ -66,9 +70,34 @@ class Explanation:
     def as_earlier(self) -> EarlierWhisk:
         """Return what the next whisk of the trial begins from."""
         fitted = self.fitted
-        lines = fitted.lines
-        return EarlierWhisk(
-            self.axis, fitted.rest_mm, lines.blur_px, lines.reader, fitted.stroke_bends
+        reader = None if fitted.lines is None else fitted.lines.reader
+        blur_px = blurs_px(self.whisk)
+        return EarlierWhisk(self.axis, fitted.rest_mm, blur_px, reader, fitted.stroke_bends)
+
+    @property
+    def kept(self) -> KeptFit | None:
+        """Return what is kept of the fit; None of an object that is no straight bar, or does not stand."""
+        whisk = self.whisk
+        problem = self.fitted.problem
+        if not isinstance(problem.axis, BarAxis) or problem.motion is not None:
+            return None
+        return KeptFit(
+            number=whisk.number,
+            cameras=tuple(whisk.cameras.names),
+            indices=tuple(whisk.indices),
+            frames=tuple(self.fitted.frames),
+            point_mm=problem.axis.point_mm,
+            direction=problem.axis.direction,
+            vector=self.fitted.state.vector,
+            arcs_mm=self.fitted.state.arcs_mm,
+            touching=problem.touching,
+            bent=problem.bent,
+            seen=tuple(problem.seen),
+            onset=problem.onset,
+            neighbour_correlation=tuple(problem.neighbour_correlation),
+            light=dict(whisk.light),
+            left_out=joined(*whisk.left_out),
+            warning=self.warning,
         )
 
     def place_comparison(self) -> PlaceComparison:
@@ -89,6 +118,35 @@ class Explanation:
             return Explanation(begin, fit_whisk(begin))
         except np.linalg.LinAlgError as error:
             raise Refused(str(error), code="fit_not_converged") from error
+
+
+def fit_again(kept: KeptFit, whisk: WhiskPictures) -> Explanation:
+    """Return the fit of the same lines by the cameras of a whisk. Fills whisk.light."""
+    cameras = whisk.cameras.subset(kept.cameras)
+    problem = Problem(
+        cameras=cameras,
+        rods=whisk.rods,
+        axis=BarAxis(kept.point_mm, kept.direction),
+        motor_rad=whisk.motor_rad[list(kept.frames)],
+        touching=kept.touching,
+        bent=kept.bent,
+        seen=kept.observed(),
+        onset=kept.onset,
+        neighbour_correlation=kept.neighbour_correlation,
+    )
+    begin = State(kept.vector, kept.arcs_mm)
+    state, _ = solve(problem, begin, scales=[LAST_SCALE] * 3)
+    fitted = FittedWhisk(problem, state, list(kept.frames))
+    whisk.light.update(kept.light)
+    same = replace(
+        whisk,
+        indices=list(kept.indices),
+        views=tuple(view for view in whisk.views if view.camera.name in kept.cameras),
+        cameras=cameras,
+        bar=SeenBar(fitted.axis.upward(), {}),
+        left_out=(kept.left_out,) if kept.left_out else (),
+    )
+    return Explanation(same, fitted, kept.warning)
 
 
 def explain(whisk: WhiskPictures) -> Explanation:

@@ -9,6 +9,7 @@ Nothing here knows of a gauge.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from vision.fit.refinements import LeftOut, left_out
 from vision.fit.turns import frame_turns
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before
+from vision.geometry.contact import BarAxis
 from vision.geometry.number_words import counted
 from vision.geometry.reasons import Reason, joined
 from vision.geometry.refusals import Misled, Refused
@@ -33,8 +35,9 @@ from vision.pictures.view import View
 from vision.touched.search import SeenBar, find_object, with_lines
 from vision.touched.search_scene import SearchScene
 from vision.touched.width import measure_relative_widths
-from vision.truth.explanations import Explanation, explain
+from vision.truth.explanations import Explanation, explain, fit_again
 from vision.truth.given_traces import traces_as_lines
+from vision.truth.kept_fit import KeptFit
 from vision.truth.moving_bar import in_one_frame
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.trial_pictures import TrialPictures
@@ -65,31 +68,43 @@ def observe_trial(
     cameras: Cameras,
     rods: Rods,
     settings: VisionSettings = _USUAL,
+    fits: Sequence[KeptFit] = (),
 ) -> TrialTruth:
     """Measure the truth of a trial: object, first touch, contact and slip in each whisk.
 
-    whisks: slices of frame indices, one a forward stroke. What keeps a whisk from having a truth is
+    whisks: slices of frame indices, one a forward stroke. fits: of whisks in these pictures, by cameras that stood
+    a little elsewhere; their lines are fitted again, and not traced. What keeps a whisk from having a truth is
     its status; raises Refused only for input that no trial could be seen with.
     """
     try:
-        scene = _whisks_of(pictures, whisks, cameras, rods, settings)
+        axis = BarAxis(fits[0].point_mm, fits[0].direction) if fits else None
+        scene = _whisks_of(pictures, whisks, cameras, rods, settings, axis)
     except Refused as reason:
         return nothing_seen(whisks, reason.reason)
     rows = []
+    kept = []
     found = scene.found
     earlier = None
+    again = {fit.number: partial(fit_again, fit) for fit in fits}
     for whisk in scene.whisks:
+        explain_by = again.get(whisk.number, explain)
         truth_of = _first_truth if earlier is None else fitted_truth
-        row, explained = see_whisk(replace(whisk, bar=found, earlier=earlier), explain, truth_of)
+        row, explained = see_whisk(replace(whisk, bar=found, earlier=earlier), explain_by, truth_of)
         rows.append(row)
         if explained is not None:
             found = explained.whisk.bar
             earlier = explained.as_earlier
+            kept.append(explained.kept)
     axis = found.axis.as_bar()
     light = [whisk.light for whisk in scene.whisks]
     bars = measure_relative_widths(with_lines(scene.search, found))
     return TrialTruth(
-        axis.point_mm, axis.direction, tuple(rows), one_sided_widths(light), as_values(bars)
+        axis.point_mm,
+        axis.direction,
+        tuple(rows),
+        one_sided_widths(light),
+        as_values(bars),
+        tuple(filter(None, kept)),
     )
 
 
@@ -140,10 +155,11 @@ def _whisks_of(
     cameras: Cameras,
     rods: Rods,
     settings: VisionSettings,
+    axis: BarAxis | None = None,
 ) -> _TrialScene:
     """Return the whisks with all that is known before a wire is traced.
 
-    Raises Refused where the object is not found.
+    axis: of the bar where that is known, else it is searched for. Raises Refused where the object is not found.
     """
     pictures = pictures.shrunk(settings.picture_scale)
     cameras = shrunk_cameras(cameras, settings.picture_scale)
@@ -153,7 +169,7 @@ def _whisks_of(
     strokes = [range(*where.indices(len(time_s)))[:: settings.every_frame] for where in whisks]
     velocity, still = _stated_motion(pictures, strokes, views, rods)
     search = SearchScene(still, used, rods, motor_rad, settings)
-    found = find_object(search)
+    found = find_object(search) if axis is None else SeenBar(axis, {})
     seen = []
     for number, stroke in enumerate(strokes):
         whisk = WhiskPictures(

@@ -12,6 +12,7 @@ from vision.fit.turns import Turns
 from vision.geometry.base_lines import BaseLines
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.at_angle import Smooth, TruthAtAngle, at_angle
+from vision.truth.kept_fit import KeptFit
 from vision.truth.value import UNKNOWN, UNKNOWN_POINT, Value, WhileTouching
 from vision.wire.one_sided import SeenWidth
 
@@ -159,6 +160,7 @@ class TrialTruth:
     (3,), and by camera its width in the pictures over the stated one.
 
     one_sided_light: the width of the wire that is seen, by camera that sees light from one side.
+    fits: those from which whisks can be fitted again.
     """
 
     bar_point_mm: np.ndarray
@@ -166,3 +168,4 @@ class TrialTruth:
     whisks: tuple[WhiskTruth, ...]
     one_sided_light: dict[str, SeenWidth] = field(default_factory=dict)
     bar_widths: dict[str, Value] = field(default_factory=dict)
+    fits: tuple[KeptFit, ...] = ()

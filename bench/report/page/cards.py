@@ -13,7 +13,7 @@ from bench.report.page.words import MISSING, WhiskRow, distance_text, number, va
 from bench.report.run_facts import plane_name
 from bench.report.summary.warning_lines import SILENT, is_silent
 from bench.report.whisk_rows import status_of
-from vision import UNKNOWN, BeamCheck, TruthAtAngle, Value
+from vision import UNKNOWN, TruthAtAngle, Value
 from vision.geometry import counted
 
 SOUND = "sound"
@@ -98,11 +98,8 @@ def _pictures(row: WhiskRow, out: Path, whisks: int) -> tuple[tuple[str, str], .
 def numbers(row: WhiskRow) -> list[tuple[str, str]]:
     """Return each quantity with one sigma; what is not known is left out."""
     beam = row.seen.truth.beam
-    quantities = _quantities(row)
-    if beam is not None:
-        quantities += _beam_changes(beam)
     found = []
-    for name, value, unit in quantities:
+    for name, value, unit in (*_quantities(row), *_beam_changes(row)):
         text = value_text(value)
         if text != MISSING:
             found.append((name, f"{text} {unit}"))
@@ -142,9 +139,12 @@ def _quantities_at(at: TruthAtAngle) -> list[_Quantity]:
     ]
 
 
-def _beam_changes(beam: BeamCheck) -> list[_Quantity]:
-    """Return by how much a curve left free moves what the beam with a point load gives."""
-    changes = []
+def _beam_changes(row: WhiskRow) -> list[_Quantity]:
+    """Return by how much a curve left free moves what the beam with a point load gives, where it was tried."""
+    beam = row.seen.truth.beam
+    changes: list[_Quantity] = []
+    if beam is None:
+        return changes
     for name, compared, unit in (
         ("d_x", beam.d_x, "mm"),
         ("touch", beam.touch, "°"),

@@ -10,8 +10,13 @@ from bench.records.phases import STATIC, Angle, Phases
 from bench.records.plain import from_plain, to_plain
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenTrial, TrialFacts
 from tests.scenes.results import seen_whisk
+from vision.fit.bend_onset import Onset
+from vision.geometry.reasons import NO_REASON, Reason
+from vision.truth.kept_fit import KeptFit
 from vision.truth.records import WhiskTruth
 from vision.truth.value import Value
+from vision.wire.one_sided import SeenWidth, WireAppearance
+from vision.wire.points import LinePoints, Observed
 
 
 def there_and_back(record):
@@ -55,6 +60,37 @@ def test_whole_records_come_back_with_all_that_vision_told(exact_record, steel_t
         np.testing.assert_array_equal(one.sigma, other.sigma)
     assert back.frames.touching.dtype == bool and back.frames.status == record.frames.status
     np.testing.assert_array_equal(back.deflection.covariance, record.deflection.covariance)
+
+
+def test_a_kept_fit_comes_back_with_what_is_not_known_of_its_lines():
+    points = LinePoints(np.ones((3, 2)), np.eye(3)[:, :2], np.ones(3), np.arange(3.0))
+    fit = KeptFit(
+        number=1,
+        cameras=("low",),
+        indices=(4, 5),
+        frames=(5,),
+        point_mm=np.arange(3.0),
+        direction=np.array([0.0, 0.0, 1.0]),
+        vector=np.full(5, 1.0 / 3.0),
+        arcs_mm=np.ones(1),
+        touching=np.array([True]),
+        bent=np.array([True]),
+        seen=(Observed(0, 0, points), Observed(-1, 0, points, side=1)),
+        onset=Onset(0.1, 0.01),
+        neighbour_correlation=(0.5,),
+        light={"low": WireAppearance(0.8, SeenWidth(9.0, 10.0, 0.1))},
+        left_out=Reason("camera_left_out", "its cap is on"),
+        warning=NO_REASON,
+    )
+    back = there_and_back(fit)
+    for one, other in zip(fit.observed(), back.observed()):
+        assert (one.frame, one.camera, one.side) == (other.frame, other.camera, other.side)
+        np.testing.assert_array_equal(one.points.widened_px2, other.points.widened_px2)
+    assert np.all(np.isinf(back.observed()[0].points.widened_px2[:, 1]))
+    assert back.touching.dtype == bool and back.onset == fit.onset and back.light == fit.light
+    assert back.left_out.codes == ("camera_left_out",) and not back.warning
+    assert (back.cameras, back.frames) == (fit.cameras, fit.frames)
+    np.testing.assert_array_equal(back.vector, fit.vector)
 
 
 def test_missing_is_nan_and_no_truth():

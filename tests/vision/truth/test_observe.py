@@ -213,3 +213,27 @@ def test_a_whisk_begins_as_the_one_before_ended_though_the_wire_has_slipped_in_i
     first, second = observe_trial(pictures, strokes, steep.cameras, RODS, quick).whisks
     assert second.touch_rad.value - first.touch_rad.value == pytest.approx(slipped_rad, abs=1e-4)
     assert abs(second.d_x_mm.value - first.d_x_mm.value) < 0.2 * first.d_x_mm.sigma
+
+
+def test_a_whisk_is_fitted_again_by_cameras_that_moved_together(steep, monkeypatch):
+    """Its lines are not traced again: it is as far off as one that is."""
+    few = slice(None, None, 3)
+    motor_rad = np.radians(steep.rows["motor_deg"][few])
+    frames = {}
+    for name, of_camera in steep.frames.items():
+        frames[name] = dict(enumerate(list(of_camera.values())[few]))
+    pictures = TrialPictures(frames, steep.rows["time_s"][few], motor_rad, steep.background)
+    whole = [slice(0, len(motor_rad))]
+    quick = VisionSettings(check_beam=False, rounds=0)
+    known = observe_trial(pictures, whole, steep.cameras, RODS, quick)
+    step = np.tile([*np.zeros(12), 0.05, 0.05, 0.0], 2)  # mm, of both cameras
+    moved = steep.cameras.moved(step)
+    (traced,) = observe_trial(pictures, whole, moved, RODS, quick).whisks
+    monkeypatch.setattr("vision.truth.observe.find_object", None)
+    monkeypatch.setattr("vision.truth.whisk_fit.fit_lines", None)
+    (again,) = observe_trial(pictures, whole, moved, RODS, quick, known.fits).whisks
+    (before,) = known.whisks
+    assert abs(before.d_x_mm.value - traced.d_x_mm.value) > 0.03
+    assert again.d_x_mm.value == pytest.approx(traced.d_x_mm.value, abs=0.2 * traced.d_x_mm.sigma)
+    assert again.d_x_mm.sigma == pytest.approx(traced.d_x_mm.sigma, rel=0.05)
+    assert again.ends.keys() == traced.ends.keys()
