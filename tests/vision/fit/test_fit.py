@@ -11,7 +11,7 @@ from tests.scenes.model_scenes import (
 )
 from vision.fit.problem import State, bends
 from vision.fit.quantities import measure
-from vision.fit.solve import linearise, solve
+from vision.fit.solve import least_squares, linearise, solve
 from vision.fit.touch import first_touch
 from vision.geometry.centreline import centrelines
 from vision.geometry.contact import contact_frame_angles
@@ -29,6 +29,16 @@ def test_noiseless_points_give_the_model_back_to_a_nanometre():
     assert np.allclose(
         here.frame["slip"][problem.touching], true.frame["slip"][problem.touching], atol=1e-6
     )
+
+
+@pytest.mark.parametrize("apart", [1.0, 1e-3, 1e-7, 0.0])
+def test_least_squares_are_those_of_singular_values_however_alike_two_columns_are(rng, apart):
+    matrix = rng.standard_normal((40, 5)) * 10.0 ** np.arange(-6, 4, 2)
+    matrix[:, 4] = 1e6 * matrix[:, 1] + apart * matrix[:, 4]
+    target = rng.standard_normal(40)
+    found = least_squares(matrix, target)
+    best = np.linalg.lstsq(matrix, target, rcond=None)[0]
+    np.testing.assert_allclose(matrix @ found, matrix @ best, rtol=1e-7, atol=1e-7)
 
 
 def test_jacobian_is_the_derivative_of_the_residual(rng):
