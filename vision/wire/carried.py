@@ -9,10 +9,11 @@ frames, so that all of them together are one set of line points.
 import numpy as np
 
 from vision.wire.bands import Pieces
+from vision.wire.binned import binned
 from vision.wire.descent import positions_with_shared
 from vision.wire.joint import widened_blurs
-from vision.wire.shading import LONGEST_PX, Knots, PositionEquations, SegmentEquations
-from vision.wire.trace import WIRE_WAVES, SegmentPositions, WireTrace
+from vision.wire.shading import LONGEST_PX, Knots, SegmentEquations
+from vision.wire.trace import BIN_PX, WIRE_WAVES, SegmentPositions, WireTrace
 
 # [steps] From a curve that is a pixel or two off: each of `LONGEST_PX` at most. Derived.
 _STEPS = 5
@@ -31,8 +32,11 @@ def carry_on(pieces: Pieces, traced: WireTrace, knots: Knots) -> SegmentPosition
     light = traced.solved
     knot_weights = knots.weights(pieces)
     coefficients = knot_weights @ light.by_knot
-    moved, linear, own_chi2 = _place_segments(pieces, traced.blur_px, coefficients)
-    chi2 = own_chi2 / pieces.freedom
+    shift_px = _find_shifts(pieces, traced.blur_px, coefficients)
+    here = SegmentEquations(pieces.moved(shift_px), traced.blur_px, WIRE_WAVES)
+    linear = here.linearised(coefficients)
+    moved = pieces.moved(shift_px + linear.step_px)
+    chi2 = here.chi2(coefficients) / pieces.freedom
     has_converged = np.abs(linear.step_px) < _CONVERGED_PX
     sensitivity = positions_with_shared(linear, knot_weights) / linear.power[:, None]
     relative_radius = pieces.radius_px / np.mean(traced.pieces.radius_px)
@@ -48,19 +52,18 @@ def carry_on(pieces: Pieces, traced: WireTrace, knots: Knots) -> SegmentPosition
     )
 
 
-def _place_segments(
-    pieces: Pieces, blur_px: float, coefficients: np.ndarray
-) -> tuple[Pieces, PositionEquations, np.ndarray]:
-    """Return segments where the rod lies, by Gauss–Newton steps of each by itself.
+def _find_shifts(pieces: Pieces, blur_px: float, coefficients: np.ndarray) -> np.ndarray:
+    """Return by how much (s,) px segments are moved to where the rod lies, but for a last step.
 
-    coefficients (s, terms): shading of each. Returned with them are their equations before the last
-    step, and the chi² (s,) there.
+    Each takes Gauss–Newton steps by itself, by averaged pixels. coefficients (s, terms): shading of each.
     """
+    averaged, variance_px2 = binned(pieces, BIN_PX)
+    blur_px = float(np.hypot(blur_px, np.sqrt(variance_px2)))
     shift_px = np.zeros(len(pieces))
     for _ in range(_STEPS):
-        here = SegmentEquations(pieces.moved(shift_px), blur_px, WIRE_WAVES)
-        linear = here.linearised(coefficients)
-        shift_px = shift_px + linear.step_px
-        if np.median(np.abs(linear.step_px)) < _STILL_PX:
+        here = SegmentEquations(averaged.moved(shift_px), blur_px, WIRE_WAVES)
+        step_px = here.linearised(coefficients).step_px
+        shift_px = shift_px + step_px
+        if np.median(np.abs(step_px)) < _STILL_PX:
             break
-    return pieces.moved(shift_px), linear, here.chi2(coefficients)
+    return shift_px

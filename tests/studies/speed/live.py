@@ -2,14 +2,14 @@
 
     OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python tests/studies/speed/live.py SCENES
 
-SCENES holds path-traced scenes of one whisk each, as of `path_traced.py`. The files of each are decoded one by one and
-fed to `vision.live.whisk.LiveWhisk`, which works between them. Prints for each scene, in processor seconds: decoding
-and `standard`, both of all frames; what comes after the last frame (decoding of that included), and the longest step
-before; then how late the result comes after the last frame where frames come at their own times: `own` with nothing
-before, `standing` with three pictures of the standing whisker three seconds before (drawn: the first picture with
-noise), `again` and `standing again` with bar and wire as the whisk before showed them (the same push at leisure, its bar
-moved by BAR_MOVED_MM). Beside it errors of d_x and z, of frames at leisure, of `standing again` and of `standard`. Then
-medians and worst, and how often 95 % intervals hold.
+SCENES holds path-traced scenes of one whisk each, as of `path_traced.py`, or is a synthetic session of such trials.
+The files of each are decoded one by one and fed to `vision.live.whisk.LiveWhisk`, which works between them. Prints for
+each scene, in processor seconds: decoding and `standard`, both of all frames; what comes after the last frame (decoding
+of that included), and the longest step before; then how late the result comes after the last frame where frames come at
+their own times: `own` with nothing before, `standing` with three pictures of the standing whisker three seconds before
+(drawn: the first picture with noise), `again` and `standing again` with bar and wire as the whisk before showed them (the
+same push at leisure, its bar moved by BAR_MOVED_MM). Beside it errors of d_x and z, of frames at leisure, of `standing
+again` and of `standard`. Then medians and worst, and how often 95 % intervals hold.
 """
 
 import sys
@@ -17,12 +17,15 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
+from bench.cameras.cameras_toml import write_cameras
+from tests.scenes.recorded import exact_cameras
 from tests.studies.accuracy.bar_scenes import read_scene
 from tests.studies.accuracy.coverage import QUANTITIES, row_of
 from tests.studies.accuracy.path_traced import beside_truth, frames_of, see_scene
@@ -228,15 +231,31 @@ def summary(rows: Sequence[dict]) -> list[str]:
     return lines
 
 
+def link_as_scenes(session: Path, folder: Path) -> None:
+    """Make each trial of a synthetic session a scene of its own in a folder, by links."""
+    cameras = exact_cameras(session)
+    for trial in (session / "trials").iterdir():
+        scene = folder / trial.name
+        (scene / "trials").mkdir(parents=True)
+        (scene / "trials" / "w").symlink_to(trial.resolve())
+        for name in ("boards", "session.toml"):
+            (scene / name).symlink_to((session / name).resolve())
+        write_cameras(scene / "cameras.toml", cameras)
+
+
 def main() -> None:
     """Measure all scenes of a folder and print what they show."""
     cv2.setNumThreads(1)
-    folders = sorted(path.parents[2] for path in Path(sys.argv[1]).glob("*/trials/w/truth.toml"))
-    print(HEADER)
-    rows = []
-    for folder in folders:
-        rows.append(scene_row(folder))
-        print(line_of(rows[-1]), flush=True)
+    with TemporaryDirectory() as linked:
+        folder = Path(sys.argv[1])
+        if (folder / "truth.json").is_file():
+            link_as_scenes(folder, Path(linked))
+            folder = Path(linked)
+        print(HEADER)
+        rows = []
+        for truth in sorted(folder.glob("*/trials/w/truth.toml")):
+            rows.append(scene_row(truth.parents[2]))
+            print(line_of(rows[-1]), flush=True)
     print(*summary(rows), sep="\n")
 
 
