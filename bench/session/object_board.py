@@ -10,9 +10,11 @@ from vision.pictures import read_picture
 def board_on_object(trial: Trial, board: Board | None) -> dict[str, Corners]:
     """Return by camera the corners of the board on a trial's object. board: of session.toml.
 
-    Raises BadInput for a picture that cannot be read or shows no board.
+    A part of a picture may show none where another part does. Raises BadInput for a picture that cannot be read
+    or shows no board.
     """
     found = {}
+    by_file: dict[str, list[str]] = {}
     for camera, path in trial.board_pictures.items():
         label = trial.label(path.name)
         if board is None:
@@ -20,7 +22,11 @@ def board_on_object(trial: Trial, board: Board | None) -> dict[str, Corners]:
         grey = read_picture(path)
         if grey is None:
             raise BadInput("cannot be read as a picture", file=label)
-        found[camera] = find_corners(grey, board)
-        if not len(found[camera]):
+        corners = find_corners(grey, board)
+        if len(corners):
+            found[camera] = corners
+        by_file.setdefault(label, []).append(camera)
+    for label, cameras in by_file.items():
+        if not found.keys() & set(cameras):
             raise BadInput("shows no board of session.toml", file=label)
     return found

@@ -9,8 +9,8 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems, refused_as_bad_input
 from bench.session.file_names import SESSION_TOML
 from bench.session.manifest import CameraKeys
-from vision.geometry import Crop
-from vision.pictures import Frames, PicturePart
+from vision.geometry import Crop, Refused
+from vision.pictures import PICTURE_SUFFIXES, Frames, PicturePart, picture_size
 
 _NEEDED_OF_PART = {
     "of": "the camera in whose picture this part is",
@@ -21,11 +21,11 @@ _NEEDED_OF_PART = {
 def stated_crops(cameras: Iterable[CameraKeys], sources: Mapping[str, Path]) -> dict[str, Crop]:
     """Return the part of a picture of each camera that is one, by the camera's name.
 
-    sources: a folder or film of each camera that has pictures. A picture of which mirrors alone are stated is a
+    sources: a folder, film or picture of each camera that has pictures. A picture of which mirrors alone are stated is a
     camera of its own, too, by the largest rectangle outside them. Raises BadInput for a part that cannot be.
     """
     of_picture: dict[str, dict[str, Crop]] = {}
-    for keys in cameras if sources else ():  # nothing is recorded yet
+    for keys in cameras:
         if keys.of is not None and keys.crop is not None:
             _check_of(keys, sources)
             crop = _crop(keys, _size_px(keys.of, sources[keys.of]))
@@ -73,15 +73,23 @@ def _check_of(keys: CameraKeys, sources: Mapping[str, Path]) -> None:
     """Raise BadInput where `of` is no camera with pictures of its own, or the part has some, too."""
     if keys.name in sources:
         raise _bad(keys.name, f"is a part of {keys.of}'s picture, and has pictures of its own")
+    if not sources:
+        found = f"no picture says how large {keys.of}'s is, of which it is a part"
+        raise _bad(keys.name, f"{found}; keep one in boards/{keys.of}")
     if keys.of not in sources:
-        listed = ", ".join(sources) or "none"
+        listed = ", ".join(sources)
         raise _bad(keys.name, f'of = "{keys.of}" is no camera with pictures; there are {listed}')
 
 
 def _size_px(name: str, source: Path) -> tuple[int, int]:
     """Return (width, height) of a camera's pictures. Raise BadInput where none can be read."""
     with refused_as_bad_input(f"pictures of camera {name}"):
-        return Frames.open(source).size_px
+        if source.is_dir() or source.suffix.lower() not in PICTURE_SUFFIXES:
+            return Frames.open(source).size_px
+        size_px = picture_size(source)
+        if size_px is None:
+            raise Refused("cannot be read as a picture")
+        return size_px
 
 
 def _crop(keys: CameraKeys, whole_px: tuple[int, int]) -> Crop:

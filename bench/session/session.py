@@ -232,11 +232,19 @@ def _find_recorded(
     found = _ordered_trials(path, stated, problems, trials)
     crops: dict[str, Crop] = {}
     with problems.guard():
-        crops = stated_crops(stated.keys.cameras, _one_source_each(board_sources, found))
-    in_crops = tuple(
-        replace(trial, camera_sources=in_parts(trial.camera_sources, crops)) for trial in found
-    )
+        sources = _one_source_each(board_sources, rig_pictures, found)
+        if sources or any(trial.cameras for trial in found):  # something is recorded
+            crops = stated_crops(stated.keys.cameras, sources)
+    in_crops = tuple(_in_crops(trial, crops) for trial in found)
     return _Recorded(in_parts(board_sources, crops), in_parts(rig_pictures, crops), in_crops, crops)
+
+
+def _in_crops(trial: Trial, crops: Mapping[str, Crop]) -> Trial:
+    """Return a trial with the pictures of each camera, of a part of a picture that part."""
+    frames = in_parts(trial.camera_sources, crops)
+    return replace(
+        trial, camera_sources=frames, board_pictures=in_parts(trial.board_pictures, crops)
+    )
 
 
 def _with_measured_rig(session: Session) -> Session:
@@ -438,11 +446,13 @@ def _warn_of_unused_surfaces(
             problems.warn(Reason("surface_unused", f"{SESSION_TOML}: {found}"))
 
 
-def _one_source_each(board_sources: Mapping[str, Path], trials: Iterable[Trial]) -> dict[str, Path]:
-    """Return a folder or film of each camera that has pictures of the board or of a trial."""
-    sources = dict(board_sources)
+def _one_source_each(
+    board_sources: Mapping[str, Path], rig_pictures: Mapping[str, Path], trials: Iterable[Trial]
+) -> dict[str, Path]:
+    """Return a folder, film or picture of each camera that has one, of the board or of a trial."""
+    sources = {**rig_pictures, **board_sources}
     for trial in trials:
-        sources = trial.camera_sources | sources
+        sources = trial.board_pictures | trial.camera_sources | sources
     return sources
 
 

@@ -202,7 +202,7 @@ def check_traces(session: Session, problems: InputProblems) -> None:
     for trial in alone:
         with problems.guard():
             count = len(frame_times(trial))
-            points = read_traces_alone(trial, count, sizes_px).object_points
+            points = read_traces_alone(trial, count, sizes_px, session.crops).object_points
             is_stated = session.truth is not None
             require_object_placed(trial, has_points=bool(points), is_stated=is_stated)
             if not points:

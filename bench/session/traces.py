@@ -6,7 +6,7 @@ Anipose's points in space, `trace_3d.csv`, with its cameras, `trace_3d.toml`. Po
 `object_<camera>`, or are joints of a trace that are named for it, where there are no pictures to find it in.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -35,7 +35,7 @@ class TracedCamera:
 
     count: of its pictures, in words `pictures`. size_px: width, height; None where no file says it.
     picture (n,): index of its picture in each frame, −1 where it dropped that. crop: of a camera that is a
-    part of a picture, whose traces are in that whole picture.
+    part of a picture, whose traces are in that whole picture, unless they are of points in space.
     """
 
     count: int
@@ -51,6 +51,20 @@ class TracedCamera:
         has = f"camera {camera} has {counted(count, 'picture')}"
         crop = source.crop if isinstance(source, PicturePart) else None
         return cls(count, Frames.open(source).size_px, picture, has, crop)
+
+    @classmethod
+    def of_rows(cls, count: int, size_px: tuple[int, int] | None, crop: Crop | None) -> Self:
+        """Return what a trace without pictures is of: the rows of frames.csv."""
+        has = f"frames.csv has {counted(count, 'row')}"
+        return cls(count, size_px, np.arange(count), has, crop)
+
+
+class _Drawn(NamedTuple):
+    """The lines of a file. label: how messages name it. is_in_space: whether a camera's own lens has projected them."""
+
+    lines: DrawnLines
+    label: str
+    is_in_space: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +87,14 @@ def read_traces(
     picture in each frame (n,), −1 where it dropped that. Raises BadInput where a file cannot be read
     or is not of these pictures.
     """
+    sizes_px = {name: Frames.open(source).size_px for name, source in sources.items()}
     traces = {}
-    for name, (drawn, of_file) in _drawn(files, list(sources), label).items():
+    for name, drawn in _drawn(files, sizes_px, label).items():
         if name not in sources:
             found = f"there are no pictures of camera {name}; there are those of"
-            raise BadInput(f"{found} {', '.join(sources) or 'none'}", file=of_file)
+            raise BadInput(f"{found} {', '.join(sources) or 'none'}", file=drawn.label)
         camera = TracedCamera.of_pictures(sources[name], pictures[name], name)
-        traces[name] = _checked(drawn.of_wire, name, camera, of_file)
+        traces[name] = _checked(drawn.lines.of_wire, name, camera, drawn)
     return traces
 
 
@@ -91,29 +106,31 @@ class TracesAlone(NamedTuple):
 
 
 def read_traces_alone(
-    trial: Trial, count: int, sizes_px: Mapping[str, tuple[int, int]]
+    trial: Trial, count: int, sizes_px: Mapping[str, tuple[int, int]], crops: Mapping[str, Crop]
 ) -> TracesAlone:
     """Return the traces of a trial that has no pictures.
 
     Points of the object are in files of their own, or else joints of the wire's traces that are named for it. count: of the
-    trial's frames. sizes_px: of the pictures of the cameras that are calibrated, empty where none is known. Raises
-    BadInput where a file cannot be read or is not of these frames.
+    trial's frames. sizes_px: of the pictures of the cameras that are calibrated, empty where none is known. crops: of
+    those that are parts of a picture. Raises BadInput where a file cannot be read or is not of these frames.
     """
-    cameras = list(sizes_px)
-    of_wire = _drawn(trial.trace_files, cameras, trial.place)
-    wire = {}
-    for name, (drawn, of_file) in of_wire.items():
-        camera = _camera_alone(name, count, sizes_px, of_file)
-        wire[name] = _checked(drawn.of_wire, name, camera, of_file)
-    of_object = dict(_drawn(trial.object_files, cameras, trial.place))
-    for name, (drawn, of_file) in of_wire.items():
-        joints = drawn.of_object
-        if len(joints.frame):
-            of_object.setdefault(name, (joints, of_file))
+    of_wire = _drawn(trial.trace_files, sizes_px, trial.place)
+    of_object = _drawn(trial.object_files, sizes_px, trial.place)
+    cameras = {}
+    for name, drawn in (*of_wire.items(), *of_object.items()):
+        if sizes_px and name not in sizes_px:
+            found = f"there is no camera {name}; there are {', '.join(sizes_px)}"
+            raise BadInput(found, file=drawn.label)
+        cameras[name] = TracedCamera.of_rows(count, sizes_px.get(name), crops.get(name))
     points = {}
-    for name, (drawn, of_file) in of_object.items():
-        camera = _camera_alone(name, count, sizes_px, of_file)
-        points[name] = _checked(drawn, name, camera, of_file)
+    for name, drawn in of_object.items():
+        points[name] = _checked(drawn.lines, name, cameras[name], drawn)
+    wire = {}
+    for name, drawn in of_wire.items():
+        wire[name] = _checked(drawn.lines.of_wire, name, cameras[name], drawn)
+        joints = drawn.lines.of_object
+        if len(joints.frame) and name not in points:
+            points[name] = _checked(joints, name, cameras[name], drawn)
     return TracesAlone(wire, points)
 
 
@@ -132,50 +149,44 @@ def has_points_in_one_camera(trial: Trial) -> bool:
     return len(found) == 1
 
 
-def _camera_alone(
-    name: str, count: int, sizes_px: Mapping[str, tuple[int, int]], label: str
-) -> TracedCamera:
-    """Return what a trace without pictures is of. Raises BadInput where there is no such camera."""
-    if sizes_px and name not in sizes_px:
-        raise BadInput(f"there is no camera {name}; there are {', '.join(sizes_px)}", file=label)
-    has = f"frames.csv has {counted(count, 'row')}"
-    return TracedCamera(count, sizes_px.get(name), np.arange(count), has)
-
-
 def _drawn(
-    files: Mapping[str, Path], cameras: Sequence[str], label: str
-) -> dict[str, tuple[DrawnLines, str]]:
-    """Return by camera the lines of its file, and how messages name that. Raise BadInput.
+    files: Mapping[str, Path], sizes_px: Mapping[str, tuple[int, int]], label: str
+) -> dict[str, _Drawn]:
+    """Return by camera the lines of its file. Raise BadInput.
 
-    cameras: names of those that see points in space.
+    sizes_px: of the pictures of those that see points in space.
     """
-    drawn: dict[str, tuple[DrawnLines, str]] = {}
+    drawn: dict[str, _Drawn] = {}
     for name, path in files.items():
         of_file = f"{label}/{path.name}"
         if name != IN_SPACE:
-            drawn[name] = read_lines(path, of_file), of_file
+            drawn[name] = _Drawn(read_lines(path, of_file), of_file, is_in_space=False)
             continue
         from bench.session.traces_in_space import lines_in_space  # with calibration's solvers
 
-        for camera, lines in lines_in_space(path, cameras, of_file).items():
-            drawn.setdefault(camera, (lines, of_file))
+        for camera, lines in lines_in_space(path, sizes_px, of_file).items():
+            drawn.setdefault(camera, _Drawn(lines, of_file, is_in_space=True))
     return drawn
 
 
-def _checked(drawn: DrawnLines, name: str, camera: TracedCamera, label: str) -> Traced:
-    """Return a camera's lines as a trace. Raise BadInput where they are not of its pictures."""
-    _require_frames(drawn.frame, camera, label)
-    px = drawn.px
+def _checked(lines: DrawnLines, name: str, camera: TracedCamera, drawn: _Drawn) -> Traced:
+    """Return a camera's lines as a trace. Raise BadInput where they are not of its pictures.
+
+    drawn: what they were read with.
+    """
+    label = drawn.label
+    _require_frames(lines.frame, camera, label)
+    px = lines.px
     is_inside = np.ones(len(px), dtype=bool)
-    if camera.crop is not None:
+    if camera.crop is not None and not drawn.is_in_space:
         px = camera.crop.in_part(px)
         is_inside = _inside_part(px, name, camera.crop, label)
     elif camera.size_px is not None:
         is_inside = _inside(px, name, camera.size_px, label)
     _require_span(px, label)
-    frame = _frames_of(drawn.frame.astype(int), camera.picture)
-    trace = Trace(frame, px, drawn.line, drawn.sigma_px)
-    return Traced(trace.select(is_inside & (frame >= 0)), drawn.has_identity)
+    frame = _frames_of(lines.frame.astype(int), camera.picture)
+    trace = Trace(frame, px, lines.line, lines.sigma_px)
+    return Traced(trace.select(is_inside & (frame >= 0)), lines.has_identity)
 
 
 def _frames_of(number: np.ndarray, picture: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from bench.base.input_problems import refused_as_bad_input
 from bench.session.text_files import read_text
 from bench.session.trace_readers import DrawnLines, numbers_with_gaps
 from vision.calibration import foreign_cameras
-from vision.geometry import Camera
+from vision.geometry import Camera, Cameras
 
 _AXES = ("x", "y", "z")
 # Anipose's columns of the axes that it has aligned points to.
@@ -24,30 +24,44 @@ _MOST_MM = 1e5
 _ROUNDING = 1e-3
 
 
-def lines_in_space(path: Path, cameras: Sequence[str], label: str) -> dict[str, DrawnLines]:
+def lines_in_space(
+    path: Path, sizes_px: Mapping[str, tuple[int, int]], label: str
+) -> dict[str, DrawnLines]:
     """Return by camera the joints of Anipose's CSV as one line in its picture.
 
+    sizes_px: of the cameras' pictures, of a part of a picture that part's.
     Its calibration is in the same folder under the same name, as TOML, and has the cameras' names. Points
     are turned back from the axes that Anipose may have aligned them to. Raises BadInput where one of
     the files cannot be read.
     """
+    known = _cameras_beside(path, sizes_px, label)
+    frame, points, joints = _joints(path, label)
+    found = {}
+    for name in sizes_px:
+        px = _as_seen(known[name], points)
+        found[name] = DrawnLines.of_joints(frame, px[:, None], joints)
+    return found
+
+
+def _cameras_beside(path: Path, sizes_px: Mapping[str, tuple[int, int]], label: str) -> Cameras:
+    """Return Anipose's cameras beside a table. Raise BadInput where they are not those of these pictures."""
     folder, _, _ = label.rpartition("/")
     calibration = path.with_suffix(".toml")
     if not calibration.is_file():
         found = f"needs its cameras beside it: Anipose's calibration.toml as {calibration.name}"
         raise BadInput(found, file=label)
-    with refused_as_bad_input(f"{folder}/{calibration.name}"):
+    beside = f"{folder}/{calibration.name}"
+    with refused_as_bad_input(beside):
         known = foreign_cameras(calibration)
-    missing = [name for name in cameras if name not in known.names]
-    if missing:
-        found = f"has no camera {missing[0]}; it has {', '.join(known.names)}"
-        raise BadInput(found, file=f"{folder}/{calibration.name}")
-    frame, points, joints = _joints(path, label)
-    found = {}
-    for name in cameras:
-        px = _as_seen(known[name], points)
-        found[name] = DrawnLines.of_joints(frame, px[:, None], joints)
-    return found
+    for name, (width, height) in sizes_px.items():
+        if name not in known.names:
+            found = f"has no camera {name}; it has {', '.join(known.names)}"
+            raise BadInput(found, file=beside)
+        its_width, its_height = known[name].size_px
+        if (its_width, its_height) != (width, height):
+            found = f"has camera {name} with pictures of {its_width} x {its_height} px"
+            raise BadInput(f"{found}; here they are {width} x {height} px", file=beside)
+    return known
 
 
 def _joints(path: Path, label: str) -> tuple[np.ndarray, np.ndarray, list[str]]:

@@ -49,7 +49,7 @@ class Trial(manifest.TrialKeys):
     givens: tuple[Given, ...] = ()
     trace_files: dict[str, Path] = field(default_factory=dict)
     object_files: dict[str, Path] = field(default_factory=dict)
-    board_pictures: dict[str, Path] = field(default_factory=dict)
+    board_pictures: dict[str, Path | PicturePart] = field(default_factory=dict)
     stage: StageLog | None = None
 
     @property

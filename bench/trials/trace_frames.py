@@ -33,7 +33,7 @@ def traced_frames(
     times = frame_times(trial)
     cameras = calibration.cameras
     sizes_px = {camera.name: tuple(camera.size_px) for camera in cameras}
-    alone = read_traces_alone(trial, len(times), sizes_px)
+    alone = read_traces_alone(trial, len(times), sizes_px, session.crops)
     traces = _asked(alone.wire, settings)
     points = alone.object_points
     motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)

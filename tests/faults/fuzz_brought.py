@@ -295,7 +295,7 @@ class Reader:
         objects = trace_files(folder, folder.name, OBJECT)
         beside = read_traces(files, self.trial.camera_sources, self.picture, folder.name)
         trial = replace(self.trial, folder=folder, trace_files=files, object_files=objects)
-        alone = read_traces_alone(trial, FRAMES, {"high": (160, 90), "low": (160, 90)})
+        alone = read_traces_alone(trial, FRAMES, {"high": (160, 90), "low": (160, 90)}, {})
         for traced in (*beside.values(), *alone.wire.values(), *alone.object_points.values()):
             yield folder.name, traced.trace.px
             yield folder.name, traced.trace.frame

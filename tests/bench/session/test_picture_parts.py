@@ -11,8 +11,9 @@ from bench.cameras.cameras_toml import write_cameras
 from bench.session.footage import read_frames, rig_picture
 from bench.session.session import load_session
 from bench.session.session_check import check_sizes
-from bench.session.traces import read_traces
+from bench.session.traces import read_traces, read_traces_alone
 from vision.geometry import Camera, Cameras
+from vision.pictures import read_picture
 
 
 @pytest.fixture
@@ -33,6 +34,7 @@ def state(session, *cameras: str) -> None:
     file.write_text("\n[".join(kept) + own)
 
 
+PART_SIZES_PX = {"high": (1280, 420), "mirrored": (1280, 300)}
 MIRROR = 'name = "mirrored"\nof = "high"\ncrop = [0, 0, 1280, 300]\nmirrored = true'
 
 
@@ -67,21 +69,57 @@ def test_the_rest_beside_two_mirrors_is_the_largest_rectangle(one_camera):
     assert (rest.left, rest.top, rest.width, rest.height) == (200, 300, 1080, 420)
 
 
-def test_a_trace_of_the_whole_picture_serves_all_its_parts(one_camera):
+@pytest.mark.parametrize("has_pictures", [True, False])
+def test_a_trace_of_the_whole_picture_serves_all_its_parts(one_camera, has_pictures):
     """Lines of 11 points down the picture: one in the mirror's part, one in the rest."""
     state(one_camera, MIRROR)
-    trial = load_session(one_camera).trials[0]
+    trial = next(trial for trial in load_session(one_camera).trials if trial.camera_sources)
     down = np.arange(20.0, 131.0, 11.0)
     rows = [f"0,{u},{v + top}" for u, top in ((100.0, 0.0), (200.0, 400.0)) for v in down]
     for name in ("high", "mirrored"):
         table = "\n".join(["frame,u_px,v_px", *rows]) + "\n"
         trial.own(f"trace_{name}.csv").write_text(table)
-    trial = load_session(one_camera).trial(trial.name)
-    pictures = {name: np.zeros(1, dtype=int) for name in trial.camera_sources}
-    read = read_traces(trial.trace_files, trial.camera_sources, pictures, "t")
+    if not has_pictures:
+        shutil.rmtree(trial.folder / "high")
+    session = load_session(one_camera)
+    trial = session.trial(trial.name)
+    if has_pictures:
+        pictures = {name: np.zeros(1, dtype=int) for name in trial.camera_sources}
+        read = read_traces(trial.trace_files, trial.camera_sources, pictures, "t")
+    else:
+        read = read_traces_alone(trial, 1, PART_SIZES_PX, session.crops).wire
     found = {name: traced.trace.px for name, traced in read.items()}
     np.testing.assert_allclose(found["mirrored"], np.column_stack([np.full(11, 1179.0), down]))
     np.testing.assert_allclose(found["high"], np.column_stack([np.full(11, 200.0), down + 100.0]))
+
+
+def test_a_picture_says_how_large_the_whole_is(one_camera):
+    """One picture of the board on the rig does; where there is none, pixels of the whole are those of no part."""
+    state(one_camera, MIRROR)
+    trials = load_session(one_camera).trials
+    for source in one_camera.rglob("high"):
+        shutil.rmtree(source)
+    trials[0].own("trace_high.csv").write_text("frame,u_px,v_px\n0,9,9\n")
+    session = load_session(one_camera, lenses_known=True)
+    assert session.crops["high"].whole_px == (1280, 720)
+    for picture in (one_camera / "boards" / "rig").iterdir():
+        picture.unlink()
+    with pytest.raises(
+        BadInput, match="no picture says how large high's is, of which it is a part"
+    ):
+        load_session(one_camera)
+
+
+def test_pictures_of_a_board_on_the_object_are_divided_as_others(one_camera):
+    state(one_camera, MIRROR)
+    trial = load_session(one_camera).trials[0]
+    rig = next((one_camera / "boards" / "rig").iterdir())
+    shutil.copy(rig, trial.folder / f"board_high{rig.suffix}")
+    divided = load_session(one_camera).trial(trial.name).board_pictures
+    assert {name: read_picture(part).shape for name, part in divided.items()} == {
+        "high": (420, 1280),
+        "mirrored": (300, 1280),
+    }
 
 
 @pytest.mark.parametrize("height, is_same", [(300, True), (310, False)])
@@ -89,7 +127,7 @@ def test_cameras_brought_along_are_of_the_parts(one_camera, height, is_same):
     """As `calibrate cameras` writes them; of another crop they are refused."""
     state(one_camera, MIRROR)
     cameras = []
-    for name, size in (("high", (1280, 420)), ("mirrored", (1280, height))):
+    for name, size in (PART_SIZES_PX | {"mirrored": (1280, height)}).items():
         matrix = [[1500.0, 0.0, 640.0], [0.0, 1500.0, 200.0], [0.0, 0.0, 1.0]]
         pose = np.column_stack([np.eye(3), [0.0, 0.0, 500.0]])
         cameras.append(Camera(name, size, matrix, np.zeros(5), pose))

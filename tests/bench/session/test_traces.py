@@ -254,6 +254,9 @@ translation = [0.0, 0.0, 500.0]
 """
 
 
+SIZE_PX = (640, 480)  # of Anipose's camera
+
+
 def anipose(folder):
     """Points in space of two joints, aligned to axes turned by 90° about z; the second is lost once."""
     points = np.array([[[10.0, 5.0, 0.0], [20.0, 6.0, 3.0]], [[11.0, 5.0, 0.0], [21.0, 6.0, 3.0]]])
@@ -276,16 +279,18 @@ def anipose(folder):
 
 def test_anipose_points_are_seen_by_its_own_cameras(tmp_path):
     points = anipose(tmp_path)
-    lines = lines_in_space(tmp_path / "trace_3d.csv", ["high"], "trials/w/trace_3d.csv")["high"]
+    lines = lines_in_space(tmp_path / "trace_3d.csv", {"high": SIZE_PX}, "trials/w/trace_3d.csv")[
+        "high"
+    ]
     matrix = [[800.0, 0.0, 320.0], [0.0, 800.0, 240.0], [0.0, 0.0, 1.0]]
     pose = np.column_stack([np.eye(3), [0.0, 0.0, 500.0]])
-    camera = Camera("high", (640, 480), matrix, np.zeros(5), pose)
+    camera = Camera("high", SIZE_PX, matrix, np.zeros(5), pose)
     expected = camera.project(np.array([points[0, 0], points[0, 1], points[1, 0]]))
     np.testing.assert_allclose(lines.px, expected, atol=1e-9)
     assert lines.frame.tolist() == [0, 0, 1]
     table = tmp_path / "trace_3d.csv"
     table.write_text(table.read_text().replace("j1_", "bar_low_"))
-    lines = lines_in_space(table, ["high"], "trials/w/trace_3d.csv")["high"]
+    lines = lines_in_space(table, {"high": SIZE_PX}, "trials/w/trace_3d.csv")["high"]
     np.testing.assert_allclose(lines.of_object.px, expected[[1]], atol=1e-9)
 
 
@@ -293,10 +298,15 @@ def test_anipose_points_need_its_cameras(tmp_path):
     anipose(tmp_path)
     (tmp_path / "trace_3d.toml").unlink()
     with pytest.raises(BadInput, match=r"calibration.toml as trace_3d.toml"):
-        lines_in_space(tmp_path / "trace_3d.csv", ["high"], "trials/w/trace_3d.csv")
+        lines_in_space(tmp_path / "trace_3d.csv", {"high": SIZE_PX}, "trials/w/trace_3d.csv")
     anipose(tmp_path)
     with pytest.raises(BadInput, match="has no camera low; it has high"):
-        lines_in_space(tmp_path / "trace_3d.csv", ["low"], "trials/w/trace_3d.csv")
+        lines_in_space(tmp_path / "trace_3d.csv", {"low": SIZE_PX}, "trials/w/trace_3d.csv")
+    other = {"high": (640, 240)}  # a part of its pictures, where the whole ones were calibrated
+    with pytest.raises(
+        BadInput, match="high with pictures of 640 x 480 px; here they are 640 x 240"
+    ):
+        lines_in_space(tmp_path / "trace_3d.csv", other, "trials/w/trace_3d.csv")
 
 
 def test_a_camera_has_one_trace(tmp_path):
