@@ -216,7 +216,7 @@ class BarSearch:
         """Find the bar by its lines in all cameras: that with the highest detection score.
 
         Pairs of lines are measured until they converge, as long as they could come within CLEARER
-        of the best so far. Where none converges, the bar is where edges are the strongest.
+        of the best so far. Where none converges, the bar is where edges are the strongest, or there without lines.
         """
         scene = self.scene
         maps = list(self.edge_maps.values())
@@ -231,9 +231,11 @@ class BarSearch:
             if can_touch(axis, scene.rods, scene.motor_range_rad):
                 with suppress(Refused):  # lines that contradict each other are no bar's
                     one.axis = other.axis = self._converge(axis, found).axis
-        if not found:
+        if found:
+            return _clearest_of(found)
+        with suppress(Refused):
             return self._converge(axes[0], found)
-        return _clearest_of(found)
+        return SeenBar(axes[0], {})
 
     def _candidates(self, axes: Sequence[BarAxis]) -> list["LineCandidate"]:
         """Measure the bar's line about each axis, once where a camera sees two axes as one."""

@@ -86,6 +86,17 @@ def test_a_camera_that_looks_along_a_hypothesis_ends_it_and_not_the_search(lamp,
     assert max(offset_px(camera, found.axis, true) for camera in scene.cameras) < FOUND_PX
 
 
+def test_the_only_hypothesis_behind_a_camera_leaves_the_bar_to_single_cameras(lamp, monkeypatch):
+    """Of an upright bar in a mirror's two views none converged: that ended the search, and the whisk had no truth."""
+    scene, true = lamp
+    camera = scene.cameras.cameras[0]
+    behind = replace(true, point_mm=2.0 * camera.centre_mm - true.point_mm)
+    monkeypatch.setattr(search, "find_bars", lambda *_: [behind])
+    alone = bar_seen_by(scene, true, scene.cameras.names)
+    monkeypatch.setattr(search.BarSearch, "bars_of_single_cameras", lambda _: [alone])
+    assert search.find_object(scene) is alone
+
+
 def test_planes_of_two_cameras_meet_in_the_axis_that_both_see(lamp):
     scene, true = lamp
     one, other = scene.cameras
