@@ -9,7 +9,9 @@ from typing import TypeAlias
 
 from bench.base.errors import BadInput
 
+# Of a board on one plane.
 KIND_NAMES = ("charuco", "checkerboard", "circles", "asymmetric_circles", "aprilgrid")
+BODY = "body"
 Ask: TypeAlias = Callable[[str], str]
 
 
@@ -32,7 +34,7 @@ CHOICES = (
         "where the truth comes from: pictures, pictures with traces, traces without pictures, or a stage",
         ("pictures", "traces", "traces-only", "stage"),
     ),
-    Choice("board_kind", "kind of board", KIND_NAMES),
+    Choice("board_kind", "kind of board", (*KIND_NAMES, BODY)),
     Choice(
         "angle_from",
         "where the motor's angle is from: its log, a marker on its hub or the whisker's base in the pictures, "

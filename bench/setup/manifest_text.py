@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import tomli_w
 
 from bench.session.angle_source import SOURCES
-from bench.setup.lab import Lab
+from bench.setup.lab import BODY, Lab
 from bench.setup.questions import Question, questions_of
 from vision.boards import CharucoBoard
 
@@ -54,13 +54,16 @@ def _line(question: Question, numbers: Mapping[str, float]) -> str:
 
 
 def _board_lines(kind: str, squares: tuple[int, int], dictionary: str) -> str:
-    """Return the lines of a board's kind, squares, and of a ChArUco board's dictionary."""
+    """Return the lines of a board's kind, squares, and of ChArUco boards' dictionary and markers."""
     lines = [
         f'kind = "{kind}"'.ljust(_LINE) + "# docs/bring.md has the others",
         f"squares = [{squares[0]}, {squares[1]}]".ljust(_LINE) + "# along x, along y",
     ]
-    if kind == CharucoBoard.kind:
+    if kind in (CharucoBoard.kind, BODY):
         lines.append(f'dictionary = "{dictionary}"')
+    if kind == BODY:
+        wanted = "[., ., ...], first marker of each face (board --first-id)"
+        lines.append(f"# first_ids =        # {TO_FILL_IN}: {wanted}")
     return "\n".join(lines)
 
 
@@ -118,6 +121,8 @@ def _pictures_to_record(lab: Lab) -> Iterator[tuple[str, str]]:
     both = ", seen in both parts at once" if lab.cameras == "mirror" else ""
     yield f"boards/{name}/*.png", f"10 or more views of the board a camera{both}:"
     yield "", "tilted, near and far, into the corners"
+    if lab.board_kind == BODY:
+        yield "", "some with two faces at once, which say how these stand"
     yield f"boards/rig/{name}.png", "the empty rig with the board standing on it"
     if lab.has_frames:
         yield f"trials/<trial>/{name}/*", f"the frames, or {name}.mp4, .avi, .mkv"

@@ -121,6 +121,15 @@ def test_another_kind_of_board_is_asked_for_what_it_has(tmp_path, capsys):
     assert "FILL IN" not in capsys.readouterr().out
 
 
+def test_a_body_is_asked_for_its_faces(tmp_path, capsys):
+    assert main(["new", str(tmp_path / "s"), "--board-kind", "body", *options(NUMBERS)]) == 0
+    assert "1 line is to be filled in" in capsys.readouterr().out
+    manifest = tmp_path / "s" / "session.toml"
+    manifest.write_text(manifest.read_text().replace("# first_ids =", "first_ids = [0, 24]"))
+    board = load_session(tmp_path / "s").board
+    assert board.first_ids == (0, 24) and board.dictionary == "DICT_5X5_100"
+
+
 def test_every_question_has_its_range():
     for question in QUESTIONS:
         with pytest.raises(BadInput):
