@@ -77,10 +77,10 @@ def place_line(session: Session) -> str:
         return f"the cameras stand where cameras.toml has them{unused}"
     measured = session.measured_rig
     if session.T_rig_board is None and measured is None:
-        return (
-            "the free strokes place the rig when the session is evaluated; `whisker-bench calibrate rig` measures it, "
-            "by a marker on the hub, too, and says how well"
-        )
+        by_strokes = "the free strokes place the rig when the session is evaluated"
+        if not session.rig_pictures:
+            return by_strokes
+        return f"{by_strokes}; `whisker-bench calibrate rig` measures it, by a marker on the hub, too, and says how well"
     if session.T_rig_board is None:
         return f"placed by {RIG_FILE} ({measured.source}): {_in_own_frame(session).spread}"
     if measured is not None:

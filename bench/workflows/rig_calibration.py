@@ -17,6 +17,7 @@ from bench.base.workers import Workers
 from bench.cameras.first_look import MOST_TRIALS
 from bench.cameras.measured_place import contradiction
 from bench.cameras.session_cameras import SessionCalibration
+from bench.session.footage import rig_picture
 from bench.session.rig_file import (
     RIG_FILE,
     MeasuredRig,
@@ -31,6 +32,7 @@ from bench.session.trial import Trial
 from bench.trials.of_session import first_units
 from bench.trials.placing import measure_rig, require_swing
 from bench.workflows.rig_picture import draw_rig
+from vision.boards import find_corners
 from vision.calibration import Placement
 from vision.geometry import Reason, counted, spread
 
@@ -43,6 +45,10 @@ _MOSTLY = np.sqrt(0.5)
 _NO_MARKER = (
     "fasten a marker of the board's dictionary to the hub, with a number that the board does not use and in view of "
     "two cameras: it shows axis and centre in all frames, bent ones included"
+)
+_NO_BOARD = (
+    "record the board standing on the rig, whose place is measured; without one `evaluate` finds the rig by the free "
+    "strokes"
 )
 _NO_TOUCH = (
     "measure how far from the motor's axis a trial's first contact is, and state d_x_mm and d_x_sigma_mm in its "
@@ -162,8 +168,11 @@ def _check_measurable(session: Session) -> None:
         )
     for name in session.camera_names:
         if name not in session.rig_pictures:
-            found = f"has no picture {name}.png: record the board standing on the rig"
-            raise BadInput(found, file="boards/rig")
+            raise BadInput(f"has no picture {name}.png: {_NO_BOARD}", file="boards/rig")
+        if session.board and not len(
+            find_corners(rig_picture(session.rig_pictures[name]), session.board)
+        ):
+            raise BadInput(f"picture {name} shows no board: {_NO_BOARD}", file="boards/rig")
 
 
 def _warn(found: RigCalibration, problems: InputProblems) -> None:

@@ -215,8 +215,8 @@ def place_cameras(
         return np.array(T_camera_rig)
     if len(cameras) > 1 and not together:
         raise Refused(
-            "there is no picture of the board on the rig, so the cameras cannot be placed in one "
-            "frame"
+            "no picture shows the board on the rig, nor do the cameras see it at once in views of one number, so "
+            "they cannot be placed in one frame: record the one or the other"
         )
     chained = chain_cameras({name: alone.poses for name, alone in cameras.items()})
     return np.array([chained[name] for name in cameras])

@@ -5,6 +5,7 @@ import shutil
 import tomllib
 
 import cv2
+import numpy as np
 import pytest
 
 from bench.cameras.session_cameras import calibrate_session
@@ -101,6 +102,17 @@ def test_another_picture_size(small_copy, refused):
 def test_no_picture_of_the_board_on_the_rig(small_copy, refused):
     next((small_copy / "boards" / "rig").glob("low.*")).unlink()
     assert "boards/rig/low: there is no picture of the board on the rig" in refused()
+
+
+def test_pictures_of_the_rig_without_a_board_place_no_camera(small_copy, refused):
+    """They are backgrounds: cameras that saw the held board at once need no more, these did not."""
+    manifest = small_copy / "session.toml"
+    text = manifest.read_text()
+    before, _, after = text.partition("[rig]\n")
+    manifest.write_text(before + after[after.index("\n[") :])
+    for picture in (small_copy / "boards" / "rig").iterdir():
+        cv2.imwrite(str(picture), np.full((720, 1280), 90, np.uint8))
+    assert "nor do the cameras see it at once in views of one number" in refused()
 
 
 DIVERGED = """
