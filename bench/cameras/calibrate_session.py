@@ -43,8 +43,9 @@ _NEAREST_BAR = 0.4
 # [mm] A bar is seen by so much on either side of the whisker.
 _BAR_REACH_MM = 20.0
 _NOT_PLACED = (
-    "T_rig_board is missing, so the cameras stand in the frame of the board on the rig, or of the first camera where "
-    "there is no such board; `evaluate` without a cameras.toml finds the rig by the free strokes"
+    "neither T_rig_board nor rig.toml says where the rig is: the cameras stand in the frame of {frame}, and beside "
+    "session.toml they would be taken for cameras in the rig frame; `evaluate` without a cameras.toml finds the rig by the free "
+    "strokes, `whisker-bench calibrate rig` measures it"
 )
 
 
@@ -68,19 +69,42 @@ def calibrate_cameras_command(
     loaded = load_session(session, lenses_known=lenses is not None, follow_links=follow_links)
     if lenses is not None:
         cameras = place_imported(loaded, lenses, names)
-        line = f"lenses of {', '.join(cameras.names)} as in {lenses.name}, taken as exact"
-        return _write(out, cameras, [line], [], file_format)
+        lines = [f"lenses of {', '.join(cameras.names)} as in {lenses.name}, taken as exact"]
+        warnings: list[str] = []
+        if not _is_placed(loaded) and not file_format:
+            _say_not_placed(lenses.name, out, session, lines, warnings)
+        return _write(out, cameras, lines, warnings, file_format)
     views = read_board_views(loaded)
     calibration = calibrate_from(loaded, views)
     cameras = moved_by_file(loaded, calibration.cameras)
-    lengths = [_NOT_PLACED]
-    warnings: list[str] = []
-    if loaded.T_rig_board is not None or loaded.measured_rig is not None:
-        lengths, warnings = check_scale(loaded, cameras)
-    measured = measure_held_out(loaded, views)
-    lines = [*report_lines(calibration), *lengths, *held_out_lines(measured, calibration)]
-    warnings = [*views.notes, *calibration.warnings, *warnings, *_corner_warnings(calibration)]
+    lines = list(report_lines(calibration))
+    warnings = [*views.notes, *calibration.warnings]
+    if _is_placed(loaded):
+        lengths, of_scale = check_scale(loaded, cameras)
+        lines += lengths
+        warnings += of_scale
+    elif not file_format:
+        frame = (
+            "the board on the rig" if _all_see_rig_board(views) else f"camera {cameras.names[0]}"
+        )
+        _say_not_placed(frame, out, session, lines, warnings)
+    lines += held_out_lines(measure_held_out(loaded, views), calibration)
+    warnings += _corner_warnings(calibration)
     return _write(out, cameras, lines, warnings, file_format)
+
+
+def _say_not_placed(
+    frame: str, out: Path, session: Path, lines: list[str], warnings: list[str]
+) -> None:
+    """Add a line on cameras that are in another frame than the rig's, a warning where they are written into the session."""
+    line = _NOT_PLACED.format(frame=frame)
+    is_of_session = out.resolve() == (session / "cameras.toml").resolve()
+    (warnings if is_of_session else lines).append(line)
+
+
+def _is_placed(session: Session) -> bool:
+    """Return whether the session says where the board on the rig stands."""
+    return session.T_rig_board is not None or session.measured_rig is not None
 
 
 def _write(
@@ -110,7 +134,7 @@ def place_imported(session: Session, lenses: Path, names: Sequence[str] = ()) ->
         raise BadInput("there is no such file", file=str(lenses))
     with refused_as_bad_input(lenses.name):
         cameras = _of_session(import_cameras(lenses), session, names, lenses.name)
-        if session.T_rig_board is None:
+        if not _is_placed(session):
             if not are_placed(cameras):
                 found = "does not state where the cameras stand to each other"
                 raise BadInput(f"{found}; [rig] T_rig_board places them", file=lenses.name)
@@ -119,9 +143,13 @@ def place_imported(session: Session, lenses: Path, names: Sequence[str] = ()) ->
         for name in cameras.names:
             if name in session.rig_pictures:
                 views[name] = rig_view(session, name, cameras[name].size_px)
-        exact = place_on_rig(cameras, views, session.board, session.T_rig_board)
-    board = stated_place(session)
-    return move_rig_frame(exact, replace(board, covariance=np.zeros((6, 6))), board)
+        stated = session.T_rig_board
+        T_world_board = np.eye(3, 4) if stated is None else stated
+        placed = place_on_rig(cameras, views, session.board, T_world_board)
+    if stated is not None:
+        board = stated_place(session)
+        placed = move_rig_frame(placed, replace(board, covariance=np.zeros((6, 6))), board)
+    return moved_by_file(session, placed)
 
 
 def _of_session(cameras: Cameras, session: Session, names: Sequence[str], file: str) -> Cameras:
@@ -176,7 +204,12 @@ def board_in_world(session: Session, views: SessionViews) -> np.ndarray | None:
     """
     if session.T_rig_board is not None:
         return session.T_rig_board
-    return np.eye(3, 4) if all(name in views.rig for name in views.boards) else None
+    return np.eye(3, 4) if _all_see_rig_board(views) else None
+
+
+def _all_see_rig_board(views: SessionViews) -> bool:
+    """Return whether all cameras see the board on the rig."""
+    return all(name in views.rig for name in views.boards)
 
 
 def _work_points(session: Session) -> np.ndarray | None:

@@ -22,7 +22,7 @@ from bench.session.traces import read_traces, read_traces_alone
 from bench.session.trial import PLACE_UNCHECKED, Trial, require_object_placed
 from bench.session.whisker import Whisker
 from vision.calibration import read_cameras
-from vision.geometry import Reason, Refused, counted
+from vision.geometry import Cameras, Reason, Refused, counted
 from vision.pictures import (
     STACK_SUFFIXES,
     VIDEO_SUFFIXES,
@@ -37,6 +37,9 @@ _MOST_NAMED = 5  # frames in one line
 # [1/rad²] Of d_x by (10), at most: its error where the whisker turns by so much up to its contact, and is
 # taken as straight. Study: curved_whiskers.py.
 _D_X_BY_TURN2 = 0.36
+# [points], [motor angles] At which a whisker is looked for in the pictures of cameras.toml: finer ones find no other. Stated.
+_POINTS_IN_SIGHT = 21
+_TURNS_IN_SIGHT = 36
 # [1] Of d_x: below, straight will do; noise and touch are off by more. Stated.
 _STRAIGHT_ENOUGH = 0.002
 
@@ -224,7 +227,10 @@ def _known_sizes(session: Session) -> dict[str, Size]:
 
 
 def _calibrated_sizes(session: Session) -> dict[str, Size]:
-    """Return the picture sizes of cameras.toml; none without it. Raise BadInput where one is missing."""
+    """Return the picture sizes of cameras.toml; none without it.
+
+    Raises BadInput where one is missing, or none of its cameras sees the whisker.
+    """
     if session.cameras_toml is None:
         return {}
     with refused_as_bad_input("cameras.toml"):
@@ -233,7 +239,24 @@ def _calibrated_sizes(session: Session) -> dict[str, Size]:
     if missing:
         found = f"has no camera {missing[0]}; it has {', '.join(cameras.names)}"
         raise BadInput(found, file="cameras.toml")
+    if session.whisker is not None and session.base is None:
+        _require_whisker_in_sight(cameras, session.whisker.length_mm)
     return {name: tuple(cameras[name].size_px) for name in cameras.names}
+
+
+def _require_whisker_in_sight(cameras: Cameras, length_mm: float) -> None:
+    """Raise BadInput where no camera has any of the whisker in its picture, at whatever motor angle."""
+    turn_rad = np.linspace(0.0, 2.0 * np.pi, _TURNS_IN_SIGHT, endpoint=False)
+    along_mm = np.linspace(0.0, length_mm, _POINTS_IN_SIGHT)[:, None]
+    across = np.zeros((_POINTS_IN_SIGHT, _TURNS_IN_SIGHT))
+    wires_mm = np.stack([along_mm * np.cos(turn_rad), along_mm * np.sin(turn_rad), across], axis=2)
+    for camera in cameras:
+        px = camera.project(wires_mm)
+        if np.any(np.all((px >= 0.0) & (px < camera.size_px), axis=2)):
+            return
+    found = "no camera would see a whisker that turns about the rig frame's z"
+    cure = "`whisker-bench calibrate cameras` places them in the rig frame"
+    raise BadInput(f"{found}: are its cameras in another frame? {cure}", file="cameras.toml")
 
 
 def _check_camera_sizes(session: Session, camera: str, calibrated_size: Size | None) -> None:

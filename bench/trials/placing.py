@@ -239,9 +239,14 @@ def _turning_elsewhere(session: Session, calibration: SessionCalibration) -> lis
     across_mm = float(np.linalg.norm(invert_transform(first.T_rig_world)[1:, 3]))
     if across_mm < _ELSEWHERE_MM:
         return []
+    placed_by = "T_rig_board"
+    cure = "measure a square of the board and check square_mm, then check T_rig_board"
+    if session.cameras_toml is not None:
+        placed_by = "cameras.toml"
+        cure = "are its cameras in the rig frame? `whisker-bench calibrate cameras` says so where they are not"
     line = (
         f"no free stroke can be read, and what turns with the motor turns about a centre some {across_mm:.0f} mm from "
-        "where T_rig_board has it: measure a square of the board and check square_mm, then check T_rig_board"
+        f"where {placed_by} has it: {cure}"
     )
     return [Reason("board_misplaced", line)]
 

@@ -2,13 +2,16 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bench.base.errors import BadInput
 from bench.cameras.board_views import sampled_frames
-from bench.cameras.calibrate_session import calibrate_cameras_command
+from bench.cameras.calibrate_session import calibrate_cameras_command, place_imported
+from bench.session.rig_file import MeasuredRig
+from bench.session.session import load_session
 from vision.calibration.cameras_file import read_cameras
 
 MANIFEST = """format = 1
@@ -98,6 +101,31 @@ def test_lenses_of_another_tool_are_placed_by_the_rig_board(small_session, tmp_p
         # With true lenses a camera's place is known to some hundredths of a millimetre from one picture.
         assert np.abs(camera.T_camera_rig[:, 3] - truth[camera.name]["t"]).max() < 0.3
         assert np.abs(camera.T_camera_rig[:, :3] - truth[camera.name]["R"]).max() < 1e-3
+
+
+def test_lenses_of_another_tool_are_placed_by_rig_toml_or_said_to_be_in_their_own_frame(
+    small_session, tmp_path, capsys
+):
+    truth = json.loads((small_session / "truth.json").read_text())["cameras"]
+    file = tmp_path / "anipose.toml"
+    text = [LENSES.format(name=name, K=t["K"], dist=t["dist"]) for name, t in truth.items()]
+    file.write_text("".join(text).replace("500.0]", "510.0]", 1))
+    stated = load_session(small_session)
+    measured = MeasuredRig(stated.T_rig_board, np.diag([1e-6] * 3 + [0.01] * 3), "strokes")
+    by_file = replace(stated, T_rig_board=None, measured_rig=measured)
+    for one, other in zip(place_imported(stated, file), place_imported(by_file, file)):
+        np.testing.assert_allclose(other.T_camera_rig, one.T_camera_rig, atol=1e-6)
+    np.testing.assert_allclose(
+        place_imported(by_file, file).placement, measured.covariance, atol=1e-12
+    )
+    shutil.copytree(small_session, tmp_path / "session")
+    manifest = tmp_path / "session" / "session.toml"
+    before, _, after = manifest.read_text().partition("[rig]\n")
+    manifest.write_text(before + after[after.index("\n[") :])
+    outs = (tmp_path / "c.toml", tmp_path / "session" / "cameras.toml")
+    found = [calibrate_cameras_command(tmp_path / "session", out, file) for out in outs]
+    assert found == [0, 1]
+    assert capsys.readouterr().out.count("stand in the frame of anipose.toml") == 2
 
 
 def test_lenses_that_cannot_be_are_refused(small_session, tmp_path):

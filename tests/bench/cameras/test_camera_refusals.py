@@ -8,11 +8,15 @@ import cv2
 import numpy as np
 import pytest
 
+from bench.base.errors import BadInput
+from bench.cameras.cameras_toml import write_cameras
 from bench.cameras.session_cameras import calibrate_session
 from bench.commands.cli import main
 from bench.session.session import load_session
 from bench.session.session_check import checked_session
 from vision.calibration.cameras_file import read_cameras
+from vision.geometry.camera import Camera, Cameras
+from vision.geometry.rotation import exp_rotation
 
 
 @pytest.fixture
@@ -136,6 +140,17 @@ def test_a_diverged_lens_brought_along(small_copy, refused, tmp_path):
 def test_another_tool_s_file_as_cameras_toml(small_copy):
     (small_copy / "cameras.toml").write_text("[cameras.high]\ntranslation = [0, 0, 500]\n")
     with pytest.raises(Exception, match=r"calibrate cameras SESSION --lenses FILE"):
+        checked_session(small_copy)
+
+
+def test_cameras_in_another_frame_as_cameras_toml(small_copy):
+    """That of the first camera, as calibrations without a board on the rig have it."""
+    matrix = [[2000.0, 0.0, 640.0], [0.0, 2000.0, 360.0], [0.0, 0.0, 1.0]]
+    aside = np.column_stack([exp_rotation([0.0, -0.6, 0.0]), [-200.0, 0.0, 60.0]])
+    poses = {"high": np.eye(3, 4), "low": aside}
+    cameras = [Camera(n, (1280, 720), matrix, np.zeros(5), T) for n, T in poses.items()]
+    write_cameras(small_copy / "cameras.toml", Cameras(tuple(cameras)))
+    with pytest.raises(BadInput, match="no camera would see a whisker that turns about the rig"):
         checked_session(small_copy)
 
 
