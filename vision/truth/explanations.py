@@ -11,6 +11,7 @@ alarm costs the time of a fit.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -100,16 +101,23 @@ class Explanation:
             warning=self.warning,
         )
 
+    @cached_property
     def place_comparison(self) -> PlaceComparison:
         """Return the comparison of this fit's place with others."""
         curves = self.fitted.some_curves(FRAMES)
         return PlaceComparison(self.whisk.views, curves, self.axis, self.whisk.rods)
 
+    @cached_property
     def detection_score(self) -> float:
         """Return how clearly the cameras see a bar about the fitted axis, as the search scores it."""
         whisk = self.whisk
         scene = SearchScene(whisk.views, whisk.cameras, whisk.rods, whisk.motor_rad, whisk.settings)
         return with_lines(scene, SeenBar(self.axis, {})).detection_score
+
+    def without_rivals(self) -> Self:
+        """Return the fit with a bar that no other one may be."""
+        bar = replace(self.whisk.bar, rivals=())
+        return replace(self, whisk=replace(self.whisk, bar=bar))
 
     def from_place(self, axis: BarAxis) -> Self:
         """Return the fit that begins from another place. Raises Refused where there is none."""
@@ -173,7 +181,7 @@ def best_explanation(first: Explanation) -> Explanation:
         if best.fitted is before.fitted:
             break
     else:
-        best = replace(best, warning=_unconverged_warning(best.place_comparison(), best))
+        best = replace(best, warning=_unconverged_warning(best.place_comparison, best))
     return _in_place_of(first, best)
 
 
@@ -181,8 +189,9 @@ def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
     """Return a fit, or that from another bar which is clearer, with a warning where it hardly is.
 
     rivals: axes of bars that the search has not excluded. Where a whisk fits at one of them and
-    changes as much of the pictures, detection scores about the two fitted axes decide. Raises
-    Refused where these are alike and the distances differ.
+    changes as much of the pictures, detection scores about the two fitted axes decide; the bar has
+    no rivals then, for the whisks to come. Raises Refused where these are alike and the distances
+    differ.
     """
     comparison = _comparison(first) if rivals else None
     best = first
@@ -197,14 +206,14 @@ def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
             continue
         if comparison and _is_better(comparison, best.axis, other.axis, _LIKELY_SIGMAS):
             continue
-        more_score = other.detection_score() - best.detection_score()
+        more_score = other.detection_score - best.detection_score
         if more_score > 0.0:
             best, other = other, best
         if abs(more_score) < CLEARER:
             _require_one(best, other)
             best = replace(best, warning=_rival_warning(comparison, other.axis, best.axis))
-            break
-    return _in_place_of(first, best)
+            return _in_place_of(first, best)
+    return _in_place_of(first, best).without_rivals()
 
 
 def _are_apart(comparison: PlaceComparison | None, place: BarAxis, other: BarAxis) -> bool:
@@ -281,7 +290,7 @@ def _comparison(fit: Explanation, earlier: PlaceComparison | None = None) -> Pla
     """
     if not _is_comparable(fit.whisk):
         return None
-    comparison = earlier or fit.place_comparison()
+    comparison = earlier or fit.place_comparison
     return comparison if len(comparison.bands) == len(fit.whisk.views) else None
 
 

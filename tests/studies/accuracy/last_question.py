@@ -73,7 +73,7 @@ def ask(whisk: WhiskPictures, true: BarAxis, d_x_mm: float) -> Row:
     """A whisk fitted from its bar's place, and asked about. Raises Refused where there is no first fit."""
     first = Explanation(whisk, fit_whisk(whisk))
     begin = time.process_time()
-    question = first.place_comparison()
+    question = first.place_comparison
     best = question.best
     gain, gain_sigma = question.gain(best, first.axis)
     asked_ms = 1e3 * (time.process_time() - begin)

@@ -168,6 +168,7 @@ class Placed(Explanation):
     def axis(self) -> BarAxis:
         return at(self.fitted.x_mm)
 
+    @property
     def place_comparison(self):
         return ComparedPlaces()
 
@@ -353,8 +354,9 @@ def test_where_the_pictures_cannot_be_compared_the_clearer_of_two_slopes_is_the_
     """Both cameras of a mirror looked along an upright bar: a fit that began 41° off ended at 113°, 580 sigma off."""
     upright = BarAxis(np.array([49.4, 5.6, 0.0]), np.array([0.0, 0.0, 1.0]))
     leaning = BarAxis(np.array([49.4, 3.4, 3.1]), np.array([0.0, -0.92, 0.39]))
-    clear = SimpleNamespace(axis=upright, detection_score=lambda: 8.0)
-    first = SimpleNamespace(axis=leaning, detection_score=lambda: -2.5, from_place=lambda _: clear)
+    alone = object()  # no later whisk fits the one that has lost
+    clear = SimpleNamespace(axis=upright, detection_score=8.0, without_rivals=lambda: alone)
+    first = SimpleNamespace(axis=leaning, detection_score=-2.5, from_place=lambda _: clear)
     monkeypatch.setattr(explanations, "_comparison", lambda *_: None)
     monkeypatch.setattr(explanations, "_in_place_of", lambda _, best: best)
-    assert explanations._weigh_rivals(first, [upright]) is clear
+    assert explanations._weigh_rivals(first, [upright]) is alone
