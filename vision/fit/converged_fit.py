@@ -16,11 +16,13 @@ from vision.fit.problem import (
     curves_of,
     point_rows,
     rest_shape,
+    wire_of,
 )
 from vision.fit.quantities import Jacobians, Measured, jacobians
 from vision.fit.solve import Linear, linearise
 from vision.geometry.camera import N_PARAMETERS
 from vision.geometry.centreline import Curves
+from vision.geometry.rods import Wire
 from vision.geometry.touched import Axis
 from vision.wire.points import Observed
 
@@ -40,6 +42,11 @@ class ConvergedFit:
     def curves(self) -> Curves:
         """Return the wire's centrelines in all frames."""
         return curves_of(self.problem, self.state.vector, self.state.arcs_mm)[0]
+
+    @property
+    def wire(self) -> Wire:
+        """Return the whisker, with the taper that the fit has."""
+        return wire_of(self.problem, self.state.vector, 0)
 
     @property
     def axis(self) -> Axis:

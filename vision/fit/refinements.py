@@ -20,7 +20,6 @@ import numpy as np
 
 from vision.fit.blocks import columns_of
 from vision.fit.converged_fit import ConvergedFit
-from vision.fit.problem import Problem, State, bar_axes, bends, curves_of
 from vision.fit.quantities import measure
 from vision.fit.reshaped import reshape
 from vision.fit.solve import residuals
@@ -114,50 +113,41 @@ def _large_bending(fit: ConvergedFit) -> LeftOut:
     """Return the effect of a beam of small angles, with no more friction along the whisker than it
     has.
     """
-    problem = fit.problem
-    state = fit.state
-    curves, arcs = curves_of(problem, state.vector, state.arcs_mm)
-    contacts_mm = _contacts_of_small_angles(problem, state, curves, arcs)
-    moves = _in_rig(problem, curves, _small_angles(problem, state, curves, contacts_mm))
-    rows, slip = reshape(fit, moves)
+    contacts_mm = _contacts_of_small_angles(fit)
+    rows, slip = reshape(fit, _moved_by_small_angles(fit, contacts_mm))
     return _followed(fit, rows[:, 0], float(slip[0]))
 
 
-def _in_rig(problem: Problem, curves: Curves, of_tangents: np.ndarray) -> Curves:
-    """Return the move of the centrelines by that of their tangents in the hub's frame (f, m, 3)."""
-    turned = np.swapaxes(rotation_z(problem.motor_rad), -1, -2)
-    tangents = of_tangents[None] @ turned
+def _moved_by_small_angles(fit: ConvergedFit, contacts_mm: np.ndarray) -> Curves:
+    """Return how the centrelines move to those of a beam of small angles that touches at arcs (f,),
+    mm: points and tangents (1, f, m, 3).
+
+    It has slopes for sines, and distance for arc.
+    """
+    curves = fit.curves
+    to_hub = rotation_z(fit.problem.motor_rad)
+    along = curves.tangents @ to_hub
+    turn = np.linalg.norm(fit.bend_rad, axis=-1)[:, None]
+    friction = fit.state.vector[fit.problem.blocks.friction.start]
+    here = bend_growth(turn, friction, curves.arc_mm, fit.state.arcs_mm[:, None], fit.wire)
+    there = tangent_growth(curves.arc_mm, contacts_mm[:, None], fit.wire)
+    slope = there - np.sinc(turn * here / np.pi) * here
+    across = slope[..., None] * fit.bend_rad[:, None]
+    in_hub = np.concatenate([1.0 - along[..., :1], across], axis=-1)
+    tangents = in_hub[None] @ np.swapaxes(to_hub, -1, -2)
     return Curves(curves.arc_mm, simpson() @ tangents * curves.arc_mm[1], tangents)
 
 
-def _small_angles(
-    problem: Problem, state: State, curves: Curves, arcs_mm: np.ndarray
-) -> np.ndarray:
-    """Return the difference of the tangents (f, m, 3) of a beam of small angles that touches at
-    arcs_mm (f,): slopes for sines, and distance for arc."""
-    along = curves.tangents @ rotation_z(problem.motor_rad)
-    bend = bends(problem, state.vector)
-    turn = np.linalg.norm(bend, axis=-1)[:, None]
-    friction = state.vector[problem.blocks.friction.start]
-    contact_mm = state.arcs_mm[:, None]
-    here = bend_growth(turn, friction, curves.arc_mm, contact_mm, problem.wire)
-    there = tangent_growth(curves.arc_mm, arcs_mm[:, None], problem.wire)
-    slope = there - np.sinc(turn * here / np.pi) * here
-    across = slope[..., None] * bend[:, None]
-    return np.concatenate([1.0 - along[..., :1], across], axis=-1)
-
-
-def _contacts_of_small_angles(
-    problem: Problem, state: State, curves: Curves, arcs_mm: np.ndarray
-) -> np.ndarray:
+def _contacts_of_small_angles(fit: ConvergedFit) -> np.ndarray:
     """Return where (f,) along itself a beam of small angles touches: distances are shorter than
     arcs.
     """
-    moves = _in_rig(problem, curves, _small_angles(problem, state, curves, arcs_mm))
+    curves = fit.curves
+    arcs_mm = fit.state.arcs_mm
+    moves = _moved_by_small_angles(fit, arcs_mm)
     points = curves.points_mm + moves.points_mm[0]
     tangents = curves.tangents + moves.tangents[0]
-    axis = bar_axes(problem, state.vector)
-    return closest_arc(Curves(curves.arc_mm, points, tangents), axis, problem.wire, arcs_mm)
+    return closest_arc(Curves(curves.arc_mm, points, tangents), fit.axes, fit.wire, arcs_mm)
 
 
 def _taper(fit: ConvergedFit) -> LeftOut:

@@ -57,7 +57,7 @@ def _by_contacts(fit: ConvergedFit, moves: Curves, step: float) -> tuple[np.ndar
     tangents = _with_moves(curves.tangents, step * moves.tangents)
     axis = fit.axes
     moved = Curves(curves.arc_mm, points, tangents)
-    distance, _, contact = clearance(moved, axis, fit.problem.wire)
+    distance, _, contact = clearance(moved, axis, fit.wire)
     by_change = (distance[1:] - distance[0]) / step / CONTACT_SIGMA_MM
     along = axis.bar_at(contact[0, frame]).direction[0]
     slip = (contact[1:, frame] - contact[0, frame]) @ along / step

@@ -7,9 +7,10 @@ import pytest
 
 from tests.scenes.model_scenes import scene, with_points
 from vision.fit.converged_fit import ConvergedFit
-from vision.fit.problem import State
+from vision.fit.problem import CONTACT_SIGMA_MM, State
 from vision.fit.solve import solve
 from vision.fit.touch import first_touch, touch_and_sigma
+from vision.geometry.contact import clearance
 from vision.geometry.rods import Bar, ProfiledWire, Rods, Wire
 
 EXACT = Wire("cone", 100.0, 1.5)
@@ -75,6 +76,16 @@ def test_a_length_off_by_its_sigma_is_partly_seen(drawn):
     for name, (value, _) in found.items():
         off = moved[name][0] - values[name][0]
         assert value - values[name][0] == pytest.approx(left * off, rel=0.1)
+
+
+def test_the_wire_of_a_fit_has_the_taper_that_it_ended_with(drawn):
+    """As stated, half a millimetre longer, it would be 0.7 CONTACT_SIGMA_MM from where the fit has it."""
+    problem, state, _, _ = fitted(drawn, replace(LONGER, length_sigma_mm=0.5))
+    fit = ConvergedFit(problem, state)
+    distance, arc, _ = clearance(fit.curves, fit.axes, fit.wire)
+    gap = distance - replace(problem.rods, wire=fit.wire).reach_mm(arc)
+    residual = (gap[problem.touching] - state.vector[problem.blocks.reach.start]) / CONTACT_SIGMA_MM
+    assert residual == pytest.approx(fit.linear.residual[problem.contact_rows], abs=1e-3)
 
 
 @pytest.mark.parametrize("wire", [EXACT, Wire("cylinder", 100.0, 1.0, 0.5, 0.02)])
