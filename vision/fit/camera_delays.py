@@ -13,7 +13,6 @@ import numpy as np
 
 from vision.fit.converged_fit import ConvergedFit, times_residual_covariance
 from vision.fit.problem import Problem, point_rows
-from vision.fit.turns import by_turn
 
 # [frames⁻²] Information on the delay of a camera that shows no wire, which would run away. Stated.
 _PRIOR = 1e-4
@@ -34,7 +33,7 @@ def camera_delays(
         return {}
     linear = fit.linear
     weight = linear.weights()
-    columns = _by_delay(problem, by_turn(fit))
+    columns = _by_delay(problem, fit.by_turn)
     found = {}
     for picture in dict.fromkeys(pictures):
         column = columns[:, [other == picture for other in pictures]].sum(axis=1)

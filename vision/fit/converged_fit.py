@@ -1,6 +1,6 @@
 """A fit that has converged: what it says, and how uncertain that is by points, priors and cameras."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,16 +16,19 @@ from vision.fit.problem import (
     curves_of,
     point_rows,
     rest_shape,
+    shifts_mm,
     wire_of,
 )
 from vision.fit.quantities import Jacobians, Measured, jacobians
-from vision.fit.solve import Linear, linearise
+from vision.fit.solve import Linear, linearise, residuals
 from vision.geometry.camera import N_PARAMETERS
 from vision.geometry.centreline import Curves
 from vision.geometry.rods import Wire
 from vision.geometry.touched import Axis
 from vision.wire.points import Observed
 
+# [rad] Step of differences of a frame's turn: the tip moves by 0.01 mm. Derived.
+_STEP_TURN_RAD = 1e-4
 # [points] Beyond, nothing is shared: at the highest correlation that `_MOST_ALIKE` allows, 7/9,
 # 0.7 % is left. Derived.
 _FARTHEST = 20
@@ -68,6 +71,11 @@ class ConvergedFit:
         """Return the object's axis (f, 3) in each frame, (1, 3) where it stands."""
         return bar_axes(self.problem, self.state.vector)
 
+    @property
+    def shifts_mm(self) -> np.ndarray:
+        """Return how far (f, 3) the object is from its axis in each frame, (1, 3) of 0 where it stands."""
+        return shifts_mm(self.problem, self.state.vector)
+
     @cached_property
     def linear(self) -> Linear:
         """Return residuals and Jacobian of all observations."""
@@ -85,6 +93,15 @@ class ConvergedFit:
         """
         jacobian = self.weighted.jacobian
         return np.linalg.inv(jacobian.T @ jacobian)
+
+    @cached_property
+    def by_turn(self) -> np.ndarray:
+        """Return derivatives (n,) of all residuals by the whisker's turn, beyond the motor's angle, in the
+        frame that each is of.
+        """
+        problem = self.problem
+        turned = replace(problem, motor_rad=problem.motor_rad + _STEP_TURN_RAD)
+        return (residuals(turned, self.state) - self.linear.residual) / _STEP_TURN_RAD
 
     @cached_property
     def by_camera(self) -> np.ndarray:

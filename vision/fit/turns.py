@@ -7,16 +7,13 @@ whisker's clamp and is not determined.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from vision.fit.converged_fit import ConvergedFit
 from vision.fit.problem import Problem, point_rows
-from vision.fit.solve import residuals
 
-# [rad] Of differences: the tip moves by 0.01 mm. Derived.
-_STEP_RAD = 1e-4
 # [rad] Keeps a frame without points from running away. Stated.
 _PRIOR_RAD = 0.3
 
@@ -50,18 +47,11 @@ def frame_turns(fit: ConvergedFit, index: Sequence[int]) -> Turns:
     return Turns(np.asarray(index), problem.motor_rad, turn_rad, covariance[-count:, -count:])
 
 
-def by_turn(fit: ConvergedFit) -> np.ndarray:
-    """Return derivatives (n,) of all residuals by the turn of the frame that each is of."""
-    turned = replace(fit.problem, motor_rad=fit.problem.motor_rad + _STEP_RAD)
-    return (residuals(turned, fit.state) - fit.linear.residual) / _STEP_RAD
-
-
 def _by_turns(fit: ConvergedFit) -> np.ndarray:
     """Return derivatives (n, f) of all residuals by the turn of each frame."""
-    own = by_turn(fit)
     frames = np.arange(len(fit.problem.motor_rad))
-    is_of_frame = _frame_of_row(fit.problem, len(own))[:, None] == frames
-    return is_of_frame * own[:, None]
+    is_of_frame = _frame_of_row(fit.problem, len(fit.by_turn))[:, None] == frames
+    return is_of_frame * fit.by_turn[:, None]
 
 
 def _frame_of_row(problem: Problem, count: int) -> np.ndarray:

@@ -424,7 +424,7 @@ class LiveWhisk:
         lines = CarriedLines(whisk, strategy.reader, wire=self._wire)
         fitted = fit_last(whisk, lines, expected, strategy.touch)
         require_cameras(fitted.problem.seen, strategy.touch)
-        check_scatter(fitted.problem, fitted.state, lines.most_scatter_px)
+        check_scatter(fitted, lines.most_scatter_px)
         return self._unless_elsewhere(whisk, fitted)
 
     def _unless_elsewhere(self, whisk: WhiskPictures, fitted: FittedWhisk) -> WhiskTruth:

@@ -72,7 +72,7 @@ def _bar_sigmas_px(known: KnownWhisk, pictures: Sequence[CameraPictures]) -> dic
     """
     place = known.place
     views = [own.view(dict.fromkeys(place.curves, own.with_bar)) for own in pictures]
-    wires_px = {view.camera.name: place.wire_px(view.camera) for view in views}
+    wires_px = place.wires_px(views)
     lines = _bar_middles(known, views, wires_px, _USUAL)
     edges = {}
     if _needs_edges(known, views, lines):

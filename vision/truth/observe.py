@@ -361,7 +361,7 @@ def _first_truth(explained: Explanation) -> WhiskTruth:
 def fitted_truth(explained: Explanation) -> WhiskTruth:
     """Return the truth of a fitted whisk, with its checks and the whisker's base before touch."""
     fitted = explained.fitted
-    whisk = explained.whisk.yielding_as(fitted.problem, fitted.state)
+    whisk = explained.whisk.yielding_as(fitted)
     truth = to_whisk(whisk, fitted)
     beam = check_beam(fitted, fitted.covariance) if whisk.settings.check_beam else None
     status = joined(truth.status, explained.warning, *warnings_of(whisk, fitted, beam))

@@ -83,20 +83,20 @@ class BarMiddles(ObjectReader):
     def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the middle of the bar, where there is one."""
         is_only = last and not self.lines
-        passes = 2 if is_only else 1
-        for _ in range(0 if self.are_fine else passes):
-            self.are_fine = bool(self.lines)
-            self.lines = measure_bars(
-                self.views,
-                place.axis,
-                self.radius_mm,
-                place.wires_px(self.views),
-                self.settings,
-                self.lines,
-            )
+        for _ in range(2 if is_only else 1):
+            if not self.are_fine:
+                self._measure(place)
         return {
             name: [ReadLine(line.points, 0)] for name, line in self.lines.items() if line.is_bar
         }
+
+    def _measure(self, place: WhiskPlace) -> None:
+        """Measure the middles, finely where they were measured before."""
+        self.are_fine = bool(self.lines)
+        wires_px = place.wires_px(self.views)
+        self.lines = measure_bars(
+            self.views, place.axis, self.radius_mm, wires_px, self.settings, self.lines
+        )
 
 
 class BarEdges(BarMiddles):

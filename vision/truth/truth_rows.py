@@ -8,7 +8,6 @@ import numpy as np
 
 from vision.fit.covariance import shared_covariance, variance_by_cause
 from vision.fit.line_noise import line_noise
-from vision.fit.problem import shifts_mm
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import whole_rest_mm
 from vision.geometry.reasons import Reason, joined
@@ -187,7 +186,7 @@ def _came(fitted: FittedWhisk, way: np.ndarray) -> Value:
     own = problem.blocks.motion.slice
     by_motion = problem.motion.by_values(fitted.state.vector[own])  # (k, f, 3)
     rows = np.einsum("kfi,fi->fk", by_motion, way)[problem.touching]
-    came_mm = np.sum(shifts_mm(problem, fitted.state.vector) * way, axis=1)[problem.touching]
+    came_mm = np.sum(fitted.shifts_mm * way, axis=1)[problem.touching]
     return Value(came_mm, propagated_sigma(rows, fitted.covariance[own, own]))
 
 

@@ -7,16 +7,7 @@ import numpy as np
 
 from vision.fit.converged_fit import ConvergedFit
 from vision.fit.first_bends import SwingPictures, contact_arc, find_rest, follow_bends
-from vision.fit.problem import (
-    Problem,
-    State,
-    at_rest,
-    bar_axis,
-    bends,
-    curves_of,
-    rest_shape,
-    shifts_mm,
-)
+from vision.fit.problem import Problem, State, at_rest
 from vision.fit.scatter import inflated_by_residuals, scatter_px
 from vision.fit.solve import LAST_SCALE, solve
 from vision.geometry.centreline import Curves, centrelines, unbent_curves
@@ -89,15 +80,15 @@ def fit_lines(
     for _ in range(whisk.settings.rounds):
         seen = lines.all_points(expected.place, last=False)
         require_cameras(seen, touch)
-        problem, state, covariance = _fit(whisk, expected, seen, touch)
-        whisk = whisk.yielding_as(problem, state)
-        check_scatter(problem, state, lines.most_scatter_px)
-        touching, free = touch.part_by_fit(problem, state, covariance)
+        fit, covariance = _fit(whisk, expected, seen, touch)
+        whisk = whisk.yielding_as(fit)
+        check_scatter(fit, lines.most_scatter_px)
+        touching, free = touch.part_by_fit(fit.problem, fit.state, covariance)
         expected = ExpectedWhisk(
-            place=_fitted_place(whisk, problem, state),
-            rest_mm=rest_shape(problem, state.vector),
-            bend_rad=bends(problem, state.vector),
-            arcs_mm=state.arcs_mm,
+            place=_fitted_place(whisk, fit),
+            rest_mm=fit.rest_mm,
+            bend_rad=fit.bend_rad,
+            arcs_mm=fit.state.arcs_mm,
             touching=touching,
             free=free,
         )
@@ -118,9 +109,10 @@ def fit_last(
     Raises Refused where the fit shows no free stroke.
     """
     seen = lines.all_points(expected.place, last=True)
-    problem, state, covariance = _fit(whisk, expected, seen, touch)
-    touch.part_by_fit(problem, state, covariance)  # raises where the last fit shows no free stroke
-    return FittedWhisk(problem, state, whisk.frames, lines)
+    fit, covariance = _fit(whisk, expected, seen, touch)
+    # Raises where the last fit shows no free stroke.
+    touch.part_by_fit(fit.problem, fit.state, covariance)
+    return FittedWhisk(fit.problem, fit.state, whisk.frames, lines)
 
 
 def _expect_coarsely(whisk: WhiskPictures, touch: Touch) -> tuple[WhiskPictures, ExpectedWhisk]:
@@ -226,10 +218,10 @@ def _given_way_mm(
 
 def _fit(
     whisk: WhiskPictures, expected: ExpectedWhisk, seen: list[Observed], touch: Touch
-) -> tuple[Problem, State, np.ndarray]:
+) -> tuple[ConvergedFit, np.ndarray]:
     """Fit all lines, with sigmas as large as residuals show.
 
-    Returns problem, state, and the parameters' covariance by noise and priors.
+    Returns with the fit the parameters' covariance (size, size) by noise and priors.
     """
     prior = whisk.axis_prior(expected.place.axis)
     problem = Problem(
@@ -248,16 +240,16 @@ def _fit(
     problem, state = touch.with_touch(problem, state, covariance)
     problem = inflated_by_residuals(problem, state)
     state, covariance = solve(problem, state, scales=[LAST_SCALE] * 3)
-    return problem, state, covariance
+    return ConvergedFit(problem, state), covariance
 
 
-def check_scatter(problem: Problem, state: State, most_px: float) -> None:
+def check_scatter(fit: ConvergedFit, most_px: float) -> None:
     """Raise Misled where a camera's lines are not those of one wire."""
-    scatter = scatter_px(problem, state)
+    scatter = scatter_px(fit.problem, fit.state)
     worst = int(np.argmax(scatter))
     if scatter[worst] > most_px:
         raise Misled(
-            problem.cameras.names[worst],
+            fit.problem.cameras.names[worst],
             f"its lines of the wire scatter by {scatter[worst]:.1f} px, {most_px:g} is allowed",
         )
 
@@ -306,8 +298,9 @@ def fit_before_touch(
     )
     middle_mm = np.full(len(nothing), 0.5 * whisk.rods.wire.length_mm)
     state, _ = solve(problem, State(at_rest(problem, rest_mm), middle_mm))
-    check_scatter(problem, state, lines.most_scatter_px)
-    return bar_axis(problem, state.vector).upward(), rest_shape(problem, state.vector)
+    fit = ConvergedFit(problem, state)
+    check_scatter(fit, lines.most_scatter_px)
+    return fit.axis.upward(), fit.rest_mm
 
 
 def _wire_points(whisk: WhiskPictures, place: WhiskPlace) -> list[Observed]:
@@ -325,15 +318,13 @@ def _resting_place(whisk: WhiskPictures, axis: Axis, rest_mm: np.ndarray) -> Whi
     return WhiskPlace(axis, curves, whisk.bar_swept_mm)
 
 
-def _fitted_place(whisk: WhiskPictures, problem: Problem, state: State) -> WhiskPlace:
+def _fitted_place(whisk: WhiskPictures, fit: ConvergedFit) -> WhiskPlace:
     """Return where a fit has object and wire."""
-    vector = state.vector
-    curves, _ = curves_of(problem, vector, state.arcs_mm)
     return WhiskPlace(
-        axis=bar_axis(problem, vector).upward(),
-        curves={f: curves.one(k) for k, f in enumerate(whisk.frames)},
+        axis=fit.axis.upward(),
+        curves={f: fit.curves.one(k) for k, f in enumerate(whisk.frames)},
         swept_mm=whisk.bar_swept_mm,
-        came_mm=shifts_mm(problem, vector),
+        came_mm=fit.shifts_mm,
     )
 
 

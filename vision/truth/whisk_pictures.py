@@ -12,7 +12,6 @@ from vision.fit.converged_fit import ConvergedFit
 from vision.fit.exposure import Exposure, slip_in_exposure
 from vision.fit.motion import Gives, Motion, StatedVelocity, Yielding
 from vision.fit.one_camera_less import OneLess, covariance_of, leave_out_each
-from vision.fit.problem import Problem, State, shifts_mm
 from vision.fit.touch import first_touch
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import Curves
@@ -106,12 +105,12 @@ class WhiskPictures:
         farthest_mm = float(np.linalg.norm(came_mm, axis=1).max())
         return replace(self, gives=Gives(touch_rad, span_rad, farthest_mm))
 
-    def yielding_as(self, problem: Problem, state: State) -> "WhiskPictures":
+    def yielding_as(self, fit: ConvergedFit) -> "WhiskPictures":
         """Return the whisk with the displacements and the touch of a fit, see `yielding`."""
         if self.gives is None:
             return self
-        touch_rad = float(first_touch(problem, state.vector).motor_rad)
-        return self.yielding(shifts_mm(problem, state.vector), touch_rad)
+        touch_rad = float(first_touch(fit.problem, fit.state.vector).motor_rad)
+        return self.yielding(fit.shifts_mm, touch_rad)
 
     @property
     def bar_swept_mm(self) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -27,7 +28,15 @@ class WhiskPlace:
 
     def wire_px(self, camera: Camera) -> list[np.ndarray]:
         """Return the wire's centreline (m, 2) in each frame of a camera."""
-        return [camera.project(curve.points_mm) for curve in self.curves.values()]
+        if camera.name not in self._wires_px:
+            curves = self.curves.values()
+            self._wires_px[camera.name] = [camera.project(curve.points_mm) for curve in curves]
+        return self._wires_px[camera.name]
+
+    @cached_property
+    def _wires_px(self) -> dict[str, list[np.ndarray]]:
+        """Return the centrelines by camera, of the cameras that were asked for so far."""
+        return {}
 
     def wires_px(self, views: Iterable[View]) -> dict[str, list[np.ndarray]]:
         """Return the wire's centreline (m, 2) in each frame, by the camera of each view."""

@@ -35,8 +35,8 @@ PURPOSES: Mapping[str, tuple[str, ...]] = {
     "bar and wire: width, end": ("measure_relative_widths", "wire_widths", "wire_ends"),
     "wire: first pass": ("coarse_shapes",),
     "wire: traced": ("wire_points",),
-    "fits, sigmas": ("_fit", "of", "part_by_fit"),
-    "last question": ("best_explanation",),
+    "fits": ("fit_lines",),
+    "last question": ("best_explanation", "_weigh_rivals"),
     "checks, rows of the truth": ("fitted_truth",),
     "estimators, gauges": ("feel_trial", "with_gauges"),
 }
