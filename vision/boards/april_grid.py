@@ -10,7 +10,9 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from vision.boards.corners import is_found, marker_dictionary
+from vision.boards.corners import is_found, none_detected
+from vision.boards.homography import fit_homography, map_places
+from vision.boards.markers import detect_markers, marker_dictionary
 from vision.boards.saddle_board import SaddleBoard, require_marker_fits
 from vision.geometry.board import grid_mm
 from vision.geometry.checks import require
@@ -95,7 +97,7 @@ class AprilGrid(SaddleBoard):
         How wide the tags' rims are, and which way up tags were printed, is what puts their corners
         on one plane; of those the picture as smooth as shows most tags is taken.
         """
-        best = np.empty(0, dtype=int), np.empty((0, 2))
+        best = none_detected()
         for smooth_px in _SMOOTH_PX:
             smooth = cv2.GaussianBlur(picture, (0, 0), smooth_px) if smooth_px else picture
             found = self._on_a_plane(smooth)
@@ -105,7 +107,7 @@ class AprilGrid(SaddleBoard):
 
     def _on_a_plane(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ids (n,) and pixels (n, 2) of tags' corners that are on one plane; none if none are."""
-        best = np.empty(0, dtype=int), np.empty((0, 2))
+        best = none_detected()
         least = _MOST_OFF_PLANE
         for rim in _RIMS:
             numbers, outlines_px = self._tags(picture, rim)
@@ -124,14 +126,10 @@ class AprilGrid(SaddleBoard):
         parameters = cv2.aruco.DetectorParameters()
         parameters.markerBorderBits = rim
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-        detector = cv2.aruco.ArucoDetector(marker_dictionary(_DICTIONARY), parameters)
-        outlines, numbers, _ = detector.detectMarkers(picture)
-        if numbers is None:
-            return np.empty(0, dtype=int), np.empty((0, 4, 2))
-        numbers = numbers.ravel().astype(int)
+        numbers, outlines_px = detect_markers(picture, _DICTIONARY, parameters)
         values, counts = np.unique(numbers, return_counts=True)
         once = np.isin(numbers, values[counts == 1]) & (numbers < self.tag_count)
-        return numbers[once], np.array(outlines, dtype=float).reshape(-1, 4, 2)[once]
+        return numbers[once], outlines_px[once]
 
     def _corner_ids(self, numbers: np.ndarray, order: np.ndarray) -> np.ndarray:
         """Return the ids (4 n,) of the corners of tags (n,), in an order (4, 2) of columns and rows."""
@@ -141,12 +139,14 @@ class AprilGrid(SaddleBoard):
     def _off_plane(self, ids: np.ndarray, outlines_px: np.ndarray) -> float:
         """Return how far corners lie off a plane's picture in the median, in sides of a tag."""
         px = outlines_px.reshape(-1, 2)
-        H, _ = cv2.findHomography(self.corners_mm[ids, :2], px, 0)
+        places_mm = self.corners_mm[ids, :2]
+        H = fit_homography(places_mm, px)
         if H is None:
             return np.inf
-        on_plane = cv2.perspectiveTransform(self.corners_mm[ids, None, :2], H)[:, 0]
+        on_plane_px, _ = map_places(H, places_mm)
+        off_px = np.linalg.norm(on_plane_px - px, axis=1)
         side_px = np.linalg.norm(outlines_px[:, 0] - outlines_px[:, 1], axis=1)
-        return float(np.median(np.linalg.norm(on_plane - px, axis=1)) / np.median(side_px))
+        return float(np.median(off_px) / np.median(side_px))
 
     def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:
         """Return a sentence on how many tags are seen; None if the board is found."""

@@ -6,9 +6,10 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from vision.boards.corners import MIN_CORNERS, marker_dictionary
+from vision.boards.corners import MIN_CORNERS, none_detected
 from vision.boards.diagnosis import why_no_charuco
 from vision.boards.marker_size import check_marker_size
+from vision.boards.markers import marker_dictionary
 from vision.boards.saddle_board import CheckeredBoard, require_marker_fits
 from vision.geometry.checks import require
 
@@ -95,7 +96,7 @@ class CharucoBoard(CheckeredBoard):
         detector = cv2.aruco.CharucoDetector(self.opencv())
         px, ids, markers, _ = detector.detectBoard(255 - picture if self.inverted else picture)
         if ids is None or len(ids) < MIN_CORNERS:
-            return np.empty(0, dtype=int), np.empty((0, 2)), ()
+            return *none_detected(), ()
         return ids.reshape(-1).astype(int), px.reshape(-1, 2).astype(float), markers
 
     def why_not_found(self, greys: list[np.ndarray], *, mirrored: bool = False) -> str | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from vision.boards.corners import MIN_CORNERS, Corners, is_found, to_8_bit
+from vision.boards.corners import MIN_CORNERS, Corners, is_found, none_detected, to_8_bit
 from vision.boards.saddle_board import CheckeredBoard
 from vision.boards.symmetry import possible_labels, turns_onto_itself, upper_left_first
 from vision.geometry.checks import require
@@ -56,7 +56,7 @@ class Checkerboard(CheckeredBoard):
         """Return all corners; none where a part of the board is hidden or out of the picture."""
         is_found, px = cv2.findChessboardCornersSB(picture, self.grid, flags=_FLAGS)
         if not is_found:
-            return np.empty(0, dtype=int), np.empty((0, 2))
+            return none_detected()
         candidates = possible_labels(px.reshape(-1, 2).astype(float), self)
         dark_first = [px for px in candidates if self._darkness(px, picture) > 0]
         return np.arange(len(px)), upper_left_first(dark_first or candidates)

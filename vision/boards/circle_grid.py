@@ -10,9 +10,9 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from vision.boards.corners import MIN_CORNERS, Corners, is_found, to_8_bit
+from vision.boards.corners import MIN_CORNERS, Corners, is_found, none_detected, to_8_bit
 from vision.boards.discs import cut_discs, fit_discs
-from vision.boards.homography import map_places
+from vision.boards.homography import fit_homography, map_places
 from vision.boards.saddle import Saddles
 from vision.boards.saddle_board import is_undisturbed, is_usual, local_frames
 from vision.boards.symmetry import possible_labels, turns_onto_itself, upper_left_first
@@ -83,7 +83,7 @@ class CircleGrid(Board):
             if is_found:
                 candidates = possible_labels(px.reshape(-1, 2).astype(float), self)
                 return np.arange(len(px)), upper_left_first(candidates)
-        return np.empty(0, dtype=int), np.empty((0, 2))
+        return none_detected()
 
     def refine(self, grey: np.ndarray, px_guess: np.ndarray, ids: np.ndarray) -> Corners:
         """Fit discs; guesses may be off by a third of a radius. The perspective's shift of their
@@ -174,7 +174,7 @@ def perspective_shift(px: np.ndarray, places_mm: np.ndarray, radius_mm: float) -
     circles = centres[:, :, None] * centres[:, None] - radius_mm**2 * np.diag([1.0, 1.0, 0.0])
     shift_px = np.zeros_like(px)
     for _ in range(2):
-        H, _ = cv2.findHomography(places_mm, px - shift_px, 0)
+        H = fit_homography(places_mm, px - shift_px)
         of_picture = (H @ circles @ H.T)[:, :, 2]
         shift_px = of_picture[:, :2] / of_picture[:, 2:] - map_places(H, places_mm)[0]
     return shift_px

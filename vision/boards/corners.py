@@ -8,7 +8,6 @@ because OpenCV's own scatter by 0.12 to 0.28 px where the picture is noisy or so
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from vision.geometry.board import Board
@@ -75,6 +74,11 @@ def refine_corners(
     return board.refine(grey, px_guess, np.asarray(ids, dtype=int))
 
 
+def none_detected() -> tuple[np.ndarray, np.ndarray]:
+    """Return the ids (0,) and px (0, 2) of no points."""
+    return np.empty(0, dtype=int), np.empty((0, 2))
+
+
 def detect(grey: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray]:
     """Return OpenCV's own points: ids (n,) and px (n, 2), good to about 0.2 px."""
     return board.detect(to_8_bit(grey))
@@ -83,11 +87,6 @@ def detect(grey: np.ndarray, board: Board) -> tuple[np.ndarray, np.ndarray]:
 def is_found(board: Board, greys: Sequence[np.ndarray]) -> bool:
     """Return whether any of some grey pictures shows the board."""
     return any(len(detect(grey, board)[0]) for grey in greys)
-
-
-def marker_dictionary(name: str) -> cv2.aruco.Dictionary:
-    """Return OpenCV's dictionary of markers of a name, such as DICT_5X5_100."""
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
 
 
 def to_8_bit(grey: np.ndarray) -> np.ndarray:

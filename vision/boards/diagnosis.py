@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from vision.boards.corners import MIN_CORNERS, detect, marker_dictionary, to_8_bit
+from vision.boards.corners import MIN_CORNERS, detect, to_8_bit
+from vision.boards.markers import detect_markers, marker_dictionary
 
 if TYPE_CHECKING:
     from vision.boards.charuco import CharucoBoard
@@ -127,8 +128,11 @@ def _count_markers(greys: Sequence[np.ndarray], dictionary: str) -> float:
     """Return how many markers of a dictionary are seen in a picture, on average."""
     parameters = cv2.aruco.DetectorParameters()
     parameters.detectInvertedMarker = True
-    detector = cv2.aruco.ArucoDetector(marker_dictionary(dictionary), parameters)
-    return float(np.mean([len(detector.detectMarkers(to_8_bit(grey))[0]) for grey in greys]))
+    counts = []
+    for grey in greys:
+        numbers, _ = detect_markers(to_8_bit(grey), dictionary, parameters)
+        counts.append(len(numbers))
+    return float(np.mean(counts))
 
 
 def _describe_markers(greys: Sequence[np.ndarray], board: "CharucoBoard") -> str:

@@ -1,6 +1,14 @@
-"""Where a homography maps places, and how fast it does."""
+"""Homographies: by points of a plane, where they map places, and how fast they do."""
 
+import cv2
 import numpy as np
+
+
+def fit_homography(places: np.ndarray, mapped: np.ndarray) -> np.ndarray | None:
+    """Return the homography (3, 3) of least squares that maps places (n, 2) to others (n, 2); None
+    where they determine none.
+    """
+    return cv2.findHomography(places, mapped, 0)[0]
 
 
 def map_places(H: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from vision.boards.corners import to_8_bit
+from vision.boards.homography import fit_homography
 from vision.geometry.refusals import Refused
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def _marker_sides(grey: np.ndarray, board: "CharucoBoard") -> list[tuple[float, 
     ids, px, markers = board.detect_with_markers(to_8_bit(grey))
     if not len(ids):
         return []
-    H, _ = cv2.findHomography(px, board.corners_mm[ids, :2] / board.square_mm, 0)
+    H = fit_homography(px, board.corners_mm[ids, :2] / board.square_mm)
     if H is None:
         return []
     sides = []

@@ -18,8 +18,9 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from vision.boards.corners import marker_dictionary, to_8_bit
+from vision.boards.corners import to_8_bit
 from vision.boards.homography import map_places, slopes_of
+from vision.boards.markers import detect_markers, marker_dictionary
 from vision.geometry.board import Board
 
 # [px] Pixels about a marker that are cut out with it: what OpenCV's corners are off by. Stated.
@@ -70,14 +71,14 @@ def find_other_markers(grey: np.ndarray, board: Board) -> list[Marker]:
         picture = 255 - picture
     name, first_spare = board.spare_markers
     dictionary = marker_dictionary(name)
-    outlines, numbers, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(picture)
+    numbers, outlines_px = detect_markers(picture, name)
     found = []
-    for outline, number in zip(outlines, () if numbers is None else numbers.ravel()):
+    for number, outline_px in zip(numbers.tolist(), outlines_px):
         if number < first_spare:
             continue
-        px = _refine(picture, dictionary, int(number), outline.reshape(4, 2))
+        px = _refine(picture, dictionary, number, outline_px)
         if px is not None:
-            found.append(Marker(int(number), px))
+            found.append(Marker(number, px))
     return found
 
 
@@ -120,7 +121,7 @@ def _fit_pattern(
     if not _is_pattern(model, fitted, units.scale_px):
         return None
     from_print = np.linalg.inv(_homography(parameters))
-    return units.to_px(cv2.perspectiveTransform(on_print[:, None], from_print)[:, 0])
+    return units.to_px(map_places(from_print, on_print)[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,11 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 
 from vision.boards.corners import MIN_CORNERS, Corners
 from vision.boards.edge_pixels import Windows, cut_windows
-from vision.boards.homography import map_places, slopes_of
+from vision.boards.homography import fit_homography, map_places, slopes_of
 from vision.boards.saddle import Saddles, fit_saddles
 from vision.geometry.board import Board, grid_mm
 from vision.geometry.checks import require, require_length
@@ -131,7 +130,7 @@ def local_frames(px: np.ndarray, places: np.ndarray) -> np.ndarray | None:
     """
     if len(px) < MIN_CORNERS:
         return None
-    H, _ = cv2.findHomography(places, px, 0)
+    H = fit_homography(places, px)
     if H is None or not np.all(np.isfinite(H)) or abs(np.linalg.det(H)) < 1e-12:
         return None
     return slopes_of(H, px, map_places(H, places)[1])

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from vision.boards.corners import Corners
+from vision.boards.homography import fit_homography
 from vision.geometry import lens as lens_model
 from vision.geometry.refusals import Refused
 from vision.geometry.rotation import angle_between, apply, compose, invert_transform
@@ -61,7 +62,7 @@ def _focal_equations(view: Corners, corners_mm: np.ndarray, size_px: tuple[int, 
     """
     middle_px = 0.5 * (np.array(size_px) - 1)
     in_widths = (view.px - middle_px) / size_px[0]
-    H, _ = cv2.findHomography(corners_mm[view.ids, :2], in_widths, 0)
+    H = fit_homography(corners_mm[view.ids, :2], in_widths)
     if H is None:
         return np.zeros((0, 2))
     axes = H[:, :2] / np.linalg.norm(H[:, :2])
