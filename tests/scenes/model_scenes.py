@@ -62,7 +62,9 @@ def _bent_until_touching(problem, state, slope=0.35):
         middle = 0.5 * (low + high)
         vector = state.vector.copy()
         vector[problem.first_bend :] = np.stack([middle, -slope * middle], axis=1).ravel()
-        curves, arcs = curves_of(problem, vector, state.arcs_mm, rounds=6)
+        arcs = state.arcs_mm
+        for _ in range(6):
+            curves, arcs = curves_of(problem, vector, arcs)
         gap = (
             clearance(curves, bar_axes(problem, vector), problem.wire)[0]
             - problem.rods.reach_mm(arcs)

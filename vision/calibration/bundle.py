@@ -286,9 +286,9 @@ class _Motion(NamedTuple):
     @staticmethod
     def none(count: int) -> "_Motion":
         """Return the motion of a board that stands still, for `count` corners."""
-        still = np.zeros((count, 3))
+        zero = np.zeros((count, 3))
         eye = np.broadcast_to(np.eye(3), (count, 3, 3))
-        return _Motion(eye, still, still, still, eye[:, None], np.ones((count, 1)))
+        return _Motion(eye, zero, zero, zero, eye[:, None], np.ones((count, 1)))
 
     def by_time(self, by_turn: np.ndarray, by_shift: np.ndarray) -> np.ndarray:
         """Return the derivative (n, 2, 1) of pixels by the time of their picture, px/s.

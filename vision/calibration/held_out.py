@@ -203,9 +203,9 @@ class _JointFits:
         """Return how the cameras agree, by a fit of the board's poses."""
         seen = self.layout.seen
         # Corners as they would have been seen at their view's own time.
-        then_px, _ = predict(fitted.state, seen, self.board)
-        still_px, _ = predict(replace(fitted.state, trajectory=None), seen, self.board)
-        px = seen.px + still_px - then_px
+        when_taken_px, _ = predict(fitted.state, seen, self.board)
+        at_view_px, _ = predict(replace(fitted.state, trajectory=None), seen, self.board)
+        px = seen.px + at_view_px - when_taken_px
         errors_mm = self._pitch_errors_mm(px)
         mean_mm = float(errors_mm.mean()) if len(errors_mm) else np.nan
         joint_px = _rms(fitted.residual_px[self.rows])

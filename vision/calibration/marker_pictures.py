@@ -134,6 +134,6 @@ class MarkerPictures:
 
         from_middle_rad (n,): turns from the middle of the motion.
         """
-        still_px, drift_px_rad = biases.reshape(2, -1, 4, 2)
+        constant_px, drift_px_rad = biases.reshape(2, -1, 4, 2)
         drift_px = drift_px_rad[self.camera] * from_middle_rad[:, None, None]
-        return still_px[self.camera] + drift_px
+        return constant_px[self.camera] + drift_px

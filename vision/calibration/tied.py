@@ -239,10 +239,11 @@ class JointInput:
             except Refused:
                 continue
             everything = self._held_layout(at_once)
-            still = self._residuals_by_view(at_once, replace(everything, trajectory=None), is_held)
-            moving = self._residuals_by_view(instants, self._held_layout(instants), is_held)
-            at_once_px += still.values()
-            instants_px += [moving[index] for index in still]
+            one_instant = replace(everything, trajectory=None)
+            by_one = self._residuals_by_view(at_once, one_instant, is_held)
+            by_own = self._residuals_by_view(instants, self._held_layout(instants), is_held)
+            at_once_px += by_one.values()
+            instants_px += [by_own[index] for index in by_one]
         return Comparison(np.array(at_once_px), np.array(instants_px))
 
     def _without(self, is_held: Mapping[int, bool]) -> "JointInput":

@@ -49,8 +49,8 @@ _BEND_PX = 1.0
 _MEDIAN_OF = 11
 # [rad] A round that moves bends by less is the last: a hundredth of a millimetre at the tip.
 # Derived.
-_STILL_RAD = 1e-4
-# [rounds] Of the fit at most; it ends where the bend is still. Stated.
+_CONVERGED_RAD = 1e-4
+# [rounds] Of the fit at most; it ends where the bend has converged. Stated.
 _ROUNDS = 8
 # [rad] Prior sigma of a frame's bend. Set by eye. Study: coverage.py alone.
 _PULL_RAD = 0.2
@@ -74,14 +74,14 @@ _STEP_RAD = 1e-5
 class SwingPictures:
     """One camera's pictures of a whisk, what stands still in them, and the bar's outline.
 
-    still: median of its frames; still_share: the part of one picture's variance that it has.
+    static: median of its frames; static_share: the part of one picture's variance that it has.
     bar_px: middle (m, 2) and half-width (m,) of the bar.
     """
 
     view: View
     rods: Rods
-    still: np.ndarray
-    still_share: float
+    static: np.ndarray
+    static_share: float
     bar_px: tuple[np.ndarray, np.ndarray]
 
     @classmethod
@@ -93,9 +93,9 @@ class SwingPictures:
         frames: those of the whisk, in which the wire moves; bar_mm: radius within which the bar is.
         """
         chosen = spread(frames, _MEDIAN_OF)
-        still = median_of([view.frames[frame] for frame in chosen])
+        static = median_of([view.frames[frame] for frame in chosen])
         bar_px = axis.covering_discs(view.camera, bar_mm)
-        return cls(view, rods, still, 0.5 * np.pi / len(chosen), bar_px)
+        return cls(view, rods, static, 0.5 * np.pi / len(chosen), bar_px)
 
     @classmethod
     def of_standing(cls, view: View, rods: Rods, axis: Axis, bar_mm: float) -> "SwingPictures":
@@ -108,10 +108,12 @@ class SwingPictures:
 
     def votes(self, curves: Mapping[int, Curves], reach_px: int = _REACH_PX) -> Votes:
         """Return where the wire may be near predicted curves by frame, clear of hub and bar."""
-        pieces = wire_pieces(self.view, curves, self.rods.wire, _PIECE_PX, reach_px - 3, self.still)
+        pieces = wire_pieces(
+            self.view, curves, self.rods.wire, _PIECE_PX, reach_px - 3, self.static
+        )
         clear = clear_of_bar(pieces, *self.bar_px, _BESIDE_BAR_PX)
         clear &= pieces.place > NEAR_CLAMP_MM
-        return votes(pieces.select(clear), self.still_share, reach_px)
+        return votes(pieces.select(clear), self.static_share, reach_px)
 
 
 def find_rest(
@@ -322,7 +324,7 @@ def fit_bend(
         normal = jacobian.T @ (weight[:, None] * jacobian) + prior
         change = np.linalg.solve(normal, jacobian.T @ (weight * residual) + prior @ bend)
         bend = np.clip(bend - change, -_MOST_BEND_RAD, _MOST_BEND_RAD)
-        if np.max(np.abs(change)) < _STILL_RAD:
+        if np.max(np.abs(change)) < _CONVERGED_RAD:
             break
     return bend
 

@@ -131,9 +131,9 @@ class Problem:
         half_swing_rad = 0.5 * float(np.ptp(self.motor_rad))
         points = [row for line in shared_px for row in line]
         common = np.linalg.norm(np.mean(points, axis=0)) if points else 0.0
-        still = np.hypot(sigma[:2], [common, 0.0])
-        sigma[2:4] = np.hypot(sigma[2:4], half_swing_rad * still)
-        sigma[4:6] = np.hypot(sigma[4:6], 0.5 * half_swing_rad**2 * still)
+        constant = np.hypot(sigma[:2], [common, 0.0])  # of offset and tilt
+        sigma[2:4] = np.hypot(sigma[2:4], half_swing_rad * constant)
+        sigma[4:6] = np.hypot(sigma[4:6], 0.5 * half_swing_rad**2 * constant)
         return sigma
 
 
@@ -235,11 +235,9 @@ def bends(problem: Problem, vector: np.ndarray) -> np.ndarray:
 
 
 def curves_of(
-    problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray, rounds: int = 1
+    problem: Problem, vector: np.ndarray, arcs_mm: np.ndarray
 ) -> tuple[Curves, np.ndarray]:
-    """Return centrelines (…, f) of all frames and their contact arcs (…, f), each found from the
-    other by turns.
-    """
+    """Return centrelines (…, f) of all frames and their contact arcs (…, f), from arcs_mm nearby."""
     axis = bar_axes(problem, vector)
     angles = bends(problem, vector)
     shape = angles.shape[:-1]
@@ -248,9 +246,8 @@ def curves_of(
     rest = rest_shape(problem, vector)[..., None, :, :]  # one for all frames
     friction = np.broadcast_to(vector[..., problem.blocks.friction.slice], shape)
     wire = wire_of(problem, vector, 2)
-    for _ in range(rounds):
-        curves = centrelines(rest, angles, arcs, motor, wire, friction)
-        arcs = np.clip(closest_arc(curves, axis, wire, arcs), 1.0, wire.length_mm)
+    nearby = centrelines(rest, angles, arcs, motor, wire, friction)
+    arcs = np.clip(closest_arc(nearby, axis, wire, arcs), 1.0, wire.length_mm)
     return centrelines(rest, angles, arcs, motor, wire, friction), arcs
 
 

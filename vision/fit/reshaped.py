@@ -64,6 +64,6 @@ def _by_contacts(fit: ConvergedFit, moves: Curves, step: float) -> tuple[np.ndar
     return by_change[:, fit.problem.touching].T, slip
 
 
-def _with_moves(still: np.ndarray, moves: np.ndarray) -> np.ndarray:
+def _with_moves(values: np.ndarray, moves: np.ndarray) -> np.ndarray:
     """Return an array (…) as it is and with each of k changes (k, …) added: (k + 1, …)."""
-    return np.concatenate([still[None], still + moves])
+    return np.concatenate([values[None], values + moves])

@@ -43,7 +43,7 @@ LAST_SCALE = 4.0
 # 10 mrad) keeps its Jacobian. Study: gradients.py.
 _ALIKE = 1000.0
 # [sigma] A step that moves all parameters together by less is the last. Derived.
-_STILL_SIGMA = 0.01
+_CONVERGED_SIGMA = 0.01
 # [sigmas] Of the Cauchy weights, round by round: wide while the state is still off by many. Set
 # by eye.
 _SCALES = (30.0, 10.0, *[LAST_SCALE] * 4)
@@ -221,7 +221,7 @@ def solve(
         linear, state = linearise(problem, state, near_jacobian)
         step, jacobian = _step_of(blocks, linear, scale)
         state = replace(state, vector=state.vector + step)
-        if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _STILL_SIGMA:
+        if scale == scales[-1] and np.linalg.norm(jacobian @ step) < _CONVERGED_SIGMA:
             break
         is_near = np.all(np.abs(step[geometry]) < near)
         near_jacobian = linear.jacobian if is_near else None

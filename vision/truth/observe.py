@@ -167,8 +167,8 @@ def _whisks_of(
     motor_rad = np.asarray(pictures.motor_rad, dtype=float)
     views, used, left_out = views_facing(pictures, cameras, rods.wire, motor_rad)
     strokes = [range(*where.indices(len(time_s)))[:: settings.every_frame] for where in whisks]
-    velocity, still = _stated_motion(pictures, strokes, views, rods)
-    search = SearchScene(still, used, rods, motor_rad, settings)
+    velocity, standing = _stated_motion(pictures, strokes, views, rods)
+    search = SearchScene(standing, used, rods, motor_rad, settings)
     found = find_object(search) if axis is None else SeenBar(axis, {})
     seen = []
     for number, stroke in enumerate(strokes):

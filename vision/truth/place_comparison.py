@@ -286,10 +286,10 @@ def _straightened(
     """Return the picture with the bar, that without rods, and which samples show them, (m, k)."""
     px = _samples_px(line)
     pictures = [_grey_at(px, view.frames[frame]) for frame in curves]
-    still = np.median(pictures, axis=0)
+    static = np.median(pictures, axis=0)
     empty = _grey_at(px, view.background)
     is_free = _grey_at(px, _hidden_by_rods(view, curves, rods)) == 0.0
-    return still, empty, np.isfinite(still) & np.isfinite(empty) & is_free
+    return static, empty, np.isfinite(static) & np.isfinite(empty) & is_free
 
 
 def _samples_px(line: _Line) -> np.ndarray:
@@ -333,13 +333,13 @@ def _hide_wire(hidden: np.ndarray, camera: Camera, curve: Curves, rods: Rods) ->
     cv2.polylines(hidden, [nodes], False, 1, thickness=width)
 
 
-def _change(still: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarray:
+def _change(static: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarray:
     """Return the confidence (m, k) that samples are not as without rods; _UNKNOWN where hidden."""
     share = _averaged(shows)
     seen = shows & (share > 0.5)
     if not np.any(seen):
-        return np.full(still.shape, _UNKNOWN)
-    difference = np.where(shows, still - _relit(still, empty, shows), 0.0)
+        return np.full(static.shape, _UNKNOWN)
+    difference = np.where(shows, static - _relit(static, empty, shows), 0.0)
     mean = _averaged(difference) / np.maximum(share, 0.5)
     level = _averaged(np.where(shows, empty, 0.0)) / np.maximum(share, 0.5)
     z = np.abs(mean) / _noise(mean, level, seen)
@@ -360,14 +360,14 @@ def _light_design(empty: np.ndarray) -> np.ndarray:
     return np.stack([empty, empty * along, empty * across, np.ones_like(empty)], axis=-1)
 
 
-def _relit(still: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarray:
+def _relit(static: np.ndarray, empty: np.ndarray, shows: np.ndarray) -> np.ndarray:
     """Return the picture (m, k) without rods in the light of that with them.
 
     Its gain is linear in both directions of the band, by weights that leave out what has changed.
     """
     design = _light_design(empty)
     rows = design[shows].astype(float)
-    grey = still[shows].astype(float)
+    grey = static[shows].astype(float)
     unchanged = np.array([1.0, 0.0, 0.0, 0.0])
     prior = _SAME_LIGHT * len(grey)
     light = unchanged

@@ -26,7 +26,7 @@ from vision.truth.trial_pictures import TrialPictures
 # tests/bench/workflows/test_seen_angles.py.
 _PASSES = 6
 # [1] Of a turn's own sigma, RMS: a pass that turns frames by less is the last. Derived.
-_STILL = 0.2
+_CONVERGED = 0.2
 
 # [1] Of the coarse angles from the stroke's start, tried one after the other: where frames before touch
 # turn by more or less than said, they look bent. Set by eye.
@@ -61,7 +61,7 @@ def whisker_angles(
         turns = truth.turns
         motor_rad = np.array(pictures.motor_rad)
         motor_rad[turns.index] += turns.turn_rad + _clamp_rad(truth.base)
-        if _are_still(turns):
+        if _have_converged(turns):
             return WhiskerAngles(turns.index, motor_rad[turns.index], turns.covariance)
         pictures = replace(pictures, motor_rad=motor_rad)
         truth = observe(pictures).whisks[0]
@@ -107,10 +107,10 @@ def _clamp_rad(base: BaseLines) -> float:
     return float(np.mean(np.angle(np.exp(1j * (azimuth - base.motor_rad)))))
 
 
-def _are_still(turns: Turns) -> bool:
+def _have_converged(turns: Turns) -> bool:
     """Return whether a pass has turned no frame against the others by what its sigma makes much of."""
     n = len(turns.turn_rad)
     without_mean = np.eye(n) - 1.0 / n
     own = without_mean @ turns.covariance @ without_mean
     step = turns.turn_rad - turns.turn_rad.mean()
-    return bool(np.sum(step**2) <= _STILL**2 * np.trace(own))
+    return bool(np.sum(step**2) <= _CONVERGED**2 * np.trace(own))

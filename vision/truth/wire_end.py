@@ -99,8 +99,8 @@ def _evidence_along(
     length_mm = whisk.rods.wire.length_mm
     visible_mm = max(length_mm, _in_picture_mm(view.camera, curves, length_mm))
     wire = replace(whisk.rods.wire, length_mm=visible_mm)
-    still = median_of([view.frames[frame] for frame in curves])
-    pieces = wire_pieces(view, curves, wire, _PIECE_PX, _FLANK_PX + _GAP_PX, still)
+    static = median_of([view.frames[frame] for frame in curves])
+    pieces = wire_pieces(view, curves, wire, _PIECE_PX, _FLANK_PX + _GAP_PX, static)
     outline = whisk.bar.axis.covering_discs(view.camera, whisk.bar_swept_mm)
     clear = clear_of_bar(pieces, *outline, _BAR_MARGIN_PX)
     return _bin_evidence(pieces.place[clear], _evidence(pieces.select(clear)))
@@ -117,9 +117,10 @@ def _evidence(pieces: Pieces) -> np.ndarray:
     middle = (pieces.weight > 0) & (outside_px < 0.0)
     flanks = (pieces.weight > 0) & (outside_px > _GAP_PX)
     from_empty = _above_flanks((pieces.grey - pieces.background) * pieces.weight, flanks)
-    from_still = _above_flanks((pieces.grey - pieces.still) * pieces.weight, flanks)
-    same_sign = from_empty * from_still > 0.0
-    squared = np.where(same_sign, np.minimum(from_empty**2, from_still**2), 0.0)
+    from_static = _above_flanks((pieces.grey - pieces.static) * pieces.weight, flanks)
+    same_sign = from_empty * from_static > 0.0
+    weaker = np.minimum(from_empty**2, from_static**2)
+    squared = np.where(same_sign, weaker, 0.0)
     return np.log1p(_row_means(squared, middle)) - np.log1p(_row_means(squared, flanks))
 
 

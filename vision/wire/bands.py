@@ -37,7 +37,7 @@ class Band(Rows):
     outside the picture, or hidden, are NaN.
     foot_px (n, 2): the curve. normal (n, 2): its unit normal. place (n,): the curve's parameter, mm.
     radius_px (n,): half the width that the rod has in the picture.
-    still (n, k): another background, of what stands still; (n, 0) where it was not read.
+    static (n, k): a second background, of what stands still; (n, 0) where it was not read.
     """
 
     offset_px: np.ndarray
@@ -47,11 +47,11 @@ class Band(Rows):
     normal: np.ndarray
     place: np.ndarray
     radius_px: np.ndarray
-    still: np.ndarray | None = None
+    static: np.ndarray | None = None
 
     def __post_init__(self):
-        if self.still is None:
-            object.__setattr__(self, "still", np.zeros((len(self.place), 0)))
+        if self.static is None:
+            object.__setattr__(self, "static", np.zeros((len(self.place), 0)))
 
 
 def read_band(
@@ -62,12 +62,12 @@ def read_band(
     radius_px: np.ndarray,
     half_width_px: int,
     hidden: np.ndarray | None = None,
-    still: np.ndarray | None = None,
+    static: np.ndarray | None = None,
 ) -> Band:
     """Read the pixels within half_width_px of a curve (m, 2), one step a pixel of the axis it runs
     along.
 
-    hidden (h, w) bool: pixels that show something else. still (h, w): another background.
+    hidden (h, w) bool: pixels that show something else. static (h, w): a second background.
     No pixel is interpolated and none is read twice, so that their noise stays independent. Normals
     point to the same side of the direction in which `place` grows, however that lies in the picture.
     """
@@ -85,7 +85,7 @@ def read_band(
         normal=path.side * path.as_xy(-path.slope * cosine, cosine),
         place=path.place,
         radius_px=path.radius_px,
-        still=None if still is None else pixels.values(still),
+        static=None if static is None else pixels.values(static),
     )
 
 
@@ -199,7 +199,7 @@ class Pieces(Rows):
     slope, curvature (s, p): of the background across the rod, per px and per px².
     weight (s, p): one over the sigma of the noise; 0 where there is no pixel.
     place, radius_px (s,), foot_px, normal (s, 2): of the segment's middle.
-    source (s,): the band of each. still (s, p): another background; (s, 0) where there is none.
+    source (s,): the band of each. static (s, p): a second background; (s, 0) where there is none.
     noise_behind (s,): variance of the background's noise over that of grey, 1 where not given.
     """
 
@@ -214,12 +214,12 @@ class Pieces(Rows):
     foot_px: np.ndarray
     normal: np.ndarray
     source: np.ndarray
-    still: np.ndarray | None = None
+    static: np.ndarray | None = None
     noise_behind: np.ndarray | None = None
 
     def __post_init__(self):
-        if self.still is None:
-            object.__setattr__(self, "still", np.zeros((len(self.place), 0)))
+        if self.static is None:
+            object.__setattr__(self, "static", np.zeros((len(self.place), 0)))
         if self.noise_behind is None:
             object.__setattr__(self, "noise_behind", np.ones(len(self.place)))
 
@@ -301,7 +301,7 @@ class Pieces(Rows):
 def cut_pieces(bands: Sequence[Band], length_px: int, noise: Noise) -> Pieces:
     """Split bands into segments of length_px steps; what is left over at a band's end is not used.
 
-    Either all bands have a second background (`still`) or none has. Where they have, the pass fits no
+    Either all bands have a second background (`static`) or none has. Where they have, the pass fits no
     shading, and slopes and curvatures are 0.
     """
     counts = [len(band.place) // length_px for band in bands]
@@ -336,7 +336,7 @@ def _cut(band: Band, length_px: int, noise: Noise, source: np.ndarray) -> Pieces
         foot_px=_means(band.foot_px, length_px),
         normal=_means(band.normal, length_px),
         source=source,
-        still=known(band.still) if band.still.size else None,
+        static=known(band.static) if band.static.size else None,
     )
 
 
@@ -348,10 +348,10 @@ def _means(values: np.ndarray, length: int) -> np.ndarray:
 def _derivatives(band: Band) -> tuple[np.ndarray, np.ndarray]:
     """Return slope and curvature (n, k) of the background across the rod, per px and per px².
 
-    They are 0 throughout a band with another background. By five points: three would lose a sixth
+    They are 0 throughout a band with a second background. By five points: three would lose a sixth
     of the slope of an edge blurred by a pixel.
     """
-    if band.still.size:
+    if band.static.size:
         return np.zeros(band.grey.shape), np.zeros(band.grey.shape)
     pitch_px = band.offset_px[:, 1:2] - band.offset_px[:, :1]
     behind = np.nan_to_num(band.background)

@@ -21,7 +21,7 @@ _STEPS = 5
 # step. Stated.
 _CONVERGED_PX = 0.5 * LONGEST_PX
 # [px] The steps end where the median is shorter: a tenth of a segment's usual sigma. Derived.
-_STILL_PX = 0.005
+_SHORT_STEP_PX = 0.005
 
 
 def carry_on(pieces: Pieces, traced: WireTrace, knots: Knots) -> SegmentPositions:
@@ -64,6 +64,6 @@ def _find_shifts(pieces: Pieces, blur_px: float, coefficients: np.ndarray) -> np
         here = SegmentEquations(averaged.moved(shift_px), blur_px, WIRE_WAVES)
         step_px = here.linearised(coefficients).step_px
         shift_px = shift_px + step_px
-        if np.median(np.abs(step_px)) < _STILL_PX:
+        if np.median(np.abs(step_px)) < _SHORT_STEP_PX:
             break
     return shift_px

@@ -141,10 +141,10 @@ def _votes_of_curves(
     return total
 
 
-def votes(pieces: Pieces, still_share: float, reach_px: int) -> Votes:
+def votes(pieces: Pieces, static_share: float, reach_px: int) -> Votes:
     """Return the votes, at shifts up to reach_px, of those segments that have any.
 
-    The segments are of bands with what stands still. still_share: the part of one picture's
+    The segments are of bands with what stands still. static_share: the part of one picture's
     variance that what stands still has. The picture without rods is as noisy as a frame: counted as
     exact, its noise would drown a dim rod.
     """
@@ -154,7 +154,7 @@ def votes(pieces: Pieces, still_share: float, reach_px: int) -> Votes:
     place, count = _places(pieces, reach_px)
     pixels = np.maximum(sums((pieces.weight > 0).astype(float), place, count), 1.0)
     changed = _mean_residual(pieces, pieces.background, 1.0, place, pixels, width_px)
-    moving = _mean_residual(pieces, pieces.still, still_share, place, pixels, width_px)
+    moving = _mean_residual(pieces, pieces.static, static_share, place, pixels, width_px)
     weaker = np.minimum(changed**2, moving**2)
     unexplained = np.where(changed * moving > 0.0, weaker, 0.0)
     share = _share(unexplained * pixels - 1.0, width_px)

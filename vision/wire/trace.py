@@ -57,11 +57,11 @@ def wire_pieces(
     wire: Wire,
     length_px: int,
     margin_px: int,
-    still: np.ndarray | None = None,
+    static: np.ndarray | None = None,
 ) -> Pieces:
     """Cut the wire's pixels in all frames of one camera into segments of length_px.
 
-    curves: predicted centreline by frame. margin_px: beyond the wire's edges. still (h, w): another
+    curves: predicted centreline by frame. margin_px: beyond the wire's edges. static (h, w): a second
     background, for a pass that fits no shading. The segments' source is the frame.
     """
     arc, middles, radii = _outlines(view.camera, curves, wire)
@@ -72,7 +72,7 @@ def wire_pieces(
         hidden = _hidden(view, frame)
         picture = view.frames[frame]
         bands.append(
-            read_band(picture, view.background, middle, arc, radius, half_px, hidden, still)
+            read_band(picture, view.background, middle, arc, radius, half_px, hidden, static)
         )
     pieces = cut_pieces(bands, length_px, view.noise)
     frames = np.array(list(curves))

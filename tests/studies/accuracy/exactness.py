@@ -53,7 +53,9 @@ def exact_problem(scene: Scene) -> Problem:
 
 def own_points(problem: Problem, state: State, sigma_px: float) -> Problem:
     """The problem with its line points where the fit's own model has them."""
-    curves, _ = curves_of(problem, state.vector, state.arcs_mm, rounds=8)
+    arcs_mm = state.arcs_mm
+    for _ in range(8):
+        curves, arcs_mm = curves_of(problem, state.vector, arcs_mm)
     return replace(
         problem, seen=[_own(problem, state, curves, seen, sigma_px) for seen in problem.seen]
     )

@@ -33,7 +33,9 @@ def slipped_px(fit, frame):
     def gap_and_lines(change):
         vector = state.vector.copy()
         vector[own] += change
-        curves, arcs = curves_of(problem, vector, state.arcs_mm, rounds=3)
+        arcs = state.arcs_mm
+        for _ in range(3):
+            curves, arcs = curves_of(problem, vector, arcs)
         axis = bar_axis(problem, vector)
         lines = [
             np.sum(
