@@ -111,8 +111,7 @@ class WireLine:
     @property
     def sigma_px(self) -> np.ndarray:
         """Return the sigma (n,) of each point along its normal, what all points share included."""
-        shared_px = np.linalg.norm(self.points.shared_px, axis=1)
-        return np.hypot(self.points.sigma_px, shared_px)
+        return _whole_sigma_px(self.points)
 
 
 def trace_between(
@@ -303,23 +302,31 @@ def _points(traced: WireTrace, curve: Curve, settings: BetweenSettings) -> LineP
 
 def _next_curve(curve: Curve, points: LinePoints) -> tuple[Curve, float]:
     """Return the curve through points, and by how much of what is allowed it moved, RMS."""
-    sigma_px = np.maximum(points.sigma_px, _LEAST_SIGMA_PX)
-    fitted = _through(curve, points.px, sigma_px, points.place)
+    least_px = np.maximum(points.sigma_px, _LEAST_SIGMA_PX)
+    fitted = _through(curve, points.px, least_px, points.place)
     old, normal, _ = curve.at(points.place)
-    new, _, _ = fitted.at(points.place * fitted.length_px / curve.length_px)
-    apart_px = np.sum((new - old) * normal, axis=1)
-    rms_px = float(np.sqrt(np.mean(apart_px**2)))
-    sigma_px = np.hypot(points.sigma_px, np.linalg.norm(points.shared_px, axis=1))
-    allowed_px = max(_CONVERGED_PX, _CONVERGED_SIGMAS * float(np.median(sigma_px)))
+    stretched = fitted.length_px / curve.length_px
+    new, _, _ = fitted.at(points.place * stretched)
+    moved_px = np.sum((new - old) * normal, axis=1)
+    rms_px = float(np.sqrt(np.mean(moved_px**2)))
+    median_sigma_px = float(np.median(_whole_sigma_px(points)))
+    allowed_px = max(_CONVERGED_PX, _CONVERGED_SIGMAS * median_sigma_px)
     return fitted, rms_px / allowed_px
+
+
+def _whole_sigma_px(points: LinePoints) -> np.ndarray:
+    """Return the sigma (n,) of each point along its normal, what all points share included."""
+    shared_px = np.linalg.norm(points.shared_px, axis=1)
+    return np.hypot(points.sigma_px, shared_px)
 
 
 def _through(curve: Curve, px: np.ndarray, sigma_px: np.ndarray, place_px: np.ndarray) -> Curve:
     """Return the smooth curve of points (n, 2) at arc lengths (n,) of a curve, up to its ends."""
     spline = make_lsq_spline(place_px, px, _spline_knots(curve, place_px), w=1.0 / sigma_px)
-    inside = np.clip(curve.arc_px, float(place_px[0]), float(place_px[-1]))
-    beyond = (curve.arc_px - inside)[:, None] * spline.derivative()(inside)
-    px_along = spline(inside) + beyond
+    inside_px = np.clip(curve.arc_px, float(place_px[0]), float(place_px[-1]))
+    past_ends_px = curve.arc_px - inside_px  # there it goes on straight
+    tangent = spline.derivative()(inside_px)
+    px_along = spline(inside_px) + past_ends_px[:, None] * tangent
     astray_px = float(np.max(np.linalg.norm(px_along - curve.px, axis=1)))
     if not astray_px < _FARTHEST_PX:
         raise Refused(

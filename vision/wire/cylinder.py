@@ -217,25 +217,23 @@ def _tables(step: int, terms: int) -> tuple[float, np.ndarray, np.ndarray]:
     rows_per_radius = _ROWS_PER_BLUR * next_ratio
     reach = int(np.ceil(rows_per_radius * (1.0 + _REACH_BLURS / ratio)))
     row = np.arange(-reach, reach + 1)
-    one = _integrated(row * (ratio / rows_per_radius), ratio, 1.0, terms)
-    other = _integrated(row * (next_ratio / rows_per_radius), next_ratio, 1.0, terms)
+    one = _integrated(row * (ratio / rows_per_radius), ratio, terms)
+    other = _integrated(row * (next_ratio / rows_per_radius), next_ratio, terms)
     return rows_per_radius, one, other
 
 
-def _integrated(
-    offset_px: np.ndarray, radius_px: np.ndarray | float, blur_px: float, terms: int
-) -> np.ndarray:
-    """Return `shading_basis` by Gauss–Legendre integration round the rod."""
-    ratio = np.max(radius_px, initial=1.0) / blur_px
-    count = int(np.clip(np.ceil(_NODES_PER_RADIUS_TO_BLUR * ratio), 16, 96))
+def _integrated(offset: np.ndarray, radius: float, terms: int) -> np.ndarray:
+    """Return `shading_basis` at offsets (n,) by Gauss–Legendre integration round the rod; lengths in
+    blurs.
+    """
+    count = int(np.clip(np.ceil(_NODES_PER_RADIUS_TO_BLUR * radius), 16, 96))
     nodes, shares = _legendre(count)
     t = 0.5 * np.pi * nodes  # angle round the rod
-    radius = np.asarray(radius_px)[..., None]
-    z = (offset_px[..., None] - radius * np.sin(t)) / blur_px
-    share = 0.5 * np.pi * shares * np.cos(t) / (blur_px * np.sqrt(2 * np.pi))
-    weight = np.exp(-0.5 * z * z) * (radius * share)
-    bells = rim_bells(offset_px, radius_px, blur_px)
-    return np.concatenate([weight @ round_the_rod(t, terms), bells], axis=-1)
+    distance = offset[:, None] - radius * np.sin(t)  # (n, nodes), from each point of the rod
+    bell = np.exp(-0.5 * distance * distance)
+    width = 0.5 * np.pi * shares * np.cos(t) / np.sqrt(2 * np.pi)  # of what a node stands for
+    light = (bell * (radius * width)) @ round_the_rod(t, terms)
+    return np.concatenate([light, rim_bells(offset, radius, 1.0)], axis=-1)
 
 
 _legendre = lru_cache(np.polynomial.legendre.leggauss)

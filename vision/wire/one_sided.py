@@ -73,16 +73,18 @@ def seen_width(pieces: Pieces, blur_px: float) -> SeenWidth:
 def _seen_bins(pieces: Pieces, reach_px: float) -> np.ndarray:
     """Return in which bins across, from -reach_px on, the segments differ from their background."""
     is_used = (pieces.weight > 0) & (np.abs(pieces.offset_px) < reach_px)
-    bins = np.floor((pieces.offset_px[is_used] + reach_px) * _BINS_PER_PX).astype(int)
+    from_edge_px = pieces.offset_px[is_used] + reach_px
+    bins = np.floor(from_edge_px * _BINS_PER_PX).astype(int)
     size = int(np.ceil(2 * reach_px * _BINS_PER_PX)) + 1
     count = np.maximum(np.bincount(bins, minlength=size), 1)
     variance = pieces.weight[is_used] ** -2.0
     difference = (pieces.grey - pieces.background)[is_used]
     power = _means(bins, difference**2 - variance, count)
-    noise = _means(bins, variance, count) * np.sqrt(2.0 / count)
+    power_sigma = _means(bins, variance, count) * np.sqrt(2.0 / count)
     strength = np.sqrt(np.maximum(power, 0.0))
-    exceeds_noise = power > _LEAST_SIGMAS * noise
-    return exceeds_noise & (strength > _LEAST_SHARE * strength.max())
+    exceeds_noise = power > _LEAST_SIGMAS * power_sigma
+    is_strong = strength > _LEAST_SHARE * strength.max()
+    return exceeds_noise & is_strong
 
 
 def _means(bins: np.ndarray, values: np.ndarray, count: np.ndarray) -> np.ndarray:

@@ -205,12 +205,13 @@ def _around(
     layers: np.ndarray, px: np.ndarray, reach_px: float = _END_REACH_PX
 ) -> tuple[np.ndarray, int, int]:
     """Return the layers (r, …) within some pixels of a point (x, y), and their first row and column."""
+    _, height, width = layers.shape
     reach = max(1, int(np.ceil(reach_px)))
-    row = int(np.clip(round(px[1]), 0, layers.shape[1] - 1))
-    column = int(np.clip(round(px[0]), 0, layers.shape[2] - 1))
-    top = max(row - reach, 0)
-    left = max(column - reach, 0)
-    return layers[:, top : row + reach + 1, left : column + reach + 1], top, left
+    row = int(np.clip(round(px[1]), 0, height - 1))
+    column = int(np.clip(round(px[0]), 0, width - 1))
+    rows = slice(max(row - reach, 0), row + reach + 1)
+    columns = slice(max(column - reach, 0), column + reach + 1)
+    return layers[:, rows, columns], rows.start, columns.start
 
 
 def _enlarged(layer: np.ndarray, scale: int, shape: tuple[int, ...]) -> np.ndarray:
@@ -231,8 +232,9 @@ def _medialness_at(grey: np.ndarray, radius_px: float) -> tuple[np.ndarray, floa
     best = np.zeros_like(grey)
     for angle in np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS:
         normal = np.array([np.cos(angle), np.sin(angle)])
-        across = normal[0] * right + normal[1] * down
-        best = np.maximum(best, _weaker_edge(across, radius_px * normal))
+        slope_across = normal[0] * right + normal[1] * down
+        here = _weaker_edge(slope_across, radius_px * normal)
+        best = np.maximum(best, here)
     return best, max(float(noise), 1e-6)
 
 
@@ -313,10 +315,16 @@ class _PathSearch:
     def _path(self, nodes: np.ndarray, share: float) -> CoarsePath:
         """Return the path of nodes (n, 3) in the full picture; share: its cost over the least."""
         changes_pixel = np.any(np.diff(nodes[:, 1:], axis=0) != 0, axis=1)
-        radius, row, column = nodes[np.append(True, changes_pixel)].T
-        px = full_px(np.stack([column, row], axis=1).astype(float), self.scale)
-        score = float(np.mean(_score_of(self.cost[tuple(nodes.T)])))
-        return CoarsePath(px, self.radius_px[radius], score, share)
+        is_first_in_pixel = np.append(True, changes_pixel)
+        radius, row, column = nodes[is_first_in_pixel].T
+        shrunk = np.stack([column, row], axis=1).astype(float)
+        scores = _score_of(self.cost[tuple(nodes.T)])
+        return CoarsePath(
+            px=full_px(shrunk, self.scale),
+            radius_px=self.radius_px[radius],
+            score=float(np.mean(scores)),
+            cost=share,
+        )
 
     def refined(self) -> CoarsePath:
         """Return the cheapest path at full resolution, within some pixels of the coarse one."""

@@ -128,12 +128,17 @@ def _hidden_light(pieces: Pieces, bells: np.ndarray, blur_px: float) -> np.ndarr
 def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots) -> tuple[Shading, float]:
     """Fit the radiance of segments where they lie; also return chi² per pixel."""
     equations = SegmentEquations(pieces, blur_px, terms)
-    left, right = equations.shared(knots.weights(pieces), np.ones(len(pieces)))
-    ridge = _RIDGE * np.mean(np.diag(left)) * np.eye(len(left))
-    found = lu_solve(lu_factor(left + ridge, check_finite=False), right, check_finite=False)
-    chi2 = float(np.sum(equations.power) - 2.0 * right @ found + found @ left @ found)
+    all_alike = np.ones(len(pieces))
+    left, right = equations.shared(knots.weights(pieces), all_alike)
+    ridge = _RIDGE * np.mean(np.diag(left))
+    factor = lu_factor(left + ridge * np.eye(len(left)), check_finite=False)
+    found = lu_solve(factor, right, check_finite=False)
+    explained = 2.0 * right @ found
+    of_model = found @ left @ found
+    chi2 = float(np.sum(equations.power) - explained + of_model)
     pixels = max(1, np.count_nonzero(pieces.weight))
-    return Shading(knots, found.reshape(len(knots), terms), blur_px), chi2 / pixels
+    coefficients = found.reshape(len(knots), terms)
+    return Shading(knots, coefficients, blur_px), chi2 / pixels
 
 
 class SegmentEquations:

@@ -66,15 +66,17 @@ def half_width_of(edges_px: np.ndarray, blur_px: float) -> np.ndarray:
 def _steepness(pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
     """Return offsets (m,) px across, at the mean half-width, and the median squared slope there."""
     relative = float(np.mean(pieces.radius_px)) / pieces.radius_px
-    place = pieces.offset_px * relative[:, None] / _BIN_PX
-    use = pieces.weight > 0
-    sides = np.where(use, place, 0.0)
-    half = int(min(np.min(np.max(sides, axis=1)), np.min(-np.min(sides, axis=1))))
+    place = pieces.offset_px * relative[:, None] / _BIN_PX  # (s, p) bins
+    is_known = pieces.weight > 0
+    known_place = np.where(is_known, place, 0.0)
+    shortest_right = np.min(np.max(known_place, axis=1))
+    shortest_left = np.min(-np.min(known_place, axis=1))
+    half = int(min(shortest_right, shortest_left))
     bins = np.arange(-half, half + 1)
-    profiles = []
-    for one, grey, known in zip(place, pieces.grey, use):
-        profiles.append(_slope_of_profile(bins, one[known], grey[known]))
-    return bins * _BIN_PX, np.median(np.square(profiles), axis=0)
+    slopes = []
+    for one, grey, known in zip(place, pieces.grey, is_known):
+        slopes.append(_slope_of_profile(bins, one[known], grey[known]))
+    return bins * _BIN_PX, np.median(np.square(slopes), axis=0)
 
 
 def _slope_of_profile(bins: np.ndarray, place: np.ndarray, grey: np.ndarray) -> np.ndarray:
@@ -96,5 +98,7 @@ def _peak(offset_px: np.ndarray, values: np.ndarray, best: int) -> float:
         return float(offset_px[best])
     before, here, after = values[best - 1 : best + 2]
     bend = before - 2.0 * here + after
-    part = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
-    return float(offset_px[best] + np.clip(part, -1.0, 1.0) * _BIN_PX)
+    if bend >= 0.0:
+        return float(offset_px[best])
+    bins_to_top = 0.5 * (before - after) / bend
+    return float(offset_px[best] + np.clip(bins_to_top, -1.0, 1.0) * _BIN_PX)

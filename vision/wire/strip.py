@@ -154,7 +154,7 @@ def with_background(pieces: Pieces, blur_px: float, noise: Noise) -> Pieces:
     that the object hides. blur_px: of the lens, by which pixels that show the background alone are
     known.
     """
-    background, slope, _ = _sides(pieces, blur_px)
+    background, slope, _ = _fit_background(pieces, blur_px)
     is_known = pieces.weight > 0
     return replace(
         pieces,
@@ -169,7 +169,7 @@ def noise_beside(pieces: Pieces, blur_px: float) -> Noise:
 
     What is printed there counts as noise: nobody knows how it goes on behind.
     """
-    background, _, is_side = _sides(pieces, blur_px)
+    background, _, is_side = _fit_background(pieces, blur_px)
     residual = (pieces.grey - background)[is_side]
     if len(residual) == 0:
         return Noise(1.0, 0.0)
@@ -177,16 +177,20 @@ def noise_beside(pieces: Pieces, blur_px: float) -> Noise:
     return Noise(robust_sigma(residual) ** 2 / freedom, 0.0)
 
 
-def _sides(pieces: Pieces, blur_px: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the background (s, p), its slope (s,) per px, and which pixels (s, p) show it alone."""
+def _fit_background(pieces: Pieces, blur_px: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fit the background (s, p) to the pixels on either side of the object; return with it its slope
+    (s,) per px, and which pixels (s, p) show it alone.
+    """
     radius_px = pieces.radius_px[:, None]
-    step = np.clip(pieces.offset_px / radius_px, -1.0, 1.0)
     beyond_px = np.abs(pieces.offset_px) - radius_px
+    level = np.ones_like(beyond_px)
+    step = np.clip(pieces.offset_px / radius_px, -1.0, 1.0)
     bend = np.maximum(beyond_px, 0.0)
-    columns = np.stack([np.ones_like(step), pieces.offset_px, step, bend], axis=-1)  # (s, p, 4)
+    design = np.stack([level, pieces.offset_px, step, bend], axis=-1)  # (s, p, 4)
     is_side = (pieces.weight > 0) & (beyond_px > _CLEAR_BLURS * blur_px)
-    sides = columns * is_side[..., None]
-    normal = sides.transpose(0, 2, 1) @ sides + _WEAK * np.eye(_BACKGROUND_TERMS)
-    right = sides.transpose(0, 2, 1) @ pieces.grey[..., None]
-    found = np.linalg.solve(normal, right)  # (s, 4, 1)
-    return (columns @ found)[..., 0], found[:, 1, 0], is_side
+    on_sides = design * is_side[..., None]
+    transposed = on_sides.transpose(0, 2, 1)
+    normal = transposed @ on_sides + _WEAK * np.eye(_BACKGROUND_TERMS)
+    coefficients = np.linalg.solve(normal, transposed @ pieces.grey[..., None])  # (s, 4, 1)
+    background = design @ coefficients
+    return background[..., 0], coefficients[:, 1, 0], is_side

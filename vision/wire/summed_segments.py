@@ -71,7 +71,8 @@ class SummedSegments:
         self._weighted_knots = knot_weights * robust[:, None]
         self._root_weighted_knots = knot_weights * self._root_robust[:, None]
         knot_pairs = knot_weights[:, :, None] * self._weighted_knots[:, None, :]
-        self._one_by_knot_pair = knot_pairs.reshape(len(pieces), -1).T @ self._one
+        by_segment = knot_pairs.reshape(len(pieces), -1)  # (s, knots²)
+        self._one_by_knot_pair = by_segment.T @ self._one
 
     def normal_at(
         self, shifts_px: np.ndarray, models: Sequence[tuple[float, float]], terms: int

@@ -76,10 +76,13 @@ def test_slopes_are_differences_of_the_basis(rng, taper):
 
 def _integrated_bends(offset, radius, terms):
     """Second differences (s, p, terms + 2) of the basis without tables, whose steps they would show."""
-    behind, here, ahead = (
-        _integrated(offset + d, radius[:, None], 0.8, terms) for d in (-0.05, 0.0, 0.05)
-    )
-    return (ahead - 2.0 * here + behind) / 0.05**2
+    bends = []
+    for own, own_radius in zip(offset, radius):
+        behind, here, ahead = (
+            _integrated((own + d) / 0.8, own_radius / 0.8, terms) for d in (-0.05, 0.0, 0.05)
+        )
+        bends.append((ahead - 2.0 * here + behind) / 0.05**2)
+    return np.array(bends)
 
 
 def test_a_cone_is_drawn_to_its_point():
