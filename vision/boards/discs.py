@@ -109,10 +109,11 @@ def _edge(windows: DiscWindows, p: np.ndarray) -> np.ndarray:
     """Return the blurred edge, −1 within the disc to 1 beyond, (n, k), by parameters p (n, 10)."""
     along = p[:, _ALONG]
     between = p[:, _BETWEEN]
-    elongation = np.array([[1.0 + along, between], [between, 1.0 - along]]).transpose(2, 0, 1)
+    elongation = np.array([[1.0 + along, between], [between, 1.0 - along]])  # (2, 2, n)
     size = np.exp(p[:, _LOG_SIZE, None, None])
-    axes = size * (windows.axes @ elongation)  # (n, 2, 2)
+    axes = size * (windows.axes @ elongation.transpose(2, 0, 1))  # (n, 2, 2)
     offset = windows.offset - p[:, PLACE, None]
-    _, from_edge_px = _from_edge(np.linalg.solve(axes, offset), axes)
+    in_half_diameters = np.linalg.solve(axes, offset)
+    _, from_edge_px = _from_edge(in_half_diameters, axes)
     blur_px = np.exp(p[:, _LOG_BLUR, None])
     return erf(from_edge_px / (np.sqrt(2.0) * blur_px))

@@ -294,13 +294,14 @@ def report_fit(windows: Windows, p: np.ndarray, converged: np.ndarray, predict: 
 
 def _is_plausible(saddles: Saddles, px_guess: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Return which corners lie near their guess and have edges that can be printed ones, (n,)."""
+    has_sigma = (saddles.sigma_px > 0) & np.isfinite(saddles.sigma_px)
     shift_px = np.linalg.norm(saddles.px - px_guess, axis=1)
     square_px = np.linalg.norm(frames, axis=1).min(axis=1)
-    plausible = (saddles.sigma_px > 0) & np.isfinite(saddles.sigma_px)
-    plausible &= shift_px < np.minimum(_MAX_SHIFT_PX, _MAX_SHIFT_SQUARES * square_px)
+    is_near = shift_px < np.minimum(_MAX_SHIFT_PX, _MAX_SHIFT_SQUARES * square_px)
     noise = np.maximum(saddles.misfit, _ROUNDING)
-    plausible &= np.abs(saddles.contrast) > _LEAST_CONTRAST * noise
-    return plausible & (saddles.blur_px < _MOST_BLUR_PX)
+    stands_out = np.abs(saddles.contrast) > _LEAST_CONTRAST * noise
+    is_sharp = saddles.blur_px < _MOST_BLUR_PX
+    return has_sigma & is_near & stands_out & is_sharp
 
 
 def _sigma_per_grey(windows: Windows, J: np.ndarray, unit_residual: np.ndarray) -> np.ndarray:

@@ -56,9 +56,9 @@ def _handedness(points: np.ndarray, board: Board) -> float:
     """Return the sign of the turn from a board's rows to its columns, by its points (m, 2)."""
     columns, rows = board.grid
     grid = points.reshape(rows, columns, 2)
-    along = (grid[:, -1] - grid[:, 0]).mean(axis=0)
-    across = (grid[-1] - grid[0]).mean(axis=0)
-    return float(np.sign(along[0] * across[1] - along[1] * across[0]))
+    row_x, row_y = (grid[:, -1] - grid[:, 0]).mean(axis=0)
+    column_x, column_y = (grid[-1] - grid[0]).mean(axis=0)
+    return float(np.sign(row_x * column_y - row_y * column_x))
 
 
 def upper_left_first(candidates: list[np.ndarray]) -> np.ndarray:

@@ -65,10 +65,10 @@ def _focal_equations(view: Corners, corners_mm: np.ndarray, size_px: tuple[int, 
     H = fit_homography(corners_mm[view.ids, :2], in_widths)
     if H is None:
         return np.zeros((0, 2))
-    axes = H[:, :2] / np.linalg.norm(H[:, :2])
-    h1, h2 = axes.T  # pictures of the board's x and y
-    at_right_angles = [h1[:2] @ h2[:2], -h1[2] * h2[2]]
-    of_equal_length = [h1[:2] @ h1[:2] - h2[:2] @ h2[:2], h2[2] ** 2 - h1[2] ** 2]
+    # Pictures of the board's x and y: across, in widths, and the part along the optical axis.
+    (x_1, y_1, z_1), (x_2, y_2, z_2) = (H[:, :2] / np.linalg.norm(H[:, :2])).T
+    at_right_angles = [x_1 * x_2 + y_1 * y_2, -z_1 * z_2]
+    of_equal_length = [x_1**2 + y_1**2 - x_2**2 - y_2**2, z_2**2 - z_1**2]
     return np.array([at_right_angles, of_equal_length])
 
 

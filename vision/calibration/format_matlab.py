@@ -55,14 +55,16 @@ def _stereo(path: Path, stereo: dict[str, Any]) -> list[Camera]:
     """Return both cameras, the first one's frame being the world."""
     if not all(isinstance(stereo.get(name), dict) for name in _BOTH):
         raise Refused(f"{path.name} has no structures {' and '.join(_BOTH)}")
-    first = _camera(path, "camera1", stereo["CameraParameters1"], None)
-    units = stereo.get("WorldUnits") or stereo["CameraParameters1"].get("WorldUnits", "mm")
+    first, second = (stereo[name] for name in _BOTH)
+    units = stereo.get("WorldUnits") or first.get("WorldUnits", "mm")
     if units not in _UNITS_MM:
         raise Refused(f"{path.name}: WorldUnits is {units!r}; allowed are {', '.join(_UNITS_MM)}")
-    R = numbers(stereo.get("RotationOfCamera2"), (3, 3), f"{path.name}: RotationOfCamera2").T
-    shift = numbers(stereo.get("TranslationOfCamera2"), (3,), f"{path.name}: TranslationOfCamera2")
-    T = np.column_stack([R, _UNITS_MM[units] * shift])
-    return [first, _camera(path, "camera2", stereo["CameraParameters2"], T)]
+    rotation = stereo.get("RotationOfCamera2")
+    transposed = numbers(rotation, (3, 3), f"{path.name}: RotationOfCamera2")
+    translation = stereo.get("TranslationOfCamera2")
+    shift = numbers(translation, (3,), f"{path.name}: TranslationOfCamera2")
+    T = np.column_stack([transposed.T, _UNITS_MM[units] * shift])
+    return [_camera(path, "camera1", first, None), _camera(path, "camera2", second, T)]
 
 
 def _camera(path: Path, name: str, lens: dict[str, Any], T: np.ndarray | None) -> Camera:

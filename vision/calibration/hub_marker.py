@@ -198,16 +198,18 @@ class _AxisFit:
         biases = parameters[FIRST_BIAS:]
         expected_px = self._seen.project(parameters, self._motor_rad, self._cameras)
         expected_px += self._seen.bias_px(biases, self._from_middle)
-        off = (expected_px - self._seen.px) / self._scatter_px[self._seen.camera][:, None]
-        return np.concatenate([off.ravel(), biases / self._prior])
+        sigma_px = self._scatter_px[self._seen.camera][:, None]
+        over_sigma = (expected_px - self._seen.px) / sigma_px
+        return np.concatenate([over_sigma.ravel(), biases / self._prior])
 
     def _of_cameras(self, fitted: OptimizeResult, covariance: np.ndarray) -> np.ndarray:
         """Return what the cameras' uncertainty adds to the axis' covariance, (4, 4)."""
         cameras = self._cameras
-        by_error = self._seen.by_errors(fitted.x, self._motor_rad, cameras, cameras.by_error)
-        by_error /= self._scatter_px[self._seen.camera][:, None, :, None]
-        gain = covariance[:4] @ fitted.jac[: self._seen.px.size].T
-        axis_by_error = gain @ by_error.reshape(gain.shape[1], -1)
+        by_error_px = self._seen.by_errors(fitted.x, self._motor_rad, cameras, cameras.by_error)
+        sigma_px = self._scatter_px[self._seen.camera][:, None, :, None]
+        over_sigma = (by_error_px / sigma_px).reshape(self._seen.px.size, -1)
+        of_corners = fitted.jac[: self._seen.px.size]
+        axis_by_error = covariance[:4] @ of_corners.T @ over_sigma
         return axis_by_error @ axis_by_error.T
 
 

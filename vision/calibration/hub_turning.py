@@ -105,8 +105,8 @@ def _outward_lines(lines: MovingLines, T_world_axis: np.ndarray) -> tuple[np.nda
     T_axis_world = invert_transform(T_world_axis)
     points = apply(T_axis_world, lines.point_mm)
     directions = lines.direction @ T_axis_world[:, :3].T
-    points_outward = np.sum(points[:, :2] * directions[:, :2], axis=1) >= 0
-    return points, np.where(points_outward[:, None], directions, -directions)
+    outward = np.sum(points[:, :2] * directions[:, :2], axis=1)  # mm, across the axis
+    return points, np.where(outward[:, None] >= 0, directions, -directions)
 
 
 def _is_near_axis(points_mm: np.ndarray, directions: np.ndarray) -> np.ndarray:

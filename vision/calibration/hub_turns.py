@@ -141,10 +141,11 @@ class _TurnFit:
         """Return the covariance of the parameters, with what the cameras' own errors add to it."""
         own = np.linalg.inv(fitted.jac.T @ fitted.jac)
         turn_rad = self.turns_rad(fitted.x)[self.frame]
-        by_error = self.seen.by_errors(fitted.x, turn_rad, self.cameras, self._camera_errors)
-        by_error /= scatter_px[self.seen.camera][:, None, None, None]
-        gain = own @ fitted.jac[: self.seen.px.size].T
-        parameters_by_error = gain @ by_error.reshape(gain.shape[1], -1)
+        by_error_px = self.seen.by_errors(fitted.x, turn_rad, self.cameras, self._camera_errors)
+        sigma_px = scatter_px[self.seen.camera][:, None, None, None]
+        over_sigma = (by_error_px / sigma_px).reshape(self.seen.px.size, -1)
+        of_corners = fitted.jac[: self.seen.px.size]
+        parameters_by_error = own @ of_corners.T @ over_sigma
         return own + parameters_by_error @ parameters_by_error.T
 
     @cached_property
@@ -165,8 +166,10 @@ class _TurnFit:
         biases = parameters[FIRST_BIAS : self.first_turn]
         expected_px = self.seen.project(parameters, turn_rad, self.cameras)
         expected_px += self.seen.bias_px(biases, turn_rad - self._middle_rad)
-        off = (expected_px - self.seen.px) / scatter_px[self.seen.camera][:, None, None]
-        return np.concatenate([off.ravel(), parameters[self._with_prior] / self._prior])
+        sigma_px = scatter_px[self.seen.camera][:, None, None]
+        over_sigma = (expected_px - self.seen.px) / sigma_px
+        of_priors = parameters[self._with_prior] / self._prior
+        return np.concatenate([over_sigma.ravel(), of_priors])
 
     def _jacobian(self, parameters: np.ndarray, scatter_px: np.ndarray) -> np.ndarray:
         """Return the derivatives of the residuals; of the turns all at once, each picture has one."""
@@ -187,8 +190,9 @@ class _TurnFit:
 
 def _turns_about_z(corners_mm: np.ndarray) -> np.ndarray:
     """Return by which angles about z, rad, corners (n, 4, 3) are turned from the first ones, (n,)."""
-    first = corners_mm[0]
     x, y, _ = np.moveaxis(corners_mm, -1, 0)  # (n, 4) each
-    along = np.sum(x * first[:, 0] + y * first[:, 1], axis=1)
-    across = np.sum(y * first[:, 0] - x * first[:, 1], axis=1)
+    first_x = x[0]
+    first_y = y[0]
+    along = np.sum(x * first_x + y * first_y, axis=1)
+    across = np.sum(y * first_x - x * first_y, axis=1)
     return np.arctan2(across, along)

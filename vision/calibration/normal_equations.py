@@ -257,12 +257,13 @@ class _SightingRows(NamedTuple):
         """Return how each point is coupled to globals and views, and its gradient, (m, 3, G + 6 V + 1)."""
         size = sum(equations.B.shape)
         W = np.zeros((len(self.board.corners_mm), 3, size + 1))
-        starts = self.seen.shot_starts()
-        for shot, rows in enumerate(np.split(np.arange(len(self.seen)), starts[1:])):
-            of_views = len(equations.a) + shots.poses[shot]
-            columns = np.concatenate([shots.columns[shot], of_views, [size]])
+        every_row = np.arange(len(self.seen))
+        rows_by_shot = np.split(every_row, self.seen.shot_starts()[1:])
+        for rows, globals_, poses in zip(rows_by_shot, shots.columns, shots.poses):
+            columns = np.concatenate([globals_, len(equations.a) + poses, [size]])
             products = np.swapaxes(self.own[rows], 1, 2) @ self.others[rows]
-            W[np.ix_(self.seen.corner[rows], np.arange(3), columns)] += products
+            place = np.ix_(self.seen.corner[rows], np.arange(3), columns)
+            W[place] += products
         return W
 
 

@@ -170,11 +170,11 @@ def _shape_at_rest(rows: list[_FrameRows]) -> tuple[np.ndarray, np.ndarray]:
     by_nuisance = np.concatenate([own.by_nuisance for own in rows])
     residual = np.concatenate([own.residual for own in rows])
     J = np.hstack([by_rest, by_nuisance])
-    one_way_sigma = np.concatenate([REST_PRIOR_MM[:2], _STRAIGHT_MM])
-    rest_sigma = np.tile(one_way_sigma, 2)  # in y, then in z
+    sigma_each_way = [*REST_PRIOR_MM[:2], *_STRAIGHT_MM]
     nuisance_sigma = np.full(by_nuisance.shape[1], WANDER_PX)
-    prior_sigma = np.append(rest_sigma, nuisance_sigma)
-    covariance = np.linalg.inv(J.T @ J + np.diag(prior_sigma**-2.0))
+    prior_sigma = np.concatenate([sigma_each_way, sigma_each_way, nuisance_sigma])  # y, z
+    precision = np.diag(prior_sigma**-2.0)
+    covariance = np.linalg.inv(J.T @ J + precision)
     solution = -covariance @ (J.T @ residual)
     return solution[:_REST], covariance[:_REST, :_REST]
 

@@ -103,8 +103,10 @@ def _misfit_of_parabola(past: np.ndarray, bend_rad: np.ndarray, covariance: np.n
     linear, square, bend = whitened.T
     slope = abs(linear @ bend) / (linear @ linear)
     curvature_sigma = max(slope * _CURVED_PER_RAD, 1e-9)
-    prior_row = [0.0, 1.0 / curvature_sigma]
-    columns = np.vstack([np.stack([linear, square], axis=1), prior_row])
+    # The last row is the prior of the curvature, which is expected to be 0.
+    by_slope = np.append(linear, 0.0)
+    by_curvature = np.append(square, 1.0 / curvature_sigma)
+    design = np.stack([by_slope, by_curvature], axis=1)
     wanted = np.append(bend, 0.0)
-    solution = np.linalg.lstsq(columns, wanted, rcond=None)[0]
-    return float(np.sum((wanted - columns @ solution) ** 2))
+    solution = np.linalg.lstsq(design, wanted, rcond=None)[0]
+    return float(np.sum((wanted - design @ solution) ** 2))

@@ -166,7 +166,8 @@ def _hinge(motor_rad: np.ndarray, bend_rad: np.ndarray) -> float:
     starts = np.linspace(motor_rad[0], motor_rad[-2], _STARTS_PER_FRAME * len(motor_rad))
     past_start = np.maximum(motor_rad - starts[:, None], 0.0)  # (starts, f) rad
     slopes = np.sum(past_start * bend, axis=1) / np.sum(past_start**2, axis=1)
-    misfit = np.sum(np.abs(bend - slopes[:, None] * past_start), axis=1)
+    expected = slopes[:, None] * past_start
+    misfit = np.sum(np.abs(bend - expected), axis=1)
     return float(starts[np.argmin(misfit)])
 
 

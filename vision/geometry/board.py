@@ -93,9 +93,9 @@ class Board(ABC):
         """Return the ids of points that are neighbours in a row or a column of a face, (p, 2)."""
         columns, rows = self.grid
         ids = np.arange(columns * rows).reshape(rows, columns)
-        along = np.stack([ids[:, :-1], ids[:, 1:]], axis=-1).reshape(-1, 2)
-        across = np.stack([ids[:-1], ids[1:]], axis=-1).reshape(-1, 2)
-        return np.concatenate([along, across])
+        in_rows = np.stack([ids[:, :-1], ids[:, 1:]], axis=-1)
+        in_columns = np.stack([ids[:-1], ids[1:]], axis=-1)
+        return np.concatenate([in_rows.reshape(-1, 2), in_columns.reshape(-1, 2)])
 
     @property
     def hidden_turns(self) -> tuple[np.ndarray, ...]:

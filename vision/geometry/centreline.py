@@ -294,12 +294,12 @@ class _Bend:
 
     def _planar_curvature(self) -> np.ndarray:
         """Return the curvature (…, m), 1/mm, that the force makes of a straight whisker so bent."""
-        forward = np.cos(self.straight_rad)
-        aside = np.sin(self.straight_rad)
-        lever = self._levers((forward, aside))
-        along = self._at_contact((forward, aside))
-        force = (self.pull * along[0] - along[1], self.pull * along[1] + along[0])
-        moment = lever[0] * force[1] - lever[1] * force[0]
+        tangents = (np.cos(self.straight_rad), np.sin(self.straight_rad))
+        lever_x, lever_y = self._levers(tangents)
+        along_x, along_y = self._at_contact(tangents)
+        force_x = self.pull * along_x - along_y
+        force_y = self.pull * along_y + along_x
+        moment = lever_x * force_y - lever_y * force_x
         return self.strength * self.softness * self.before * moment
 
     def _curvature(self, tangents: _Vectors) -> _Vectors:

@@ -40,7 +40,8 @@ def distort_jacobian(ab: np.ndarray, distortion: np.ndarray) -> np.ndarray:
     k1, k2, p1, p2, k3 = distortion
     r2, scale = _scale(ab, distortion)
     slope = k1 + r2 * (2 * k2 + 3 * r2 * k3)  # d radial / d r²
-    half = (slope[:, None] * ab + [2 * p2, 2 * p1])[:, :, None] * ab[:, None]  # (n, 2, 2)
+    half_gradient = slope[:, None] * ab + [2 * p2, 2 * p1]  # of the scale, (n, 2)
+    half = half_gradient[:, :, None] * ab[:, None]  # (n, 2, 2)
     return scale[:, None, None] * np.eye(2) + half + np.swapaxes(half, 1, 2)
 
 
@@ -148,8 +149,10 @@ def _by_lens(ab: np.ndarray, distorted: np.ndarray, lens: np.ndarray) -> np.ndar
 def _solve_2x2(J: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return x (n, 2) with J x = y, by Cramer's rule; NaN where J (n, 2, 2) is singular."""
     a, b, c, d = J.reshape(-1, 4).T
-    determinant = a * d - b * c
-    determinant = np.where(np.abs(determinant) > 1e-12, determinant, np.nan)
     y0, y1 = y.T
-    numerators = np.column_stack([d * y0 - b * y1, a * y1 - c * y0])
-    return numerators / determinant[:, None]
+    determinant = a * d - b * c
+    is_singular = np.abs(determinant) <= 1e-12
+    divisor = np.where(is_singular, np.nan, determinant)
+    first = (d * y0 - b * y1) / divisor
+    second = (a * y1 - c * y0) / divisor
+    return _as_rows(first, second)

@@ -174,10 +174,12 @@ class _Band:
         """Return the integral of the change up to lateral positions (n, m), in radii."""
         last = self.changed.shape[1]
         position = np.clip((radii / _BAND_RADII + 1.0) * 0.5 * last, 0.0, last)
-        lower = np.minimum(position.astype(int), last - 1)
+        before = np.minimum(position.astype(int), last - 1)
+        part = position - before
         rows = np.arange(len(self.changed))
-        below = self._sums[rows, lower]
-        return below + (position - lower) * (self._sums[rows, lower + 1] - below)
+        sum_before = self._sums[rows, before]
+        sum_after = self._sums[rows, before + 1]
+        return sum_before + part * (sum_after - sum_before)
 
     def coarsely_covered(self, offsets: np.ndarray) -> np.ndarray:
         """Return the mean share (n,) covered by strips, interpolated between steps of their ends."""
