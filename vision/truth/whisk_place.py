@@ -35,7 +35,7 @@ class WhiskPlace:
 
     @cached_property
     def _wires_px(self) -> dict[str, list[np.ndarray]]:
-        """Return the centrelines by camera, of the cameras that were asked for so far."""
+        """Return the centrelines by camera, of the cameras projected so far."""
         return {}
 
     def wires_px(self, views: Iterable[View]) -> dict[str, list[np.ndarray]]:
