@@ -208,44 +208,37 @@ class _Rod:
         theta, m_y, m_z, alpha = inputs.T
         heading = unknowns[:, 4]
         now, halfway = self._bent(unknowns, theta)
-        friction = self._friction(alpha, heading)
-        beta = _slope(now.force, friction.sideways)
-        bar, across = _bar_directions(beta)
-        axis = self._axis(now, bar)
-        first = self._first_touch(axis[:, 0], bar, now.arc)
+        beta = _slope(now.force, self._friction(alpha, heading).sideways)
+        bar, _ = _bar_directions(beta)
+        first = self._first_touch(self._axis(now, bar)[:, 0], bar, now.arc)
+        push = _Push(theta, alpha, beta, first)
         heading_halfway, latest = _headings(halfway, now, first, bar, np.copysign(1.0, m_y))
+        # The bar has its slope, and its place along the whisker, by the rod as it is now.
+        _, force_along, place_across, _ = self._residuals_at(now, heading, push)
         moment = np.hypot(m_y, m_z)
         residuals = [
             (now.moment[:, 1] - m_y) / moment,
             (now.moment[:, 2] - m_z) / moment,
-            self._unexplained_along(now, bar, alpha, friction),
-            dot(axis - first.axis, across) / theta,
+            force_along,
+            place_across,
             heading if self.held else _wrapped(heading - latest),
-            *self._residuals_halfway(halfway, first, heading_halfway, beta, theta, alpha),
+            *self._residuals_at(halfway, heading_halfway, push),
         ]
         return np.stack([*residuals, np.linalg.norm(first.point, axis=1), beta])
 
-    def _residuals_halfway(
-        self,
-        halfway: "_Bent",
-        first: "_FirstTouch",
-        heading: np.ndarray,
-        beta: np.ndarray,
-        theta: np.ndarray,
-        alpha: np.ndarray,
-    ) -> list[np.ndarray]:
-        """Return the residuals (n,) of the four equations halfway: the bar's slope, the force along the
-        rod, and the place of the bar's axis across the bar and along the whisker.
+    def _residuals_at(
+        self, bent: "_Bent", heading: np.ndarray, push: "_Push"
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return the residuals (n,) of rods against the bar that is pushed: of its slope, of the force
+        along the rod, and of the place of its axis across the bar and along the whisker.
         """
-        bar, across = _bar_directions(beta)
-        friction = self._friction(alpha, heading)
-        off = (self._axis(halfway, bar) - first.axis) / theta[:, None]
-        return [
-            _slope(halfway.force, friction.sideways) - beta,
-            self._unexplained_along(halfway, bar, alpha, friction),
-            dot(off, across),
-            off[:, 0],
-        ]
+        bar, across = _bar_directions(push.beta)
+        friction = self._friction(push.alpha, heading)
+        slope = _slope(bent.force, friction.sideways) - push.beta
+        by_taper = np.cos(push.alpha) * self._growth(bent.arc)
+        force_along = _along(bent, bar) - friction.lengthways - by_taper
+        off = (self._axis(bent, bar) - push.first.axis) / push.theta[:, None]
+        return slope, force_along, dot(off, across), off[:, 0]
 
     def _bent(self, unknowns: np.ndarray, theta: np.ndarray) -> tuple["_Bent", "_Bent"]:
         """Return the rods of n sets of unknowns at the end of the push, and halfway."""
@@ -266,13 +259,6 @@ class _Rod:
     def _axis(self, bent: "_Bent", bar: np.ndarray) -> np.ndarray:
         """Return the points (n, 3) of the bars' axes that contacts lie before."""
         return bent.point - self._normal(bent.tangent, bar, bent.arc) * self._reach(bent.arc)
-
-    def _unexplained_along(
-        self, bent: "_Bent", bar: np.ndarray, alpha: np.ndarray, friction: "_Friction"
-    ) -> np.ndarray:
-        """Return the part (n,) of forces along rods that neither friction nor their taper explains."""
-        by_taper = np.cos(alpha) * self._growth(bent.arc)
-        return _along(bent, bar) - friction.lengthways - by_taper
 
     def _friction(self, alpha: np.ndarray, heading: np.ndarray) -> "_Friction":
         """Return the friction of contacts that move with these headings (n,) from sideways, rad.
@@ -320,10 +306,10 @@ class _Rod:
 
         Steps are even in the logarithm of the closest cone's width, so that a cone's thin end has its share of them.
         """
-        at, rate = self._nodes(arc)
+        at, per_march = self._nodes(arc)
         rest = self.tangent(at)[..., None]
-        rate = rate[..., None] / _STEPS
-        softness = rate / self.width(at[..., None]) ** 4
+        way = per_march[..., None] / _STEPS  # of the arc, in a step
+        softness = way / self.width(at[..., None]) ** 4
 
         def gain(place: float, pose: np.ndarray) -> np.ndarray:
             """Return what turns and ways (n, 3, 4) gain in a step towards the base."""
@@ -333,16 +319,17 @@ class _Rod:
             moment = cross(pose[..., 3], force)
             twist = _POISSON * dot(tangent, moment)[:, None] * tangent
             curvature = softness[node] * (moment + twist)
-            by_turn = -cross_matrices(curvature) @ turn
-            return np.concatenate([by_turn, (rate[node] * tangent)[..., None]], axis=2)
+            gained_turn = -cross_matrices(curvature) @ turn
+            gained_way = way[node] * tangent
+            return np.concatenate([gained_turn, gained_way[..., None]], axis=2)
 
-        pose = np.broadcast_to(
-            np.eye(3, 4), (len(arc), 3, 4)
-        )  # not turned, no way from the contact
-        pose = runge_kutta(gain, pose, _STEPS)
-        to_hub = np.swapaxes(pose[..., :3], 1, 2)
-        found = to_hub @ np.stack([pose[..., 3], force, rest[0, :, :, 0]], axis=2)
-        return found[..., 0], found[..., 1], found[..., 2]
+        # At the contact: not turned, and no way from there.
+        at_contact = np.broadcast_to(np.eye(3, 4), (len(arc), 3, 4))
+        at_base = runge_kutta(gain, at_contact, _STEPS)
+        to_hub = np.swapaxes(at_base[..., :3], 1, 2)
+        in_march = np.stack([at_base[..., 3], force, rest[0, :, :, 0]], axis=2)
+        contact, turned_force, tangent = np.moveaxis(to_hub @ in_march, 2, 0)
+        return contact, turned_force, tangent
 
     def _nodes(self, arc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the arcs (2 steps + 1, n) of the march's nodes from contacts at arcs (n,) to the base, and
@@ -381,6 +368,16 @@ class _FirstTouch:
     point: np.ndarray
     axis: np.ndarray
     arc: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _Push:
+    """Pushing and friction angles, rad, slopes of the bars, rad (n,), and where these are first touched."""
+
+    theta: np.ndarray
+    alpha: np.ndarray
+    beta: np.ndarray
+    first: _FirstTouch
 
 
 @dataclass(frozen=True, eq=False)
@@ -431,9 +428,9 @@ def _along(bent: _Bent, bar: np.ndarray) -> np.ndarray:
 
 def _sizes(unknowns: np.ndarray) -> np.ndarray:
     """Return the sizes (9,) of the unknowns: of the forces, of the arcs, and a radian."""
-    strength = np.linalg.norm(unknowns[:3])
-    halfway = np.linalg.norm(unknowns[5:8])
-    return np.array([*[strength] * 3, unknowns[3], 1.0, *[halfway] * 3, unknowns[8]])
+    force = np.repeat(np.linalg.norm(unknowns[:3]), 3)
+    halfway = np.repeat(np.linalg.norm(unknowns[5:8]), 3)
+    return np.concatenate([force, [unknowns[3], 1.0], halfway, [unknowns[8]]])
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -451,8 +448,8 @@ def _wrapped(angle: np.ndarray) -> np.ndarray:
 
 def _slope(force: np.ndarray, sideways: np.ndarray) -> np.ndarray:
     """Return the slope (n,) of bars along which friction has this part (n,) of forces (n, 3): (9)."""
-    phi = np.arctan2(force[:, 2], -force[:, 1])
-    in_plane = np.hypot(force[:, 1], force[:, 2])
-    sine = sideways * np.linalg.norm(force, axis=1) / in_plane
+    _, y, z = force.T
+    phi = np.arctan2(z, -y)
+    sine = sideways * np.linalg.norm(force, axis=1) / np.hypot(y, z)
     cone = np.arcsin(np.clip(sine, -1.0, 1.0))
     return phi + np.copysign(cone, phi)
