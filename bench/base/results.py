@@ -52,6 +52,9 @@ SEEING = (
     *(
         "bench/trials/one_camera.py",
         "estimator/seen_shape.py",
+        "estimator/shape_fit.py",
+        "estimator/numerics.py",
+        "estimator/vectors.py",
         "estimator/beam.py",
         "estimator/load_cell.py",
     ),

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.seen_shape import FEW, NO_END, NOT_PUSHED, SeenShape, bend, contact_of_shape
+from estimator.seen_shape import FEW, NO_END, NOT_PUSHED, SeenShape, contact_of_shape
+from estimator.shape_fit import bend
 from tests.scenes.seen_shapes import shown
 
 TOLD = {"reach_mm": 3.5, "tilt_sigma_rad": np.radians(5.0)}
