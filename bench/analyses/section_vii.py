@@ -23,7 +23,7 @@ from bench.base.statuses import reason
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.whisker import Whisker
 from estimator.distance import felt_slip_angle
-from estimator.friction import alpha_from_tilts, confidence
+from estimator.friction_ways import alpha_from_tilts, confidence
 from vision import UNKNOWN, Value
 
 _ALPHA_EST_SIGMA_RAD = np.radians(ALPHA_EST_SIGMA_DEG)

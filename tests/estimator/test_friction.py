@@ -3,17 +3,9 @@
 import numpy as np
 import pytest
 
-from estimator import friction, slip
-from estimator.friction import (
-    AT_ZERO,
-    NEVER_SLIPPED,
-    ONE_SIDED,
-    Pushes,
-    alpha_from_tilts,
-    confidence,
-    curves,
-    fit_alpha,
-)
+from estimator import friction, friction_ways, slip
+from estimator.friction import AT_ZERO, NEVER_SLIPPED, Pushes, curves, fit_alpha
+from estimator.friction_ways import ONE_SIDED, alpha_from_tilts, confidence
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -118,16 +110,17 @@ def test_the_fit_finds_the_least_sum_of_squares_of_a_fine_grid():
     for count in range(2, 14):
         beta = np.radians(rng.uniform(-20, 80, count))
         data = rng.normal(size=2 * count)
-        given = (beta, data, np.ones(count))
-        least = friction._cost(friction._least_squares(*given), *given)
-        assert least <= friction._cost(grid, *given).min() * (1 + 1e-12)
+        observed = friction._Observed(beta, data, np.ones(count))
+        least = observed.cost(observed.best_alpha())
+        assert least <= observed.cost(grid).min() * (1 + 1e-12)
 
 
 def test_derivative_is_the_difference():
     """Central differences of step 1e-6 are good to 1e-9 of the moments."""
-    above, below = (friction._model(0.2 + step, SLOPES, 1.0) for step in (1e-6, -1e-6))
-    derivative = friction._derivative(0.2, SLOPES, 1.0)
-    np.testing.assert_allclose(derivative, (above - below) / 2e-6, atol=1e-9)
+    nothing = np.zeros(2 * len(SLOPES))
+    observed = friction._Observed(SLOPES, nothing, np.ones(len(SLOPES)))
+    above, below = (-observed.residuals(0.2 + step) for step in (1e-6, -1e-6))
+    np.testing.assert_allclose(observed.derivative(0.2), (above - below) / 2e-6, atol=1e-9)
 
 
 def test_curves_are_those_of_figure_8():
@@ -227,7 +220,7 @@ def test_weight_is_the_share_of_variance_not_due_to_friction():
     from estimator.distance import with_friction
 
     phi, alpha, alpha_sigma = 0.5, 0.2, 0.03
-    own = friction._OWN_SHARE
+    own = friction_ways._OWN_SHARE
     d_x = [with_friction(0.05, np.sin(phi), np.cos(phi), alpha + step, C) for step in (-1e-6, 1e-6)]
     relative = alpha_sigma * (np.log(d_x[1]) - np.log(d_x[0])) / 2e-6
     assert confidence(phi, alpha, alpha_sigma) == pytest.approx(
