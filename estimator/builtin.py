@@ -68,12 +68,12 @@ def corrected(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     estimate = _with_friction(whisk, settings, _share_of_corrected)
     if not 0 < estimate.d_x_mm < length:
         return _with_friction(whisk, settings, _share_of_10)
-    factor = 1 - _first_order(whisk, settings, estimate.d_x_mm)
+    less = estimate.times(1 - _first_order(whisk, settings, estimate.d_x_mm))
     return replace(
-        estimate,
-        d_x_mm=min(estimate.d_x_mm * factor, length),
-        low_mm=min(estimate.low_mm * factor, length),
-        high_mm=min(estimate.high_mm * factor, length),
+        less,
+        d_x_mm=min(less.d_x_mm, length),
+        low_mm=min(less.low_mm, length),
+        high_mm=min(less.high_mm, length),
     )
 
 
@@ -201,9 +201,7 @@ def _first_order(whisk, settings, d_x):
     alpha = settings.alpha_est_rad
     phi = 0.0 if is_held(whisk) else _phi(whisk)
     thickness = whisk.beam.thickness(d_x)
-    reach = settings.object_reach_mm
-    if not isnan(settings.object_radius_mm):
-        reach = settings.object_radius_mm + settings.whisker_radius_mm * thickness
+    reach = settings.reach_mm(thickness)
     rolling = first_order.rolling(theta, reach, phi, alpha, d_x, thickness)
     if phi != 0:
         return rolling
@@ -278,9 +276,9 @@ def _sigma_by_friction(whisk, settings, d_x, low, high):
 
 def _reach(settings):
     """Return what lies between centreline and the object's axis."""
-    if isnan(settings.object_radius_mm):
-        return Reach(settings.object_reach_mm, 0.0)
-    return Reach(settings.object_radius_mm, settings.whisker_radius_mm)
+    if settings.is_radius_known:
+        return Reach(settings.object_radius_mm, settings.whisker_radius_mm)
+    return Reach(settings.object_reach_mm, 0.0)
 
 
 def _errors(whisk, settings):
@@ -353,7 +351,7 @@ def _share_of_10(whisk, settings, d_x, thickness):
 def _share_of_corrected(whisk, settings, d_x, thickness):
     """Return the relative sigma of (10) less its first order."""
     held_spread = first_order.HELD_SPREAD if is_held(whisk) else 1.0
-    return _model_share(whisk, settings, d_x, thickness, _unknown_reach_mm(settings), held_spread)
+    return _model_share(whisk, settings, d_x, thickness, settings.unknown_reach_mm, held_spread)
 
 
 def _model_share(whisk, settings, d_x, thickness, reach_mm, held_spread):
@@ -372,23 +370,20 @@ def _model_share(whisk, settings, d_x, thickness, reach_mm, held_spread):
     )
 
 
-def _unknown_reach_mm(settings):
-    """Return the most that the object's radius may be, 0 where it is known."""
-    return settings.object_reach_mm if isnan(settings.object_radius_mm) else 0.0
-
-
 def _share_of_rod(whisk, settings, d_x, thickness):
     """Return the relative sigma of the exact rod: the object's lean and radius, and friction's way."""
     if isnan(d_x) or settings.object_reach_mm == 0:
         return 0.0
     theta = whisk.theta_at_rad
+    phi = _phi(whisk)
     alpha = settings.alpha_est_rad
-    leaning = first_order.leaning(theta, settings.tilt_sigma_rad, _phi(whisk), alpha)
-    reach_mm = _unknown_reach_mm(settings)
-    rolling = first_order.rolling(theta, reach_mm, _phi(whisk), alpha, d_x, thickness)
+    leaning = first_order.leaning(theta, settings.tilt_sigma_rad, phi, alpha)
+    rolling = first_order.rolling(theta, settings.unknown_reach_mm, phi, alpha, d_x, thickness)
     by_friction = _ROD_BY_FRICTION * tan(alpha)
-    held = first_order.HELD_SPREAD * first_order.dragging(theta, alpha) if is_held(whisk) else 0.0
-    return hypot(leaning, rolling, by_friction, _ROD_WITHOUT_FRICTION, held)
+    dragging = 0.0
+    if is_held(whisk):
+        dragging = first_order.HELD_SPREAD * first_order.dragging(theta, alpha)
+    return hypot(leaning, rolling, by_friction, _ROD_WITHOUT_FRICTION, dragging)
 
 
 def _reason(whisk, alpha_est, high):

@@ -83,9 +83,10 @@ def _where_valid(r_n, theta, beta_0, phi, d, slides):
     d = np.where(slides, d, theta)
     pushes = (theta >= 0) & (theta < RIGHT_ANGLE)
     meets = np.isfinite(beta_0) & (np.abs(beta_0) < RIGHT_ANGLE) & (r_n > 0)
-    valid = pushes & meets & (theta / r_n < 2 * np.cos(beta_0)) & (phi < RIGHT_ANGLE)
-    phi = np.where(valid, np.copysign(phi, beta_0) + 0.0, np.nan)
-    return phi, np.where(valid, d, np.nan)
+    has_not_passed = theta / r_n < 2 * np.cos(beta_0)
+    valid = pushes & meets & has_not_passed & (phi < RIGHT_ANGLE)
+    on_its_side = np.copysign(phi, beta_0) + 0.0
+    return np.where(valid, on_its_side, np.nan), np.where(valid, d, np.nan)
 
 
 @elementwise

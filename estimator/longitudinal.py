@@ -5,7 +5,6 @@ whisker as it rolls over a round object. Their equation is not at hand: this is 
 exact mechanics (`estimator.first_order.rolling`), for an object of known radius met head-on.
 """
 
-from dataclasses import replace
 from math import isnan
 
 from estimator import first_order
@@ -19,14 +18,10 @@ def compliance_with_rolling(whisk: Whisk, settings: EstimatorSettings) -> Estima
     Slip sideways is ignored, as (2) ignores it.
     """
     estimate = no_slip(whisk, settings)
-    if isnan(estimate.d_x_mm) or isnan(settings.object_radius_mm):
+    d_x = estimate.d_x_mm
+    if isnan(d_x) or not settings.is_radius_known:
         return estimate
-    thickness = whisk.beam.thickness(estimate.d_x_mm)
-    reach = settings.object_radius_mm + settings.whisker_radius_mm * thickness
-    rolled = first_order.rolling(whisk.theta_at_rad, reach, 0.0, 0.0, estimate.d_x_mm, thickness)
-    return replace(
-        estimate,
-        d_x_mm=estimate.d_x_mm * (1 - rolled),
-        low_mm=estimate.low_mm * (1 - rolled),
-        high_mm=estimate.high_mm * (1 - rolled),
-    )
+    thickness = whisk.beam.thickness(d_x)
+    reach = settings.reach_mm(thickness)
+    rolled = first_order.rolling(whisk.theta_at_rad, reach, 0.0, 0.0, d_x, thickness)
+    return estimate.times(1 - rolled)

@@ -280,9 +280,12 @@ def _interval(solve, inputs, beam, d_x, half_alpha, rest) -> tuple[float, float]
     """
     steep = _d_x_at(solve, inputs, beam, inputs[3] + half_alpha)
     flat = _d_x_at(solve, inputs, beam, inputs[3] - half_alpha)
-    ends = (steep if steep > 0 else 0.0, flat if flat > 0 else beam.length_mm)
-    low = d_x - hypot(max(d_x - min(ends), 0.0), rest)
-    high = d_x + hypot(max(max(ends) - d_x, 0.0), rest)
+    at_steep = steep if steep > 0 else 0.0
+    at_flat = flat if flat > 0 else beam.length_mm
+    nearer = max(d_x - min(at_steep, at_flat), 0.0)
+    farther = max(max(at_steep, at_flat) - d_x, 0.0)
+    low = d_x - hypot(nearer, rest)
+    high = d_x + hypot(farther, rest)
     return max(low, 0.0), min(high, beam.length_mm)
 
 

@@ -79,7 +79,8 @@ def _error_of_10(beta, alpha, alpha_est):
     slope = np.abs(beta)
     phi = np.maximum(0.0, slope - alpha)
     excess = np.sin(phi) / (np.cos(slope) * np.cos(alpha))  # tan β − tan α
-    error = -np.sin(alpha_est - alpha) * excess * np.cos(alpha) / np.cos(alpha_est)
+    detour = np.sin(alpha - alpha_est)
+    error = detour * excess * np.cos(alpha) / np.cos(alpha_est)
     return np.where(slope < RIGHT_ANGLE, np.maximum(error, -1.0), np.nan)
 
 

@@ -16,7 +16,7 @@ whisk differ from another's. Angles in rad, lengths in mm.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import atan, cos, hypot, isnan, nan, sin, sqrt
+from math import atan, cos, hypot, nan, sin, sqrt
 
 import numpy as np
 
@@ -134,12 +134,14 @@ class _Equations:
 
     def refine(self, solution: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Solve for (d, μ) and its covariance with errors and weights at the solution so far."""
-        models = [_model(whisk, solution, self.settings) for whisk in self.whisks]
+        models = []
+        by_friction = []
+        for whisk, m_y in zip(self.whisks, self.m_y):
+            model = _model(whisk, solution, self.settings)
+            models.append(model)
+            by_friction.append(0.0 if model.held else m_y)
         error = np.array([model.error for model in models])
-        is_held = np.array([model.held for model in models])
-        by_distance = self.per_mm * (1 + error)
-        by_friction = np.where(is_held, 0.0, self.m_y)
-        rows = np.column_stack([by_distance, by_friction])
+        rows = np.column_stack([self.per_mm * (1 + error), by_friction])
         return _weighted(rows, self.m_z, self.spread(models, solution))
 
     def spread(self, models: "Sequence[_TiltModel]", solution: np.ndarray) -> np.ndarray:
@@ -321,12 +323,11 @@ def _rolling(theta, phi, alpha, d_x, thickness, settings) -> tuple[float, float]
     """Return the error by rolling over the object, and its sigma: that of a uniform distribution of
     unknown radii.
     """
-    radius = settings.object_radius_mm
-    if isnan(radius):
-        most = first_order.rolling(theta, settings.object_reach_mm, phi, alpha, d_x, thickness)
-        return 0.5 * most, most / sqrt(12.0)
-    reach = radius + settings.whisker_radius_mm * thickness
-    return first_order.rolling(theta, reach, phi, alpha, d_x, thickness), 0.0
+    reach = settings.reach_mm(thickness)
+    rolling = first_order.rolling(theta, reach, phi, alpha, d_x, thickness)
+    if settings.is_radius_known:
+        return rolling, 0.0
+    return 0.5 * rolling, rolling / sqrt(12.0)
 
 
 def _contact(whisk: Whisk, solution: np.ndarray, covariance: np.ndarray) -> SharedContact:

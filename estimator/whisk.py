@@ -1,8 +1,8 @@
 """What an estimator receives of one whisk, its settings, and the estimate that it returns."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from math import nan
+from dataclasses import dataclass, field, replace
+from math import isnan, nan
 
 import numpy as np
 
@@ -176,6 +176,24 @@ class EstimatorSettings:
         for name in ("alpha_est_sigma_rad", "object_reach_mm", "tilt_sigma_rad"):
             require_sigma(name, getattr(self, name))
 
+    @property
+    def is_radius_known(self) -> bool:
+        """Return whether the object's radius is known."""
+        return not isnan(self.object_radius_mm)
+
+    @property
+    def unknown_reach_mm(self) -> float:
+        """Return the most that the object's radius may be, 0 where it is known."""
+        return 0.0 if self.is_radius_known else self.object_reach_mm
+
+    def reach_mm(self, thickness: float) -> float:
+        """Return how far the axes of object and whisker are apart, where the whisker has this diameter
+        over its base's; the most that is allowed where the object's radius is not known.
+        """
+        if self.is_radius_known:
+            return self.object_radius_mm + self.whisker_radius_mm * thickness
+        return self.object_reach_mm
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -202,3 +220,12 @@ class Estimate:
     deflection_mm: tuple[float, float] | None = None
     deflection_sigma_mm: tuple[float, float] | None = None
     gradient: np.ndarray | None = field(default=None, compare=False)
+
+    def times(self, factor: float) -> "Estimate":
+        """Return the estimate with the distance, and the ends of its interval, so many times as large."""
+        return replace(
+            self,
+            d_x_mm=self.d_x_mm * factor,
+            low_mm=self.low_mm * factor,
+            high_mm=self.high_mm * factor,
+        )
