@@ -13,6 +13,7 @@ and falls to 4.39 at the tip: a ratio above 4.39 has two distances. Angles in ra
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import cos, cosh, hypot, nan, pi, sin, sinh, sqrt
 
 import numpy as np
@@ -191,22 +192,23 @@ def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None)
     Frequency and damping are those of least squares, all else being linear; the sigma is that of the
     residuals' scatter. Raises ArithmeticError where the fit does not converge.
     """
-    slowest_Hz = _FEWEST_PERIODS / time_s[-1]
+    record = _Record(time_s, moments)
+    slowest_Hz = _FEWEST_PERIODS / record.span_s
     if beside is None:
-        mains_Hz = _mains_beside_ring(time_s, moments, slowest_Hz)
+        mains_Hz = record.mains_beside_ring(slowest_Hz)
     else:
         mains_Hz = beside.mains_Hz
         slowest_Hz = max(slowest_Hz, beside.frequency_Hz)
-    best_Hz, runner_up = _strongest(time_s, moments, slowest_Hz, mains_Hz)
+    best_Hz, runner_up = record.strongest(slowest_Hz, mains_Hz)
     start = np.log([best_Hz, _TYPICAL_DAMPING, mains_Hz])
     free = 3 if beside is None else 2
-    fit = _refined(time_s, moments, slowest_Hz, start, free)
+    fit = _refined(record, slowest_Hz, start, free)
     frequency, damping, mains_Hz = np.exp([*fit.x, *start[free:]]).tolist()
     left = 2 * fit.cost
     known = moments.size - _LINEAR_UNKNOWNS * moments.shape[1] - free
     variance = left / known
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * variance
-    without = _left(time_s, moments, None, None, mains_Hz)[0]
+    without = record.left(None, mains_Hz)
     return Ring(
         frequency,
         damping,
@@ -217,29 +219,80 @@ def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None)
     )
 
 
-def _strongest(
-    time_s: np.ndarray, moments: np.ndarray, slowest_Hz: float, mains_Hz: float | None
-) -> tuple[float, float]:
-    """Return the frequency that explains most, and the sum of squares that any other leaves."""
-    frequencies = _frequencies(time_s, slowest_Hz)
-    sums = [_left(time_s, moments, f, _TYPICAL_DAMPING, mains_Hz)[0] for f in frequencies]
-    best_Hz = float(frequencies[int(np.argmin(sums))])
-    others = np.abs(frequencies - best_Hz) > _APART / time_s[-1]
-    return best_Hz, float(min(np.array(sums)[others], default=np.inf))
+@dataclass(frozen=True)
+class _Record:
+    """Moments (n, k) of a part of a whisk at times (n,) from its beginning on, in which a ring is sought."""
+
+    time_s: np.ndarray
+    moments: np.ndarray
+
+    @property
+    def span_s(self) -> float:
+        """Return the time from the first sample to the last."""
+        return float(self.time_s[-1])
+
+    @cached_property
+    def step_s(self) -> float:
+        """Return the time between samples."""
+        return float(np.median(np.diff(self.time_s)))
+
+    def residuals(
+        self, frequency_Hz: float | None, damping: float, mains_Hz: float | None
+    ) -> np.ndarray:
+        """Return what push, hum and ring leave of the moments (n k,)."""
+        columns = ring_columns(self.time_s, frequency_Hz, damping, mains_Hz)
+        orthonormal, _ = np.linalg.qr(columns)
+        explained = orthonormal @ (orthonormal.T @ self.moments)
+        return (self.moments - explained).ravel()
+
+    def left(self, frequency_Hz: float | None, mains_Hz: float | None) -> float:
+        """Return the sum of squares that push, hum and a ring of the typical damping leave."""
+        residuals = self.residuals(frequency_Hz, _TYPICAL_DAMPING, mains_Hz)
+        return float(residuals @ residuals)
+
+    def strongest(self, slowest_Hz: float, mains_Hz: float | None) -> tuple[float, float]:
+        """Return the frequency that explains most, and the sum of squares that any other leaves.
+
+        The frequencies tried are a quarter of what the span resolves apart.
+        """
+        apart_Hz = 0.25 / self.span_s
+        frequencies = np.arange(slowest_Hz, _FASTEST_SHARE / self.step_s, apart_Hz)
+        sums = np.array([self.left(frequency, mains_Hz) for frequency in frequencies])
+        best_Hz = float(frequencies[np.argmin(sums)])
+        is_other = np.abs(frequencies - best_Hz) > _APART / self.span_s
+        return best_Hz, float(min(sums[is_other], default=np.inf))
+
+    def best_mains(self, ring_Hz: float | None) -> float:
+        """Return the frequency of mains that explains most beside a ring, if there is one, Hz."""
+        candidates = np.arange(_MAINS_HZ[0], _MAINS_HZ[1] + 0.5, 1.0)
+        return float(min(candidates, key=lambda mains_Hz: self.left(ring_Hz, mains_Hz)))
+
+    def mains_beside_ring(self, slowest_Hz: float) -> float:
+        """Return the frequency of mains that explains most together with a ring, Hz.
+
+        A hum alone would stand for a louder ring near it, so either is looked for first, and the pair
+        that leaves less counts.
+        """
+        hum_first_Hz = self.best_mains(None)
+        ring_beside_Hz, _ = self.strongest(slowest_Hz, hum_first_Hz)
+        ring_first_Hz, _ = self.strongest(slowest_Hz, None)
+        hum_beside_Hz = self.best_mains(ring_first_Hz)
+        by_hum = self.left(ring_beside_Hz, hum_first_Hz)
+        by_ring = self.left(ring_first_Hz, hum_beside_Hz)
+        return hum_first_Hz if by_hum < by_ring else hum_beside_Hz
 
 
-def _refined(
-    time_s: np.ndarray, moments: np.ndarray, slowest_Hz: float, start: np.ndarray, free: int
-) -> OptimizeResult:
+def _refined(record: _Record, slowest_Hz: float, start: np.ndarray, free: int) -> OptimizeResult:
     """Fit the first `free` of the logarithms of frequency, damping and hum's frequency from their start.
 
     Raises ArithmeticError where the fit does not converge.
     """
     low = np.log([_SLOWER * slowest_Hz, _DAMPING[0], _MAINS_HZ[0]])[:free]
-    high = np.log([0.5 / _step_s(time_s), _DAMPING[1], _MAINS_HZ[1]])[:free]
+    high = np.log([0.5 / record.step_s, _DAMPING[1], _MAINS_HZ[1]])[:free]
 
-    def residuals(logarithms):
-        return _left(time_s, moments, *np.exp([*logarithms, *start[free:]]))[1]
+    def residuals(logarithms: np.ndarray) -> np.ndarray:
+        frequency_Hz, damping, mains_Hz = np.exp([*logarithms, *start[free:]])
+        return record.residuals(frequency_Hz, damping, mains_Hz)
 
     fit = least_squares(residuals, np.clip(start[:free], low, high), bounds=(low, high))
     if not fit.success:
@@ -247,54 +300,8 @@ def _refined(
     return fit
 
 
-def _step_s(time_s: np.ndarray) -> float:
-    """Return the time between samples."""
-    return float(np.median(np.diff(time_s)))
-
-
-def _frequencies(time_s: np.ndarray, slowest_Hz: float) -> np.ndarray:
-    """Return frequencies a quarter of what the span resolves."""
-    return np.arange(slowest_Hz, _FASTEST_SHARE / _step_s(time_s), 0.25 / time_s[-1])
-
-
-def _mains_beside_ring(time_s: np.ndarray, moments: np.ndarray, slowest_Hz: float) -> float:
-    """Return the frequency of mains that explains most together with a ring, Hz.
-
-    A hum alone would stand for a louder ring near it, so either is looked for first, and the pair
-    that leaves less counts.
-    """
-    hum_first_Hz = _best_mains(time_s, moments, None)
-    ring_beside_Hz, _ = _strongest(time_s, moments, slowest_Hz, hum_first_Hz)
-    ring_first_Hz, _ = _strongest(time_s, moments, slowest_Hz, None)
-    hum_beside_Hz = _best_mains(time_s, moments, ring_first_Hz)
-    by_hum, _ = _left(time_s, moments, ring_beside_Hz, _TYPICAL_DAMPING, hum_first_Hz)
-    by_ring, _ = _left(time_s, moments, ring_first_Hz, _TYPICAL_DAMPING, hum_beside_Hz)
-    return hum_first_Hz if by_hum < by_ring else hum_beside_Hz
-
-
-def _best_mains(time_s: np.ndarray, moments: np.ndarray, ring_Hz: float | None) -> float:
-    """Return the frequency of mains that explains most beside a ring, if there is one, Hz."""
-    candidates = np.arange(_MAINS_HZ[0], _MAINS_HZ[1] + 0.5, 1.0)
-    return float(
-        min(candidates, key=lambda f: _left(time_s, moments, ring_Hz, _TYPICAL_DAMPING, f)[0])
-    )
-
-
-def _left(
-    time_s: np.ndarray,
-    moments: np.ndarray,
-    frequency_Hz: float | None,
-    damping: float | None,
-    mains_Hz: float | None,
-) -> tuple[float, np.ndarray]:
-    """Return what push, hum and ring leave of moments: the sum of squares, and the residuals."""
-    orthonormal, _ = np.linalg.qr(ring_columns(time_s, frequency_Hz, damping, mains_Hz))
-    residuals = (moments - orthonormal @ (orthonormal.T @ moments)).ravel()
-    return float(residuals @ residuals), residuals
-
-
 def ring_columns(
-    time_s: np.ndarray, frequency_Hz: float | None, damping: float | None, mains_Hz: float | None
+    time_s: np.ndarray, frequency_Hz: float | None, damping: float, mains_Hz: float | None
 ) -> np.ndarray:
     """Return the columns (n, 4 to 8) of push, hum and, last, ring; of what has no frequency none."""
     share = time_s / time_s[-1]
