@@ -18,7 +18,7 @@ from math import atan2, cos, hypot, nan, sin
 
 import numpy as np
 
-from estimator import distance, first_order
+from estimator import first_order
 from estimator.beam import Beam
 from estimator.numerics import central_differences
 from estimator.reasons import NamedReason
@@ -81,7 +81,7 @@ def there_and_back(
     shared: for each way the change (k, 2) of its moments by one sigma of each cause of error that
     both have in common. Thickness and lean of the object enter the sigma as in (10).
     """
-    felt = np.array([*_felt(there), *_felt(back)])
+    felt = np.array([*there.felt, *back.felt])
     if not _pushes_both_ways(felt):
         return ThereAndBack(nan, status=NO_PUSH)
     beam = there.beam
@@ -116,11 +116,6 @@ def _with_sigmas(
         low_mm=max(d_x - Z_95 * sigma, 0.0),
         high_mm=min(d_x + Z_95 * sigma, length_mm),
     )
-
-
-def _felt(whisk: Whisk) -> tuple[float, float, float]:
-    """Return θ, m_y and m_z at the pushing angle."""
-    return whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm
 
 
 def _pushes_both_ways(felt: np.ndarray) -> bool:
@@ -178,14 +173,16 @@ def _covariance_of_dragging(felt: np.ndarray, alpha: float, thickness: float) ->
 
 def _differs(felt: np.ndarray, covariance: np.ndarray) -> bool:
     """Check that the moments' difference is more than its noise, that of both angles included."""
+    theta_there, theta_back = felt[[0, 3]]
     there = felt[1:3]
     back = felt[4:6]
     along = there - back
     size = hypot(*along)
-    by_theta_there = there @ along / felt[0]
-    by_theta_back = -back @ along / felt[3]
-    gradient = np.array([by_theta_there, *along, by_theta_back, *-along]) / (size or 1.0)
-    return size > _SURE_SIGMAS * float(gradient @ covariance @ gradient) ** 0.5
+    by_there = [there @ along / theta_there, *along]
+    by_back = [-back @ along / theta_back, *-along]
+    gradient = np.array([*by_there, *by_back]) / (size or 1.0)
+    variance = float(gradient @ covariance @ gradient)
+    return size > _SURE_SIGMAS * variance**0.5
 
 
 def _model_share(
@@ -196,10 +193,8 @@ def _model_share(
     """
     theta = whisk.theta_at_rad
     thickness = whisk.beam.thickness(d_x)
-    phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
     rolling = first_order.rolling_at(theta, settings.object_reach_mm, beta, d_x, thickness)
     alpha = min(alpha, _STEEPEST_FRICTION_RAD)
-    leaning = first_order.leaning(theta, settings.tilt_sigma_rad, phi, alpha)
-    large_angle = theta**2 / (6 * thickness)
-    by_taper = whisk.beam.share_by_taper(d_x)
-    return float(np.sqrt(rolling**2 + leaning**2 + large_angle**2 + by_taper**2))
+    leaning = first_order.leaning(theta, settings.tilt_sigma_rad, whisk.phi_rad, alpha)
+    large = first_order.bending_far(theta, thickness)
+    return hypot(rolling, leaning, large, whisk.beam.share_by_taper(d_x))

@@ -10,6 +10,10 @@ distance beyond the length means slip, not the tip: it is flagged and left.
 from collections.abc import Callable
 from dataclasses import replace
 from math import hypot, isnan, nan, sqrt, tan
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator import distance, first_order, uncertainty
 from estimator.beam import Beam
@@ -37,11 +41,13 @@ _ROD_BY_FRICTION = 0.011
 # Study: exact_rod_limits.py.
 _ROD_WITHOUT_FRICTION = 1e-4
 
+# An equation's own relative sigma at a distance, mm, such as `_share_of_10`.
+_ModelShare: TypeAlias = Callable[[Whisk, EstimatorSettings, float], float]
+
 
 def no_slip(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     """Estimate by equation (2): as if the whisker did not slip sideways."""
-    theta = whisk.theta_at_rad
-    m_z = whisk.m_z_at_Nmm
+    theta, _, m_z = whisk.felt
     d_x = distance.no_slip(theta, m_z, whisk.beam.C_Nmm2)
     gradient = uncertainty.gradient_no_slip(theta, m_z, whisk.beam.C_Nmm2)
     settings = _without_friction(settings)
@@ -86,13 +92,13 @@ def exact_rod(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     ten = _with_friction(whisk, settings, _share_of_rod)
     if isnan(ten.d_x_mm):
         return ten
-    felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad)
+    felt = (*whisk.felt, settings.alpha_est_rad)
     reach = _reach(settings)
-    contact = contact_by_exact_rod(felt, whisk.beam, reach, is_held(whisk))
+    contact = contact_by_exact_rod(felt, whisk.beam, reach, whisk.is_held)
     if contact is None or abs(contact.d_x_mm / ten.d_x_mm - 1) > _MOST_FROM_10:
         at_tip = ten.d_x_mm == whisk.beam.length_mm
         return ten if at_tip else Estimate(nan, nan, UNCONVERGED)
-    of_rest = _sigma_of_rest(felt, whisk.beam, reach, is_held(whisk), contact.d_x_mm)
+    of_rest = _sigma_of_rest(felt, whisk.beam, reach, whisk.is_held, contact.d_x_mm)
     return _as_of_rod(ten, contact, of_rest, whisk, settings)
 
 
@@ -111,8 +117,7 @@ def _as_of_rod(
     factor = d_x / ten.d_x_mm
     low, high = _wider(ten.low_mm * factor, d_x, ten.high_mm * factor, of_rest)
     high = min(high, whisk.beam.length_mm)
-    model = _share_of_rod(whisk, settings, d_x, whisk.beam.thickness(d_x))
-    model = hypot(model, whisk.beam.share_by_taper(d_x))
+    model = hypot(_share_of_rod(whisk, settings, d_x), whisk.beam.share_by_taper(d_x))
     of_inputs = uncertainty.sigma(contact.gradient, **_errors(whisk, settings))
     sigma = hypot(of_inputs, model * d_x, of_rest)
     return replace(
@@ -122,12 +127,14 @@ def _as_of_rod(
         status=NEARER.format(high) if low == 0 else "",
         low_mm=low,
         high_mm=high,
-        beta_rad=ten.beta_rad if is_held(whisk) else contact.beta_rad,
+        beta_rad=ten.beta_rad if whisk.is_held else contact.beta_rad,
         gradient=contact.gradient,
     )
 
 
-def _sigma_of_rest(felt, beam, reach, held, d_x):
+def _sigma_of_rest(
+    felt: tuple[float, ...], beam: Beam, reach: Reach, held: bool, d_x: float
+) -> float:
     """Return one sigma of the exact rod's distance d_x by the stated unloaded shape, mm.
 
     All of the distance where no rod of a shape within its sigma has these moments.
@@ -139,7 +146,7 @@ def _sigma_of_rest(felt, beam, reach, held, d_x):
     return off
 
 
-def _wider(low, d_x, high, sigma):
+def _wider(low: float, d_x: float, high: float, sigma: float) -> tuple[float, float]:
     """Return the ends of a 95 % interval about d_x, widened by one more sigma; an open end stays so."""
     if sigma == 0:
         return low, high
@@ -159,23 +166,18 @@ def printed_17(whisk: Whisk, settings: EstimatorSettings) -> Estimate:
     It is far from the truth where a tapered whisker slips, since slip takes its share of the angle
     and not of the distance. It is not among ESTIMATORS: use it by its name.
     """
-    felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+    felt = whisk.felt
     beam = whisk.beam
 
-    def nu(theta, m):
+    def nu(theta: float, m: float) -> float:
         """Return the no-slip distance, mm, for an angle and a moment."""
         return beam.distance_mm(beam.C_Nmm2 * theta / m)
 
     d_x = distance.general_printed(*felt, nu)
     if isnan(d_x):
         return Estimate(nan, nan, distance.why_not(*felt))
-    sigma = uncertainty.sigma(
-        uncertainty.gradient_printed(*felt, beam.C_Nmm2, beam.taper / beam.length_mm),
-        theta_sigma=whisk.theta_sigma_rad,
-        covariance=whisk.covariance_at,
-        theta_moment_covariance=whisk.theta_moment_covariance_at,
-    )
-    return Estimate(d_x, sigma)
+    gradient = uncertainty.gradient_printed(*felt, beam.C_Nmm2, beam.taper / beam.length_mm)
+    return Estimate(d_x, uncertainty.sigma(gradient, **_errors(whisk, settings)))
 
 
 ESTIMATORS = {
@@ -195,11 +197,11 @@ def estimators_of(beam: Beam) -> dict[str, Callable[[Whisk, EstimatorSettings], 
     return ESTIMATORS | OF_CURVED if beam.is_curved else ESTIMATORS
 
 
-def _first_order(whisk, settings, d_x):
+def _first_order(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float:
     """Return the relative error of (10) at d_x, by the settings' knowledge of the object."""
     theta = whisk.theta_at_rad
     alpha = settings.alpha_est_rad
-    phi = 0.0 if is_held(whisk) else _phi(whisk)
+    phi = 0.0 if whisk.is_held else whisk.phi_rad
     thickness = whisk.beam.thickness(d_x)
     reach = settings.reach_mm(thickness)
     rolling = first_order.rolling(theta, reach, phi, alpha, d_x, thickness)
@@ -208,33 +210,16 @@ def _first_order(whisk, settings, d_x):
     return rolling + first_order.HELD_SHARE * first_order.dragging(theta, alpha)
 
 
-def is_held(whisk: Whisk) -> bool:
-    """Check that no lateral slip is felt, within two sigma of m_y."""
-    return abs(whisk.m_y_at_Nmm) <= 2 * sqrt(whisk.covariance_at[0, 0])
-
-
-def _phi(whisk):
-    """Return the felt slip angle φ of (8), rad."""
-    return distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-
-
-def _with_friction(whisk, settings, model):
-    """Estimate by (10), with its friction angle and the slope (9) that follows.
-
-    model: the function of its own relative sigma, such as `_share_of_10`.
-    """
-    felt = (
-        whisk.theta_at_rad,
-        whisk.m_y_at_Nmm,
-        whisk.m_z_at_Nmm,
-        settings.alpha_est_rad,
-        whisk.beam.C_Nmm2,
-    )
-    d_x = distance.with_friction(*felt)
-    gradient = uncertainty.gradient_with_friction(*felt)
-    estimate = _estimate(whisk, settings, d_x, gradient, model, m_y=whisk.m_y_at_Nmm)
-    slope = distance.estimated_slope(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, settings.alpha_est_rad)
-    return replace(estimate, alpha_est_rad=settings.alpha_est_rad, beta_rad=slope)
+def _with_friction(whisk: Whisk, settings: EstimatorSettings, model_share: _ModelShare) -> Estimate:
+    """Estimate by (10), with its friction angle and the slope (9) that follows."""
+    theta, m_y, m_z = whisk.felt
+    alpha = settings.alpha_est_rad
+    inputs = (theta, m_y, m_z, alpha, whisk.beam.C_Nmm2)
+    d_x = distance.with_friction(*inputs)
+    gradient = uncertainty.gradient_with_friction(*inputs)
+    estimate = _estimate(whisk, settings, d_x, gradient, model_share, m_y=m_y)
+    slope = distance.estimated_slope(m_y, m_z, alpha)
+    return replace(estimate, alpha_est_rad=alpha, beta_rad=slope)
 
 
 def _without_friction(settings: EstimatorSettings) -> EstimatorSettings:
@@ -242,12 +227,20 @@ def _without_friction(settings: EstimatorSettings) -> EstimatorSettings:
     return replace(settings, alpha_est_rad=0.0, alpha_est_sigma_rad=0.0)
 
 
-def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
+def _estimate(
+    whisk: Whisk,
+    settings: EstimatorSettings,
+    d_x: float,
+    gradient: np.ndarray,
+    model_share: _ModelShare,
+    *,
+    m_y: float,
+    clamp: bool = True,
+) -> Estimate:
     """Assemble an estimate from a cylinder's distance and gradient.
 
     It adds sigma and interval, the taper, the clamp at the tip, and the reason for a NaN. m_y: the
-    moment along the surface that the equation takes; (2) takes none. model_share: function of the
-    equation's own relative sigma (`_share_of_10`). A tapering whisker's distance is not linear over
+    moment along the surface that the equation takes; (2) takes none. A tapering whisker's distance is not linear over
     the sigma of α_est: its sigma is no less than the two sides of the interval, in the mean of
     their squares.
     """
@@ -256,7 +249,7 @@ def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
     # The change of d_x with the distance of the base's cylinder.
     thickness = beam.thickness(tapered)
     by_cylinder = thickness * tapered / d_x
-    model = hypot(model_share(whisk, settings, tapered, thickness), beam.share_by_taper(tapered))
+    model = hypot(model_share(whisk, settings, tapered), beam.share_by_taper(tapered))
     low, high = _interval(whisk, settings, m_y, model / thickness if model > 0 else 0.0)
     if isnan(d_x):
         return Estimate(nan, nan, _reason(whisk, settings.alpha_est_rad, high), low, high)
@@ -267,21 +260,23 @@ def _estimate(whisk, settings, d_x, gradient, model_share, *, m_y, clamp=True):
     return _up_to_tip(estimate, beam, clamp)
 
 
-def _sigma_by_friction(whisk, settings, d_x, low, high):
+def _sigma_by_friction(
+    whisk: Whisk, settings: EstimatorSettings, d_x: float, low: float, high: float
+) -> float:
     """Return the least sigma of a tapering whisker's distance, by the sides of its interval; 0 elsewhere."""
     if whisk.beam.taper and settings.alpha_est_sigma_rad > 0 and low > 0:
         return hypot(d_x - low, high - d_x) / (sqrt(2) * uncertainty.Z_95)
     return 0.0
 
 
-def _reach(settings):
+def _reach(settings: EstimatorSettings) -> Reach:
     """Return what lies between centreline and the object's axis."""
     if settings.is_radius_known:
         return Reach(settings.object_radius_mm, settings.whisker_radius_mm)
     return Reach(settings.object_reach_mm, 0.0)
 
 
-def _errors(whisk, settings):
+def _errors(whisk: Whisk, settings: EstimatorSettings) -> dict[str, ArrayLike]:
     """Return the errors of the inputs, as keywords of `uncertainty.sigma`."""
     return {
         "theta_sigma": whisk.theta_sigma_rad,
@@ -291,7 +286,9 @@ def _errors(whisk, settings):
     }
 
 
-def _interval(whisk, settings, m_y, model_sigma):
+def _interval(
+    whisk: Whisk, settings: EstimatorSettings, m_y: float, model_sigma: float
+) -> tuple[float, float]:
     """Return the ends of the 95 % interval on this whisker, mm; model_sigma: relative sigma of the
     cylinder's equation.
     """
@@ -309,7 +306,7 @@ def _interval(whisk, settings, m_y, model_sigma):
     return low, min(high, whisk.beam.length_mm) if high > 0 else high
 
 
-def _up_to_tip(estimate, beam, clamp):
+def _up_to_tip(estimate: Estimate, beam: Beam, clamp: bool) -> Estimate:
     """Return the estimate with its status: clamped at the tip, or flagged there and without an
     interval.
 
@@ -336,60 +333,62 @@ def _up_to_tip(estimate, beam, clamp):
     return replace(estimate, d_x_mm=clamped, status=status)
 
 
-def _on_this_whisker(end, beam):
+def _on_this_whisker(end: float, beam: Beam) -> float:
     """Convert an end of the cylinder's interval to this whisker; keep 0 and NaN."""
     return beam.distance_mm(end) if end > 0 else end
 
 
-def _share_of_10(whisk, settings, d_x, thickness):
+def _share_of_10(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float:
     """Return the relative sigma of (10) itself; 0 without a distance or without a thickness to
     allow for.
     """
-    return _model_share(whisk, settings, d_x, thickness, settings.object_reach_mm, 1.0)
+    return _share(whisk, settings, d_x, settings.object_reach_mm, 1.0)
 
 
-def _share_of_corrected(whisk, settings, d_x, thickness):
+def _share_of_corrected(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float:
     """Return the relative sigma of (10) less its first order."""
-    held_spread = first_order.HELD_SPREAD if is_held(whisk) else 1.0
-    return _model_share(whisk, settings, d_x, thickness, settings.unknown_reach_mm, held_spread)
+    held_spread = first_order.HELD_SPREAD if whisk.is_held else 1.0
+    return _share(whisk, settings, d_x, settings.unknown_reach_mm, held_spread)
 
 
-def _model_share(whisk, settings, d_x, thickness, reach_mm, held_spread):
+def _share(
+    whisk: Whisk, settings: EstimatorSettings, d_x: float, reach_mm: float, held_spread: float
+) -> float:
     """Return the relative sigma of (10) by what a reach and a held contact leave open."""
     if isnan(d_x) or settings.object_reach_mm == 0:
         return 0.0
     return uncertainty.model_share(
         whisk.theta_at_rad,
-        _phi(whisk),
+        whisk.phi_rad,
         settings.alpha_est_rad,
         d_x,
         reach=reach_mm,
         tilt_sigma=settings.tilt_sigma_rad,
-        thickness=thickness,
+        thickness=whisk.beam.thickness(d_x),
         held_spread=held_spread,
     )
 
 
-def _share_of_rod(whisk, settings, d_x, thickness):
+def _share_of_rod(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float:
     """Return the relative sigma of the exact rod: the object's lean and radius, and friction's way."""
     if isnan(d_x) or settings.object_reach_mm == 0:
         return 0.0
     theta = whisk.theta_at_rad
-    phi = _phi(whisk)
+    phi = whisk.phi_rad
     alpha = settings.alpha_est_rad
+    thickness = whisk.beam.thickness(d_x)
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, phi, alpha)
     rolling = first_order.rolling(theta, settings.unknown_reach_mm, phi, alpha, d_x, thickness)
     by_friction = _ROD_BY_FRICTION * tan(alpha)
     dragging = 0.0
-    if is_held(whisk):
+    if whisk.is_held:
         dragging = first_order.HELD_SPREAD * first_order.dragging(theta, alpha)
     return hypot(leaning, rolling, by_friction, _ROD_WITHOUT_FRICTION, dragging)
 
 
-def _reason(whisk, alpha_est, high):
+def _reason(whisk: Whisk, alpha_est: float, high: float) -> NamedReason:
     """Return the reason for having no distance, and the interval's open end where there is one."""
-    felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    reason = distance.why_not(*felt, alpha_est=alpha_est)
+    reason = distance.why_not(*whisk.felt, alpha_est=alpha_est)
     if high > 0:
         nearer = NEARER.format(high)
         return NamedReason(nearer.code, f"{reason}; {nearer}")

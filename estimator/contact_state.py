@@ -68,8 +68,7 @@ def contact_of(whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> Contact:
     on_whisker = d_x > 0 and np.isfinite(beam.as_cylinder_mm(d_x * (1 + _STEP)))
     if not (on_whisker and estimate.sigma_mm > 0):
         return NO_CONTACT
-    felt = (whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    inputs = np.array([*felt, estimate.alpha_est_rad])
+    inputs = np.array([*whisk.felt, estimate.alpha_est_rad])
     error = _DistanceError.of(whisk, estimate, alpha_sigma)
     variances = error.variances(*_derivatives(d_x, inputs, beam))
     sigmas = np.sqrt(np.maximum(variances, 0.0)).tolist()

@@ -70,3 +70,13 @@ def dragging(theta: ArrayLike, alpha: ArrayLike) -> Numbers:
     -0.00422793
     """
     return -0.2 * theta * np.tan(alpha)
+
+
+@elementwise
+def bending_far(theta: ArrayLike, thickness: ArrayLike) -> Numbers:
+    """Return θ² / (6 w): angles that are not small, to their second order.
+
+    >>> round(bending_far(0.3, 1.0), 8)
+    0.015
+    """
+    return theta**2 / (6 * thickness)

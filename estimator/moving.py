@@ -39,7 +39,7 @@ AMBIGUOUS = NamedReason(
 # Share of the distance above which another distance counts: at one as near as that the object would
 # run at nine tenths of the whisker's own speed.
 _LEAST_OTHER = 0.1
-# [sigma] of m_y, as in `estimator.builtin.is_held`.
+# [sigma] of m_y, as in `Whisk.is_held`.
 _HELD_SIGMAS = 2.0
 # Iterations of the share of friction along the object, by the direction of the motion over it.
 _ITERATIONS = 4
@@ -206,7 +206,7 @@ def _why_not(whisk: Whisk) -> str:
     """Return the reason for having no distance before it is sought; empty without one."""
     if whisk.object_motion is None:
         return MOTION_UNKNOWN
-    return distance.why_not(whisk.theta_at_rad, whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+    return distance.why_not(*whisk.felt)
 
 
 def _status(contact: MovingContact) -> str:
@@ -227,9 +227,7 @@ def _sigma_without_alpha(
 
 def _inputs(whisk: Whisk, settings: EstimatorSettings) -> np.ndarray:
     """Return (7,): θ, m_y, m_z, α and u, of which the contact is a function."""
-    moments = (whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
-    motion = whisk.object_motion.per_rad_mm
-    return np.array([whisk.theta_at_rad, *moments, settings.alpha_est_rad, *motion])
+    return np.array([*whisk.felt, settings.alpha_est_rad, *whisk.object_motion.per_rad_mm])
 
 
 def _held_at(inputs: np.ndarray, beam: Beam) -> MovingContact:
@@ -301,10 +299,9 @@ def _model_share(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float
 
     That is thickness and lean of the object, friction along the whisker, large angles.
     """
-    phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
     share = uncertainty.model_share(
         whisk.theta_at_rad,
-        phi,
+        whisk.phi_rad,
         settings.alpha_est_rad,
         d_x,
         reach=settings.object_reach_mm,

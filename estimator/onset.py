@@ -256,8 +256,9 @@ def _rises_already(motor, samples, before, after):
 
 def _extrapolate(motor, samples, used, touch, window):
     """Return the touch of one pass of `felt_touch`, which starts from an earlier touch."""
-    free = used & (motor < touch - GUARD_RAD)
-    rising = used & (motor > touch + GUARD_RAD) & (motor <= touch + window)
+    past_rad = motor - touch
+    free = used & (past_rad < -GUARD_RAD)
+    rising = used & (past_rad > GUARD_RAD) & (past_rad <= window)
     if np.count_nonzero(free) < MIN_FREE_SAMPLES:
         return FeltTouch.none(NO_FREE_STROKE)
     if np.count_nonzero(rising) < MIN_RISE_SAMPLES:
@@ -267,8 +268,9 @@ def _extrapolate(motor, samples, used, touch, window):
     if not by_noise < window / 3:
         return FeltTouch.none(VAGUE)
     sigma = np.sqrt(by_noise**2 + hidden_step_variance(motor, free | rising))
-    gap = noise.weighted_sum(rise.weights, samples, rising) - level.offset
-    return FeltTouch(float(touch - gap @ rise.gain), float(sigma), level=level, rise=rise)
+    line_at_touch = noise.weighted_sum(rise.weights, samples, rising)
+    meets_level_rad = touch - (line_at_touch - level.offset) @ rise.gain
+    return FeltTouch(float(meets_level_rad), float(sigma), level=level, rise=rise)
 
 
 def _fit_rise(motor, samples, free, rising, touch, level):

@@ -122,7 +122,7 @@ def _model_share(whisk: Whisk, settings: EstimatorSettings, d_x: float) -> float
     """Return the relative sigma of the distance by unknown thickness and lean of the object, and by the taper."""
     theta = whisk.theta_at_rad
     thickness = whisk.beam.thickness(d_x)
-    phi = distance.felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm)
+    phi = whisk.phi_rad
     rolling = load_cell.rolling(theta, settings.object_reach_mm, phi, d_x, thickness)
     leaning = load_cell.leaning(theta, settings.tilt_sigma_rad, phi, settings.alpha_est_rad)
     return hypot(rolling, leaning, whisk.beam.share_by_taper(d_x))

@@ -21,8 +21,6 @@ from math import atan, cos, hypot, nan, sin, sqrt
 import numpy as np
 
 from estimator import first_order
-from estimator.builtin import is_held
-from estimator.distance import felt_slip_angle
 from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
@@ -86,7 +84,8 @@ def shared_contact(
     """
     if len(whisks) < 2:
         raise ValueError("two whisks at two tilts are the fewest that tell friction from distance")
-    if not _all_push(_felt(whisks)):
+    felt = np.array([whisk.felt for whisk in whisks])
+    if not _all_push(felt):
         return _without_contact(NO_PUSH)
     apart = apart_sigma_mm * _by_place(places or range(len(whisks)))
     equations = _Equations(whisks, settings, apart, shared_Nmm)
@@ -121,12 +120,12 @@ class _Equations:
     @cached_property
     def m_y(self) -> np.ndarray:
         """Return |m_y| (n,), N·mm."""
-        return np.abs(_felt(self.whisks)[:, 1])
+        return np.array([abs(whisk.m_y_at_Nmm) for whisk in self.whisks])
 
     @cached_property
     def m_z(self) -> np.ndarray:
         """Return m_z (n,), N·mm."""
-        return _felt(self.whisks)[:, 2]
+        return np.array([whisk.m_z_at_Nmm for whisk in self.whisks])
 
     def start(self) -> np.ndarray:
         """Solve for (d, μ) without errors and weights."""
@@ -182,13 +181,8 @@ def _has_converged(step: np.ndarray, solution: np.ndarray, covariance: np.ndarra
     return bool((np.abs(step) <= _LAST_STEP_SIGMAS * np.sqrt(np.diag(covariance)) + least).all())
 
 
-def _felt(whisks: Sequence[Whisk]) -> np.ndarray:
-    """Return θ, rad, and m_y, m_z, N·mm, of each whisk (n, 3)."""
-    return np.array([(w.theta_at_rad, w.m_y_at_Nmm, w.m_z_at_Nmm) for w in whisks])
-
-
 def _all_push(felt: np.ndarray) -> bool:
-    """Check that all felt values (n, 3) are known, and that each m_z is positive."""
+    """Check that all of θ, m_y and m_z (n, 3) are known, and that each m_z is positive."""
     return (felt[:, 2] > 0).all() and np.isfinite(felt).all()
 
 
@@ -237,9 +231,7 @@ def _by_place(places: Sequence[object]) -> np.ndarray:
 def _gradient(whisk: Whisk, held: bool, solution: np.ndarray) -> np.ndarray:
     """Compute the derivative (3,) of m_z − a d − |m_y| μ by θ, m_y, m_z, where a = |m|² / Cθ."""
     d, mu = solution
-    theta = whisk.theta_at_rad
-    m_y = whisk.m_y_at_Nmm
-    m_z = whisk.m_z_at_Nmm
+    theta, m_y, m_z = whisk.felt
     per_moment = d / (whisk.beam.C_Nmm2 * theta)
     friction = 0.0 if held else np.copysign(mu, m_y)
     by_theta = per_moment * (m_y**2 + m_z**2) / theta
@@ -271,9 +263,9 @@ def _model(whisk: Whisk, solution: np.ndarray, settings: EstimatorSettings) -> _
     alpha = max(atan(solution[1]), 0.0)
     d_x = whisk.beam.distance_mm(solution[0])
     thickness = d_x / solution[0]
-    held = is_held(whisk)
+    held = whisk.is_held
     bending = _bending_held(theta, alpha) if held else _bending_slipping(whisk, alpha)
-    large = bending.bent**2 / (6 * thickness)
+    large = first_order.bending_far(bending.bent, thickness)
     rolling, rolling_sigma = _rolling(theta, bending.phi, alpha, d_x, thickness, settings)
     leaning = first_order.leaning(theta, settings.tilt_sigma_rad, bending.phi, alpha)
     error = bending.dragging + large + rolling
@@ -311,7 +303,7 @@ def _bending_slipping(whisk: Whisk, alpha: float) -> _Bending:
     Friction acts along it by the share that the way along has in the whole way of the contact.
     """
     theta = whisk.theta_at_rad
-    phi = abs(felt_slip_angle(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm))
+    phi = abs(whisk.phi_rad)
     bent = theta * max(cos(phi + alpha), 0.0) / cos(alpha)
     drawn = DRAWN * bent
     along = drawn / hypot(drawn, sin(phi) / cos(alpha))

@@ -175,7 +175,7 @@ def model_share(
     leaning = first_order.leaning(theta, tilt_sigma, phi, alpha)
     rolling = first_order.rolling(theta, reach, phi, alpha, d_x, thickness)
     dragging = held_spread * first_order.dragging(theta, alpha)
-    large = theta**2 / (6 * thickness)
+    large = first_order.bending_far(theta, thickness)
     return np.sqrt(leaning**2 + rolling**2 + dragging**2 + large**2)
 
 

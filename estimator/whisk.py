@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import isnan, nan
+from math import isnan, nan, sqrt
 
 import numpy as np
 
 from estimator.beam import Beam
+from estimator.distance import felt_slip_angle
 from estimator.domain import require_friction_angle, require_sigma
 
 _ARRAYS = (
@@ -140,6 +141,21 @@ class Whisk:
             beam=beam,
             theta_moment_covariance_at=theta_moment_covariance_at,
         )
+
+    @property
+    def felt(self) -> tuple[float, float, float]:
+        """Return the pushing angle, and m_y and m_z there."""
+        return self.theta_at_rad, self.m_y_at_Nmm, self.m_z_at_Nmm
+
+    @property
+    def phi_rad(self) -> float:
+        """Return the felt slip angle φ of (8) at the pushing angle."""
+        return felt_slip_angle(self.m_y_at_Nmm, self.m_z_at_Nmm)
+
+    @property
+    def is_held(self) -> bool:
+        """Return whether no lateral slip is felt, within two sigma of m_y."""
+        return abs(self.m_y_at_Nmm) <= 2 * sqrt(self.covariance_at[0, 0])
 
     @property
     def felt_covariance(self) -> np.ndarray:
