@@ -48,6 +48,8 @@ SEEING = (
         "bench/base/statuses.py",
         "bench/base/results.py",
         "bench/base/settings.py",
+        "bench/base/text_files.py",
+        "bench/base/toml_text.py",
     ),
     *(
         "bench/trials/one_camera.py",

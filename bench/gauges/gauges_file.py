@@ -12,11 +12,12 @@ import tomli_w
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.base.toml_text import read_toml
 from bench.gauges.matrix import FROM_FILE, FROM_MANIFEST, GaugeCalibration, GaugeMatrix
 from bench.session import manifest, plausible
 from bench.session.givens import with_sigmas
 from bench.session.session import Session
-from bench.session.strict_toml import as_keys, convert, read_toml
+from bench.session.strict_toml import as_keys, convert
 from bench.session.written_covariance import is_covariance
 
 Rows4 = Annotated[

@@ -2,8 +2,6 @@
 
 import hashlib
 import itertools
-import re
-import tomllib
 from collections import Counter
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +9,7 @@ from typing import Annotated
 import msgspec
 
 from bench.base.errors import BadInput
+from bench.base.toml_text import in_toml_words, read_toml, what_and_where
 from bench.rig.built_in import FOLDER, protocol_names
 from bench.rig.feasible import check_protocol
 from bench.rig.protocol_tables import (
@@ -29,21 +28,6 @@ from bench.rig.protocol_tables import (
     TrialTable,
     WhiskerTable,
 )
-
-# How msgspec's messages begin and call kinds of values, and what who writes TOML says. A layout.
-_FAULTS = {
-    "Expected": "expected is",
-    "Object missing required field": "there is no",
-    "Object contains unknown field": "no key is",
-}
-_KINDS = {
-    "float": "a number",
-    "int": "a whole number",
-    "str": "text",
-    "bool": "true or false",
-    "array": "a list",
-    "object": "a table",
-}
 
 
 class Protocol(ProtocolTable, kw_only=True):
@@ -150,24 +134,6 @@ def _run_name(table, speed_deg_s, beta_deg, psi_deg) -> str:
     return (table.name or table.surface) + f"_b{beta_deg:02g}{tilt}_v{speed_deg_s:g}"
 
 
-def _in_words(problem: str) -> str:
-    """Return msgspec's message on a protocol for one who writes TOML: the key first, kinds by their names."""
-    found, _, place = problem.partition(" - at `$")
-    for fault, words in _FAULTS.items():
-        found = found.replace(fault, words)
-    found = re.sub("`([a-z| ]+)`", _kinds_in_words, found)
-    key = place.rstrip("`").removeprefix(".")
-    return f"{key}: {found}" if key else found
-
-
-def _kinds_in_words(quoted: re.Match) -> str:
-    """Return kinds of values, such as `float | array`, in words; the name of a key as it is."""
-    kinds = quoted[1].split(" | ")
-    if not set(kinds) <= set(_KINDS):
-        return quoted[0]
-    return " or ".join(_KINDS[kind] for kind in kinds)
-
-
 def load(protocol: str | Path) -> Protocol:
     """Load a protocol by its name ("quick", "paper") or from a file.
 
@@ -176,17 +142,15 @@ def load(protocol: str | Path) -> Protocol:
     path = FOLDER / f"{protocol}.toml"
     if isinstance(protocol, Path) or not path.is_file():
         path = Path(protocol)
+    if not path.is_file():
+        built_in = f"the built-in protocols are {protocol_names()}"
+        raise BadInput(f"there is no such file; {built_in}", file=path)
+    tables = read_toml(path, str(path))
     try:
-        tables = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
         found = msgspec.convert(tables, Protocol)
-    except OSError as problem:
-        raise BadInput(
-            f"cannot be read ({problem.strerror}); the built-in protocols are {protocol_names()}",
-            file=path,
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as problem:
-        raise BadInput(f"is not TOML: {problem}", file=path) from None
     except msgspec.ValidationError as problem:
-        raise BadInput(_in_words(str(problem)), file=path) from None
+        what, place = what_and_where(str(problem))
+        key = f"{place}: " if place else ""
+        raise BadInput(key + in_toml_words(what), file=path) from None
     check_protocol(found, path)
     return found

@@ -15,12 +15,12 @@ import numpy as np
 from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
 from bench.base.numbers import first_names
+from bench.base.text_files import check_size
 from bench.session import manifest
 from bench.session.file_names import SESSION_TOML
 from bench.session.manifest import ChannelKeys
 from bench.session.strict_toml import values
 from bench.session.table import NumberTable, column_names, read_table
-from bench.session.text_files import check_size
 from vision.calibration import load_matlab
 
 _TIME = "time_s"

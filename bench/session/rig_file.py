@@ -13,8 +13,9 @@ from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.results import hash_of_files
+from bench.base.toml_text import read_toml
 from bench.session.manifest import Row4
-from bench.session.strict_toml import Keys, as_keys, read_toml
+from bench.session.strict_toml import Keys, as_keys
 from bench.session.written_covariance import is_covariance
 from vision.geometry import nearest_rotation
 

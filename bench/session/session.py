@@ -11,6 +11,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.base.toml_text import read_toml
 from bench.session import manifest
 from bench.session.angle_source import SOURCES
 from bench.session.daq import daq_file
@@ -25,7 +26,7 @@ from bench.session.rest_shape import read_rest_shape
 from bench.session.rig_file import RIG_FILE, MeasuredRig, exact_pose, read_rig
 from bench.session.stated import StatedSession
 from bench.session.stated_board import missing_parts, stated_board, with_kalibr_target
-from bench.session.strict_toml import as_keys, key_names, read_toml
+from bench.session.strict_toml import as_keys, key_names
 from bench.session.trial import Trial, load_trial
 from bench.session.whisker import Whisker, profiled_sizes
 from vision.boards import CharucoBoard

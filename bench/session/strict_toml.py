@@ -7,22 +7,18 @@ states is used under the names of its keys: `Whisker` and `Trial` derive from th
 
 import difflib
 import re
-import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import lru_cache, partial
-from pathlib import Path
 from typing import Any, ClassVar, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
+from bench.base.toml_text import in_toml_words, what_and_where
 from bench.session import plausible
-from bench.session.text_files import check_size, read_text
 
-# [bytes] Largest file that is read: a thousand times what people write.
-_MOST_BYTES = 1 << 22
 # Keys that people set by a protractor, and may write in radians.
 _SET_BY_PROTRACTOR = ("beta_deg", "follicle_roll_deg")
 # The names of the tables that lead to one, outermost first; a list of tables ends in [].
@@ -40,32 +36,6 @@ class Keys:
 
 
 KeysOf = TypeVar("KeysOf", bound=Keys)
-
-
-def read_toml(path: Path, label: str) -> dict[str, Any]:
-    """Return the tables of a TOML file. Raise BadInput, naming it as `label`, where it is not one."""
-    check_size(path, _MOST_BYTES, "a few lines are expected", label)
-    text = read_text(path, "save it as UTF-8", label)
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as problem:
-        raise _bad_toml(str(problem), text, label) from None
-    except RecursionError:
-        raise BadInput("is not TOML: brackets within brackets without end", file=label) from None
-    except ValueError:  # Python converts no whole number of more than 4300 digits
-        raise BadInput("holds a number of thousands of digits", file=label) from None
-
-
-def _bad_toml(problem: str, text: str, label: str) -> BadInput:
-    """Return the error of a text that is not TOML, with its line."""
-    place = re.search(r"line (\d+)", problem)
-    if not place:
-        return BadInput(f"is not TOML: {problem}", file=label)
-    row = int(place.group(1))
-    line = text.splitlines()[row - 1].strip()
-    if re.search(r"=\s*-?\d+,\d", line):
-        return BadInput(f"found {line!r}; a decimal comma? Write a point.", file=label, row=row)
-    return BadInput(f"is not TOML: {problem}; found {line!r}", file=label, row=row)
 
 
 def as_keys(
@@ -232,14 +202,14 @@ def _probably_meant(key: str, kind: type[Keys], top: type[Keys]) -> str:
 
 def _in_plain_words(problem: str, kind: type[Keys]) -> str:
     """Return msgspec's message with the key's path as in the file; kind: of the whole file."""
-    what, _, place = problem.partition(" - at `$")
-    path = [part for part in re.split(r"[.`]", place) if part]
+    what, place = what_and_where(problem)
+    path = [part for part in place.split(".") if part]
     if missing := re.match(r"Object missing required field `(.*)`", what):
         return f"{_key_path([*path, missing.group(1)])} is missing"
     if choice := re.match(r"Invalid enum value (.*)", what):
         found = f"{choice.group(1)} is none of its values"
         return f"{_key_path(path)}: {found}; allowed are {_choices(path, kind)}"
-    return f"{_key_path(path)}: {_what_is_wrong(what)}"
+    return f"{_key_path(path)}: {in_toml_words(what)}"
 
 
 def _choices(path: list[str], kind: type[Keys]) -> str:
@@ -248,25 +218,6 @@ def _choices(path: list[str], kind: type[Keys]) -> str:
     for table in tables:
         kind = inner_tables(kind)[re.sub(r"\[.*", "", table)]
     return ", ".join(map(repr, get_args(get_type_hints(kind)[key])))
-
-
-_TOML_WORDS = {
-    "float": "a number",
-    "int": "a whole number",
-    "str": "text",
-    "bool": "true or false",
-    "null": "nothing",
-}
-
-
-def _what_is_wrong(what: str) -> str:
-    """Return msgspec's "Expected `float | null`, got `str`" in the words of who writes TOML."""
-
-    def in_words(match: re.Match) -> str:
-        return _TOML_WORDS.get(match.group(1).removesuffix(" | null"), match.group(1))
-
-    found = re.sub(r"`([^`]*)`", in_words, what)
-    return found.replace("Expected", "expected").replace("got", "found")
 
 
 def _key_path(path: Sequence[str]) -> str:

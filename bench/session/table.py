@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.session.text_files import check_size, decode, read_text
+from bench.base.text_files import check_size, decode, read_text
 from vision.geometry import counted
 
 # [bytes] Two hours at 2 kHz, which as text and numbers fill 4 GB of memory.

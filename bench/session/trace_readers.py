@@ -20,9 +20,9 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
+from bench.base.text_files import check_size, read_text
 from bench.session.daq import NOT_HDF5, optional_library
 from bench.session.table import read_table, require_columns
-from bench.session.text_files import check_size, read_text
 from bench.session.trace_files import KINDS
 from vision.calibration import load_matlab
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.base.input_problems import refused_as_bad_input
-from bench.session.text_files import read_text
+from bench.base.text_files import read_text
 from bench.session.trace_readers import DrawnLines, numbers_with_gaps
 from vision.calibration import foreign_cameras
 from vision.geometry import Camera, Cameras

@@ -7,6 +7,7 @@ from typing import Any
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.statuses import reason
+from bench.base.toml_text import read_toml
 from bench.session import manifest
 from bench.session.daq import DaqFile
 from bench.session.file_names import TRIAL_TOML
@@ -14,7 +15,7 @@ from bench.session.footage import camera_sources, single_pictures
 from bench.session.givens import Given, with_sigmas
 from bench.session.stage import STAGE, StageLog, read_stage
 from bench.session.stated import StatedSession
-from bench.session.strict_toml import as_keys, convert, read_toml, values
+from bench.session.strict_toml import as_keys, convert, values
 from bench.session.trace_files import IN_SPACE, OBJECT, trace_files
 from vision.pictures import PicturePart
 

@@ -7,8 +7,9 @@ from typing import Annotated
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.settings import Seeing, Settings
+from bench.base.toml_text import read_toml
 from bench.session.plausible import PlausibleRange
-from bench.session.strict_toml import Keys, as_keys, plausible_ranges, read_toml, values
+from bench.session.strict_toml import Keys, as_keys, plausible_ranges, values
 from vision.geometry import VisionSettings
 
 # The second has what the first leaves out. What it costs and how wrong it is, `tradeoff` measures.

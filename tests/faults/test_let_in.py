@@ -228,7 +228,7 @@ def test_a_package_of_our_name_is_told_before_it_is_imported(tmp_path, name):
 def test_tables_and_manifests_of_absurd_size(session, monkeypatch):
     monkeypatch.setattr("bench.session.table._MOST_BYTES", 1000)
     assert "signals.csv: has more than" in refusal(session)
-    monkeypatch.setattr("bench.session.strict_toml._MOST_BYTES", 10)
+    monkeypatch.setattr("bench.base.toml_text._MOST_BYTES", 10)
     assert "session.toml: has more than" in refusal(session)
 
 

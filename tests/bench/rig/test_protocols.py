@@ -16,11 +16,15 @@ from tests.scenes.rig_sessions import TINY, protocol_file
     [
         (('name = "tiny"', 'nome = "tiny"'), "no key is `nome`"),
         (("[[trials]]", "[[trails]]"), "no key is `trails`"),
-        (("views = 2", 'views = "two"'), "board.views: expected is a whole number, got text"),
+        (("views = 2", 'views = "two"'), "board.views: expected a whole number, found text"),
         (("beta_deg = [20, 50]", "beta_deg = [20, 95]"), "±89"),
         (
             ("beta_deg = [20, 50]", 'beta_deg = "steep"'),
-            "trials[0].beta_deg: expected is a number or a list, got text",
+            "trials[0].beta_deg: expected a number or a list, found text",
+        ),
+        (
+            ("static_friction = 0.3", 'static_friction = "high"'),
+            "trials[2].static_friction: expected a number, found text",
         ),
         (("friction = 0.2\n", "friction = -0.2\n"), "friction"),
         (("static_friction = 0.3", "static_friction = 0.1"), "below friction"),

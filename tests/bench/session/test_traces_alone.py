@@ -9,11 +9,11 @@ import pytest
 
 from bench.base.input_problems import InputProblems
 from bench.base.settings import Settings
+from bench.base.toml_text import read_toml
 from bench.cameras.session_cameras import calibrate_session
 from bench.session.abilities import abilities
 from bench.session.session_check import checked_session
 from bench.session.signals import forward_strokes, read_signals
-from bench.session.strict_toml import read_toml
 from bench.session.trial import PLACE_UNCHECKED
 from bench.trials.seen import see_trial
 from bench.trials.stated_truth import stated_whisk

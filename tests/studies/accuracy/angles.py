@@ -20,12 +20,12 @@ import tomli_w
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench import api
+from bench.base.toml_text import read_toml
 from bench.cameras.cameras_toml import write_cameras
 from bench.commands import cli
 from bench.report.score import truth_of
 from bench.rig.simulation import simulate
 from bench.session.session import load_session
-from bench.session.strict_toml import read_toml
 from tests.scenes.no_motor_log import without_log
 from tests.scenes.recorded import exact_cameras
 from tests.scenes.rig_sessions import CAMERAS_OF_QUICK
