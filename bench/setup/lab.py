@@ -3,7 +3,7 @@
 Imports nothing heavy: the command line makes its options of these.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -13,6 +13,8 @@ from bench.base.errors import BadInput
 KIND_NAMES = ("charuco", "checkerboard", "circles", "asymmetric_circles", "aprilgrid")
 BODY = "body"
 Ask: TypeAlias = Callable[[str], str]
+# The answer of who has no cameras, and so no board.
+NOTHING = "none"
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,9 @@ class Choice:
 
 
 CHOICES = (
-    Choice("cameras", "cameras: two or more, one and a mirror, or none", ("two", "mirror", "none")),
+    Choice(
+        "cameras", "cameras: two or more, one and a mirror, or none", ("two", "mirror", NOTHING)
+    ),
     Choice(
         "truth",
         "where the truth comes from: pictures, pictures with traces, traces without pictures, or a stage",
@@ -62,7 +66,7 @@ class Lab:
     @property
     def has_cameras(self) -> bool:
         """Return whether anything is seen."""
-        return self.cameras != "none"
+        return self.cameras != NOTHING
 
     @property
     def has_traces(self) -> bool:
@@ -94,31 +98,28 @@ class Lab:
 
 def _allowed(choice: Choice, known: Mapping[str, str]) -> tuple[str, ...]:
     """Return the answers that go with those known by option, the default first."""
-    if choice.option == "cameras" and (
-        known.get("truth") == "stage" or known.get("angle_from") == "speed"
-    ):
-        return tuple(reversed(choice.answers))
-    if choice.option == "cameras" and "truth" in known:
-        return choice.answers[:-1]  # all but none
-    if choice.option == "truth" and (
-        known.get("cameras") == "none" or known.get("angle_from") == "speed"
-    ):
-        return ("stage",)
-    if choice.option == "board_kind" and known.get("cameras") == "none":
-        return ("none",)
-    if choice.option == "angle_from":
-        return tuple(_angles(known["cameras"], known["truth"]))
-    return choice.answers
+    found = [answer for answer in choice.answers if _go_together({**known, choice.option: answer})]
+    if not found:
+        return (NOTHING,)  # no board where nothing is seen
+    needs_no_camera = known.get("truth") == "stage" or known.get("angle_from") == "speed"
+    if NOTHING in found and needs_no_camera:
+        found.remove(NOTHING)
+        found.insert(0, NOTHING)
+    return tuple(found)
 
 
-def _angles(cameras: str, truth: str) -> Iterator[str]:
-    """Yield where the motor's angle may be from: pictures of trials show it, and give no truth with a stated speed."""
-    yield "log"
-    if cameras != "none" and truth != "traces-only":
-        yield "marker"
-        yield "whisker"
-    if truth == "stage":
-        yield "speed"
+def _go_together(known: Mapping[str, str]) -> bool:
+    """Return whether no two of the answers known by option contradict each other."""
+    truth = known.get("truth", "stage")  # what goes with every other answer, where it is not known
+    angle_from = known.get("angle_from", "log")
+    board_kind = known.get("board_kind", NOTHING)
+    angle_is_seen = angle_from in ("marker", "whisker")
+    needs_cameras = truth != "stage" or angle_is_seen or board_kind != NOTHING
+    if known.get("cameras") == NOTHING and needs_cameras:
+        return False
+    if truth == "traces-only" and angle_is_seen:
+        return False  # the angle is seen in pictures of the trials
+    return truth == "stage" or angle_from != "speed"  # no zero, no truth by pictures
 
 
 def _ask_until_allowed(wanted: str, allowed: tuple[str, ...], ask: Ask) -> str:
