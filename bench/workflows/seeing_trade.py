@@ -27,6 +27,8 @@ from bench.base.workers import Workers
 from bench.report.score import truth_of
 from bench.session.session import Session
 from bench.session.signals import forward_strokes, read_signals
+from bench.session.trial import Trial
+from bench.trials.of_session import require_some
 from bench.trials.seeing import PRESETS, STANDARD, as_toml, by_preset
 from bench.trials.trial_evaluation import trial_result
 from bench.trials.unit import Unit
@@ -193,12 +195,18 @@ def tradeoff(
     timed. workers: so many settings are timed at once, each by a process of one thread; they share
     the machine's memory, so times are longest with many. Raise BadInput.
     """
-    with opened_session(path, out, settings, workers) as (session, units, pool):
+    with opened_session(path, out, settings, workers, _require_pictures) as opened:
+        session, units, pool = opened
         chosen = [unit for unit in units if unit.trial.camera_sources]
-        if not chosen:
-            raise BadInput(f"--trials {settings.trials}: no trial of such a name has pictures")
         trades = _with_errors(session, chosen, _time_all(chosen, repeats, pool))
     return _write(out, trades)
+
+
+def _require_pictures(trials: Sequence[Trial], settings: Settings) -> None:
+    """Raise BadInput where the settings choose no trial, or none with pictures."""
+    require_some(trials, settings)
+    if not any(settings.takes(trial.name) and trial.camera_sources for trial in trials):
+        raise BadInput(f"--trials {settings.trials}: no trial of such a name has pictures")
 
 
 def _time_all(units: Sequence[Unit], repeats: int, pool: Workers) -> list[Trade]:

@@ -13,7 +13,9 @@ from bench.workflows import seeing_trade
 from bench.workflows.expected_error import interval_of_rms
 from bench.workflows.seeing_trade import Trade, front, pick_line, settings_to_try, tradeoff_lines
 
-RING = Path(__file__).resolve().parents[3] / "fixtures" / "scenes" / "ring"
+FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
+RING = FIXTURES / "scenes" / "ring"
+SIGNALS = FIXTURES / "steel-signals"
 
 
 def trade(after_s, sigma_mm, error_mm=0.01, missing=0, name="standard"):
@@ -112,6 +114,12 @@ def test_a_table_and_files_to_give_back(tmp_path, monkeypatch):
 def test_no_trial_of_that_name(tmp_path):
     with pytest.raises(BadInput, match=r"--trials c\*: no trial has such a name"):
         seeing_trade.tradeoff(RING, tmp_path, Settings(trials="c*"))
+
+
+def test_trials_without_pictures_are_refused_before_anything_is_calibrated(tmp_path):
+    with pytest.raises(BadInput, match=r"--trials \*: no trial of such a name has pictures"):
+        seeing_trade.tradeoff(SIGNALS, tmp_path / "out", Settings())
+    assert not (tmp_path / "out").exists()
 
 
 def test_nothing_is_written_into_the_session():
