@@ -9,7 +9,7 @@ whisks of a session that angle is held against touch felt (`bench.trials.stage_t
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,6 +65,16 @@ _HOW = {
 }
 
 
+@dataclass(frozen=True, eq=False)
+class StatedWhisk:
+    """A whisk as a stage states it. touch: first touch by the object's place, None where none is stated,
+    or the whisker does not come to it.
+    """
+
+    truth: WhiskTruth
+    touch: StageTouch | None = None
+
+
 def by_stage(
     session: Session, trial: Trial, signals: Signals, settings: Settings, seen: SeenTrial
 ) -> SeenTrial:
@@ -76,9 +86,8 @@ def by_stage(
     whisks = []
     for whisk, stroke in zip(seen.whisks, strokes):
         stated = stated_whisk(session, trial, signals, stroke)
-        with_stated = _with_stated(whisk, stated, settings)
-        touch = stage_touch(session, trial, signals, stroke)
-        whisks.append(replace(with_stated, stage_touch=touch))
+        with_stated = _with_stated(whisk, stated.truth, settings)
+        whisks.append(replace(with_stated, stage_touch=stated.touch))
     return replace(seen, whisks=tuple(whisks))
 
 
@@ -191,21 +200,21 @@ def _in_other_unit(length: float, least_mm: float, most_mm: float) -> str:
     return f". Is it in {name}?" if name else ""
 
 
-def stated_whisk(session: Session, trial: Trial, signals: Signals, stroke: slice) -> WhiskTruth:
-    """Return the truth of one stroke as the stage states it; a status where it states none.
+def stated_whisk(session: Session, trial: Trial, signals: Signals, stroke: slice) -> StatedWhisk:
+    """Return one stroke as the stage states it; with a status where it states no truth.
 
     Raises BadInput for a distance beyond the whisker, or a place where no bar can be touched.
     """
     if trial.states_place:
         return _by_place(session, trial, signals, stroke)
     if trial.d_x_mm is None:
-        return WhiskTruth(0, status=reason("stage_says_nothing"))
+        return StatedWhisk(WhiskTruth(0, status=reason("stage_says_nothing")))
     _check_on_whisker(trial.d_x_mm, session, trial)
     slope = nominal_slope(trial)
     tilt = Value(0.0, slope.sigma) if slope.is_known else UNKNOWN
     shared_mm = session.truth.origin_sigma_mm
     sigma_mm = math.hypot(trial.d_x_sigma_mm, shared_mm)
-    return _truth(Value(trial.d_x_mm, sigma_mm), slope, tilt, shared_mm)
+    return StatedWhisk(_truth(Value(trial.d_x_mm, sigma_mm), slope, tilt, shared_mm))
 
 
 def _truth(d_x_mm: Value, beta_rad: Value, psi_rad: Value, shared_mm: float) -> WhiskTruth:
@@ -214,39 +223,24 @@ def _truth(d_x_mm: Value, beta_rad: Value, psi_rad: Value, shared_mm: float) -> 
     return WhiskTruth(0, d_x_mm=d_x_mm, beta_rad=beta_rad, psi_rad=psi_rad, shared=shared)
 
 
-def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -> WhiskTruth:
-    """Return the truth of a stroke against an object that stands where the stage has it."""
+def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -> StatedWhisk:
+    """Return a stroke against an object that stands where the stage has it."""
     push = _push(session, trial, signals, stroke)
     touch = push.touch(Offsets.none())
     if touch is None:
-        return _without_touch(push, trial)
-    rows = _derivatives(push, touch)[1:]
-    own = rows * _own_sigmas(trial, signals, stroke, touch)
-    shared = rows * _shared_sigmas(session, trial, touch)
-    shared_mm = float(np.linalg.norm(shared[0]))
-    values = []
-    for value, of_own, of_shared in zip((touch.d_x_mm, touch.beta_rad, touch.psi_rad), own, shared):
-        values.append(Value(value, float(np.hypot(*map(np.linalg.norm, (of_own, of_shared))))))
-    truth = _truth(*values, shared_mm)
-    return replace(
-        truth, status=joined(_unlike_stated(values[0], trial), _other_slope(values[1], trial))
-    )
-
-
-def stage_touch(
-    session: Session, trial: Trial, signals: Signals, stroke: slice
-) -> StageTouch | None:
-    """Return the motor's angle at first touch by the object's place; None where none is stated, or it is not touched."""
-    if not trial.states_place:
-        return None
-    push = _push(session, trial, signals, stroke)
-    touch = push.touch(Offsets.none())
-    if touch is None:
-        return None
-    by_offset = _derivatives(push, touch)[0]
-    own_rad = np.linalg.norm(by_offset * _own_sigmas(trial, signals, stroke, touch))
-    shared_rad = by_offset * _shared_sigmas(session, trial, touch)
-    return StageTouch(touch.motor_rad, float(own_rad), shared_rad)
+        return StatedWhisk(_without_touch(push, trial))
+    by_offset = _derivatives(push, touch)  # (4, p)
+    own = by_offset * _own_sigmas(trial, signals, stroke, touch)
+    shared = by_offset * _shared_sigmas(session, trial, touch)
+    own_sigma = np.linalg.norm(own, axis=1)  # (4,)
+    shared_sigma = np.linalg.norm(shared, axis=1)
+    _, *sigmas = np.hypot(own_sigma, shared_sigma).tolist()
+    numbers = (touch.d_x_mm, touch.beta_rad, touch.psi_rad)
+    d_x_mm, beta_rad, psi_rad = map(Value, numbers, sigmas)
+    truth = _truth(d_x_mm, beta_rad, psi_rad, float(shared_sigma[1]))
+    status = joined(_unlike_stated(d_x_mm, trial), _other_slope(beta_rad, trial))
+    stage_touch = StageTouch(touch.motor_rad, float(own_sigma[0]), shared[0])
+    return StatedWhisk(replace(truth, status=status), stage_touch)
 
 
 def stated_place(session: Session, trial: Trial, signals: Signals) -> tuple[Axis, np.ndarray]:

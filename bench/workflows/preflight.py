@@ -171,7 +171,7 @@ def _check_stage(session: Session, trial: Trial, signals: Signals, problems: Inp
     from bench.trials.stated_truth import stated_whisk  # it loads the solvers of the truth
 
     for number, stroke in enumerate(forward_strokes(signals)):
-        said = stated_whisk(session, trial, signals, stroke).status
+        said = stated_whisk(session, trial, signals, stroke).truth.status
         if said:
             problems.warn(said.about(f"{trial.place}, whisk {number}"))
 

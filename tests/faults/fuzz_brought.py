@@ -306,7 +306,7 @@ def _stated(session) -> Iterator[tuple[str, np.ndarray]]:
     for trial in session.trials:
         signals = read_signals(trial)
         for stroke in forward_strokes(signals):
-            truth = stated_whisk(session, trial, signals, stroke)
+            truth = stated_whisk(session, trial, signals, stroke).truth
             if not truth.status:
                 yield "stage", np.array([truth.d_x_mm.value, truth.d_x_mm.sigma])
 

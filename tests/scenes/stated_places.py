@@ -86,7 +86,7 @@ def drawn_whisk(
     motor_rad = np.radians(np.linspace(-8.0, 15.0, 500))
     time_s = np.linspace(0.0, 2.3, 500)
     signals = Signals(time_s, motor_rad, np.zeros(500), np.zeros(500), "V")
-    truth = stated_whisk(session, known, signals, slice(0, 500))
+    truth = stated_whisk(session, known, signals, slice(0, 500)).truth
     local = touched.local_bar(touch.point_mm)
     x, y, z = local.axis
     beta_rad = math.atan2(y * math.cos(touch.motor_rad) - x * math.sin(touch.motor_rad), z)

@@ -87,7 +87,7 @@ def test_a_stage_s_place_is_the_truth_of_each_whisker(session, tmp_path):
     for view in load_views(stated):
         (trial,) = view.trials
         signals = read_signals(trial)
-        truth = stated_whisk(view, trial, signals, forward_strokes(signals)[0])
+        truth = stated_whisk(view, trial, signals, forward_strokes(signals)[0]).truth
         true_mm = tomllib.loads(trial.own("truth.toml").read_text())["d_x_mm"]
         assert abs(truth.d_x_mm.value - true_mm) < 3.0 * truth.d_x_mm.sigma < 3.0
     text = re.sub(r"axis = \[[^\]]*\]\n", "", (trial.folder / "trial.toml").read_text())

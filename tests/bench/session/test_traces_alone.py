@@ -184,7 +184,7 @@ def test_a_stage_gives_the_truth_once_the_traces_are_taken_out(alone):
     assert (distance.count, slope.count, seen.count) == (1, 1, 0)
     signals = read_signals(session.trials[0])
     stroke = forward_strokes(signals)[0]
-    d_x_mm = stated_whisk(session, session.trials[0], signals, stroke).d_x_mm
+    d_x_mm = stated_whisk(session, session.trials[0], signals, stroke).truth.d_x_mm
     true_mm = read_toml(trial_of(alone) / "truth.toml", "truth.toml")["d_x_mm"]
     assert abs(d_x_mm.value - true_mm) < 2.0 * d_x_mm.sigma < 1.0, (d_x_mm, true_mm)
     assert np.isfinite(d_x_mm.sigma)

@@ -59,7 +59,7 @@ def stated(folder: Path, name: str = TRIAL):
     session = load_session(folder)
     trial = session.trial(name)
     signals = read_signals(trial)
-    return stated_whisk(session, trial, signals, forward_strokes(signals)[0])
+    return stated_whisk(session, trial, signals, forward_strokes(signals)[0]).truth
 
 
 def push(truth: dict[str, float], wire: Wire = WIRE, *, by_axis: bool = True) -> StatedPush:
