@@ -5,13 +5,13 @@ A number that is missing is NaN, a record that is missing None; a status says wh
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bench.records.phases import NO_PHASES, Phases
 from vision import NAN, UNKNOWN, FrameTruth, KeptFit, SeenWidth, TruthAtAngle, Value, WhiskTruth
-from vision.geometry import NO_REASON, Reason
+from vision.geometry import NO_REASON, Reason, joined
 
 # Where the truth of a whisk comes from.
 BY_PICTURES = "pictures"
@@ -226,6 +226,12 @@ class SeenWhisk:
     def has_truth(self) -> bool:
         """Return whether the whisk's distance is known."""
         return self.d_x_mm.is_known
+
+    def with_contradiction(self, found: Reason) -> "SeenWhisk":
+        """Return the whisk with what speaks against its truth in its status; as it is where nothing does."""
+        if not found:
+            return self
+        return replace(self, status=joined(self.status, found), contradicted=True)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from bench.base.input_problems import InputProblems
 from bench.base.statuses import ESTIMATES, TRUTH, reaching
 from bench.gauges.matrix import GaugeCalibration
 from bench.records.trial_result import SeenTrial, SeenWhisk
-from vision.geometry import Reason, as_reason, joined
+from vision.geometry import Reason, as_reason
 
 
 def contradictions_of(problems: InputProblems, trial: str) -> Reason:
@@ -44,7 +44,7 @@ def _contradicted(whisk: SeenWhisk, found: Reason) -> SeenWhisk:
     """Return a whisk with what speaks against its truth; one of which nothing is seen as it is."""
     if not whisk.has_truth and whisk.deflection is None:
         return whisk
-    return replace(whisk, status=joined(whisk.status, found), contradicted=True)
+    return whisk.with_contradiction(found)
 
 
 def against_estimates(said: Reason, gauges: GaugeCalibration | None, seen: SeenWhisk) -> Reason:

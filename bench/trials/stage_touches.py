@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.base.statuses import reason
-from bench.records.trial_result import FeltWhisk, SeenWhisk, StageTouch, TrialResult
+from bench.records.trial_result import FeltWhisk, StageTouch, TrialResult
 from bench.trials.differences import Difference
-from vision.geometry import Reason, joined
+from vision.geometry import NO_REASON, Reason
 
 # [rad] One sigma of the zero: wider than any bench has it. Stated.
 _ZERO_RAD = np.radians(10.0)
@@ -44,19 +44,12 @@ def with_stage_touches(results: Iterable[TrialResult]) -> tuple[TrialResult, ...
         return results
     named = []
     for result in results:
-        whisks = tuple(
-            _named(whisk, elsewhere.get((result.trial.name, whisk.whisk)))
-            for whisk in result.seen.whisks
-        )
-        named.append(replace(result, seen=replace(result.seen, whisks=whisks)))
+        whisks = []
+        for whisk in result.seen.whisks:
+            found = elsewhere.get((result.trial.name, whisk.whisk), NO_REASON)
+            whisks.append(whisk.with_contradiction(found))
+        named.append(replace(result, seen=replace(result.seen, whisks=tuple(whisks))))
     return tuple(named)
-
-
-def _named(seen: SeenWhisk, found: Reason | None) -> SeenWhisk:
-    """Return a whisk with what speaks against its place."""
-    if found is None:
-        return seen
-    return replace(seen, status=joined(seen.status, found), contradicted=True)
 
 
 def _touched(results: Iterable[TrialResult]) -> Iterator[_Touched]:

@@ -106,13 +106,9 @@ def _with_stated(seen: SeenWhisk, stated: WhiskTruth, settings: Settings) -> See
     if not seen.has_truth:
         at = TruthAtAngle(theta_rad=settings.theta_rad, status=_why_not_seen(seen))
         return replace(whisk, at=at, status=joined(stated.status, at.status))
-    against = _unlike_pictures(stated, seen)
-    return replace(
-        whisk,
-        pictured=PicturedContact(seen.d_x_mm, seen.beta_rad),
-        status=joined(seen.status, stated.status, against),
-        contradicted=seen.contradicted or bool(against),
-    )
+    pictured = PicturedContact(seen.d_x_mm, seen.beta_rad)
+    whisk = replace(whisk, pictured=pictured, status=joined(seen.status, stated.status))
+    return whisk.with_contradiction(_unlike_pictures(stated, seen))
 
 
 def _shared(seen: SeenWhisk, stated: WhiskTruth) -> SharedSigmas | None:

@@ -70,8 +70,7 @@ def _checked(
         offsets.append(_base_offset(wire, straight[camera], frame, own, radius_mm))
     offset_mm, nearest = max(offsets)
     found = _wire_reasons(offset_mm, nearest, taken, own)
-    status = in_one_status(whisk.status, *found)
-    return replace(whisk, status=status, contradicted=whisk.contradicted or bool(found))
+    return whisk.with_contradiction(in_one_status(*found))
 
 
 def _wire_reasons(offset_mm: float, nearest: str, taken: list[str], own: str) -> list[Reason]:
