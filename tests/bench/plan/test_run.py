@@ -9,7 +9,6 @@ import pytest
 from bench import api
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.base.statuses import reason
 from bench.commands import cli
 from bench.commands.plan import EXAMPLE
 from bench.plan.outlook import QUANTITIES
@@ -26,6 +25,7 @@ from tests.scenes.planned import LINES, cameras_of, protocol_of, staged_of
 from tests.scenes.results import seen_whisk
 from tests.scenes.rig_sessions import protocol_file, rows
 from vision.fit.line_noise import LineNoise
+from vision.geometry.reasons import Reason
 from vision.truth.predicted_truth import predict_truth
 
 SMALL = """
@@ -120,7 +120,7 @@ def test_a_recorded_whisk_beside_what_was_stated(tmp_path, steel_signals):
 
 def test_a_whisk_without_truth_keeps_its_reason(steel_signals, tmp_path):
     session, protocol = load_session(steel_signals), protocol_of(tmp_path)
-    seen = seen_whisk(0, reason("never_touches"))
+    seen = seen_whisk(0, Reason("never_touches", "it never touches"))
     task = SeenTask(
         session, session.trials[0], SeenTrial((seen,)), seen, cameras_of(protocol), (), 0.05
     )

@@ -8,7 +8,6 @@ import pytest
 from bench.analyses.single_camera import ONE_CAMERA, OneCamera, ShapeSeen
 from bench.base.errors import BadInput
 from bench.base.settings import Settings
-from bench.base.statuses import reason
 from bench.records.trial_result import ByOneCamera
 from bench.trials.one_camera import NOT_SHOWN, by_one_camera, require_camera
 from estimator.beam import Beam
@@ -16,6 +15,7 @@ from estimator.seen_shape import PLANE_UNKNOWN
 from tests.scenes.model_scenes import scene, with_points
 from tests.scenes.results import seen_whisk
 from vision.geometry.centreline import rotation_z
+from vision.geometry.reasons import Reason
 from vision.truth.records import WhiskTruth
 from vision.truth.sight_lines import sights_of
 from vision.truth.value import Value
@@ -70,7 +70,9 @@ def test_without_being_asked_and_without_the_camera(problem):
         == NOT_SHOWN
     )
     lost = by_one_camera(
-        WhiskTruth(0, None, status=reason("never_touches")), WHISKER, Settings(one_camera="one")
+        WhiskTruth(0, None, status=Reason("never_touches", "it never touches")),
+        WHISKER,
+        Settings(one_camera="one"),
     )
     assert lost.status.codes == ("never_touches",)
 
