@@ -34,8 +34,6 @@ NOMINAL_SHARE = 0.01
 _NOMINAL_SLOPE_DEG = 5.0
 # [rad] A stroke's usual range, where no frame has the angles.
 _NOMINAL_THETA_RAD = np.radians(np.linspace(1.0, 4.0, 6))
-# [1] Step of differences over the contact's distance: far above rounding, far below what curves. Derived.
-_STEP_SHARE = 1e-5
 # [rad] As the estimators average over (estimator.signal.HALF_WINDOW_RAD).
 _MOST_HALF_WINDOW_RAD = np.radians(0.5)
 # Where moments come from.
@@ -190,18 +188,18 @@ def reference_from_pictures(seen: SeenWhisk, whisker: Whisker) -> ReferenceMomen
     serves too. The deflection is from the unbent whisker as the free stroke has it, so a sag or a
     set of the wire is no moment. The force lies in the plane in which the wire is bent.
     """
-    d = seen.deflection
-    good = frames_with_moments(d)
+    good = frames_with_moments(seen.deflection)
     if not good.any():
         return None
-    moments = _seen_loads(d, good, whisker, lambda rod: rod.moments_Nmm)
+    d = seen.deflection.part(good)
+    moments = _seen_loads(d, whisker, lambda rod: rod.moments_Nmm)
     by_arc = moments.by_arc
     scale_sigma = float(np.sum(by_arc * moments.values) / np.sum(moments.values**2))
     return ReferenceMoments(
         d.touch_rad.value,
         d.d_x_mm,
-        d.motor_rad[good],
-        d.theta_rad[good],
+        d.motor_rad,
+        d.theta_rad,
         moments.values,
         moments.own_covariance + _common_cause(by_arc - scale_sigma * moments.values),
         scale_sigma=abs(scale_sigma),
@@ -215,8 +213,8 @@ def loads_from_pictures(deflection: Deflection, whisker: Whisker) -> tuple[np.nd
 
     Raises ArithmeticError where no rod of its rigidity is bent so.
     """
-    good = frames_with_moments(deflection)
-    loads = _seen_loads(deflection, good, whisker, lambda rod: rod.loads)
+    d = deflection.part(frames_with_moments(deflection))
+    loads = _seen_loads(d, whisker, lambda rod: rod.loads)
     covariance = loads.own_covariance + _common_cause(loads.by_arc)
     return loads.values, covariance + loads.by_camera_error @ loads.by_camera_error.T
 
@@ -241,30 +239,40 @@ class _SeenLoads:
 
 
 def _seen_loads(
-    d: Deflection, good: np.ndarray, whisker: Whisker, loads_of: Callable[[WhiskerRod], Loads]
+    d: Deflection, whisker: Whisker, loads_of: Callable[[WhiskerRod], Loads]
 ) -> _SeenLoads:
-    """Return the loads in the frames `good` (f,), of which there is one.
+    """Return the loads in the frames of a deflection, of which there is one.
 
     loads_of: which loads of a rod. Raises ArithmeticError where no rod is bent so.
     """
-    contacts = _contacts(d, good)
-    share = _share_along_rod(contacts, d.slip_mm[good], d.slip_sigma_mm[good])
+    contacts = SeenContacts.of(d)
+    share = _share_along_rod(contacts, d.slip_mm, d.slip_sigma_mm)
+    friction = -_FRICTION * share.value
     loads = loads_of(rod_of(whisker))
-    values = loads(contacts, -_FRICTION * share.value)
-    by_place = _by_place(contacts, share.value, loads, values)
-    by_camera_error_mm, of_places = _errors_of_places(d, good)
-    by_arc, own_covariance = _common_and_own(by_place, of_places)
+    values = loads(contacts, friction)
+    by_place = _by_places(contacts.derivatives(lambda moved: loads(moved, friction), values))
+    by_cameras_mm = d.by_camera_error_mm
+    by_arc, own_covariance = _common_and_own(
+        by_place, d.covariance - by_cameras_mm @ by_cameras_mm.T
+    )
     own_covariance += _covariance_by_friction(contacts, share, loads, values)
     for rest_mm in whisker.beam.other_rests_mm():
         other = loads_of(rod_of(whisker.with_rest(rest_mm)))
-        own_covariance += _common_cause(other(contacts, -_FRICTION * share.value) - values)
-    return _SeenLoads(values, by_arc, own_covariance, by_place @ by_camera_error_mm)
+        own_covariance += _common_cause(other(contacts, friction) - values)
+    return _SeenLoads(values, by_arc, own_covariance, by_place @ by_cameras_mm)
 
 
-def _contacts(d: Deflection, good: np.ndarray) -> SeenContacts:
-    """Return the contacts of a deflection in the frames `good` (f,)."""
-    across = np.stack([d.across_z_mm, d.across_y_mm], axis=1)[good]
-    return SeenContacts(d.along_mm[good], across, d.theta_rad[good], d.d_x_mm)
+def _by_places(of_own: np.ndarray) -> np.ndarray:
+    """Return the derivatives (nk, 3n) of the loads of n frames by the places of all contacts.
+
+    of_own (n, k, 3): of the k loads of each frame by the place of its own contact. Further along the
+    wire the deflection grows too; what is left of both is in the covariance of the places.
+    """
+    n, loads, _ = of_own.shape
+    rows = np.zeros((n, loads, n, 3))
+    frames = np.arange(n)
+    rows[frames, :, frames] = of_own
+    return rows.reshape(-1, 3 * n)
 
 
 def _covariance_by_friction(
@@ -279,40 +287,11 @@ def _covariance_by_friction(
     return _common_cause(_FRICTION_SIGMA * by_friction) + _common_cause(by_share)
 
 
-def _errors_of_places(d: Deflection, good: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the errors of the places of contacts in the frames `good` (f,), n of them.
-
-    These are by_camera_error_mm (3n, k), and the covariance (3n, 3n), mm², without the cameras' errors.
-    """
-    rows = np.repeat(good, 3)
-    by_camera_error_mm = d.by_camera_error_mm[rows]
-    covariance = d.covariance[np.ix_(rows, rows)] - by_camera_error_mm @ by_camera_error_mm.T
-    return by_camera_error_mm, covariance
-
-
 def source_of(seen: SeenWhisk) -> str:
     """Return where the moments of a whisk come from, for people."""
     if seen.deflection is None:
         return NOMINAL
     return SEEN if seen.has_truth else WIRE_ALONE
-
-
-def _by_place(
-    contacts: SeenContacts, share: np.ndarray, loads: Loads, here: np.ndarray
-) -> np.ndarray:
-    """Return the derivatives (kn, 3n) of k loads by where contacts are along, across z and across y.
-
-    Further along the wire the deflection grows too; what is left of both is in the covariance of
-    the places. here (n, k): the loads of the contacts where they are.
-    """
-    n = len(contacts.along_mm)
-    frames = np.arange(n)
-    step_mm = _STEP_SHARE * float(contacts.along_mm.max())
-    rows = np.zeros((*here.shape, n, 3))
-    for k, step in enumerate(step_mm * np.eye(3)):
-        moved = loads(contacts.moved(step), -_FRICTION * share)
-        rows[frames, :, frames, k] = (moved - here) / step_mm
-    return rows.reshape(-1, 3 * n)
 
 
 def _common_and_own(by_place: np.ndarray, of_places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

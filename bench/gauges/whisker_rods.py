@@ -1,6 +1,7 @@
 """The rod that a whisker is to its gauges: straight, or curved; chosen once, by what is stated of it."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +9,11 @@ import numpy as np
 from bench.gauges.clamped_rod import load_at_clamp
 from bench.gauges.curved_rod import KirchhoffRods, UnloadedRod
 from bench.gauges.held_rod import HeldRod
+from bench.records.trial_result import Deflection
 from bench.session.whisker import Whisker
+
+# [1] Step of differences over the contact's distance: far above rounding, far below what curves. Derived.
+_STEP_SHARE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,11 +29,29 @@ class SeenContacts:
     theta_rad: np.ndarray
     d_x_mm: float
 
+    @classmethod
+    def of(cls, deflection: Deflection) -> "SeenContacts":
+        """Return the contacts of a deflection."""
+        across_mm = np.stack([deflection.across_z_mm, deflection.across_y_mm], axis=1)
+        return cls(deflection.along_mm, across_mm, deflection.theta_rad, deflection.d_x_mm)
+
     def moved(self, step_mm: np.ndarray) -> "SeenContacts":
         """Return the contacts moved by a step (3,): along, across z and across y."""
         return replace(
             self, along_mm=self.along_mm + step_mm[0], across_mm=self.across_mm + step_mm[1:]
         )
+
+    def derivatives(
+        self, values_at: Callable[["SeenContacts"], np.ndarray], here: np.ndarray
+    ) -> np.ndarray:
+        """Return the derivatives (n, ..., 3), per mm, of what each contact has by where it is.
+
+        The last axis is along, across z and across y. values_at: of contacts, the values (n, ...);
+        here: those of these contacts.
+        """
+        step_mm = _STEP_SHARE * float(self.along_mm.max())
+        moved = [values_at(self.moved(step)) for step in step_mm * np.eye(3)]
+        return (np.stack(moved, axis=-1) - here[..., None]) / step_mm
 
 
 class WhiskerRod(ABC):

@@ -91,6 +91,19 @@ class Deflection:
     touch_rad: Value
     d_x_mm: float
 
+    def part(self, which: np.ndarray) -> "Deflection":
+        """Return the deflection in some of its frames; which (frames,): True for these."""
+        of_frames = {
+            name: array[which] for name, array in vars(self).items() if np.ndim(array) == 1
+        }
+        rows = np.repeat(which, 3)
+        return replace(
+            self,
+            **of_frames,
+            covariance=self.covariance[np.ix_(rows, rows)],
+            by_camera_error_mm=self.by_camera_error_mm[rows],
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Drawing:

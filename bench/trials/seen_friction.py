@@ -6,7 +6,6 @@ whisker bends the rod, that along the whisker hardly does. So tan α is the forc
 that along the normal, over the cosine of the angle at which the whisker slides along itself.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,9 +32,7 @@ _SET_LEFT = 1 / 2
 # [1] Share of what sliding along the whisker changes α by that may be wrong: two whisks of a vibrissa that slide along
 # themselves at 10 and 16° are off by a tenth and a seventh of it. Study: tests/studies/accuracy/species.py.
 _HEADING_LEFT = 1 / 8
-# [1] Step of differences over the contact's distance: far above rounding, far below what curves. Derived.
-_STEP_SHARE = 1e-5
-# [rad] The same of slope and tilt of the bar. Derived.
+# [rad] Step of differences of slope and tilt of the bar: far above rounding, far below what curves. Derived.
 _STEP_RAD = 1e-5
 # [mm] Less slip shows neither rest nor jump. Study: tests/bench/trials/test_phases.py, which holds at half and
 # at twice of it.
@@ -110,11 +107,14 @@ def _of_sliding(sliding: "_Sliding", seen: SeenWhisk, whisker: Whisker) -> Value
     """Return α of a contact that slides. Raises ArithmeticError where no rod is bent so."""
     d = sliding.deflection
     rod = rod_of(whisker)
-    contacts = SeenContacts(d.along_mm, _across_mm(d), d.theta_rad, d.d_x_mm)
+    contacts = SeenContacts.of(d)
     friction = sliding.friction_along(rod.held(contacts, 0.0))
     held = rod.held(contacts, friction)
     alpha_rad = sliding.slope_rad(held)
-    by_place = _by_place(sliding, contacts, lambda moved: rod.held(moved, friction))
+    by_place = contacts.derivatives(
+        lambda moved: sliding.alpha_rad(rod.held(moved, friction)), sliding.alpha_rad(held)
+    )
+    by_place = (sliding.weights[:, None] * by_place).ravel()  # (3n,)
     by_beta, by_psi = _by_direction(sliding, held)
     parts = [
         np.sqrt(by_place @ d.covariance @ by_place),
@@ -124,22 +124,6 @@ def _of_sliding(sliding: "_Sliding", seen: SeenWhisk, whisker: Whisker) -> Value
         _left_of_set(seen, whisker),
     ]
     return Value(alpha_rad, float(np.linalg.norm(parts)))
-
-
-def _by_place(
-    sliding: "_Sliding", contacts: SeenContacts, held_at: Callable[[SeenContacts], HeldRod]
-) -> np.ndarray:
-    """Return the derivatives (3n,) of α by where contacts are along, across z and across y, frame by frame.
-
-    held_at: the rod held at contacts. Raises ArithmeticError where no rod is bent so.
-    """
-    step_mm = _STEP_SHARE * float(contacts.along_mm.max())
-    here_rad = sliding.alpha_rad(held_at(contacts))
-    by_place = np.empty((len(here_rad), 3))
-    for k, step in enumerate(step_mm * np.eye(3)):
-        moved_rad = sliding.alpha_rad(held_at(contacts.moved(step)))
-        by_place[:, k] = sliding.weights * (moved_rad - here_rad) / step_mm
-    return by_place.ravel()
 
 
 def _by_direction(sliding: "_Sliding", held: HeldRod) -> tuple[float, float]:
@@ -169,7 +153,7 @@ class _Sliding:
     @property
     def weights(self) -> np.ndarray:
         """Return the weights (n,) by which angles make the slope of angle · size over the deflection's size."""
-        size = np.linalg.norm(_across_mm(self.deflection), axis=1)
+        size = np.hypot(self.deflection.across_z_mm, self.deflection.across_y_mm)
         centred = size - size.mean()
         return centred * size / np.sum(centred**2)
 
@@ -236,24 +220,12 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.sum(a * b, axis=1)
 
 
-def _across_mm(d: Deflection) -> np.ndarray:
-    """Return the deflections (n, 2) along z and against y."""
-    return np.stack([d.across_z_mm, d.across_y_mm], axis=1)
-
-
 def _near_touch(d: Deflection) -> Deflection:
     """Return the frames from `_NEAREST_RAD` to `_FARTHEST_RAD`, those beyond too where the former are few."""
     bent = d.theta_rad > _NEAREST_RAD
     near = bent & (d.theta_rad <= _FARTHEST_RAD)
     chosen = near if np.sum(near) >= _FEWEST_NEAR else bent
-    rows = np.repeat(chosen, 3)
-    of_frames = {name: values[chosen] for name, values in vars(d).items() if np.ndim(values) == 1}
-    return replace(
-        d,
-        **of_frames,
-        covariance=d.covariance[np.ix_(rows, rows)],
-        by_camera_error_mm=d.by_camera_error_mm[rows],
-    )
+    return d.part(chosen)
 
 
 def _left_of_set(seen: SeenWhisk, whisker: Whisker) -> float:
