@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bench.base.errors import BadInput
-from vision.geometry import Reason, Refused, joined
+from vision.geometry import Cameras, Reason, Refused, joined
 
 
 @contextmanager
@@ -16,6 +16,14 @@ def refused_as_bad_input(file: str) -> Iterator[None]:
         yield
     except Refused as problem:
         raise BadInput(str(problem), file=file) from None
+
+
+def require_cameras(cameras: Cameras, wanted: Iterable[str], file: str, cure: str = "") -> None:
+    """Raise BadInput, naming the file that they are from, where cameras lack one that is wanted."""
+    missing = [name for name in wanted if name not in cameras.names]
+    if missing:
+        found = f"has no camera {missing[0]}; it has {', '.join(cameras.names)}"
+        raise BadInput(found + cure, file=file)
 
 
 def in_one_status(*said: str | None) -> Reason:

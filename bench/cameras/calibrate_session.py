@@ -9,7 +9,7 @@ import numpy as np
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.exit_codes import print_written
-from bench.base.input_problems import refused_as_bad_input
+from bench.base.input_problems import refused_as_bad_input, require_cameras
 from bench.cameras.board_views import SessionViews, read_board_views, rig_view
 from bench.cameras.cameras_toml import write_cameras
 from bench.cameras.known_scale import check_scale
@@ -163,12 +163,8 @@ def _of_session(cameras: Cameras, session: Session, names: Sequence[str], file: 
             raise BadInput(f"{found}; --names takes as many, each once", file=file)
         cameras = Cameras(tuple(replace(camera, name=name) for camera, name in zip(cameras, names)))
     wanted = session.camera_names or tuple(session.rig_pictures)
-    missing = [name for name in wanted if name not in cameras.names]
-    if missing:
-        found = f"has no camera {missing[0]}, it has {', '.join(cameras.names)}"
-        raise BadInput(
-            f"{found}; give the session's names for these, in this order: --names …", file=file
-        )
+    cure = "; give the session's names for these, in this order: --names …"
+    require_cameras(cameras, wanted, file, cure)
     return cameras.subset(wanted) if wanted else cameras
 
 

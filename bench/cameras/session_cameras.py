@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.digests import Digests
-from bench.base.errors import BadInput
-from bench.base.input_problems import refused_as_bad_input
+from bench.base.input_problems import refused_as_bad_input, require_cameras
 from bench.base.results import (
     SEEING,
     hash_of,
@@ -102,10 +101,7 @@ def calibrate_session(session: Session, out: Path) -> SessionCalibration:
     else:
         known = _from_boards(session, out / "calibration")
         cameras = known.cameras
-    missing = [name for name in session.camera_names if name not in cameras]
-    if missing:
-        found = f"has no camera {missing[0]}, which has frames; calibrate it"
-        raise BadInput(found, file="cameras.toml")
+    require_cameras(cameras, session.camera_names, "cameras.toml", "; calibrate it")
     background = {name: _background(session, name) for name in cameras.names}
     cameras = _with_optics(cameras, background, session.board)
     of_cameras = [[c, cameras.covariance, cameras.placement] for c in cameras.cameras]

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.base.input_problems import InputProblems, refused_as_bad_input
+from bench.base.input_problems import InputProblems, refused_as_bad_input, require_cameras
 from bench.base.numbers import first_names
 from bench.base.progress import count_parts
 from bench.base.results import hash_of_files
@@ -235,10 +235,7 @@ def _calibrated_sizes(session: Session) -> dict[str, Size]:
         return {}
     with refused_as_bad_input("cameras.toml"):
         cameras = read_cameras(session.cameras_toml, session.pixel_aspects)
-    missing = [name for name in session.camera_names if name not in cameras.names]
-    if missing:
-        found = f"has no camera {missing[0]}; it has {', '.join(cameras.names)}"
-        raise BadInput(found, file="cameras.toml")
+    require_cameras(cameras, session.camera_names, "cameras.toml")
     if session.whisker is not None and session.base is None:
         _require_whisker_in_sight(cameras, session.whisker.length_mm)
     return {name: tuple(cameras[name].size_px) for name in cameras.names}

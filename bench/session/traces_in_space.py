@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.base.input_problems import refused_as_bad_input
+from bench.base.input_problems import refused_as_bad_input, require_cameras
 from bench.base.text_files import read_text
 from bench.session.trace_readers import DrawnLines, numbers_with_gaps
 from vision.calibration import foreign_cameras
@@ -53,10 +53,8 @@ def _cameras_beside(path: Path, sizes_px: Mapping[str, tuple[int, int]], label: 
     beside = f"{folder}/{calibration.name}"
     with refused_as_bad_input(beside):
         known = foreign_cameras(calibration)
+    require_cameras(known, list(sizes_px), beside)
     for name, (width, height) in sizes_px.items():
-        if name not in known.names:
-            found = f"has no camera {name}; it has {', '.join(known.names)}"
-            raise BadInput(found, file=beside)
         its_width, its_height = known[name].size_px
         if (its_width, its_height) != (width, height):
             found = f"has camera {name} with pictures of {its_width} x {its_height} px"

@@ -88,7 +88,7 @@ def test_lenses_of_another_tool_are_placed_by_the_rig_board(small_session, tmp_p
     text = "".join(LENSES.format(name=str(k), K=t["K"], dist=t["dist"]) for k, t in numbered)
     file = tmp_path / "anipose.toml"
     file.write_text(text)
-    with pytest.raises(BadInput, match=r"has no camera high, it has 0, 1; .* --names"):
+    with pytest.raises(BadInput, match=r"has no camera high; it has 0, 1; .* --names"):
         calibrate_cameras_command(small_session, tmp_path / "c.toml", file)
     with pytest.raises(BadInput, match=r"the lenses of .* are exchanged"):
         calibrate_cameras_command(small_session, tmp_path / "c.toml", file, names=list(truth)[::-1])
