@@ -7,7 +7,9 @@ import numpy as np
 
 from bench.base.errors import BadInput
 from bench.session.angles_file import angles_file, read_angles
+from bench.session.file_names import TRIAL_TOML
 from bench.session.stated_speed import by_stated_speed
+from bench.session.strict_toml import is_sigma
 from bench.session.table import NumberTable, require_columns
 from bench.session.trial import Trial
 
@@ -61,14 +63,27 @@ class AngleSource(ABC):
 
     by: how tables say where the angle is from. has_zero: pictures and angle have one zero, so that
     pictures give truth. is_seen: it is from the trial's own pictures, and so is θ of its estimates.
-    unknown: what cannot be known then, for `check`. keys: of [trial], without which it gives no angle.
+    is_one_way: the way back has none. unknown: what cannot be known then, for `check`. keys: of
+    [trial], without which it gives no angle.
     """
 
     by: str
     has_zero = True
     is_seen = False
+    is_one_way = False
     unknown = ""
     keys: tuple[str, ...] = ()
+
+    def check_keys(self, trial: Trial) -> None:
+        """Raise BadInput where the trial lacks a key, or asks for the way back of one that has none."""
+        label = trial.label(TRIAL_TOML)
+        for key in self.keys:
+            value = getattr(trial, key)
+            if value is None or (is_sigma(key) and not value > 0):
+                raise BadInput(missing_key(key, trial.angle_from), file=label)
+        if trial.both_ways and self.is_one_way:
+            cure = f'angle_from = "{trial.angle_from}" knows the way there alone'
+            raise BadInput(f"both_ways needs motor_deg: {cure}", file=label)
 
     def lacks(self, trial: Trial) -> str:
         """Return what is to be done before the angle is known; '' where nothing is."""
@@ -107,15 +122,20 @@ class StatedSpeed(AngleSource):
 
     by = "the stated speed"
     has_zero = False
+    is_one_way = True
     unknown = "touch as pictures have it, changes of speed, and the way back"
     keys = ("speed_deg_s", "speed_sigma_deg_s")
 
     def of_samples(
         self, table: NumberTable, channels: np.ndarray, trial: Trial, label: str
     ) -> MotorAngle:
-        """Return the angle from the recording's start. Raises BadInput as `by_stated_speed`."""
-        motor_deg, share = by_stated_speed(table[TIME], channels, trial, label)
-        return MotorAngle(table, motor_deg, AngleSigma(share))
+        """Return the angle from the recording's start. Raises BadInput as `by_stated_speed`, and where a
+        key is missing."""
+        if trial.purpose == "weight":
+            return MotorAngle(table, np.zeros(len(table)))
+        self.check_keys(trial)
+        motor_deg = by_stated_speed(table[TIME], channels, trial.speed_deg_s, label)
+        return MotorAngle(table, motor_deg, AngleSigma(trial.speed_sigma_deg_s / trial.speed_deg_s))
 
 
 class Seen(AngleSource):
@@ -126,10 +146,11 @@ class Seen(AngleSource):
         "the motor between frames and outside them, a lag of motor or encoder behind the pictures"
     )
 
-    def __init__(self, by: str, key: str):
+    def __init__(self, by: str, key: str, *, is_one_way: bool = False):
         """Take how tables say where the angle is from, and the key without which there is none."""
         self.by = by
         self.keys = (key,)
+        self.is_one_way = is_one_way
 
     def lacks(self, trial: Trial) -> str:
         """Return the verb that makes the file of angles, where it is missing."""
@@ -159,8 +180,15 @@ SOURCES: dict[str, AngleSource] = {
     "log": Logged(),
     "speed": StatedSpeed(),
     "marker": Seen("the hub's marker, seen in pictures of the same trial", "hub_marker"),
-    "whisker": Seen("the whisker's base, seen in pictures of the same trial", "speed_deg_s"),
+    "whisker": Seen(
+        "the whisker's base, seen in pictures of the same trial", "speed_deg_s", is_one_way=True
+    ),
 }
+
+
+def missing_key(key: str, angle_from: str) -> str:
+    """Return what is said where a key of [trial] is missing that an angle's source needs."""
+    return f'{key} is missing: angle_from = "{angle_from}" needs it'
 
 
 def angle_source(trial: Trial) -> AngleSource:

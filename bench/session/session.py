@@ -13,7 +13,7 @@ from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.base.toml_text import read_toml
 from bench.session import manifest
-from bench.session.angle_source import SOURCES
+from bench.session.angle_source import SOURCES, missing_key
 from bench.session.daq import daq_file
 from bench.session.file_names import SESSION_TOML
 from bench.session.footage import camera_sources, single_pictures, visible
@@ -346,8 +346,7 @@ def _check_angle_parts(trial: Any, problems: InputProblems) -> None:
     for key in SOURCES[angle_from].keys if angle_from in SOURCES else ():
         with problems.guard():
             if key not in trial:
-                found = f'[trial] {key} is missing: angle_from = "{angle_from}"'
-                raise BadInput(found, file=SESSION_TOML)
+                raise BadInput(f"[trial] {missing_key(key, angle_from)}", file=SESSION_TOML)
 
 
 def _whisker(keys: manifest.WhiskerKeys | None, path: Path) -> Whisker | None:

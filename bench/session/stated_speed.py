@@ -8,8 +8,6 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from bench.base.errors import BadInput
-from bench.session.file_names import TRIAL_TOML
-from bench.session.trial import Trial
 
 # [1] Of the recording's samples, for the level at its start and for the mean that finds its crest. Stated.
 _SMOOTH_SHARE = 0.01
@@ -24,29 +22,15 @@ _FALLEN = 0.2
 
 
 def by_stated_speed(
-    time_s: np.ndarray, channels: np.ndarray, trial: Trial, label: str
-) -> tuple[np.ndarray, float]:
-    """Return the motor's angle (n,), degrees, and the relative sigma of its differences.
+    time_s: np.ndarray, channels: np.ndarray, speed_deg_s: float, label: str
+) -> np.ndarray:
+    """Return the motor's angle (n,), degrees.
 
     It grows from 0 at the stated speed until the channels (n, 2) are at their crest, and stays there: how
-    the motor comes back is not known. Where a weight hangs it is 0. Raises BadInput where the speed or its
-    sigma is not stated, and where the recording has several strokes.
+    the motor comes back is not known. Raises BadInput where the recording has several strokes.
     """
-    if trial.purpose == "weight":
-        return np.zeros(len(time_s)), 0.0
-    speed_deg_s = trial.speed_deg_s
-    if speed_deg_s is None or not trial.speed_sigma_deg_s > 0:
-        missing = "speed_deg_s" if speed_deg_s is None else "speed_sigma_deg_s"
-        found = (
-            f'angle_from = "speed" needs speed_deg_s and speed_sigma_deg_s; {missing} is missing'
-        )
-        raise BadInput(found, file=trial.label(TRIAL_TOML))
-    if trial.both_ways:
-        found = 'both_ways needs motor_deg: angle_from = "speed" knows the way there alone'
-        raise BadInput(found, file=trial.label(TRIAL_TOML))
     crest = _crest(channels, label)
-    elapsed_s = np.minimum(time_s, time_s[crest]) - time_s[0]
-    return speed_deg_s * elapsed_s, trial.speed_sigma_deg_s / speed_deg_s
+    return speed_deg_s * (np.minimum(time_s, time_s[crest]) - time_s[0])
 
 
 def _crest(channels: np.ndarray, label: str) -> int:

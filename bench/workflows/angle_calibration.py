@@ -108,15 +108,7 @@ def _check(session: Session, trial: Trial) -> None:
     if session.cameras_toml is None and session.T_rig_board is None and not session.measured_rig:
         found = "where the motor's axis is must be known: state T_rig_board, or bring rig.toml or cameras.toml"
         raise BadInput(found, file=SESSION_TOML)
-    if trial.angle_from == "whisker" and trial.both_ways:
-        found = 'both_ways needs the way back: angle_from = "whisker" knows the way there alone'
-        raise BadInput(found, file=label)
-    if trial.angle_from == "whisker" and trial.speed_deg_s is None:
-        found = 'angle_from = "whisker" needs speed_deg_s, nominal, to begin from; it is missing'
-        raise BadInput(found, file=label)
-    if trial.angle_from == "marker" and trial.hub_marker is None:
-        found = 'angle_from = "marker" needs hub_marker, the number of the marker on the hub'
-        raise BadInput(f"{found}; it is missing", file=label)
+    angle_source(trial).check_keys(trial)
     if trial.angle_from == "marker" and session.board is None:
         raise BadInput("[board] is missing; its dictionary is the marker's", file=SESSION_TOML)
 

@@ -128,9 +128,9 @@ def nothing(session: Path) -> None:
     [
         (WHISKER, blank, "trials/w_b35_v10: "),
         (WHISKER, one_camera, "needs pictures by two cameras; there are 1"),
-        (WHISKER, no_speed, "needs speed_deg_s, nominal, to begin from"),
-        (WHISKER + "\nboth_ways = true", nothing, "both_ways needs the way back"),
-        ('angle_from = "marker"', nothing, "needs hub_marker, the number of the marker on the hub"),
+        (WHISKER, no_speed, "speed_deg_s is missing: angle_from"),
+        (WHISKER + "\nboth_ways = true", nothing, "both_ways needs motor_deg"),
+        ('angle_from = "marker"', nothing, "hub_marker is missing: angle_from"),
         (
             'angle_from = "marker"\nhub_marker = 77',
             nothing,
