@@ -48,6 +48,12 @@ def as_cell(is_inside: bool | None) -> int | None:
     return None if is_inside is None else int(is_inside)
 
 
+def angle_text(angle: Value) -> str:
+    """Return an angle, rad, with its sigma in degrees; a dash where it is not known."""
+    shown = angle.in_degrees()
+    return f"{shown.value:.2f} ± {shown.sigma:.2f}°" if angle.is_known else "-"
+
+
 def panel_title(surface: str, speed_deg_s: float | None) -> str:
     """Return surface and speed in words."""
     name = surface or "surface not named"

@@ -22,7 +22,7 @@ from bench.base.drawing import (
     whisk_url,
 )
 from bench.base.settings import Settings
-from bench.records.trial_result import TrialResult, whisks
+from bench.records.trial_result import WITH_FRICTION, TrialResult, whisks
 from bench.trials.estimate_errors import Judged, judge
 from estimator.threshold import distance_error
 
@@ -91,7 +91,7 @@ def error_against_slope(
 
     The error of (2), which assumes no slip, dwarfs the others'. Hollow points are flagged.
     """
-    judged = [j for j in judged if not j.one_factor or j.estimator == "with_friction"]
+    judged = [one for one in judged if one.is_shown]
     panels = grouped(judged, lambda one: (one.surface, one.speed_deg_s))
     surface_of = {surface.panel: surface for surface in fitted}
     lanes = _lanes(judged)
@@ -117,17 +117,13 @@ def _name_panels(left: "Axes", right: "Axes", title: str) -> None:
     right.set_title(f"{title}: without (2)")
 
 
-Lane = tuple[str, bool]  # estimator, and whether it was given one gauge factor a channel
-
-
-def _lane(judged: Judged) -> Lane:
-    """Return by what an estimate is moved, so as not to cover others of its whisk."""
-    return judged.estimator, judged.one_factor
+# A `Judged.way`: by it an estimate is moved, so as not to cover others of its whisk.
+Lane = tuple[str, bool]
 
 
 def _lanes(judged: Sequence[Judged]) -> dict[Lane, float]:
     """Return how far the estimates of each lane are drawn to the side of their slope, degrees."""
-    lanes = list(dict.fromkeys(_lane(one) for one in judged))
+    lanes = list(dict.fromkeys(one.way for one in judged))
     step_deg = min(_APART_DEG, _SPREAD_DEG / len(lanes))
     middle = 0.5 * (len(lanes) - 1)
     return {lane: step_deg * (number - middle) for number, lane in enumerate(lanes)}
@@ -145,7 +141,7 @@ def _draw_estimators(
     lanes: how far the estimates of one whisk stand to the side, so that none hides another; the
     predicted line goes with them.
     """
-    of_lanes = grouped(judged, _lane)
+    of_lanes = grouped(judged, lambda one: one.way)
     for number, (lane, apart_deg) in enumerate(lanes.items()):
         mine = of_lanes.get(lane, [])
         if not mine:
@@ -188,7 +184,7 @@ def error_against_friction(found: Sequence[tuple[float, Judged]]) -> "Figure":
     _draw_group(axes, [alpha for alpha, _ in found], chosen, 0)
     axes.axhline(0.0, color="0.6", lw=0.8, zorder=0)
     axes.set(xlabel="friction angle α  [°]", ylabel="error of d$_x$  [%]")
-    axes.set_title(label_of("with_friction"))
+    axes.set_title(label_of(WITH_FRICTION))
     axes.set_ylim(*_limits(chosen))
     return figure
 
@@ -217,10 +213,10 @@ def _draw_prediction(
 
     apart_deg: how far to the side.
     """
-    assumed_rad = {"frictionless": 0.0, "with_friction": settings.alpha_est_rad, "no_slip": 0.0}
+    assumed_rad = {"frictionless": 0.0, WITH_FRICTION: settings.alpha_est_rad, "no_slip": 0.0}
     if name not in assumed_rad or surface.fit is None:
         return
-    equation = "no_slip" if name == "no_slip" else "with_friction"
+    equation = "no_slip" if name == "no_slip" else WITH_FRICTION
     error = distance_error(np.radians(SLOPES_DEG), surface.alpha_rad, assumed_rad[name], equation)
     axes.plot(
         SLOPES_DEG + apart_deg,

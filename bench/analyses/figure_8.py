@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun
-from bench.analyses.cells import value_cells
+from bench.analyses.cells import angle_text, value_cells
 from bench.analyses.pooling import column
 from bench.analyses.surfaces import FittedSurface, SlopePoint
 from bench.base.drawing import SLOPES_DEG, add_legend, blank, colour_of, whisk_url
 from bench.base.tables import SPEED, SURFACE, Column, Kind, Table, alike, with_sigma
+from bench.records.trial_result import WITH_FRICTION
 from estimator.beam import moment_in_EI_per_metre
 from estimator.friction import curves
 
@@ -203,11 +204,10 @@ def _label_panel(top: "Axes", bottom: "Axes", surface: FittedSurface, letter: st
 def _draw_fit(top: "Axes", bottom: "Axes", surface: FittedSurface) -> str:
     """Draw |m| and φ of (13), (14) at the fitted α; return a line with that α."""
     m_fit, phi_fit_deg = _fitted_curves(surface, SLOPES_DEG)
-    colour = colour_of("with_friction")
+    colour = colour_of(WITH_FRICTION)
     top.plot(SLOPES_DEG, m_fit, color=colour, lw=1.4, label="(13), (14) with the fitted α")
     bottom.plot(SLOPES_DEG, phi_fit_deg, color=colour, lw=1.4)
-    alpha_deg = surface.alpha.in_degrees()
-    return f"α = {alpha_deg.value:.2f} ± {alpha_deg.sigma:.2f}°\n"
+    return f"α = {angle_text(surface.alpha)}\n"
 
 
 def _meaning(points: Sequence[SlopePoint]) -> str:

@@ -17,7 +17,7 @@ from bench.analyses.analysis import (
     TrueRun,
     read_rows,
 )
-from bench.analyses.cells import cell_with_sigma, panel_cell, value_cells
+from bench.analyses.cells import angle_text, cell_with_sigma, panel_cell, value_cells
 from bench.analyses.pooling import column, measured
 from bench.analyses.section_vii import (
     Way,
@@ -202,7 +202,7 @@ class FrictionAngles(Analysis):
         yield f"{'surface':<24}{'whisks':>7}  {'seen':>15}  {'felt':>15}  {'Fig. 8 fit':>15}"
         for one in found.surfaces:
             names = (*RECORDS, "least_squares")
-            cells = "  ".join(f"{_alpha_text(one.alpha(name)):>15}" for name in names)
+            cells = "  ".join(f"{angle_text(one.alpha(name)):>15}" for name in names)
             yield f"{one.surface.title:<24}{len(one.whisks):>7}  {cells}"
         if any(_has_both_signs(one.whisks) for one in found.surfaces):
             yield _WIDE
@@ -360,8 +360,8 @@ def _stick_slip_lines(one: SurfaceFriction) -> Iterator[str]:
             continue
         rests = sum(each.rests for each in phases)
         sticking = sum(each.jumps > 0 for each in phases)
-        static = _alpha_text(one.alpha(f"{STATIC}_{record}"))
-        kinetic = _alpha_text(one.alpha(f"{KINETIC}_{record}"))
+        static = angle_text(one.alpha(f"{STATIC}_{record}"))
+        kinetic = angle_text(one.alpha(f"{KINETIC}_{record}"))
         is_nominal = any(whisk.nominal for whisk in one.whisks)
         by_hand = ", slopes as the manifest has them" if is_nominal else ""
         yield (
@@ -375,15 +375,9 @@ def _section_vii_lines(one: SurfaceFriction) -> Iterator[str]:
     for way in one.ways:
         if way.alpha.is_known:
             status = f"; {way.status}" if way.status else ""
-            yield f"by {way.name} (section VII) α = {_alpha_text(way.alpha)}{status}"
+            yield f"by {way.name} (section VII) α = {angle_text(way.alpha)}{status}"
     if np.isfinite(one.error_rms_weighted_percent) and len(one.whisks) > 1:
         yield (
             f"RMS error of (10), α_est given: {one.error_rms_percent:.2f} %, weighted by confidence "
             f"(section VII) {one.error_rms_weighted_percent:.2f} %"
         )
-
-
-def _alpha_text(alpha: Value) -> str:
-    """Return a friction angle in degrees; a dash where it is not known."""
-    alpha_deg = alpha.in_degrees()
-    return f"{alpha_deg.value:.2f} ± {alpha_deg.sigma:.2f}°" if alpha.is_known else "-"

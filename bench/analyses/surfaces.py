@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bench.analyses.cells import panel_title
+from bench.analyses.cells import angle_text, panel_title
 from bench.analyses.pooling import by_slope, column, measured
 from bench.analyses.theory_left import as_theory_has_them
 from bench.base.combined import add_common, student_factor
@@ -153,9 +153,8 @@ def friction_lines(fitted: Iterable[FittedSurface]) -> Iterator[str]:
         if surface.fit is None:
             yield f"{surface.title}: {count} cannot hold it (two slopes above α are needed)"
             continue
-        alpha_deg = surface.alpha.in_degrees()
         status = f"; {surface.fit.status}" if surface.fit.status else ""
-        yield f"{surface.title}: α = {alpha_deg.value:.2f} ± {alpha_deg.sigma:.2f}° over {count}{status}"
+        yield f"{surface.title}: α = {angle_text(surface.alpha)} over {count}{status}"
 
 
 def _felt(recording: int, result: TrialResult, seen: SeenWhisk, felt: FeltWhisk) -> Felt | None:

@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from bench.array.cloud import SEEN, ContactPoint
+from bench.array.shape_verdict import FELT
 from bench.array.surface import ObjectSurface
 from bench.base.drawing import blank, is_drawn, save, style
 from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.records.plain import to_plain
 
-_FELT = "with_friction"
 _VIEWS = ((0, 2, "x (mm)", "z (mm)"), (0, 1, "x (mm)", "y (mm)"))
 _MARGIN_MM = 15.0  # mm of a bar that are drawn beyond the contacts
 _MOST_ENTRIES = 14  # of a column of the legend that is as high as the figure
@@ -34,7 +34,7 @@ def write_figures(
     by_trial = {}
     for contact in cloud:
         chosen = by_trial.setdefault(contact.trial, [])
-        if contact.estimator in (SEEN, _FELT):
+        if contact.estimator in (SEEN, FELT):
             chosen.append(contact)
     code = hash_of_code((*DRAWING, "bench/array"))
     names = []

@@ -10,6 +10,7 @@ import numpy as np
 from bench.array.cloud import SEEN, ContactPoint
 from bench.base.drawing import label_of
 from bench.base.tables import TRIAL, WHISK, WHISKER, Column, Kind, Table, alike, status, with_sigma
+from bench.records.trial_result import WITH_FRICTION
 from estimator.uncertainty import Z_95
 from vision.geometry import counted
 
@@ -46,7 +47,7 @@ SURFACE_POINTS = Table(
         status("its warnings"),
     ),
 )
-FELT = "with_friction"  # equation (10), whose contacts are the array's verdict
+FELT = WITH_FRICTION  # whose contacts are the array's verdict
 
 
 def write_surface(out: Path, cloud: Iterable[ContactPoint]) -> None:

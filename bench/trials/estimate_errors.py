@@ -61,6 +61,16 @@ class Judged:
         return self.estimator == WITH_FRICTION and not self.one_factor
 
     @property
+    def is_shown(self) -> bool:
+        """Return whether it stands beside those of other estimators: with one factor a channel, (10) alone does."""
+        return not self.one_factor or self.estimator == WITH_FRICTION
+
+    @property
+    def way(self) -> tuple[str, bool]:
+        """Return estimator and kind of gauges: which estimates of other whisks it stands with."""
+        return self.estimator, self.one_factor
+
+    @property
     def has_warning(self) -> bool:
         """Return whether the whisk itself has a warning."""
         return not has_only_notes(self.whisk_status)

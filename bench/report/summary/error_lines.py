@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.analyses.pooling import grouped, rms
 from bench.base.drawing import label_of
-from bench.records.trial_result import TrialResult
+from bench.records.trial_result import WITH_FRICTION, TrialResult
 from bench.report.whisk_rows import estimate_rows
 from bench.trials.estimate_errors import Judged, sound_whisks
 
@@ -15,29 +15,18 @@ _NARROWEST = 17  # letters of a column
 
 def error_lines(judged: Sequence[Judged]) -> Iterator[str]:
     """Yield a head and a line a whisk, a column an estimator: estimate less truth in percent."""
-    known = [one for one in judged if _is_shown(one)]
+    known = [one for one in judged if one.is_shown and np.isfinite(one.error_percent)]
     if not known:
         return
     by_factor = sorted(known, key=lambda one: one.one_factor)
-    heads = {_column(one): _head(one) for one in by_factor}
+    heads = {one.way: _head(one) for one in by_factor}
     yield f"{'trial':<18}{'whisk':>5}  {'β':>6}   {_in_columns(heads.values(), heads.values())}"
     for (trial, whisk), mine in grouped(known, lambda one: (one.trial, one.whisk)).items():
         errors = dict.fromkeys(heads, "-")
         for one in mine:
-            errors[_column(one)] = f"{one.error_percent:+.2f} ± {one.error_sigma_percent:.2f}"
+            errors[one.way] = f"{one.error_percent:+.2f} ± {one.error_sigma_percent:.2f}"
         cells = _in_columns(heads.values(), errors.values())
         yield f"{trial:<18}{whisk:>5}  {mine[0].beta_deg:>5.1f}°   {cells}"
-
-
-def _is_shown(judged: Judged) -> bool:
-    """Return whether an error is known, and of the estimators by one factor the one with friction."""
-    is_wanted = not judged.one_factor or judged.estimator == "with_friction"
-    return bool(np.isfinite(judged.error_percent)) and is_wanted
-
-
-def _column(judged: Judged) -> tuple[str, bool]:
-    """Return estimator and kind of gauges: what an error's column stands for."""
-    return judged.estimator, judged.one_factor
 
 
 def _head(judged: Judged) -> str:
@@ -62,7 +51,7 @@ def contact_lines(results: Iterable[TrialResult]) -> Iterator[str]:
     sound = sound_whisks(results)
     rows = []
     for row in estimate_rows(results):
-        if row["estimator"] == "with_friction" and (row["trial"], row["whisk"]) in sound:
+        if row["estimator"] == WITH_FRICTION and (row["trial"], row["whisk"]) in sound:
             rows.append(row)
     parts = []
     for name in ("point", "d_y", "d_z", "slip"):
