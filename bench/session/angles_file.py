@@ -7,7 +7,13 @@ import numpy as np
 
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
-from bench.session.table import read_table, require_columns
+from bench.session.table import (
+    read_table,
+    refuse_where,
+    require_columns,
+    require_rising,
+    require_rows,
+)
 from bench.session.trial import Trial
 
 _COLUMNS = ("time_s", "motor_deg", "motor_sigma_deg", "share_sigma")
@@ -62,17 +68,10 @@ def read_angles(trial: Trial) -> FrameAngles:
         raise BadInput(f"is not there; {cure}", file=label)
     table = read_table(path, label)
     require_columns(table, _COLUMNS, label)
-    if len(table) < 2:
-        raise BadInput("has fewer than two rows, one a frame", file=label)
-    for column, is_wrong in (
-        ("time_s", np.diff(table["time_s"], prepend=-np.inf) <= 0.0),
-        ("motor_sigma_deg", table["motor_sigma_deg"] < 0.0),
-        ("share_sigma", table["share_sigma"] < 0.0),
-    ):
-        if is_wrong.any():
-            row = int(np.argmax(is_wrong))
-            found = f"{table[column][row]:g}; times must increase, sigmas be 0 or more"
-            raise BadInput(found, file=label, row=int(table.row[row]), column=column)
+    require_rows(table, 2, "rows, one a frame", label)
+    require_rising(table, "time_s", "times must increase", label)
+    for column in ("motor_sigma_deg", "share_sigma"):
+        refuse_where(table, column, table[column] < 0.0, "sigmas are 0 or more", label)
     return FrameAngles(
         table["time_s"],
         table["motor_deg"],

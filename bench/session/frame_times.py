@@ -10,7 +10,13 @@ from bench.base.errors import BadInput
 from bench.session.daq import DaqFile, frame_edges, read_daq
 from bench.session.footage import declared_rate_Hz, decoded_count, frame_count, read_frames
 from bench.session.signals import Signals
-from bench.session.table import NumberTable, forward_in_time, read_table, require_columns
+from bench.session.table import (
+    NumberTable,
+    forward_in_time,
+    read_table,
+    require_columns,
+    require_rising,
+)
 from bench.session.trial import Trial
 from vision.geometry import Reason, Refused, counted
 from vision.pictures import Frames, PicturePart
@@ -290,11 +296,7 @@ def _read(path: Path, label: str) -> tuple[NumberTable, int]:
     table = read_table(path, label)
     require_columns(table, (FRAME, TIME), label)
     table, repeats = forward_in_time(table, TIME, label)
-    wrong = np.flatnonzero(np.diff(table[FRAME]) <= 0)
-    if len(wrong):
-        row = int(table.row[wrong[0] + 1])
-        found = "frame numbers must increase, a row a picture"
-        raise BadInput(found, file=label, row=row, column=FRAME)
+    require_rising(table, FRAME, "frame numbers must increase, a row a picture", label)
     return table, repeats
 
 

@@ -12,7 +12,14 @@ from numpy.polynomial import Polynomial
 
 from bench.base.errors import BadInput
 from bench.session.rest_shape import check_is_beside
-from bench.session.table import NumberTable, read_table, require_columns
+from bench.session.table import (
+    NumberTable,
+    read_table,
+    refuse_where,
+    require_columns,
+    require_rising,
+    require_rows,
+)
 
 _COLUMNS = ("arc_mm", "diameter_mm")
 _SIGMA = "diameter_sigma_mm"
@@ -60,7 +67,9 @@ def read_profile(session: Path, name: str, length_mm: float) -> Profile:
     check_is_beside(session, name, "profile")
     table = read_table(session / name, name)
     require_columns(table, _COLUMNS, name)
-    _check_places(table, name, length_mm)
+    require_rows(table, _LEAST_ROWS, "places", name)
+    require_rising(table, "arc_mm", "places go from the base on, rising", name)
+    _check_ends(table["arc_mm"], name, length_mm)
     _check_diameters(table, name)
     curve = Polynomial.fit(
         table["arc_mm"] / length_mm, table["diameter_mm"], _POWERS, domain=[-1, 1]
@@ -83,19 +92,6 @@ def contradiction(key: str, stated_mm: float, sigma_mm: float, measured_mm: floa
     )
 
 
-def _check_places(table: NumberTable, name: str, length_mm: float) -> None:
-    """Raise BadInput for too few places, or places that do not go on from the base to the tip."""
-    if len(table) < _LEAST_ROWS:
-        raise BadInput(f"has {len(table)} places; {_LEAST_ROWS} or more are needed", file=name)
-    arc_mm = table["arc_mm"]
-    back = np.flatnonzero(np.diff(arc_mm) <= 0)
-    if len(back):
-        before, after = arc_mm[back[0] : back[0] + 2]
-        found = f"goes from {before:g} to {after:g}; places go from the base on, rising"
-        raise BadInput(found, file=name, row=int(table.row[back[0] + 1]), column="arc_mm")
-    _check_ends(arc_mm, name, length_mm)
-
-
 def _check_ends(arc_mm: np.ndarray, name: str, length_mm: float) -> None:
     """Raise BadInput where places (n,) lack one near the base or the tip, or have one beyond the tip."""
     first, last = arc_mm[[0, -1]] / length_mm
@@ -112,14 +108,11 @@ def _check_diameters(table: NumberTable, name: str) -> None:
     """Raise BadInput for a diameter that is not positive, but for the last, and for a negative sigma."""
     wrong = table["diameter_mm"] <= 0
     wrong[-1] = table["diameter_mm"][-1] < 0
-    for column, where, allowed in (
-        ("diameter_mm", wrong, "diameters are above 0, at the tip 0 or more"),
-        (_SIGMA, table.columns.get(_SIGMA, np.zeros(0)) < 0, "sigmas are 0 or more"),
-    ):
-        if where.any():
-            row = int(np.flatnonzero(where)[0])
-            found = f"{table[column][row]:g} mm; {allowed}"
-            raise BadInput(found, file=name, row=int(table.row[row]), column=column)
+    refuse_where(
+        table, "diameter_mm", wrong, "diameters are above 0 mm, at the tip 0 or more", name
+    )
+    if _SIGMA in table.columns:
+        refuse_where(table, _SIGMA, table[_SIGMA] < 0, "sigmas are 0 mm or more", name)
 
 
 def _check_curve(curve: Polynomial, table: NumberTable, name: str, length_mm: float) -> None:

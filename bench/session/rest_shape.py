@@ -11,7 +11,14 @@ from numpy.polynomial import Polynomial
 
 from bench.base.errors import BadInput
 from bench.session.file_names import SESSION_TOML
-from bench.session.table import NumberTable, read_table, require_columns
+from bench.session.table import (
+    NumberTable,
+    read_table,
+    refuse_where,
+    require_columns,
+    require_rising,
+    require_rows,
+)
 
 # Coefficients in y and z, mm, lowest power first.
 RestShape = tuple[tuple[float, ...], tuple[float, ...]]
@@ -68,7 +75,9 @@ def read_rest_shape(session: Path, name: str, length_mm: float) -> RestShape:
     check_is_beside(session, name, "rest_shape")
     table = read_table(session / name, name, _COLUMNS)
     require_columns(table, _COLUMNS, name)
-    _check_points(table, name, length_mm)
+    require_rows(table, _LEAST_ROWS, "points", name)
+    _check_lengths(table, name, length_mm)
+    require_rising(table, "x_mm", "points go from the base on, x rising", name)
     rest_mm, end_mm = _fit(table, name, length_mm)
     _check_length(end_mm, name, length_mm)
     return rest_mm
@@ -81,26 +90,11 @@ def check_is_beside(session: Path, name: str, key: str) -> None:
         raise BadInput(f"[whisker] {found}", file=SESSION_TOML)
 
 
-def _check_points(table: NumberTable, name: str, length_mm: float) -> None:
-    """Raise BadInput for too few points, points far beyond the tip, or not from the base on along x."""
-    if len(table) < _LEAST_ROWS:
-        raise BadInput(f"has {len(table)} points; {_LEAST_ROWS} or more are needed", file=name)
-    _check_lengths(table, name, length_mm)
-    back = np.flatnonzero(np.diff(table["x_mm"]) <= 0)
-    if len(back):
-        before, after = table["x_mm"][back[0] : back[0] + 2]
-        found = f"goes from {before:g} to {after:g}; points go from the base on, x rising"
-        raise BadInput(found, file=name, row=int(table.row[back[0] + 1]), column="x_mm")
-
-
 def _check_lengths(table: NumberTable, name: str, length_mm: float) -> None:
     """Raise BadInput for points far beyond the tip, or a first point that is not at the base."""
+    rule = f"far beyond the whisker's {length_mm:g} mm. Are the points in mm?"
     for column in _COLUMNS:
-        beyond = np.flatnonzero(np.abs(table[column]) > _FARTHEST * length_mm)
-        if len(beyond):
-            found = f"{table[column][beyond[0]]:g} mm is far beyond the whisker's {length_mm:g} mm"
-            row = int(table.row[beyond[0]])
-            raise BadInput(f"{found}. Are the points in mm?", file=name, row=row, column=column)
+        refuse_where(table, column, np.abs(table[column]) > _FARTHEST * length_mm, rule, name)
     first_mm = float(np.linalg.norm([table[column][0] for column in _COLUMNS]))
     if first_mm > _MISPLACED * length_mm:
         found = f"the first point is {first_mm:.3g} mm from the base, which is [0, 0, 0]"

@@ -101,6 +101,31 @@ def require_columns(table: NumberTable, names: Sequence[str], label: str) -> Non
         raise BadInput(f"column {name} is missing; found {hint}", file=label, row=1)
 
 
+def require_rows(table: NumberTable, least: int, what: str, label: str) -> None:
+    """Raise BadInput where a table has fewer rows; what: of a row, "places"."""
+    if len(table) < least:
+        raise BadInput(f"has {len(table)} {what}; {least} or more are needed", file=label)
+
+
+def refuse_where(
+    table: NumberTable, column: str, is_wrong: np.ndarray, rule: str, label: str
+) -> None:
+    """Raise BadInput for the first row (n,) that is wrong, with its value and the rule that it breaks."""
+    if is_wrong.any():
+        first = int(np.argmax(is_wrong))
+        found = f"{table[column][first]:g}; {rule}"
+        raise BadInput(found, file=label, row=int(table.row[first]), column=column)
+
+
+def require_rising(table: NumberTable, column: str, rule: str, label: str) -> None:
+    """Raise BadInput for the first value of a column that is no larger than the one before it."""
+    back = np.flatnonzero(np.diff(table[column]) <= 0)
+    if len(back):
+        before, after = table[column][back[0] : back[0] + 2]
+        found = f"goes from {before:g} to {after:g}; {rule}"
+        raise BadInput(found, file=label, row=int(table.row[back[0] + 1]), column=column)
+
+
 def _lines(path: Path, label: str) -> list[str]:
     """Return a file's lines without empty ones at its end. Raise BadInput where it has none."""
     check_size(path, _MOST_BYTES, "record in several trials", label)

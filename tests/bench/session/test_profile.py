@@ -82,7 +82,7 @@ def test_a_sigma_of_the_table_is_the_diameter_s(session):
         (lambda p: p[[0, 2, 1, *range(3, 16)]], r"profile.csv, row 4, column arc_mm: goes from"),
         (
             lambda p: p * [1, -1],
-            r"profile.csv, row 2, column diameter_mm: -1 mm; diameters are above 0",
+            r"profile.csv, row 2, column diameter_mm: -1; diameters are above 0",
         ),
         (
             lambda p: p + np.outer(np.arange(16) == 7, [0, 0.3]),

@@ -102,7 +102,7 @@ STRAIGHT = np.linspace([0.0, 0.0, 0.0], [100.0, 0.0, 0.0], 11)
         ),
         (
             lambda p: 1000 * p,
-            r"rest.csv, row 3, column x_mm: 10000 mm is far beyond .*Are the points in mm\?",
+            r"rest.csv, row 3, column x_mm: 10000; far beyond .*Are the points in mm\?",
         ),
         (lambda p: p[:9], r"arc length of 80 mm, length_mm is 100; 90 % of the whisker or more"),
         (lambda p: p[:4], r"rest.csv: has 4 points; 6 or more are needed"),

@@ -161,7 +161,7 @@ def test_angles_that_are_not_there_say_how_they_are_made(tmp_path):
     [
         ("0,1,0.1,0\n0,2,0.1,0\n", "row 3, column time_s"),
         ("0,1,-0.1,0\n1,2,0.1,0\n", "row 2, column motor_sigma_deg"),
-        ("0,1,0.1,0\n", "fewer than two rows"),
+        ("0,1,0.1,0\n", "has 1 rows, one a frame; 2 or more"),
     ],
 )
 def test_a_damaged_file_of_angles_is_named_by_row(rows, found, tmp_path):
