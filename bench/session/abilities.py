@@ -43,25 +43,24 @@ def abilities(session: Session) -> tuple[Ability, ...]:
     has_gauges = _has_gauges(session, of_gauges)
     seen = [trial for trial in measured if not lacks[trial.name]]
     felt = [trial for trial in measured if has_gauges or has_moments(trial)]
+    true = seen
     to_see = _first(lacks.values())
-    if session.truth is None:
-        true = seen
-        to_know = f'{to_see}; or a stage: [truth] source = "stage"'
-    else:
+    to_know = f'{to_see}; or a stage: [truth] source = "stage"'
+    if session.truth is not None:
         true = [trial for trial in measured if _is_stated(trial)]
         to_know = _TO_STATE
     both = [trial for trial in true if trial in felt]
     drawn = both if _has_slopes(both, session) else []
-    of = len(measured)
-    return (
-        _ability("truth of d_x", true, of, to_know),
-        _ability("truth of β", true, of, to_know),
-        _ability("slip, deflection", seen, of, to_see),
-        _ability("estimates of d_x", felt, of, _TO_FEEL),
-        _ability("errors", both, of, _TO_COMPARE),
-        _ability("Fig. 8", drawn, of, _TO_DRAW),
-        *_of_gauges(of_gauges, has_gauges=has_gauges),
+    rows = (
+        ("truth of d_x", true, to_know),
+        ("truth of β", true, to_know),
+        ("slip, deflection", seen, to_see),
+        ("estimates of d_x", felt, _TO_FEEL),
+        ("errors", both, _TO_COMPARE),
+        ("Fig. 8", drawn, _TO_DRAW),
     )
+    found = [_ability(quantity, able, len(measured), missing) for quantity, able, missing in rows]
+    return (*found, *_of_gauges(of_gauges, has_gauges=has_gauges))
 
 
 def _ability(quantity: str, able: Sequence[Trial], of: int, missing: str) -> Ability:
