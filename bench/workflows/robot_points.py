@@ -11,16 +11,13 @@ from bench.analyses.pooling import grouped, mean, rms
 from bench.base.drawing import label_of
 from bench.base.tables import TRUTH_SOURCE, WHISKS_KNOWN, WHISKS_WITHOUT, Column, Kind, Table, alike
 from bench.workflows.expected_error import ExpectedRms
+from bench.workflows.pareto import worth_waiting_for
 from bench.workflows.robot_answers import Answer, Converter
 from vision.geometry import counted
 
 # [1] Least share of all whisks that an estimator on the front has a distance for: with fewer its
 # error is that of other whisks. Stated.
 _LEAST_SHARE = 0.9
-# [1] Least share by which a slower choice on the front is expected to err less than any faster one.
-# Study: `whisker-bench robot fixtures/small-session`. Stated sigmas differ by 3 % between 8, 10 and
-# 12 bits, which are alike.
-_LEAST_GAIN = 0.05
 
 
 @dataclass(frozen=True)
@@ -163,14 +160,13 @@ def front(points: Sequence[Point]) -> np.ndarray:
     for too few whisks are not on it.
     """
     most = max(point.whisks + point.none for point in points)
+    by_time = sorted(range(len(points)), key=lambda number: _haste(points[number]))
+    errors_percent = []
+    for number in by_time:
+        has_few = points[number].whisks < _LEAST_SHARE * most
+        errors_percent.append(np.inf if has_few else points[number].ranked_percent)
     is_on_front = np.zeros(len(points), dtype=bool)
-    least_percent = np.inf
-    for number in sorted(range(len(points)), key=lambda number: _haste(points[number])):
-        point = points[number]
-        has_few = point.whisks < _LEAST_SHARE * most
-        if not has_few and point.ranked_percent < (1.0 - _LEAST_GAIN) * least_percent:
-            is_on_front[number] = True
-            least_percent = point.ranked_percent
+    is_on_front[by_time] = worth_waiting_for(errors_percent)
     return is_on_front
 
 

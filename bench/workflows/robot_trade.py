@@ -9,12 +9,14 @@ choices are ranked and drawn, since of many that few whisks measure the best is 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bench.analyses.pooling import column
 from bench.base.drawing import (
     colour_of,
     label_logarithmic,
@@ -145,8 +147,8 @@ def _draw_against_time(
     for number, name in enumerate(names):
         own = [point for point in points if point.estimator == name and point.whisks]
         axes.plot(
-            [point.time_ms for point in own],
-            [point.expected_rms_percent for point in own],
+            column(own, "time_ms"),
+            column(own, "expected_rms_percent"),
             "o",
             ms=nested_size(number, len(names), least=3.0, step=1.0),
             alpha=0.5,
@@ -169,22 +171,17 @@ def _draw_against_time(
 def _draw_front(axes: Axes, on_front: Sequence[Point]) -> None:
     """Draw the front: a line through its expected errors, their ranges, and measured errors."""
     best = sorted(on_front, key=lambda point: point.time_ms)
-    time_ms = [point.time_ms for point in best]
-    axes.plot(
-        time_ms,
-        [point.expected_rms_percent for point in best],
-        color="0.2",
-        lw=1,
-        label="front, expected",
-    )
-    low = [point.expected_low_percent for point in best]
-    high = [point.expected_high_percent for point in best]
+    time_ms = column(best, "time_ms")
+    expected = column(best, "expected_rms_percent")
+    axes.plot(time_ms, expected, color="0.2", lw=1, label="front, expected")
+    low = column(best, "expected_low_percent")
+    high = column(best, "expected_high_percent")
     axes.vlines(time_ms, low, high, color="0.6", lw=2, zorder=1.5, label="95 % by chance")
-    measured = [point.error_rms_percent for point in best]
+    measured = column(best, "error_rms_percent")
     axes.plot(time_ms, measured, "x", ms=5, color="0.2", label="measured")
 
 
-def _draw_against(axes: Axes, points: Sequence[Point], column: str, names: Sequence[str]) -> None:
+def _draw_against(axes: Axes, points: Sequence[Point], over: str, names: Sequence[str]) -> None:
     """Draw expected error (a line in the range of 95 %) and measured error (crosses) over a column of
     ROBOT_TRADE.
 
@@ -200,27 +197,26 @@ def _draw_against(axes: Axes, points: Sequence[Point], column: str, names: Seque
                 is_own = point.estimator == name and point.speed_deg_s == speed_deg_s
                 if is_own and point.whisks:
                     own.append(point)
-            _draw_line(axes, own, column, colour, rim_points)
+            _draw_line(axes, own, over, colour, rim_points)
     axes.set_yscale("log")
     label_logarithmic(axes.yaxis)
-    if column != "bits":
+    if over != "bits":
         axes.set_xscale("log")
         label_logarithmic(axes.xaxis)
 
 
 def _draw_line(
-    axes: Axes, points: Sequence[Point], column: str, colour: str, rim_points: float
+    axes: Axes, points: Sequence[Point], over: str, colour: str, rim_points: float
 ) -> None:
     """Draw expected and measured errors of one estimator at one speed over a column of ROBOT_TRADE.
 
     rim_points: by how much the line is wider than those that are drawn last.
     """
-    own = sorted(points, key=lambda point: getattr(point, column))
-    x = [getattr(point, column) for point in own]
-    low = [point.expected_low_percent for point in own]
-    high = [point.expected_high_percent for point in own]
+    own = sorted(points, key=attrgetter(over))
+    x = column(own, over)
+    low = column(own, "expected_low_percent")
+    high = column(own, "expected_high_percent")
     axes.fill_between(x, low, high, color=colour, alpha=0.1, lw=0)
-    expected = [point.expected_rms_percent for point in own]
-    measured = [point.error_rms_percent for point in own]
-    axes.plot(x, expected, lw=1.0 + rim_points, color=colour)
+    axes.plot(x, column(own, "expected_rms_percent"), lw=1.0 + rim_points, color=colour)
+    measured = column(own, "error_rms_percent")
     axes.plot(x, measured, "x", ms=4 + 1.5 * rim_points, color=colour)

@@ -11,6 +11,7 @@ sigmas let one expect, and by the measured one where that is larger than chance 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,7 @@ from bench.trials.trial_evaluation import trial_result
 from bench.trials.unit import Unit
 from bench.workflows.expected_error import ExpectedRms, interval_of_rms
 from bench.workflows.opened_session import opened_session
-from bench.workflows.pareto import pareto_front
+from bench.workflows.pareto import pareto_front, worth_waiting_for
 from bench.workflows.seeing_times import draw_all, play_all, see_all, time_work
 from estimator.uncertainty import Z_95
 from vision import Value
@@ -93,8 +94,6 @@ LIVE = "live"
 LIVE_COLD = "live-cold"
 # [s] From the first three pictures of a push to it, for `live`: all work on them is done then. Stated.
 _LEAD_S = 60.0
-# [1] Least share by which a slower setting is expected to err less, to be advised. Stated, as `robot` has it.
-_LEAST_GAIN = 0.05
 # [1] An error that may be so many times the measured one is not known. Stated.
 _UNKNOWN_FACTOR = 2.0
 # Keys of a row of TRADEOFF that are printed, their heads and formats.
@@ -362,15 +361,13 @@ def advised(rows: Sequence[dict]) -> list[dict]:
     Each is expected to err clearly less than any faster one, and none has fewer truths than `standard`.
     """
     (standard,) = [row for row in rows if row["setting"] == STANDARD]
-    steps = []
-    least_mm = np.inf
-    for row in sorted(rows, key=_after_s):
+    by_time = sorted(rows, key=_after_s)
+    errors_mm = []
+    for row in by_time:
         has_fewer = row["whisks_with_truth"] < standard["whisks_with_truth"]
-        is_worth = _ranked_mm(row) < (1.0 - _LEAST_GAIN) * least_mm
-        if row["on_front"] and not has_fewer and is_worth:
-            steps.append(row)
-            least_mm = _ranked_mm(row)
-    return steps
+        is_choice = row["on_front"] and not has_fewer
+        errors_mm.append(_ranked_mm(row) if is_choice else np.inf)
+    return list(compress(by_time, worth_waiting_for(errors_mm)))
 
 
 def pick_line(rows: Sequence[dict], accuracy_mm: float, out: Path) -> str:
