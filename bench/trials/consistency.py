@@ -5,7 +5,6 @@ Each check returns NO_REASON where both agree or one of them is unknown.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -19,6 +18,7 @@ from bench.trials.differences import (
     LEAST_CHANCE,
     Cause,
     Difference,
+    agree,
     are_alike,
     constant_message,
     without_mean,
@@ -288,31 +288,32 @@ def check_length(ends: Mapping[str, Value], whisker: Whisker) -> Reason:
     sigmas = np.array([end.sigma for end in ends.values()])
     if not are_alike(places, sigmas**2):
         return NO_REASON
-    sigma = math.hypot(np.max(sigmas), whisker.length_sigma_mm)
-    end_mm = float(np.average(places, weights=sigmas**-2.0))
-    if Difference.scalar(end_mm - whisker.length_mm, sigma).is_chance:
+    end = Value(float(np.average(places, weights=sigmas**-2.0)), float(np.max(sigmas)))
+    if agree(end, Value(whisker.length_mm, whisker.length_sigma_mm)):
         return NO_REASON
-    found = f"the whisker is seen to end {end_mm:.0f} ± {sigma:.0f} mm from its base"
+    sigma = math.hypot(end.sigma, whisker.length_sigma_mm)
+    found = f"the whisker is seen to end {end.value:.0f} ± {sigma:.0f} mm from its base"
     sentence = f"{found}, length_mm says {whisker.length_mm:g}"
     return Reason("length_unlike_stated", sentence)
 
 
-def check_slope(beta: Value, trial: Trial) -> Reason:
-    """Compare the bar's slope as seen with the one that trial.toml states."""
+def check_slope(
+    beta: Value,
+    trial: Trial,
+    how: str = "is seen as",
+    cause: str = "check it, or something else is taken for the bar",
+) -> Reason:
+    """Compare the bar's slope with the one that trial.toml states.
+
+    how, cause: how the slope is known, and what may be wrong, in words.
+    """
     nominal = nominal_slope(trial)
-    apart = beta.value - nominal.value
-    if not np.isfinite(apart):
+    if agree(beta, nominal):
         return NO_REASON
-    difference = Difference.scalar(apart, math.hypot(beta.sigma, nominal.sigma))
-    if difference.is_chance:
-        return NO_REASON
-    mirrored = replace(difference, values=np.array([beta.value + nominal.value]))
-    if mirrored.is_chance:
+    if agree(Value(-beta.value, beta.sigma), nominal):
         cause = "its sign looks turned"
-    else:
-        cause = "check it, or something else is taken for the bar"
-    seen = f"{np.degrees(beta.value):.1f} ± {np.degrees(beta.sigma):.1f}°"
-    found = f"the bar's slope is seen as {seen}, beta_deg says {trial.beta_deg:g}"
+    slope = f"{np.degrees(beta.value):.1f} ± {np.degrees(beta.sigma):.1f}°"
+    found = f"the bar's slope {how} {slope}, beta_deg says {trial.beta_deg:g}"
     return Reason("slope_unlike_stated", f"{found}: {cause}")
 
 

@@ -4,11 +4,14 @@ A difference has a covariance: χ² shows whether it is more than chance. Each c
 its own; the one that leaves the least χ² when its trace is subtracted is named.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
+
+from vision import Value
 
 # Once in ten thousand whisks by chance. 51 path-traced scenes show 1.3 times their degrees of freedom at most.
 LEAST_CHANCE = 1e-4
@@ -77,6 +80,13 @@ class Difference:
             if explains and cost < best_cost:
                 best_cost, sentence = cost, cause.message(size)
         return sentence
+
+
+def agree(one: Value, other: Value) -> bool:
+    """Return whether independent records of a number differ by chance alone, or one is not known."""
+    apart = one.value - other.value
+    sigma = math.hypot(one.sigma, other.sigma)
+    return not np.isfinite(apart) or Difference.scalar(apart, sigma).is_chance
 
 
 def constant_message(text: str) -> Callable[[float], str]:

@@ -28,8 +28,8 @@ from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
 from bench.session.stage import StageLog
 from bench.session.trial import Trial
-from bench.trials.consistency import nominal_slope, nominal_slope_sigma_rad
-from bench.trials.differences import Difference
+from bench.trials.consistency import check_slope, nominal_slope, nominal_slope_sigma_rad
+from bench.trials.differences import agree
 from bench.trials.stage_contact import (
     REST_TERMS,
     Contact,
@@ -131,10 +131,10 @@ def _why_not_seen(seen: SeenWhisk) -> Reason:
 
 def _unlike_pictures(stated: WhiskTruth, seen: SeenWhisk) -> Reason:
     """Return how the stage's distance contradicts the one seen; NO_REASON where chance explains it."""
+    if agree(stated.d_x_mm, seen.d_x_mm):
+        return NO_REASON
     apart_mm = stated.d_x_mm.value - seen.d_x_mm.value
     sigma_mm = math.hypot(stated.d_x_mm.sigma, seen.d_x_mm.sigma)
-    if not np.isfinite(apart_mm) or Difference.scalar(apart_mm, sigma_mm).is_chance:
-        return NO_REASON
     found = f"d_x by the stage is {apart_mm:+.2f} ± {sigma_mm:.2f} mm from the one seen"
     cause = "check the stage's origin, whether the place is the object's middle, and T_rig_board"
     return Reason("stage_unlike_pictures", f"{found}: {cause}")
@@ -144,24 +144,13 @@ def _unlike_stated(d_x_mm: Value, trial: Trial) -> Reason:
     """Return how a distance by the object's place contradicts d_x_mm; NO_REASON where it does not."""
     if trial.d_x_mm is None:
         return NO_REASON
-    apart_mm = d_x_mm.value - trial.d_x_mm
-    sigma_mm = math.hypot(d_x_mm.sigma, trial.d_x_sigma_mm or _RULER_MM)
-    if Difference.scalar(apart_mm, sigma_mm).is_chance:
+    stated = Value(trial.d_x_mm, trial.d_x_sigma_mm or _RULER_MM)
+    if agree(d_x_mm, stated):
         return NO_REASON
-    found = f"d_x by the object's place is {d_x_mm.value:.2f} mm, d_x_mm says {trial.d_x_mm:g}"
+    found = f"d_x by the object's place is {d_x_mm.value:.2f} mm, d_x_mm says {stated.value:g}"
+    chance = f"{math.hypot(d_x_mm.sigma, stated.sigma):.2g} mm are chance"
     rule = "d_x_mm goes from the base to the contact, the place to the bar's axis"
-    return Reason("distance_unlike_stated", f"{found} ({sigma_mm:.2g} mm are chance): {rule}")
-
-
-def _other_slope(beta_rad: Value, trial: Trial) -> Reason:
-    """Return how a slope by the object's place contradicts beta_deg; NO_REASON where it does not."""
-    stated = nominal_slope(trial)
-    apart = beta_rad.value - stated.value
-    sigma = math.hypot(beta_rad.sigma, stated.sigma)
-    if not np.isfinite(apart) or Difference.scalar(apart, sigma).is_chance:
-        return NO_REASON
-    found = f"the slope by the object's place is {np.degrees(beta_rad.value):.1f}°"
-    return Reason("slope_unlike_stated", f"{found}, beta_deg says {trial.beta_deg:g}: check both")
+    return Reason("distance_unlike_stated", f"{found} ({chance}): {rule}")
 
 
 def _check_on_whisker(d_x_mm: float, session: Session, trial: Trial) -> None:
@@ -234,7 +223,8 @@ def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -
     numbers = (touch.d_x_mm, touch.beta_rad, touch.psi_rad)
     d_x_mm, beta_rad, psi_rad = map(Value, numbers, sigmas)
     truth = _truth(d_x_mm, beta_rad, psi_rad, float(shared_sigma[1]))
-    status = joined(_unlike_stated(d_x_mm, trial), _other_slope(beta_rad, trial))
+    slope = check_slope(beta_rad, trial, "by the object's place is", "check both")
+    status = joined(_unlike_stated(d_x_mm, trial), slope)
     stage_touch = StageTouch(touch.motor_rad, float(own_sigma[0]), shared[0])
     return StatedWhisk(replace(truth, status=status), stage_touch)
 
