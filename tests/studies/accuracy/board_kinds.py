@@ -28,8 +28,9 @@ from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from tests.scenes.board_prints import KINDS, NAMES, picture_of, pose_before
 from tests.studies.accuracy.board_scenes import SIZE_PX, T_RIG_BOARD, WORK_MM, two_cameras
-from tests.studies.accuracy.rows import HALF_WIDTH_95, all_rows
+from tests.studies.accuracy.rows import all_rows
 from tests.studies.accuracy.sessions import errors
+from tests.studies.accuracy.whisk_errors import as_columns, columns_of, of_columns, of_whisks
 from vision.boards import Corners, find_corners
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.turned import with_turns_resolved
@@ -160,8 +161,8 @@ beta_deg = [0, 25, 50]
 d_x_mm = 58.0
 """
 QUANTITIES = {"d_x": "d_x_mm", "beta": "beta_deg"}
-OF_EACH = ("n", "held", "rms_z", "rms", "rms_sigma", "most_z")
-WHISK_COLUMNS = ("look", *(f"{name}_{what}" for name in QUANTITIES for what in OF_EACH), "status")
+MOST_Z = tuple(f"{name}_most_z" for name in QUANTITIES)
+WHISK_COLUMNS = ("look", *columns_of(QUANTITIES), *MOST_Z, "status")
 FIRST_SEED = 5
 
 
@@ -186,12 +187,9 @@ def whisks_of(folder: Path, name: str, seed: int, workers: int) -> dict:
     status = " ".join(filter(None, run.whisks["status"]))
     row: dict = {"look": f"{name} {seed}", "status": status}
     for quantity, column in QUANTITIES.items():
-        error, sigma, _ = errors(load_session(path), out, run.whisks, column).T
-        z = error / sigma
-        held = np.mean(np.abs(z) < HALF_WIDTH_95)
-        rms_z, rms, rms_sigma = (np.sqrt(np.mean(one**2)) for one in (z, error, sigma))
-        values = (len(z), held, rms_z, rms, rms_sigma, np.abs(z).max())
-        row |= {f"{quantity}_{what}": float(value) for what, value in zip(OF_EACH, values)}
+        found = errors(load_session(path), out, run.whisks, column)[:, :2]
+        row |= as_columns(quantity, of_whisks(found))
+        row[f"{quantity}_most_z"] = float(np.abs(np.divide(*found.T)).max())
     shutil.rmtree(path)
     return row
 
@@ -204,9 +202,10 @@ def print_whisks(folder: Path, only: str, seeds: int) -> None:
             row = row_of(folder, name, seed)
             print(f"{row['look']}: {row['d_x_n']:.0f} whisks {row['status']}")
             for quantity in QUANTITIES:
-                _, held, rms_z, rms, _, most_z = (row[f"{quantity}_{what}"] for what in OF_EACH)
+                found = of_columns(row, quantity)
                 print(
-                    f"  {quantity} off by {rms:.4f} RMS, z {rms_z:.2f} RMS, {most_z:.1f} at most, {held:.0%} hold",
+                    f"  {quantity} off by {found['rms']:.4f} RMS, z {found['rms_z']:.2f} RMS, "
+                    f"{row[f'{quantity}_most_z']:.1f} at most, {found['held']:.0%} hold",
                     flush=True,
                 )
 

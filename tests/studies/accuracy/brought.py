@@ -16,45 +16,27 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from scipy.stats import binomtest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from bench.session.session import load_session
 from tests.studies.accuracy import angles, board_kinds, given_traces, mirror, stage
-from tests.studies.accuracy.rows import HALF_WIDTH_95, all_rows
+from tests.studies.accuracy.rows import all_rows
+from tests.studies.accuracy.whisk_errors import (
+    Figures,
+    as_columns,
+    columns_of,
+    of_columns,
+    of_whisks,
+    pooled,
+)
 
 MOST_TRACES_MM = 0.05
 MOST_OF_MIRROR = 1.5
 MOST_OF_NATIVE = 2.0
 LASTING_PX = 0.1
 STAGE_WHISKS = 100
-OF_EACH = ("n", "held", "rms_z", "rms", "rms_sigma")
-Figures = dict[str, float]  # OF_EACH
-
-
-def of_whisks(found: list) -> Figures:
-    """Reduce errors and sigmas (n, 2), mm, of the whisks that have a truth."""
-    table = np.array(found)
-    table = table[np.isfinite(table).all(axis=1)]
-    error, sigma = table.T
-    z = error / sigma
-    held = np.mean(np.abs(z) < HALF_WIDTH_95)
-    roots = (np.sqrt(np.mean(column**2)) for column in (z, error, sigma))
-    return dict(zip(OF_EACH, (len(z), held, *roots)))
-
-
-def of_columns(row: dict, name: str) -> Figures:
-    """Return a quantity's figures of another study's row."""
-    return {what: row[f"{name}_{what}"] for what in OF_EACH}
-
-
-def pooled(rows: list[dict]) -> Figures:
-    """Reduce the figures of several sessions to those of all their whisks."""
-    n, held, *roots = np.array([[row[what] for what in OF_EACH] for row in rows]).T
-    squares = (np.sqrt(n @ root**2 / n.sum()) for root in roots)
-    return dict(zip(OF_EACH, (n.sum(), n @ held / n.sum(), *squares)))
 
 
 def by_stage(folder: Path, seed: int, workers: int) -> dict[str, Figures]:
@@ -139,14 +121,14 @@ def rows_of(folder: Path, name: str, seeds: int, workers: int) -> dict[str, list
     """Return by look the figures of each seed of a way, made where they are not there."""
     way = WAYS[name]
     looks = dict.fromkeys((way.native, *way.looks))
-    columns = ("seed", *(f"{look}_{what}" for look in looks for what in OF_EACH))
+    columns = ("seed", *columns_of(looks))
 
     def row_of(seed: int) -> dict:
         """The row of a seed."""
         (folder / name).mkdir(parents=True, exist_ok=True)
         row: dict = {"seed": seed}
         for look, figures in way.figures(folder / name, seed, workers).items():
-            row |= {f"{look}_{what}": value for what, value in figures.items()}
+            row |= as_columns(look, figures)
         return row
 
     rows = all_rows(folder / f"{name}.csv", columns, range(seeds), row_of)

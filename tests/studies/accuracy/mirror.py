@@ -26,11 +26,17 @@ from bench.rig.protocol import FOLDER, load
 from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from tests.studies.accuracy.rows import all_rows
-from tests.studies.accuracy.sessions import errors, figures
+from tests.studies.accuracy.sessions import errors
+from tests.studies.accuracy.whisk_errors import (
+    as_columns,
+    columns_of,
+    of_columns,
+    of_whisks,
+    pooled,
+)
 
 NAMES = ("d_x_mm", "touch_deg", "beta_deg")
-OF_EACH = ("n", "held", "rms_z", "rms", "rms_sigma")
-COLUMNS = ("seed", *(f"{name}_{what}" for name in NAMES for what in OF_EACH), "status")
+COLUMNS = ("seed", *columns_of(NAMES), "status")
 AXIS_MM = 350.0  # of a point on a camera's axis, near the whisker
 
 
@@ -74,19 +80,9 @@ def row_of(folder: Path, kind: str, protocol: Path, seed: int, workers: int = 2)
     row: dict = {"seed": seed, "status": ""}
     for name in NAMES:
         found = errors(session, out, whisks, name)
-        n, held, _, rms_z, *_ = figures(found)
-        values = (n, held, rms_z, *np.sqrt(np.mean(found[:, :2] ** 2, axis=0)))
-        row |= {f"{name}_{what}": float(value) for what, value in zip(OF_EACH, values)}
+        row |= as_columns(name, of_whisks(found[:, :2]))
     shutil.rmtree(path)
     return row
-
-
-def pooled(rows: list[dict], name: str) -> np.ndarray:
-    """OF_EACH of a quantity over sessions."""
-    each = np.array([[row[f"{name}_{what}"] for what in OF_EACH] for row in rows])
-    n, held, *roots = each.T
-    mean_squares = [n @ root**2 / n.sum() for root in roots]
-    return np.array([n.sum(), n @ held / n.sum(), *np.sqrt(mean_squares)])
 
 
 def rows_of(folder: Path, seeds: range, workers: int = 2) -> dict[str, list[dict]]:
@@ -111,9 +107,11 @@ def main() -> None:
     for name in NAMES:
         rms = {}
         for kind in rows:
-            n, held, rms_z, rms[kind], _ = pooled(rows[kind], name)
+            found = pooled(of_columns(row, name) for row in rows[kind])
+            rms[kind] = found["rms"]
             print(
-                f"{name} {kind:6s}: {n:.0f} whisks, RMS {rms[kind]:.4f}, {held:.0%} hold, z {rms_z:.2f} RMS"
+                f"{name} {kind:6s}: {found['n']:.0f} whisks, RMS {found['rms']:.4f}, "
+                f"{found['held']:.0%} hold, z {found['rms_z']:.2f} RMS"
             )
         print(f"{name} mirror over two cameras: {rms['mirror'] / rms['two']:.2f}")
 
