@@ -1,7 +1,6 @@
 """The results of an array's whiskers put together: tables, figure, summary and page, from their runs'
 folders alone."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from bench.array.surface import ObjectSurface, seen_surface, stated_surface
 from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.tables import WHISKER
-from bench.records.plain import from_plain, to_plain
+from bench.records.record_file import read_record_file, write_record_file
 from bench.records.trial_result import TrialResult, whisks
 from bench.report.record import ARRAY, RUNS
 from bench.report.run_facts import RunRecord, Section
@@ -101,20 +100,14 @@ def array_record(
 
 def write_array_record(out: Path, record: ArrayRecord) -> None:
     """Write array.json, whole."""
-    text = json.dumps(to_plain(record), sort_keys=True, ensure_ascii=False, indent=1)
-    write_whole(out / ARRAY, text + "\n")
+    write_record_file(out / ARRAY, record)
 
 
 def read_array_record(out: Path) -> ArrayRecord:
     """Read the array of a folder. Raises BadInput where it is none, or of another version."""
-    try:
-        return from_plain(ArrayRecord, json.loads((out / ARRAY).read_text(encoding="utf-8")))
-    except FileNotFoundError:
-        raise BadInput(f"is no array's run (there is no {ARRAY} in it)", file=out) from None
-    except (OSError, ValueError, KeyError):
-        raise BadInput(
-            "is damaged or of an older version; evaluate the session again", file=out / ARRAY
-        ) from None
+    if not is_array(out):
+        raise BadInput(f"is no array's run (there is no {ARRAY} in it)", file=out)
+    return read_record_file(ArrayRecord, out / ARRAY)
 
 
 def is_array(out: Path) -> bool:

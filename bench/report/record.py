@@ -3,7 +3,6 @@
 `.session` names the session's folder, which only the video needs.
 """
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from bench.base.atomic import write_whole
 from bench.base.environment import versions
 from bench.base.errors import BadInput
 from bench.cameras.session_cameras import SessionCalibration
-from bench.records.plain import from_plain, to_plain
+from bench.records.record_file import read_record_file, write_record_file
 from bench.report.evaluation import Evaluation
 from bench.report.run_facts import BoardFacts, CameraFacts, GaugeFacts, GaugePoints, RunRecord
 from bench.report.summary.compose import Summary
@@ -22,7 +21,6 @@ RECORD = "run.json"
 SESSION = ".session"
 ARRAY = "array.json"  # of several whiskers
 RUNS = "whiskers"  # folder of theirs, in which each has a run of its own
-AGAIN = "evaluate the session again into this folder"
 
 
 def record_of(evaluation: Evaluation, summary: Summary, figures: Sequence[str]) -> RunRecord:
@@ -98,8 +96,7 @@ def write_record(out: Path, record: RunRecord, session: Path) -> RunRecord:
 
     Every report is made from that, so that one made again is the same.
     """
-    text = json.dumps(to_plain(record), sort_keys=True, ensure_ascii=False, indent=1)
-    write_whole(out / RECORD, text + "\n")
+    write_record_file(out / RECORD, record)
     write_whole(out / SESSION, f"{session.resolve()}\n")
     return read_record(out)
 
@@ -112,7 +109,4 @@ def read_record(out: Path) -> RunRecord:
     if not (out / RECORD).is_file():
         none = f"is no evaluated run (there is no {RECORD} in it); give the OUT of `evaluate`"
         raise BadInput(none, file=out)
-    try:
-        return from_plain(RunRecord, json.loads((out / RECORD).read_text(encoding="utf-8")))
-    except (ValueError, BadInput):
-        raise BadInput(f"is damaged or of an older version; {AGAIN}", file=out / RECORD) from None
+    return read_record_file(RunRecord, out / RECORD)

@@ -7,9 +7,10 @@ from bench.analyses.analysis import EvaluatedRun
 from bench.base.errors import BadInput
 from bench.base.results import read_result
 from bench.records.plain import from_plain
+from bench.records.record_file import AGAIN
 from bench.records.trial_result import TrialResult
 from bench.report.evaluation import evaluated_run
-from bench.report.record import AGAIN, RECORD, read_record
+from bench.report.record import RECORD, read_record
 from bench.report.run_facts import RunRecord
 
 _TABLE = "whisks.csv"
