@@ -10,13 +10,14 @@ from math import degrees
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.cells import estimate_cells, value_cells, whisk_cells
+from bench.analyses.cells import value_cells, whisk_cells
+from bench.analyses.compared_estimate import ComparedEstimate
 from bench.analyses.pooling import column, coverage, grouped, rms
 from bench.base.drawing import label_of
 from bench.base.input_problems import in_one_status
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult
-from vision import UNKNOWN, Value, WhiskTruth
+from vision import UNKNOWN, WhiskTruth
 
 BOTH_WAYS = Table(
     "both_ways",
@@ -54,30 +55,16 @@ BOTH_WAYS = Table(
 
 
 @dataclass(frozen=True, eq=False)
-class WayBack:
-    """One estimate of one way back.
+class WayBack(ComparedEstimate):
+    """One estimate of one way back; its truth as seen on the way back, else on the way there.
 
-    d_x_mm: distance of the contact as seen on the way back, else on the way there. felt, felt_there:
-    moments of the way back and of the way there. estimate: with a status alone where
-    there is none.
+    felt, felt_there: moments of the way back and of the way there.
     """
 
     result: TrialResult
     seen: SeenWhisk
-    d_x_mm: Value
     felt: FeltWhisk
     felt_there: FeltWhisk
-    estimate: EstimateRow
-
-    @property
-    def error_percent(self) -> float:
-        """Return estimate less truth, percent of the truth."""
-        return self.estimate.error_percent(self.d_x_mm).value
-
-    @property
-    def inside(self) -> bool | None:
-        """Return whether the 95 % interval holds the truth; None where either is not known."""
-        return self.estimate.holds(self.d_x_mm.value)
 
 
 class BothWays(Analysis):
@@ -95,11 +82,10 @@ class BothWays(Analysis):
         """Return the row of a way back and estimator."""
         seen = one.seen
         felt = one.felt
-        estimate = one.estimate
         phi_seen_rad = np.nan if seen.at is None else seen.at.phi_rad.value
         return {
             **whisk_cells(one.result, seen.whisk),
-            **estimate_cells(estimate, one.d_x_mm),
+            **one.cells,
             **value_cells("touch_deg", seen.touch_rad),
             **value_cells("touch_felt_deg", felt.touch_felt_rad),
             **value_cells("beta_deg", seen.beta_rad),
@@ -108,7 +94,7 @@ class BothWays(Analysis):
             "phi_there_deg": degrees(one.felt_there.phi_felt_rad.value),
             "m_y_Nmm": felt.m_y_Nmm.value,
             "m_z_Nmm": felt.m_z_Nmm.value,
-            "status": in_one_status(seen.status, felt.status, estimate.status),
+            "status": in_one_status(seen.status, felt.status, one.estimate.status),
         }
 
     def lines(self, found: Sequence[WayBack]) -> Iterator[str]:
@@ -133,5 +119,5 @@ def ways_back(results: Sequence[TrialResult]) -> list[WayBack]:
         ):
             d_x_mm = seen.d_x_mm if seen.has_truth else seen_there.d_x_mm
             for estimate in felt.estimates or (EstimateRow("", UNKNOWN),):
-                found.append(WayBack(result, seen, d_x_mm, felt, felt_there, estimate))
+                found.append(WayBack(estimate, d_x_mm, result, seen, felt, felt_there))
     return found

@@ -1,12 +1,10 @@
 """Cells of rows: of the tables of a run, in their columns' units, and of the tables of the page."""
 
-from math import degrees
-
 import numpy as np
 
 from bench.base.numbers import MISSING, with_sigma
 from bench.base.tables import sigma_name
-from bench.records.trial_result import EstimateRow, TrialResult
+from bench.records.trial_result import TrialResult
 from vision import Value
 
 
@@ -24,22 +22,6 @@ def whisk_cells(result: TrialResult, whisk: int) -> dict:
         "whisk": whisk,
         "surface": trial.surface,
         "speed_deg_s": trial.speed_deg_s,
-    }
-
-
-def estimate_cells(estimate: EstimateRow, truth: Value) -> dict:
-    """Return the cells of an estimate, of the true distance and of their difference."""
-    return {
-        "estimator": estimate.estimator,
-        "alpha_est_deg": degrees(estimate.alpha_est_rad),
-        "beta_est_deg": degrees(estimate.beta_est_rad),
-        **value_cells("d_x_est_mm", estimate.d_x_est_mm),
-        "d_x_est_low_mm": estimate.d_x_est_low_mm,
-        "d_x_est_high_mm": estimate.d_x_est_high_mm,
-        **value_cells("d_x_mm", truth),
-        "error_mm": estimate.error_mm(truth).value,
-        "error_percent": estimate.error_percent(truth).value,
-        "inside": as_cell(estimate.holds(truth.value)),
     }
 
 

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.cells import estimate_cells
+from bench.analyses.compared_estimate import ComparedEstimate
 from bench.analyses.pooling import column, coverage, grouped, rms
 from bench.base.drawing import add_legend, blank, colour_of, label_of
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, alike, status, with_sigma
 from bench.gauges.felt import motor_speed
-from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, whisks
+from bench.records.trial_result import FeltWhisk, SeenWhisk, whisks
 from bench.session.trial import Trial
 from bench.trials.estimate_errors import is_sound
 from bench.trials.object_motion import in_contact_frame
@@ -61,7 +61,7 @@ MOVING = Table(
 
 
 @dataclass(frozen=True, eq=False)
-class Moved:
+class Moved(ComparedEstimate):
     """One estimate of a whisk whose object moved.
 
     share_percent: the object's speed along the push, of the whisker's own at the contact.
@@ -69,21 +69,8 @@ class Moved:
 
     trial: Trial
     seen: SeenWhisk
-    estimate: EstimateRow
     share_percent: float
     is_sound: bool
-
-    @property
-    def error_percent(self) -> float:
-        """Return estimate less truth, percent of the truth."""
-        return self.estimate.error_percent(self.seen.d_x_mm).value
-
-    @property
-    def inside(self) -> bool | None:
-        """Return whether the 95 % interval holds the truth; None where there is no interval."""
-        if not np.isfinite(self.error_percent):
-            return None
-        return self.estimate.holds(self.seen.d_x_mm.value)
 
 
 class MovingObjects(Analysis):
@@ -103,24 +90,24 @@ class MovingObjects(Analysis):
             if trial.object_velocity_mm_s is None or not (seen.has_truth and felt.has_moments):
                 continue
             share = _share_percent(trial, seen, felt)
+            sound = is_sound(seen, felt)
             for estimate in (*felt.estimates, *felt.sensors):
-                found.append(Moved(trial, seen, estimate, share, is_sound(seen, felt)))
+                found.append(Moved(estimate, seen.d_x_mm, trial, seen, share, sound))
         return found
 
     def row(self, one: Moved) -> dict:
         """Return the row of a whisk and estimator."""
         trial = one.trial
         seen = one.seen
-        estimate = one.estimate
         row = {
             "trial": trial.name,
             "whisk": seen.whisk,
             "surface": trial.surface,
-            **estimate_cells(estimate, seen.d_x_mm),
+            **one.cells,
             "beta_deg": degrees(seen.beta_rad.value),
             "velocity_share_percent": one.share_percent,
             "velocity_sigma_mm_s": trial.object_velocity_sigma_mm_s,
-            "status": estimate.status,
+            "status": one.estimate.status,
         }
         for k, axis in enumerate(_AXES):
             row[f"velocity_{axis}_mm_s"] = float(trial.object_velocity_mm_s[k])

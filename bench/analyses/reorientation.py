@@ -13,11 +13,12 @@ from math import degrees
 import numpy as np
 
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
-from bench.analyses.cells import as_cell, estimate_cells, value_cells
-from bench.analyses.pooling import grouped, rms, sound_measured_whisks
+from bench.analyses.cells import as_cell, value_cells
+from bench.analyses.compared_estimate import ComparedEstimate
+from bench.analyses.pooling import column, coverage, grouped, rms, sound_measured_whisks
 from bench.base.settings import Settings
 from bench.base.tables import SURFACE, TRIAL, Column, Kind, Table, alike, status, with_sigma
-from bench.records.trial_result import WITH_FRICTION, EstimateRow, FeltWhisk, SeenWhisk, TrialResult
+from bench.records.trial_result import WITH_FRICTION, FeltWhisk, SeenWhisk, TrialResult
 from bench.session.session import Session
 from bench.trials.estimates import assumed_settings, run_estimator, whisk_of
 from estimator.reorientation import next_turn_rad, reoriented, slip_angle
@@ -57,11 +58,11 @@ REORIENTATION = Table(
 
 
 @dataclass(frozen=True, eq=False)
-class Rotation:
+class Rotation(ComparedEstimate):
     """One rotation of a contact: a row of REORIENTATION.
 
-    phi_felt_rad: against the turned plane. next_turn_rad: 0 where what slip is left does not matter.
-    estimate: by (2). one_push: by (10).
+    Its estimate is by (2). phi_felt_rad: against the turned plane. next_turn_rad: 0 where what slip is left does not
+    matter. one_push: by (10).
     """
 
     contact: str
@@ -70,9 +71,7 @@ class Rotation:
     plane_turn_deg: float
     phi_felt_rad: Value
     next_turn_rad: float
-    d_x_mm: Value
-    estimate: EstimateRow
-    one_push: EstimateRow
+    one_push: ComparedEstimate
 
 
 class Reorientation(Analysis):
@@ -89,32 +88,30 @@ class Reorientation(Analysis):
 
     def row(self, one: Rotation) -> dict:
         """Return the row of a rotation."""
-        estimate = one.estimate
         return {
             "trial": one.result.trial.name,
             "surface": one.result.trial.surface,
-            **estimate_cells(estimate, one.d_x_mm),
+            **one.cells,
             "contact": one.contact,
             "rotation": one.rotation,
             "plane_turn_deg": one.plane_turn_deg,
             **value_cells("phi_felt_deg", one.phi_felt_rad),
             "next_turn_deg": degrees(one.next_turn_rad),
-            "error_with_friction_mm": one.one_push.error_mm(one.d_x_mm).value,
-            "inside_with_friction": as_cell(one.one_push.holds(one.d_x_mm.value)),
-            "status": estimate.status,
+            "error_with_friction_mm": one.one_push.error_mm,
+            "inside_with_friction": as_cell(one.one_push.inside),
+            "status": one.estimate.status,
         }
 
     def lines(self, found: Sequence[Rotation]) -> Iterator[str]:
         """Yield a line a number of rotations, over the contacts whose distance is known."""
-        known = [one for one in found if np.isfinite(one.estimate.error_mm(one.d_x_mm).value)]
+        known = [one for one in found if np.isfinite(one.error_percent)]
         for rotation, mine in sorted(grouped(known, lambda one: one.rotation).items()):
-            by_2 = rms(one.estimate.error_percent(one.d_x_mm).value for one in mine)
-            by_10 = rms(one.one_push.error_percent(one.d_x_mm).value for one in mine)
-            held = sum(bool(one.estimate.holds(one.d_x_mm.value)) for one in mine)
+            by_2 = rms(column(mine, "error_percent"))
+            by_10 = rms(column(mine, "one_push.error_percent"))
             settled = sum(one.next_turn_rad == 0.0 for one in mine)
             yield (
-                f"after {counted(rotation, 'rotation')}: (2) is off by {by_2:.2g} % RMS, its 95 % interval "
-                f"holds {held} of {counted(len(mine), 'contact')}, {settled} need no further turn; "
+                f"after {counted(rotation, 'rotation')}: (2) is off by {by_2:.2g} % RMS, "
+                f"{coverage(mine, 'contact')}, {settled} need no further turn; "
                 f"(10) by the same push is off by {by_10:.2g} %"
             )
 
@@ -147,14 +144,15 @@ def _rotation(
     alpha_sigma_rad = math.radians(settings.first_alpha_est_sigma_deg)
     alpha_rad = settings.alpha_est_rad
     assumed = assumed_settings(alpha_rad, alpha_sigma_rad)
+    by_2 = run_estimator("reoriented", reoriented, whisk, alpha_rad, alpha_sigma_rad)
     return Rotation(
+        by_2,
+        seen.d_x_mm,
         trial.contact,
         result,
         number,
         plane_turn_deg=trial.plane_turn_deg,
         phi_felt_rad=Value(*slip_angle(whisk)),
         next_turn_rad=next_turn_rad(whisk, assumed),
-        d_x_mm=seen.d_x_mm,
-        estimate=run_estimator("reoriented", reoriented, whisk, alpha_rad, alpha_sigma_rad),
-        one_push=felt.estimate(WITH_FRICTION),
+        one_push=ComparedEstimate(felt.estimate(WITH_FRICTION), seen.d_x_mm),
     )

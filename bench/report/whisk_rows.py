@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.analyses.cells import estimate_cells, value_cells, whisk_cells
+from bench.analyses.cells import value_cells, whisk_cells
+from bench.analyses.compared_estimate import ComparedEstimate
 from bench.base.input_problems import in_one_status
 from bench.base.tables import shared_name
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
@@ -138,7 +139,7 @@ def estimate_rows(results: Iterable[TrialResult]) -> Iterator[dict]:
         for estimate in (*felt.estimates, *felt.sensors):
             yield {
                 **whisk_cells(result, seen.whisk),
-                **estimate_cells(estimate, seen.d_x_mm),
+                **ComparedEstimate(estimate, seen.d_x_mm).cells,
                 **_contact_cells(seen, felt, estimate),
                 "d_x_est_sigma_alpha_exact_mm": estimate.d_x_est_sigma_alpha_exact_mm,
                 "truth_source": seen.truth_source,

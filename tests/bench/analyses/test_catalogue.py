@@ -6,7 +6,8 @@ import pytest
 
 from bench.analyses.analysis import Analysis, Heading, PageTable
 from bench.analyses.catalogue import ANALYSES
-from bench.analyses.cells import estimate_cells, whisk_cells
+from bench.analyses.cells import whisk_cells
+from bench.analyses.compared_estimate import ComparedEstimate
 from bench.base.settings import Settings
 from bench.base.tables import Column, Kind, Table
 from bench.records.trial_result import EstimateRow
@@ -70,7 +71,7 @@ def test_rows_have_the_cells_of_their_tables(analysis):
     run = run_of(*(result(beta) for beta in (5.0, 40.0, 60.0)), session=SESSION)
     known = {name for one in analysis.tables for name in one.names}
     known |= set(whisk_cells(result(5.0), 0)) | set(
-        estimate_cells(EstimateRow("", UNKNOWN), UNKNOWN)
+        ComparedEstimate(EstimateRow("", UNKNOWN), UNKNOWN).cells
     )
     for table, rows in analysis.rows(analysis.compute(run)).items():
         assert table.name in {declared.name for declared in analysis.tables}
