@@ -6,7 +6,7 @@ Compared over the session, of those whisks whose moments are not those of their 
 pictures agree whichever file they are with.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -29,26 +29,34 @@ def exchanged_signals(units: Sequence[Unit], results: Sequence[TrialResult]) -> 
     """Yield a line for each two trials whose signals fit each other's pictures, and neither its
     own.
     """
-    apart = [(unit, result) for unit, result in zip(units, results) if _is_apart(result)]
-    if len(apart) > _MOST_APART:
-        return
-    for (unit, result), (other, other_result) in combinations(apart, 2):
-        if _fits(unit, result, other) and _fits(other, other_result, unit):
-            names = f"{unit.trial.name} and {other.trial.name}"
-            yield reason("signals_exchanged", names=names)
+    for names in _exchanged(units, results, _is_apart, _fits):
+        yield reason("signals_exchanged", names=names)
 
 
 def exchanged_pictures(units: Sequence[Unit], results: Sequence[TrialResult]) -> Iterator[str]:
     """Yield a line for each two trials whose pictures show the slope that the other states, and
     neither its own.
     """
-    apart = [(unit, result) for unit, result in zip(units, results) if _has_another_slope(result)]
+    for names in _exchanged(units, results, _has_another_slope, _shows_slope_of):
+        yield reason("pictures_exchanged", names=names)
+
+
+def _exchanged(
+    units: Sequence[Unit],
+    results: Sequence[TrialResult],
+    is_apart: Callable[[TrialResult], bool],
+    fits: Callable[[Unit, TrialResult, Unit], bool],
+) -> Iterator[str]:
+    """Yield the names of each two trials that are not of a piece, each of which fits the other.
+
+    is_apart: whether a trial is not of a piece. fits: whether a trial, with its result, fits another one.
+    """
+    apart = [(unit, result) for unit, result in zip(units, results) if is_apart(result)]
     if len(apart) > _MOST_APART:
         return
     for (unit, result), (other, other_result) in combinations(apart, 2):
-        if _shows_slope_of(result, other) and _shows_slope_of(other_result, unit):
-            names = f"{unit.trial.name} and {other.trial.name}"
-            yield reason("pictures_exchanged", names=names)
+        if fits(unit, result, other) and fits(other, other_result, unit):
+            yield f"{unit.trial.name} and {other.trial.name}"
 
 
 def _has_another_slope(result: TrialResult) -> bool:
@@ -57,7 +65,7 @@ def _has_another_slope(result: TrialResult) -> bool:
     return bool(known) and all("slope_unlike_stated" in seen.status.codes for seen in known)
 
 
-def _shows_slope_of(result: TrialResult, other: Unit) -> bool:
+def _shows_slope_of(_: Unit, result: TrialResult, other: Unit) -> bool:
     """Return whether all whisks with a truth show the slope that another trial states."""
     known = [seen for seen in result.seen.whisks if seen.has_truth]
     return not any(check_slope(seen.beta_rad, other.trial) for seen in known)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.base.drawing import label_of
+from bench.base.numbers import number_range
 from bench.base.statuses import cure_of
 from bench.gauges.felt import lateness
 from bench.records.trial_result import BY_STAGE, EstimateRow, SeenWhisk
@@ -160,11 +161,7 @@ def _beam_changes(row: WhiskRow) -> list[_Quantity]:
 def _estimate(row: WhiskRow, estimate: EstimateRow) -> tuple[str, ...]:
     """Return estimator, distance, 95 % interval, error in mm, in per cent, status."""
     truth = row.seen.d_x_mm
-    low = estimate.d_x_est_low_mm
-    high = estimate.d_x_est_high_mm
-    interval = MISSING
-    if math.isfinite(low) and math.isfinite(high):
-        interval = f"{number(low, 1)} to {number(high, 1)}"
+    interval = number_range(estimate.d_x_est_low_mm, estimate.d_x_est_high_mm, 1)
     error = estimate.error_mm(truth)
     percent = estimate.error_percent(truth)
     return (
