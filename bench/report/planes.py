@@ -14,6 +14,7 @@ from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.run_facts import plane_name
 from bench.report.sensing_plane import draw_sensing_plane
 from bench.session.whisker import Whisker
+from vision import FrameTruth, Value
 
 _SEEN = "#2166ac"
 _CHANNELS = ("#b2182b", "#2166ac")  # m_y, m_z
@@ -75,12 +76,7 @@ def whisk_figure(
 def slip_over_stroke(seen: SeenWhisk) -> list[Curve]:
     """Return the slip in each touching frame."""
     frames = seen.frames
-    if frames is None:
-        return []
-    touching = np.asarray(frames.touching, dtype=bool)
-    theta_deg = np.degrees(frames.theta_rad.value[touching])
-    slip = frames.slip_mm
-    return [Curve(theta_deg, slip.value[touching], slip.sigma[touching], _SEEN, "seen")]
+    return [] if frames is None else [_seen_curve(frames, frames.slip_mm)]
 
 
 def force_angle_over_stroke(seen: SeenWhisk) -> list[Curve]:
@@ -88,11 +84,15 @@ def force_angle_over_stroke(seen: SeenWhisk) -> list[Curve]:
     frames = seen.frames
     if frames is None:
         return []
-    known = np.asarray(frames.touching, dtype=bool) & (frames.theta_rad.value > _LEAST_THETA_RAD)
-    theta_deg = np.degrees(frames.theta_rad.value[known])
-    phi_deg = np.degrees(frames.phi_rad.value[known])
-    sigma_deg = np.degrees(frames.phi_rad.sigma[known])
-    return [Curve(theta_deg, phi_deg, sigma_deg, _SEEN, "seen")]
+    return [_seen_curve(frames, frames.phi_rad.in_degrees(), _LEAST_THETA_RAD)]
+
+
+def _seen_curve(frames: FrameTruth, quantity: Value, above_rad: float = -np.inf) -> Curve:
+    """Return a quantity (frames,) of the touching frames above a pushing angle."""
+    theta_rad = frames.theta_rad.value
+    known = np.asarray(frames.touching, dtype=bool) & (theta_rad > above_rad)
+    values = quantity.value[known]
+    return Curve(np.degrees(theta_rad[known]), values, quantity.sigma[known], _SEEN, "seen")
 
 
 def moments_over_stroke(

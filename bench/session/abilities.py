@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from bench.session.angle_source import SOURCES, angle_source
+from bench.session.angle_source import angle_source, without_motor_log
 from bench.session.session import Session
 from bench.session.signals import has_moments
 from bench.session.traces import has_points_in_one_camera
@@ -104,13 +104,11 @@ def ability_lines(session: Session) -> Iterator[str]:
     found = abilities(session)
     if not found[0].of:
         return
-    for name, source in SOURCES.items():
-        count = sum(trial.angle_from == name for trial in session.trials)
-        if count and source.unknown:
-            of = f"{count} of {len(session.trials)} trials"
-            yield f"angle: {of} by {source.by}, without a motor log; not known: {source.unknown}"
-            if source.is_seen:
-                yield "  estimates there have θ of their own pictures: seen, not felt alone"
+    for source, count in without_motor_log(session.trials):
+        of = f"{count} of {len(session.trials)} trials"
+        yield f"angle: {of} by {source.by}, without a motor log; not known: {source.unknown}"
+        if source.is_seen:
+            yield "  estimates there have θ of their own pictures: seen, not felt alone"
     yield "this recording can give, of its trials:"
     for ability in found:
         yield ability.line

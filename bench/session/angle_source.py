@@ -1,6 +1,7 @@
 """Where a trial's motor angle is from: `angle_from` of [trial], one implementation of `AngleSource` each."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -194,3 +195,11 @@ def missing_key(key: str, angle_from: str) -> str:
 def angle_source(trial: Trial) -> AngleSource:
     """Return where a trial's motor angle is from."""
     return SOURCES[trial.angle_from]
+
+
+def without_motor_log(trials: Sequence[Trial]) -> Iterator[tuple[AngleSource, int]]:
+    """Yield each source but a log that trials have their motor angle from, and how many of them."""
+    for name, source in SOURCES.items():
+        count = sum(trial.angle_from == name for trial in trials)
+        if count and source.unknown:
+            yield source, count

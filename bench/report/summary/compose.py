@@ -23,7 +23,7 @@ from bench.report.summary.warning_lines import (
     light_lines,
     whisk_warnings,
 )
-from bench.session.angle_source import SOURCES
+from bench.session.angle_source import without_motor_log
 from bench.session.given_lines import given_lines
 from bench.session.session import Session
 from bench.trials.estimate_errors import judge
@@ -127,12 +127,10 @@ def _verdict_lines(evaluation: Evaluation, warnings: int) -> Iterator[str]:
 
 def angle_lines(session: Session) -> Iterator[str]:
     """Yield a line on each source of motor angles but a log: how many trials, and whether θ is seen."""
-    for name, source in SOURCES.items():
-        count = sum(trial.angle_from == name for trial in session.trials)
-        if count and source.unknown:
-            seen = "; θ of their estimates is seen" if source.is_seen else ""
-            trials = f"{count} of {counted(len(session.trials), 'trial')}"
-            yield f"No motor log: the angle of {trials} is by {source.by}{seen}."
+    for source, count in without_motor_log(session.trials):
+        seen = "; θ of their estimates is seen" if source.is_seen else ""
+        trials = f"{count} of {counted(len(session.trials), 'trial')}"
+        yield f"No motor log: the angle of {trials} is by {source.by}{seen}."
 
 
 def _given_lines(evaluation: Evaluation) -> Iterator[str]:
