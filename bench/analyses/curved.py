@@ -271,7 +271,8 @@ def _by_slip(felt: Sequence[FeltAt], slip: _SlipAngle, whisker: Whisker, alpha: 
     if slip.is_held:
         radius = _radius(d_x.value, creep, 0.0, alpha, 0.0, whisker)
         return Curved(count, radius, phi, status=reason("no_lateral_slip"))
-    turned = _turned(d_x.value, phi.value, slip.rate, alpha_rad)
+    beyond = turn_beyond_chance(phi.value, slip.rate, alpha_rad)
+    turned = d_x.value * beyond * share_by_turn(phi.value, alpha_rad)
     radius = _radius(d_x.value, creep, phi.value, alpha, turned, whisker)
     lateral, printed = _lateral(phi.value, slip.rate, d_x.value, alpha_rad)
     return Curved(count, radius, phi, lateral, printed)
@@ -343,17 +344,34 @@ def _distance(at: FeltAt, alpha_rad: float, beam: Beam) -> tuple[float, float]:
     return d_x_mm, float(np.sqrt(by_moments @ at.covariance_at @ by_moments))
 
 
-def _turned(d_x_mm: float, phi: float, rate: Value, alpha_rad: float) -> float:
-    """Return by how much (10) may change with θ because φ turns, mm/rad.
+def rate_by_hand(phi: float, alpha_rad: float) -> float:
+    """Return the change of φ with θ against an object that leans as one set up by hand, one sigma."""
+    return float(0.5 * np.cos(_slope(phi, alpha_rad)) * np.tan(TILT_SIGMA_RAD))
 
-    Of the turn counts what is beyond an object's lean by hand and noise: all of it where the object
-    leans, half of it the other way where it is curved to the side (`bench.analyses.turning_phi`,
-    docs/maps.md).
+
+def turn_beyond_chance(phi: float, rate: Value, alpha_rad: float) -> float:
+    """Return by how much φ turns with θ beyond noise and an object's lean by hand; 0 where it does not.
+
+    It is the root of what the turn's square is beyond its variance (the positive part of the moment estimate,
+    as DerSimonian & Laird, Controlled Clinical Trials 7, 1986): of an object across the whisker nothing, in
+    the mean.
     """
-    beta = min(abs(phi) + alpha_rad, 0.999 * RIGHT_ANGLE)
-    by_hand = 0.5 * np.cos(beta) * np.tan(TILT_SIGMA_RAD)
-    beyond = float(np.sqrt(max(rate.value**2 - rate.sigma**2 - by_hand**2, 0.0)))
-    return float(d_x_mm * beyond * np.sin(abs(phi)) / (np.cos(alpha_rad) * np.cos(beta)))
+    by_hand = rate_by_hand(phi, alpha_rad)
+    return float(np.sqrt(max(rate.value**2 - rate.sigma**2 - by_hand**2, 0.0)))
+
+
+def share_by_turn(phi: float, alpha_rad: float) -> float:
+    """Return the change of (10), as a share of it, with θ and with the rate at which φ turns.
+
+    It goes one way where the object leans, half as far the other way where it is curved to the side
+    (`bench.analyses.turning_phi`, docs/maps.md).
+    """
+    return float(np.sin(abs(phi)) / (np.cos(alpha_rad) * np.cos(_slope(phi, alpha_rad))))
+
+
+def _slope(phi: float, alpha_rad: float) -> float:
+    """Return the size of the slope, rad, by the slip angle and the friction angle."""
+    return min(abs(phi) + alpha_rad, 0.999 * RIGHT_ANGLE)
 
 
 def _radius(
@@ -390,6 +408,6 @@ def _lateral(phi: float, rate: Value, d_x_mm: float, alpha_rad: float) -> tuple[
     """
     exact = float(curvature.curvature_of_slip(1.0, phi, alpha_rad)) / d_x_mm
     printed = float(curvature.curvature_of_slip_printed(1.0, phi, alpha_rad)) / d_x_mm
-    leaning = 0.5 * np.cos(abs(phi) + alpha_rad) * np.tan(TILT_SIGMA_RAD)
-    lateral = Measurement(exact * rate.value, abs(exact * rate.sigma), float(abs(exact * leaning)))
+    leaning = rate_by_hand(phi, alpha_rad)
+    lateral = Measurement(exact * rate.value, abs(exact * rate.sigma), abs(exact * leaning))
     return lateral, printed * rate.value

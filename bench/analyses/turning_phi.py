@@ -13,12 +13,18 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri, ndtr, stdtrit
 
-from bench.analyses.curved import independent_angles, phi_sigma, slip_angles, weighted_fit
+from bench.analyses.curved import (
+    independent_angles,
+    phi_sigma,
+    rate_by_hand,
+    share_by_turn,
+    slip_angles,
+    turn_beyond_chance,
+    weighted_fit,
+)
 from bench.analyses.pooling import column
 from bench.base.combined import holm
-from bench.base.settings import TILT_SIGMA_RAD
 from bench.records.trial_result import EstimateRow, FeltAt
-from estimator.domain import RIGHT_ANGLE
 from estimator.uncertainty import Z_95
 from vision import UNKNOWN, Value
 from vision.geometry import Reason, joined
@@ -62,15 +68,9 @@ def sure_turns(phi_rad: Sequence[float], rates: Sequence[Value], alpha_rad: floa
     """
     chances = []
     for phi, rate in zip(phi_rad, rates):
-        spread = np.hypot(rate.sigma, _rate_by_hand(phi, alpha_rad))
+        spread = np.hypot(rate.sigma, rate_by_hand(phi, alpha_rad))
         chances.append(2 * ndtr(-abs(rate.value) / spread))
     return holm(chances, _CHANCE)
-
-
-def _rate_by_hand(phi: float, alpha_rad: float) -> float:
-    """Return the change of φ with θ against an object that leans as one set up by hand, one sigma."""
-    beta = min(abs(phi) + alpha_rad, 0.999 * RIGHT_ANGLE)
-    return float(0.5 * np.cos(beta) * np.tan(TILT_SIGMA_RAD))
 
 
 def with_turn(
@@ -86,22 +86,18 @@ def with_turn(
 
     It gets a status where φ turns by more than against an object that leans as one set up by hand, and
     that matters. phi, rate: the slip angle felt, and its `turn`; is_sure: of `sure_turns`; length_mm: the
-    whisker's, at which intervals end. Into the sigma goes what the turn's square is beyond its variance (the positive part of
-    the moment estimate, as DerSimonian & Laird, Controlled Clinical Trials 7, 1986): of an object across
-    the whisker nothing, in the mean.
+    whisker's, at which intervals end.
     """
-    alpha = row.alpha_est_rad
-    beta = min(abs(phi) + alpha, 0.999 * RIGHT_ANGLE)
-    share = theta_rad * np.sin(abs(phi)) / (np.cos(alpha) * np.cos(beta))  # of d_x, by a rate
-    spread = math.hypot(rate.sigma, _rate_by_hand(phi, alpha))
     d_x_mm = row.d_x_est_mm
-    size = abs(rate.value)
-    if not (size > spread and d_x_mm.is_known):
+    beyond = turn_beyond_chance(phi, rate, row.alpha_est_rad)
+    if not (beyond > 0.0 and d_x_mm.is_known):
         return row
-    widened = _widened(row, share * float(np.sqrt(size**2 - spread**2)), length_mm)
-    if not (is_sure and size * share * d_x_mm.value > _MATTERS * d_x_mm.sigma):
+    share = theta_rad * share_by_turn(phi, row.alpha_est_rad)  # of d_x, by a rate
+    widened = _widened(row, share * beyond, length_mm)
+    error_share = abs(rate.value) * share
+    if not (is_sure and error_share * d_x_mm.value > _MATTERS * d_x_mm.sigma):
         return widened
-    status = _turning_status(rate.value * theta_rad, size * share)
+    status = _turning_status(rate.value * theta_rad, error_share)
     return replace(widened, status=joined(row.status, status))
 
 
