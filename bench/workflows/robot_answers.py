@@ -231,15 +231,15 @@ def _answers_at(
     whisk: _ConvertedWhisk, cut: FeltStroke, theta_rad: float, push_deg: float, time_s: float
 ) -> Iterator[Answer]:
     """Yield each estimator's answer from a stroke that is cut at a push."""
-    d_x_mm = whisk.seen.d_x_mm.value
+    truth = whisk.seen.d_x_mm
     measured = {row.estimator: row for row in _measured_rows(whisk, cut, theta_rad)}
     for expected in _estimate(whisk, _expected_whisk(whisk, theta_rad)):
         row = measured.get(expected.estimator)
         error_percent = math.nan
         noise_percent = math.nan
         if row is not None:
-            error_percent = _error_percent(row, d_x_mm)
-            noise_percent = 100.0 * row.d_x_est_sigma_alpha_exact_mm / d_x_mm
+            error_percent = row.error_percent(truth).value
+            noise_percent = 100.0 * row.d_x_est_sigma_alpha_exact_mm / truth.value
         yield Answer(
             estimator=expected.estimator,
             truth_source=whisk.seen.truth_source,
@@ -248,7 +248,7 @@ def _answers_at(
             rate_Hz=whisk.rate_Hz,
             push_deg=push_deg,
             time_s=time_s,
-            expected_percent=_error_percent(expected, d_x_mm),
+            expected_percent=expected.error_percent(truth).value,
             error_percent=error_percent,
             noise_percent=noise_percent,
         )
@@ -271,11 +271,6 @@ def _estimate(whisk: _ConvertedWhisk, felt: Whisk) -> tuple[EstimateRow, ...]:
     return run_estimators(
         felt, estimators(settings.estimators, felt.beam), settings, whisk.task.result.radii_mm
     )
-
-
-def _error_percent(row: EstimateRow, d_x_mm: float) -> float:
-    """Return an estimate's error in % of the true distance."""
-    return 100.0 * (row.d_x_est_mm.value / d_x_mm - 1.0)
 
 
 def _expected_whisk(whisk: _ConvertedWhisk, theta_rad: float) -> Whisk:
@@ -304,12 +299,11 @@ def _friction_angle_rad(whisk: _ConvertedWhisk) -> float:
 def _share_left_out(whisk: _ConvertedWhisk, theta_rad: float, alpha_rad: float) -> float:
     """Return by what share leaning and rolling lower the moments, to first order."""
     seen = whisk.seen
-    beam = whisk.task.unit.session.whisker.beam
-    reach_mm = sum(whisk.task.result.radii_mm)  # NaN where the bar's diameter is not known
     d_x_mm = seen.d_x_mm.value
+    reach_mm = whisk.task.result.reach_mm(d_x_mm)  # NaN where the bar's diameter is not known
     phi_rad = float(slip_angle(seen.beta_rad.value, alpha_rad))
     share = first_order.leaning(theta_rad, seen.psi_rad.value, phi_rad, alpha_rad)
     if np.isfinite(reach_mm):
-        left = 1.0 - beam.taper * d_x_mm / beam.length_mm  # of the base's diameter
+        left = whisk.task.unit.session.whisker.beam.thickness(d_x_mm)
         share += first_order.rolling(theta_rad, reach_mm, phi_rad, alpha_rad, d_x_mm, left)
     return share
