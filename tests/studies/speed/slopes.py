@@ -6,11 +6,14 @@ The rig paints a scene; one thing at a time is doubled. Pictures grow by a large
 bench is in view, and by a longer lens, as the wire is thicker; whisks are the same one, again and again. Seconds of
 processor, pictures in memory, after a first look that fills tables. The exponent is of a straight line through the
 logarithms; what does not grow with the number flattens it. Of board views it is the adjustment of two cameras
-(`cameras.py`), of whisks together what `whisks.py` prints step by step, of workers wall time of eight scenes.
+(`cameras.py`), of whisks together what `whisks.py` prints step by step; of workers what all of them together take of
+processor and memory (MB, the largest that each had) for eight scenes, their imports apart.
 """
 
 import argparse
 import math
+import os
+import resource
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -108,21 +111,27 @@ def table(settings: VisionSettings) -> Iterator[str]:
     yield together.line("board views", VIEWS, [adjustment.seconds(2, count) for count in VIEWS])
     counts, spent_s = together.measured(together.results_of_fixture())
     yield together.line("whisks together", counts, np.sum(list(spent_s.values()), axis=0))
-    yield together.line("workers", WORKERS, [with_workers(count, settings) for count in WORKERS])
+    spent = [with_workers(count, settings) for count in WORKERS]
+    yield together.line(
+        "workers: processor", WORKERS, [seconds_in_all for seconds_in_all, _ in spent]
+    )
+    yield together.line("workers: memory", WORKERS, [megabytes for _, megabytes in spent])
 
 
-def with_workers(count: int, settings: VisionSettings) -> float:
-    """Wall time of scenes seen by so many processes, once these have begun."""
-    tasks = [settings] * SCENES_FOR_WORKERS
+def with_workers(count: int, settings: VisionSettings) -> tuple[float, float]:
+    """Seconds of processor in which so many processes see scenes, and MB of memory that they have at most, all together."""
     with Workers(count) as pool:
-        pool.run(_see, tasks[:count], "scenes")
-        begin = time.perf_counter()
-        pool.run(_see, tasks, "scenes")
-        return time.perf_counter() - begin
+        seen = pool.run(_see, [settings] * SCENES_FOR_WORKERS, "scenes")
+    most = {
+        number: megabytes for number, _, megabytes in seen
+    }  # of each process after its last scene
+    return sum(spent_s for _, spent_s, _ in seen), sum(most.values())
 
 
-def _see(settings: VisionSettings) -> float:
-    return seconds(protocol(), settings)
+def _see(settings: VisionSettings) -> tuple[int, float, float]:
+    """Number of this process, seconds of processor in which it sees a scene, and MB that it has had at most."""
+    spent_s = seconds(protocol(), settings)
+    return os.getpid(), spent_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 
 def main() -> None:
