@@ -53,9 +53,15 @@ class StillScene:
 
 
 def still_scene(
-    session: Session, calibration: "SessionCalibration", frames: Mapping[str, Pictures]
+    session: Session,
+    calibration: "SessionCalibration",
+    frames: Mapping[str, Pictures],
+    unmoved: Collection[str] = (),
 ) -> StillScene:
-    """Compare a trial's frames with the pictures of the scene without rods."""
+    """Compare a trial's frames with the pictures of the scene without rods.
+
+    unmoved: cameras of which it is known that they stand as they were calibrated.
+    """
     # It imports all of the calibration, which `check` does without.
     from bench.cameras.session_cameras import moved_cameras
 
@@ -70,7 +76,8 @@ def still_scene(
             kept[name], corrected, lost = evenly_exposed(name, pictures)
             notes += corrected
             unusable += lost
-    moved = moved_cameras(session, calibration, kept)
+    unknown = {name: pictures for name, pictures in kept.items() if name not in unmoved}
+    moved = moved_cameras(session, calibration, unknown)
     return StillScene(kept, left_out | moved, tuple(notes), tuple(unusable))
 
 

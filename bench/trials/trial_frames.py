@@ -62,7 +62,8 @@ class TrialFrames:
         """
         times = frame_times(trial)
         by_camera = read_trial(trial, times)
-        scene = still_scene(session, calibration, by_camera)
+        unmoved = fits[0].cameras if fits else ()  # those that had moved are in no fit
+        scene = still_scene(session, calibration, by_camera, unmoved)
         others, itself = _own_apart(wires, session.base.name if session.base else "")
         velocity = trial.object_velocity_mm_s
         pictures = TrialPictures(

@@ -48,6 +48,21 @@ def test_a_camera_that_shows_another_scene_is_left_out(small_copy, fault, expect
     assert left_out["low"].startswith(f"camera low was left out: {expected}")
 
 
+def test_a_camera_that_is_known_to_stand_is_not_asked_whether_it_moved(small_session, monkeypatch):
+    session = load_session(small_session)
+    trial = session.trial(TRIAL)
+    frames = read_trial(trial, frame_times(trial), [0, 5, 10])
+    rig = {name: read_picture(path) for name, path in session.rig_pictures.items()}
+    calibration = SessionCalibration(None, rig, hash_of("none"))
+
+    def all_moved(session, calibration, frames):
+        return dict.fromkeys(frames, "moved")
+
+    monkeypatch.setattr("bench.cameras.session_cameras.moved_cameras", all_moved)
+    assert still_scene(session, calibration, frames).left_out == {"high": "moved", "low": "moved"}
+    assert still_scene(session, calibration, frames, ["high"]).left_out == {"low": "moved"}
+
+
 def test_cameras_exchanged(small_copy):
     FAULTS["cameras exchanged"](small_copy)
     assert scene_of(small_copy).left_out == {

@@ -7,7 +7,7 @@ bench is in view, and by a longer lens, as the wire is thicker; whisks are the s
 processor, pictures in memory, after a first look that fills tables. The exponent is of a straight line through the
 logarithms; what does not grow with the number flattens it. Of board views it is the adjustment of two cameras
 (`cameras.py`), of whisks together what `whisks.py` prints step by step; of workers what all of them together take of
-processor and memory (MB, the largest that each had) for eight scenes, their imports apart.
+processor and memory (GB, the most that each had) for eight scenes, their imports apart.
 """
 
 import argparse
@@ -112,26 +112,23 @@ def table(settings: VisionSettings) -> Iterator[str]:
     counts, spent_s = together.measured(together.results_of_fixture())
     yield together.line("whisks together", counts, np.sum(list(spent_s.values()), axis=0))
     spent = [with_workers(count, settings) for count in WORKERS]
-    yield together.line(
-        "workers: processor", WORKERS, [seconds_in_all for seconds_in_all, _ in spent]
-    )
-    yield together.line("workers: memory", WORKERS, [megabytes for _, megabytes in spent])
+    yield together.line("workers: processor", WORKERS, [spent_s for spent_s, _ in spent])
+    yield together.line("workers: memory", WORKERS, [memory_GB for _, memory_GB in spent], "GB")
 
 
 def with_workers(count: int, settings: VisionSettings) -> tuple[float, float]:
-    """Seconds of processor in which so many processes see scenes, and MB of memory that they have at most, all together."""
+    """Seconds of processor in which so many processes see scenes, and GB of memory that they have at most, all together."""
     with Workers(count) as pool:
         seen = pool.run(_see, [settings] * SCENES_FOR_WORKERS, "scenes")
-    most = {
-        number: megabytes for number, _, megabytes in seen
-    }  # of each process after its last scene
+    # of each process after its last scene
+    most = {number: memory_GB for number, _, memory_GB in seen}
     return sum(spent_s for _, spent_s, _ in seen), sum(most.values())
 
 
 def _see(settings: VisionSettings) -> tuple[int, float, float]:
-    """Number of this process, seconds of processor in which it sees a scene, and MB that it has had at most."""
+    """Number of this process, seconds of processor in which it sees a scene, and GB that it has had at most."""
     spent_s = seconds(protocol(), settings)
-    return os.getpid(), spent_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return os.getpid(), spent_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0**2
 
 
 def main() -> None:

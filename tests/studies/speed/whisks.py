@@ -66,10 +66,10 @@ def seconds(call: Callable) -> float:
     return time.process_time() - begin
 
 
-def line(name: str, counts: Sequence[float], spent_s: Sequence[float]) -> str:
-    """Return the line of a step: seconds against a number, and the exponent."""
+def line(name: str, counts: Sequence[float], spent_s: Sequence[float], unit: str = "s") -> str:
+    """Return the line of a step: seconds, or another unit, against a number, and the exponent."""
     exponent = np.polyfit(np.log(counts), np.log(np.maximum(spent_s, 1e-4)), 1)[0]
-    costs = ", ".join(f"{count:g}: {cost:.2f} s" for count, cost in zip(counts, spent_s))
+    costs = ", ".join(f"{count:g}: {cost:.2f} {unit}" for count, cost in zip(counts, spent_s))
     mark = "  FASTER" if exponent > MOST_EXPONENT and spent_s[-1] > LEAST_S else ""
     return f"{name:<26}{costs}  (cost ∝ n^{exponent:.2f}){mark}"
 
