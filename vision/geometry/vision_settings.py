@@ -17,6 +17,7 @@ class VisionSettings:
     before touch.
     check_beam: whether the wire is fitted again as a curve that is no beam and with another width,
     to check that it is the one that is stated.
+    read_base: whether the whisker's base is read in all frames before touch, by which the rig is placed.
     """
 
     wire_piece_px: int = 12
@@ -29,3 +30,4 @@ class VisionSettings:
     picture_scale: int = 1
     every_frame: int = 1
     check_beam: bool = True
+    read_base: bool = True

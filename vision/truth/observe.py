@@ -21,6 +21,7 @@ from vision.fit.motion import Gives, StatedVelocity
 from vision.fit.one_camera_less import contradiction
 from vision.fit.refinements import LeftOut, left_out
 from vision.fit.turns import frame_turns
+from vision.geometry.base_lines import BaseLines
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import REST_POWERS, Curves, is_before
 from vision.geometry.contact import BarAxis
@@ -365,20 +366,23 @@ def fitted_truth(explained: Explanation) -> WhiskTruth:
     truth = to_whisk(whisk, fitted)
     beam = check_beam(fitted, fitted.covariance) if whisk.settings.check_beam else None
     status = joined(truth.status, explained.warning, *warnings_of(whisk, fitted, beam))
-    # Before the free stroke is traced, which changes whisk.light.
-    refinements = _refinements(whisk, fitted) if truth.d_x_mm.is_known else {}
-    free: ConvergedFit = fitted
-    if len(fitted.frames) < len(whisk.frames):
-        free = free_stroke(whisk, fitted)
     return replace(
         truth,
-        refinements=refinements,
+        refinements=_refinements(whisk, fitted) if truth.d_x_mm.is_known else {},
         status=status,
         turns=frame_turns(fitted, fitted.frames),
         delays=as_values(camera_delays(fitted, whisk.picture_of)),
-        base=base_lines(free),
+        base=_base_of(whisk, fitted) if whisk.settings.read_base else None,
         beam=beam,
     )
+
+
+def _base_of(whisk: WhiskPictures, fitted: FittedWhisk) -> BaseLines | None:
+    """Return the whisker's base in all frames before touch."""
+    free: ConvergedFit = fitted
+    if len(fitted.frames) < len(whisk.frames):
+        free = free_stroke(whisk, fitted)
+    return base_lines(free)
 
 
 def warnings_of(

@@ -258,7 +258,8 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> ConvergedFit:
     """Fit all frames before touch, about the object and the rest shape of a fit."""
     problem = fitted.problem
     bent = {f for f, is_bent in zip(fitted.frames, problem.bent) if is_bent}
-    whisk = whisk.during([f for f in whisk.frames if f not in bent])
+    before_touch = [f for f in whisk.frames if f not in bent]
+    whisk = replace(whisk.during(before_touch), light=dict(whisk.light))
     place = _resting_place(whisk, fitted.axis, fitted.rest_mm)
     seen = _wire_points(whisk, place)
     nothing = np.zeros(len(place.curves), dtype=bool)

@@ -76,6 +76,7 @@ def place(small_copy, monkeypatch):
 def test_what_was_learnt_is_said_and_an_exact_board_stays(place):
     made, warnings, stages = place(0 * OFF)
     assert made.cameras is CAMERAS and made.hash == "before" and not warnings
+    assert not made.placed_by
     assert stages == {
         "seen"
     }  # what was looked at is the trial's own result and is not looked at again
@@ -104,6 +105,8 @@ def test_an_axis_that_leans_along_the_whisker_may_be_a_frame_rate(place):
 def test_a_board_with_a_sigma_gives_way(place):
     made, warnings, stages = place(OFF, sigma_mm=0.5)
     assert not warnings and made.hash != "before" and stages == {"swing0", "swing1"}
+    # its fits are those that the trials are fitted again from
+    assert made.placed_by == "swing1" and len(set(made.hashes_before.values())) > 1
     moved = made.cameras["one"].T_camera_rig[:, 3] - CAMERAS["one"].T_camera_rig[:, 3]
     np.testing.assert_allclose(moved, CAMERAS["one"].T_camera_rig[:, :3] @ OFF[3:], atol=0.05)
     # The board on the rig has not moved in the pictures: it stands elsewhere in the rig's frame.
