@@ -73,7 +73,7 @@ def calibrate_cameras_command(
         warnings: list[str] = []
         if not _is_placed(loaded) and not file_format:
             _say_not_placed(lenses.name, out, session, lines, warnings)
-        return _write(out, cameras, lines, warnings, file_format)
+        return _write(out, loaded, cameras, lines, warnings, file_format)
     views = read_board_views(loaded)
     calibration = calibrate_from(loaded, views)
     cameras = moved_by_file(loaded, calibration.cameras)
@@ -90,7 +90,7 @@ def calibrate_cameras_command(
         _say_not_placed(frame, out, session, lines, warnings)
     lines += held_out_lines(measure_held_out(loaded, views), calibration)
     warnings += _corner_warnings(calibration)
-    return _write(out, cameras, lines, warnings, file_format)
+    return _write(out, loaded, cameras, lines, warnings, file_format)
 
 
 def _say_not_placed(
@@ -108,9 +108,14 @@ def _is_placed(session: Session) -> bool:
 
 
 def _write(
-    out: Path, cameras: Cameras, lines: list[str], warnings: list[str], file_format: str
+    out: Path,
+    session: Session,
+    cameras: Cameras,
+    lines: list[str],
+    warnings: list[str],
+    file_format: str,
 ) -> int:
-    """Write the cameras and print the lines. Return 0, or 1 with warnings."""
+    """Write the session's cameras and print the lines. Return 0, or 1 with warnings."""
     if file_format:
         with refused_as_bad_input(f"--format {file_format}"):
             files = WRITERS[file_format](cameras, out.stem)
@@ -118,7 +123,7 @@ def _write(
             write_whole(out.parent / name, content)
         written = f", without uncertainties: {', '.join(files)} in {out.parent}"
     else:
-        write_cameras(out, cameras)
+        write_cameras(out, cameras, session.crops)
         written = f": {out} and {out.with_suffix('.npz').name}"
     return print_written(lines, warnings, written)
 

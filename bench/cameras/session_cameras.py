@@ -208,7 +208,7 @@ def _calibrate_into(session: Session, folder: Path, key: str) -> dict:
     cameras, T_rig_board, note = on_the_rig(session, made.cameras, board)
     lengths, warnings = check_scale(session, cameras)
     folder.mkdir(parents=True, exist_ok=True)
-    write_cameras(folder / "cameras.toml", cameras)
+    write_cameras(folder / "cameras.toml", cameras, session.crops)
     notes = [*report_lines(made), *([note] if note else []), *lengths]
     kept = plain(
         {

@@ -21,7 +21,7 @@ from bench.session.signals import Signals, forward_strokes, read_signals
 from bench.session.traces import read_traces, read_traces_alone
 from bench.session.trial import PLACE_UNCHECKED, Trial, require_object_placed
 from bench.session.whisker import Whisker
-from vision.calibration import read_cameras
+from vision.calibration import check_crops, read_cameras
 from vision.geometry import Cameras, Reason, Refused, counted
 from vision.pictures import (
     STACK_SUFFIXES,
@@ -235,6 +235,7 @@ def _calibrated_sizes(session: Session) -> dict[str, Size]:
         return {}
     with refused_as_bad_input("cameras.toml"):
         cameras = read_cameras(session.cameras_toml, session.pixel_aspects)
+        check_crops(session.cameras_toml, session.crops)
     require_cameras(cameras, session.camera_names, "cameras.toml")
     if session.whisker is not None and session.base is None:
         _require_whisker_in_sight(cameras, session.whisker.length_mm)

@@ -11,7 +11,7 @@ from vision.geometry.lazy_names import lazy_names
 NAMES = {
     "board_place": ("place_board",),
     "calibrate": ("Calibration", "CameraReport", "calibrate_cameras"),
-    "cameras_file": ("cameras_as_files", "read_cameras"),
+    "cameras_file": ("cameras_as_files", "check_crops", "read_cameras"),
     "cameras_import": (
         "WRITERS",
         "are_placed",

@@ -12,16 +12,20 @@ import tomli_w
 
 from vision.boards.sufficiency import check_lens
 from vision.geometry.camera import PARAMETERS, Camera, Cameras
+from vision.geometry.crop import Crop
 from vision.geometry.refusals import Refused
 
 _KEYS = ("size_px", "matrix", "distortion", "T_camera_rig", "rms_px")
+_KEYS_OF_PART = ("crop", "mirrored")
 
 
-def cameras_as_files(cameras: Cameras, companion: str) -> tuple[bytes, bytes]:
+def cameras_as_files(
+    cameras: Cameras, companion: str, crops: Mapping[str, Crop]
+) -> tuple[bytes, bytes]:
     """Return the contents of cameras.toml and of its companion file of that name.
 
-    The companion holds the joint covariance with the parameters' names, and the part of it that is
-    the rig frame's, where that is known.
+    crops: of cameras that are parts of a picture. The companion holds the joint covariance with the parameters'
+    names, and the part of it that is the rig frame's, where that is known.
     """
     packed = _pack_covariance(cameras)
     tables = {}
@@ -33,12 +37,37 @@ def cameras_as_files(cameras: Cameras, companion: str) -> tuple[bytes, bytes]:
             "T_camera_rig": camera.T_camera_rig.tolist(),
             "rms_px": float(camera.rms_px),
         }
+        if camera.name in crops:
+            tables[camera.name] |= _part(crops[camera.name])
     document = {
         "covariance": companion,
         "covariance_sha256": hashlib.sha256(packed).hexdigest(),
         "cameras": tables,
     }
     return tomli_w.dumps(document).encode(), packed
+
+
+def _part(crop: Crop) -> dict[str, list[int] | bool]:
+    """Return the keys of a camera that is a part of a picture."""
+    crop_px = [crop.left, crop.top, crop.width, crop.height]
+    return dict(zip(_KEYS_OF_PART, (crop_px, crop.mirrored)))
+
+
+def check_crops(path: Path, crops: Mapping[str, Crop]) -> None:
+    """Raise Refused where a camera of `path` is a part of a picture, and `crops` states another part, or none."""
+    for name, table in parse_toml(path, "is not TOML")["cameras"].items():
+        made = {key: table[key] for key in _KEYS_OF_PART if key in table}
+        stated = _part(crops[name]) if name in crops else {}
+        if made and made != stated:
+            found = f"was made with camera {name} as {_named(made)} of a picture"
+            raise Refused(f"{found}, session.toml has it as {_named(stated)}: calibrate again")
+
+
+def _named(part: Mapping[str, list[int] | bool]) -> str:
+    """Return how messages name a part of a picture."""
+    if not part:
+        return "a whole one"
+    return f"{'mirrored ' if part.get('mirrored') else ''}part {part.get('crop')}"
 
 
 def _pack_covariance(cameras: Cameras) -> bytes:
@@ -94,7 +123,7 @@ def _camera(name: str, table: dict) -> Camera:
     missing = sorted(set(_KEYS) - set(table))
     if missing:
         raise Refused(f"cameras.{name}: {', '.join(missing)} missing")
-    unknown = sorted(set(table) - set(_KEYS) - {"covariance"})
+    unknown = sorted(set(table) - set(_KEYS) - {"covariance", *_KEYS_OF_PART})
     if unknown:
         raise Refused(
             f"cameras.{name}: unknown key {', '.join(unknown)}; allowed are {', '.join(_KEYS)}"

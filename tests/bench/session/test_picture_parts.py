@@ -122,20 +122,36 @@ def test_pictures_of_a_board_on_the_object_are_divided_as_others(one_camera):
     }
 
 
-@pytest.mark.parametrize("height, is_same", [(300, True), (310, False)])
-def test_cameras_brought_along_are_of_the_parts(one_camera, height, is_same):
-    """As `calibrate cameras` writes them; of another crop they are refused."""
-    state(one_camera, MIRROR)
+OTHER_SIZE = MIRROR.replace("1280, 300]", "1280, 310]")
+OTHER_PLACE = MIRROR.replace("[0, 0, 1280", "[8, 0, 1272")
+
+
+@pytest.mark.parametrize(
+    "made_with, refused",
+    [
+        (MIRROR, ""),
+        (OTHER_SIZE, "is it of another crop?"),
+        (OTHER_PLACE.replace("[8", "[0"), "as mirrored part [8, 0, 1272, 300]: calibrate again"),
+        (OTHER_PLACE.replace("true", "false"), "with camera mirrored as part [8, 0, 1272, 300] of"),
+    ],
+)
+def test_cameras_brought_along_are_of_the_parts(one_camera, made_with, refused):
+    """As `calibrate cameras` writes them; of another crop they are refused: 8 px put touch 3 sigma off."""
+    state(one_camera, made_with)
+    crops = load_session(one_camera).crops
     cameras = []
-    for name, size in (PART_SIZES_PX | {"mirrored": (1280, height)}).items():
+    for name, crop in crops.items():
         matrix = [[1500.0, 0.0, 640.0], [0.0, 1500.0, 200.0], [0.0, 0.0, 1.0]]
         pose = np.column_stack([np.eye(3), [0.0, 0.0, 500.0]])
-        cameras.append(Camera(name, size, matrix, np.zeros(5), pose))
-    write_cameras(one_camera / "cameras.toml", Cameras(tuple(cameras)))
+        cameras.append(Camera(name, crop.size_px, matrix, np.zeros(5), pose))
+    is_known = "part" in refused or not refused
+    file = one_camera / "cameras.toml"
+    write_cameras(file, Cameras(tuple(cameras)), crops if is_known else {})
+    state(one_camera, OTHER_PLACE if "part" in refused else MIRROR)
     problems = InputProblems(stop_at_first=False)
     check_sizes(load_session(one_camera), problems)
     said = [str(refusal) for refusal in problems.refusals]
-    assert said == [] if is_same else "is it of another crop?" in said[0]
+    assert said == [] if not refused else refused in said[0]
 
 
 @pytest.mark.parametrize(
