@@ -134,14 +134,17 @@ class _AxisFit:
         self._seen = MarkerPictures.of(marker.sightings, cameras)
         motor_rad = np.array([one.motor_rad for one in marker.sightings])
         self._motor_rad = motor_rad
-        self._from_middle = motor_rad - 0.5 * (motor_rad.min() + motor_rad.max())
+        self._middle_rad = 0.5 * (motor_rad.min() + motor_rad.max())
         self.number = marker.sightings[0].number
         self.pictures = len(marker.sightings)
         fitted = self._fit(marker)
         covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
+        by_error = self._seen.by_camera_errors(
+            fitted, motor_rad, cameras, self._scatter_px, cameras.by_error
+        )
         self.axis = fitted.x[:4]
         self.covariance = covariance[:4, :4]
-        self.by_cameras = self._of_cameras(fitted, covariance)
+        self.by_cameras = by_error[:4] @ by_error[:4].T
 
     def _fit(self, marker: _Turning) -> OptimizeResult:
         """Fit in passes: each gives the corners' scatter and the size of their biases to the next."""
@@ -167,7 +170,7 @@ class _AxisFit:
 
     def _scatter(self, fitted: OptimizeResult) -> np.ndarray:
         """Return the scatter (cameras, 2) of corners along x and y, px, by the residuals."""
-        residual = fitted.fun[: self._seen.px.size].reshape(self._seen.px.shape)
+        residual = self._seen.of_corners(fitted.fun).reshape(self._seen.px.shape)
         scatter_px = self._scatter_px.copy()
         for k in self._seen.cameras_with_pictures:
             x_y = np.moveaxis(residual[self._seen.camera == k], -1, 0)
@@ -189,28 +192,17 @@ class _AxisFit:
         pictures, plain for the biases.
         """
         loss = np.stack([squares, np.ones_like(squares), np.zeros_like(squares)])
-        seen = 1.0 + squares[: self._seen.px.size]
-        loss[:, : self._seen.px.size] = 2.0 * (np.sqrt(seen) - 1.0), seen**-0.5, -0.5 * seen**-1.5
+        seen = 1.0 + self._seen.of_corners(squares)
+        robust = [2.0 * (np.sqrt(seen) - 1.0), seen**-0.5, -0.5 * seen**-1.5]
+        loss[:, : len(seen)] = robust
         return loss
 
     def _residuals(self, parameters: np.ndarray) -> np.ndarray:
         """Return all residuals over their sigmas: of the corners in pictures, then of the biases."""
-        biases = parameters[FIRST_BIAS:]
-        expected_px = self._seen.project(parameters, self._motor_rad, self._cameras)
-        expected_px += self._seen.bias_px(biases, self._from_middle)
-        sigma_px = self._scatter_px[self._seen.camera][:, None]
-        over_sigma = (expected_px - self._seen.px) / sigma_px
-        return np.concatenate([over_sigma.ravel(), biases / self._prior])
-
-    def _of_cameras(self, fitted: OptimizeResult, covariance: np.ndarray) -> np.ndarray:
-        """Return what the cameras' uncertainty adds to the axis' covariance, (4, 4)."""
-        cameras = self._cameras
-        by_error_px = self._seen.by_errors(fitted.x, self._motor_rad, cameras, cameras.by_error)
-        sigma_px = self._scatter_px[self._seen.camera][:, None, :, None]
-        over_sigma = (by_error_px / sigma_px).reshape(self._seen.px.size, -1)
-        of_corners = fitted.jac[: self._seen.px.size]
-        axis_by_error = covariance[:4] @ of_corners.T @ over_sigma
-        return axis_by_error @ axis_by_error.T
+        of_corners = self._seen.residuals(
+            parameters, self._motor_rad, self._middle_rad, self._cameras, self._scatter_px
+        )
+        return np.concatenate([of_corners, parameters[FIRST_BIAS:] / self._prior])
 
 
 def _turning(sightings: Sequence[MarkerSighting], cameras: Cameras) -> Iterator[_Turning]:

@@ -59,7 +59,7 @@ def marker_turns(sightings: Sequence[MarkerSighting], cameras: Cameras) -> HubTu
     the fit does not converge.
     """
     fit = _TurnFit(sightings, cameras)
-    scatter_px = np.full(len(cameras), FIRST_SCATTER_PX)
+    scatter_px = np.full((len(cameras), 1), FIRST_SCATTER_PX)
     fitted = fit.solve(fit.start(), scatter_px)
     for _ in range(_PASSES):
         scatter_px = fit.scatter_px(fitted, scatter_px)
@@ -125,12 +125,12 @@ class _TurnFit:
         return fitted
 
     def scatter_px(self, fitted: OptimizeResult, used_px: np.ndarray) -> np.ndarray:
-        """Return the scatter (cameras,) of a corner's coordinates, px, by the residuals.
+        """Return the scatter (cameras, 1) of a corner's coordinates, px, by the residuals.
 
         The fit's parameters take up their share of it.
         """
         freedom = max(self.seen.px.size - len(fitted.x), 1)
-        residual = fitted.fun[: self.seen.px.size].reshape(self.seen.px.shape)
+        residual = self.seen.of_corners(fitted.fun).reshape(self.seen.px.shape)
         residual = residual * np.sqrt(self.seen.px.size / freedom)
         scatter = used_px.copy()
         for k in self.seen.cameras_with_pictures:
@@ -141,12 +141,10 @@ class _TurnFit:
         """Return the covariance of the parameters, with what the cameras' own errors add to it."""
         own = np.linalg.inv(fitted.jac.T @ fitted.jac)
         turn_rad = self.turns_rad(fitted.x)[self.frame]
-        by_error_px = self.seen.by_errors(fitted.x, turn_rad, self.cameras, self._camera_errors)
-        sigma_px = scatter_px[self.seen.camera][:, None, None, None]
-        over_sigma = (by_error_px / sigma_px).reshape(self.seen.px.size, -1)
-        of_corners = fitted.jac[: self.seen.px.size]
-        parameters_by_error = own @ of_corners.T @ over_sigma
-        return own + parameters_by_error @ parameters_by_error.T
+        by_error = self.seen.by_camera_errors(
+            fitted, turn_rad, self.cameras, scatter_px, self._camera_errors
+        )
+        return own + by_error @ by_error.T
 
     @cached_property
     def _camera_errors(self) -> np.ndarray:
@@ -163,13 +161,10 @@ class _TurnFit:
     def _residuals(self, parameters: np.ndarray, scatter_px: np.ndarray) -> np.ndarray:
         """Return all residuals over their sigmas: of the corners in pictures, then of the priors."""
         turn_rad = self.turns_rad(parameters)[self.frame]
-        biases = parameters[FIRST_BIAS : self.first_turn]
-        expected_px = self.seen.project(parameters, turn_rad, self.cameras)
-        expected_px += self.seen.bias_px(biases, turn_rad - self._middle_rad)
-        sigma_px = scatter_px[self.seen.camera][:, None, None]
-        over_sigma = (expected_px - self.seen.px) / sigma_px
-        of_priors = parameters[self._with_prior] / self._prior
-        return np.concatenate([over_sigma.ravel(), of_priors])
+        of_corners = self.seen.residuals(
+            parameters, turn_rad, self._middle_rad, self.cameras, scatter_px
+        )
+        return np.concatenate([of_corners, parameters[self._with_prior] / self._prior])
 
     def _jacobian(self, parameters: np.ndarray, scatter_px: np.ndarray) -> np.ndarray:
         """Return the derivatives of the residuals; of the turns all at once, each picture has one."""

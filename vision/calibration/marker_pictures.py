@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import OptimizeResult
 
 from vision.geometry.camera import Cameras
 from vision.geometry.centreline import rotation_z
@@ -117,23 +118,53 @@ class MarkerPictures:
             px[own] = cameras.cameras[k].project(points_mm[own])
         return px
 
-    def by_errors(
-        self, parameters: np.ndarray, turn_rad: np.ndarray, cameras: Cameras, errors: np.ndarray
+    def residuals(
+        self,
+        parameters: np.ndarray,
+        turn_rad: np.ndarray,
+        middle_rad: float,
+        cameras: Cameras,
+        scatter_px: np.ndarray,
     ) -> np.ndarray:
-        """Return by how much the corners (n, 4, 2, k) move with unit errors (15 cameras, k) of the
-        cameras, px.
+        """Return the corners as expected less those seen, over their scatter, (8 n,).
+
+        middle_rad: of the motion, from which on biases change. scatter_px (cameras, 1 or 2): of
+        corners along x and y.
         """
-        here = self.project(parameters, turn_rad, cameras)
-        by_error = np.zeros((*here.shape, errors.shape[1]))
+        expected_px = self.project(parameters, turn_rad, cameras)
+        expected_px += self._bias_px(parameters, turn_rad - middle_rad, cameras)
+        sigma_px = scatter_px[self.camera][:, None]
+        return ((expected_px - self.px) / sigma_px).ravel()
+
+    def of_corners(self, values: np.ndarray) -> np.ndarray:
+        """Return what of a fit's residuals, or of their derivatives, belongs to corners, (8 n, …)."""
+        return values[: self.px.size]
+
+    def by_camera_errors(
+        self,
+        fitted: OptimizeResult,
+        turn_rad: np.ndarray,
+        cameras: Cameras,
+        scatter_px: np.ndarray,
+        errors: np.ndarray,
+    ) -> np.ndarray:
+        """Return by how much a fit's parameters move (p, k) with unit errors (15 cameras, k) of the
+        cameras.
+        """
+        here = self.project(fitted.x, turn_rad, cameras)
+        by_error_px = np.zeros((*here.shape, errors.shape[1]))
         for k, error in enumerate(errors.T):
-            by_error[..., k] = self.project(parameters, turn_rad, cameras.moved(error)) - here
-        return by_error
+            by_error_px[..., k] = self.project(fitted.x, turn_rad, cameras.moved(error)) - here
+        sigma_px = scatter_px[self.camera][:, None, :, None]
+        over_sigma = (by_error_px / sigma_px).reshape(self.px.size, -1)
+        by_parameters = self.of_corners(fitted.jac)
+        return np.linalg.solve(fitted.jac.T @ fitted.jac, by_parameters.T @ over_sigma)
 
-    def bias_px(self, biases: np.ndarray, from_middle_rad: np.ndarray) -> np.ndarray:
-        """Return the biases (n, 4, 2) of the corners, by the parameters (16 cameras,) of all cameras.
-
-        from_middle_rad (n,): turns from the middle of the motion.
-        """
+    def _bias_px(
+        self, parameters: np.ndarray, from_middle_rad: np.ndarray, cameras: Cameras
+    ) -> np.ndarray:
+        """Return the biases (n, 4, 2) of the corners; from_middle_rad (n,): turns from the middle."""
+        biases = parameters[FIRST_BIAS : FIRST_BIAS + BIASES * len(cameras)]
         constant_px, drift_px_rad = biases.reshape(2, -1, 4, 2)
         drift_px = drift_px_rad[self.camera] * from_middle_rad[:, None, None]
         return constant_px[self.camera] + drift_px
