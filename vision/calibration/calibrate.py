@@ -143,12 +143,7 @@ def calibrate_cameras(
     standing = standing_boards(views, board) if on_rig else None
     lens_notes = _check_own_lenses(alone, standing, views, board)
     joint = JointInput(alone, standing, board, on_rig, views.times_s, triggered, crops).adjust()
-    adjustment, notes = _with_warp(joint.layout, joint.adjustment, board)
-    _check_adjustment(alone, adjustment, triggered)
-    notes += _point_notes(adjustment)
-    adjustment, shared_notes = with_shared_errors(adjustment, board, list(alone))
-    if joint.timing is not None:
-        notes.append(timing_note(alone, joint.timing))
+    adjustment, notes = _finished(joint, alone, board, triggered)
     stretch_notes, warnings = _stretch_lines(adjustment, board)
     cameras = _place(as_cameras(alone, views.sizes_px, adjustment), on_rig)
     reports = _checked_reports(cameras, alone, crops, adjustment, board, views.pixel_aspects)
@@ -156,7 +151,7 @@ def calibrate_cameras(
     return Calibration(
         cameras=cameras,
         report=reports,
-        notes=(*joint.notes, *lens_notes, *notes, *stretch_notes, *shared_notes),
+        notes=(*joint.notes, *lens_notes, *notes, *stretch_notes),
         timing=joint.timing,
         board=adjustment.solution.state.board,
         board_covariance=_board_covariance(adjustment),
@@ -165,6 +160,22 @@ def calibrate_cameras(
         together=joint.layout.trajectory is not None,
         warnings=(*_disagreement(joint), *warnings, *_squashed(cameras, views.pixel_aspects)),
     )
+
+
+def _finished(
+    joint: JointAdjustment, alone: Mapping[str, Alone], board: Board, triggered: bool
+) -> tuple[Adjustment, list[str]]:
+    """Return the adjustment with all that is learnt from its residuals, and notes on it.
+
+    triggered: as of `calibrate_cameras`. Raises Refused as `_check_adjustment`.
+    """
+    adjustment, notes = _with_warp(joint.layout, joint.adjustment, board)
+    _check_adjustment(alone, adjustment, triggered)
+    notes += _point_notes(adjustment)
+    if joint.timing is not None:
+        notes.append(timing_note(alone, joint.timing))
+    adjustment, shared_notes = with_shared_errors(adjustment, board, list(alone))
+    return adjustment, [*notes, *shared_notes]
 
 
 def _disagreement(joint: JointAdjustment) -> Iterator[Reason]:

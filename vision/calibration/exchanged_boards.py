@@ -7,6 +7,7 @@ principal point or distortion is another's leaves residuals that no pose of it t
 
 from collections.abc import Mapping
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -41,15 +42,15 @@ def check_own_lenses(
     it as these pictures do. Raises Refused, naming the cameras, where other lenses explain the
     pictures of two or more cameras clearly better than their own.
     """
-    names = list(cameras)
     lenses = {name: alone.lens for name, alone in cameras.items()}
     residual_px = lens_residuals_px(lenses, standing, board)
-    better = _better_lenses(residual_px)
-    if better:
-        exchanged = [names[k] for k in better]
-        found = [_fit_by_both(names, residual_px, *pair) for pair in better.items()]
-        raise Refused(_exchanged(exchanged, found, same_in_trials), "boards_exchanged")
-    return _notes_on_alike(names, residual_px)
+    folders = {name: f"boards/{name}" for name in cameras}
+    exchange = _exchange(residual_px, folders)
+    if exchange is not None:
+        pictures = "" if same_in_trials else ", or their pictures in boards/rig,"
+        found = f"{exchange.whose}{pictures} are exchanged: {exchange.fits}"
+        raise Refused(f"{found}: give each camera its own", "boards_exchanged")
+    return _notes_on_alike(list(folders.values()), residual_px)
 
 
 def check_imported_lenses(cameras: Cameras, standing: Mapping[str, Corners], board: Board) -> None:
@@ -58,17 +59,37 @@ def check_imported_lenses(cameras: Cameras, standing: Mapping[str, Corners], boa
     standing: the board on the rig in each camera.
     """
     lenses = {camera.name: camera.lens for camera in cameras}
-    names = list(lenses)
     residual_px = lens_residuals_px(lenses, standing, board)
+    exchange = _exchange(residual_px, {name: name for name in lenses})
+    if exchange is not None:
+        found = f"the lenses of {exchange.whose} are exchanged: {exchange.fits}"
+        raise Refused(found, "boards_exchanged")
+
+
+class _Exchange(NamedTuple):
+    """Whose lenses are exchanged, and how well pictures are fitted by them: parts of sentences."""
+
+    whose: str
+    fits: str
+
+
+def _exchange(residual_px: np.ndarray, lenses: Mapping[str, str]) -> _Exchange | None:
+    """Return which cameras' lenses are exchanged; None where none are.
+
+    residual_px (C, C): of each camera's view by each lens. lenses: what each camera's is called.
+    """
+    names = list(lenses)
+    called = list(lenses.values())
     better = _better_lenses(residual_px)
-    if better:
-        exchanged = " and ".join(names[k] for k in better)
-        k, other = next(iter(better.items()))
-        found = (
-            f"camera {names[k]}'s picture of the board on the rig by the lens of {names[other]} to "
-            f"{residual_px[k, other]:.3f} px, by its own to {residual_px[k, k]:.3f} px"
+    if not better:
+        return None
+    fits = []
+    for own, other in better.items():
+        fits.append(
+            f"camera {names[own]}'s picture of the board on the rig by the lens of {called[other]} "
+            f"to {residual_px[own, other]:.3f} px, by that of {called[own]} to {residual_px[own, own]:.3f} px"
         )
-        raise Refused(f"the lenses of {exchanged} are exchanged: {found}", "boards_exchanged")
+    return _Exchange(" and ".join(called[k] for k in better), "; ".join(fits))
 
 
 def _better_lenses(residual_px: np.ndarray) -> dict[int, int]:
@@ -82,28 +103,17 @@ def _better_lenses(residual_px: np.ndarray) -> dict[int, int]:
     return dict(zip(own[moved], best[moved])) if np.all(is_clear[moved]) else {}
 
 
-def _fit_by_both(names: list[str], residual_px: np.ndarray, own: int, other: int) -> str:
-    """Return how well another camera's lens and its own explain a camera's picture.
-
-    residual_px (C, C): of each camera's view by each lens.
-    """
-    return (
-        f"camera {names[own]}'s picture of the board on the rig by the lens of boards/{names[other]} "
-        f"to {residual_px[own, other]:.3f} px, by that of boards/{names[own]} to {residual_px[own, own]:.3f} px"
-    )
-
-
-def _notes_on_alike(names: list[str], residual_px: np.ndarray) -> list[str]:
+def _notes_on_alike(folders: list[str], residual_px: np.ndarray) -> list[str]:
     """Return a note on each pair of cameras whose lenses explain each other's picture as well.
 
-    residual_px (C, C): of each camera's view by each lens.
+    folders: of the cameras' boards. residual_px (C, C): of each camera's view by each lens.
     """
     notes = []
-    for a, b in combinations(range(len(names)), 2):
+    for a, b in combinations(range(len(folders)), 2):
         if _are_alike(residual_px[np.ix_([a, b], [a, b])]):
             notes.append(
-                f"The board on the rig does not tell whether boards/{names[a]} and boards/{names[b]} are "
-                "exchanged: the two lenses are too much alike."
+                f"The board on the rig does not tell whether {folders[a]} and {folders[b]} are exchanged: "
+                "the two lenses are too much alike."
             )
     return notes
 
@@ -121,13 +131,6 @@ def lens_residuals_px(
         for column, lens in enumerate(lenses.values()):
             residual_px[row, column] = _residual_px(lens, standing[name], board)
     return residual_px
-
-
-def _exchanged(names: list[str], found: list[str], same_in_trials: bool) -> str:
-    """Return the sentence on exchanged boards."""
-    folders = " and ".join(f"boards/{name}" for name in names)
-    pictures = "" if same_in_trials else ", or their pictures in boards/rig,"
-    return f"{folders}{pictures} are exchanged: {'; '.join(found)}: give each camera its own"
 
 
 def _are_alike(residual_px: np.ndarray) -> bool:

@@ -73,11 +73,11 @@ def _bar_sigmas_px(known: KnownWhisk, pictures: Sequence[CameraPictures]) -> dic
     place = known.place
     views = [own.view(dict.fromkeys(place.curves, own.with_bar)) for own in pictures]
     wires_px = place.wires_px(views)
-    lines = _bar_middles(known, views, wires_px, _USUAL)
+    lines = _bar_middles(known, views, wires_px)
     edges = {}
     if _needs_edges(known, views, lines):
         shown = [view for view in views if view.camera.name in lines]
-        edges = _bar_edges(known, shown, wires_px, _USUAL)
+        edges = _bar_edges(known, shown, wires_px)
     found = {}
     for name in wires_px:
         points = edges.get(name) or {}  # by side of the bar
@@ -102,29 +102,23 @@ def _needs_edges(
 
 
 def _bar_edges(
-    known: KnownWhisk,
-    views: Sequence[View],
-    wires_px: Mapping[str, Sequence[np.ndarray]],
-    settings: VisionSettings,
+    known: KnownWhisk, views: Sequence[View], wires_px: Mapping[str, Sequence[np.ndarray]]
 ) -> dict[str, dict[int, LinePoints] | None]:
     """Return by camera and side of the bar the points of its edges, None where they do not show."""
     radius_mm = known.rods.bar.radius_mm
     edges = {}
     for view in views:
         name = view.camera.name
-        edges[name] = measure_edges(view, known.axis, radius_mm, wires_px[name], settings)
+        edges[name] = measure_edges(view, known.axis, radius_mm, wires_px[name], _USUAL)
     return edges
 
 
 def _bar_middles(
-    known: KnownWhisk,
-    views: Sequence[View],
-    wires_px: Mapping[str, Sequence[np.ndarray]],
-    settings: VisionSettings,
+    known: KnownWhisk, views: Sequence[View], wires_px: Mapping[str, Sequence[np.ndarray]]
 ) -> dict[str, BarLineEstimate]:
     """Return by camera the middle of the bar, of cameras that show its edges."""
     try:
-        lines = measure_bars(views, known.axis, known.rods.bar.radius_mm, wires_px, settings)
+        lines = measure_bars(views, known.axis, known.rods.bar.radius_mm, wires_px, _USUAL)
     except Refused:
         return {}
     return {name: line for name, line in lines.items() if line.has_edges}
