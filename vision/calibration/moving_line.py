@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
+from vision.geometry.grouped import group_means
 from vision.geometry.planes import fit_plane, meet_planes, nearest_along_mm
 from vision.geometry.rows import Rows
 from vision.geometry.sampling import spread
@@ -169,11 +170,8 @@ def _middles_along(px: np.ndarray, angle_rad: float, offset_px: float) -> np.nda
     normal = np.array([np.cos(angle_rad), np.sin(angle_rad)])
     near = px[np.abs(px @ normal - offset_px) < _NEAR_PX]
     along = near @ np.array([-normal[1], normal[0]])
-    step = np.round(along / HALF).astype(int)
-    step -= step.min(initial=0)
-    count = np.bincount(step)
-    sums = np.column_stack([np.bincount(step, column) for column in near.T])
-    return sums[count > 0] / count[count > 0, None]
+    _, step = np.unique(np.round(along / HALF), return_inverse=True)
+    return group_means(step, near)
 
 
 def _intersection(planes: Sequence[_Plane]) -> tuple[np.ndarray, np.ndarray] | None:

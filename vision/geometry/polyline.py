@@ -31,6 +31,15 @@ def normals(curve_px: np.ndarray) -> np.ndarray:
     return unit(np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1))
 
 
+def beside_nodes(from_node: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far points (n, 2), from the nodes of a curve, are across it, to the right, and along it.
+
+    normal (n, 2): of the curve at the nodes.
+    """
+    across = np.sum(from_node * normal, axis=-1)
+    return across, np.sum(from_node * tangents_by(normal), axis=-1)
+
+
 def tangents_by(normal: np.ndarray) -> np.ndarray:
     """Return the tangents (..., 2) of curves with these normals (..., 2)."""
     return np.stack([normal[..., 1], -normal[..., 0]], axis=-1)

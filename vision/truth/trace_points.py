@@ -8,7 +8,8 @@ import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
-from vision.geometry.polyline import lengths_px, normals, tangents_by
+from vision.geometry.grouped import group_means
+from vision.geometry.polyline import beside_nodes, lengths_px, normals, tangents_by
 from vision.geometry.rotation import unit
 from vision.geometry.rows import Rows
 from vision.pictures.pyramid import shrunk_px
@@ -78,18 +79,16 @@ def beside_wire(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> B
 def beside_curve(trace: Trace, curve_px: np.ndarray, arc_mm: np.ndarray) -> BesideWire:
     """Return how far points of one frame are off a curve of nodes (m, 2) px at arcs (m,) mm."""
     node = _nearest_nodes(trace.px, curve_px)
-    from_node = trace.px - curve_px[node]
-    normal = normals(curve_px)  # (m, 2)
-    tangent = tangents_by(normal)
-    on_px = np.sum(from_node * tangent[node], axis=1)
+    normal = normals(curve_px)[node]
+    offset_px, on_px = beside_nodes(trace.px - curve_px[node], normal)
     step_px = np.linalg.norm(np.gradient(curve_px, axis=0), axis=1)
     found = BesideWire(
         frame=trace.frame,
         line=trace.line,
         place_mm=arc_mm[node] + on_px * _NODE_MM / step_px[node],
-        offset_px=np.sum(from_node * normal[node], axis=1),
-        foot_px=curve_px[node] + on_px[:, None] * tangent[node],
-        normal=normal[node],
+        offset_px=offset_px,
+        foot_px=curve_px[node] + on_px[:, None] * tangents_by(normal),
+        normal=normal,
         along_px=lengths_px(curve_px)[node] + on_px,
         sigma_px=trace.sigma_px,
     )
@@ -149,11 +148,13 @@ def averaged(beside: BesideWire, segment_px: float) -> BesideWire:
     Points are taken to err independently of each other where their sigma is stated.
     """
     segment = np.floor(beside.along_px / segment_px).astype(int)
-    groups, member = np.unique(np.stack([beside.frame, segment]), axis=1, return_inverse=True)
-    mean = partial(_mean_by, member.ravel())
+    frame_and_segment = np.stack([beside.frame, segment])
+    groups, member = np.unique(frame_and_segment, axis=1, return_inverse=True)
+    member = member.ravel()  # NumPy 2.0 returns it as a row
+    mean = partial(group_means, member)
     line = np.zeros(groups.shape[1], dtype=int)
-    line[member.ravel()] = beside.line
-    count = np.bincount(member.ravel())
+    line[member] = beside.line
+    count = np.bincount(member)
     return BesideWire(
         frame=groups[0],
         line=line,
@@ -164,11 +165,3 @@ def averaged(beside: BesideWire, segment_px: float) -> BesideWire:
         along_px=mean(beside.along_px),
         sigma_px=np.sqrt(mean(beside.sigma_px**2) / count),
     )
-
-
-def _mean_by(member: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the mean (k, …) over each group of values (n, …), of which member (n,) is the group's number."""
-    count = np.bincount(member)
-    total = np.zeros((len(count), *values.shape[1:]))
-    np.add.at(total, member, values)
-    return (total.T / count).T

@@ -7,6 +7,7 @@ softer: the steepest place on each side says how wide the object is.
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from vision.geometry.grouped import group_means
 from vision.wire.bands import Pieces
 
 # [px] Bins of the profile across. Derived.
@@ -88,8 +89,8 @@ def _slope_of_profile(bins: np.ndarray, place: np.ndarray, grey: np.ndarray) -> 
 
 def _mean_of_bins(place: np.ndarray, grey: np.ndarray) -> np.ndarray:
     """Return for each pixel (n,) the mean grey level of those in its bin."""
-    bins = np.unique(np.rint(place), return_inverse=True)[1]
-    return (np.bincount(bins, grey) / np.bincount(bins))[bins]
+    _, bins = np.unique(np.rint(place), return_inverse=True)
+    return group_means(bins, grey)[bins]
 
 
 def _peak(offset_px: np.ndarray, values: np.ndarray, best: int) -> float:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vision.geometry.polyline import at_lengths, lengths_px, normals, tangents_by
+from vision.geometry.polyline import at_lengths, beside_nodes, lengths_px, normals
 from vision.geometry.robust import robust_sigma
 from vision.geometry.rotation import unit
 from vision.pictures.pixel_noise import Noise
@@ -121,10 +121,7 @@ def _pixels_near(grey: np.ndarray, curve: Curve, margin_px: float) -> _Pixels:
     """Return the pixels whose foot is on a curve, within margin_px of the object's edge there."""
     widest_px = float(np.max(curve.radius_px)) + margin_px
     px, node = _nearest_nodes(grey.shape, curve, widest_px)
-    from_node = px - curve.px[node]
-    normal = curve.normals[node]
-    offset_px = np.sum(from_node * normal, axis=1)
-    past_node_px = np.sum(from_node * tangents_by(normal), axis=1)
+    offset_px, past_node_px = beside_nodes(px - curve.px[node], curve.normals[node])
     place_px = curve.arc_px[node] + past_node_px
     is_near = (place_px >= 0.0) & (place_px <= curve.length_px)
     is_near &= np.abs(offset_px) <= curve.radius_px[node] + margin_px
