@@ -291,6 +291,7 @@ def _refined(record: _Record, slowest_Hz: float, start: np.ndarray, free: int) -
     high = np.log([0.5 / record.step_s, _DAMPING[1], _MAINS_HZ[1]])[:free]
 
     def residuals(logarithms: np.ndarray) -> np.ndarray:
+        """Return what is left of the moments at these logarithms; the others stay at their start."""
         frequency_Hz, damping, mains_Hz = np.exp([*logarithms, *start[free:]])
         return record.residuals(frequency_Hz, damping, mains_Hz)
 

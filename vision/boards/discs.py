@@ -96,12 +96,13 @@ def _edge_difference(windows: DiscWindows, p: np.ndarray, column: int) -> np.nda
 
 def predict_discs(windows: DiscWindows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Predict the grey (n, k) by the parameters p (n, 10), with its Jacobian (n, 10, k)."""
-    J = np.empty((len(p), 10, windows.offset.shape[2]))
-    offset = windows.offset - p[:, PLACE, None]
+    offset = windows.offset - p[:, PLACE, None]  # (n, 2, k) px from the centre
+    J = np.empty((len(p), 10, offset.shape[2]))
     J[:, CONTRAST] = _edge(windows, p)
     contrast = p[:, CONTRAST, None]
     for column in range(*_CURVED.indices(10)):
-        J[:, column] = contrast * _edge_difference(windows, p, column) / (2.0 * _STEP)
+        by_column = _edge_difference(windows, p, column) / (2.0 * _STEP)
+        J[:, column] = contrast * by_column
     return in_light(offset, p, J), J
 
 

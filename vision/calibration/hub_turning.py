@@ -103,10 +103,13 @@ def _heights_mm(points: np.ndarray, directions: np.ndarray) -> np.ndarray:
 def _outward_lines(lines: MovingLines, T_world_axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return points, mm, and directions (n, 3) of lines in the axis's frame, directions away from the axis."""
     T_axis_world = invert_transform(T_world_axis)
+    R = T_axis_world[:, :3]
     points = apply(T_axis_world, lines.point_mm)
-    directions = lines.direction @ T_axis_world[:, :3].T
-    outward = np.sum(points[:, :2] * directions[:, :2], axis=1)  # mm, across the axis
-    return points, np.where(outward[:, None] >= 0, directions, -directions)
+    directions = lines.direction @ R.T
+    across_axis = directions[:, :2]
+    outward_mm = np.sum(points[:, :2] * across_axis, axis=1)
+    is_outward = outward_mm[:, None] >= 0
+    return points, np.where(is_outward, directions, -directions)
 
 
 def _is_near_axis(points_mm: np.ndarray, directions: np.ndarray) -> np.ndarray:

@@ -162,8 +162,10 @@ class _LinesOff:
         determined, directions = _determined_directions(own)
         gain = fit.inverse_normal[off] @ fit.weighted.jacobian.T  # (4, n)
         rows = -gain / sigma_px[:, None]
-        rows[np.arange(len(off)), problem.prior_rows.start + off] += 1.0
-        in_sigmas = (fit.state.vector[off] - gain @ fit.weighted.residual) / sigma_px
+        own_priors = problem.prior_rows.start + off
+        rows[np.arange(len(off)), own_priors] += 1.0
+        fitted_px = fit.state.vector[off] - gain @ fit.weighted.residual
+        in_sigmas = fitted_px / sigma_px
         covariance = fit.spread(directions.T @ rows)
         px_per_value = sigma_px[:, None] * directions / determined
         return cls(directions, directions.T @ in_sigmas, covariance, px_per_value)

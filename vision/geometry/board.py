@@ -93,9 +93,13 @@ class Board(ABC):
         """Return the ids of points that are neighbours in a row or a column of a face, (p, 2)."""
         columns, rows = self.grid
         ids = np.arange(columns * rows).reshape(rows, columns)
-        in_rows = np.stack([ids[:, :-1], ids[:, 1:]], axis=-1)
-        in_columns = np.stack([ids[:-1], ids[1:]], axis=-1)
-        return np.concatenate([in_rows.reshape(-1, 2), in_columns.reshape(-1, 2)])
+        left = ids[:, :-1].ravel()
+        right = ids[:, 1:].ravel()
+        upper = ids[:-1].ravel()
+        lower = ids[1:].ravel()
+        in_rows = np.column_stack([left, right])
+        in_columns = np.column_stack([upper, lower])
+        return np.concatenate([in_rows, in_columns])
 
     @property
     def hidden_turns(self) -> tuple[np.ndarray, ...]:

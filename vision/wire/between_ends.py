@@ -342,8 +342,9 @@ def _spline_knots(curve: Curve, place_px: np.ndarray) -> np.ndarray:
     last = float(place_px[-1])
     most = max(len(place_px) // 3 - 1, 1)
     count = int(np.clip((last - first) / _knot_distance_px(curve), 1, most))
-    inner = np.quantile(place_px, np.linspace(0.0, 1.0, count + 1)[1:-1])
-    return np.concatenate([[first] * 4, inner, [last] * 4])
+    shares = np.linspace(0.0, 1.0, count + 1)
+    inner = np.quantile(place_px, shares[1:-1])
+    return np.concatenate([[first] * 4, inner, [last] * 4])  # a cubic's ends count four times
 
 
 def _knot_distance_px(curve: Curve) -> float:

@@ -23,10 +23,11 @@ class PixelTable:
         """Return the table of pixels (n,) in `count` segments, by the segment and offset of each."""
         order = np.lexsort((offset_px, segment))
         own = np.bincount(segment, minlength=count)  # pixels of each segment
-        most = own.max()
-        column = np.arange(len(order)) - np.repeat(np.cumsum(own) - own, own)
-        column += np.repeat((most - own) // 2, own)
-        return PixelTable(order, segment[order], column, (count, max(int(most), 1)))
+        most = int(own.max())
+        first = np.cumsum(own) - own  # in that order, of each segment
+        indent = (most - own) // 2  # of a short row
+        column = np.arange(len(order)) + np.repeat(indent - first, own)
+        return PixelTable(order, segment[order], column, (count, max(most, 1)))
 
     def filled(self, values: np.ndarray) -> np.ndarray:
         """Return the table of values (n,), 0 where no pixel stands."""

@@ -123,10 +123,12 @@ def _pixels_near(grey: np.ndarray, curve: Curve, margin_px: float) -> _Pixels:
     px, node = _nearest_nodes(grey.shape, curve, widest_px)
     offset_px, past_node_px = beside_nodes(px - curve.px[node], curve.normals[node])
     place_px = curve.arc_px[node] + past_node_px
-    is_near = (place_px >= 0.0) & (place_px <= curve.length_px)
-    is_near &= np.abs(offset_px) <= curve.radius_px[node] + margin_px
+    reach_px = curve.radius_px[node] + margin_px
+    is_beside = (place_px >= 0.0) & (place_px <= curve.length_px)
+    is_near = is_beside & (np.abs(offset_px) <= reach_px)
     column, row = px[is_near].T
-    return _Pixels(offset_px[is_near], place_px[is_near], grey[row, column].astype(float))
+    seen = grey[row, column].astype(float)
+    return _Pixels(offset_px[is_near], place_px[is_near], seen)
 
 
 def _nearest_nodes(
