@@ -30,7 +30,7 @@ from vision.calibration.adjust import adjust_bundle
 from vision.calibration.calibrate import Calibration, calibrate_cameras
 from vision.calibration.held_out import camera_alone, check_held_out
 from vision.calibration.layout import lay_out
-from vision.calibration.tied import pose_priors
+from vision.calibration.priors import pose_priors
 from vision.calibration.views import BoardViews
 from vision.geometry.rotation import apply, exp_rotation, log_rotation
 from vision.pictures.frames import Frames

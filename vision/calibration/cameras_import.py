@@ -5,7 +5,6 @@ picture of the board on the rig places them (`place_on_rig`).
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,17 +19,15 @@ from vision.calibration import (
     format_opencv,
     format_toml,
 )
-from vision.calibration.bundle import N_CAMERA, BundleState, Priors
+from vision.calibration.bundle import BundleState
 from vision.calibration.calibrate import as_cameras
 from vision.calibration.corner_noise import adjust_with_noise
 from vision.calibration.exchanged_boards import check_imported_lenses
-from vision.calibration.first_guess import board_pose
-from vision.calibration.layout import gather
-from vision.calibration.tied import lens_priors, with_print
+from vision.calibration.layout import gather, place_before_rig
+from vision.calibration.priors import camera_pose_priors, with_print
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
-from vision.geometry.rotation import compose, invert_transform
 
 Read = Callable[[Path], list[Camera]]
 Write = Callable[[Cameras, str], dict[str, bytes]]
@@ -121,33 +118,13 @@ def place_on_rig(
         raise Refused(
             "a body of several faces places no cameras of known lenses: calibrate with it, or take a board"
         )
-    T_board_rig = invert_transform(T_rig_board)
-    lenses = []
-    poses = []
-    shots = []
-    for k, camera in enumerate(cameras):
-        view = rig_views.get(camera.name)
-        check_rig_view(camera.name, view, board)
-        T_camera_board = board_pose(view, board.corners_mm, camera.lens)
-        lenses.append(camera.lens)
-        poses.append(compose(T_camera_board, T_board_rig))
-        shots.append((k, 0, view))
-    check_imported_lenses(cameras, rig_views, board)
-    state = BundleState(np.array(lenses), np.array(poses), np.asarray(T_rig_board)[None])
-    priors = with_print(_camera_pose_priors(len(cameras), board), board)
+    for name in cameras.names:
+        check_rig_view(name, rig_views.get(name), board)
+    lenses = {camera.name: camera.lens for camera in cameras}
+    poses = place_before_rig(lenses, rig_views, board, T_rig_board)
+    check_imported_lenses(lenses, rig_views, board)
+    state = BundleState(np.array(list(lenses.values())), poses, np.asarray(T_rig_board)[None])
+    shots = [(k, 0, rig_views[name]) for k, name in enumerate(lenses)]
+    priors = with_print(camera_pose_priors(len(cameras), board), board)
     adjustment = adjust_with_noise(state, gather(shots), board, priors)
     return as_cameras(cameras.names, {c.name: c.size_px for c in cameras}, adjustment)
-
-
-def _camera_pose_priors(n_cameras: int, board: Board) -> Priors:
-    """Return the priors with the cameras' poses free, and lenses and board held."""
-    priors = lens_priors(n_cameras, 1, board)
-    free = np.zeros_like(priors.free)
-    for k in range(n_cameras):
-        free[N_CAMERA * k + 9 : N_CAMERA * k + 15] = True
-    return replace(
-        priors,
-        free=free,
-        sigma=np.full_like(priors.sigma, np.inf),
-        view_free=np.zeros(1, dtype=bool),
-    )

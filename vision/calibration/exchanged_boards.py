@@ -17,9 +17,8 @@ from vision.calibration.adjust import adjust_bundle
 from vision.calibration.bundle import BundleState
 from vision.calibration.first_guess import board_pose
 from vision.calibration.layout import Alone, gather
-from vision.calibration.tied import pose_priors
+from vision.calibration.priors import pose_priors
 from vision.geometry.board import Board
-from vision.geometry.camera import Cameras
 from vision.geometry.refusals import Refused
 
 # [1] Residuals by the camera's own lens over those by another's, in each picture. What is wrong with
@@ -53,12 +52,13 @@ def check_own_lenses(
     return _notes_on_alike(list(folders.values()), residual_px)
 
 
-def check_imported_lenses(cameras: Cameras, standing: Mapping[str, Corners], board: Board) -> None:
+def check_imported_lenses(
+    lenses: Mapping[str, np.ndarray], standing: Mapping[str, Corners], board: Board
+) -> None:
     """Raise Refused, naming the cameras, where the lenses of a file are exchanged.
 
-    standing: the board on the rig in each camera.
+    lenses: of each camera, (9,). standing: the board on the rig in each.
     """
-    lenses = {camera.name: camera.lens for camera in cameras}
     residual_px = lens_residuals_px(lenses, standing, board)
     exchange = _exchange(residual_px, {name: name for name in lenses})
     if exchange is not None:

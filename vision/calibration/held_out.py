@@ -23,7 +23,7 @@ from vision.calibration.bundle import BundleState, Priors, predict
 from vision.calibration.calibrate import Calibration
 from vision.calibration.first_guess import board_pose, with_pose
 from vision.calibration.layout import Alone, Layout, lay_out
-from vision.calibration.tied import pose_priors
+from vision.calibration.priors import pose_priors
 from vision.geometry.board import Board
 from vision.geometry.camera import Camera
 from vision.geometry.triangulate import triangulate

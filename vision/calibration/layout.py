@@ -207,12 +207,8 @@ def place_cameras(
     where cameras cannot be placed relative to each other.
     """
     if standing is not None:
-        T_board_rig = invert_transform(T_rig_board)
-        T_camera_rig = []
-        for name, alone in cameras.items():
-            T_camera_board = board_pose(standing[name], board.corners_mm, alone.lens)
-            T_camera_rig.append(compose(T_camera_board, T_board_rig))
-        return np.array(T_camera_rig)
+        lenses = {name: alone.lens for name, alone in cameras.items()}
+        return place_before_rig(lenses, standing, board, T_rig_board)
     if len(cameras) > 1 and not together:
         raise Refused(
             "no picture shows the board on the rig, nor do the cameras see it at once in views of one number, so "
@@ -220,6 +216,21 @@ def place_cameras(
         )
     chained = chain_cameras({name: alone.poses for name, alone in cameras.items()})
     return np.array([chained[name] for name in cameras])
+
+
+def place_before_rig(
+    lenses: Mapping[str, np.ndarray],
+    standing: Mapping[str, Corners],
+    board: Board,
+    T_rig_board: np.ndarray,
+) -> np.ndarray:
+    """Return T_camera_rig (C, 3, 4) of cameras by their lenses (9,), each by the board on the rig."""
+    T_board_rig = invert_transform(T_rig_board)
+    poses = []
+    for name, lens in lenses.items():
+        T_camera_board = board_pose(standing[name], board.corners_mm, lens)
+        poses.append(compose(T_camera_board, T_board_rig))
+    return np.array(poses)
 
 
 def gather(

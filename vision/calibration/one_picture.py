@@ -10,7 +10,7 @@ from vision.calibration.bundle import N_CAMERA, POSE, BundleState, SharedLenses
 from vision.calibration.corner_noise import Adjustment, adjust_coarse
 from vision.calibration.first_guess import board_pose, first_lens
 from vision.calibration.layout import gather
-from vision.calibration.tied import lens_priors
+from vision.calibration.priors import lens_priors
 from vision.geometry.board import Board
 from vision.geometry.crop import Crop
 

@@ -13,38 +13,20 @@ import numpy as np
 
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import MOST_ERROR_PX
-from vision.calibration.board_motion import Trajectory
-from vision.calibration.bundle import (
-    CAMERA_COLUMNS,
-    CLOCK,
-    N_BOARD,
-    N_CAMERA,
-    POSE,
-    BundleState,
-    Priors,
-    SharedLenses,
-)
+from vision.calibration.bundle import BundleState, Priors, SharedLenses
 from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
 from vision.calibration.instants_help import TURNS, Comparison, residuals_by_view
 from vision.calibration.layout import Alone, Layout, lay_out, place_cameras, saw_board_at_once
+from vision.calibration.priors import allow_lateness, joint_priors, pose_priors
 from vision.calibration.views import MeasuredPose
 from vision.geometry.board import Board
 from vision.geometry.crop import Crop
 from vision.geometry.refusals import Refused
 
-# One sigma about zero of the distortion terms, for lenses of 3 to 100 mm; wider than any that is not a
-# fisheye.
-LENS_PRIOR = {"k1": 0.5, "k2": 0.5, "p1": 0.005, "p2": 0.005, "k3": 0.3}
 # [1] Cameras that share views were not triggered together where they agree this many times worse
 # than each with itself. Origin not known; webcams without a trigger disagree by several times.
 # Study: cameras.py.
 _DISAGREE = 1.5
-# [frame intervals] A prior: twice 1/√12, that of cameras that start at random within an interval.
-# Derived. Study: cameras.py.
-_CLOCK_SIGMA = 0.6
-# [frame intervals] Where the fit of instants starts; learnt anew from the residuals. Study:
-# cameras.py.
-_FIRST_LATENESS = 0.2
 # [px] Where the fit of instants starts; learnt anew. Study: cameras.py.
 _FIRST_EXCESS_PX = 0.1
 # [rounds] Of learning the noise anew where models are compared, whose difference it does not turn:
@@ -198,7 +180,7 @@ class JointInput:
 
     def _priors_of(self, layout: Layout) -> Priors:
         """Return the priors of all views."""
-        return _priors(layout.first, self.board, self.on_rig, SharedLenses.of(self.crops))
+        return joint_priors(layout.first, self.board, self.on_rig, SharedLenses.of(self.crops))
 
     def _at_once(self, layout: Layout, rounds: int | None = None) -> Adjustment:
         """Adjust all cameras with the pictures of a view as of one instant.
@@ -280,76 +262,3 @@ def timing_note(names: Sequence[str], timing: Timing) -> str:
         "Pictures of one view were not taken at one instant: later than the view by "
         f"{', '.join(late)} (below 0: earlier); taken into account, for {timing.held_out}."
     )
-
-
-def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
-    """Return the priors with clocks and pictures' instants free, and the board's points held; the
-    clock of the camera that ranks first is held, too.
-    """
-    free = priors.free.copy()
-    sigma = priors.sigma.copy()
-    clocks = CLOCK + N_CAMERA * np.arange(len(trajectory.camera_rank))
-    clock_of = priors.shared.first
-    is_own = clock_of == np.arange(len(clocks))
-    is_late = clock_of != clock_of[np.argmin(trajectory.camera_rank)]
-    free[clocks[is_own & is_late]] = True
-    sigma[clocks[is_own]] = _CLOCK_SIGMA * trajectory.interval_s
-    late_s = np.full(len(clocks), _FIRST_LATENESS * trajectory.interval_s)
-    return replace(priors, free=free, sigma=sigma, late_sigma_s=late_s, point_sigma_mm=0.0)
-
-
-def lens_priors(
-    n_cameras: int, n_views: int, board: Board, shared: SharedLenses | None = None
-) -> Priors:
-    """Return the priors with lenses, poses and the board's shape free, LENS_PRIOR on the lenses, an
-    exact print, and cameras that are triggered together.
-
-    shared: which cameras have one lens; None: each has its own.
-    """
-    camera_sigma = [LENS_PRIOR.get(name, np.inf) for name in CAMERA_COLUMNS]
-    camera_free = [not name.endswith("_s") for name in CAMERA_COLUMNS]
-    free = np.tile(camera_free, (n_cameras, 1))
-    sigma = np.tile(camera_sigma, (n_cameras, 1))
-    if shared is not None:
-        free[shared.tied()] = False
-        sigma[shared.tied()] = np.inf
-    shape_sigma = board.shape_sigma
-    return Priors(
-        np.concatenate([free.ravel(), np.isfinite(shape_sigma), [False] * N_BOARD]),
-        np.concatenate([sigma.ravel(), shape_sigma, [np.inf] * N_BOARD]),
-        np.ones(n_views, dtype=bool),
-        shared=shared,
-        point_sigma_mm=board.point_sigma_mm,
-    )
-
-
-def pose_priors(n_cameras: int, n_views: int, board: Board) -> Priors:
-    """Return the priors with the board's poses free, and the cameras and the board held."""
-    priors = lens_priors(n_cameras, n_views, board)
-    return replace(priors, free=np.zeros_like(priors.free), point_sigma_mm=0.0)
-
-
-def with_print(priors: Priors, board: Board) -> Priors:
-    """Return the priors with size and stretch of the board's print free where they have a sigma,
-    and observed to be as stated within that.
-    """
-    sigmas = [board.square_sigma_mm / board.square_mm, board.stretch_sigma]
-    return priors.observed(slice(-N_BOARD, -2), sigmas)
-
-
-def _priors(
-    first: BundleState, board: Board, on_rig: MeasuredPose | None, shared: SharedLenses
-) -> Priors:
-    """Return the priors with the rig board's measured pose and the print's size and stretch, each
-    held where its sigma is 0 and an observation else.
-
-    Without a rig board the first camera is the world's frame.
-    """
-    priors = lens_priors(len(first.lens), len(first.T_world_board), board, shared)
-    priors = with_print(priors, board)
-    if on_rig is None:
-        priors.free[POSE] = False
-        return priors
-    priors.view_free[0] = not on_rig.is_exact
-    pose_sigma = np.repeat([max(on_rig.sigma_rad, 1e-9), max(on_rig.sigma_mm, 1e-7)], 3)
-    return replace(priors, pose_view=0, pose_T=on_rig.T_rig_board, pose_sigma=pose_sigma)

@@ -31,7 +31,7 @@ from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.corner_noise import adjust_with_noise
 from vision.calibration.layout import gather
 from vision.calibration.one_picture import calibrate_alone
-from vision.calibration.tied import lens_priors
+from vision.calibration.priors import lens_priors
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.rotation import exp_rotation, left_jacobian, log_rotation
 
