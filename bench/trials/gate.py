@@ -13,7 +13,7 @@ import numpy as np
 from bench.gauges.felt import FeltStroke
 from bench.records.trial_result import EstimateRow, FeltAt
 from bench.trials.estimates import felt_at
-from bench.trials.readout import Readout
+from bench.trials.readout import RawMoments, Readout
 from bench.trials.stick_slip_phases import ContactRest, find_rests
 from estimator.signal import FeltTouch
 from estimator.whisk import Whisk
@@ -27,30 +27,21 @@ def kinetic_of(
     stroke: FeltStroke, touch: FeltTouch, readout: Readout, whisk: Whisk, ten: EstimateRow
 ) -> FeltAt | None:
     """Return the record of a stroke's `kinetic_end`; ten: (10) of the whisk."""
-    theta = stroke.motor_rad - touch.motor_rad
-    moments = readout.moments_Nmm(stroke, touch)
-    found = kinetic_end(stroke.time_s, theta, moments, whisk, ten)
+    found = kinetic_end(readout.raw(stroke, touch), whisk, ten)
     return None if found is None else felt_at(found)
 
 
-def kinetic_end(
-    time_s: np.ndarray,
-    theta_rad: np.ndarray,
-    moments_Nmm: np.ndarray,
-    whisk: Whisk,
-    ten: EstimateRow,
-) -> Whisk | None:
+def kinetic_end(raw: RawMoments, whisk: Whisk, ten: EstimateRow) -> Whisk | None:
     """Return the whisk with the moments that it would have on the kinetic cone.
 
-    moments_Nmm (n, 2): m_y, m_z as recorded, unfiltered. ten: (10) of the whisk. None where the
-    moments show no teeth. On the cone both moments grow with θ (13), (14), so the kinetic ends of
-    all teeth near the wanted angle are averaged per radian.
+    ten: (10) of the whisk. None where the moments show no teeth. On the cone both moments grow with θ
+    (13), (14), so the kinetic ends of all teeth near the wanted angle are averaged per radian.
     """
     d_x_mm = ten.d_x_est_mm.value
     beta_rad = ten.beta_est_rad
     if not (d_x_mm > 0 and beta_rad != 0):
         return None
-    _, rests = find_rests(time_s, theta_rad, moments_Nmm, beta_rad, d_x_mm, whisk.beam)
+    _, rests = find_rests(raw, beta_rad, d_x_mm, whisk.beam)
     theta = whisk.theta_at_rad
     per_rad = _moments_per_rad(rests, theta)
     if len(per_rad) < _FEWEST:

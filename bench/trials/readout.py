@@ -15,6 +15,18 @@ from estimator.whisk import Whisk
 from vision.geometry import Reason, as_reason
 
 
+@dataclass(frozen=True, eq=False)
+class RawMoments:
+    """The samples of a stroke as recorded, unfiltered; NaN where the gauges were at their rail.
+
+    time_s, theta_rad (n,): pushing angles since felt touch. moments_Nmm (n, 2): m_y, m_z.
+    """
+
+    time_s: np.ndarray
+    theta_rad: np.ndarray
+    moments_Nmm: np.ndarray
+
+
 @dataclass(frozen=True)
 class Readout:
     """Conversion of a trial's channels to moments in the hub's axes: the gauges, and the follicle's
@@ -51,9 +63,10 @@ class Readout:
         """Return the whisk's moments (2,) at the wanted angle, in the axes of the gauges."""
         return to_follicle(self.roll_rad) @ [whisk.m_y_at_Nmm, whisk.m_z_at_Nmm]
 
-    def moments_Nmm(self, stroke: FeltStroke, touch: FeltTouch) -> np.ndarray:
-        """Return the moments (n, 2) of the stroke's samples as recorded, unfiltered."""
-        return (stroke.channels - touch.offset) @ self.matrix.T
+    def raw(self, stroke: FeltStroke, touch: FeltTouch) -> RawMoments:
+        """Return the moments of the stroke's samples as recorded, unfiltered."""
+        moments_Nmm = (stroke.channels - touch.offset) @ self.matrix.T
+        return RawMoments(stroke.time_s, stroke.motor_rad - touch.motor_rad, moments_Nmm)
 
     def covariance(self, channels: np.ndarray, channels_covariance: np.ndarray) -> np.ndarray:
         """Return the covariance (2, 2) of the moments of `channels` (2,).
@@ -109,12 +122,12 @@ def whisk_at(
     if at.status:
         return as_reason(at.status)
     moments = (stroke.filtered - touch.offset) @ readout.matrix.T  # (n, 2) N·mm
-    unfiltered = (stroke.channels - touch.offset) @ readout.matrix.T
+    raw = readout.raw(stroke, touch)
     m_y, m_z = readout.matrix @ at.values
     of_angles = stroke.angle_sigma.of_push(stroke.motor_rad, touch.motor_rad, theta_rad)
     return Whisk(
-        time_s=stroke.time_s,
-        theta_rad=stroke.motor_rad - touch.motor_rad,
+        time_s=raw.time_s,
+        theta_rad=raw.theta_rad,
         m_y_Nmm=moments[:, 0],
         m_z_Nmm=moments[:, 1],
         theta_at_rad=theta_rad,
@@ -124,5 +137,5 @@ def whisk_at(
         theta_sigma_rad=math.hypot(touch.sigma_rad, of_angles),
         beam=beam,
         theta_moment_covariance_at=readout.matrix @ at.theta_covariance,
-        unfiltered_Nmm=unfiltered,
+        unfiltered_Nmm=raw.moments_Nmm,
     )

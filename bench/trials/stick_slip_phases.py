@@ -18,7 +18,7 @@ from bench.gauges.felt import FeltStroke
 from bench.records.phases import KINETIC, NO_PHASES, STATIC, Angle, Phases
 from bench.records.trial_result import SeenWhisk
 from bench.session.trial import Trial
-from bench.trials.readout import Readout
+from bench.trials.readout import RawMoments, Readout
 from bench.trials.seen_friction import slips
 from estimator.beam import Beam
 from estimator.signal import FeltTouch
@@ -153,25 +153,15 @@ def phases_of(
         return NO_PHASES
     if not beta_rad or not d_x_mm or np.isnan(beta_rad):
         return NO_PHASES
-    theta = stroke.motor_rad - touch.motor_rad
-    moments = readout.moments_Nmm(stroke, touch)
-    return felt_phases(stroke.time_s, theta, moments, beta_rad, d_x_mm, beam)
+    return felt_phases(readout.raw(stroke, touch), beta_rad, d_x_mm, beam)
 
 
-def felt_phases(
-    time_s: np.ndarray,
-    theta_rad: np.ndarray,
-    moments_Nmm: np.ndarray,
-    beta_rad: float,
-    d_x_mm: float,
-    beam: Beam,
-) -> Phases:
-    """Find phases in the moments (n, 2), m_y and m_z as recorded, unfiltered; NaN samples are left
-    out.
+def felt_phases(raw: RawMoments, beta_rad: float, d_x_mm: float, beam: Beam) -> Phases:
+    """Find phases in the moments of a stroke; NaN samples are left out.
 
     Between two jumps both moments are lines, whose ends give the friction angles.
     """
-    jumps, rests = find_rests(time_s, theta_rad, moments_Nmm, beta_rad, d_x_mm, beam)
+    jumps, rests = find_rests(raw, beta_rad, d_x_mm, beam)
     if not jumps:
         return NO_PHASES
     angles: list[Angle] = []
@@ -214,27 +204,22 @@ class ContactRest:
 
 
 def find_rests(
-    time_s: np.ndarray,
-    theta_rad: np.ndarray,
-    moments_Nmm: np.ndarray,
-    beta_rad: float,
-    d_x_mm: float,
-    beam: Beam,
+    raw: RawMoments, beta_rad: float, d_x_mm: float, beam: Beam
 ) -> tuple[int, list[ContactRest]]:
-    """Return the number of jumps, and the rests between two of them; arguments as `felt_phases`.
+    """Return the number of jumps, and the rests between two of them.
 
     They are sought where the motor moves steadily. Where it starts, stops or turns round the slip
     per angle changes with its speed, as the moments come late out of the gauges' filter.
     """
-    steady = _steady(time_s, theta_rad)
-    good = np.zeros(len(theta_rad), dtype=bool)
-    good[steady] = np.isfinite(moments_Nmm[steady]).all(axis=1)
-    theta = theta_rad[good]
+    steady = _steady(raw.time_s, raw.theta_rad)
+    good = np.zeros(len(raw.theta_rad), dtype=bool)
+    good[steady] = np.isfinite(raw.moments_Nmm[steady]).all(axis=1)
+    theta = raw.theta_rad[good]
     if len(theta) < 2:
         return 0, []
-    moments = moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0]
+    moments = raw.moments_Nmm[good] * [np.sign(beta_rad) or 1.0, 1.0]
     slip = _slip_mm(theta, moments, abs(beta_rad), d_x_mm, beam)
-    jumps = _jumps(time_s[good], theta, slip)
+    jumps = _jumps(raw.time_s[good], theta, slip)
     return len(jumps), _rests_between(jumps, theta, moments, slip)
 
 

@@ -15,6 +15,7 @@ from bench.rig.simulation import simulate
 from bench.rig.stroke import Stroke as Plan
 from bench.session.session import load_session
 from bench.session.signals import read_signals
+from bench.trials.readout import RawMoments
 from bench.trials.stick_slip_phases import _steady, felt_phases, seen_phases
 from bench.workflows.session_evaluation import evaluate
 from estimator.beam import Beam
@@ -85,7 +86,7 @@ def test_moments_tell_static_from_kinetic(seed, mirror):
     time, theta = samples()
     slip = saw_tooth(theta)
     felt = moments(theta, slip, np.random.default_rng(seed)) * [mirror, 1.0]
-    found = felt_phases(time, theta, felt, mirror * BETA, D_X, Beam(C, 100.0))
+    found = felt_phases(RawMoments(time, theta, felt), mirror * BETA, D_X, Beam(C, 100.0))
     teeth = np.count_nonzero(np.diff(slip[theta > np.radians(2.3)]) > 0.02)
     assert teeth <= found.jumps <= teeth + 6  # earlier, smaller ones may drown in the noise
     for kind, true in ((STATIC, ALPHA_STATIC), (KINETIC, ALPHA_KINETIC)):
@@ -106,7 +107,7 @@ def test_ringing_after_a_jump_is_no_jump():
             since > 0, 0.5 * (slip[k + 1] - slip[k]) * np.exp(-0.02 * since) * np.cos(since), 0.0
         )
     felt = moments(theta, slip - ringing, np.random.default_rng(1))
-    found = felt_phases(time, theta, felt, BETA, D_X, Beam(C, 100.0))
+    found = felt_phases(RawMoments(time, theta, felt), BETA, D_X, Beam(C, 100.0))
     assert found.jumps <= len(rung)
     assert np.degrees(found.mean(STATIC).value) == pytest.approx(23.0, abs=1.0)
     assert np.degrees(found.mean(KINETIC).value) == pytest.approx(18.5, abs=1.0)
@@ -118,7 +119,7 @@ def test_a_whisker_that_slides_neither_rests_nor_jumps(seed):
     tangent = np.tan(BETA - ALPHA_KINETIC)
     slip = D_X * np.maximum(theta, 0.0) * tangent / (np.cos(BETA) + np.sin(BETA) * tangent)
     felt = moments(theta, slip, np.random.default_rng(seed))
-    assert felt_phases(time, theta, felt, BETA, D_X, Beam(C, 100.0)) == NO_PHASES
+    assert felt_phases(RawMoments(time, theta, felt), BETA, D_X, Beam(C, 100.0)) == NO_PHASES
     touching = theta > 0
     assert seen_phases(frames(theta[touching][::40], slip[touching][::40]), BETA, D_X) == NO_PHASES
 
@@ -193,7 +194,8 @@ def test_the_rig_s_sandpaper(tmp_path):
         touch = stroke.touch()
         felt = (stroke.channels - touch.offset) @ np.array(true["gauge_matrix_Nmm_per_V"]).T
         theta, beta = stroke.motor_rad - touch.motor_rad, np.radians(told["beta_deg"])
-        found = felt_phases(stroke.time_s, theta, felt, beta, told["d_x_mm"], session.whisker.beam)
+        raw = RawMoments(stroke.time_s, theta, felt)
+        found = felt_phases(raw, beta, told["d_x_mm"], session.whisker.beam)
         assert found.jumps >= 7
         for kind, mu in ((STATIC, told["mu_static"]), (KINETIC, told["mu_kinetic"])):
             assert np.degrees(found.mean(kind).value - np.arctan(mu)) == pytest.approx(0.0, abs=1.0)

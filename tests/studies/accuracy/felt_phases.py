@@ -31,6 +31,7 @@ from bench.rig.protocol_tables import (
 )
 from bench.rig.recording import Recording
 from bench.session.signals import Signals
+from bench.trials.readout import RawMoments
 from bench.trials.stick_slip_phases import felt_phases
 from estimator.beam import Beam
 
@@ -96,7 +97,8 @@ def phases_of_recording(protocol: Protocol, recording: Recording, beam: Beam) ->
         moments = (stroke.channels - touch.offset) @ matrix.T
         theta = stroke.motor_rad - touch.motor_rad
         beta = np.radians(recording.run.beta_deg)
-        yield felt_phases(stroke.time_s, theta, moments, beta, recording.run.d_x_mm, beam)
+        raw = RawMoments(stroke.time_s, theta, moments)
+        yield felt_phases(raw, beta, recording.run.d_x_mm, beam)
 
 
 def errors_deg(whisks: list[FeltWhisk], kind: str) -> np.ndarray:
