@@ -1,6 +1,7 @@
 """The main job: a recorded session in; truth, estimates and their errors out."""
 
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bench.analyses.catalogue import ANALYSES
@@ -56,74 +57,70 @@ def evaluate(
     recorded = [trials_with_whisks(view) for view in views]
     require_some(recorded[0], settings)
     with lock_output(out), _workers(dask, workers, out) as pool:
+        job = _Job(out, settings, pool, problems, figure_formats)
         if views[0].base is None:
             units = first_units(views[0], recorded[0], out, settings)
-            summary = _evaluate_whisker(
-                views[0], units, out, settings, pool, problems, figure_formats
-            )
+            summary = _evaluate_whisker(views[0], units, job)
         else:
-            summary = _evaluate_array(
-                views, recorded, out, settings, pool, problems, figure_formats
-            )
+            summary = _evaluate_array(views, recorded, job)
     announce("\n".join(summary.verdict) if verdict_alone else summary.on_screen(out))
     return WITH_WARNINGS if summary.warnings else DONE
 
 
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """The folder that an evaluation fills, which is locked, its settings, and the processes that work on it.
+
+    problems: what has been found so far. figure_formats: of figures for a paper.
+    """
+
+    out: Path
+    settings: Settings
+    pool: Workers
+    problems: InputProblems
+    figure_formats: Sequence[str]
+
+
 def _evaluate_array(
-    views: Sequence[Session],
-    recorded: Sequence[Sequence[Trial]],
-    out: Path,
-    settings: Settings,
-    pool: Workers,
-    problems: InputProblems,
-    figure_formats: Sequence[str],
+    views: Sequence[Session], recorded: Sequence[Sequence[Trial]], job: _Job
 ) -> Summary:
     """Evaluate each whisker of an array as a run of its own, and then all whiskers together."""
     from bench.array.array_results import array_record, folder_of, write_array, write_array_record
     from bench.report.score import score_all
 
-    folders = [folder_of(out, view.base.name) for view in views]
-    units_of_views = array_units(views, recorded, out, folders, settings, pool)
+    folders = [folder_of(job.out, view.base.name) for view in views]
+    units_of_views = array_units(views, recorded, job.out, folders, job.settings, job.pool)
     for view, folder, units in zip(views, folders, units_of_views):
-        carried = contradictions_alone(problems)
+        carried = contradictions_alone(job.problems)
         with lock_output(folder):
-            _evaluate_whisker(view, units, folder, settings, pool, carried, figure_formats)
+            _evaluate_whisker(view, units, replace(job, out=folder, problems=carried))
     scores = score_all(list(zip(views, folders)))
-    write_array_record(out, array_record(views, problems.warnings, scores))
-    return write_array(out)
+    write_array_record(job.out, array_record(views, job.problems.warnings, scores))
+    return write_array(job.out)
 
 
-def _evaluate_whisker(
-    session: Session,
-    units: Sequence[Unit],
-    out: Path,
-    settings: Settings,
-    pool: Workers,
-    problems: InputProblems,
-    figure_formats: Sequence[str],
-) -> Summary:
-    """Evaluate the trials of one whisker's session, a unit each, into the folder `out`.
-
-    The folder is locked.
-    """
-    calibration, units = units_in_rig(session, units, pool, problems)
-    gauges, certificate, units = with_gauges(units, pool, problems)
+def _evaluate_whisker(session: Session, units: Sequence[Unit], job: _Job) -> Summary:
+    """Evaluate the trials of one whisker's session, a unit each."""
+    settings = job.settings
+    problems = job.problems
+    calibration, units = units_in_rig(session, units, job.pool, problems)
+    gauges, certificate, units = with_gauges(units, job.pool, problems)
     chosen = [unit for unit in units if settings.takes(unit.trial.name)]
-    run = evaluated_run(evaluate_units(chosen, pool), session.whisker, settings, session)
+    run = evaluated_run(evaluate_units(chosen, job.pool), session.whisker, settings, session)
     if run.touch_warning:
         problems.warnings.append(run.touch_warning)
     problems.warnings += exchanged_signals(chosen, run.results)
     problems.warnings += exchanged_pictures(chosen, run.results)
     evaluation = Evaluation(
         run,
-        out,
+        job.out,
         gauges=gauges,
         certificate=certificate,
         calibration=calibration,
         warnings=tuple(problems.warnings),
         recordings={unit.trial.name: unit.files for unit in chosen},
     )
-    return report(evaluation, pool, figure_formats)
+    return report(evaluation, job.pool, job.figure_formats)
 
 
 def _workers(dask: str | None, count: int, out: Path) -> Workers:
