@@ -11,29 +11,17 @@ import cv2
 import numpy as np
 
 from bench.rig.plate import CirclePrint, Print
-from bench.rig.printed_board import Ink, PrintedBoard
+from bench.rig.printed_board import Ink, PrintedBoard, PrintedSquares
 
 _TAG_CELLS = 10  # of an AprilTag 36h11 with its rim of two, across
 
 
 @dataclass(frozen=True)
-class PrintedCheckerboard:
+class PrintedCheckerboard(PrintedSquares):
     """A plain checkerboard, its upper left square dark. dictionary: of the markers on the rig."""
 
-    squares: tuple[int, int]
-    square_mm: float
     dictionary: str
     is_found_in_parts: ClassVar[bool] = False
-
-    @property
-    def size_mm(self) -> tuple[float, float]:
-        """Return width and height."""
-        return self.squares[0] * self.square_mm, self.squares[1] * self.square_mm
-
-    @property
-    def T_print_board(self) -> np.ndarray:
-        """Return the board frame's pose (3, 4) on the print."""
-        return np.eye(3, 4)
 
     def to_print(self, ink: Ink, margin_mm: float) -> Print:
         """Print the board within a white margin."""

@@ -20,15 +20,31 @@ class Ink:
 
 
 @dataclass(frozen=True)
-class PrintedBoard:
+class PrintedSquares:
+    """Squares in columns and rows; the board frame is the print's."""
+
+    squares: tuple[int, int]
+    square_mm: float
+
+    @property
+    def size_mm(self) -> tuple[float, float]:
+        """Return width and height."""
+        return self.squares[0] * self.square_mm, self.squares[1] * self.square_mm
+
+    @property
+    def T_print_board(self) -> np.ndarray:
+        """Return the board frame's pose (3, 4) on the print."""
+        return np.eye(3, 4)
+
+
+@dataclass(frozen=True)
+class PrintedBoard(PrintedSquares):
     """A ChArUco board as session.toml names it.
 
     Raises ValueError for a dictionary that OpenCV does not know, or a marker that does not fit its
     square.
     """
 
-    squares: tuple[int, int]
-    square_mm: float
     marker_mm: float
     dictionary: str
     legacy: bool = False
@@ -51,16 +67,6 @@ class PrintedBoard:
         board = cv2.aruco.CharucoBoard(tuple(self.squares), square, marker, dictionary)
         board.setLegacyPattern(self.legacy)
         return board
-
-    @property
-    def size_mm(self) -> tuple[float, float]:
-        """Return width and height."""
-        return self.squares[0] * self.square_mm, self.squares[1] * self.square_mm
-
-    @property
-    def T_print_board(self) -> np.ndarray:
-        """Return the board frame's pose (3, 4) on the print."""
-        return np.eye(3, 4)
 
     @property
     def corners_mm(self) -> np.ndarray:
