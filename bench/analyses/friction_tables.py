@@ -185,7 +185,7 @@ class FrictionAngles(Analysis):
         phi_rad = {}
         for one in found.surfaces:
             for felt in one.surface.felt:
-                phi_rad[felt.key] = np.radians(felt.phi_deg)
+                phi_rad[felt.key] = felt.phi_rad
         of_whisks = []
         for whisk in found.whisks:
             confidence = None
@@ -270,7 +270,7 @@ def friction_of(
             by_smoothness(felt, whisker),
         )
         errors = np.array([error_percent.get(one.key, np.nan) for one in surface.felt])
-        phi_rad = np.radians(column(surface.felt, "phi_deg"))
+        phi_rad = column(surface.felt, "phi_rad")
         confidences = weights(phi_rad, alpha_est_rad)
         friction = SurfaceFriction(
             surface,

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from bench.analyses.explained import by_10
+from bench.analyses.felt_push import FeltPush
 from bench.analyses.pooling import column, grouped, measured
 from bench.analyses.theory_left import as_theory_has_them
 from bench.base.combined import add_common, student_factor
@@ -22,7 +23,6 @@ from bench.base.settings import ALPHA_EST_SIGMA_DEG
 from bench.base.statuses import reason
 from bench.records.trial_result import TrialResult, whisks
 from bench.session.whisker import Whisker
-from estimator.distance import felt_slip_angle
 from estimator.friction_ways import alpha_from_tilts, confidence
 from vision import UNKNOWN, Value
 
@@ -43,42 +43,15 @@ class Way:
     status: str = ""
 
 
-@dataclass(frozen=True)
-class FeltContact:
-    """What a robot has of one whisk: nominal slope and distance (NaN where not given), and what was felt.
-
-    shared_Nmm (k, 2): what (m_y, m_z) change by at one sigma of each cause that all whisks have in common.
-    reach_mm: radii of bar and whisker together, NaN where nobody states the bar's.
-    """
-
-    beta_rad: float
-    d_x_nominal_mm: float
-    theta_rad: float
-    m_y_Nmm: float
-    m_z_Nmm: float
-    shared_Nmm: np.ndarray
-    trial: str = ""
-    reach_mm: float = np.nan
-
-    @property
-    def phi_rad(self) -> float:
-        """Return the slip angle (8)."""
-        return felt_slip_angle(self.m_y_Nmm, self.m_z_Nmm)
-
-    def moved(self, cause: int) -> "FeltContact":
-        """Return the contact with one of the shared causes off by its sigma."""
-        by_y, by_z = self.shared_Nmm[cause]
-        return replace(self, m_y_Nmm=float(self.m_y_Nmm + by_y), m_z_Nmm=float(self.m_z_Nmm + by_z))
-
-
-def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) -> list[FeltContact]:
-    """Return the measured whisks of one surface and speed that have sound moments."""
+def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) -> list[FeltPush]:
+    """Return the measured whisks of one surface and speed that have sound moments, at nominal slopes and
+    distances."""
     found = []
     for result, _, felt in whisks(measured(results)):
         trial = result.trial
         if trial.panel != panel or not felt.has_moments or felt.apart:
             continue
-        contact = FeltContact(
+        contact = FeltPush(
             np.radians(trial.beta_nominal_deg),
             trial.d_x_nominal_mm,
             result.theta_rad,
@@ -92,14 +65,14 @@ def contacts(results: Sequence[TrialResult], panel: tuple[str, float | None]) ->
     return found
 
 
-def by_tilting(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
+def by_tilting(of_surface: Sequence[FeltPush], whisker: Whisker) -> Way:
     """Return α by way 1, from nominal slopes of both signs."""
     known = [contact for contact in of_surface if np.isfinite(contact.beta_rad)]
     slopes = [contact.beta_rad for contact in known]
     if not (slopes and min(slopes) < 0 < max(slopes)):
         return Way("tilting", status=reason("slopes_one_sided"))
 
-    def fit(recordings: Sequence[FeltContact]) -> _AlphaFit:
+    def fit(recordings: Sequence[FeltPush]) -> _AlphaFit:
         """Fit the slip angles of tilts."""
         betas = [contact.beta_rad for contact in recordings]
         fitted = alpha_from_tilts(betas, [contact.phi_rad for contact in recordings])
@@ -108,34 +81,34 @@ def by_tilting(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
     return _with_shared("tilting", fit, known, whisker)
 
 
-def by_consistency(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
+def by_consistency(of_surface: Sequence[FeltPush], whisker: Whisker) -> Way:
     """Return α by way 2: that under which distances scatter least in parts of their mean."""
-    nominal = {contact.d_x_nominal_mm for contact in of_surface}
+    nominal = {contact.d_x_mm for contact in of_surface}
     if len(of_surface) < _FEWEST or len(nominal) != 1 or not np.isfinite(list(nominal)).all():
         return Way("consistency", status=reason("whisks_few", least=_FEWEST))
     return _by_object("consistency", of_surface, whisker, 0)
 
 
-def by_smoothness(of_surface: Sequence[FeltContact], whisker: Whisker) -> Way:
+def by_smoothness(of_surface: Sequence[FeltPush], whisker: Whisker) -> Way:
     """Return α by way 2 of an object that is no edge at one distance: contacts lie on a straight one.
 
     Bars at several nominal distances stand for one straight edge that leans along the whisker, touched at heights that
     are these distances.
     """
-    nominal = {contact.d_x_nominal_mm for contact in of_surface}
+    nominal = {contact.d_x_mm for contact in of_surface}
     if len(nominal) < 2 or not np.isfinite(list(nominal)).all():
         return Way("smoothness", status=reason("one_nominal_distance"))
     return _by_object("smoothness", of_surface, whisker, 1)
 
 
-def _by_object(name: str, of_surface: Sequence[FeltContact], whisker: Whisker, degree: int) -> Way:
+def _by_object(name: str, of_surface: Sequence[FeltPush], whisker: Whisker, degree: int) -> Way:
     """Return α by way 2 with an object whose distance is a polynomial of this degree in height."""
     if not np.isfinite(_distances(of_surface, np.zeros(1), whisker)).all():
         return Way(name, status=reason("no_push_on_object"))
     if np.ptp([abs(np.tan(contact.phi_rad)) for contact in of_surface]) < _LEAST_SPREAD:
         return Way(name, status=reason("slip_angles_alike"))
 
-    def fit(recordings: Sequence[FeltContact]) -> _AlphaFit:
+    def fit(recordings: Sequence[FeltPush]) -> _AlphaFit:
         """Fit the distances of contacts to the object."""
         return _least_scatter(recordings, whisker, degree)
 
@@ -154,8 +127,8 @@ class _AlphaFit:
 
 def _with_shared(
     name: str,
-    fit_to: Callable[[Sequence[FeltContact]], _AlphaFit],
-    known: Sequence[FeltContact],
+    fit_to: Callable[[Sequence[FeltPush]], _AlphaFit],
+    known: Sequence[FeltPush],
     whisker: Whisker,
 ) -> Way:
     """Return the way by a fit to recordings, with what all whisks share in its sigma.
@@ -181,24 +154,16 @@ def _with_shared(
 
 
 def _as_theory_has_them(
-    some: Sequence[FeltContact], alpha_rad: float, whisker: Whisker
-) -> list[FeltContact]:
+    some: Sequence[FeltPush], alpha_rad: float, whisker: Whisker
+) -> list[FeltPush]:
     """Return the contacts without what theory leaves out of their moments at an α."""
-    m_Nmm = as_theory_has_them(
-        np.stack([column(some, "m_y_Nmm"), column(some, "m_z_Nmm")], axis=1),
-        column(some, "theta_rad"),
-        alpha_rad,
-        column(some, "d_x_nominal_mm"),
-        column(some, "reach_mm"),
-        whisker.beam,
-    )
     found = []
-    for contact, (m_y, m_z) in zip(some, m_Nmm):
+    for contact, (m_y, m_z) in zip(some, as_theory_has_them(some, alpha_rad, whisker.beam)):
         found.append(replace(contact, m_y_Nmm=float(m_y), m_z_Nmm=float(m_z)))
     return found
 
 
-def _mean(some: Sequence[FeltContact]) -> FeltContact:
+def _mean(some: Sequence[FeltPush]) -> FeltPush:
     """Return the whisks of one recording as one."""
     return replace(
         some[0],
@@ -208,7 +173,7 @@ def _mean(some: Sequence[FeltContact]) -> FeltContact:
     )
 
 
-def _distances(some: Sequence[FeltContact], alphas_rad: np.ndarray, whisker: Whisker) -> np.ndarray:
+def _distances(some: Sequence[FeltPush], alphas_rad: np.ndarray, whisker: Whisker) -> np.ndarray:
     """Return d_x by (10), mm, (contacts, α); NaN where there is none."""
     theta = column(some, "theta_rad")[:, None]
     m_y = column(some, "m_y_Nmm")[:, None]
@@ -228,13 +193,13 @@ def _residuals(distances: np.ndarray, heights: np.ndarray, degree: int) -> np.nd
     return (distances - on_object) / np.mean(distances, axis=0)
 
 
-def _least_scatter(some: Sequence[FeltContact], whisker: Whisker, degree: int) -> _AlphaFit:
+def _least_scatter(some: Sequence[FeltPush], whisker: Whisker, degree: int) -> _AlphaFit:
     """Fit the α at which the contacts lie least off an object.
 
     Where one of their distances ends, the search ends, and status says so. Sigma is that of a least-squares fit whose
     residuals, all of one size, are what bars are set up wrong by.
     """
-    heights = column(some, "d_x_nominal_mm")
+    heights = column(some, "d_x_mm")
 
     def residuals(alphas_rad: np.ndarray) -> np.ndarray:
         """Return residuals (contacts, α)."""

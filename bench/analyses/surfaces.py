@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bench.analyses.cells import angle_text, panel_title
+from bench.analyses.felt_push import FeltPush
 from bench.analyses.pooling import by_slope, column, measured
 from bench.analyses.theory_left import as_theory_has_them
 from bench.base.combined import add_common, student_factor
@@ -23,30 +24,20 @@ from vision.geometry import counted
 _MANY = 3
 
 
-@dataclass(frozen=True)
-class Felt:
-    """The moments felt of one whisk, with slope and distance as seen, else nominal.
+@dataclass(frozen=True, kw_only=True)
+class Felt(FeltPush):
+    """The moments felt of one whisk with their sigmas, slope and distance as seen, else nominal.
 
-    recording: number of the trial, whose whisks count together. shared_Nmm: as of `FeltWhisk`.
-    reach_mm: radii of bar and whisker together, NaN where nobody states the bar's.
+    recording: number of the trial, whose whisks count together.
     """
 
-    beta_deg: float
-    d_x_mm: float
-    theta_rad: float
-    m_y_Nmm: float
-    m_z_Nmm: float
     m_y_sigma_Nmm: float
     m_z_sigma_Nmm: float
-    phi_deg: float
     phi_sigma_deg: float
     nominal: bool
     recording: int = 0
-    trial: str = ""
     whisk: int = 0
-    shared_Nmm: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     beta_sigma_rad: float = 0.0
-    reach_mm: float = np.nan
 
     @property
     def key(self) -> tuple[str, int]:
@@ -162,26 +153,25 @@ def _felt(recording: int, result: TrialResult, seen: SeenWhisk, felt: FeltWhisk)
     trial = result.trial
     nominal = not seen.has_truth
     d_x_mm = trial.d_x_nominal_mm if nominal else seen.d_x_mm.value
-    beta_deg = slope_deg(result, seen)
-    if not felt.has_moments or felt.apart or not np.isfinite([d_x_mm, beta_deg]).all():
+    beta_rad = math.radians(slope_deg(result, seen))
+    if not felt.has_moments or felt.apart or not np.isfinite([d_x_mm, beta_rad]).all():
         return None
     return Felt(
-        beta_deg,
+        beta_rad,
         d_x_mm,
-        theta_rad=result.theta_rad,
-        m_y_Nmm=felt.m_y_Nmm.value,
-        m_z_Nmm=felt.m_z_Nmm.value,
+        result.theta_rad,
+        felt.m_y_Nmm.value,
+        felt.m_z_Nmm.value,
+        felt.shared_Nmm,
+        trial.name,
+        result.reach_mm(d_x_mm),
         m_y_sigma_Nmm=felt.m_y_Nmm.sigma,
         m_z_sigma_Nmm=felt.m_z_Nmm.sigma,
-        phi_deg=math.degrees(felt.phi_felt_rad.value),
         phi_sigma_deg=math.degrees(felt.phi_felt_rad.sigma),
         nominal=nominal,
         recording=recording,
-        trial=trial.name,
         whisk=seen.whisk,
-        shared_Nmm=felt.shared_Nmm,
         beta_sigma_rad=trial.beta_nominal_sigma_rad if nominal else seen.beta_rad.sigma,
-        reach_mm=result.reach_mm(d_x_mm),
     )
 
 
@@ -213,7 +203,7 @@ def _fit(felt: Sequence[Felt], beam: Beam) -> FrictionFit | None:
 def _pushes(felt: Sequence[Felt], beam: Beam) -> Pushes:
     """Return slopes, moments and distances of whisks as a fit of α takes them: of a cylinder."""
     return Pushes(
-        np.radians(column(felt, "beta_deg")),
+        column(felt, "beta_rad"),
         m_y=column(felt, "m_y_Nmm"),
         m_z=column(felt, "m_z_Nmm"),
         d_x=beam.as_cylinder_mm(column(felt, "d_x_mm")),
@@ -257,14 +247,7 @@ def _alphas_by_shared(pushes: Pushes, felt: Sequence[Felt]) -> np.ndarray:
 
 def _alpha_by_theory(pushes: Pushes, felt: Sequence[Felt], beam: Beam, alpha_rad: float) -> float:
     """Return α by the moments without what (13), (14) leave out of them at an α."""
-    m_Nmm = as_theory_has_them(
-        np.stack([pushes.m_y, pushes.m_z], axis=1),
-        pushes.theta,
-        alpha_rad,
-        column(felt, "d_x_mm"),
-        column(felt, "reach_mm"),
-        beam,
-    )
+    m_Nmm = as_theory_has_them(felt, alpha_rad, beam)
     return float(fit_alpha(replace(pushes, m_y=m_Nmm[:, 0], m_z=m_Nmm[:, 1])).alpha_rad)
 
 

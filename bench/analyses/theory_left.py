@@ -5,10 +5,13 @@ all its points the same way, and no scatter shows it. So the fit is made once mo
 have them, and the change is part of its sigma.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from bench.analyses.direction import slip_angle
+from bench.analyses.felt_push import FeltPush
+from bench.analyses.pooling import column
 from bench.base.settings import OBJECT_REACH_MM
 from estimator import first_order
 from estimator.beam import Beam
@@ -19,28 +22,23 @@ from estimator.two_tilts import DRAWN
 _STEEPEST_RAD = 0.999 * RIGHT_ANGLE
 
 
-def as_theory_has_them(
-    m_Nmm: np.ndarray,
-    theta_rad: ArrayLike,
-    alpha_rad: float,
-    d_x_mm: ArrayLike,
-    reach_mm: ArrayLike,
-    beam: Beam,
-) -> np.ndarray:
-    """Return moments (n, 2) without what small-angle theory leaves out of them.
+def as_theory_has_them(pushes: Sequence[FeltPush], alpha_rad: float, beam: Beam) -> np.ndarray:
+    """Return the moments (n, 2), m_y and m_z, of pushes without what small-angle theory leaves out of them.
 
-    m_Nmm (n, 2): m_y, m_z as measured at pushing angles theta_rad (n,). reach_mm (n,): radii of object and
-    whisker together; NaN where nobody states it, which stands for the thickness that settings allow.
     Out of |m| go rolling over the object, large angles, and friction along the whisker; out of φ the way
     that the force turns (`bench.analyses.direction`) and the share of friction that acts along the
-    whisker. A distance that is not known leaves |m| as it is.
+    whisker. A distance that is not known leaves |m| as it is, a reach that nobody states is that which
+    settings allow.
     """
-    m_y, m_z = m_Nmm.T
+    m_y = column(pushes, "m_y_Nmm")
+    m_z = column(pushes, "m_z_Nmm")
+    theta = column(pushes, "theta_rad")
+    d_x_mm = column(pushes, "d_x_mm")
+    reach_mm = column(pushes, "reach_mm")
     phi = np.arctan2(m_y, m_z)
     slope = np.minimum(np.abs(phi) + alpha_rad, _STEEPEST_RAD)
-    theta = np.broadcast_to(np.asarray(theta_rad, dtype=float), phi.shape)
     reach = np.where(np.isfinite(reach_mm), reach_mm, OBJECT_REACH_MM)
-    left = beam.thickness(np.asarray(d_x_mm, dtype=float))
+    left = beam.thickness(d_x_mm)
     bent = theta * np.cos(slope) / np.cos(alpha_rad)
     along = _share_along(phi, bent, alpha_rad)
     rolling = first_order.rolling_at(theta, reach, slope, d_x_mm, left)

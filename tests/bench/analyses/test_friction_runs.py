@@ -8,14 +8,9 @@ import pytest
 
 from bench.analyses.alphas import alphas_of, felt_friction, mean_alpha
 from bench.analyses.estimates_again import FITTED, SEEN, _rescaled, with_estimates_again
+from bench.analyses.felt_push import FeltPush
 from bench.analyses.friction_tables import FrictionAngles, friction_of
-from bench.analyses.section_vii import (
-    FeltContact,
-    by_consistency,
-    by_smoothness,
-    by_tilting,
-    weights,
-)
+from bench.analyses.section_vii import by_consistency, by_smoothness, by_tilting, weights
 from bench.base.settings import Settings
 from bench.records.trial_result import EstimateRow
 from bench.report.whisk_rows import estimate_rows
@@ -120,11 +115,9 @@ def test_every_way_finds_the_friction_angle(tmp_path):
     assert any("tilting" in line for line in FrictionAngles().lines(of_run))
 
 
-def contact(beta_deg, d_x_nominal_mm=60.0) -> FeltContact:
+def contact(beta_deg, d_x_mm=60.0) -> FeltPush:
     m_y, m_z = slip.moments(60.0, THETA, np.radians(beta_deg), ALPHA, C)
-    return FeltContact(
-        np.radians(beta_deg), d_x_nominal_mm, THETA, m_y, m_z, NOTHING_SHARED, f"b{beta_deg}"
-    )
+    return FeltPush(np.radians(beta_deg), d_x_mm, THETA, m_y, m_z, NOTHING_SHARED, f"b{beta_deg}")
 
 
 def test_ways_say_what_they_lack():
@@ -164,7 +157,7 @@ def test_intervals_of_way_2_hold_as_often_as_they_say(way, places_mm):
     for _ in range(150):
         drawn = []
         for c in exact:
-            share = 1 + 0.4 / c.d_x_nominal_mm * rng.normal()
+            share = 1 + 0.4 / c.d_x_mm * rng.normal()
             drawn.append(replace(c, m_y_Nmm=c.m_y_Nmm * share, m_z_Nmm=c.m_z_Nmm * share))
         found = way(drawn, WHISKER)
         held += abs(found.alpha.value - ALPHA) < Z_95 * found.alpha.sigma
@@ -247,17 +240,17 @@ def test_smoothness_finds_the_friction_of_bars_along_one_edge(shape):
     way = by_smoothness(bars, whisker)
     assert way.alpha.value == pytest.approx(ALPHA, abs=1e-6)
     assert way.status == "" and way.alpha.sigma < np.radians(1.0)
-    level = [replace(b, d_x_nominal_mm=60.0) for b in bars]
+    level = [replace(b, d_x_mm=60.0) for b in bars]
     assert by_smoothness(level, whisker).status.codes == ("one_nominal_distance",)
 
 
-def along(beta_deg: float, d_x: float, whisker: Whisker) -> FeltContact:
+def along(beta_deg: float, d_x: float, whisker: Whisker) -> FeltPush:
     """A contact of a bar at this slope and distance, in a recording of its own."""
     beta = np.radians(beta_deg)
     m_y, m_z = slip.moments(
         whisker.beam.as_cylinder_mm(d_x), THETA, beta, ALPHA, whisker.beam.C_Nmm2
     )
-    return FeltContact(beta, d_x, THETA, m_y, m_z, NOTHING_SHARED, f"b{beta_deg:g}")
+    return FeltPush(beta, d_x, THETA, m_y, m_z, NOTHING_SHARED, f"b{beta_deg:g}")
 
 
 def test_ones_own_estimate_takes_the_sessions_sigma_of_alpha():

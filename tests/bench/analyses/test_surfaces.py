@@ -84,9 +84,20 @@ def test_repeats_of_a_few_recordings_are_not_independent(rng):
                     np.hypot(0.02, 4e-3 * np.hypot(*m)),
                     4e-3 * np.kron(np.eye(2), m[:, None]),
                 )
-                phi = np.degrees(np.arctan2(*m)), 0.3
-                place = True, number, f"b{beta_deg}", 0, shared, np.radians(0.4)
-                whisks.append(Felt(beta_deg, 60.0, THETA, *m, sigma, sigma, *phi, *place))
+                felt = Felt(
+                    np.radians(beta_deg),
+                    60.0,
+                    THETA,
+                    *m,
+                    shared,
+                    m_y_sigma_Nmm=sigma,
+                    m_z_sigma_Nmm=sigma,
+                    phi_sigma_deg=0.3,
+                    nominal=True,
+                    recording=number,
+                    beta_sigma_rad=np.radians(0.4),
+                )
+                whisks.append(felt)
         fit = _fit(whisks, BEAM)
         held.append(fit.low_rad < np.radians(14.0) < fit.high_rad)
     assert np.mean(held) > 0.83

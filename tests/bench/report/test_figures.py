@@ -34,8 +34,19 @@ def surface(name="steel", alpha_deg=10.5, slopes=(0, 20, 40, -60)) -> FittedSurf
     beta = np.radians(slopes)
     m_y, m_z = slip.moments(60.0, THETA, beta, np.radians(alpha_deg), C)
     felt = tuple(
-        Felt(b, 60.0, THETA, y, z, 0.02, 0.02, np.degrees(np.arctan2(y, z)), 0.2, False)
-        for b, y, z in zip(slopes, m_y, m_z)
+        Felt(
+            b,
+            60.0,
+            THETA,
+            y,
+            z,
+            np.zeros((0, 2)),
+            m_y_sigma_Nmm=0.02,
+            m_z_sigma_Nmm=0.02,
+            phi_sigma_deg=0.2,
+            nominal=False,
+        )
+        for b, y, z in zip(beta, m_y, m_z)
     )
     return FittedSurface(
         name, 10.0, felt, fit_alpha(Pushes(beta, m_y, m_z, 60.0, THETA, C)), Beam(C, 100.0)

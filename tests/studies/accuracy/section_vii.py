@@ -18,7 +18,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from bench.analyses.section_vii import FeltContact, by_consistency, by_smoothness, by_tilting
+from bench.analyses.felt_push import FeltPush
+from bench.analyses.section_vii import by_consistency, by_smoothness, by_tilting
 from bench.analyses.soft import Place, Soft, softness
 from bench.records.trial_result import TrialFacts
 from bench.report.score import Score
@@ -41,9 +42,7 @@ ALPHA_EST_DEG, ALPHA_EST_SIGMA_DEG = 12.0, 5.0  # as assumed
 WHISKER = Whisker(shape="cylinder", length_mm=100.0, diameter_mm=1.0, youngs_modulus_GPa=E_GPA)
 
 
-def session(
-    alpha_deg: float, rng: np.random.Generator, places_mm=(D_X_MM,)
-) -> Iterator[FeltContact]:
+def session(alpha_deg: float, rng: np.random.Generator, places_mm=(D_X_MM,)) -> Iterator[FeltPush]:
     """The contacts of a session, at nominal distances that take turns."""
     rod, _ = rod_and_beam("cylinder")
     gauges = np.eye(2) + GAUGE_SHARE * rng.normal(size=(2, 2))
@@ -57,7 +56,7 @@ def session(
         for _ in range(WHISKS):
             m_y, m_z = gauges @ exact + NOISE_NMM * rng.normal(size=2)
             shared = GAUGE_SHARE * np.kron(np.eye(2), [[m_y], [m_z]])
-            yield FeltContact(
+            yield FeltPush(
                 np.radians(beta_deg), nominal, THETA_RAD, m_y, m_z, shared, f"b{beta_deg}"
             )
 
