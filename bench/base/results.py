@@ -34,6 +34,7 @@ SEEING = (
         "bench/trials/seeing.py",
         "bench/trials/truth_source.py",
         "bench/trials/stated_truth.py",
+        "bench/trials/stated_stroke.py",
         "bench/trials/stage_contact.py",
         "bench/trials/stated_length.py",
         "bench/trials/seen_friction.py",

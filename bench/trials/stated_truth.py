@@ -8,7 +8,6 @@ whisks of a session that angle is held against touch felt (`bench.trials.stage_t
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,31 +25,16 @@ from bench.records.trial_result import (
 from bench.session.file_names import TRIAL_TOML
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
-from bench.session.stage import StageLog
 from bench.session.trial import Trial
-from bench.trials.consistency import check_slope, nominal_slope, nominal_slope_sigma_rad
+from bench.trials.consistency import check_slope, nominal_slope
 from bench.trials.differences import agree
-from bench.trials.stage_contact import (
-    REST_TERMS,
-    Contact,
-    Offsets,
-    StatedBar,
-    StatedObject,
-    StatedPush,
-    StatedRounded,
-)
+from bench.trials.stage_contact import REST_TERMS, Contact, Offsets, StatedPush
 from bench.trials.stated_length import unit_within
-from bench.trials.trial_frames import stated_object
+from bench.trials.stated_stroke import StatedStroke
 from vision import NAN, UNKNOWN, SharedSigmas, TruthAtAngle, Value, WhiskTruth
-from vision.geometry import NO_REASON, Axis, Reason, Refused, Rounded, apply, joined
+from vision.geometry import NO_REASON, Axis, Reason, Refused, joined
 
 NOT_SEEN = reason("slip_not_seen")
-# [mm] One sigma of where the clamp holds the whisker's axis beside the hub's: a collet's runout.
-# Stated.
-_CLAMP_MM = 0.3
-# [1] Of the length: one sigma of the tip's distance from a straight line, by set and sag, where
-# nothing is stated of the unloaded shape. A drawn wire, straightened by hand. Stated.
-_SET_SHARE = 0.01
 # [mm] One sigma of a stated distance without one: a ruler's. Stated.
 _RULER_MM = 0.5
 # [mm] Least sigma of a place that is stated as exact. Derived.
@@ -191,7 +175,7 @@ def stated_whisk(session: Session, trial: Trial, signals: Signals, stroke: slice
     Raises BadInput for a distance beyond the whisker, or a place where no bar can be touched.
     """
     if trial.states_place:
-        return _by_place(session, trial, signals, stroke)
+        return _by_place(StatedStroke(session, trial, signals, stroke))
     if trial.d_x_mm is None:
         return StatedWhisk(WhiskTruth(0, status=reason("stage_says_nothing")))
     _check_on_whisker(trial.d_x_mm, session, trial)
@@ -208,15 +192,16 @@ def _truth(d_x_mm: Value, beta_rad: Value, psi_rad: Value, shared_mm: float) -> 
     return WhiskTruth(0, d_x_mm=d_x_mm, beta_rad=beta_rad, psi_rad=psi_rad, shared=shared)
 
 
-def _by_place(session: Session, trial: Trial, signals: Signals, stroke: slice) -> StatedWhisk:
-    """Return a stroke against an object that stands where the stage has it."""
-    push = _push(session, trial, signals, stroke)
+def _by_place(stroke: StatedStroke) -> StatedWhisk:
+    """Return the truth of a stroke against an object that stands where the stage has it."""
+    trial = stroke.trial
+    push = stroke.push()
     touch = push.touch(Offsets.none())
     if touch is None:
         return StatedWhisk(_without_touch(push, trial))
     by_offset = _derivatives(push, touch)  # (4, p)
-    own = by_offset * _own_sigmas(trial, signals, stroke, touch)
-    shared = by_offset * _shared_sigmas(session, trial, touch)
+    own = by_offset * stroke.own_sigmas(touch)
+    shared = by_offset * stroke.shared_sigmas(touch)
     own_sigma = np.linalg.norm(own, axis=1)  # (4,)
     shared_sigma = np.linalg.norm(shared, axis=1)
     _, *sigmas = np.hypot(own_sigma, shared_sigma).tolist()
@@ -234,14 +219,15 @@ def stated_place(session: Session, trial: Trial, signals: Signals) -> tuple[Axis
 
     Raises BadInput where no such place can be, Refused where no stroke comes to touch it there.
     """
-    for stroke in forward_strokes(signals):
-        push = _push(session, trial, signals, stroke)
+    for rows in forward_strokes(signals):
+        stroke = StatedStroke(session, trial, signals, rows)
+        push = stroke.push()
         touch = push.touch(Offsets.none())
         if touch is None:
             _check_place(push, trial)
             continue
-        own = Offsets.from_vector(_own_sigmas(trial, signals, stroke, touch))
-        shared = Offsets.from_vector(_shared_sigmas(session, trial, touch))
+        own = Offsets.from_vector(stroke.own_sigmas(touch))
+        shared = Offsets.from_vector(stroke.shared_sigmas(touch))
         shift_mm = np.hypot(own.place_mm, shared.place_mm).max()
         turn_rad = np.hypot(own.slope_rad, shared.slope_rad)
         sigma = np.repeat([max(shift_mm, _EXACT_MM), max(turn_rad, _EXACT_RAD)], 2)
@@ -254,58 +240,6 @@ def _without_touch(push: StatedPush, trial: Trial) -> WhiskTruth:
     _check_place(push, trial)
     code = "starts_touching" if push.starts_touching(Offsets.none()) else "never_touches"
     return WhiskTruth(0, status=Reason(code, f"by the stage the whisker {_HOW[code]}"))
-
-
-def _push(session: Session, trial: Trial, signals: Signals, stroke: slice) -> StatedPush:
-    """Return a stroke against the trial's object. Raise BadInput where the stage's log does not cover it."""
-    time_s = signals.time_s[stroke]
-    motor_rad = signals.motor_rad[stroke]
-    log = trial.stage
-    if log is not None:
-        _check_covers(log, time_s)
-    stated = trial.object
-    origin_mm = np.zeros(3) if stated is None or stated.point_mm is None else stated.point_mm
-    T_base_rig = np.eye(3, 4) if session.base is None else session.base.T_base_rig
-    rising = np.maximum.accumulate(motor_rad)
-
-    def place_at(angles_rad: np.ndarray) -> np.ndarray:
-        """Return the object's place (..., 3), mm, when the motor is at angles (...)."""
-        in_rig_mm = np.broadcast_to(origin_mm, (*np.shape(angles_rad), 3))
-        if log is not None:
-            in_rig_mm = in_rig_mm + log.at(np.interp(angles_rad, rising, time_s))
-        return apply(T_base_rig, in_rig_mm)
-
-    standing = _standing_object(trial, T_base_rig[:, :3])
-    return StatedPush(motor_rad, place_at, session.whisker.wire, standing)
-
-
-def _standing_object(trial: Trial, to_base: np.ndarray) -> StatedObject:
-    """Return the trial's object with its direction. to_base (3, 3): turns rig vectors into the whisker's base frame."""
-    form = stated_object(trial)
-    if isinstance(form, Rounded):
-        axis = to_base @ trial.object.direction
-        return StatedRounded(form, axis / np.linalg.norm(axis))
-    slope_rad = nominal_slope(trial).value
-    is_turned = trial.object is not None and trial.object.axis is not None
-    return StatedBar(
-        form.radius_mm,
-        _upward(to_base @ trial.object.axis) if is_turned else None,
-        float(slope_rad) if np.isfinite(slope_rad) else 0.0,
-    )
-
-
-def _check_covers(log: StageLog, time_s: np.ndarray) -> None:
-    """Raise BadInput where the stage's log does not cover a stroke's times (n,)."""
-    if not log.covers(time_s):
-        held = f"holds {log.time_s[0]:.6g} to {log.time_s[-1]:.6g} s"
-        found = f"{held}; a stroke of the signals goes from {time_s[0]:.6g} to {time_s[-1]:.6g} s"
-        raise BadInput(f"{found}; both are on one clock", file=log.label)
-
-
-def _upward(axis: Sequence[float]) -> np.ndarray:
-    """Return the unit vector (3,) along an axis whose z is not negative."""
-    axis = np.array(axis, dtype=float)
-    return axis / np.linalg.norm(axis) * (-1.0 if axis[2] < 0 else 1.0)
 
 
 def _derivatives(push: StatedPush, touch: Contact) -> np.ndarray:
@@ -321,34 +255,3 @@ def _derivatives(push: StatedPush, touch: Contact) -> np.ndarray:
             ends.append(numbers or [NAN] * 4)
         rows.append((np.array(ends[0]) - np.array(ends[1])) / (2.0 * step))
     return np.stack(rows, axis=-1)
-
-
-def _own_sigmas(trial: Trial, signals: Signals, stroke: slice, touch: Contact) -> np.ndarray:
-    """Return one sigma (p,) of each offset that is the trial's own: place and direction."""
-    variances = np.zeros(3)
-    if trial.object is not None and trial.object.point_mm is not None:
-        variances += trial.object.point_sigma_mm**2
-    if trial.stage is not None:
-        rising = np.maximum.accumulate(signals.motor_rad[stroke])
-        time_s = np.interp(touch.motor_rad, rising, signals.time_s[stroke])
-        variances += trial.stage.sigma_at(time_s) ** 2
-    slope_sigma_rad = nominal_slope_sigma_rad(trial)
-    return Offsets(
-        np.sqrt(variances), slope_sigma_rad, slope_sigma_rad, 0.0, np.zeros((2, REST_TERMS))
-    ).vector
-
-
-def _shared_sigmas(session: Session, trial: Trial, touch: Contact) -> np.ndarray:
-    """Return one sigma (p,) of each offset that all whisks share: origin, radii, the whisker's shape, its base."""
-    whisker = session.whisker
-    reach_mm = 0.5 * np.hypot(trial.bar_diameter_sigma_mm, whisker.diameter_sigma_mm)
-    is_stated = whisker.rest_curvature_per_mm is not None or whisker.rest_shape is not None
-    set_mm = 0.0 if is_stated else _SET_SHARE * whisker.length_mm
-    rest_mm = np.tile([_CLAMP_MM, 0.0, set_mm], (2, 1))
-    place_mm = session.truth.origin_sigma_mm
-    turn_rad = 0.0
-    if session.base is not None:
-        turn_rad = session.base.sigma_rad
-        of_base_mm = np.hypot(session.base.sigma_mm, turn_rad * touch.d_x_mm)
-        place_mm = math.hypot(place_mm, of_base_mm)
-    return Offsets(np.full(3, place_mm), turn_rad, turn_rad, float(reach_mm), rest_mm).vector
