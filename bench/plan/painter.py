@@ -102,9 +102,7 @@ class Painter:
         """Return one painted frame (h, w) of one camera as its file gives it back."""
         studio = self.studios[number]
         motor_rad = float(staged.known.motor_rad[frame])
-        instants = exposure_instants(
-            self.protocol, studio, staged.recording, staged.marched, motor_rad, False
-        )
+        instants = exposure_instants(studio, staged.recording, staged.marched, motor_rad, False)
         brightness = setting.brightness(instants)
         picture = studio.sensor.expose(brightness, self._stream(number, _FRAME, frame))
         if self.protocol.pictures.moving != "jpg":

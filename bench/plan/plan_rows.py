@@ -111,7 +111,6 @@ class Plan:
 class RigTask:
     """One trial of a rig to be planned."""
 
-    protocol: Protocol
     run: ProtocolRun
     cameras: Cameras
     changes: Sequence[Change]
@@ -144,15 +143,14 @@ def _with_more_light(protocol: Protocol) -> Protocol:
 
 def plan_run(task: RigTask) -> Row:
     """Return the row of a rig's trial."""
-    protocol = task.protocol
     facts = _facts(task.run)
     try:
-        staged = stage_run(protocol, task.run)
+        staged = stage_run(task.run)
     except ArithmeticError as problem:
         status = f"the whisker slips off or buckles ({problem}); push less far or nearer the base"
         return Row(facts, Outlook(status=status))
     begin_step(f"{task.run.name}: pictures, and the truth that they would give")
-    noise = painter_of(protocol).line_noise(staged, task.cameras)
+    noise = painter_of(task.run.protocol).line_noise(staged, task.cameras)
     predicted = predict_truth(staged.known, task.cameras, noise, Clamp.of(staged))
     changes = []
     for change in count_parts(task.changes, f"{task.run.name}, changes", len(task.changes)):
@@ -168,7 +166,7 @@ def _noise_with(
     """Return by camera the noise of its lines with a change; noise: on the present bench."""
     if not change.light:
         return change.line_noise(noise, staged.known)
-    brighter = painter_of(_with_more_light(task.protocol))
+    brighter = painter_of(_with_more_light(task.run.protocol))
     return brighter.line_noise(staged, task.cameras)
 
 

@@ -149,8 +149,7 @@ def _rig_tasks(rig: _PlacedRig, options: Options) -> list[RigTask]:
     if options.changes:
         changes = list_changes(rig.cameras, rig.work, rig.target_mm, light=True)
     theta_rad = math.radians(options.theta_deg)
-    runs = rig.protocol.runs()
-    return [RigTask(rig.protocol, run, rig.cameras, changes, theta_rad) for run in runs]
+    return [RigTask(run, rig.cameras, changes, theta_rad) for run in rig.protocol.runs()]
 
 
 def _load_rig(path: Path) -> Protocol:
@@ -188,7 +187,7 @@ def _stage_runs(protocol: Protocol) -> dict[str, StagedWhisk]:
     runs = protocol.runs()
     for run in count_parts(runs, "whisks staged", len(runs)):
         try:
-            staged[run.name] = stage_run(protocol, run)
+            staged[run.name] = stage_run(run)
         except ArithmeticError:
             continue
     return staged

@@ -10,7 +10,7 @@ import numpy as np
 from bench.rig.bar import TouchedBar, UnloadedTouch
 from bench.rig.elastic_rod import Rod
 from bench.rig.linear import rotate_about_z
-from bench.rig.protocol import Protocol, ProtocolRun
+from bench.rig.protocol import ProtocolRun
 from bench.rig.recording import Recording
 from bench.rig.stick_slip import FrictionCoefficients
 from bench.rig.whisk_mechanics import WhiskMechanics
@@ -38,8 +38,8 @@ class StagedWhisk:
     recording: Recording | None = None
 
 
-def stage_run(protocol: Protocol, run: ProtocolRun) -> StagedWhisk:
-    """Return a whisk of a protocol's trial, with everything exactly where it is wanted.
+def stage_run(run: ProtocolRun) -> StagedWhisk:
+    """Return a whisk of a rig's trial, with everything exactly where it is wanted.
 
     Raises ArithmeticError where the whisker slips off or buckles.
     """
@@ -48,13 +48,14 @@ def stage_run(protocol: Protocol, run: ProtocolRun) -> StagedWhisk:
         if name.endswith(("_scatter_deg", "_scatter_mm")):
             exact[name] = 0.0
     table = msgspec.structs.replace(run.table, whisks=1, **exact)
+    protocol = run.protocol
     gauges = msgspec.structs.replace(
         protocol.gauges, vibration=False, filter_Hz=0.0, rate_Hz=_SLOW_HZ
     )
     friction = msgspec.structs.replace(protocol.friction, scatter=0.0, irregular=0.0)
     alone = msgspec.structs.replace(protocol, gauges=gauges, friction=friction)
-    run = msgspec.structs.replace(run, table=table)
-    recording = Recording.make(alone, run, np.random.default_rng(0))
+    run = msgspec.structs.replace(run, table=table, protocol=alone)
+    recording = Recording.make(run, np.random.default_rng(0))
     frames = recording.frames
     forth = ~frames.back
     whisk = as_staged(recording.whisks[0], frames.motor_rad[forth], frames.time_s[forth])

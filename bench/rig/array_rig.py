@@ -95,7 +95,6 @@ class ArrayRecording:
     @classmethod
     def make(
         cls,
-        protocol: Protocol,
         run: ProtocolRun,
         whiskers: Sequence[MountedWhisker],
         rngs: Sequence[np.random.Generator],
@@ -105,38 +104,38 @@ class ArrayRecording:
         Raises ArithmeticError, naming the whisker, where one cannot go on, BadInput where one
         cannot begin.
         """
-        bar, near_rad, _ = place_object(protocol, run, build.rod(protocol), rngs[0])
+        bar, near_rad, _ = place_object(run, build.rod(run.protocol), rngs[0])
         touches = {}
         for whisker in whiskers:
             touches[whisker.name] = _find_touch(whisker, bar, near_rad)
-        strokes = _plan_strokes(protocol, run, whiskers, touches, near_rad)
-        frame_times_s = _frame_times_s(protocol, run, next(iter(strokes.values())))
+        strokes = _plan_strokes(run, whiskers, touches, near_rad)
+        frame_times_s = _frame_times_s(run, next(iter(strokes.values())))
         recordings = {}
         channels = {}
         for whisker, rng in zip(whiskers, rngs[1:]):
             stroke = strokes[whisker.column.name]
             recording, signals = _record(
-                protocol, run, whisker, bar, touches[whisker.name], stroke, frame_times_s, rng
+                run, whisker, bar, touches[whisker.name], stroke, frame_times_s, rng
             )
             recordings[whisker.name] = recording
-            columns = dict(zip(channel_names(protocol), signals.T))
+            columns = dict(zip(channel_names(run.protocol), signals.T))
             _add_channels(channels, whisker, columns, len(strokes) > 1)
         return cls(run, bar, recordings, strokes, channels, frame_times_s)
 
 
 def _record(
-    protocol, run, whisker, bar, touch, stroke, frame_times_s, rng
+    run, whisker, bar, touch, stroke, frame_times_s, rng
 ) -> tuple[Recording | None, np.ndarray]:
     """Simulate one whisker; return its recording, None where it touches nothing, and its signals.
 
     Raises ArithmeticError, naming it, where it cannot go on.
     """
     if touch is None or touch.motor_rad >= stroke.angles_rad.max():
-        return None, sample_signals(protocol, run, stroke, (), whisker.gauges, rng)
+        return None, sample_signals(run, stroke, (), whisker.gauges, rng)
     exposures = _exposures(stroke, frame_times_s)
     own_bar = bar.in_frame(whisker.pose)
     try:
-        recording = Recording.record(protocol, run, whisker, own_bar, touch, stroke, exposures, rng)
+        recording = Recording.record(run, whisker, own_bar, touch, stroke, exposures, rng)
     except ArithmeticError as problem:
         raise ArithmeticError(f"whisker {whisker.name}: {problem}") from None
     return recording, recording.signals
@@ -181,7 +180,7 @@ def find_touch_from_afar(rod: Rod, bar: TouchedObject, towards_rad: float) -> Un
     return None
 
 
-def _plan_strokes(protocol, run, whiskers, touches, near_rad) -> dict[str, Stroke]:
+def _plan_strokes(run, whiskers, touches, near_rad) -> dict[str, Stroke]:
     """Return each column's stroke, from before its first touch; all go as far as the one that
     goes farthest."""
     before_rad = math.radians(run.before_deg)
@@ -193,7 +192,7 @@ def _plan_strokes(protocol, run, whiskers, touches, near_rad) -> dict[str, Strok
         last = min(max(angles), min(angles) + _FARTHEST_RAD - after_rad)
         spans.append(last + after_rad - starts[name])
     span = max(spans)
-    return {name: plan_stroke(protocol, run, low, low + span) for name, low in starts.items()}
+    return {name: plan_stroke(run, low, low + span) for name, low in starts.items()}
 
 
 def _touch_angles_rad(whiskers, touches, near_rad) -> dict[str, list[float]]:
@@ -210,9 +209,9 @@ def _touch_angles_rad(whiskers, touches, near_rad) -> dict[str, list[float]]:
     return angles
 
 
-def _frame_times_s(protocol, run, stroke) -> list[np.ndarray]:
+def _frame_times_s(run, stroke) -> list[np.ndarray]:
     """Return the middles of the exposures of each forward stroke, from end to end of it."""
-    pictures = protocol.pictures
+    pictures = run.protocol.pictures
     step_s = 1.0 / pictures.rate_Hz if pictures.rate_Hz else pictures.step_deg / run.speed_deg_s
     return [np.arange(start, end, step_s) for start, end in stroke.forward]
 

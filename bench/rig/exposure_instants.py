@@ -10,7 +10,6 @@ from bench.rig.elastic_rod import Rod
 from bench.rig.light import Material
 from bench.rig.mirror import MirrorStudio
 from bench.rig.painted_scene import HUB_FRONT_MM
-from bench.rig.protocol import Protocol
 from bench.rig.recording import Recording
 from bench.rig.studio import Instant, Studio
 from bench.rig.tube import Tube
@@ -21,7 +20,6 @@ _LEAST_RADIUS_MM = 0.01  # of a whisker in pictures
 
 
 def exposure_instants(
-    protocol: Protocol,
     studio: Studio | MirrorStudio,
     recording: Recording,
     whisk: WhiskMechanics,
@@ -31,11 +29,10 @@ def exposure_instants(
     """Return the instants of one exposure: as many as keep the whisker's tip within half a pixel
     from one to the next."""
     rod = recording.rod
-    speed_deg_s = recording.run.speed_deg_s
     near_mm = recording.touch.point_mm
     arc = _drawn_arcs_mm(rod)
     instants = []
-    for turn in _exposure_turns_rad(protocol, studio, speed_deg_s, rod.length_mm, near_mm):
+    for turn in _exposure_turns_rad(recording.run, studio, rod.length_mm, near_mm):
         state = whisk.path(back).state_between(motor_rad + turn)
         points = whisk.centreline_mm(motor_rad + turn, state, arc)
         tube = _tube(rod, arc, points, studio.scene.appearance.wire)
@@ -44,7 +41,6 @@ def exposure_instants(
 
 
 def array_exposure_instants(
-    protocol: Protocol,
     studio: Studio | MirrorStudio,
     recording: ArrayRecording,
     whiskers: Sequence[MountedWhisker],
@@ -54,9 +50,8 @@ def array_exposure_instants(
     """Return the instants of one exposure of an array, about a time of one of its whisks."""
     length_mm = max(whisker.rod.length_mm for whisker in whiskers)
     near_mm = recording.bar.point_mm
-    speed_deg_s = recording.run.speed_deg_s
     instants = []
-    for turn in _exposure_turns_rad(protocol, studio, speed_deg_s, length_mm, near_mm):
+    for turn in _exposure_turns_rad(recording.run, studio, length_mm, near_mm):
         motor = {}  # rad, by column
         hubs = []
         for stand, (name, stroke) in zip(studio.scene.stands, recording.strokes.items()):
@@ -72,11 +67,11 @@ def array_exposure_instants(
     return instants
 
 
-def _exposure_turns_rad(protocol, studio, speed_deg_s, length_mm, near_mm) -> list[float]:
+def _exposure_turns_rad(run, studio, length_mm, near_mm) -> list[float]:
     """Return by how much the motor has turned since the middle of the exposure, at each
     instant."""
-    pictures = protocol.pictures
-    swept = np.radians(speed_deg_s) * pictures.exposure_s if pictures.motion_blur else 0.0
+    pictures = run.protocol.pictures
+    swept = np.radians(run.speed_deg_s) * pictures.exposure_s if pictures.motion_blur else 0.0
     near = np.linalg.norm(studio.camera.centre_mm - near_mm)
     count = 1 + int(2 * swept * length_mm * studio.camera.matrix[0, 0] / near)
     return (swept * ((np.arange(count) + 0.5) / count - 0.5)).tolist()

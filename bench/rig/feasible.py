@@ -28,10 +28,10 @@ def check_protocol(protocol: "Protocol", path: Path) -> None:
         _check_columns(protocol)
         _check_microphone(protocol)
         for run in protocol.runs():
-            _check_run(protocol, run)
+            _check_run(run)
             _check_object(run)
-            _check_moving(protocol, run)
-            _check_rotations(protocol, run)
+            _check_moving(run)
+            _check_rotations(run)
     except ValueError as problem:
         raise BadInput(str(problem), file=path) from None
 
@@ -84,12 +84,12 @@ def _check_microphone(protocol):
         raise ValueError(f"{found}; rising, above 0 and below {highest_Hz:g} is allowed")
 
 
-def _check_run(protocol, run: "ProtocolRun"):
+def _check_run(run: "ProtocolRun"):
     """Raise ValueError for a trial's angles, distance, speed and stroke."""
     if not (abs(run.beta_deg) <= _STEEPEST_DEG and abs(run.psi_deg) <= _MOST_TILT_DEG):
         allowed = f"±{_STEEPEST_DEG:g} and ±{_MOST_TILT_DEG:g} are allowed"
         raise ValueError(f"beta_deg {run.beta_deg:g}, psi_deg {run.psi_deg:g}; {allowed}")
-    length_mm = protocol.whisker.length_mm
+    length_mm = run.protocol.whisker.length_mm
     if not _NEAREST * length_mm <= run.d_x_mm <= 1.05 * length_mm:
         raise ValueError(
             f"d_x_mm {run.d_x_mm:g} is outside {_NEAREST:g} to 1.05 of the whisker's length"
@@ -101,7 +101,7 @@ def _check_run(protocol, run: "ProtocolRun"):
         raise ValueError(
             f"the motor's before_deg is 0.1 to 90 and its after_deg 0.1 to 25; {found}"
         )
-    pictures = protocol.pictures
+    pictures = run.protocol.pictures
     if pictures.before_deg > run.before_deg or pictures.after_deg > run.after_deg:
         raise ValueError("pictures: before_deg and after_deg are at most the motor's")
 
@@ -121,7 +121,7 @@ def _check_object(run: "ProtocolRun"):
         raise ValueError(f"static_friction {static:g} is below friction {table.friction:g}")
 
 
-def _check_moving(protocol, run: "ProtocolRun"):
+def _check_moving(run: "ProtocolRun"):
     """Raise ValueError for an object that moves otherwise than with the motor's steady motion, by
     which the march goes."""
     velocity = run.table.object_velocity_mm_s
@@ -129,9 +129,10 @@ def _check_moving(protocol, run: "ProtocolRun"):
         return
     key = "object_velocity_mm_s: "
     moves = key + "an object that moves is "
-    if protocol.goes_back(run) or protocol.motor.ramp_s or protocol.motor.pause_s:
+    motor = run.protocol.motor
+    if run.goes_back or motor.ramp_s or motor.pause_s:
         raise ValueError(f"{moves}simulated for single forward strokes without ramps and pauses")
-    if protocol.columns:
+    if run.protocol.columns:
         raise ValueError(f"{moves}simulated for one whisker")
     if run.table.stiffness_N_mm:
         raise ValueError(f"{moves}rigid; leave out stiffness_N_mm")
@@ -142,7 +143,7 @@ def _check_moving(protocol, run: "ProtocolRun"):
         raise ValueError(f"{key}{speed:.3g} mm/s, {allowed}")
 
 
-def _check_rotations(protocol, run: "ProtocolRun"):
+def _check_rotations(run: "ProtocolRun"):
     """Raise ValueError where rotations in turned planes would not meet one and the same contact."""
     table = run.table
     if not table.rotations:
@@ -151,5 +152,5 @@ def _check_rotations(protocol, run: "ProtocolRun"):
         raise ValueError(
             "rotations are against one object: beta_scatter_deg, psi_scatter_deg and d_x_scatter_mm are 0"
         )
-    if table.purpose == "gauge" or protocol.columns or protocol.goes_back(run):
+    if table.purpose == "gauge" or run.protocol.columns or run.goes_back:
         raise ValueError("rotations are single forward strokes that measure, of one whisker")

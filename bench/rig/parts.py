@@ -126,8 +126,8 @@ def _write_trial(job, number, folder):
     """Write the files of a trial of one whisker."""
     run = job.protocol.runs()[number]
     first = number - run.rotation
-    run = turned_plane(job.protocol, run, lambda rotation: job.stream(_TRIAL, first + rotation))
-    recording = Recording.make(job.protocol, run, job.stream(_TRIAL, number))
+    run = turned_plane(run, lambda rotation: job.stream(_TRIAL, first + rotation))
+    recording = Recording.make(run, job.stream(_TRIAL, number))
     clock_offset_s = job.protocol.pictures.clock_offset_s
     texts = {
         "trial.toml": session_files.trial_toml(recording, by_stage=bool(job.protocol.stage)),
@@ -144,7 +144,7 @@ def _write_array_trial(job, number, folder):
     streams = [job.stream(_TRIAL, number)]
     streams += [job.stream(_ARRAY, number, whisker) for whisker in range(len(job.whiskers))]
     run = job.protocol.runs()[number]
-    recording = ArrayRecording.make(job.protocol, run, job.whiskers, streams)
+    recording = ArrayRecording.make(run, job.whiskers, streams)
     clock_offset_s = job.protocol.pictures.clock_offset_s
     times_s = np.concatenate(recording.frame_times_s)
     texts = {
@@ -176,7 +176,7 @@ def render_frames(job: Job, trial: int, camera: int, recording: Recording) -> It
     still = studio.setting(bar, middle) if bar.velocity_mm_rad is None else None
     for number, (_, motor_rad, which, back) in enumerate(recording.frames):
         whisk = recording.whisks[which]
-        instants = exposure_instants(job.protocol, studio, recording, whisk, motor_rad, back)
+        instants = exposure_instants(studio, recording, whisk, motor_rad, back)
         gave = whisk.gave_mm(motor_rad, back)
         setting = still
         if still is None or gave.any():
@@ -196,9 +196,7 @@ def render_array_frames(
     number = 0
     for whisk, times_s in enumerate(recording.frame_times_s):
         for time_s in times_s.tolist():
-            instants = array_exposure_instants(
-                job.protocol, studio, recording, job.whiskers, time_s, whisk
-            )
+            instants = array_exposure_instants(studio, recording, job.whiskers, time_s, whisk)
             noise = job.stream(_TRIAL, trial, camera + 1, number)
             yield studio.sensor.expose(setting.brightness(instants), noise)
             number += 1

@@ -58,7 +58,7 @@ class Protocol(ProtocolTable, kw_only=True):
         """Return the trials one by one, their names numbered where several are alike."""
         runs = []
         for table in self.trials:
-            runs += _table_runs(table, self.motor)
+            runs += _table_runs(table, self)
         totals = Counter((run.name, run.rotation) for run in runs)
         counts = Counter()
         named = []
@@ -71,22 +71,13 @@ class Protocol(ProtocolTable, kw_only=True):
             named.append(msgspec.structs.replace(run, contact=contact, name=contact + rotation))
         return named
 
-    def goes_back(self, run: "ProtocolRun") -> bool:
-        """Return whether a trial's recording holds back strokes."""
-        return (
-            run.table.whisks > 1
-            or bool(run.table.both_ways)
-            or self.motor.back_stroke
-            or self.pictures.back_stroke
-        )
-
     def fingerprint(self) -> str:
         """Return a hash that changes with any value."""
         return hashlib.sha256(msgspec.json.encode(self)).hexdigest()
 
 
 class ProtocolRun(msgspec.Struct, frozen=True):
-    """One trial. The motor goes from `before_deg` before touch to `after_deg` after it.
+    """One trial of a protocol. The motor goes from `before_deg` before touch to `after_deg` after it.
 
     rotation: its number among the rotations against one object. contact: the name that these share.
     plane_turn_deg: how far the plane of rotation is turned about the whisker, against which beta_deg is
@@ -101,9 +92,20 @@ class ProtocolRun(msgspec.Struct, frozen=True):
     before_deg: float
     after_deg: float
     table: TrialTable
+    protocol: Protocol
     rotation: int = 1
     contact: str = ""
     plane_turn_deg: float = 0.0
+
+    @property
+    def goes_back(self) -> bool:
+        """Return whether its recording holds back strokes."""
+        return (
+            self.table.whisks > 1
+            or bool(self.table.both_ways)
+            or self.protocol.motor.back_stroke
+            or self.protocol.pictures.back_stroke
+        )
 
     def turned(self, plane_turn_deg: float) -> "ProtocolRun":
         """Return the run with its plane of rotation turned about the whisker."""
@@ -111,8 +113,9 @@ class ProtocolRun(msgspec.Struct, frozen=True):
         return msgspec.structs.replace(self, beta_deg=beta_deg, plane_turn_deg=plane_turn_deg)
 
 
-def _table_runs(table, motor) -> list[ProtocolRun]:
-    """Return the trials of one table."""
+def _table_runs(table, protocol) -> list[ProtocolRun]:
+    """Return the trials of one table of a protocol."""
+    motor = protocol.motor
     before_deg = table.before_deg or motor.before_deg
     after_deg = table.after_deg or motor.after_deg
     values = [table.speed_deg_s, table.beta_deg, table.psi_deg, table.d_x_mm]
@@ -120,7 +123,7 @@ def _table_runs(table, motor) -> list[ProtocolRun]:
     runs = []
     for speed, beta, psi, d_x, _ in itertools.product(*lists, range(table.repeats)):
         name = _run_name(table, speed, beta, psi)
-        run = ProtocolRun(name, beta, psi, d_x, speed, before_deg, after_deg, table)
+        run = ProtocolRun(name, beta, psi, d_x, speed, before_deg, after_deg, table, protocol)
         rotations = range(1, (table.rotations or 1) + 1)
         runs += [msgspec.structs.replace(run, rotation=rotation) for rotation in rotations]
     return runs

@@ -72,13 +72,13 @@ class Recording:
     stated_velocity_mm_s: np.ndarray | None = None
 
     @classmethod
-    def make(cls, protocol: Protocol, run: ProtocolRun, rng: np.random.Generator) -> "Recording":
+    def make(cls, run: ProtocolRun, rng: np.random.Generator) -> "Recording":
         """Simulate a run, the chance in it drawn from `rng`.
 
         Raises ArithmeticError where the whisker cannot go on.
         """
-        whisker = GaugedWhisker(build.rod(protocol), protocol.gauges)
-        bar, *near = place_object(protocol, run, whisker.rod, rng)
+        whisker = GaugedWhisker(build.rod(run.protocol), run.protocol.gauges)
+        bar, *near = place_object(run, whisker.rod, rng)
         touch = find_first_touch(whisker.rod, bar, *near)
         velocity_mm_s = run.table.object_velocity_mm_s
         if velocity_mm_s:
@@ -86,16 +86,13 @@ class Recording:
             bar = replace(bar, velocity_mm_rad=velocity_mm_rad, touch_rad=touch.motor_rad)
         before_rad = math.radians(run.before_deg)
         after_rad = math.radians(run.after_deg)
-        stroke = plan_stroke(
-            protocol, run, touch.motor_rad - before_rad, touch.motor_rad + after_rad
-        )
-        frames = _take_frames(protocol, run, touch, stroke)
-        return cls.record(protocol, run, whisker, bar, touch, stroke, frames, rng)
+        stroke = plan_stroke(run, touch.motor_rad - before_rad, touch.motor_rad + after_rad)
+        frames = _take_frames(run, touch, stroke)
+        return cls.record(run, whisker, bar, touch, stroke, frames, rng)
 
     @classmethod
     def record(
         cls,
-        protocol: Protocol,
         run: ProtocolRun,
         whisker: GaugedWhisker,
         bar: TouchedObject,
@@ -108,7 +105,7 @@ class Recording:
 
         Raises ArithmeticError where the whisker cannot go on.
         """
-        frictions = _draw_frictions(protocol, run, len(stroke.forward), rng)
+        frictions = _draw_frictions(run, len(stroke.forward), rng)
         in_first = (frames.whisk == 0) & ~frames.back
         mechanics = {}  # whisks of one friction are alike
         for friction in dict.fromkeys(frictions):
@@ -123,7 +120,7 @@ class Recording:
                 back=bool(stroke.back),
             )
         whisks = tuple(mechanics[friction] for friction in frictions)
-        signals = sample_signals(protocol, run, stroke, whisks, whisker.gauges, rng)
+        signals = sample_signals(run, stroke, whisks, whisker.gauges, rng)
         return cls(
             run,
             whisker.rod,
@@ -133,13 +130,13 @@ class Recording:
             whisks,
             frames,
             signals,
-            channel_names(protocol),
+            channel_names(run.protocol),
             _state_velocity(run, rng),
         )
 
 
 def place_object(
-    protocol: Protocol, run: ProtocolRun, rod: Rod, rng: np.random.Generator
+    run: ProtocolRun, rod: Rod, rng: np.random.Generator
 ) -> tuple[TouchedObject, float, float]:
     """Place the object as people set it, near what they wanted of the unloaded whisker.
 
@@ -153,7 +150,7 @@ def place_object(
         beta_rad=math.radians(beta_deg),
         psi_rad=math.radians(psi_deg),
         touch_rad=touch_rad,
-        radius_mm=(table.bar_diameter_mm or protocol.bar_diameter_mm) / 2,
+        radius_mm=(table.bar_diameter_mm or run.protocol.bar_diameter_mm) / 2,
         whisker_radius_mm=float(rod.radius_mm(min(d_x_mm, rod.length_mm))),
         stiffness_N_mm=table.stiffness_N_mm or math.inf,
     )
@@ -180,16 +177,17 @@ def _draw_place(run: ProtocolRun, rng: np.random.Generator) -> np.ndarray:
     return wanted + scatter * rng.standard_normal(4)
 
 
-def plan_stroke(protocol: Protocol, run: ProtocolRun, low_rad: float, high_rad: float) -> Stroke:
+def plan_stroke(run: ProtocolRun, low_rad: float, high_rad: float) -> Stroke:
     """Return a run's motion between two motor angles."""
+    motor = run.protocol.motor
     return Stroke.plan(
         low_rad,
         high_rad,
         math.radians(run.speed_deg_s),
         whisks=run.table.whisks,
-        ramp_s=protocol.motor.ramp_s,
-        pause_s=protocol.motor.pause_s,
-        back=protocol.goes_back(run),
+        ramp_s=motor.ramp_s,
+        pause_s=motor.pause_s,
+        back=run.goes_back,
     )
 
 
@@ -202,7 +200,6 @@ def channel_names(protocol: Protocol) -> tuple[str, ...]:
 
 
 def sample_signals(
-    protocol: Protocol,
     run: ProtocolRun,
     stroke: Stroke,
     whisks: Sequence[WhiskMechanics],
@@ -211,6 +208,7 @@ def sample_signals(
 ) -> np.ndarray:
     """Return what the DAQ writes (n, k), of the columns `channel_names`; without whisks, of a whisker that
     touches nothing."""
+    protocol = run.protocol
     fine_s = fine_times_s(gauges, stroke.end_s)
     moments = quasi_static_Nmm(stroke, whisks, fine_s)
     if gauges.vibration and whisks:
@@ -239,15 +237,16 @@ def _state_velocity(run, rng) -> np.ndarray | None:
     return np.array(table.object_velocity_mm_s) + sigma * rng.standard_normal(3)
 
 
-def _take_frames(protocol, run, touch, stroke) -> Exposures:
+def _take_frames(run, touch, stroke) -> Exposures:
     """Return the exposures of all whisks, the camera triggered anew in each.
 
     On the way back, where that is wanted, they are at the same angles but the furthest, where the
     motor may turn.
     """
-    up = touch.motor_rad + np.radians(protocol.pictures.frame_angles_deg(run.speed_deg_s))
+    pictures = run.protocol.pictures
+    up = touch.motor_rad + np.radians(pictures.frame_angles_deg(run.speed_deg_s))
     passes = [(up, False)]
-    if protocol.pictures.back_stroke:
+    if pictures.back_stroke:
         passes.append((up[-2::-1], True))
     parts = []  # (4, n): the columns of frames of one way of one whisk
     for whisk in range(len(stroke.forward)):
@@ -259,9 +258,9 @@ def _take_frames(protocol, run, touch, stroke) -> Exposures:
     return Exposures(times, angles, whisks.astype(int), backs.astype(bool))
 
 
-def _draw_frictions(protocol, run, count: int, rng) -> list[FrictionCoefficients]:
+def _draw_frictions(run, count: int, rng) -> list[FrictionCoefficients]:
     """Draw the friction in each of the whisks; regular rests draw nothing."""
-    table = protocol.friction
+    table = run.protocol.friction
     kinetic = run.table.friction
     static = kinetic if run.table.static_friction is None else run.table.static_friction
     frictions = []

@@ -56,7 +56,7 @@ def forecast(job: Job, workers: int) -> str:
     runs = job.protocol.runs()
     whiskers = max(1, len(job.whiskers))
     whisks = whiskers * sum(run.table.whisks for run in runs)
-    samples = whiskers * sum(_sample_count(job.protocol, run) for run in runs)
+    samples = whiskers * sum(_sample_count(run) for run in runs)
     frames = _frame_count(job)  # of each camera
     sizes_px = [camera.size_px for camera in job.protocol.cameras]
     pictures = frames * len(sizes_px)
@@ -69,10 +69,11 @@ def forecast(job: Job, workers: int) -> str:
     return f"{found}: about {megabytes:.0f} MB and {minutes:.1f} minutes"
 
 
-def _sample_count(protocol, run) -> float:
+def _sample_count(run) -> float:
     """Return the number of samples of a trial's signals."""
+    protocol = run.protocol
     stroke_s = (run.before_deg + run.after_deg) / run.speed_deg_s + protocol.motor.pause_s
-    strokes = run.table.whisks * (2 if protocol.goes_back(run) else 1)
+    strokes = run.table.whisks * (2 if run.goes_back else 1)
     return stroke_s * strokes * protocol.gauges.rate_Hz
 
 

@@ -27,7 +27,7 @@ def pushed(bar_mm: float, d_x_mm: float) -> Whisk:
     protocol = Protocol(
         trials=[table], motor=MotorTable(after_deg=4.0), pictures=PicturesTable(step_deg=3.0)
     )
-    recording = Recording.make(protocol, protocol.runs()[0], np.random.default_rng(0))
+    recording = Recording.make(protocol.runs()[0], np.random.default_rng(0))
     (whisk,) = recording.whisks
     (moments,) = whisk.forward.moments_at(np.array([recording.touch.motor_rad + THETA]))
     return Whisk.without_samples(THETA, moments, 1e-6 * np.eye(2), BEAM)

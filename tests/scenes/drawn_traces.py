@@ -41,7 +41,7 @@ def exact_cameras(job: Job) -> Cameras:
 
 def recorded_run(job: Job, run, number: int) -> Recording:
     """What the rig records of a job's run, of this number among all."""
-    return Recording.make(job.protocol, run, job.stream(_TRIAL, number))
+    return Recording.make(run, job.stream(_TRIAL, number))
 
 
 def _curve(recording, _time_s, motor_rad, whisk, back):

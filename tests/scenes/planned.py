@@ -29,7 +29,7 @@ def protocol_of(folder, text: str = BENCH) -> Protocol:
 
 def staged_of(protocol: Protocol) -> StagedWhisk:
     """Its first trial."""
-    return stage_run(protocol, protocol.runs()[0])
+    return stage_run(protocol.runs()[0])
 
 
 def cameras_of(protocol: Protocol) -> Cameras:

@@ -31,14 +31,14 @@ def protocol(**column) -> Protocol:
 def recorded(made: Protocol) -> ArrayRecording:
     whiskers = mount_whiskers(made, np.random.default_rng(0))
     rngs = [np.random.default_rng(k) for k in range(1 + len(whiskers))]
-    return ArrayRecording.make(made, *made.runs(), whiskers, rngs)
+    return ArrayRecording.make(*made.runs(), whiskers, rngs)
 
 
 def test_one_whisker_at_the_origin_feels_what_it_feels_alone():
     """Its march stops at other frames, and moments lie on straight lines between instants 0.1° apart: over a bend of
     1 % a degree of a slope of 0.1 V a degree that is 1e-6 V."""
     made = protocol()
-    alone = Recording.make(made, *made.runs(), np.random.default_rng(0))
+    alone = Recording.make(*made.runs(), np.random.default_rng(0))
     array = recorded(made)
     assert array.recordings["w1"].touch.motor_rad == pytest.approx(alone.touch.motor_rad, abs=1e-12)
     for name, column in zip(("time_s", "motor_deg", "y_V@w1", "z_V@w1"), alone.signals.T):

@@ -50,7 +50,7 @@ def test_each_kind_of_whisker_meets_its_bar_where_the_protocol_wants(name):
     run = protocol.runs()[-1]
     exact = {key: 0.0 for key in run.table.__struct_fields__ if "scatter" in key}
     run = msgspec.structs.replace(run, table=msgspec.structs.replace(run.table, **exact))
-    recording = Recording.make(protocol, run, np.random.default_rng(1))
+    recording = Recording.make(run, np.random.default_rng(1))
     assert recording.touch.d_x_mm == pytest.approx(run.d_x_mm, rel=0.01)
     assert math.degrees(recording.touch.motor_rad) == pytest.approx(2.3, abs=0.2)
     whisk = recording.whisks[0]

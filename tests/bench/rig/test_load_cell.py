@@ -25,7 +25,7 @@ TRIAL = TrialTable(beta_deg=40.0, d_x_mm=55.0)
 
 def recording(**changes) -> Recording:
     protocol = Protocol(trials=[TRIAL], **changes)
-    return Recording.make(protocol, *protocol.runs(), np.random.default_rng(5))
+    return Recording.make(*protocol.runs(), np.random.default_rng(5))
 
 
 @pytest.mark.parametrize("beta_deg, alpha_deg", [(0.0, 20.0), (40.0, 10.0), (70.0, 5.0)])

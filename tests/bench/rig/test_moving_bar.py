@@ -19,7 +19,7 @@ EXACTLY = {"beta_scatter_deg": 0.0, "d_x_scatter_mm": 0.0, "touch_scatter_deg": 
 def recording(velocity_mm_s, **trial) -> Recording:
     table = TrialTable(object_velocity_mm_s=velocity_mm_s, **EXACTLY, **trial)
     protocol = Protocol(trials=[table])
-    return Recording.make(protocol, *protocol.runs(), np.random.default_rng(5))
+    return Recording.make(*protocol.runs(), np.random.default_rng(5))
 
 
 @pytest.mark.parametrize("velocity", [(0.0, 2.0, 0.0), (1.5, -2.0, 1.0)])

@@ -38,11 +38,11 @@ def test_after_one_turn_the_slope_is_the_friction_angle(protocol):
     """To 0.5°: of the signals' noise 0.15°, and of bending by 3° a part of it."""
     loaded = load(protocol)
     first, second, third = loaded.runs()
-    assert turned_plane(loaded, first, np.random.default_rng).plane_turn_deg == 0.0
-    turned = turned_plane(loaded, second, np.random.default_rng)
+    assert turned_plane(first, np.random.default_rng).plane_turn_deg == 0.0
+    turned = turned_plane(second, np.random.default_rng)
     assert turned.beta_deg == pytest.approx(ALPHA_DEG, abs=0.5)
     assert turned.beta_deg + turned.plane_turn_deg == 40.0
-    assert abs(turned_plane(loaded, third, np.random.default_rng).beta_deg) < ALPHA_DEG + 0.5
+    assert abs(turned_plane(third, np.random.default_rng).beta_deg) < ALPHA_DEG + 0.5
 
 
 def test_a_trial_says_what_was_turned_whatever_was_made_before_it(protocol, tmp_path):

@@ -38,7 +38,7 @@ def recording(tmp_path, *changes):
     path = tmp_path / "protocol.toml"
     path.write_text(text)
     protocol = load(path)
-    return Recording.make(protocol, protocol.runs()[0], np.random.default_rng(11))
+    return Recording.make(protocol.runs()[0], np.random.default_rng(11))
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ EXACTLY = {"beta_scatter_deg": 0.0, "d_x_scatter_mm": 0.0, "touch_scatter_deg": 
 
 def recording(**trial) -> Recording:
     protocol = Protocol(trials=[TrialTable(**EXACTLY, **trial)])
-    return Recording.make(protocol, *protocol.runs(), np.random.default_rng(5))
+    return Recording.make(*protocol.runs(), np.random.default_rng(5))
 
 
 @pytest.mark.parametrize("beta_deg", [0.0, 40.0])

@@ -79,7 +79,7 @@ def test_friction_holds_slip_and_moment_back_on_both_ways(ways):
 def test_the_whisker_that_is_drawn_touches_where_truth_says(back, tmp_path):
     """On both ways its centreline runs through the contact point, at frames and between them."""
     protocol = load(protocol_file(tmp_path, WAYS))
-    recording = Recording.make(protocol, protocol.runs()[0], np.random.default_rng(2))
+    recording = Recording.make(protocol.runs()[0], np.random.default_rng(2))
     whisk, way = recording.whisks[0], recording.whisks[0].path(back)
     frames = [
         motor

@@ -72,7 +72,7 @@ def errors_percent(
     )
     protocol = _protocol(design, table)
     for _ in range(whisks):
-        recording = Recording.make(protocol, *protocol.runs(), rng)
+        recording = Recording.make(*protocol.runs(), rng)
         d_x_est = _felt(design, recording)
         found.append(100.0 * (d_x_est / recording.touch.d_x_mm - 1.0))
     return np.array(found)

@@ -201,7 +201,7 @@ def _scenes(seed: int, before_deg: float) -> tuple[Scene, ...]:
     cameras = exact_cameras(protocol)
     scenes = []
     for number, run in enumerate(protocol.runs()):
-        recording = Recording.make(protocol, run, np.random.default_rng([seed, 21, number]))
+        recording = Recording.make(run, np.random.default_rng([seed, 21, number]))
         scenes.append(Scene(seed, protocol, recording, cameras, Sigmas()))
     return tuple(scenes)
 

@@ -82,7 +82,7 @@ def felt_whisks(
         protocol.whisker.length_mm,
     )
     for number, run in enumerate(protocol.runs()):
-        recording = Recording.make(protocol, run, np.random.default_rng([seed, number]))
+        recording = Recording.make(run, np.random.default_rng([seed, number]))
         for phases in phases_of_recording(protocol, recording, beam):
             yield FeltWhisk(phases, kinetic, static)
 

@@ -162,7 +162,7 @@ def replace_tables(protocol: Protocol, **tables) -> Protocol:
 
 def make_scene(protocol: Protocol, sigmas: Sigmas, seed: int) -> Scene:
     """The scene of a protocol's first trial. Raises ArithmeticError where its whisker slips off the bar."""
-    recording = Recording.make(protocol, protocol.runs()[0], np.random.default_rng([seed, 21]))
+    recording = Recording.make(protocol.runs()[0], np.random.default_rng([seed, 21]))
     return Scene(seed, protocol, recording, exact_cameras(protocol), sigmas)
 
 

@@ -137,7 +137,7 @@ def recorded_stroke(
     """(true d_x, the stroke as felt) of a protocol's one push; None where the whisker finds no hold."""
     (run,) = protocol.runs()
     try:
-        recording = Recording.make(protocol, run, rng)
+        recording = Recording.make(run, rng)
     except ArithmeticError:
         return None
     time, motor_deg, y, z, *forces = recording.signals.T

@@ -64,7 +64,7 @@ def recordings(irregular: float, excess_fast: float, speed: float, whisks: int, 
         pictures=PicturesTable(step_deg=3.0),
     )
     for number, run in enumerate(protocol.runs()):
-        yield protocol, Recording.make(protocol, run, np.random.default_rng([seed, number]))
+        yield protocol, Recording.make(run, np.random.default_rng([seed, number]))
 
 
 def slip_angles(protocol: Protocol, recording: Recording) -> np.ndarray:

@@ -81,7 +81,7 @@ def main() -> None:
         recorded, msgspec.structs.replace(twin, trials=[exact_trial(f) for f in folders]), 0, False
     )
     for number, (folder, run) in enumerate(zip(folders, job.protocol.runs())):
-        recording = Recording.make(job.protocol, run, job.stream(2, number))
+        recording = Recording.make(run, job.stream(2, number))
         pictures = [
             cv2.imread(str(p), cv2.IMREAD_GRAYSCALE) for p in sorted((folder / NAME).iterdir())
         ]

@@ -61,7 +61,7 @@ def frame_s(protocol_name: str, trial: int, camera: int) -> tuple[float, int]:
     """One frame of a trial: drawn, exposed and encoded; its CPU seconds and the file's bytes."""
     with TemporaryDirectory() as folder:
         job = Job(Path(folder), load(protocol_name), 0, False)
-        recording = Recording.make(job.protocol, job.protocol.runs()[trial], job.stream(2, trial))
+        recording = Recording.make(job.protocol.runs()[trial], job.stream(2, trial))
         frames, sizes = render_frames(job, trial, camera, recording), []
 
         def encode():
