@@ -83,15 +83,15 @@ def felt_whisks(
     )
     for number, run in enumerate(protocol.runs()):
         recording = Recording.make(run, np.random.default_rng([seed, number]))
-        for phases in phases_of_recording(protocol, recording, beam):
+        for phases in phases_of_recording(recording, beam):
             yield FeltWhisk(phases, kinetic, static)
 
 
-def phases_of_recording(protocol: Protocol, recording: Recording, beam: Beam) -> Iterator[Phases]:
+def phases_of_recording(recording: Recording, beam: Beam) -> Iterator[Phases]:
     """Yield what is felt of each whisk, by the true gauges, slope and distance."""
     time, motor_deg, y, z = recording.signals.T
     signals = Signals(time, np.radians(motor_deg), y, z, "V")
-    matrix = np.array(protocol.gauges.matrix_Nmm_per_V)
+    matrix = np.array(recording.run.protocol.gauges.matrix_Nmm_per_V)
     for stroke in strokes_of(signals, recording.run, Settings()):
         touch = stroke.touch()
         moments = (stroke.channels - touch.offset) @ matrix.T

@@ -64,14 +64,14 @@ def recordings(irregular: float, excess_fast: float, speed: float, whisks: int, 
         pictures=PicturesTable(step_deg=3.0),
     )
     for number, run in enumerate(protocol.runs()):
-        yield protocol, Recording.make(run, np.random.default_rng([seed, number]))
+        yield Recording.make(run, np.random.default_rng([seed, number]))
 
 
-def slip_angles(protocol: Protocol, recording: Recording) -> np.ndarray:
+def slip_angles(recording: Recording) -> np.ndarray:
     """φ (whisks, 2), degrees: as recorded, and low-passed."""
     time, motor_deg, y, z = recording.signals.T
     signals = Signals(time, np.radians(motor_deg), y, z, "V")
-    matrix, found = np.array(protocol.gauges.matrix_Nmm_per_V), []
+    matrix, found = np.array(recording.run.protocol.gauges.matrix_Nmm_per_V), []
     for stroke in strokes_of(signals, recording.run, Settings()):
         touch = stroke.touch()
         both = (
@@ -92,10 +92,10 @@ def main() -> None:
     print(f"{'':<22}{'speed':>8}{'β':>6}{'mean φ':>9}{'SD':>8}{'SD low-passed':>15}")
     for name, (irregular, excess_fast) in CASES.items():
         for speed in SPEEDS:
-            for protocol, recording in recordings(
+            for recording in recordings(
                 irregular, excess_fast, speed, options.whisks, options.seed
             ):
-                phi = slip_angles(protocol, recording)
+                phi = slip_angles(recording)
                 mean, sd = phi.mean(axis=0), phi.std(axis=0, ddof=1)
                 beta = recording.run.beta_deg
                 print(
