@@ -68,7 +68,7 @@ _TILT_SHARE = 0.65
 # [1] Most correlation of shift and tilt that is handed on. Stated.
 _MOST_CORRELATED = 0.8
 # [1] Least temperature beyond 1: no light is so plain. Stated.
-_LEAST_BEYOND = 0.01
+_LEAST_BEYOND = 0.1
 
 # Posteriors of the bar's line by camera, then by gamma of the transfer curve.
 CameraPosteriors = Mapping[str, Mapping[float, Posterior]]

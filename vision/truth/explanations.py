@@ -194,26 +194,36 @@ def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
     differ.
     """
     comparison = _comparison(first) if rivals else None
-    best = first
-    for axis in rivals:
-        if not _are_apart(comparison, axis, best.axis):
-            continue
-        try:
-            other = best.from_place(axis)
-        except Refused:
-            continue
-        if not _are_apart(comparison, other.axis, best.axis):
-            continue
-        if comparison and _is_better(comparison, best.axis, other.axis, _LIKELY_SIGMAS):
-            continue
-        more_score = other.detection_score - best.detection_score
-        if more_score > 0.0:
-            best, other = other, best
-        if abs(more_score) < CLEARER:
+    explanations = [first, *_rival_explanations(first, rivals, comparison)]
+    best, *others = sorted(explanations, key=lambda one: one.detection_score, reverse=True)
+    for other in others:
+        is_clearer = best.detection_score - other.detection_score >= CLEARER
+        if not is_clearer and _are_apart(comparison, other.axis, best.axis):
             _require_one(best, other)
             best = replace(best, warning=_rival_warning(comparison, other.axis, best.axis))
             return _in_place_of(first, best)
     return _in_place_of(first, best).without_rivals()
+
+
+def _rival_explanations(
+    first: Explanation, rivals: Sequence[BarAxis], comparison: PlaceComparison | None
+) -> list[Explanation]:
+    """Return the fits from rivals that end apart from the first one and change as much of the
+    pictures."""
+    explanations = []
+    for axis in rivals:
+        if not _are_apart(comparison, axis, first.axis):
+            continue
+        try:
+            other = first.from_place(axis)
+        except Refused:
+            continue
+        if not _are_apart(comparison, other.axis, first.axis):
+            continue
+        if comparison and _is_better(comparison, first.axis, other.axis, _LIKELY_SIGMAS):
+            continue
+        explanations.append(other)
+    return explanations
 
 
 def _are_apart(comparison: PlaceComparison | None, place: BarAxis, other: BarAxis) -> bool:

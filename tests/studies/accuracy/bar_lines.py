@@ -103,17 +103,16 @@ def measured(view: View, axis: BarAxis) -> BarLineEstimate:
 
 
 def errors_and_sigmas(shade, behind, rng) -> tuple[np.ndarray, np.ndarray]:
-    """Error across the bar of the line's two points, and what is stated of them, px."""
+    """Error across the bar of the line's two points, and what is stated of them, in common too, px."""
     angle, across_mm = rng.uniform(0.9, 2.2), rng.uniform(-2.0, 2.0)
     view = noisy_view(shade, behind, angle, across_mm, rng)
     normal = np.array([-np.sin(angle), np.cos(angle), 0.0])
     off_mm, off_rad = rng.uniform(-0.5, 0.5) * AWAY_MM / FOCAL_PX, rng.uniform(-0.004, 0.004)
     direction = np.array([np.cos(angle + off_rad), np.sin(angle + off_rad), 0.0])
     axis = BarAxis((across_mm + off_mm) * normal, direction)
-    found = measured(view, axis)
-    return (found.points.px - CENTRE) @ normal[:2] - np.mean(
-        edges_px(across_mm)
-    ), found.points.sigma_px
+    points = measured(view, axis).points
+    error = (points.px - CENTRE) @ normal[:2] - np.mean(edges_px(across_mm))
+    return error, np.sqrt(points.sigma_px**2 + np.sum(points.shared_px**2, axis=1))
 
 
 def main() -> None:

@@ -50,9 +50,9 @@ def test_over_printed_squares_the_texture_beside_both_edges_is_in_the_sigma(rng)
 
 
 def test_where_printed_squares_end_is_the_edge_of_a_bar_as_bright_as_their_mean(rng):
-    """Sigmas and errors measured over six bars: 0.02 and 0.01 px; from mean profiles alone 0.04 and 0.02 px."""
+    """Sigmas and errors measured over six bars: 0.03 and 0.01 px; from mean profiles alone 0.04 and 0.02 px."""
     error, sigma = of_bars("grey as the mean of printed squares", rng)
-    assert np.sqrt(np.mean(sigma**2)) < 0.03
+    assert np.sqrt(np.mean(sigma**2)) < 0.036
     assert np.sqrt(np.mean((error / sigma) ** 2)) < Z_HIGH
 
 
@@ -60,7 +60,10 @@ def test_where_printed_squares_end_is_the_edge_of_a_bar_as_bright_as_their_mean(
     "bar", ["painted, flat background", "painted, step of a fifth", "polished, flat background"]
 )
 def test_before_an_even_wall_light_inside_the_bar_does_not_pull_its_line(bar, rng):
-    """RMS measured over eight bars: 0.009 to 0.014 px. The sigma, right for path-traced bars, is wide here."""
+    """RMS measured over twenty bars: 0.009 to 0.018 px, z 0.4 to 0.6 RMS.
+
+    While the grid of blurs was wider than their posterior, lines were up to 0.16 px and 36 sigma off.
+    """
     error, sigma = of_bars(bar, rng)
     assert np.sqrt(np.mean(error**2)) < 0.03
     assert np.sqrt(np.mean((error / sigma) ** 2)) < Z_HIGH

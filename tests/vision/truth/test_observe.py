@@ -217,7 +217,10 @@ def test_a_whisk_begins_as_the_one_before_ended_though_the_wire_has_slipped_in_i
 
 
 def test_a_whisk_is_fitted_again_by_cameras_that_moved_together(steep, monkeypatch):
-    """Its lines are not traced again: it is as far off as one that is."""
+    """Its lines are not traced again: it is as far off as one that is.
+
+    Sigmas of lines that are traced again differ by a patch of the bar more or less.
+    """
     few = slice(None, None, 3)
     motor_rad = np.radians(steep.rows["motor_deg"][few])
     frames = {}
@@ -237,6 +240,6 @@ def test_a_whisk_is_fitted_again_by_cameras_that_moved_together(steep, monkeypat
     (before,) = known.whisks
     assert abs(before.d_x_mm.value - traced.d_x_mm.value) > 0.03
     assert again.d_x_mm.value == pytest.approx(traced.d_x_mm.value, abs=0.2 * traced.d_x_mm.sigma)
-    assert again.d_x_mm.sigma == pytest.approx(traced.d_x_mm.sigma, rel=0.05)
+    assert again.d_x_mm.sigma == pytest.approx(traced.d_x_mm.sigma, rel=0.2)
     assert again.ends.keys() == traced.ends.keys()
     assert before.base is not None and again.base is None

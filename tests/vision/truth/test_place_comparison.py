@@ -342,7 +342,7 @@ def test_of_a_bar_and_its_shadow_the_clearer_one_is_the_truth_and_the_other_is_t
         found = find_object(scene)
         direction = np.array([0.01306, -0.19837, 0.98004])
         shadow = BarAxis(np.array([49.785, 1.701, 0.652]), direction)
-        return replace(found, axis=shadow, lines={}, rivals=(found.axis,))
+        return replace(found, axis=shadow, lines={}, rivals=(found.axis, *found.rivals))
 
     monkeypatch.setattr(observe, "find_object", find_shadow)
     (whisk,) = observe_trial(*shadowed()).whisks
