@@ -37,8 +37,9 @@ _MOST_NAMED = 5  # frames in one line
 # [1/rad²] Of d_x by (10), at most: its error where the whisker turns by so much up to its contact, and is
 # taken as straight. Study: curved_whiskers.py.
 _D_X_BY_TURN2 = 0.36
-# [points], [motor angles] At which a whisker is looked for in the pictures of cameras.toml: finer ones find no other. Stated.
+# [points] Along a whisker that is looked for in the pictures of cameras.toml. A layout.
 _POINTS_IN_SIGHT = 21
+# [motor angles] At which it is looked for there. A layout.
 _TURNS_IN_SIGHT = 36
 # [1] Of d_x: below, straight will do; noise and touch are off by more. Stated.
 _STRAIGHT_ENOUGH = 0.002
