@@ -73,10 +73,14 @@ def observe_trial(
 ) -> TrialTruth:
     """Measure the truth of a trial: object, first touch, contact and slip in each whisk.
 
-    whisks: slices of frame indices, one a forward stroke. fits: of whisks in these pictures, by cameras that stood
-    a little elsewhere; their lines are fitted again, and not traced. What keeps a whisk from having a truth is
+    whisks: slices of frame indices, one a forward stroke. fits: of all whisks in these pictures, by cameras that
+    stood a little elsewhere; their lines are fitted again, and not traced. What keeps a whisk from having a truth is
     its status; raises Refused only for input that no trial could be seen with.
     """
+    if len(fits) < len(
+        whisks
+    ):  # where one was refused, pictures are asked again for all that speaks against it
+        fits = ()
     try:
         axis = BarAxis(fits[0].point_mm, fits[0].direction) if fits else None
         scene = _whisks_of(pictures, whisks, cameras, rods, settings, axis)

@@ -243,3 +243,5 @@ def test_a_whisk_is_fitted_again_by_cameras_that_moved_together(steep, monkeypat
     assert again.d_x_mm.sigma == pytest.approx(traced.d_x_mm.sigma, rel=0.2)
     assert again.ends.keys() == traced.ends.keys()
     assert before.base is not None and again.base is None
+    with pytest.raises(TypeError):  # a whisk without a fit has the object searched for again
+        observe_trial(pictures, whole * 2, moved, RODS, placed, known.fits)
