@@ -67,7 +67,7 @@ def _named(part: Mapping[str, list[int] | bool]) -> str:
     """Return how messages name a part of a picture."""
     if not part:
         return "a whole one"
-    return f"{'mirrored ' if part.get('mirrored') else ''}part {part.get('crop')}"
+    return f"{'mirrored ' if part.get('mirrored') else ''}part {part.get('crop')!r}"
 
 
 def _pack_covariance(cameras: Cameras) -> bytes:
@@ -132,7 +132,7 @@ def _camera(name: str, table: dict) -> Camera:
         return Camera(name, **{key: table[key] for key in _KEYS})
     except Refused:
         raise
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise Refused(f"cameras.{name}: {error}") from error
 
 

@@ -34,7 +34,7 @@ def foreign_camera(
     try:
         size = tuple(float(n) for n in size_px)
         return Camera(name, size, np.array(matrix, dtype=float), lens, T, rms_px)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         if isinstance(error, Refused):
             raise
         raise Refused(f"camera {name}: {error}") from error
@@ -44,7 +44,7 @@ def _terms(name: str, distortion: Sequence[float] | np.ndarray) -> np.ndarray:
     """Return distortion terms as an array (n,). Raise Refused where they are no numbers."""
     try:
         return np.array(distortion, dtype=float).ravel()
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise Refused(f"camera {name}: its distortion is no list of numbers") from None
 
 

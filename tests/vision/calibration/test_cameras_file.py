@@ -57,6 +57,7 @@ def test_without_covariance_cameras_are_taken_as_exact(tmp_path, cameras):
         (lambda f: (f / "cameras.npz").write_bytes(b"other"), "copy both"),
         (lambda f: _replace(f, "rms_px", "rms"), "rms_px missing"),
         (lambda f: _replace(f, "2010.0", '"wide"'), "cameras.high"),
+        (lambda f: _replace(f, "2010.0", "1" + 400 * "0"), "cameras.high: int too large"),
         (lambda f: _replace(f, "[cameras", "[["), "is not TOML"),
         (lambda f: _replace(f, "1280", "inf"), "size_px = .*, must be two counts above 0"),
         (lambda f: _replace(f, "1280", "1280.5"), "size_px = .*, must be two counts above 0"),

@@ -67,6 +67,8 @@ def test_both_files_of_caliscope_give_the_same_cameras(real):
         (anipose_text().replace("rotation", "turn"), "rotation missing"),
         (anipose_text().replace("-0.11, 0.14, 0.0006", "-2.91, 0.011, -0.278"), "over-fitted"),
         (anipose_text().replace("2012.4", "1700.0"), "differ by 18 %"),
+        (anipose_text().replace("2012.4", "1" + 400 * "0"), "int too large"),
+        (anipose_text().replace("-0.11", "1" + 400 * "0"), "distortion is no list of numbers"),
         ("[metadata]\nerror = 1.0\n", "no camera"),
         ("[[", "not TOML"),
     ],
