@@ -77,9 +77,8 @@ def observe_trial(
     stood a little elsewhere; their lines are fitted again, and not traced. What keeps a whisk from having a truth is
     its status; raises Refused only for input that no trial could be seen with.
     """
-    if len(fits) < len(
-        whisks
-    ):  # where one was refused, pictures are asked again for all that speaks against it
+    # Where one was refused, pictures are asked again for all that speaks against it.
+    if len(fits) < len(whisks):
         fits = ()
     try:
         axis = BarAxis(fits[0].point_mm, fits[0].direction) if fits else None
