@@ -245,12 +245,16 @@ def least_squares(matrix: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Return the solution (size,) of least squares for a matrix (n, size) and targets (n,).
 
     It is by Cholesky's factor of the normal equations, their columns scaled to one length, a fifth
-    of the work of singular values; these do it where columns are too nearly dependent.
+    of the work of singular values; these do it where columns are too nearly dependent. Raises
+    LinAlgError where a value is not finite.
     """
     normal = matrix.T @ matrix
     length = np.sqrt(np.diag(normal))
-    factor, failed = dpotrf(normal / np.outer(length, length))
-    if failed or np.min(np.diag(factor)) < _LEAST_INDEPENDENT:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor, failed = dpotrf(normal / np.outer(length, length))
+    # NaN, of a fit that diverges or a column of zeros, is not determined either.
+    is_determined = not failed and np.min(np.diag(factor)) >= _LEAST_INDEPENDENT
+    if not is_determined:
         return np.linalg.lstsq(matrix, target, rcond=None)[0]
     scaled, _ = dpotrs(factor, matrix.T @ target / length)
     return scaled / length

@@ -41,6 +41,16 @@ def test_least_squares_are_those_of_singular_values_however_alike_two_columns_ar
     np.testing.assert_allclose(matrix @ found, matrix @ best, rtol=1e-7, atol=1e-7)
 
 
+def test_least_squares_of_a_column_of_zeros_leave_it_and_of_nan_there_are_none(rng):
+    """Cholesky's factor of NaN is no failure to LAPACK: a fit that diverged went on without a word."""
+    matrix = rng.standard_normal((40, 5))
+    matrix[:, 2] = 0.0
+    assert least_squares(matrix, matrix @ np.ones(5)) == pytest.approx([1.0, 1.0, 0.0, 1.0, 1.0])
+    matrix[3, 1] = np.nan
+    with pytest.raises(np.linalg.LinAlgError):
+        least_squares(matrix, np.ones(40))
+
+
 def test_jacobian_is_the_derivative_of_the_residual(rng):
     """Rung 2: central differences of the whole residual, the contact arcs left to find themselves."""
     problem, truth = scene()
