@@ -208,19 +208,21 @@ class _Rod:
         theta, m_y, m_z, alpha = inputs.T
         heading = unknowns[:, 4]
         now, halfway = self._bent(unknowns, theta)
-        beta = _slope(now.force, self._friction(alpha, heading).sideways)
-        bar, _ = _bar_directions(beta)
-        first = self._first_touch(self._axis(now, bar)[:, 0], bar, now.arc)
+        friction = self._friction(alpha, heading)
+        beta = _slope(now.force, friction.sideways)
+        bar, across = _bar_directions(beta)
+        axis = self._axis(now, bar)
+        first = self._first_touch(axis[:, 0], bar, now.arc)
         push = _Push(theta, alpha, beta, first)
         heading_halfway, latest = _headings(halfway, now, first, bar, np.copysign(1.0, m_y))
         # The bar has its slope, and its place along the whisker, by the rod as it is now.
-        _, force_along, place_across, _ = self._residuals_at(now, heading, push)
+        off = (axis - first.axis) / theta[:, None]
         moment = np.hypot(m_y, m_z)
         residuals = [
             (now.moment[:, 1] - m_y) / moment,
             (now.moment[:, 2] - m_z) / moment,
-            force_along,
-            place_across,
+            self._force_along(now, bar, alpha, friction),
+            dot(off, across),
             heading if self.held else _wrapped(heading - latest),
             *self._residuals_at(halfway, heading_halfway, push),
         ]
@@ -229,16 +231,22 @@ class _Rod:
     def _residuals_at(
         self, bent: "_Bent", heading: np.ndarray, push: "_Push"
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return the residuals (n,) of rods against the bar that is pushed: of its slope, of the force
-        along the rod, and of the place of its axis across the bar and along the whisker.
+        """Return the residuals (n,) of rods halfway, against the bar that is pushed: of its slope, of the
+        force along the rod, and of the place of its axis across the bar and along the whisker.
         """
         bar, across = _bar_directions(push.beta)
         friction = self._friction(push.alpha, heading)
         slope = _slope(bent.force, friction.sideways) - push.beta
-        by_taper = np.cos(push.alpha) * self._growth(bent.arc)
-        force_along = _along(bent, bar) - friction.lengthways - by_taper
+        force_along = self._force_along(bent, bar, push.alpha, friction)
         off = (self._axis(bent, bar) - push.first.axis) / push.theta[:, None]
         return slope, force_along, dot(off, across), off[:, 0]
+
+    def _force_along(
+        self, bent: "_Bent", bar: np.ndarray, alpha: np.ndarray, friction: "_Friction"
+    ) -> np.ndarray:
+        """Return the residuals (n,) of the force along rods, less what friction and taper give."""
+        by_taper = np.cos(alpha) * self._growth(bent.arc)
+        return _along(bent, bar) - friction.lengthways - by_taper
 
     def _bent(self, unknowns: np.ndarray, theta: np.ndarray) -> tuple["_Bent", "_Bent"]:
         """Return the rods of n sets of unknowns at the end of the push, and halfway."""

@@ -12,7 +12,6 @@ from dataclasses import replace
 from math import degrees, hypot, isnan, tan
 
 from estimator.builtin import with_friction
-from estimator.distance import felt_slip_angle
 from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95, slip_angle_sigma
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
@@ -24,10 +23,8 @@ STILL_SLIPS = NamedReason(
 
 def slip_angle(whisk: Whisk) -> tuple[float, float]:
     """Return the felt slip angle φ of (8) and its standard deviation, rad; φ is NaN without a push."""
-    m_y = whisk.m_y_at_Nmm
-    m_z = whisk.m_z_at_Nmm
-    phi = float(felt_slip_angle(m_y, m_z))
-    return phi, slip_angle_sigma(m_y, m_z, whisk.covariance_at)
+    sigma = slip_angle_sigma(whisk.m_y_at_Nmm, whisk.m_z_at_Nmm, whisk.covariance_at)
+    return whisk.phi_rad, sigma
 
 
 def reoriented(whisk: Whisk, settings: EstimatorSettings) -> Estimate:

@@ -42,7 +42,7 @@ def as_theory_has_them(pushes: Sequence[FeltPush], alpha_rad: float, beam: Beam)
     bent = theta * np.cos(slope) / np.cos(alpha_rad)
     along = _share_along(phi, bent, alpha_rad)
     rolling = first_order.rolling_at(theta, reach, slope, d_x_mm, left)
-    large_angles = bent**2 / (6 * left)
+    large_angles = first_order.bending_far(bent, left)
     share = rolling + along * first_order.dragging(theta, alpha_rad) + large_angles
     size = np.hypot(m_y, m_z) * (1.0 + np.nan_to_num(share * left))
     return size[:, None] * _direction(theta, phi, slope, along, alpha_rad, left)

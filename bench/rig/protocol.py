@@ -145,7 +145,7 @@ def load(protocol: str | Path) -> Protocol:
     path = FOLDER / f"{protocol}.toml"
     if isinstance(protocol, Path) or not path.is_file():
         path = Path(protocol)
-    if not path.is_file():
+    if not path.exists():
         built_in = f"the built-in protocols are {protocol_names()}"
         raise BadInput(f"there is no such file; {built_in}", file=path)
     tables = read_toml(path, str(path))

@@ -251,7 +251,7 @@ def _require_whisker_in_sight(cameras: Cameras, length_mm: float) -> None:
     wires_mm = np.stack([along_mm * np.cos(turn_rad), along_mm * np.sin(turn_rad), across], axis=2)
     for camera in cameras:
         px = camera.project(wires_mm)
-        if np.any(np.all((px >= 0.0) & (px < camera.size_px), axis=2)):
+        if camera.has_in_picture(px).any():
             return
     found = "no camera would see a whisker that turns about the rig frame's z"
     cure = "`whisker-bench calibrate cameras` places them in the rig frame"

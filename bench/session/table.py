@@ -122,7 +122,7 @@ def require_rising(table: NumberTable, column: str, rule: str, label: str) -> No
     back = np.flatnonzero(np.diff(table[column]) <= 0)
     if len(back):
         before, after = table[column][back[0] : back[0] + 2]
-        found = f"goes from {before:g} to {after:g}; {rule}"
+        found = f"goes from {before:.10g} to {after:.10g}; {rule}"
         raise BadInput(found, file=label, row=int(table.row[back[0] + 1]), column=column)
 
 

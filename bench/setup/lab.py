@@ -98,7 +98,12 @@ class Lab:
 
 def _allowed(choice: Choice, known: Mapping[str, str]) -> tuple[str, ...]:
     """Return the answers that go with those known by option, the default first."""
-    found = [answer for answer in choice.answers if _go_together({**known, choice.option: answer})]
+    others = {option: answer for option, answer in known.items() if option != choice.option}
+    found = []
+    for answer in choice.answers:
+        pairs = [{option: other, choice.option: answer} for option, other in others.items()]
+        if all(map(_go_together, pairs)):
+            found.append(answer)
     if not found:
         return (NOTHING,)  # no board where nothing is seen
     needs_no_camera = known.get("truth") == "stage" or known.get("angle_from") == "speed"

@@ -208,7 +208,8 @@ def _neglected_bias(design: Design, region: Region, slope, alpha, d_x) -> Number
     left_friction = np.sqrt(np.maximum(1.0 - used_friction**2, 0.0))
     held = np.where(steepness > alpha, 0.0, left_friction)
     bend = theta * np.cos(slope) / np.cos(np.minimum(steepness, alpha))
-    return rolling + held * first_order.dragging(theta, alpha) + bend**2 / (6 * thickness)
+    large_angles = first_order.bending_far(bend, thickness)
+    return rolling + held * first_order.dragging(theta, alpha) + large_angles
 
 
 def worst_percent(design: Design, region: Region, equipment: Equipment) -> float:

@@ -16,7 +16,6 @@ from bench.records.trial_result import EstimateRow, FeltAt, FeltWhisk
 from estimator.beam import Beam
 from estimator.builtin import WITHOUT_ALPHA, estimators_of
 from estimator.contact_state import Contact, contact_of
-from estimator.distance import felt_slip_angle
 from estimator.signal import FeltTouch
 from estimator.uncertainty import Z_95, slip_angle_sigma
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
@@ -73,7 +72,7 @@ def as_felt(
     if whisk is None:
         return felt
     m_y, m_z = _moments(whisk)
-    phi_rad = felt_slip_angle(m_y.value, m_z.value)
+    phi_rad = whisk.phi_rad
     return replace(
         felt,
         theta_sigma_rad=whisk.theta_sigma_rad,

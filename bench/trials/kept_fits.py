@@ -1,5 +1,7 @@
 """Fits of the pass that placed the rig, from which its trials are fitted again where the rig stands."""
 
+from pathlib import Path
+
 from bench.base.results import read_result
 from bench.records.plain import from_plain
 from bench.records.trial_result import SeenTrial
@@ -14,7 +16,13 @@ def kept_fits(unit: Unit) -> tuple[KeptFit, ...]:
     path, seen_hash = unit.placing_pass
     if not seen_hash or unit.settings.accuracy_mm is not None:
         return ()
+    seen = seen_in(path, seen_hash)
+    return seen.fits if seen else ()
+
+
+def seen_in(path: Path, seen_hash: str) -> SeenTrial | None:
+    """Return the seen half in a result's file that has these inputs; None without one."""
     kept = read_result(path)
     if not kept or kept.get("seen_hash") != seen_hash:
-        return ()
-    return from_plain(SeenTrial, kept["seen"]).fits
+        return None
+    return from_plain(SeenTrial, kept["seen"])

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -43,10 +44,14 @@ class StatedStroke:
     signals: Signals
     stroke: slice
 
+    @cached_property
+    def _farthest_rad(self) -> np.ndarray:
+        """Return the largest motor angle (n,) up to each sample."""
+        return np.maximum.accumulate(self.signals.motor_rad[self.stroke])
+
     def time_s(self, motor_rad: np.ndarray | float) -> np.ndarray:
         """Return when the motor first comes to angles (...)."""
-        rising = np.maximum.accumulate(self.signals.motor_rad[self.stroke])
-        return np.interp(motor_rad, rising, self.signals.time_s[self.stroke])
+        return np.interp(motor_rad, self._farthest_rad, self.signals.time_s[self.stroke])
 
     def push(self) -> StatedPush:
         """Return the stroke against the object. Raise BadInput where the stage's log does not cover it."""

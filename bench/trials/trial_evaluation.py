@@ -7,12 +7,13 @@ interruption, resuming, and redoing only what changed are this one mechanism.
 from dataclasses import replace
 
 from bench.base.results import read_result, write_result
-from bench.records.plain import from_plain, to_plain
+from bench.records.plain import to_plain
 from bench.records.trial_result import SeenTrial, TrialFacts, TrialResult, WhiskerFacts
 from bench.session.signals import Signals, read_signals
 from bench.trials.consistency import nominal_slope
 from bench.trials.contradictions import contradicted
 from bench.trials.felt_trial import feel_trial
+from bench.trials.kept_fits import seen_in
 from bench.trials.object_motion import MOVING
 from bench.trials.other_wires import lines_in
 from bench.trials.truth_source import truth_source
@@ -47,9 +48,9 @@ def _see(unit: Unit, signals: Signals) -> SeenTrial:
 def kept_seen(unit: Unit) -> SeenTrial | None:
     """Return the seen half of an earlier result that has the same inputs; None without one."""
     for path in (unit.path, unit.seen_path):
-        kept = read_result(path)
-        if kept and kept.get("seen_hash") == unit.seen_hash:
-            return from_plain(SeenTrial, kept["seen"])
+        seen = seen_in(path, unit.seen_hash)
+        if seen is not None:
+            return seen
     return None
 
 

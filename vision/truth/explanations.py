@@ -195,6 +195,8 @@ def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
     """
     comparison = _comparison(first) if rivals else None
     explanations = [first, *_rival_explanations(first, rivals, comparison)]
+    if len(explanations) == 1:
+        return first.without_rivals()
     best, *others = sorted(explanations, key=lambda one: one.detection_score, reverse=True)
     for other in others:
         is_clearer = best.detection_score - other.detection_score >= CLEARER
