@@ -61,8 +61,7 @@ def read_board_views(session: Session) -> SessionViews:
             rig[name] = rig_view(session, name, frames.size_px)
             trials[name], left_out = _trial_views(session, name, rig[name])
             notes += left_out
-    is_placed = session.T_rig_board is not None or session.measured_rig is not None
-    if not is_placed and not any(map(len, rig.values())):
+    if not session.is_rig_placed and not any(map(len, rig.values())):
         rig, trials = {}, {}  # pictures of the rig without a board: backgrounds alone
     found = SessionViews(
         boards,

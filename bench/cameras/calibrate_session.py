@@ -71,7 +71,7 @@ def calibrate_cameras_command(
         cameras = place_imported(loaded, lenses, names)
         lines = [f"lenses of {', '.join(cameras.names)} as in {lenses.name}, taken as exact"]
         warnings: list[str] = []
-        if not _is_placed(loaded) and not file_format:
+        if not loaded.is_rig_placed and not file_format:
             _say_not_placed(lenses.name, out, session, lines, warnings)
         return _write(out, loaded, cameras, lines, warnings, file_format)
     views = read_board_views(loaded)
@@ -79,7 +79,7 @@ def calibrate_cameras_command(
     cameras = moved_by_file(loaded, calibration.cameras)
     lines = list(report_lines(calibration))
     warnings = [*views.notes, *calibration.warnings]
-    if _is_placed(loaded):
+    if loaded.is_rig_placed:
         lengths, of_scale = check_scale(loaded, cameras)
         lines += lengths
         warnings += of_scale
@@ -100,11 +100,6 @@ def _say_not_placed(
     line = _NOT_PLACED.format(frame=frame)
     is_of_session = out.resolve() == (session / "cameras.toml").resolve()
     (warnings if is_of_session else lines).append(line)
-
-
-def _is_placed(session: Session) -> bool:
-    """Return whether the session says where the board on the rig stands."""
-    return session.T_rig_board is not None or session.measured_rig is not None
 
 
 def _write(
@@ -139,7 +134,7 @@ def place_imported(session: Session, lenses: Path, names: Sequence[str] = ()) ->
         raise BadInput("there is no such file", file=str(lenses))
     with refused_as_bad_input(lenses.name):
         cameras = _of_session(import_cameras(lenses), session, names, lenses.name)
-        if not _is_placed(session):
+        if not session.is_rig_placed:
             if not are_placed(cameras):
                 found = "does not state where the cameras stand to each other"
                 raise BadInput(f"{found}; [rig] T_rig_board places them", file=lenses.name)

@@ -18,7 +18,7 @@ def check_calibration(session: Session) -> list[Reason]:
     begin_step("cameras from pictures of the board")
     made = calibrate_from(session, read_board_views(session))
     warnings = list(made.warnings)
-    if session.T_rig_board is not None or session.measured_rig is not None:
+    if session.is_rig_placed:
         begin_step("widths of bars")
         _, of_scale = check_scale(session, moved_by_file(session, made.cameras))
         warnings += of_scale

@@ -76,7 +76,7 @@ def place_line(session: Session) -> str:
         unused = f"; {RIG_FILE} is not used" if (session.path / RIG_FILE).is_file() else ""
         return f"the cameras stand where cameras.toml has them{unused}"
     measured = session.measured_rig
-    if session.T_rig_board is None and measured is None:
+    if not session.is_rig_placed:
         by_strokes = "the free strokes place the rig when the session is evaluated"
         if not session.rig_pictures:
             return by_strokes

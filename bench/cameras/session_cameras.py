@@ -251,8 +251,8 @@ def _key(session: Session, digests: Digests) -> str:
     paths = [session.path / "boards"]
     for trial in session.trials:
         # without T_rig_board motor angles count too
-        is_by_strokes = session.T_rig_board is None and session.measured_rig is None
-        paths += [trial.folder] if is_by_strokes else map(Path, trial.camera_sources.values())
+        sources = map(Path, trial.camera_sources.values())
+        paths += sources if session.is_rig_placed else [trial.folder]
     given = [
         session.board,
         session.T_rig_board,

@@ -110,6 +110,11 @@ class Session:
     pixel_aspects: Mapping[str, float] = field(default_factory=dict)
 
     @property
+    def is_rig_placed(self) -> bool:
+        """Return whether session.toml or rig.toml says where the board on the rig stands."""
+        return self.T_rig_board is not None or self.measured_rig is not None
+
+    @property
     def whole_name(self) -> str:
         """Return the name without that of the whisker whose view it is."""
         return self.name.removesuffix(f", whisker {self.base.name}") if self.base else self.name

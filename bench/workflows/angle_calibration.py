@@ -105,7 +105,7 @@ def _check(session: Session, trial: Trial) -> None:
     if len(trial.camera_sources) < 2:
         found = f'angle_from = "{trial.angle_from}" needs pictures by two cameras'
         raise BadInput(f"{found}; there are {len(trial.camera_sources)}", file=label)
-    if session.cameras_toml is None and session.T_rig_board is None and not session.measured_rig:
+    if session.cameras_toml is None and not session.is_rig_placed:
         found = "where the motor's axis is must be known: state T_rig_board, or bring rig.toml or cameras.toml"
         raise BadInput(found, file=SESSION_TOML)
     angle_source(trial).check_keys(trial)
