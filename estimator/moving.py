@@ -39,8 +39,6 @@ AMBIGUOUS = NamedReason(
 # Share of the distance above which another distance counts: at one as near as that the object would
 # run at nine tenths of the whisker's own speed.
 _LEAST_OTHER = 0.1
-# [sigma] of m_y, as in `Whisk.is_held`.
-_HELD_SIGMAS = 2.0
 # Iterations of the share of friction along the object, by the direction of the motion over it.
 _ITERATIONS = 4
 # [1] Step of differences, of the pushing angle, the moment, a radian of α and the distance.
@@ -252,7 +250,7 @@ def _is_held(whisk: Whisk, contact: MovingContact) -> bool:
     theta = whisk.theta_at_rad
     x = contact.d_x_mm + u[0] * theta
     expected = whisk.beam.C_Nmm2 * u[2] * theta / (x * whisk.beam.as_cylinder_mm(x))
-    return abs(whisk.m_y_at_Nmm - expected) <= _HELD_SIGMAS * whisk.covariance_at[0, 0] ** 0.5
+    return whisk.feels_m_y(expected)
 
 
 def _gradient(solve: Callable, inputs: np.ndarray, beam: Beam) -> np.ndarray:

@@ -10,6 +10,8 @@ from estimator.beam import Beam
 from estimator.distance import felt_slip_angle
 from estimator.domain import require_friction_angle, require_sigma
 
+# [sigma] Of m_y: more is no chance. Stated.
+_HELD_SIGMAS = 2.0
 _ARRAYS = (
     "time_s",
     "theta_rad",
@@ -155,7 +157,12 @@ class Whisk:
     @property
     def is_held(self) -> bool:
         """Return whether no lateral slip is felt, within two sigma of m_y."""
-        return abs(self.m_y_at_Nmm) <= 2 * sqrt(self.covariance_at[0, 0])
+        return self.feels_m_y(0.0)
+
+    def feels_m_y(self, expected_Nmm: float) -> bool:
+        """Return whether m_y at the pushing angle is as expected, within _HELD_SIGMAS."""
+        sigma_Nmm = sqrt(self.covariance_at[0, 0])
+        return abs(self.m_y_at_Nmm - expected_Nmm) <= _HELD_SIGMAS * sigma_Nmm
 
     @property
     def felt_covariance(self) -> np.ndarray:

@@ -140,7 +140,7 @@ class _AxisFit:
         fitted = self._fit(marker)
         covariance = np.linalg.inv(fitted.jac.T @ fitted.jac)
         by_error = self._seen.by_camera_errors(
-            fitted, motor_rad, cameras, self._scatter_px, cameras.by_error
+            fitted, motor_rad, cameras, self._scatter_px, cameras.by_error, covariance
         )
         self.axis = fitted.x[:4]
         self.covariance = covariance[:4, :4]

@@ -142,7 +142,7 @@ class _TurnFit:
         own = np.linalg.inv(fitted.jac.T @ fitted.jac)
         turn_rad = self.turns_rad(fitted.x)[self.frame]
         by_error = self.seen.by_camera_errors(
-            fitted, turn_rad, self.cameras, scatter_px, self._camera_errors
+            fitted, turn_rad, self.cameras, scatter_px, self._camera_errors, own
         )
         return own + by_error @ by_error.T
 

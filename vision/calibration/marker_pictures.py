@@ -147,9 +147,12 @@ class MarkerPictures:
         cameras: Cameras,
         scatter_px: np.ndarray,
         errors: np.ndarray,
+        covariance: np.ndarray,
     ) -> np.ndarray:
         """Return by how much a fit's parameters move (p, k) with unit errors (15 cameras, k) of the
         cameras.
+
+        covariance (p, p): of the parameters, by the scatter alone.
         """
         here = self.project(fitted.x, turn_rad, cameras)
         by_error_px = np.zeros((*here.shape, errors.shape[1]))
@@ -158,7 +161,7 @@ class MarkerPictures:
         sigma_px = scatter_px[self.camera][:, None, :, None]
         over_sigma = (by_error_px / sigma_px).reshape(self.px.size, -1)
         by_parameters = self.of_corners(fitted.jac)
-        return np.linalg.solve(fitted.jac.T @ fitted.jac, by_parameters.T @ over_sigma)
+        return covariance @ (by_parameters.T @ over_sigma)
 
     def _bias_px(
         self, parameters: np.ndarray, from_middle_rad: np.ndarray, cameras: Cameras

@@ -222,12 +222,14 @@ class _LineGrid:
 
     def change_between_blurs(self) -> np.ndarray:
         """Return by how much (2,) the mean line changes from the most probable blur to the next, px."""
-        density = np.exp(-0.5 * (self.deviance - self.deviance.min(axis=(0, 1))))
-        by_blur = density.sum(axis=1)  # (n, b)
-        lines = (by_blur / by_blur.sum(axis=0)).T @ self.lines  # (b, 2)
         best = int(np.argmax(self._density.sum(axis=(0, 1))))
-        nearby = lines[max(best - 1, 0) : best + 2]
-        return np.max(np.abs(nearby - lines[best]), axis=0)
+        nearby = self.deviance[
+            ..., max(best - 1, 0) : best + 2
+        ]  # of improbable blurs _density is 0
+        density = np.exp(-0.5 * (nearby - nearby.min(axis=(0, 1)))).sum(axis=1)
+        lines = (density / density.sum(axis=0)).T @ self.lines
+        change_px = np.abs(lines - lines[min(best, 1)])
+        return np.max(change_px, axis=0)
 
     def average_log_blur(self) -> tuple[float, float]:
         """Return the posterior's mean of the blur's logarithm, and its sigma."""

@@ -9,7 +9,7 @@ import numpy as np
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.grouped import group_means
-from vision.geometry.polyline import beside_nodes, lengths_px, normals, tangents_by
+from vision.geometry.polyline import beside_nodes, lengths_px, normals
 from vision.geometry.rotation import unit
 from vision.geometry.rows import Rows
 from vision.pictures.pyramid import shrunk_px
@@ -87,7 +87,7 @@ def beside_curve(trace: Trace, curve_px: np.ndarray, arc_mm: np.ndarray) -> Besi
         line=trace.line,
         place_mm=arc_mm[node] + on_px * _NODE_MM / step_px[node],
         offset_px=offset_px,
-        foot_px=curve_px[node] + on_px[:, None] * tangents_by(normal),
+        foot_px=trace.px - offset_px[:, None] * normal,
         normal=normal,
         along_px=lengths_px(curve_px)[node] + on_px,
         sigma_px=trace.sigma_px,
