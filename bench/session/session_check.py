@@ -1,7 +1,7 @@
 """Checks of a session before any of it is evaluated: `check` lists all, `evaluate` stops."""
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
@@ -84,8 +84,8 @@ def _check(views: Sequence[Session], problems: InputProblems) -> None:
             check_recording(trial, problems)
         if view.whisker is not None:
             _warn_of_curvature(view.whisker, problems)
-    check_sizes(views[0], problems)
-    check_traces(views[0], problems)
+    calibrated = check_sizes(views[0], problems)
+    check_traces(views[0], calibrated, problems)
     for names, line in _copies(views[0]):
         problems.warn(line, names)
 
@@ -185,24 +185,28 @@ def trials_with_whisks(session: Session) -> list[Trial]:
     return trials
 
 
-def check_sizes(session: Session, problems: InputProblems) -> None:
-    """Check that each camera has one picture size: in its boards, on the rig, in every trial."""
+def check_sizes(session: Session, problems: InputProblems) -> dict[str, Size]:
+    """Check that each camera has one picture size: in its boards, on the rig, in every trial.
+
+    Returns the sizes by cameras.toml; none without it, or where it is refused.
+    """
     calibrated: dict[str, Size] = {}
     with problems.guard():
         calibrated = _calibrated_sizes(session)
     for camera in session.camera_names:
         with problems.guard():
             _check_camera_sizes(session, camera, calibrated.get(camera))
+    return calibrated
 
 
-def check_traces(session: Session, problems: InputProblems) -> None:
-    """Check the traces of each trial that has no pictures."""
+def check_traces(session: Session, calibrated: Mapping[str, Size], problems: InputProblems) -> None:
+    """Check the traces of each trial that has no pictures; calibrated: picture sizes by cameras.toml."""
     alone = [trial for trial in session.trials if trial.is_traced_alone]
     if not alone:
         return
-    sizes_px: dict[str, Size] = {}
-    with problems.guard():
-        sizes_px = _known_sizes(session)
+    sizes_px = calibrated
+    if session.cameras_toml is None:
+        sizes_px = _sizes_of_pictures(session)
     for trial in alone:
         with problems.guard():
             count = len(frame_times(trial))
@@ -215,10 +219,8 @@ def check_traces(session: Session, problems: InputProblems) -> None:
                 board_on_object(trial, session.board)
 
 
-def _known_sizes(session: Session) -> dict[str, Size]:
-    """Return the picture sizes of cameras.toml, or else of the cameras' boards. Raise BadInput."""
-    if session.cameras_toml is not None:
-        return _calibrated_sizes(session)
+def _sizes_of_pictures(session: Session) -> dict[str, Size]:
+    """Return the picture size of each camera of which a picture can be read."""
     found = {}
     for camera in session.camera_names:
         size = next(filter(None, map(_size, _files_of_camera(session, camera))), None)
