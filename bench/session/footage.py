@@ -13,6 +13,7 @@ from vision.pictures import (
     Frames,
     PicturePart,
     natural_order,
+    picture_size,
     pictures_in,
     read_picture,
 )
@@ -59,6 +60,19 @@ def rig_picture(path: Path | PicturePart) -> np.ndarray:
     if grey is None:
         raise BadInput("cannot be read as a picture", file=f"boards/rig/{path.name}")
     return grey
+
+
+def size_px(source: Path) -> tuple[int, int]:
+    """Return (width, height) of a folder of pictures, a video, or a picture, of which the header alone is read.
+
+    Raises Refused where it cannot be read.
+    """
+    if source.is_dir() or source.suffix.lower() not in PICTURE_SUFFIXES:
+        return Frames.open(source).size_px
+    size = picture_size(source)
+    if size is None:
+        raise Refused("cannot be read as a picture")
+    return size
 
 
 def frame_count(source: Path | PicturePart) -> int:

@@ -8,9 +8,10 @@ from typing import Any
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems, refused_as_bad_input
 from bench.session.file_names import SESSION_TOML
+from bench.session.footage import size_px
 from bench.session.manifest import CameraKeys
-from vision.geometry import Crop, Refused
-from vision.pictures import PICTURE_SUFFIXES, Frames, PicturePart, picture_size
+from vision.geometry import Crop
+from vision.pictures import PicturePart
 
 _NEEDED_OF_PART = {
     "of": "the camera in whose picture this part is",
@@ -28,7 +29,9 @@ def stated_crops(cameras: Iterable[CameraKeys], sources: Mapping[str, Path]) -> 
     for keys in cameras:
         if keys.of is not None and keys.crop is not None:
             _check_of(keys, sources)
-            crop = _crop(keys, _size_px(keys.of, sources[keys.of]))
+            with refused_as_bad_input(f"pictures of camera {keys.of}"):
+                whole_px = size_px(sources[keys.of])
+            crop = _crop(keys, whole_px)
             of_picture.setdefault(keys.of, {})[keys.name] = crop
     found: dict[str, Crop] = {}
     for of, crops in of_picture.items():
@@ -79,17 +82,6 @@ def _check_of(keys: CameraKeys, sources: Mapping[str, Path]) -> None:
     if keys.of not in sources:
         listed = ", ".join(sources)
         raise _bad(keys.name, f'of = "{keys.of}" is no camera with pictures; there are {listed}')
-
-
-def _size_px(name: str, source: Path) -> tuple[int, int]:
-    """Return (width, height) of a camera's pictures. Raise BadInput where none can be read."""
-    with refused_as_bad_input(f"pictures of camera {name}"):
-        if source.is_dir() or source.suffix.lower() not in PICTURE_SUFFIXES:
-            return Frames.open(source).size_px
-        size_px = picture_size(source)
-        if size_px is None:
-            raise Refused("cannot be read as a picture")
-        return size_px
 
 
 def _crop(keys: CameraKeys, whole_px: tuple[int, int]) -> Crop:

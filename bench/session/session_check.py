@@ -14,6 +14,7 @@ from bench.base.progress import count_parts
 from bench.base.results import hash_of_files
 from bench.base.statuses import reason
 from bench.session.array_view import load_views
+from bench.session.footage import size_px
 from bench.session.frame_times import frame_times
 from bench.session.object_board import board_on_object
 from bench.session.session import Session, load_session
@@ -23,14 +24,7 @@ from bench.session.trial import PLACE_UNCHECKED, Trial, require_object_placed
 from bench.session.whisker import Whisker
 from vision.calibration import check_crops, read_cameras
 from vision.geometry import Cameras, Reason, Refused, counted
-from vision.pictures import (
-    STACK_SUFFIXES,
-    VIDEO_SUFFIXES,
-    Frames,
-    page_count,
-    picture_size,
-    pictures_in,
-)
+from vision.pictures import STACK_SUFFIXES, Frames, page_count, pictures_in
 
 Size: TypeAlias = tuple[int, int]  # width, height, px
 _MOST_NAMED = 5  # frames in one line
@@ -309,14 +303,9 @@ def _check_stack(file: Path, camera: str, label: str) -> None:
 
 
 def _size(file: Path) -> Size | None:
-    """Return a picture's size from the header alone; None where it cannot be read.
-
-    A damaged picture has no size.
-    """
-    if file.suffix.lower() not in VIDEO_SUFFIXES:
-        return picture_size(file)
+    """Return the size of a picture or video; None where it cannot be read."""
     try:
-        return Frames.open(file).size_px
+        return size_px(file)
     except Refused:
         return None
 

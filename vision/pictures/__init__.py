@@ -13,7 +13,6 @@ NAMES = {
         "PICTURE_SUFFIXES",
         "PicturePart",
         "STACK_SUFFIXES",
-        "VIDEO_SUFFIXES",
         "natural_order",
         "page_count",
         "picture_size",
