@@ -14,7 +14,6 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from bench.base.errors import BadInput
-from bench.session.footage import frame_count
 from bench.session.trace_files import IN_SPACE
 from bench.session.trace_readers import DrawnLines, read_lines
 from bench.session.trial import Trial
@@ -45,12 +44,12 @@ class TracedCamera:
     crop: Crop | None = None
 
     @classmethod
-    def of_pictures(cls, source: Path | PicturePart, picture: np.ndarray, camera: str) -> Self:
+    def of_pictures(
+        cls, frames: Frames, crop: Crop | None, picture: np.ndarray, camera: str
+    ) -> Self:
         """Return what a trace in a folder of pictures or a video is of."""
-        count = frame_count(source)
-        has = f"camera {camera} has {counted(count, 'picture')}"
-        crop = source.crop if isinstance(source, PicturePart) else None
-        return cls(count, Frames.open(source).size_px, picture, has, crop)
+        has = f"camera {camera} has {counted(frames.count, 'picture')}"
+        return cls(frames.count, frames.size_px, picture, has, crop)
 
     @classmethod
     def of_rows(cls, count: int, size_px: tuple[int, int] | None, crop: Crop | None) -> Self:
@@ -87,13 +86,16 @@ def read_traces(
     picture in each frame (n,), −1 where it dropped that. Raises BadInput where a file cannot be read
     or is not of these pictures.
     """
-    sizes_px = {name: Frames.open(source).size_px for name, source in sources.items()}
+    frames = {name: Frames.open(source) for name, source in sources.items()}
+    sizes_px = {name: of_camera.size_px for name, of_camera in frames.items()}
     traces = {}
     for name, drawn in _drawn(files, sizes_px, label).items():
         if name not in sources:
             found = f"there are no pictures of camera {name}; there are those of"
             raise BadInput(f"{found} {', '.join(sources) or 'none'}", file=drawn.label)
-        camera = TracedCamera.of_pictures(sources[name], pictures[name], name)
+        source = sources[name]
+        crop = source.crop if isinstance(source, PicturePart) else None
+        camera = TracedCamera.of_pictures(frames[name], crop, pictures[name], name)
         traces[name] = _checked(drawn.lines.of_wire, name, camera, drawn)
     return traces
 
