@@ -80,14 +80,8 @@ def forward_in_time(table: NumberTable, time: str, label: str) -> tuple[NumberTa
     values = np.column_stack(list(table.columns.values()))  # (n, columns)
     repeats = np.concatenate([[False], (np.diff(values, axis=0) == 0).all(axis=1)])
     table = table.keep(~repeats)
-    wrong = np.flatnonzero(np.diff(table[time]) <= 0)
-    if len(wrong):
-        before, after = table[time][wrong[0] : wrong[0] + 2]
-        found = f"{after:.10g} comes twice"
-        if after < before:
-            found = f"goes back from {before:.10g} to {after:.10g}"
-        fix = "; times must increase (rows that are wholly the same are dropped)"
-        raise BadInput(found + fix, file=label, row=int(table.row[wrong[0] + 1]), column=time)
+    rule = "times must increase (rows that are wholly the same are dropped)"
+    require_rising(table, time, rule, label)
     return table, int(repeats.sum())
 
 
@@ -119,11 +113,14 @@ def refuse_where(
 
 def require_rising(table: NumberTable, column: str, rule: str, label: str) -> None:
     """Raise BadInput for the first value of a column that is no larger than the one before it."""
-    back = np.flatnonzero(np.diff(table[column]) <= 0)
-    if len(back):
-        before, after = table[column][back[0] : back[0] + 2]
-        found = f"goes from {before:.10g} to {after:.10g}; {rule}"
-        raise BadInput(found, file=label, row=int(table.row[back[0] + 1]), column=column)
+    wrong = np.flatnonzero(np.diff(table[column]) <= 0)
+    if len(wrong):
+        before, after = table[column][wrong[0] : wrong[0] + 2]
+        found = f"{after:.10g} comes twice"
+        if after < before:
+            found = f"goes back from {before:.10g} to {after:.10g}"
+        row = int(table.row[wrong[0] + 1])
+        raise BadInput(f"{found}; {rule}", file=label, row=row, column=column)
 
 
 def _lines(path: Path, label: str) -> list[str]:

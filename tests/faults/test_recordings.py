@@ -189,7 +189,7 @@ def test_frames_and_rows_differ_in_number(session, frames):
     ("row", "text", "expected"),
     [
         (5, "3,0.1", r"frames.csv, row 5, column time_s: goes back from 0.1005 to 0.1"),
-        (5, "2,0.1505", r"frames.csv, row 5, column frame: goes from 2 to 2; frame numbers"),
+        (5, "2,0.1505", r"frames.csv, row 5, column frame: 2 comes twice; frame numbers"),
         (5, "3,", r"frames.csv, row 5, column time_s: is empty"),
         (1, "frame,time_ms", r"frames.csv, row 1: column time_s is missing"),
     ],

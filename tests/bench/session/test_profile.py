@@ -79,7 +79,10 @@ def test_a_sigma_of_the_table_is_the_diameter_s(session):
             r"profile.csv: goes from 0 to 80 mm, length_mm is 100; the first and the last",
         ),
         (lambda p: p[:5], r"profile.csv: has 5 places; 6 or more are needed"),
-        (lambda p: p[[0, 2, 1, *range(3, 16)]], r"profile.csv, row 4, column arc_mm: goes from"),
+        (
+            lambda p: p[[0, 2, 1, *range(3, 16)]],
+            r"profile.csv, row 4, column arc_mm: goes back from",
+        ),
         (
             lambda p: p * [1, -1],
             r"profile.csv, row 2, column diameter_mm: -1; diameters are above 0",

@@ -95,7 +95,10 @@ STRAIGHT = np.linspace([0.0, 0.0, 0.0], [100.0, 0.0, 0.0], 11)
     ("change", "expected"),
     [
         (lambda p: p[1:], r"rest.csv, row 2: the first point is 10 mm from the base"),
-        (lambda p: p[[0, 1, 3, 2, *range(4, 11)]], r"rest.csv, row 5, column x_mm: goes from 30"),
+        (
+            lambda p: p[[0, 1, 3, 2, *range(4, 11)]],
+            r"rest.csv, row 5, column x_mm: goes back from 30",
+        ),
         (
             lambda p: 1.1 * p,
             r"rest.csv: the points go to an arc length of 110 mm, length_mm is 100",
