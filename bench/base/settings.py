@@ -2,9 +2,10 @@
 
 import importlib.util
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any, Self
 
 from bench.base.errors import BadInput
 from vision.geometry import VisionSettings
@@ -32,6 +33,10 @@ class Seeing:
     def asks(self, camera: str) -> bool:
         """Return whether this camera's pictures are evaluated."""
         return not self.cameras or camera in self.cameras
+
+    def with_vision(self, **changed: Any) -> Self:
+        """Return these settings with some of vision's changed, by name."""
+        return replace(self, vision=replace(self.vision, **changed))
 
 
 @dataclass(frozen=True)
@@ -76,6 +81,10 @@ class Settings:
             _require("--accuracy-mm", self.accuracy_mm, 0.0, 100.0, above=True)
         if self.clock_sigma_s is not None:
             _require("--clock-sigma-s", self.clock_sigma_s, 0.0, 10.0)
+
+    def with_vision(self, **changed: Any) -> Self:
+        """Return these settings with some of vision's changed, by name."""
+        return replace(self, seeing=self.seeing.with_vision(**changed))
 
     @property
     def theta_rad(self) -> float:

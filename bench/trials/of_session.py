@@ -108,17 +108,13 @@ def units_in_rig(
     placed = []
     for unit in units:
         found = contradictions_of(problems, unit.trial.name)
-        settings = _without_base(unit.settings) if calibration.placed_by else unit.settings
+        settings = unit.settings
+        if calibration.placed_by:  # no trial reads the whisker's base again
+            settings = settings.with_vision(read_base=False)
         placed.append(
             replace(unit, calibration=calibration, contradictions=found, settings=settings)
         )
     return calibration, placed
-
-
-def _without_base(settings: Settings) -> Settings:
-    """Return the settings of trials whose rig is placed: none reads the whisker's base again."""
-    vision = replace(settings.seeing.vision, read_base=False)
-    return replace(settings, seeing=replace(settings.seeing, vision=vision))
 
 
 def with_gauges(

@@ -293,13 +293,10 @@ def _converge(
 
 def _of_swing(unit: Unit, calibration: SessionCalibration, step: str) -> Unit:
     """Return a unit of which the free stroke is read, without checks of what bends: nothing reads them."""
-    seeing = unit.settings.seeing
-    vision = replace(seeing.vision, check_beam=False)
-    settings = replace(unit.settings, seeing=replace(seeing, vision=vision))
     return replace(
         unit,
         calibration=calibration,
-        settings=settings,
+        settings=unit.settings.with_vision(check_beam=False),
         calibration_step=step,
         places_rig=True,
     )

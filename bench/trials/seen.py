@@ -107,7 +107,9 @@ def _see(
     clock_sigma_s = settings.clock_sigma_s
     if clock_sigma_s is None:
         clock_sigma_s = times.clock_sigma_s
-    presets = [_with_clock(preset, clock_sigma_s) for preset in presets_for(settings)]
+    presets = []
+    for preset in presets_for(settings):
+        presets.append(preset.with_vision(clock_sigma_s=clock_sigma_s))
     truth, whisks = _observe(frames, calibration, presets, settings.accuracy_mm)
     back = dict(zip(frames.back, truth.whisks[len(whisks) :]))
     late = check_camera_delays(whisk.delays for whisk in truth.whisks)
@@ -210,11 +212,6 @@ def _observe(
     for preset in finer:
         whisks = _refine(observe, frames.places, whisks, preset, accuracy_mm)
     return truth, whisks
-
-
-def _with_clock(preset: Seeing, clock_sigma_s: float) -> Seeing:
-    """Return settings with the sigma of the frames' clock."""
-    return replace(preset, vision=replace(preset.vision, clock_sigma_s=clock_sigma_s))
 
 
 def _contradicted_diameters(truth: TrialTruth, session: Session, trial: Trial) -> list[Reason]:
