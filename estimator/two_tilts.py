@@ -84,11 +84,10 @@ def shared_contact(
     """
     if len(whisks) < 2:
         raise ValueError("two whisks at two tilts are the fewest that tell friction from distance")
-    felt = np.array([whisk.felt for whisk in whisks])
-    if not _all_push(felt):
-        return _without_contact(NO_PUSH)
     apart = apart_sigma_mm * _by_place(places or range(len(whisks)))
     equations = _Equations(whisks, settings, apart, shared_Nmm)
+    if not equations.all_push:
+        return _without_contact(NO_PUSH)
     solution = equations.start()
     for _ in range(_MOST_ITERATIONS):
         before = solution
@@ -113,19 +112,31 @@ class _Equations:
     shared_Nmm: Sequence[np.ndarray]
 
     @cached_property
+    def felt(self) -> np.ndarray:
+        """Return θ, m_y and m_z (n, 3) of the whisks, rad and N·mm."""
+        return np.array([whisk.felt for whisk in self.whisks])
+
+    @property
+    def all_push(self) -> bool:
+        """Return whether all of θ, m_y and m_z are known, and each m_z is positive."""
+        return bool((self.m_z > 0).all() and np.isfinite(self.felt).all())
+
+    @cached_property
     def per_mm(self) -> np.ndarray:
         """Return a (n,), N·mm per mm."""
-        return _per_distance(self.whisks)
+        theta, m_y, m_z = self.felt.T
+        stiffness = np.array([whisk.beam.C_Nmm2 for whisk in self.whisks])
+        return (m_y**2 + m_z**2) / (stiffness * theta)
 
-    @cached_property
+    @property
     def m_y(self) -> np.ndarray:
         """Return |m_y| (n,), N·mm."""
-        return np.array([abs(whisk.m_y_at_Nmm) for whisk in self.whisks])
+        return np.abs(self.felt[:, 1])
 
-    @cached_property
+    @property
     def m_z(self) -> np.ndarray:
         """Return m_z (n,), N·mm."""
-        return np.array([whisk.m_z_at_Nmm for whisk in self.whisks])
+        return self.felt[:, 2]
 
     def start(self) -> np.ndarray:
         """Solve for (d, μ) without errors and weights."""
@@ -179,17 +190,6 @@ def _has_converged(step: np.ndarray, solution: np.ndarray, covariance: np.ndarra
     """Return whether the last step (2,) of (d, μ) is nothing against its sigmas."""
     least = _LAST_STEP * np.array([solution[0], 1.0])
     return bool((np.abs(step) <= _LAST_STEP_SIGMAS * np.sqrt(np.diag(covariance)) + least).all())
-
-
-def _all_push(felt: np.ndarray) -> bool:
-    """Check that all of θ, m_y and m_z (n, 3) are known, and that each m_z is positive."""
-    return (felt[:, 2] > 0).all() and np.isfinite(felt).all()
-
-
-def _per_distance(whisks: Sequence[Whisk]) -> np.ndarray:
-    """Compute |m|² / Cθ (n,), N·mm per mm."""
-    squares = np.array([w.m_y_at_Nmm**2 + w.m_z_at_Nmm**2 for w in whisks])
-    return squares / [w.beam.C_Nmm2 * w.theta_at_rad for w in whisks]
 
 
 def _start(rows: np.ndarray, m_z: np.ndarray) -> np.ndarray:
