@@ -112,6 +112,7 @@ def curved_error(
     return theta * np.maximum(0.0, np.cos(np.abs(phi) + alpha)) / (d * np.cos(alpha)) - 1
 
 
+@elementwise
 def curved_threshold(
     error: ArrayLike, alpha: ArrayLike, r_n: ArrayLike, theta: ArrayLike, form: AppendixB
 ) -> Numbers:
@@ -127,12 +128,6 @@ def curved_threshold(
     """
     require_positive("error", error, "(a share)")
     require_positive("theta", theta, "rad")
-    return _first_crossing(error, alpha, r_n, theta, form)
-
-
-@elementwise
-def _first_crossing(error, alpha, r_n, theta, form):
-    """Find the slope of `curved_threshold`."""
     conditions = [condition[..., None] for condition in np.broadcast_arrays(alpha, r_n, theta)]
 
     def is_reached(slope):
