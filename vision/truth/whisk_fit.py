@@ -271,9 +271,8 @@ def free_stroke(whisk: WhiskPictures, fitted: FittedWhisk) -> ConvergedFit:
         seen=seen,
         motion=whisk.motion,
     )
-    middle_mm = np.full(len(place.curves), 0.5 * whisk.rods.wire.length_mm)
-    state = State(fitted.state.vector[: problem.first_bend], middle_mm)
-    state, _ = solve(alone, state, scales=[LAST_SCALE] * 3)
+    start = _untouched_state(alone, fitted.state.vector[: problem.first_bend])
+    state, _ = solve(alone, start, scales=[LAST_SCALE] * 3)
     return ConvergedFit(inflated_by_residuals(alone, state, FREE_SHARED), state)
 
 
@@ -297,11 +296,16 @@ def fit_before_touch(
         bent=nothing,
         seen=seen,
     )
-    middle_mm = np.full(len(nothing), 0.5 * whisk.rods.wire.length_mm)
-    state, _ = solve(problem, State(at_rest(problem, rest_mm), middle_mm))
+    state, _ = solve(problem, _untouched_state(problem, at_rest(problem, rest_mm)))
     fit = ConvergedFit(problem, state)
     check_scatter(fit, lines.most_scatter_px)
     return fit.axis.upward(), fit.rest_mm
+
+
+def _untouched_state(problem: Problem, vector: np.ndarray) -> State:
+    """Return a state of frames in which nothing touches: the contact is sought from the wire's middle on."""
+    middle_mm = np.full(len(problem.motor_rad), 0.5 * problem.rods.wire.length_mm)
+    return State(vector, middle_mm)
 
 
 def _wire_points(whisk: WhiskPictures, place: WhiskPlace) -> list[Observed]:
