@@ -1,7 +1,7 @@
 """`whisker-bench calibrate cameras`: cameras.toml from a session's board views, and how far to trust it."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -67,60 +67,72 @@ def calibrate_cameras_command(
     anything is written.
     """
     loaded = load_session(session, lenses_known=lenses is not None, follow_links=follow_links)
-    if lenses is not None:
-        cameras = place_imported(loaded, lenses, names)
-        lines = [f"lenses of {', '.join(cameras.names)} as in {lenses.name}, taken as exact"]
-        warnings: list[str] = []
-        if not loaded.is_rig_placed and not file_format:
-            _say_not_placed(lenses.name, out, session, lines, warnings)
-        return _write(out, loaded, cameras, lines, warnings, file_format)
-    views = read_board_views(loaded)
-    calibration = calibrate_from(loaded, views)
-    cameras = moved_by_file(loaded, calibration.cameras)
-    lines = list(report_lines(calibration))
-    warnings = [*views.notes, *calibration.warnings]
-    if loaded.is_rig_placed:
-        lengths, of_scale = check_scale(loaded, cameras)
-        lines += lengths
-        warnings += of_scale
-    elif not file_format:
-        frame = (
-            "the board on the rig" if _all_see_rig_board(views) else f"camera {cameras.names[0]}"
-        )
-        _say_not_placed(frame, out, session, lines, warnings)
-    lines += held_out_lines(measure_held_out(loaded, views), calibration)
-    warnings += _corner_warnings(calibration)
-    return _write(out, loaded, cameras, lines, warnings, file_format)
+    file = _CameraFile(out, loaded, file_format)
+    if lenses is None:
+        return file.write(_calibrate_by_boards(loaded, file))
+    cameras = place_imported(loaded, lenses, names)
+    file.lines.append(f"lenses of {', '.join(cameras.names)} as in {lenses.name}, taken as exact")
+    if not loaded.is_rig_placed:
+        file.say_not_placed(lenses.name)
+    return file.write(cameras)
 
 
-def _say_not_placed(
-    frame: str, out: Path, session: Path, lines: list[str], warnings: list[str]
-) -> None:
-    """Add a line on cameras that are in another frame than the rig's, a warning where they are written into the session."""
-    line = _NOT_PLACED.format(frame=frame)
-    is_of_session = out.resolve() == (session / "cameras.toml").resolve()
-    (warnings if is_of_session else lines).append(line)
+@dataclass(frozen=True)
+class _CameraFile:
+    """A session's camera file before it is written, and what is printed with it.
+
+    file_format: another program's, '' for ours.
+    """
+
+    out: Path
+    session: Session
+    file_format: str
+    lines: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def say_not_placed(self, frame: str) -> None:
+        """Add a line on cameras that are in another frame than the rig's.
+
+        It is a warning where they are written into the session. Files of other programs may have any frame.
+        """
+        if self.file_format:
+            return
+        line = _NOT_PLACED.format(frame=frame)
+        is_of_session = self.out.resolve() == (self.session.path / "cameras.toml").resolve()
+        (self.warnings if is_of_session else self.lines).append(line)
+
+    def write(self, cameras: Cameras) -> int:
+        """Write the cameras and print the lines. Return 0, or 1 with warnings."""
+        if self.file_format:
+            with refused_as_bad_input(f"--format {self.file_format}"):
+                files = WRITERS[self.file_format](cameras, self.out.stem)
+            for name, content in files.items():
+                write_whole(self.out.parent / name, content)
+            written = f", without uncertainties: {', '.join(files)} in {self.out.parent}"
+        else:
+            write_cameras(self.out, cameras, self.session.crops)
+            written = f": {self.out} and {self.out.with_suffix('.npz').name}"
+        return print_written(self.lines, self.warnings, written)
 
 
-def _write(
-    out: Path,
-    session: Session,
-    cameras: Cameras,
-    lines: list[str],
-    warnings: list[str],
-    file_format: str,
-) -> int:
-    """Write the session's cameras and print the lines. Return 0, or 1 with warnings."""
-    if file_format:
-        with refused_as_bad_input(f"--format {file_format}"):
-            files = WRITERS[file_format](cameras, out.stem)
-        for name, content in files.items():
-            write_whole(out.parent / name, content)
-        written = f", without uncertainties: {', '.join(files)} in {out.parent}"
+def _calibrate_by_boards(session: Session, file: _CameraFile) -> Cameras:
+    """Return the cameras by the session's board views; add to the file's lines what they rest on."""
+    views = read_board_views(session)
+    calibration = calibrate_from(session, views)
+    cameras = moved_by_file(session, calibration.cameras)
+    file.lines.extend(report_lines(calibration))
+    file.warnings.extend([*views.notes, *calibration.warnings])
+    if session.is_rig_placed:
+        lengths, of_scale = check_scale(session, cameras)
+        file.lines.extend(lengths)
+        file.warnings.extend(of_scale)
+    elif _all_see_rig_board(views):
+        file.say_not_placed("the board on the rig")
     else:
-        write_cameras(out, cameras, session.crops)
-        written = f": {out} and {out.with_suffix('.npz').name}"
-    return print_written(lines, warnings, written)
+        file.say_not_placed(f"camera {cameras.names[0]}")
+    file.lines.extend(held_out_lines(measure_held_out(session, views), calibration))
+    file.warnings.extend(_corner_warnings(calibration))
+    return cameras
 
 
 def place_imported(session: Session, lenses: Path, names: Sequence[str] = ()) -> Cameras:

@@ -6,7 +6,7 @@ Anipose's points in space, `trace_3d.csv`, with its cameras, `trace_3d.toml`. Po
 `object_<camera>`, or are joints of a trace that are named for it, where there are no pictures to find it in.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -118,11 +118,10 @@ def read_traces_alone(
     """
     of_wire = _drawn(trial.trace_files, sizes_px, trial.place)
     of_object = _drawn(trial.object_files, sizes_px, trial.place)
+    _require_known(of_wire, sizes_px)
+    _require_known(of_object, sizes_px)
     cameras = {}
-    for name, drawn in (*of_wire.items(), *of_object.items()):
-        if sizes_px and name not in sizes_px:
-            found = f"there is no camera {name}; there are {', '.join(sizes_px)}"
-            raise BadInput(found, file=drawn.label)
+    for name in {**of_wire, **of_object}:
         cameras[name] = TracedCamera.of_rows(count, sizes_px.get(name), crops.get(name))
     points = {}
     for name, drawn in of_object.items():
@@ -134,6 +133,14 @@ def read_traces_alone(
         if len(joints.frame) and name not in points:
             points[name] = _checked(joints, name, cameras[name], drawn)
     return TracesAlone(wire, points)
+
+
+def _require_known(drawn: Mapping[str, _Drawn], names: Collection[str]) -> None:
+    """Raise BadInput for a file of none of the cameras that are calibrated; names: empty where none is known."""
+    for name, file in drawn.items():
+        if names and name not in names:
+            found = f"there is no camera {name}; there are {', '.join(names)}"
+            raise BadInput(found, file=file.label)
 
 
 def has_points_in_one_camera(trial: Trial) -> bool:
