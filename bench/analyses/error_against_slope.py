@@ -98,23 +98,19 @@ def error_against_slope(
     figure = blank(9.6, 1.0 + 3.2 * len(panels))
     rows = figure.subplots(len(panels), 2, squeeze=False)
     for (left, right), (panel, every) in zip(rows, panels.items()):
+        title = panel_title(*panel)
+        without_2 = [one for one in every if one.estimator != "no_slip"]
+        by_whole_matrix = [one for one in every if not one.one_factor]
         surface = surface_of.get(panel)
-        without_2 = [j for j in every if j.estimator != "no_slip"]
         _draw_estimators(left, every, lanes, surface, settings)
         _draw_estimators(right, without_2, lanes, surface, settings)
-        left.set_ylim(*_limits([j for j in every if not j.one_factor]))
-        right.set_ylim(*_limits(without_2))
-        _name_panels(left, right, panel_title(*panel))
+        left.set(title=f"{title}: every estimator", ylim=_limits(by_whole_matrix))
+        left.set_ylabel("error of d$_x$  [%]")
+        right.set(title=f"{title}: without (2)", ylim=_limits(without_2))
     for axes in rows[-1]:
         axes.set_xlabel("slope β  [°]")
     add_legend(figure, 3)
     return figure
-
-
-def _name_panels(left: "Axes", right: "Axes", title: str) -> None:
-    """Write the titles above the panels of one surface and speed, and what is drawn upwards."""
-    left.set(ylabel="error of d$_x$  [%]", title=f"{title}: every estimator")
-    right.set_title(f"{title}: without (2)")
 
 
 # A `Judged.way`: by it an estimate is moved, so as not to cover others of its whisk.

@@ -105,6 +105,18 @@ class _Marched:
     tangent: np.ndarray
 
 
+def _newton_step(by_unknowns: np.ndarray, missing: np.ndarray) -> np.ndarray | None:
+    """Solve for the changes (n, 3) of the unknowns that give what is missing (n, 3); None where they do not exist.
+
+    by_unknowns (n, 3, 3): derivatives.
+    """
+    try:
+        step = np.linalg.solve(by_unknowns, missing[..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        return None
+    return step if np.isfinite(step).all() else None
+
+
 @dataclass(frozen=True, eq=False)
 class KirchhoffRods:
     """Rods of one whisker, held at contacts (n, 3), mm, in the hub's axes.
@@ -134,11 +146,8 @@ class KirchhoffRods:
             points = marched.contact
             missing = wanted - points[0]
             by_unknowns = np.moveaxis(points[1:] - points[0], 0, -1) / _DIFFERENCE
-            try:
-                step = np.linalg.solve(by_unknowns, missing[..., None])[..., 0]
-            except np.linalg.LinAlgError:
-                break
-            if not np.isfinite(step).all():
+            step = _newton_step(by_unknowns, missing)
+            if step is None:
                 break
             if np.abs(step).max() < _LAST_STEP:
                 return self._in_units(marched, chord)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 from bench.session.angle_source import angle_source, without_motor_log
 from bench.session.session import Session
@@ -28,6 +29,11 @@ class Ability:
     of: int
     missing: str = ""
 
+    @classmethod
+    def of_trials(cls, quantity: str, able: Sequence[Trial], of: int, missing: str) -> Self:
+        """Return the row of a quantity. missing: what gives it to the trials that are not able to."""
+        return cls(quantity, len(able), of, "" if len(able) == of else missing)
+
     @property
     def line(self) -> str:
         """Return the row as `check` prints it."""
@@ -42,30 +48,26 @@ def abilities(session: Session) -> tuple[Ability, ...]:
     of_gauges = [lacks[trial.name] for trial in measured if trial.purpose == "gauge"]
     has_gauges = _has_gauges(session, of_gauges)
     seen = [trial for trial in measured if not lacks[trial.name]]
-    felt = [trial for trial in measured if has_gauges or has_moments(trial)]
-    true = seen
     to_see = _first(lacks.values())
-    to_know = f'{to_see}; or a stage: [truth] source = "stage"'
-    if session.truth is not None:
+    if session.truth is None:
+        true = seen
+        to_know = f'{to_see}; or a stage: [truth] source = "stage"'
+    else:
         true = [trial for trial in measured if _is_stated(trial)]
         to_know = _TO_STATE
+    felt = [trial for trial in measured if has_gauges or has_moments(trial)]
     both = [trial for trial in true if trial in felt]
     drawn = both if _has_slopes(both, session) else []
-    rows = (
-        ("truth of d_x", true, to_know),
-        ("truth of β", true, to_know),
-        ("slip, deflection", seen, to_see),
-        ("estimates of d_x", felt, _TO_FEEL),
-        ("errors", both, _TO_COMPARE),
-        ("Fig. 8", drawn, _TO_DRAW),
+    count = len(measured)
+    return (
+        Ability.of_trials("truth of d_x", true, count, to_know),
+        Ability.of_trials("truth of β", true, count, to_know),
+        Ability.of_trials("slip, deflection", seen, count, to_see),
+        Ability.of_trials("estimates of d_x", felt, count, _TO_FEEL),
+        Ability.of_trials("errors", both, count, _TO_COMPARE),
+        Ability.of_trials("Fig. 8", drawn, count, _TO_DRAW),
+        *_of_gauges(of_gauges, has_gauges=has_gauges),
     )
-    found = [_ability(quantity, able, len(measured), missing) for quantity, able, missing in rows]
-    return (*found, *_of_gauges(of_gauges, has_gauges=has_gauges))
-
-
-def _ability(quantity: str, able: Sequence[Trial], of: int, missing: str) -> Ability:
-    """Return the row of a quantity. missing: what gives it to the trials that are not able to."""
-    return Ability(quantity, len(able), of, "" if len(able) == of else missing)
 
 
 def _has_slopes(trials: Sequence[Trial], session: Session) -> bool:

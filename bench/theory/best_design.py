@@ -127,8 +127,7 @@ def expected_error(
         of_cylinder, noise_mm = _cylinder_distance(design, equipment, *moments)
         by_friction = _taper_distance(design, of_cylinder) / d_x - 1.0
         by_noise = noise_mm / of_cylinder * design.thickness(d_x)
-        lean_sigma = np.radians(region.lean_sigma_deg)
-        by_lean = first_order.leaning(design.theta_rad, lean_sigma, np.arctan2(*moments), alpha)
+        by_lean = _share_by_lean(design, region, np.arctan2(*moments), alpha)
     by_making = _share_by_making(design, equipment, d_x)
     bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
     sigma = np.linalg.norm(np.broadcast_arrays(by_noise, by_lean, by_making), axis=0)
@@ -136,6 +135,12 @@ def expected_error(
     bias[is_open] = np.inf
     sigma[is_open] = np.inf
     return ExpectedError(100.0 * bias, 100.0 * sigma)
+
+
+def _share_by_lean(design: Design, region: Region, phi: Numbers, alpha: Numbers) -> Numbers:
+    """Return the relative sigma of d_x by how upright objects stand; phi: slip angle (8), rad."""
+    lean_sigma = np.radians(region.lean_sigma_deg)
+    return first_order.leaning(design.theta_rad, lean_sigma, phi, alpha)
 
 
 def _share_by_making(design: Design, equipment: Equipment, d_x: Numbers) -> Numbers:

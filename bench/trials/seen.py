@@ -103,27 +103,19 @@ def _see(
     settings: Settings,
 ) -> SeenTrial:
     """Evaluate the pictures of a trial. Raise Refused where they do not suffice."""
-    times = frames.times
-    clock_sigma_s = settings.clock_sigma_s
-    if clock_sigma_s is None:
-        clock_sigma_s = times.clock_sigma_s
-    presets = []
-    for preset in presets_for(settings):
-        presets.append(preset.with_vision(clock_sigma_s=clock_sigma_s))
-    truth, whisks = _observe(frames, calibration, presets, settings.accuracy_mm)
+    clock = _clock(frames.times, settings)
+    truth, whisks = _observe(frames, calibration, clock.sigma_s, settings)
     back = dict(zip(frames.back, truth.whisks[len(whisks) :]))
     late = check_camera_delays(whisk.delays for whisk in truth.whisks)
     of_trial = [*_contradicted_diameters(truth, session, trial), late]
     return SeenTrial(
         tuple(_records(session, trial, frames, settings, whisks, of_trial)),
         notes=_notes(frames),
-        damaged=in_one_status(
-            *_damaged_frames(frames.by_camera, frames.times), *frames.scene.unusable
-        ),
+        damaged=_damage(frames),
         bar=BarLine(truth.bar_point_mm, truth.bar_direction),
         bar_radius_mm=0.5 * trial.bar_diameter_mm,
         wire_radius_mm=0.5 * frames.rods.wire.diameter_mm,
-        clock=Clock(times.source, clock_sigma_s, times.clock_sigma_s == 0.0),
+        clock=clock,
         bar_looks=truth.bar_widths,
         one_sided_light=truth.one_sided_light,
         back=_back_stroke(back.get(0)),
@@ -194,11 +186,19 @@ def _notes(frames: TrialFrames) -> tuple[str, ...]:
     return (*missing, *lost, *frames.scene.notes, *others, *frames.notes)
 
 
+def _clock(times: FrameTimes, settings: Settings) -> Clock:
+    """Return how well the frames' clock is known: as the settings state it, or by where times come from."""
+    sigma_s = settings.clock_sigma_s
+    if sigma_s is None:
+        sigma_s = times.clock_sigma_s
+    return Clock(times.source, sigma_s, times.clock_sigma_s == 0.0)
+
+
 def _observe(
     frames: TrialFrames,
     calibration: SessionCalibration,
-    presets: Sequence[Seeing],
-    accuracy_mm: float | None,
+    clock_sigma_s: float,
+    settings: Settings,
 ) -> tuple[TrialTruth, list[Evaluated]]:
     """Return the truth of the trial by the first preset, and its forward whisks, each by the first
     preset that reaches the accuracy.
@@ -206,11 +206,14 @@ def _observe(
     observe = partial(
         frames.observe, frames.pictures, cameras=calibration.cameras, rods=frames.rods
     )
+    presets = []
+    for preset in presets_for(settings):
+        presets.append(preset.with_vision(clock_sigma_s=clock_sigma_s))
     first, *finer = presets
     truth = observe(whisks=[*frames.places, *frames.back.values()], settings=first.vision)
     whisks = [(first.name, whisk) for whisk in truth.whisks[: len(frames.places)]]
     for preset in finer:
-        whisks = _refine(observe, frames.places, whisks, preset, accuracy_mm)
+        whisks = _refine(observe, frames.places, whisks, preset, settings.accuracy_mm)
     return truth, whisks
 
 
@@ -284,16 +287,18 @@ def _missing_frames(frames: Mapping[str, Mapping], times: FrameTimes) -> Iterato
             yield f"camera {name} dropped {lost} of {count} frames"
 
 
-def _damaged_frames(frames: Mapping[str, Mapping], times: FrameTimes) -> Iterator[Reason]:
-    """Yield a line on the damaged frames of each camera that has some."""
-    count = len(times)
-    for name, pictures in frames.items():
-        is_recorded = times.picture[name] >= 0
+def _damage(frames: TrialFrames) -> Reason:
+    """Return a status of the damaged frames of each camera, and of what of the pictures is of no use."""
+    count = len(frames.times)
+    found = []
+    for name, pictures in frames.by_camera.items():
+        is_recorded = frames.times.picture[name] >= 0
         damaged = [k for k in np.flatnonzero(is_recorded) if k not in pictures]
         if damaged:
             named = first_names(damaged, _MOST_NAMED)
-            found = f"camera {name}: {len(damaged)} of {count} frames damaged ({named})"
-            yield Reason("frames_damaged", found)
+            line = f"camera {name}: {len(damaged)} of {count} frames damaged ({named})"
+            found.append(Reason("frames_damaged", line))
+    return in_one_status(*found, *frames.scene.unusable)
 
 
 def whisk_record(
