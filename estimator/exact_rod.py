@@ -316,24 +316,11 @@ class _Rod:
         """
         at, per_march = self._nodes(arc)
         rest = self.tangent(at)[..., None]
-        way = per_march[..., None] / _STEPS  # of the arc, in a step
-        softness = way / self.width(at[..., None]) ** 4
-
-        def gain(place: float, pose: np.ndarray) -> np.ndarray:
-            """Return what turns and ways (n, 3, 4) gain in a step towards the base."""
-            node = int(2 * place)
-            turn = pose[..., :3]
-            tangent = (turn @ rest[node])[..., 0]
-            moment = cross(pose[..., 3], force)
-            twist = _POISSON * dot(tangent, moment)[:, None] * tangent
-            curvature = softness[node] * (moment + twist)
-            gained_turn = -cross_matrices(curvature) @ turn
-            gained_way = way[node] * tangent
-            return np.concatenate([gained_turn, gained_way[..., None]], axis=2)
-
+        way = per_march[..., None] / _STEPS
+        march = _March(force, rest, way, softness=way / self.width(at[..., None]) ** 4)
         # At the contact: not turned, and no way from there.
         at_contact = np.broadcast_to(np.eye(3, 4), (len(arc), 3, 4))
-        at_base = runge_kutta(gain, at_contact, _STEPS)
+        at_base = runge_kutta(march.gain, at_contact, _STEPS)
         to_hub = np.swapaxes(at_base[..., :3], 1, 2)
         in_march = np.stack([at_base[..., 3], force, rest[0, :, :, 0]], axis=2)
         contact, turned_force, tangent = np.moveaxis(to_hub @ in_march, 2, 0)
@@ -350,6 +337,32 @@ class _Rod:
             return at, -log_width / self.taper * (1.0 - self.taper * at)
         at = arc * parts
         return at, np.broadcast_to(arc, at.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class _March:
+    """n rods on the march from their contacts to the base, over nodes at the ends and middles of its steps.
+
+    force (n, 3): at the contacts. rest (nodes, n, 3, 1): unloaded tangents. way (nodes, n, 1): of the arc, in
+    a step. softness (nodes, n, 1): turn by a step per moment.
+    """
+
+    force: np.ndarray
+    rest: np.ndarray
+    way: np.ndarray
+    softness: np.ndarray
+
+    def gain(self, place: float, pose: np.ndarray) -> np.ndarray:
+        """Return what turns and ways (n, 3, 4) gain in a step towards the base; place: in steps from the contact."""
+        node = int(2 * place)
+        turn = pose[..., :3]
+        tangent = (turn @ self.rest[node])[..., 0]
+        moment = cross(pose[..., 3], self.force)
+        twist = _POISSON * dot(tangent, moment)[:, None] * tangent
+        curvature = self.softness[node] * (moment + twist)
+        gained_turn = -cross_matrices(curvature) @ turn
+        gained_way = self.way[node] * tangent
+        return np.concatenate([gained_turn, gained_way[..., None]], axis=2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,15 +183,11 @@ class _Observed:
         (..., n) each.
 
         In the segment below a slope, its point and those of all steeper ones slip; the others hold.
-        By (13) and (14) the moments of points that slip are start + rate·tan α.
         """
         order = np.argsort(np.abs(self.beta))
-        beta = self.beta[order]
         scale = self.scale[order]
-        data = self.data.reshape(*self.data.shape[:-1], 2, len(beta))[..., order]
-        sliding = scale * np.cos(beta)
-        start = np.stack([sliding * np.sin(beta), sliding * np.cos(beta)])
-        rate = np.stack([-np.sign(beta) * sliding * np.cos(beta), sliding * np.sin(np.abs(beta))])
+        data = self.data.reshape(*self.data.shape[:-1], 2, len(order))[..., order]
+        start, rate = _slipping_moments(self.beta[order], scale)
         residual = data - start
         held = np.stack([np.zeros_like(scale), scale])
         held_squares = ((data - held) ** 2).sum(axis=-2)
@@ -200,6 +196,14 @@ class _Observed:
         cross = _sum_from_here((residual * rate).sum(axis=-2))
         curvature = _sum_from_here((rate**2).sum(axis=-2))
         return squares, cross, curvature
+
+
+def _slipping_moments(beta: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return m_y and m_z (2, n) of points that slip, by (13) and (14): at tan α = 0, and their rates with tan α."""
+    sliding = scale * np.cos(beta)
+    start = np.stack([sliding * np.sin(beta), sliding * np.cos(beta)])
+    rate = np.stack([-np.sign(beta) * sliding * np.cos(beta), sliding * np.sin(np.abs(beta))])
+    return start, rate
 
 
 def _lowest(

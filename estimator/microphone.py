@@ -37,6 +37,9 @@ class HeardTouch:
     status: str = ""
 
 
+_NO_TOUCH = HeardTouch(nan, nan, nan, NOTHING_HEARD)
+
+
 def heard_touch(time_s: np.ndarray, pressure: np.ndarray) -> HeardTouch:
     """Find first touch in the pressure (n,) of one forward stroke, at times (n,), s.
 
@@ -49,12 +52,12 @@ def heard_touch(time_s: np.ndarray, pressure: np.ndarray) -> HeardTouch:
     begin = int(_FREE_SHARE * count)
     free = pressure[:begin]
     if count < _FEWEST_SAMPLES or not np.std(free) > 0:
-        return HeardTouch(nan, nan, nan, NOTHING_HEARD)
+        return _NO_TOUCH
     sought = (pressure[begin:] - np.mean(free)) / np.std(free, ddof=2)
     loudest = -float(ndtri(0.5 * _FALSE_ALARMS / count))
     louder = np.flatnonzero(np.abs(sought) > loudest)
     if not len(louder):
-        return HeardTouch(nan, nan, nan, NOTHING_HEARD)
+        return _NO_TOUCH
     first = int(louder[0])
     likelihood = _onset_likelihood(sought[: first + _LOUD_SAMPLES], first)
     instant_s, sigma_s = _instant_of_touch(time_s, begin, likelihood)

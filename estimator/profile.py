@@ -89,12 +89,16 @@ def contact(
     why_not = CURVED if beam.is_curved else load_cell.why_not(*felt)
     if why_not:
         return np.full(3, np.nan), np.full((3, 3), np.nan), why_not
+    point, gradient = _contact_with_gradient(felt, beam)
+    by_moments = gradient[:, :2] @ moment_covariance @ gradient[:, :2].T
+    by_forces = gradient[:, 2:] @ force_covariance @ gradient[:, 2:].T
+    return point, by_moments + by_forces, "" if np.isfinite(point).all() else NO_END
+
+
+def _contact_with_gradient(felt: np.ndarray, beam: Beam) -> tuple[np.ndarray, np.ndarray]:
+    """Return the contact (3,) by what is felt (5,), and its derivatives (3, 5) by that."""
     moment = np.hypot(felt[0], felt[1])
     force = np.linalg.norm(felt[2:])
     steps = _DIFFERENCE * np.array([moment, moment, force, force, force])
     points = contact_in_hub(felt + steps_each_way(steps), beam)
-    point = points[0]
-    gradient = differences(points.T, steps)  # (3, 5)
-    by_moments = gradient[:, :2] @ moment_covariance @ gradient[:, :2].T
-    by_forces = gradient[:, 2:] @ force_covariance @ gradient[:, 2:].T
-    return point, by_moments + by_forces, "" if np.isfinite(point).all() else NO_END
+    return points[0], differences(points.T, steps)

@@ -196,12 +196,13 @@ def ringing(time_s: np.ndarray, moments: np.ndarray, beside: Ring | None = None)
     slowest_Hz = _FEWEST_PERIODS / record.span_s
     if beside is None:
         mains_Hz = record.mains_beside_ring(slowest_Hz)
+        free = 3
     else:
         mains_Hz = beside.mains_Hz
         slowest_Hz = max(slowest_Hz, beside.frequency_Hz)
+        free = 2
     best_Hz, runner_up = record.strongest(slowest_Hz, mains_Hz)
     start = np.log([best_Hz, _TYPICAL_DAMPING, mains_Hz])
-    free = 3 if beside is None else 2
     fit = _refined(record, slowest_Hz, start, free)
     frequency, damping, mains_Hz = np.exp([*fit.x, *start[free:]]).tolist()
     left = 2 * fit.cost
