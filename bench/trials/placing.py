@@ -282,13 +282,18 @@ def _converge(
         units = [_of_swing(unit, here, f"swing{round_number}") for unit in chosen]
         both = place(board, units, see_units(units, pool, "free strokes", problems))
         if np.all(np.abs(both.step) < _SMALL_STEP):
-            hashes = {unit.trial.name: unit.seen_hash for unit in units}
-            here = replace(here, placed_by=units[0].calibration_step, hashes_before=hashes)
+            here = _as_placed_by(units, here)
             break
         here = _moved(here, exact, _as_exact(both))
         board = replace(board, step=board.step - both.step)
         both = replace(both, step=exact.step)
     return _with_scale(_moved(here, exact, both), both), both
+
+
+def _as_placed_by(units: Sequence[Unit], calibration: SessionCalibration) -> SessionCalibration:
+    """Return the calibration that names the units, as they were seen to place the rig."""
+    hashes = {unit.trial.name: unit.seen_hash for unit in units}
+    return replace(calibration, placed_by=units[0].calibration_step, hashes_before=hashes)
 
 
 def _of_swing(unit: Unit, calibration: SessionCalibration, step: str) -> Unit:
