@@ -19,6 +19,7 @@ from bench.analyses.moving_objects import MovingObjects
 from bench.analyses.reorientation import Reorientation
 from bench.analyses.single_camera import OneCamera
 from bench.analyses.soft import Softness
+from bench.analyses.stage_and_felt import StageAndFelt
 from bench.analyses.stage_and_pictures import StageAndPictures
 from bench.analyses.table_i_sensors import Sensors
 from bench.analyses.tilted import Tilts
@@ -45,5 +46,6 @@ ANALYSES: tuple[Analysis, ...] = (
     BothWays(),
     OneCamera(),
     StageAndPictures(),
+    StageAndFelt(),
     Ledger(),
 )

@@ -56,7 +56,7 @@ class StageAndPictures(Analysis):
 
     tables = (STAGE_AND_PICTURES,)
     in_every_run = False
-    heading = Heading("stage", "The stage against the pictures (± one sigma)")
+    heading = Heading("stage", "The stage against pictures and what is felt (± one sigma)")
 
     def compute(self, run: EvaluatedRun) -> list[Compared]:
         """Return every whisk that both know."""

@@ -175,7 +175,13 @@ _TABLE = (
         "stage_unlike_felt",
         WARNING,
         "compare stage.csv or point_mm with those of its neighbours, and its unit and axes",
-        sentence="touch felt is {apart}° from touch by the stage, as the other whisks have it: is the place of another trial?",
+        sentence="felt elsewhere than the stage says, by the other whisks: {apart}; as if {causes}",
+    ),
+    Status(
+        "stage_unlike_all_felt",
+        WARNING,
+        "measure the stage's origin against the whisker's base anew; check stiffness and gains",
+        sentence="what is felt of all whisks is unlike what the stage says: as if {causes}",
         reaches=(TRUTH,),
     ),
     Status(

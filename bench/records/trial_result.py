@@ -141,16 +141,20 @@ class PicturedContact:
 
 
 @dataclass(frozen=True, eq=False)
-class StageTouch:
-    """First touch of the unbent whisker on an object where a stage has it.
+class StageContact:
+    """What a stage states of a whisk's contact, with every error that it may have.
 
-    motor_rad: the motor's angle. own_rad: its sigma by what is the trial's own. shared_rad (p,): how it changes with one
-    sigma of each error that all whisks share.
+    motor_rad: of the unbent whisker's first touch on the object where it is stated to stand; NaN where the distance
+    alone is stated. by_offset (3, p): change of motor angle, d_x and slope with each of `stage_contact.Offsets`. own,
+    shared (p,): one sigma of each, the trial's own and alike in all whisks. stands: whether it is a straight bar that
+    neither moves nor gives way, so that moments show how far away it is.
     """
 
     motor_rad: float
-    own_rad: float
-    shared_rad: np.ndarray
+    by_offset: np.ndarray
+    own: np.ndarray
+    shared: np.ndarray
+    stands: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +169,7 @@ class SeenWhisk:
     disagree (`bench.trials.consistency`). deflection: also of a whisk whose distance or slope is
     not known; None where no frame is seen to touch. by_one_camera: only where the settings name one.
     source: of d_x, β and ψ, BY_PICTURES or BY_STAGE. pictured: what pictures show of these where they
-    are another source's. stage_touch: first touch by the object's stated place. friction_rad: the angle α
+    are another source's. stage_contact: the contact that a stage states. friction_rad: the angle α
     by pictures alone (`bench.trials.seen_friction`).
     """
 
@@ -181,7 +185,7 @@ class SeenWhisk:
     by_one_camera: ByOneCamera | None = None
     source: str = BY_PICTURES
     pictured: PicturedContact | None = None
-    stage_touch: StageTouch | None = None
+    stage_contact: StageContact | None = None
 
     @property
     def truth_source(self) -> str:

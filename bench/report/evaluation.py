@@ -15,7 +15,7 @@ from bench.records.trial_result import TrialResult
 from bench.session.session import Session
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_touch, shared_touch_warning, with_shared_touch
-from bench.trials.stage_touches import with_stage_touches
+from bench.trials.stage_against_felt import with_stage_against_felt
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ def evaluated_run(
     """
     results = with_estimates_again(results, whisker, settings)
     shared = shared_touch(results)
-    results = with_stage_touches(with_shared_touch(results, shared))
+    results = with_stage_against_felt(with_shared_touch(results, shared), whisker)
     friction = tuple(friction_of(results, whisker, settings.alpha_est_rad))
     return EvaluatedRun(
         whisker=whisker,

@@ -4,7 +4,8 @@ d_x is what an estimator estimates: the distance from the base to the contact at
 whisker's centreline. Either it is stated as it is (`d_x_mm`), or it follows from the object's place
 (`[object]`, `stage.csv`). When the whisker touches by the motor's angle is known no better than how
 it is clamped, and no stage sees how the contact slips: touch, slip and deflection stay NaN. Over the
-whisks of a session that angle is held against touch felt (`bench.trials.stage_touches`).
+whisks of a session that angle is held against touch felt, and d_x against the moments
+(`bench.trials.stage_against_felt`).
 """
 
 import math
@@ -20,7 +21,7 @@ from bench.records.trial_result import (
     PicturedContact,
     SeenTrial,
     SeenWhisk,
-    StageTouch,
+    StageContact,
 )
 from bench.session.file_names import TRIAL_TOML
 from bench.session.session import Session
@@ -51,12 +52,10 @@ _HOW = {
 
 @dataclass(frozen=True, eq=False)
 class StatedWhisk:
-    """A whisk as a stage states it. touch: first touch by the object's place, None where none is stated,
-    or the whisker does not come to it.
-    """
+    """A whisk as a stage states it. contact: None where nothing is stated, or the whisker does not come to the object."""
 
     truth: WhiskTruth
-    touch: StageTouch | None = None
+    contact: StageContact | None = None
 
 
 def by_stage(
@@ -71,7 +70,7 @@ def by_stage(
     for whisk, stroke in zip(seen.whisks, strokes):
         stated = stated_whisk(session, trial, signals, stroke)
         with_stated = _with_stated(whisk, stated.truth, settings)
-        whisks.append(replace(with_stated, stage_touch=stated.touch))
+        whisks.append(replace(with_stated, stage_contact=stated.contact))
     return replace(seen, whisks=tuple(whisks))
 
 
@@ -183,7 +182,24 @@ def stated_whisk(session: Session, trial: Trial, signals: Signals, stroke: slice
     tilt = Value(0.0, slope.sigma) if slope.is_known else UNKNOWN
     shared_mm = session.truth.origin_sigma_mm
     sigma_mm = math.hypot(trial.d_x_sigma_mm, shared_mm)
-    return StatedWhisk(_truth(Value(trial.d_x_mm, sigma_mm), slope, tilt, shared_mm))
+    truth = _truth(Value(trial.d_x_mm, sigma_mm), slope, tilt, shared_mm)
+    return StatedWhisk(truth, _by_distance(trial, slope.sigma, shared_mm))
+
+
+def _by_distance(trial: Trial, slope_sigma_rad: float, shared_mm: float) -> StageContact:
+    """Return the contact of a stated distance and slope. shared_mm: the origin's sigma."""
+    along = Offsets.none()
+    along.place_mm[0] = 1.0
+    turned = replace(Offsets.none(), slope_rad=1.0)
+    by_offset = np.stack([np.zeros(len(_STEPS)), along.vector, turned.vector])
+    own = trial.d_x_sigma_mm * along.vector + slope_sigma_rad * turned.vector
+    return StageContact(NAN, by_offset, own, shared_mm * along.vector, _stands(trial))
+
+
+def _stands(trial: Trial) -> bool:
+    """Return whether the object is a straight bar that neither moves nor gives way."""
+    is_moved = trial.object_velocity_mm_s is not None or (trial.stage and trial.stage.moves)
+    return trial.is_bar and not is_moved and not trial.object_gives_way
 
 
 def _truth(d_x_mm: Value, beta_rad: Value, psi_rad: Value, shared_mm: float) -> WhiskTruth:
@@ -200,18 +216,18 @@ def _by_place(stroke: StatedStroke) -> StatedWhisk:
     if touch is None:
         return StatedWhisk(_without_touch(push, trial))
     by_offset = _derivatives(push, touch)  # (4, p)
-    own = by_offset * stroke.own_sigmas(touch)
-    shared = by_offset * stroke.shared_sigmas(touch)
-    own_sigma = np.linalg.norm(own, axis=1)  # (4,)
-    shared_sigma = np.linalg.norm(shared, axis=1)
+    own = stroke.own_sigmas(touch)
+    shared = stroke.shared_sigmas(touch)
+    own_sigma = np.linalg.norm(by_offset * own, axis=1)  # (4,)
+    shared_sigma = np.linalg.norm(by_offset * shared, axis=1)
     _, *sigmas = np.hypot(own_sigma, shared_sigma).tolist()
     numbers = (touch.d_x_mm, touch.beta_rad, touch.psi_rad)
     d_x_mm, beta_rad, psi_rad = map(Value, numbers, sigmas)
     truth = _truth(d_x_mm, beta_rad, psi_rad, float(shared_sigma[1]))
     slope = check_slope(beta_rad, trial, "by the object's place is", "check both")
     status = joined(_unlike_stated(d_x_mm, trial), slope)
-    stage_touch = StageTouch(touch.motor_rad, float(own_sigma[0]), shared[0])
-    return StatedWhisk(replace(truth, status=status), stage_touch)
+    contact = StageContact(touch.motor_rad, by_offset[:3], own, shared, _stands(trial))
+    return StatedWhisk(replace(truth, status=status), contact)
 
 
 def stated_place(session: Session, trial: Trial, signals: Signals) -> tuple[Axis, np.ndarray]:

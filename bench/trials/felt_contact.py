@@ -1,0 +1,99 @@
+"""A contact as touch and moments show it where its slope is stated: by (6) no friction need be known."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult
+from bench.session.whisker import Whisker
+from estimator import distance, first_order
+from vision import NAN
+
+# Causes of which `FeltWhisk.shared_Nmm` has a row each.
+_GAUGE_CAUSES = 6
+# [rad] Friction that pulls along the whisker, which (6) leaves out: the paper's. Stated.
+_FRICTION_RAD = math.radians(10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class FeltContact:
+    """Touch and distance as they are felt.
+
+    values (2,): touch, rad, and the logarithm of d_x, NaN where unknown. own (2, 2): their covariance by this whisk
+    alone. shared (2, k): change by one sigma of each error that all whisks share. by_slope: derivative of the
+    logarithm by the stated slope, 1/rad.
+    """
+
+    values: np.ndarray
+    own: np.ndarray
+    shared: np.ndarray
+    by_slope: float
+
+
+def felt_contact(
+    result: TrialResult, seen: SeenWhisk, felt: FeltWhisk, whisker: Whisker
+) -> FeltContact:
+    """Return a whisk's contact as it is felt.
+
+    Without a distance where there are no moments, or nothing is concluded from them, or the object is no bar that stands.
+    """
+    late_rad = felt.delay_s.sigma * math.radians(result.trial.speed_deg_s or 0.0)
+    late = np.array([[late_rad], [0.0]])
+    touch = FeltContact(
+        np.array([felt.touch_felt_rad.value, NAN]),
+        np.diag([felt.theta_sigma_rad**2, 0.0]),
+        np.hstack([late, np.zeros((2, _GAUGE_CAUSES))]),
+        0.0,
+    )
+    stands = seen.stage_contact.stands and not whisker.beam.is_curved
+    if not stands or not felt.has_moments or felt.apart:
+        return touch
+    moments = np.array([felt.m_y_Nmm.value, felt.m_z_Nmm.value])
+    d_x_mm = _distance_mm(result, moments, seen.beta_rad.value, whisker)
+    if not math.isfinite(d_x_mm):
+        return touch
+    thickness = whisker.beam.thickness(d_x_mm)
+    gradient = thickness * _gradient(result.theta_rad, moments, seen.beta_rad.value)
+    by_input = np.array([[-1.0, 0.0, 0.0], gradient[:3]])  # of touch and distance by θ, m_y and m_z
+    by_cause = np.zeros((_GAUGE_CAUSES, 3))
+    by_cause[: len(felt.shared_Nmm), 1:] = felt.shared_Nmm
+    inputs = np.zeros((3, 3))
+    inputs[0, 0] = felt.theta_sigma_rad**2
+    inputs[0, 1:] = inputs[1:, 0] = felt.theta_moment_covariance_at
+    inputs[1:, 1:] = felt.covariance_at
+    own = by_input @ (inputs - by_cause.T @ by_cause) @ by_input.T
+    own[1, 1] += _model_share(result.theta_rad, thickness) ** 2
+    values = np.array([felt.touch_felt_rad.value, math.log(d_x_mm)])
+    return FeltContact(values, own, np.hstack([late, by_input @ by_cause.T]), float(gradient[3]))
+
+
+def _distance_mm(
+    result: TrialResult, moments: np.ndarray, slope_rad: float, whisker: Whisker
+) -> float:
+    """Return d_x of (6), mm, less how far the contact rolls over the bar; NaN where there is none."""
+    beam = whisker.beam
+    theta_rad = result.theta_rad
+    as_cylinder_mm = distance.known_slope(theta_rad, *moments, slope_rad, beam.C_Nmm2)
+    d_x_mm = beam.distance_mm(as_cylinder_mm)
+    rolled = 0.0
+    reach_mm = result.reach_mm(d_x_mm)
+    if math.isfinite(reach_mm):
+        thickness = beam.thickness(d_x_mm)
+        rolled = first_order.rolling_at(theta_rad, reach_mm, slope_rad, d_x_mm, thickness)
+    return d_x_mm * (1.0 - rolled)
+
+
+def _gradient(theta_rad: float, moments: np.ndarray, slope_rad: float) -> np.ndarray:
+    """Return the derivatives (4,) of the logarithm of (6) by θ, m_y, m_z and the slope."""
+    across = np.array([math.sin(slope_rad), math.cos(slope_rad)])
+    along = np.array([math.cos(slope_rad), -math.sin(slope_rad)])
+    push_Nmm = across @ moments
+    by_slope = -math.tan(slope_rad) - along @ moments / push_Nmm
+    return np.array([1.0 / theta_rad, *(-across / push_Nmm), by_slope])
+
+
+def _model_share(theta_rad: float, thickness: float) -> float:
+    """Return the relative sigma of (6) itself: friction along the whisker, and angles that are not small."""
+    dragging = first_order.dragging(theta_rad, _FRICTION_RAD)
+    return math.hypot(dragging, first_order.bending_far(theta_rad, thickness))

@@ -1,0 +1,239 @@
+"""What a stage states against what is felt, over all whisks: a place, or the stage's origin, that is off.
+
+A recording without pictures holds the contact twice. Touch is stated by the object's place, and felt:
+
+    touch felt − by the stage = zero + late · speed + what all whisks share of place and whisker + their own
+
+zero: of the motor's angle in the stage's frame. late: the gauges' filter. The distance is stated, and follows from the
+moments by (6), for the slope is stated, too, so that friction need not be known. What the moments' scale (stiffness,
+gauges) is off by, all whisks share. Both are compared as they are known, so that whisks are held against each other
+where a scale or a zero is not. No truth is moved by what is felt: a whisk that is off has a status.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import ndtri
+
+from bench.base.statuses import reason
+from bench.records.trial_result import SeenWhisk, StageContact, TrialResult, whisks
+from bench.session.whisker import Whisker
+from bench.trials.differences import LEAST_CHANCE
+from bench.trials.felt_contact import FeltContact, felt_contact
+from vision import UNKNOWN, Value
+from vision.geometry import NO_REASON, Reason
+
+# [rad] One sigma of the zero: wider than any bench has it. Stated.
+_ZERO_RAD = np.radians(10.0)
+# [whisks] Fewer do not say which of them is off. Derived.
+_FEWEST_TO_NAME = 3
+# [sigma] More is no chance. Derived.
+MOST_SIGMAS = -float(ndtri(0.5 * LEAST_CHANCE))
+# [1] Of χ²: causes that explain less well by as much, two sigma, are named, too. Stated.
+_AS_GOOD = 4.0
+# Places in `Offsets.vector`.
+X, Y, Z, SLOPE = range(4)
+_TOUCH, _DISTANCE = range(2)
+
+
+@dataclass(frozen=True, eq=False)
+class HeldWhisk:
+    """A whisk, by trial and number, as a stage states it and as it is felt."""
+
+    trial: str
+    number: int
+    seen: SeenWhisk
+    stage: StageContact
+    felt: FeltContact
+
+    @property
+    def apart(self) -> np.ndarray:
+        """Return felt less stated (2,): touch, rad, and logarithm of d_x; NaN where unknown."""
+        return self.felt.values - [self.stage.motor_rad, math.log(self.seen.d_x_mm.value)]
+
+    @property
+    def by_offset(self) -> np.ndarray:
+        """Return the change (2, p) of that with each offset of what is stated."""
+        touch, d_x, slope = self.stage.by_offset
+        by_distance = self.felt.by_slope * slope - d_x / self.seen.d_x_mm.value
+        return np.stack([-touch, by_distance])
+
+    @property
+    def own(self) -> np.ndarray:
+        """Return the covariance (2, 2) by what is this whisk's own."""
+        by_stage = self.by_offset * self.stage.own
+        return self.felt.own + by_stage @ by_stage.T
+
+    @property
+    def shared(self) -> np.ndarray:
+        """Return the changes (2, q) by one sigma of each error that all whisks share."""
+        zero = np.array([[_ZERO_RAD], [0.0]])
+        return np.hstack([self.by_offset * self.stage.shared, self.felt.shared, zero])
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """An error that would explain differences. text: with a place for its size. trace (n,): of a unit of it."""
+
+    text: str
+    trace: np.ndarray
+
+
+class Comparison:
+    """All whisks of a session that are both stated and felt, and how well they can be compared."""
+
+    def __init__(self, held: Sequence[HeldWhisk]):
+        """Take the whisks."""
+        self.held = tuple(held)
+        apart = np.array([one.apart for one in held]).reshape(-1, 2)
+        known = np.isfinite(apart)
+        self._whisk, self._kind = np.nonzero(known)  # (n,) of each row
+        self.apart = apart[known]
+        of_all = [one.by_offset for one in held]
+        self._by_offset = self._rows(of_all)  # (n, p)
+        shared = self._rows([one.shared for one in held])
+        covariance = shared @ shared.T
+        for number, one in enumerate(held):
+            rows = self._of(number)
+            kinds = self._kind[rows]
+            covariance[np.ix_(rows, rows)] += one.own[np.ix_(kinds, kinds)]
+        self._information = np.linalg.inv(covariance)
+
+    def _rows(self, of_whisks: Sequence[np.ndarray]) -> np.ndarray:
+        """Return the rows (n, p) of arrays (2, p) of all whisks."""
+        rows = [of_whisks[whisk][kind] for whisk, kind in zip(self._whisk, self._kind)]
+        return np.array(rows) if rows else np.zeros((0, 0))
+
+    def _of(self, number: int) -> np.ndarray:
+        """Return which rows are a whisk's."""
+        return np.flatnonzero(self._whisk == number)
+
+    def size(self, trace: np.ndarray) -> Value:
+        """Return how much of an error of this trace (n,) there is, per unit; UNKNOWN where none would show."""
+        weighted = self._information @ trace
+        information = float(weighted @ trace)
+        if information <= 0.0:
+            return UNKNOWN
+        return Value(float(weighted @ self.apart) / information, information**-0.5)
+
+    def apart_from_others(self, number: int) -> tuple[Value, Value]:
+        """Return felt less stated of a whisk less what the others predict: touch, rad, and log d_x."""
+        rows = self._of(number)
+        covariance = np.linalg.inv(self._information[np.ix_(rows, rows)])
+        values = covariance @ (self._information @ self.apart)[rows]
+        found = [UNKNOWN, UNKNOWN]
+        for kind, value, variance in zip(self._kind[rows], values, np.diag(covariance)):
+            found[kind] = Value(float(value), math.sqrt(variance))
+        return found[_TOUCH], found[_DISTANCE]
+
+    def of_place(self, axis: int, number: int | None = None) -> np.ndarray:
+        """Return the trace (n,) of an offset by `axis` of one whisk's place or direction, or of all."""
+        trace = self._by_offset[:, axis]
+        return trace if number is None else trace * (self._whisk == number)
+
+    def least_noticed(self, axis: int, number: int | None = None) -> float:
+        """Return the least offset that is no chance: mm, or rad of SLOPE; infinite where none would show."""
+        sigma = self.size(self.of_place(axis, number)).sigma
+        return MOST_SIGMAS * sigma if math.isfinite(sigma) else math.inf
+
+    def suspects_of_all(self) -> list[Suspect]:
+        """Return the errors that all whisks would share."""
+        found = [
+            Suspect("the stage's origin {:+.2f} mm off along x", self.of_place(X)),
+            Suspect("the stage's origin {:+.2f} mm off along y", self.of_place(Y)),
+            Suspect("the stage's origin {:+.2f} mm off along z", self.of_place(Z)),
+        ]
+        by_percent = -0.01 * (self._kind == _DISTANCE)
+        found.append(Suspect("the moments' scale {:+.1f} % off", by_percent))
+        return found
+
+    def suspects_of(self, number: int) -> list[Suspect]:
+        """Return the errors of one whisk's own."""
+        per_degree = math.radians(1.0) * self.of_place(SLOPE, number)
+        return [
+            Suspect("its place {:+.2f} mm off along x", self.of_place(X, number)),
+            Suspect("its place {:+.2f} mm off along y", self.of_place(Y, number)),
+            Suspect("its place {:+.2f} mm off along z", self.of_place(Z, number)),
+            Suspect("its slope {:+.1f}° off", per_degree),
+        ]
+
+    def likeliest(self, suspects: Iterable[Suspect]) -> tuple[float, str]:
+        """Return by how many sigmas the likeliest suspect is there, and those that explain as much, in words."""
+        found = []
+        for suspect in suspects:
+            size = self.size(suspect.trace)
+            if size.is_known:
+                found.append((abs(size.value) / size.sigma, suspect.text.format(size.value)))
+        found.sort(reverse=True)
+        most, _ = found[0] if found else (0.0, "")
+        texts = [text for sigmas, text in found if sigmas**2 > most**2 - _AS_GOOD]
+        return most, " or ".join(texts)
+
+
+def compare(results: Iterable[TrialResult], whisker: Whisker) -> Comparison:
+    """Compare all whisks of a session that are both stated and felt."""
+    held = []
+    for result, seen, felt in whisks(results):
+        if seen.stage_contact is None or not seen.has_truth:
+            continue
+        contact = felt_contact(result, seen, felt, whisker)
+        one = HeldWhisk(result.trial.name, seen.whisk, seen, seen.stage_contact, contact)
+        if np.isfinite(one.apart).any():
+            held.append(one)
+    return Comparison(held)
+
+
+def with_stage_against_felt(
+    results: Iterable[TrialResult], whisker: Whisker
+) -> tuple[TrialResult, ...]:
+    """Return the results, in which a whisk that is felt elsewhere than its stage says has a status."""
+    results = tuple(results)
+    elsewhere = dict(_elsewhere(compare(results, whisker)))
+    if not elsewhere:
+        return results
+    named = []
+    for result in results:
+        of_trial = []
+        for whisk in result.seen.whisks:
+            found = elsewhere.get((result.trial.name, whisk.whisk), NO_REASON)
+            of_trial.append(whisk.with_contradiction(found))
+        named.append(replace(result, seen=replace(result.seen, whisks=tuple(of_trial))))
+    return tuple(named)
+
+
+def _elsewhere(comparison: Comparison) -> Iterator[tuple[tuple[str, int], Reason]]:
+    """Yield the whisks that are felt elsewhere than is stated: all by what they share, or one after another."""
+    while comparison.held:
+        held = comparison.held
+        of_all, causes = comparison.likeliest(comparison.suspects_of_all())
+        alone = [comparison.likeliest(comparison.suspects_of(k)) for k in range(len(held))]
+        worst = max(range(len(held)), key=lambda k: alone[k][0])
+        if max(of_all, alone[worst][0]) <= MOST_SIGMAS:
+            return
+        if len(held) < _FEWEST_TO_NAME or of_all >= alone[worst][0]:
+            if len(held) < _FEWEST_TO_NAME:
+                causes = f"{alone[worst][1]} in {held[worst].trial}, or {causes}"
+            for one in held:
+                yield _key(one), reason("stage_unlike_all_felt", causes=causes)
+            return
+        yield _key(held[worst]), _reason_of(comparison, worst, alone[worst][1])
+        comparison = Comparison([one for one in held if one is not held[worst]])
+
+
+def _key(one: HeldWhisk) -> tuple[str, int]:
+    """Return trial and number of a whisk."""
+    return one.trial, one.number
+
+
+def _reason_of(comparison: Comparison, number: int, causes: str) -> Reason:
+    """Return how a whisk differs from what its stage states, as the others have it."""
+    touch, log = comparison.apart_from_others(number)
+    parts = []
+    if touch.is_known:
+        parts.append(f"touch by {touch.in_degrees().value:+.2f} ± {touch.in_degrees().sigma:.2f}°")
+    if log.is_known:
+        d_x_mm = comparison.held[number].seen.d_x_mm.value
+        parts.append(f"d_x by {log.value * d_x_mm:+.2f} ± {log.sigma * d_x_mm:.2f} mm")
+    return reason("stage_unlike_felt", apart=", ".join(parts), causes=causes)

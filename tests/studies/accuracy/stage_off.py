@@ -1,0 +1,133 @@
+"""A stage's place that is off, in sessions without pictures: how small an error is named, and is any right one?
+
+    python tests/studies/accuracy/stage_off.py FOLDER --seeds 3
+
+Each session is simulated, with the errors that a stage's sigmas say: 21 whisks on slopes of 0 to 60°, 43 to 88 mm
+away. Printed of all: whisks that are warned of as they are; then, along x and z, of each size, how many places are
+named where only one is off, in how many sessions the origin is. A whisk that no longer touches counts as named; one on
+a slope of 0° is the same bar wherever it is along z, and is left out there.
+"""
+
+import argparse
+import math
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+
+from bench.base.settings import Settings
+from bench.records.trial_result import TrialResult
+from bench.report.run_folder import read_results
+from bench.session.session import Session, load_session
+from bench.session.signals import forward_strokes, read_signals
+from bench.trials.stage_against_felt import with_stage_against_felt
+from bench.trials.stated_truth import stated_whisk
+from bench.workflows.session_evaluation import evaluate
+from fixtures.bring_stage import PROTOCOL, bring_stage
+
+TRIALS = """
+[[trials]]
+beta_deg = [0, 20, 35, 50, 60]
+d_x_mm = [45.0, 60.0, 75.0, 85.0]
+surface = "steel"
+friction = 0.185339
+beta_scatter_deg = 0.5
+d_x_scatter_mm = 2.0
+[[trials]]
+beta_deg = 45
+d_x_mm = 50.0
+surface = "steel"
+friction = 0.185339
+"""
+OFF_MM = (2.0, 1.0, 0.5)
+LEAST_SLOPE_DEG = 5.0
+STEEP_DEG = 40.0
+NOWHERE: Mapping[str, np.ndarray] = {}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--seeds", type=int, default=3)
+    arguments = parser.parse_args()
+    warned = total = 0
+    counts: dict[tuple, list[bool]] = {}
+    for seed in range(1, arguments.seeds + 1):
+        session, results = evaluated(arguments.folder, seed)
+        total += len(results)
+        warned += len(named(session, results))
+        for key, is_named in of_session(session, results):
+            counts.setdefault(key, []).append(is_named)
+    print(f"as they are: {warned} of {total} whisks are warned of")
+    for (what, axis, off_mm), is_named in counts.items():
+        print(f"{what} {off_mm:g} mm off along {axis}: named {sum(is_named)} of {len(is_named)}")
+
+
+def evaluated(folder: Path, seed: int) -> tuple[Session, list[TrialResult]]:
+    """Simulate a session and evaluate it."""
+    path = folder / f"session_{seed}"
+    if not path.exists():
+        bring_stage(path, seed, PROTOCOL.split("[[trials]]")[0] + TRIALS)
+    out = folder / f"out_{seed}"
+    evaluate(path, out, Settings(figures=False), workers=0, announce=lambda text: None)
+    return load_session(path), read_results(out)
+
+
+def of_session(session: Session, results: list[TrialResult]) -> Iterator[tuple[tuple, bool]]:
+    """Yield what is off, and whether it is named."""
+    for axis, letter in ((0, "x"), (2, "z")):
+        for off_mm in OFF_MM:
+            off = off_mm * np.eye(3)[axis]
+            for result in results:
+                slope_deg = abs(math.degrees(result.seen.whisks[0].beta_rad.value))
+                by_ruler = session.trial(result.trial.name).stage is None
+                if letter == "z" and (slope_deg < LEAST_SLOPE_DEG or by_ruler):
+                    continue
+                steepness = "steeper" if slope_deg > STEEP_DEG else "up to 40°"
+                names = named(session, results, {result.trial.name: off})
+                yield (
+                    (f"one place, slopes {steepness},", letter, off_mm),
+                    names == {result.trial.name},
+                )
+            everywhere = {result.trial.name: off for result in results}
+            yield (
+                ("origin", letter, off_mm),
+                len(named(session, results, everywhere)) == len(results),
+            )
+
+
+def named(
+    session: Session, results: list[TrialResult], off: Mapping[str, np.ndarray] = NOWHERE
+) -> set[str]:
+    """Return the trials that are warned of, or without a truth, where places (3,), mm, are off."""
+    moved = [
+        restated(session, one, off[one.trial.name]) if one.trial.name in off else one
+        for one in results
+    ]
+    compared = with_stage_against_felt(moved, session.whisker)
+    whisks = {one.trial.name: one.seen.whisks[0] for one in compared}
+    return {name for name, whisk in whisks.items() if whisk.contradicted or not whisk.has_truth}
+
+
+def restated(session: Session, result: TrialResult, off_mm: np.ndarray) -> TrialResult:
+    """Return a trial's result as by a stage that says a place off by so much."""
+    trial = session.trial(result.trial.name)
+    if trial.stage is None:
+        trial = replace(trial, d_x_mm=trial.d_x_mm + off_mm[0])
+    else:
+        trial = replace(trial, stage=replace(trial.stage, place_mm=trial.stage.place_mm + off_mm))
+    signals = read_signals(trial)
+    (stroke,) = forward_strokes(signals)
+    stated = stated_whisk(session, trial, signals, stroke)
+    (whisk,) = result.seen.whisks
+    truth = replace(whisk.truth, d_x_mm=stated.truth.d_x_mm, beta_rad=stated.truth.beta_rad)
+    whisk = replace(whisk, truth=truth, stage_contact=stated.contact)
+    return replace(result, seen=replace(result.seen, whisks=(whisk,)))
+
+
+if __name__ == "__main__":
+    main()
