@@ -10,7 +10,7 @@ of a picture are fitted side by side (Levenberg–Marquardt, a damping each), to
 edges and away from the markers.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -37,6 +37,9 @@ _ROUNDING = 0.3
 # [steps] The fit ends before: most corners take 8, those as sharp as a pixel up to 40. Study:
 # thresholds.py boards.saddle _ITERATIONS ….
 _ITERATIONS = 50
+# [corners] Evaluated together: arrays that stay in the processor's cache. No result depends on it.
+# Study: tests/studies/speed/beside.py.
+_BATCH = 6
 # [px] A tenth of a good corner's sigma. moves nothing on the fixtures between 0.0005 and 0.01.
 # Study: thresholds.py boards.saddle _CONVERGED_PX ….
 _CONVERGED_PX = 2e-3
@@ -115,23 +118,38 @@ def start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray)
 
 def with_linear_part(windows: Windows, p: np.ndarray, predict: Predict) -> np.ndarray:
     """Return parameters p (n, 10) with contrast, level and slope by least squares."""
-    p = p.copy()
-    _, J = predict(windows, p)
-    normal, gradient = _normal_equations(J[:, LINEAR], windows.grey, windows.weight)
-    p[:, LINEAR] = _solve(normal, gradient, np.zeros(len(p)))
-    return p
+    fit = _evaluate(windows, p.copy(), predict)
+    normal = fit.normal[:, LINEAR, LINEAR]
+    fit.p[:, LINEAR] += _solve(normal, fit.gradient[:, LINEAR], np.zeros(len(p)))
+    return fit.p
 
 
 def predict_saddles(windows: Windows, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Predict the grey (n, k) by the parameters p (n, 10), with its Jacobian (n, 10, k)."""
     offset = windows.offset - p[:, PLACE, None]  # (n, 2, k) px from the corner
-    crossing, by_edge = _crossing(offset, p)
+    normals, tangents = _directions(p[:, TURN])
+    # A copy, because NumPy 1.26 takes a strided column's exp otherwise, by 1e-16, where its result
+    # happens to lie right behind in memory.
+    blur_px = np.exp(p[:, BLUR, None].copy())
+    distance_px = normals @ offset  # (n, 2, k) from each edge
+    t = distance_px / blur_px
+    edges = erf(t / np.sqrt(2.0))  # -1 to 1
+    # Each edge is multiplied by the other.
+    most_by_px = np.sqrt(2.0 / np.pi) * p[:, CONTRAST, None, None] / blur_px
+    by_distance = most_by_px * np.exp(-0.5 * t**2) * edges[:, ::-1]
     J = np.empty((len(p), 10, offset.shape[2]))
-    J[:, PLACE] = by_edge[:, :, :2].sum(axis=1)
-    J[:, TURN] = by_edge[:, :, 2]
-    J[:, BLUR] = by_edge[:, :, 3]
-    J[:, CONTRAST] = crossing
+    J[:, PLACE] = -normals.transpose(0, 2, 1) @ by_distance
+    J[:, TURN] = by_distance * (tangents @ offset)
+    J[:, BLUR] = -by_distance * distance_px
+    J[:, CONTRAST] = edges[:, 0] * edges[:, 1]
     return in_light(offset, p, J), J
+
+
+def _directions(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normals of edges turned by (n, 2), and their tangents, (n, 2, 2), a row an edge."""
+    cosine = np.cos(turn)
+    sine = np.sin(turn)
+    return np.stack([cosine, sine], axis=2), np.stack([-sine, cosine], axis=2)
 
 
 def in_light(offset: np.ndarray, p: np.ndarray, J: np.ndarray) -> np.ndarray:
@@ -146,41 +164,6 @@ def in_light(offset: np.ndarray, p: np.ndarray, J: np.ndarray) -> np.ndarray:
     J[:, SLOPE] = offset
     grey = p[:, None, LINEAR] @ J[:, LINEAR]
     return grey[:, 0]
-
-
-def _crossing(offset: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the product (n, k) of both edges, −1 to 1, and the derivatives (n, 2, 4, k) of grey.
-
-    offset (n, 2, k): px from the corner. The derivatives are by each edge's share of the corner's x
-    and y, its turn and its log s, with the contrast of the parameters p (n, 10).
-    """
-    edges, by_edge = _blurred_edges(offset, p[:, TURN, None], p[:, BLUR, None])
-    contrast = p[:, CONTRAST, None, None, None]
-    # each edge is multiplied by the other
-    return edges.prod(axis=1), contrast * by_edge * edges[:, ::-1, None]
-
-
-def _blurred_edges(
-    offset: np.ndarray, turn: np.ndarray, log_blur: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return both edges erf(e / (√2 s)), −1 to 1, (n, 2, k), and their derivatives (n, 2, 4, k).
-
-    offset (n, 2, k): px from the corner. turn, log_blur (n, 2, 1). The derivatives are by the
-    corner's x and y, the turn and log s.
-    """
-    dx = offset[:, None, 0]
-    dy = offset[:, None, 1]
-    cosine = np.cos(turn)
-    sine = np.sin(turn)
-    # A copy, because NumPy 1.26 takes a strided column's exp otherwise, by 1e-16, where its result
-    # happens to lie right behind in memory.
-    blur = np.exp(log_blur.copy())
-    t = (cosine * dx + sine * dy) / blur
-    slope = np.sqrt(2.0 / np.pi) * np.exp(-0.5 * t**2)
-    per_px = slope / blur
-    by_turn = per_px * (cosine * dy - sine * dx)
-    by_edge = np.stack([-per_px * cosine, -per_px * sine, by_turn, -slope * t], axis=2)
-    return erf(t / np.sqrt(2.0)), by_edge
 
 
 def _normal_equations(
@@ -268,28 +251,53 @@ class _Fit(NamedTuple):
 
 def _evaluate(windows: Windows, p: np.ndarray, predict: Predict) -> _Fit:
     """Return the state of the fit of a model at its parameters p (n, m)."""
-    grey, J = predict(windows, p)
-    residual = windows.grey - grey
-    cost = np.sum(windows.weight * residual**2, axis=1)
-    normal, gradient = _normal_equations(J, residual, windows.weight)
-    return _Fit(p, cost, normal, gradient)
+    fit = _Fit(p, np.empty(len(p)), np.empty((*p.shape, p.shape[1])), np.empty(p.shape))
+    for rows, some in _in_batches(windows):
+        grey, J = predict(some, p[rows])
+        residual = some.grey - grey
+        fit.cost[rows] = np.sum(some.weight * residual**2, axis=1)
+        fit.normal[rows], fit.gradient[rows] = _normal_equations(J, residual, some.weight)
+    return fit
+
+
+def _in_batches(windows: Windows) -> Iterator[tuple[slice, Windows]]:
+    """Yield the windows of some corners at a time, and their rows."""
+    for first in range(0, len(windows.grey), _BATCH):
+        rows = slice(first, first + _BATCH)
+        yield rows, windows.select(rows)
 
 
 def report_fit(windows: Windows, p: np.ndarray, converged: np.ndarray, predict: Predict) -> Saddles:
     """Return the corners of the parameters p (n, 10) of a model, with their sigmas."""
-    grey, J = predict(windows, p)
-    residual = (windows.grey - grey) * windows.weight
+    residual, influence = _residuals_and_influences(windows, p, predict)
     freedom = np.maximum(windows.weight.sum(axis=1) - p.shape[1], 1)
     misfit = np.sqrt(np.sum(residual**2, axis=1) / freedom)
     unit_residual = residual / np.maximum(misfit, 1e-9)[:, None]
     return Saddles(
         px=windows.anchor + p[:, PLACE],
-        sigma_px=misfit * _sigma_per_grey(windows, J, unit_residual),
+        sigma_px=misfit * _sigma_per_grey(windows, unit_residual, influence),
         contrast=p[:, CONTRAST],
         blur_px=np.exp(p[:, BLUR].mean(axis=1)),
         misfit=misfit,
         converged=converged,
     )
+
+
+def _residuals_and_influences(
+    windows: Windows, p: np.ndarray, predict: Predict
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return each pixel's residual (n, k), and its influence on the corner's place (n, 2, k), which is
+    (JᵀJ)⁻¹ Jᵀ.
+    """
+    residual = np.empty(windows.grey.shape)
+    influence = np.empty(windows.offset.shape)
+    for rows, some in _in_batches(windows):
+        grey, J = predict(some, p[rows])
+        residual[rows] = some.weight * (some.grey - grey)
+        J *= some.weight[:, None, :]
+        inverse = np.linalg.pinv(J @ J.transpose(0, 2, 1), hermitian=True)
+        influence[rows] = inverse[:, PLACE] @ J
+    return residual, influence
 
 
 def _is_plausible(saddles: Saddles, px_guess: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -304,17 +312,16 @@ def _is_plausible(saddles: Saddles, px_guess: np.ndarray, frames: np.ndarray) ->
     return has_sigma & is_near & stands_out & is_sharp
 
 
-def _sigma_per_grey(windows: Windows, J: np.ndarray, unit_residual: np.ndarray) -> np.ndarray:
+def _sigma_per_grey(
+    windows: Windows, unit_residual: np.ndarray, influence: np.ndarray
+) -> np.ndarray:
     """Return a corner's sigma per axis for pixel noise of one grey level, (n,).
 
     Noise of neighbouring pixels is correlated (demosaicing, compression, a soft lens before a noisy
     codec), which a plain (JᵀJ)⁻¹ neglects: by it sigmas were 2.4 times too small. With the
-    influence of each pixel on the corner a = (JᵀJ)⁻¹ Jᵀ, the variance is aᵀ C a, C being the
+    influence a (n, 2, k) of each pixel on the corner, the variance is aᵀ C a, C being the
     residuals' own correlation, taken as separable.
     """
-    normal, _ = _normal_equations(J, unit_residual, windows.weight)
-    inverse = np.linalg.pinv(normal, hermitian=True)
-    influence = inverse[:, PLACE] @ (J * windows.weight[:, None, :])
     residual = windows.on_grid(unit_residual[:, None])
     a = windows.on_grid(influence)
     Ca = a
