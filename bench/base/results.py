@@ -155,6 +155,8 @@ def plain(value: object) -> Any:
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
+    if isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.floating):
+        return np.where(np.isfinite(value), value, None).tolist()
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if isinstance(value, (np.bool_, np.integer)):
@@ -165,8 +167,8 @@ def plain(value: object) -> Any:
 
 
 def write_result(path: Path, result: dict) -> None:
-    """Write one trial's result, whole."""
-    write_whole(path, json.dumps(plain(result), sort_keys=True) + "\n")
+    """Write one trial's result, of plain values, whole."""
+    write_whole(path, json.dumps(result, sort_keys=True, allow_nan=False) + "\n")
 
 
 def read_result(path: Path) -> dict | None:

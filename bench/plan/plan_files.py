@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from bench.base.atomic import write_whole
-from bench.base.results import write_result
+from bench.base.results import plain, write_result
 from bench.base.tables import (
     SPEED,
     SURFACE,
@@ -70,7 +70,7 @@ def write_plan(out: Path, plan: Plan) -> str:
     """Write all of a plan but its drawing. Returns the text of plan.txt."""
     PLAN.write(out, map(_plan_cells, plan.rows))
     CHANGES.write(out, _changes_cells(plan))
-    write_result(out / "plan.json", _as_json(plan))
+    write_result(out / "plan.json", plain(_as_json(plan)))
     text = "\n".join(lines_of(plan)) + "\n"
     write_whole(out / "plan.txt", text)
     return text

@@ -70,10 +70,8 @@ def test_pictures_in_a_linked_folder_count(tmp_path):
 
 def test_results_come_back_as_they_went(tmp_path):
     value = 0.1 + 0.2
-    write_result(
-        tmp_path / "r.json",
-        {"x": np.float64(value), "n": np.int64(3), "none": math.nan, "a": np.eye(2)},
-    )
+    result = {"x": np.float64(value), "n": np.int64(3), "none": math.nan, "a": np.eye(2)}
+    write_result(tmp_path / "r.json", plain(result))
     assert read_result(tmp_path / "r.json") == {
         "x": value,
         "n": 3,
