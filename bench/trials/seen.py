@@ -108,10 +108,11 @@ def _see(
     back = dict(zip(frames.back, truth.whisks[len(whisks) :]))
     late = check_camera_delays(whisk.delays for whisk in truth.whisks)
     of_trial = [*_contradicted_diameters(truth, session, trial), late]
+    damaged = _damaged_frames(frames.by_camera, frames.times)
     return SeenTrial(
         tuple(_records(session, trial, frames, settings, whisks, of_trial)),
         notes=_notes(frames),
-        damaged=_damage(frames),
+        damaged=in_one_status(*damaged, *frames.scene.unusable),
         bar=BarLine(truth.bar_point_mm, truth.bar_direction),
         bar_radius_mm=0.5 * trial.bar_diameter_mm,
         wire_radius_mm=0.5 * frames.rods.wire.diameter_mm,
@@ -287,18 +288,16 @@ def _missing_frames(frames: Mapping[str, Mapping], times: FrameTimes) -> Iterato
             yield f"camera {name} dropped {lost} of {count} frames"
 
 
-def _damage(frames: TrialFrames) -> Reason:
-    """Return a status of the damaged frames of each camera, and of what of the pictures is of no use."""
-    count = len(frames.times)
-    found = []
-    for name, pictures in frames.by_camera.items():
-        is_recorded = frames.times.picture[name] >= 0
+def _damaged_frames(frames: Mapping[str, Mapping], times: FrameTimes) -> Iterator[Reason]:
+    """Yield a status of the damaged frames of each camera that has some."""
+    count = len(times)
+    for name, pictures in frames.items():
+        is_recorded = times.picture[name] >= 0
         damaged = [k for k in np.flatnonzero(is_recorded) if k not in pictures]
         if damaged:
             named = first_names(damaged, _MOST_NAMED)
             line = f"camera {name}: {len(damaged)} of {count} frames damaged ({named})"
-            found.append(Reason("frames_damaged", line))
-    return in_one_status(*found, *frames.scene.unusable)
+            yield Reason("frames_damaged", line)
 
 
 def whisk_record(
