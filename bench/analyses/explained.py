@@ -8,6 +8,7 @@ are in the remainder.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -220,9 +221,12 @@ def mean_row(rows: Sequence[dict]) -> dict:
 
     Shares keep their signs, so they add up. A share that is known of none of them has no mean.
     """
-    shares = [name for name in SHARES if any(np.isfinite(row[name]) for row in rows)]
+    shares = []
+    for name in SHARES:
+        if np.isfinite([row[name] for row in rows]).any():
+            shares.append(name)
     names = ("d_x_mm", "error_mm", *shares)
-    complete, _ = known_rows(([row[name] for name in names] for row in rows), len(names))
+    complete, _ = known_rows(map(itemgetter(*names), rows), len(names))
     means = complete.mean(axis=0).tolist() if len(complete) else []
     return {"trial": TOTAL, **dict(zip(names, means))}
 

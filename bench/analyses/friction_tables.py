@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import degrees
 from pathlib import Path
 
@@ -39,7 +40,8 @@ FRICTION_ANGLE = Heading("friction", "Friction angle α (± one sigma)")
 RECORDS = ("seen", "felt")
 WAYS = ("tilting", "consistency", "smoothness")
 # Angles of a whisk, by their names in the columns and in `WhiskAlphas.angle`.
-_ANGLES = (*RECORDS, *(f"{kind}_{record}" for kind in (STATIC, KINETIC) for record in RECORDS))
+_OF_STICK_AND_SLIP = tuple("_".join(pair) for pair in product((STATIC, KINETIC), RECORDS))
+_ANGLES = (*RECORDS, *_OF_STICK_AND_SLIP)
 FRICTION = Table(
     "friction",
     "A row a whisk: friction angles α, each with its sigma.",

@@ -210,13 +210,16 @@ def _calibrate_into(session: Session, folder: Path, key: str) -> dict:
     folder.mkdir(parents=True, exist_ok=True)
     write_cameras(folder / "cameras.toml", cameras, session.crops)
     notes = [*report_lines(made), *([note] if note else []), *lengths]
+    parts = []
+    for warning in (*made.warnings, *warnings):
+        parts += warning.parts
     kept = plain(
         {
             "hash": key,
             "notes": notes,
             "T_rig_board": T_rig_board,
             "board_mm": made.board_mm,
-            "warnings": [part for warning in (*made.warnings, *warnings) for part in warning.parts],
+            "warnings": parts,
         }
     )
     write_result(folder / "cameras.json", kept)

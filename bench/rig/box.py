@@ -1,6 +1,7 @@
 """A block with plain faces, on one of which a print may be."""
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -41,7 +42,7 @@ class Box:
 
     def faces(self) -> dict[Face, Plate]:
         """Return the six faces, prints outwards."""
-        return {(axis, side): self.face((axis, side)) for axis in range(3) for side in (-1, 1)}
+        return {face: self.face(face) for face in product(range(3), (-1, 1))}
 
     def corners_mm(self) -> np.ndarray:
         """Return the corners (24, 3) in the rig frame, face by face."""

@@ -154,12 +154,11 @@ def scene(protocol: Protocol) -> Scene:
         table.floor,
         table.wall,
     )
-    stands = [
-        Stand.of_column(column_pose(column), column.heights_mm) for column in protocol.columns or ()
-    ]
-    return Scene(
-        board(protocol), _T_rig_print(protocol), appearance, tuple(stands) or (Stand.alone(),)
-    )
+    stands = []
+    for column in protocol.columns or ():
+        stands.append(Stand.of_column(column_pose(column), column.heights_mm))
+    stands = tuple(stands) or (Stand.alone(),)
+    return Scene(board(protocol), _T_rig_print(protocol), appearance, stands)
 
 
 def column_pose(column: ColumnTable) -> np.ndarray:

@@ -345,7 +345,10 @@ def _sleap_joints(file: Mapping) -> list[list[str]]:
     """Return of each skeleton of SLEAP's project the names of its joints, in the order of its points."""
     stated = json.loads(file["metadata"].attrs["json"])
     names = [node["name"] for node in stated["nodes"]]
-    return [[names[node["id"]] for node in one["nodes"]] for one in stated["skeletons"]]
+    joints = []
+    for skeleton in stated["skeletons"]:
+        joints.append([names[node["id"]] for node in skeleton["nodes"]])
+    return joints
 
 
 def _joints_px(instance: np.void, points_px: Mapping[int, np.ndarray]) -> np.ndarray:

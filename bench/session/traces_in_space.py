@@ -16,8 +16,8 @@ from vision.geometry import Camera, Cameras
 
 _AXES = ("x", "y", "z")
 # Anipose's columns of the axes that it has aligned points to.
-_TURN = tuple(f"M_{i}{j}" for i in range(3) for j in range(3))
-_CENTRE = tuple(f"center_{i}" for i in range(3))
+_TURN = ("M_00", "M_01", "M_02", "M_10", "M_11", "M_12", "M_20", "M_21", "M_22")
+_CENTRE = ("center_0", "center_1", "center_2")
 # [mm] Of a place from the cameras: 100 m. Stated.
 _MOST_MM = 1e5
 # [1] Of a turn in a table. Stated.

@@ -330,7 +330,7 @@ def _scores(scored: Sequence[TrialScores]) -> Iterator[TraceScore]:
     cameras = dict.fromkeys(frame.camera for trial in scored for frame in trial.frames)
     for trial in scored:
         for camera in cameras:
-            own = [frame for frame in trial.frames if frame.camera == camera]
+            own = _frames_of(camera, [trial])
             if own:
                 yield _score(own[0].trial, camera, [trial])
     for camera in cameras:
@@ -449,7 +449,7 @@ def draw(scored: Sequence[TrialScores]) -> Figure:
     panels = figure.subplots(count, 2, squeeze=False, sharey="row")
     for (along, in_time), camera, colour in zip(panels, cameras, OTHER_COLOURS * count):
         _draw_along(along, scored, camera, colour)
-        frames = [frame for trial in scored for frame in trial.frames if frame.camera == camera]
+        frames = _frames_of(camera, scored)
         order = np.arange(len(frames))
         bias_px = [frame.bias_px for frame in frames]
         scatter_px = [frame.scatter_px for frame in frames]
