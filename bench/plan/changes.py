@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bench.base.progress import count_parts
-from bench.plan.planned_cameras import BoardWork, as_seen_camera, expected_cameras
+from bench.plan.planned_cameras import PlannedCalibration, as_seen_camera, expected_cameras
 from bench.rig.pinhole import PinholeCamera
 from vision import KnownWhisk, LineNoise
 from vision.geometry import Camera, Cameras, Refused
@@ -18,13 +18,13 @@ _TURN_DEG = 30.0
 _STEEPEST_DEG = 85.0
 # [1] Of its distance, to which a camera is brought. Stated.
 _NEAR_SHARE = 0.7
-# [1] Times the focal length: the next in a shop. Stated.
+# [1] Factor of a longer focal length: the next in a shop. Stated.
 _LENS = 1.5
-# [1] Times as many views of the board. Stated.
+# [1] Factor of the number of the board's views. Stated.
 VIEWS = 4
-# [1] Times as well is known where the board stands on the rig. Stated.
+# [1] Factor by which the sigmas of the board's pose on the rig are smaller. Stated.
 PLACED = 4
-# [1] Times as much light, at as much less gain. Stated.
+# [1] Factor of the light, with the gain that much less. Stated.
 LIGHT = 4.0
 # [deg] Azimuth (0: beyond the tip) and elevation from which a third camera is tried. Stated.
 _THIRD_DEG = (
@@ -86,18 +86,18 @@ def _of_both_rods(noise: LineNoise | None) -> LineNoise:
 
 
 def list_changes(
-    cameras: Cameras, work: BoardWork | None, target_mm: np.ndarray, *, light: bool
+    cameras: Cameras, calibration: PlannedCalibration | None, target_mm: np.ndarray, *, light: bool
 ) -> list[Change]:
     """Return the changes to be tried of which the cameras can be calibrated.
 
-    work: what they are calibrated from; None where they were given: then each keeps its covariance.
+    calibration: what they are calibrated from; None where they were given: then each keeps its covariance.
     target_mm (3,): where the contact is. light: whether to try more of it.
     """
     found = []
     to_try = list(_changes(cameras, target_mm))
     for change in count_parts(to_try, "cameras calibrated with a change", len(to_try)):
         try:
-            calibrated = _calibrate(cameras, change, work, target_mm)
+            calibrated = _calibrate(cameras, change, calibration, target_mm)
         except Refused:
             continue  # its views would not do: no change to propose
         found.append(replace(change, cameras=calibrated))
@@ -201,7 +201,7 @@ def _with_longer_lens(camera: Camera) -> Camera:
 
 
 def _calibrate(
-    present: Cameras, change: Change, work: BoardWork | None, target_mm: np.ndarray
+    present: Cameras, change: Change, calibration: PlannedCalibration | None, target_mm: np.ndarray
 ) -> Cameras:
     """Return a change's cameras with a covariance: by predicted views, or that of those they are like.
 
@@ -209,8 +209,8 @@ def _calibrate(
     """
     views = VIEWS if change.kind == "views" else 1
     pose = PLACED if change.kind == "board" else 1
-    if work is not None:
-        return expected_cameras(change.cameras.cameras, work.improved(views, pose))
+    if calibration is not None:
+        return expected_cameras(change.cameras.cameras, calibration.improved(views, pose))
     covariance, placement = _improved_covariance(present, views, pose)
     rows = []
     scales = []

@@ -29,12 +29,12 @@ WORDS = {
     "cameras": "the cameras' calibration",
     "placement": "where the rig board stands",
 }
-# [1] Share of the wire outside a picture or behind the clamp, from which on it is said. Stated.
-_SOME = 0.1
-# [1] Share of the wire behind the bar, from which on it is said. Stated.
-_MUCH = 0.3
-# [1] Share of the bar's middle in a picture, below which it is said. Stated.
-_LEAST_OF_BAR = 0.7
+# [1] Least share of the wire outside a picture or behind the clamp that is reported. Stated.
+_LEAST_HIDDEN_SHARE = 0.1
+# [1] Least share of the wire behind the bar that is reported. Stated.
+_LEAST_BEHIND_BAR = 0.3
+# [1] Of the bar's middle in a picture: a smaller share is reported. Stated.
+_LEAST_BAR_SEEN = 0.7
 
 
 def in_unit(column: str, value: float) -> float:
@@ -99,14 +99,14 @@ def _obstacles_of(name: str, predicted: PredictedTruth, own: LineNoise | None) -
         yield f"camera {name} looks along the bar ({angle_deg:.0f} deg to its axis)"
     elif own is not None and len(own.bar_px) == 0:
         yield f"camera {name} does not see the bar's edges"
-    if sight.outside > _SOME:
+    if sight.outside > _LEAST_HIDDEN_SHARE:
         yield f"camera {name} has {_percent(sight.outside)} of the whisker outside its picture"
-    if sight.bar_share < _LEAST_OF_BAR:
+    if sight.bar_share < _LEAST_BAR_SEEN:
         missing = _percent(1 - sight.bar_share)
         yield f"camera {name} has {missing} of the bar's middle outside its picture"
-    if sight.behind_bar > _MUCH and sight.is_bar_nearer:
+    if sight.behind_bar > _LEAST_BEHIND_BAR and sight.is_bar_nearer:
         yield f"camera {name} has the bar before {_percent(sight.behind_bar)} of the whisker"
-    if sight.hidden > _SOME:
+    if sight.hidden > _LEAST_HIDDEN_SHARE:
         hidden = _percent(sight.hidden)
         yield f"camera {name} has the bar's clamp before {hidden} of the whisker"
     if own is not None and not np.isfinite(own.wire_px):

@@ -96,13 +96,13 @@ class Painter:
 
     def setting(self, number: int, staged: StagedWhisk) -> Setting:
         """Return a trial's still scene before one camera."""
-        return self.studios[number].setting(staged.marched.bar, staged.known.axis.point_mm)
+        return self.studios[number].setting(staged.mechanics.bar, staged.known.axis.point_mm)
 
     def frame(self, number: int, staged: StagedWhisk, setting: Setting, frame: int) -> np.ndarray:
         """Return one painted frame (h, w) of one camera as its file gives it back."""
         studio = self.studios[number]
         motor_rad = float(staged.known.motor_rad[frame])
-        instants = exposure_instants(studio, staged.recording, staged.marched, motor_rad, False)
+        instants = exposure_instants(studio, staged.recording, staged.mechanics, motor_rad, False)
         brightness = setting.brightness(instants)
         picture = studio.sensor.expose(brightness, self._stream(number, _FRAME, frame))
         if self.protocol.pictures.moving != "jpg":
@@ -145,7 +145,7 @@ class Clamp:
     @staticmethod
     def of(staged: StagedWhisk) -> "Clamp":
         """Return the clamp of a trial's bar."""
-        return Clamp(block_corners_mm(staged.marched.bar, staged.known.axis.point_mm))
+        return Clamp(block_corners_mm(staged.mechanics.bar, staged.known.axis.point_mm))
 
     def __call__(self, camera: Camera, points_mm: np.ndarray) -> np.ndarray:
         """Return which of points (n, 3) the clamp hides from a camera, (n,) bool."""

@@ -141,7 +141,7 @@ def _with_more_light(protocol: Protocol) -> Protocol:
     return msgspec.structs.replace(protocol, pictures=pictures)
 
 
-def plan_run(task: RigTask) -> Row:
+def plan_trial(task: RigTask) -> Row:
     """Return the row of a rig's trial."""
     facts = _facts(task.run)
     try:

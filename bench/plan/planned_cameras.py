@@ -21,8 +21,8 @@ _SEED, _VIEWS, _NOISE = 0, 0, 1  # words of the random streams
 
 
 @dataclass(frozen=True, eq=False)
-class BoardWork:
-    """What cameras are calibrated from.
+class PlannedCalibration:
+    """What the cameras of a bench would be calibrated from.
 
     printed: the same board for the rig. on_rig: where it stands on the rig. views: of it held up to
     each camera. corner_px: sigma of a corner along each axis, by camera.
@@ -34,14 +34,14 @@ class BoardWork:
     views: int
     corner_px: Mapping[str, float]
 
-    def improved(self, views: int, pose: int) -> "BoardWork":
-        """Return the work with so many times the views, and the pose known so many times as well."""
+    def improved(self, views_factor: int, pose_factor: int) -> "PlannedCalibration":
+        """Return it with more views of the board, and with smaller sigmas of its pose on the rig, by these factors."""
         on_rig = replace(
             self.on_rig,
-            sigma_mm=self.on_rig.sigma_mm / pose,
-            sigma_rad=self.on_rig.sigma_rad / pose,
+            sigma_mm=self.on_rig.sigma_mm / pose_factor,
+            sigma_rad=self.on_rig.sigma_rad / pose_factor,
         )
-        return replace(self, views=views * self.views, on_rig=on_rig)
+        return replace(self, views=views_factor * self.views, on_rig=on_rig)
 
     @property
     def largest_corner_px(self) -> float:
@@ -49,32 +49,38 @@ class BoardWork:
         return max(self.corner_px.values())
 
 
-def expected_cameras(cameras: Sequence[Camera], work: BoardWork) -> Cameras:
+def expected_cameras(cameras: Sequence[Camera], calibration: PlannedCalibration) -> Cameras:
     """Return the cameras where they are, with the covariance that a calibration states.
 
     Corners of a camera that is not there yet are as uncertain as the worst. Raises Refused where
     the views would not do, saying what to record.
     """
+    board = calibration.board
+    on_rig = calibration.on_rig
     held = {}
     standing = {}
     sizes_px = {}
     for number, camera in enumerate(cameras):
         rng = np.random.default_rng([_SEED, _NOISE, number])
-        sigma_px = work.corner_px.get(camera.name, work.largest_corner_px)
-        views = _draw_views(camera, work, np.random.default_rng([_SEED, _VIEWS, number]))
-        held[camera.name] = [_corners(camera, work.board, pose, sigma_px, rng) for pose in views]
-        on_rig = work.on_rig.T_rig_board
-        standing[camera.name] = _corners(camera, work.board, on_rig, sigma_px, rng)
+        sigma_px = calibration.corner_px.get(camera.name, calibration.largest_corner_px)
+        held[camera.name] = []
+        for pose in _draw_poses(
+            camera, calibration, np.random.default_rng([_SEED, _VIEWS, number])
+        ):
+            held[camera.name].append(_corners(camera, board, pose, sigma_px, rng))
+        standing[camera.name] = _corners(camera, board, on_rig.T_rig_board, sigma_px, rng)
         sizes_px[camera.name] = camera.size_px
     views = BoardViews(held, sizes_px, standing)
-    found = calibrate_cameras(views, work.board, work.on_rig, triggered=True).cameras
+    found = calibrate_cameras(views, board, on_rig, triggered=True).cameras
     return Cameras(tuple(cameras), found.covariance, found.placement)
 
 
-def _draw_views(camera: Camera, work: BoardWork, rng: np.random.Generator) -> list[np.ndarray]:
+def _draw_poses(
+    camera: Camera, calibration: PlannedCalibration, rng: np.random.Generator
+) -> list[np.ndarray]:
     """Draw the poses (3, 4) of the board in the views of a camera, rig frame."""
-    poses = boards.draw_poses(work.printed, as_rig_camera(camera), work.views, rng)
-    return [compose(pose, work.printed.T_print_board) for pose in poses]
+    poses = boards.draw_poses(calibration.printed, as_rig_camera(camera), calibration.views, rng)
+    return [compose(pose, calibration.printed.T_print_board) for pose in poses]
 
 
 def _corners(

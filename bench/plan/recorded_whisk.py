@@ -128,7 +128,7 @@ def _facts(task: SeenTask) -> Facts:
 def _stated_sigmas(whisk: SeenWhisk) -> dict[str, float]:
     """Return the sigmas by column that `evaluate` states.
 
-    UnloadedTouch is without what the felt touches of all whisks add to it.
+    That of touch is without what the touches felt in all whisks add to it.
     """
     values = {
         "d_x_mm": whisk.d_x_mm,

@@ -20,8 +20,8 @@ from bench.plan.changes import Change, list_changes
 from bench.plan.painter import Painter
 from bench.plan.plan_drawing import Bench, PaintedTrial, board_outline, write_drawing
 from bench.plan.plan_files import write_plan
-from bench.plan.plan_rows import Plan, RigTask, painter_of, plan_run
-from bench.plan.planned_cameras import BoardWork, expected_cameras
+from bench.plan.plan_rows import Plan, RigTask, painter_of, plan_trial
+from bench.plan.planned_cameras import PlannedCalibration, expected_cameras
 from bench.plan.recorded_whisk import SeenTask, plan_seen, stage_again
 from bench.plan.staged import StagedWhisk, stage_run
 from bench.records.trial_result import SeenTrial
@@ -50,7 +50,7 @@ _AS_RECORDED = (
 
 @dataclass(frozen=True)
 class Options:
-    """The options of the verb. Refused where the angle is out of range.
+    """The options of the verb. Raises BadInput where the angle is out of range.
 
     theta_deg: of slip, φ, α. changes: whether to try any. follow_links: a session's pictures may
     lie elsewhere.
@@ -101,7 +101,7 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
         raise BadInput(bad.reason, file=path) from None
     except (Refused, ValueError, cv2.error) as problem:
         raise _on_one_line(problem, path) from None
-    rows = pool.run(plan_run, _rig_tasks(rig, options), "trials")
+    rows = pool.run(plan_trial, _rig_tasks(rig, options), "trials")
     begin_step("drawing")
     with lock_output(out):
         _draw_rig(out, rig.painter, rig.cameras, staged)
@@ -110,7 +110,7 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
         cameras=tuple(_describe_cameras(rig.cameras, whisks)),
         rows=tuple(rows),
         theta_deg=options.theta_deg,
-        assumptions=tuple(_assumptions(rig.work)),
+        assumptions=tuple(_assumptions(rig.calibration)),
     )
 
 
@@ -118,14 +118,14 @@ def plan_rig(path: Path, out: Path, options: Options, pool: Workers) -> Plan:
 class _PlacedRig:
     """A rig whose cameras all have a place.
 
-    target_mm (3,): what they are aimed at. work: what they would be calibrated from. cameras: with the
+    target_mm (3,): what they are aimed at. calibration: what they would be calibrated from. cameras: with the
     covariance that this leaves.
     """
 
     protocol: Protocol
     target_mm: np.ndarray
     painter: Painter
-    work: BoardWork
+    calibration: PlannedCalibration
     cameras: Cameras
 
 
@@ -138,16 +138,18 @@ def _place_rig(protocol: Protocol, whisks: Sequence[StagedWhisk]) -> _PlacedRig:
     placed = place_cameras(protocol, whisks, target_mm)
     begin_step("pictures of the board")
     painter = painter_of(placed)
-    work = _board_work(painter)
+    calibration = _planned_calibration(painter)
     begin_step("cameras as they would be calibrated")
-    return _PlacedRig(placed, target_mm, painter, work, expected_cameras(painter.cameras, work))
+    return _PlacedRig(
+        placed, target_mm, painter, calibration, expected_cameras(painter.cameras, calibration)
+    )
 
 
 def _rig_tasks(rig: _PlacedRig, options: Options) -> list[RigTask]:
     """Return a task for each trial of a rig."""
     changes: Sequence[Change] = ()
     if options.changes:
-        changes = list_changes(rig.cameras, rig.work, rig.target_mm, light=True)
+        changes = list_changes(rig.cameras, rig.calibration, rig.target_mm, light=True)
     theta_rad = math.radians(options.theta_deg)
     return [RigTask(run, rig.cameras, changes, theta_rad) for run in rig.protocol.runs()]
 
@@ -198,7 +200,7 @@ def _mean_contact_mm(staged: Sequence[StagedWhisk]) -> np.ndarray:
     return np.mean([whisk.known.contact_mm for whisk in staged], axis=0)
 
 
-def _board_work(painter: Painter) -> BoardWork:
+def _planned_calibration(painter: Painter) -> PlannedCalibration:
     """Return what the cameras would be calibrated from.
 
     Raises Refused or ValueError where board or light would not do.
@@ -209,14 +211,16 @@ def _board_work(painter: Painter) -> BoardWork:
         table.pose_sigma_mm,
         math.radians(table.pose_sigma_deg),
     )
-    return BoardWork(painter.board, painter.printed, on_rig, table.views, painter.corner_px())
+    return PlannedCalibration(
+        painter.board, painter.printed, on_rig, table.views, painter.corner_px()
+    )
 
 
-def _assumptions(work: BoardWork) -> Iterator[str]:
+def _assumptions(calibration: PlannedCalibration) -> Iterator[str]:
     """Yield sentences on what the plan of a rig takes for granted."""
     yield (
         "Taken for granted: light and noise of the file, lines of wire and bar as sure as they are in pictures "
-        f"painted so; {work.views} views of the board a camera, corners to {work.largest_corner_px:.3f} px."
+        f"painted so; {calibration.views} views of the board a camera, corners to {calibration.largest_corner_px:.3f} px."
     )
     yield (
         "Changes are tried with lines as sure, in pixels, as before; a camera that is new, or did not see the bar, "
@@ -247,7 +251,7 @@ def _draw_rig(
     out: Path, painter: Painter, cameras: Cameras, staged: dict[str, StagedWhisk]
 ) -> None:
     """Write the drawing of a rig, and what each camera will see of the trial with the steepest bar."""
-    name = max(staged, key=lambda trial: abs(staged[trial].marched.slope[0]))
+    name = max(staged, key=lambda trial: abs(staged[trial].mechanics.slope[0]))
     painted = PaintedTrial(name, staged[name], painter.last_frames(staged[name]))
     (out / "views").mkdir(parents=True, exist_ok=True)
     for camera, picture in painted.pictures.items():

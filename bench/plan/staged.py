@@ -29,11 +29,11 @@ _REST_POINTS = 50
 class StagedWhisk:
     """One whisk of a plan.
 
-    marched: by the rig's mechanics. known: in vision's terms, in its frames. recording: what the
+    mechanics: of the rig. known: in vision's terms, in its frames. recording: what the
     rig paints it from; None of a session that was recorded.
     """
 
-    marched: WhiskMechanics
+    mechanics: WhiskMechanics
     known: KnownWhisk
     recording: Recording | None = None
 
@@ -75,7 +75,7 @@ def stage_on_bar(
     Raises ArithmeticError where the whisker slips off or buckles.
     """
     motor = np.asarray(motor_rad, dtype=float)
-    marched = WhiskMechanics.run(
+    mechanics = WhiskMechanics.run(
         rod,
         bar,
         FrictionCoefficients(friction, friction),
@@ -84,22 +84,22 @@ def stage_on_bar(
         step_rad=_STEP_RAD,
         stops_rad=motor,
     )
-    return as_staged(marched, motor, time_s)
+    return as_staged(mechanics, motor, time_s)
 
 
-def as_staged(marched: WhiskMechanics, motor_rad: np.ndarray, time_s: np.ndarray) -> StagedWhisk:
+def as_staged(mechanics: WhiskMechanics, motor_rad: np.ndarray, time_s: np.ndarray) -> StagedWhisk:
     """Return a whisk of the rig in frames at these motor angles (f,); its diameters are exact."""
-    rod = marched.rod
-    touch = marched.touch
-    bend_rad, arc_mm = _bends_and_arcs(marched, motor_rad)
+    rod = mechanics.rod
+    touch = mechanics.touch
+    bend_rad, arc_mm = _bends_and_arcs(mechanics, motor_rad)
     wire = _wire(rod)
-    bar = Bar(2.0 * marched.bar.radius_mm)
+    bar = Bar(2.0 * mechanics.bar.radius_mm)
     share = np.linspace(0.0, 1.0, _REST_POINTS)
     rest_offset_mm = rod.rest.point_mm(share * rod.length_mm)[:, 1:]
-    foot_mm = marched.bar.foot_mm(touch.point_mm)  # of the bar's axis, opposite the contact
+    foot_mm = mechanics.bar.foot_mm(touch.point_mm)  # of the bar's axis, opposite the contact
     known = KnownWhisk(
         rods=Rods(wire, bar),
-        axis=BarAxis(foot_mm, marched.bar.axis).upward(),
+        axis=BarAxis(foot_mm, mechanics.bar.axis).upward(),
         motor_rad=np.asarray(motor_rad),
         time_s=np.asarray(time_s),
         bend_rad=bend_rad,
@@ -108,7 +108,7 @@ def as_staged(marched: WhiskMechanics, motor_rad: np.ndarray, time_s: np.ndarray
         touch_rad=touch.motor_rad,
         contact_mm=touch.point_mm,
     )
-    return StagedWhisk(marched, known)
+    return StagedWhisk(mechanics, known)
 
 
 def _wire(rod: Rod) -> Wire:
@@ -120,16 +120,16 @@ def _wire(rod: Rod) -> Wire:
 
 
 def _bends_and_arcs(
-    marched: WhiskMechanics, motor_rad: np.ndarray
+    mechanics: WhiskMechanics, motor_rad: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return bends (f, 2), rad, and contact arcs (f,), mm, at motor angles (f,)."""
-    touch = marched.touch
+    touch = mechanics.touch
     bends = []
     arcs_mm = []
     for motor in motor_rad:
         if motor > touch.motor_rad:
-            state = marched.forward.state_at(motor)
-            bends.append(_bend_rad(marched.rod, state))
+            state = mechanics.forward.state_at(motor)
+            bends.append(_bend_rad(mechanics.rod, state))
             arcs_mm.append(state.arc_mm)
         else:
             bends.append(np.zeros(2))

@@ -36,15 +36,15 @@ def moved(camera, staged, place_mm):
 def test_values_are_those_staged(bench):
     staged, cameras = bench
     found, row = of(staged, cameras)
-    marched = staged.marched
-    touch = marched.touch
+    mechanics = staged.mechanics
+    touch = mechanics.touch
     assert found.truth.d_x_mm.value == pytest.approx(touch.d_x_mm, abs=1e-6)
     assert found.truth.touch_rad.value == pytest.approx(touch.motor_rad, abs=1e-7)
     assert found.truth.beta_rad.value == pytest.approx(
-        marched.bar.slope(touch.motor_rad, touch.point_mm)[0], abs=1e-9
+        mechanics.bar.slope(touch.motor_rad, touch.point_mm)[0], abs=1e-9
     )
     # the beam of the fit is one of small angles: within 0.3 µm of the exact rod, and of its contact (docs/truth.md)
-    slip = float(marched.slip_at(THETA_RAD))
+    slip = float(mechanics.slip_at(THETA_RAD))
     assert found.truth.at(THETA_RAD).slip_mm.value == pytest.approx(slip, abs=0.005)
     assert row.has_truth and not row.status
 

@@ -47,9 +47,9 @@ def test_a_fit_to_predicted_lines_comes_back_to_the_whisk(bench):
     )
     fitted = fit_lines(whisk, predicted_lines(known, cameras), expected, touch)
     for name, value in (
-        ("d_x", staged.marched.touch.d_x_mm),
+        ("d_x", staged.mechanics.touch.d_x_mm),
         ("touch", known.touch_rad),
-        ("beta", staged.marched.bar.slope(known.touch_rad, known.contact_mm)[0]),
+        ("beta", staged.mechanics.bar.slope(known.touch_rad, known.contact_mm)[0]),
     ):
         found = fitted.of_whisk(name)
         assert abs(found.value - value) < 0.01 * found.sigma
