@@ -1,6 +1,6 @@
 """The AprilGrid of Kalibr: tags in rows, with a small dark square in each gap between four of them.
 
-Each corner of a tag is so a crossing of two edges. Frame and numbers are Kalibr's: tag 0 lower
+So each corner of a tag is a crossing of two edges. Frame and numbers are Kalibr's: tag 0 lower
 left, x along its row, y to the next row above, z out of the board.
 """
 
@@ -94,8 +94,8 @@ class AprilGrid(SaddleBoard):
     def detect(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the corners of the tags that are seen.
 
-        How wide the tags' rims are, and which way up tags were printed, is what puts their corners
-        on one plane; of those the picture as smooth as shows most tags is taken.
+        Tags have the rim, and were printed the way up, by which their corners lie on one plane. The
+        picture is searched as it is and smoothed; the search that finds most tags counts.
         """
         best = none_detected()
         for smooth_px in _SMOOTH_PX:

@@ -56,10 +56,10 @@ def estimate_optics(grey: np.ndarray, board: Board) -> Optics:
     cut = board.cut(picture, corners.px, corners.ids)
     if cut is None:
         return UNKNOWN
-    windows, frames = cut
+    windows, axes = cut
     windows = replace(windows, weight=windows.weight * (windows.grey < SATURATED * 255.0))
     light = 255.0 * (windows.grey / 255.0) ** _FIRST_GAMMA
-    saddles = start_parameters(replace(windows, grey=light), corners.px, frames)
+    saddles = start_parameters(replace(windows, grey=light), corners.px, axes)
     log_gammas = np.full((len(saddles), 1), np.log(_FIRST_GAMMA))
     start = np.concatenate([saddles, log_gammas], axis=1)
     fitted, converged = fit_windows(windows, start, _predict_grey)

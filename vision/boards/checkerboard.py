@@ -1,8 +1,8 @@
 """The plain checkerboard, found whole or not at all.
 
-Its upper left square is dark. One with an odd number of squares one way and an even one the other
-differs after half a turn; of any other its points are named from the upper left of the
-picture, and `vision.calibration.turned` makes the cameras agree.
+Its upper left square is dark. After half a turn it looks different if it has an odd number of squares
+one way and an even number the other. The points of any other one are named from the upper left of
+the picture, and `vision.calibration.turned` makes the cameras agree.
 """
 
 from dataclasses import dataclass, field
@@ -62,10 +62,10 @@ class Checkerboard(CheckeredBoard):
         return np.arange(len(px)), upper_left_first(dark_first or candidates)
 
     def refine(self, grey: np.ndarray, px_guess: np.ndarray, ids: np.ndarray) -> Corners:
-        """Fit saddles as of any board; none where no corner of an outer row or column is one.
+        """Fit saddles; return none where a whole outer row or column shows none.
 
-        OpenCV takes the edge of a board that is partly out of the picture for such a row, and all its
-        names are of other corners then.
+        Of a board that is partly out of the picture OpenCV takes the edge for such a row, and then
+        names all corners falsely.
         """
         corners = super().refine(grey, px_guess, ids)
         row, column = np.divmod(corners.ids, self.grid[0])

@@ -1,7 +1,7 @@
-"""Grids of dark circles, in rows or in rows each other of which is shifted.
+"""Grids of dark circles, in columns or with every second row shifted.
 
-In perspective the centre of a circle's picture is not the picture of its centre: by some r² tan(tilt)
-/ f, 0.1 px where r is 20 px. That is computed of the board's plane and taken off.
+In perspective the centre of a circle's picture is not the picture of its centre. They are about r²
+tan(tilt) / f apart, 0.1 px where r is 20 px. This shift follows from the board's plane and is subtracted.
 """
 
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from vision.boards.corners import MIN_CORNERS, Corners, is_found, none_detected,
 from vision.boards.discs import cut_discs, fit_discs
 from vision.boards.homography import fit_homography, map_places
 from vision.boards.saddle import Saddles
-from vision.boards.saddle_board import is_undisturbed, is_usual, local_frames
+from vision.boards.saddle_board import is_undisturbed, is_usual, local_axes
 from vision.boards.symmetry import possible_labels, turns_onto_itself, upper_left_first
 from vision.geometry.board import Board, grid_mm
 from vision.geometry.checks import require, require_length
@@ -27,8 +27,8 @@ _MOST_AREA = 0.02
 _MOST_SHIFT = 0.3
 # [pixels] Four times the ten parameters. Derived.
 _MIN_PIXELS = 40
-# [1] Of the perspective's shift that a lens leaves unknown: by k1 = −0.1 a twentieth.
-# Derived.
+# [1] Share of the perspective's shift that is uncertain because lenses distort: with k1 = −0.1 a
+# twentieth. Derived.
 _SHIFT_SHARE = 0.05
 
 
@@ -90,7 +90,7 @@ class CircleGrid(Board):
         centres is taken off.
         """
         radius_mm = 0.5 * self.marker_mm
-        axes = local_frames(px_guess, self.corners_mm[ids, :2] / radius_mm)
+        axes = local_axes(px_guess, self.corners_mm[ids, :2] / radius_mm)
         if axes is None:
             return Corners.none()
         windows = cut_discs(grey, px_guess, axes, 0.5 * self.nearest_mm / radius_mm)

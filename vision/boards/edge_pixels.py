@@ -49,17 +49,15 @@ class Windows(Rows):
         return grid.reshape(*values.shape[:2], side, side)
 
 
-def cut_windows(
-    grey: np.ndarray, px_guess: np.ndarray, frames: np.ndarray, border: float
-) -> Windows:
+def cut_windows(grey: np.ndarray, px_guess: np.ndarray, axes: np.ndarray, border: float) -> Windows:
     """Return the pixels that show the two edges of each corner.
 
-    grey (height, width). px_guess (n, 2). frames (n, 2, 2): px, in its columns one square along
+    grey (height, width). px_guess (n, 2). axes (n, 2, 2): px, in its columns one square along
     board x and y in the picture at the corner. border: clear rim between a square's edge and its
     marker, in squares.
     """
     return cut_where(
-        grey, px_guess, _reach_px(frames), lambda offset: _shows_edges(offset, frames, border)
+        grey, px_guess, _reach_px(axes), lambda offset: _shows_edges(offset, axes, border)
     )
 
 
@@ -83,9 +81,9 @@ def cut_where(
     return Windows(anchor, offset, _grey_at(grey, anchor[:, :, None] + offset), weight)
 
 
-def _reach_px(frames: np.ndarray) -> int:
-    """Return how far from their corners edges are used, whole px, for frames (n, 2, 2)."""
-    longest_px = np.linalg.norm(frames, axis=1).max()
+def _reach_px(axes: np.ndarray) -> int:
+    """Return how far from their corners edges are used, whole px, for axes (n, 2, 2)."""
+    longest_px = np.linalg.norm(axes, axis=1).max()
     return int(np.ceil(min(REACH_PX, _ARM_SQUARES * longest_px)))
 
 
@@ -121,14 +119,14 @@ def _used_first(is_used: np.ndarray) -> np.ndarray:
     return np.argsort(~is_used, axis=1, kind="stable")[:, :count]
 
 
-def _shows_edges(offset: np.ndarray, frames: np.ndarray, border: float) -> np.ndarray:
+def _shows_edges(offset: np.ndarray, axes: np.ndarray, border: float) -> np.ndarray:
     """Return which pixels show the two edges and no marker, (n, k) bool.
 
     offset (n, 2, k): px from the guess.
     """
-    in_squares = np.abs(np.linalg.solve(frames, offset))
-    across_px = np.linalg.norm(frames[:, :, ::-1], axis=1)
-    px_per_square = np.abs(np.linalg.det(frames))[:, None] / across_px
+    in_squares = np.abs(np.linalg.solve(axes, offset))
+    across_px = np.linalg.norm(axes[:, :, ::-1], axis=1)
+    px_per_square = np.abs(np.linalg.det(axes))[:, None] / across_px
     clear_px = border * px_per_square - _CLEAR_OF_MARKER_PX
     band_px = np.clip(clear_px, _CLEAR_OF_MARKER_PX, _BAND_PX)
     is_near_edge = in_squares * px_per_square[:, :, None] < band_px[:, :, None]

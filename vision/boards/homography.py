@@ -1,4 +1,4 @@
-"""Homographies: by points of a plane, where they map places, and how fast they do."""
+"""Homographies: fitted to points of a plane, the places that they map to, and the derivatives of these."""
 
 import cv2
 import numpy as np

@@ -170,7 +170,7 @@ def _is_pattern(model: "_Pattern", fitted: np.ndarray, scale_px: float) -> bool:
     blur_px = scale_px * np.exp(fitted[_BLUR])
     if not np.all((blur_px > _BLUR_LIMITS_PX[0]) & (blur_px < _BLUR_LIMITS_PX[1])):
         return False
-    return not np.corrcoef(model.predict(fitted), model.grey)[0, 1] < _LEAST_CORRELATION
+    return bool(np.corrcoef(model.predict(fitted), model.grey)[0, 1] >= _LEAST_CORRELATION)
 
 
 def _corners_on_print(modules: int) -> np.ndarray:

@@ -20,13 +20,13 @@ from scipy.special import erf
 
 from vision.boards.edge_pixels import Windows
 
-# [px] A fit that runs farther than this from OpenCV's corner found another. moves nothing on the
+# [px] A fit that runs farther than this from OpenCV's corner found another. Moves nothing on the
 # fixtures between 2 and 8. Study: thresholds.py boards.saddle _MAX_SHIFT_PX ….
 _MAX_SHIFT_PX = 4.0
-# [squares] The same on small boards. moves nothing on the fixtures between 0.15 and 0.6. Study:
+# [squares] The same on small boards. Moves nothing on the fixtures between 0.15 and 0.6. Study:
 # thresholds.py boards.saddle _MAX_SHIFT_SQUARES ….
 _MAX_SHIFT_SQUARES = 1.0 / 3.0
-# [pixels] Over four times the nine parameters. moves nothing on the fixtures between 10 and 160.
+# [pixels] Four times the ten parameters. Moves nothing on the fixtures between 10 and 160.
 # Study: thresholds.py boards.saddle _MIN_PIXELS ….
 _MIN_PIXELS = 40
 # [1] Against what the model leaves over, and against rounding. Moves nothing on the fixtures
@@ -40,10 +40,10 @@ _ITERATIONS = 50
 # [corners] Evaluated together: arrays that stay in the processor's cache. No result depends on it.
 # Study: tests/studies/speed/beside.py.
 _BATCH = 6
-# [px] A tenth of a good corner's sigma. moves nothing on the fixtures between 0.0005 and 0.01.
+# [px] A tenth of a good corner's sigma. Moves nothing on the fixtures between 0.0005 and 0.01.
 # Study: thresholds.py boards.saddle _CONVERGED_PX ….
 _CONVERGED_PX = 2e-3
-# [px] Where the fit starts. moves nothing on the fixtures between 0.6 and 2. Study: thresholds.py
+# [px] Where the fit starts. Moves nothing on the fixtures between 0.6 and 2. Study: thresholds.py
 # boards.saddle _FIRST_BLUR_PX ….
 _FIRST_BLUR_PX = 1.0
 # [px] Softer is no edge. 4 and 12 leave the fixtures as they are. Study:
@@ -67,8 +67,9 @@ LINEAR = slice(6, 10)
 # [columns] The light's slope along x and y. A layout, no threshold.
 SLOPE = slice(8, 10)
 CONTRAST, LEVEL = range(6, 8)
-# [columns] Of a saddle besides its place: they converge with it. A layout, no threshold.
-_NOT_WATCHED = slice(2, 10)
+# [columns] Of a saddle besides its place: they converge with it, so that their last step is not looked
+# at. A layout, no threshold.
+_BESIDES_PLACE = slice(2, 10)
 
 # Grey (n, k) of windows by parameters (n, m), and its Jacobian (n, m, k).
 Predict = Callable[[Windows, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -90,17 +91,17 @@ class Saddles:
     converged: np.ndarray
 
 
-def fit_saddles(windows: Windows, frames: np.ndarray, px_guess: np.ndarray) -> Saddles:
-    """Fit the corner nearest each guess (n, 2) px; windows and frames are as of `cut_windows`."""
-    start = start_parameters(windows, px_guess, frames)
+def fit_saddles(windows: Windows, axes: np.ndarray, px_guess: np.ndarray) -> Saddles:
+    """Fit the corner nearest each guess (n, 2) px; windows and axes are as of `cut_windows`."""
+    start = start_parameters(windows, px_guess, axes)
     parameters, converged = fit_windows(windows, start, predict_saddles)
     saddles = report_fit(windows, parameters, converged, predict_saddles)
-    plausible = converged & _is_plausible(saddles, px_guess, frames)
+    plausible = converged & _is_plausible(saddles, px_guess, axes)
     has_pixels = windows.weight.sum(axis=1) >= _MIN_PIXELS
     return replace(saddles, converged=plausible & has_pixels)
 
 
-def start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def start_parameters(windows: Windows, px_guess: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """Return the parameters (n, 10) that the fit starts from.
 
     Edges as the homography has them; contrast, level and slope by least squares.
@@ -108,8 +109,8 @@ def start_parameters(windows: Windows, px_guess: np.ndarray, frames: np.ndarray)
     p = np.zeros((len(px_guess), 10))
     p[:, PLACE] = px_guess - windows.anchor
     # Edge 1 runs along board y, edge 2 along board x; each is named by the direction of its normal.
-    normal_1 = np.arctan2(-frames[:, 0, 1], frames[:, 1, 1])
-    normal_2 = np.arctan2(frames[:, 0, 0], -frames[:, 1, 0])
+    normal_1 = np.arctan2(-axes[:, 0, 1], axes[:, 1, 1])
+    normal_2 = np.arctan2(axes[:, 0, 0], -axes[:, 1, 0])
     p[:, TURN] = np.column_stack([normal_1, normal_2])
     p[:, BLUR] = np.log(_FIRST_BLUR_PX)
     p[:, CONTRAST] = 1.0
@@ -192,8 +193,8 @@ def fit_windows(
     """Fit all corners side by side: return their parameters (n, m) and which converged (n,).
 
     start (n, m): parameters to begin with, those of a saddle first. predict: the model. Levenberg
-    and Marquardt's method; corners leave the iteration as they converge. SciPy fits one corner at a
-    time.
+    and Marquardt's method; corners leave the iteration as they converge. (SciPy would fit one corner
+    at a time.)
     """
     fit = _evaluate(windows, start.copy(), predict)
     damping = np.full(len(start), 1e-3)
@@ -208,9 +209,10 @@ def fit_windows(
         is_better = trial.cost <= fit.cost[active]
         fit.accept(active, trial, is_better)
         damping[active] *= np.where(is_better, 0.2, 10.0)
-        converged[active] = (
-            np.linalg.norm(np.delete(step, _NOT_WATCHED, axis=1), axis=1) < _CONVERGED_PX
-        )
+        judged = np.delete(
+            step, _BESIDES_PLACE, axis=1
+        )  # place, and what a model has beyond a saddle
+        converged[active] = np.linalg.norm(judged, axis=1) < _CONVERGED_PX
     return fit.p, converged
 
 
@@ -300,11 +302,11 @@ def _residuals_and_influences(
     return residual, influence
 
 
-def _is_plausible(saddles: Saddles, px_guess: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def _is_plausible(saddles: Saddles, px_guess: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """Return which corners lie near their guess and have edges that can be printed ones, (n,)."""
     has_sigma = (saddles.sigma_px > 0) & np.isfinite(saddles.sigma_px)
     shift_px = np.linalg.norm(saddles.px - px_guess, axis=1)
-    square_px = np.linalg.norm(frames, axis=1).min(axis=1)
+    square_px = np.linalg.norm(axes, axis=1).min(axis=1)
     is_near = shift_px < np.minimum(_MAX_SHIFT_PX, _MAX_SHIFT_SQUARES * square_px)
     noise = np.maximum(saddles.misfit, _ROUNDING)
     stands_out = np.abs(saddles.contrast) > _LEAST_CONTRAST * noise

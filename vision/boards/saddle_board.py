@@ -30,7 +30,7 @@ class SaddleBoard(Board):
     @property
     @abstractmethod
     def cell_mm(self) -> float:
-        """Return twice the length of an edge, from its corner on, that is the corner's own."""
+        """Return how much of an edge a corner has to itself, to both sides together."""
 
     @property
     @abstractmethod
@@ -39,8 +39,8 @@ class SaddleBoard(Board):
 
     @property
     def is_dark_first(self) -> np.ndarray:
-        """Return at which points, (m,) bool, the quadrants of x and y of like sign are as dark as
-        at the first.
+        """Return which points, (m,) bool, are printed as the first one is, and not with dark and
+        white exchanged.
         """
         columns, rows = self.grid
         return (np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 0).ravel()
@@ -50,8 +50,8 @@ class SaddleBoard(Board):
         cut = self.cut(grey, px_guess, ids)
         if cut is None:
             return Corners.none()
-        windows, frames = cut
-        saddles = fit_saddles(windows, frames, px_guess)
+        windows, axes = cut
+        saddles = fit_saddles(windows, axes, px_guess)
         if not saddles.converged.any():
             return Corners.none()
         good = saddles.converged & self._resemble_others(saddles, ids)
@@ -63,10 +63,10 @@ class SaddleBoard(Board):
         """Return the pixels about corners at guesses (n, 2) px, and one cell in the picture at
         each, (n, 2, 2) px. None where the guesses fix no plane.
         """
-        frames = local_frames(px, self.corners_mm[ids, :2] / self.cell_mm)
-        if frames is None:
+        axes = local_axes(px, self.corners_mm[ids, :2] / self.cell_mm)
+        if axes is None:
             return None
-        return cut_windows(grey, px, frames, self.clear_mm / self.cell_mm), frames
+        return cut_windows(grey, px, axes, self.clear_mm / self.cell_mm), axes
 
     def _resemble_others(self, saddles: Saddles, ids: np.ndarray) -> np.ndarray:
         """Return which corners resemble the board's other corners, (n,) bool.
@@ -121,7 +121,7 @@ def is_undisturbed(misfit: np.ndarray, good: np.ndarray) -> np.ndarray:
     return misfit < _DISTURBED_RATIO * np.median(misfit[good])
 
 
-def local_frames(px: np.ndarray, places: np.ndarray) -> np.ndarray | None:
+def local_axes(px: np.ndarray, places: np.ndarray) -> np.ndarray | None:
     """Return one unit along board x and y in the picture at each point: (n, 2, 2) px, columns x
     and y.
 

@@ -40,8 +40,9 @@ def mean_view(rig_view: Corners, frames: Sequence[Corners]) -> Corners:
 
 
 def _mean_corner(seen: Corners, first_is_rig: bool) -> tuple[np.ndarray, float]:
-    """Return the mean (2,) of one corner as often as it is seen, and its sigma, without disturbed
-    places.
+    """Return the mean (2,) of one corner over all pictures that show it undisturbed, and its sigma.
+
+    first_is_rig: whether the first place is that of the rig picture.
     """
     px = seen.px
     sigma_px = seen.sigma_px

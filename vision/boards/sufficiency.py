@@ -53,9 +53,9 @@ _LEAST_REACH = 0.7
 
 
 def without_strays(view: Corners, board: Board) -> Corners:
-    """Return the corners of which each face's lie as on a plane seen through any lens.
+    """Return the corners of each face that lie as on a plane, however a lens bends its picture.
 
-    None remain of a face where too few do (a mislabelled board).
+    Of a face where too few do (a mislabelled board) none remain.
     """
     return Corners.join(
         [Corners.none(), *(_on_plane(part, board) for part in by_face(view, board))]
@@ -63,7 +63,7 @@ def without_strays(view: Corners, board: Board) -> Corners:
 
 
 def _on_plane(view: Corners, board: Board) -> Corners:
-    """Return the corners of one face that lie as on a plane seen through any lens; none of too few."""
+    """Return the corners of one face that lie as on a plane; none where they are too few."""
     if len(view) < MIN_VIEW_CORNERS:
         return Corners.none()
     limit_px = max(_STRAY_PX, _STRAY_SHARE * float(np.ptp(view.px, axis=0).max()))

@@ -44,8 +44,9 @@ def _centred(board: Board) -> np.ndarray:
 
 
 def possible_labels(px: np.ndarray, board: Board) -> list[np.ndarray]:
-    """Return the places (m, 2) of a board's points, in all orders that its print and no mirror
-    allow, from those in the order in which OpenCV returns them.
+    """Return the places px (m, 2) that OpenCV found, in each order that may be that of the board's ids.
+
+    Orders differ by turns that the print allows; none is one of a mirrored board.
     """
     turned, mirrored = _symmetries(board)
     as_seen = _handedness(px, board) * _handedness(board.corners_mm[:, :2], board)
