@@ -14,7 +14,7 @@ import numpy as np
 from vision.fit.converged_fit import ConvergedFit, times_residual_covariance
 from vision.fit.problem import Problem, point_rows
 
-# [frames⁻²] Information on the delay of a camera that shows no wire, which would run away. Stated.
+# [frames⁻²] Information on the delay of a camera that hardly shows the wire turn, which would run away. Stated.
 _PRIOR = 1e-4
 
 
@@ -24,7 +24,7 @@ def camera_delays(
     """Return the delay of each camera in frames, the others having none, and its sigma.
 
     picture_of: by camera that is a part of a picture, the camera whose picture it is; the delay is that
-    of all its parts, under its name. There is none of a single picture.
+    of all its parts, under its name. There is none of a single picture, nor of a camera that shows no wire.
     """
     parts = picture_of or {}
     problem = fit.problem
@@ -37,6 +37,8 @@ def camera_delays(
     found = {}
     for picture in dict.fromkeys(pictures):
         column = columns[:, [other == picture for other in pictures]].sum(axis=1)
+        if not column.any():  # it shows no wire
+            continue
         gain = _gain_of_last(np.column_stack([linear.jacobian, column]), weight)
         sigma = _sigma(problem, gain, gain[:, linear.is_point] @ fit.by_camera)
         found[picture] = (float(gain[0] @ linear.residual), sigma)

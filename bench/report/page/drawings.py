@@ -72,8 +72,15 @@ def inside(figure: "Figure", name: str, alt: str, rows: Sequence[WhiskRow]) -> M
     at = by_whisk(rows)
 
     def link(found: re.Match) -> str:
-        """Return the page's own link to the whisk that a link of the drawing names."""
-        row = at[unquote(found[1]), int(found[2])]
+        """Return the page's own link to the whisk that a link of the drawing names.
+
+        A gauge trial that the run has not evaluated has a name and no link.
+        """
+        trial = unquote(found[1])
+        number = int(found[2])
+        row = at.get((trial, number))
+        if row is None:
+            return f"<a><title>{escape(trial)}, whisk {number}</title>"
         which = f'href="#{row.key}" class="mark" data-w="{row.key}"'
         return f"<a {which}><title>{escape(row.name)}</title>"
 

@@ -12,11 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 from bench.analyses.estimator_accuracy import accuracies, truth_uncertainty
+from bench.base.drawing import whisk_url
 from bench.commands.cli import main
 from bench.report.page import words
+from bench.report.page.drawings import inside
 from bench.report.page.thumbnails import MOST_BYTES, MOST_INSIDE, picture_source
 from bench.report.page.write import BIBLIOGRAPHY, METHODS, REPORT, as_script
 from bench.report.run_folder import read_results
@@ -276,3 +279,11 @@ def test_what_is_no_code_is_package_data():
             if path.is_file() and path.suffix not in (".py", ".pyc"):
                 below = {path.name, f"{path.parent.name}/{path.name}"}
                 assert any(fnmatch(name, pattern) for name in below for pattern in patterns), path
+
+
+def test_a_whisk_of_a_drawing_that_the_run_has_not_is_named_without_a_link():
+    """Gauge trials are drawn where `--trials` leaves them out."""
+    figure = Figure()
+    figure.add_subplot().text(0.5, 0.5, "x", url=whisk_url("gauge a", 0))
+    drawing = str(inside(figure, "gauges", "residuals", []))
+    assert "<a><title>gauge a, whisk 0</title>" in drawing and "whisk:" not in drawing

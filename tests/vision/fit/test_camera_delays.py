@@ -15,8 +15,11 @@ from vision.geometry.camera import Cameras
 THREE = Cameras((*CAMERAS.cameras, camera("three", (-80, -250, 200))))
 
 
-def delays(rng, cameras, late=(), picture_of=None):
-    """Delays by a fit to pictures of which those of the cameras `late` show the frame before."""
+def delays(rng, cameras, late=(), picture_of=None, hidden=()):
+    """Delays by a fit to pictures of which those of the cameras `late` show the frame before.
+
+    Those of the cameras `hidden` show no wire.
+    """
     problem, true = scene(frames=9)
     problem = replace(problem, cameras=cameras)
     vector = np.zeros(problem.size)
@@ -27,6 +30,8 @@ def delays(rng, cameras, late=(), picture_of=None):
     seen = {(one.camera, one.frame): one for one in problem.seen if one.frame >= 0}
     shown = []
     for one in problem.seen:
+        if cameras.names[one.camera] in hidden:
+            continue
         if one.frame >= 1 and cameras.names[one.camera] in late:
             one = replace(one, points=seen[one.camera, one.frame - 1].points)
         shown.append(one)
@@ -50,6 +55,10 @@ def test_of_three_cameras_the_late_one_is_told(rng, late):
 def test_cameras_that_agree_have_no_delay(seed):
     for delay, sigma in delays(np.random.default_rng(seed), THREE).values():
         assert abs(delay) <= 4.0 * sigma
+
+
+def test_a_camera_that_shows_no_wire_has_no_delay(rng):
+    assert set(delays(rng, THREE, hidden=("three",))) == set(CAMERAS.names)
 
 
 def test_two_cameras_hardly_tell(rng):
