@@ -126,11 +126,13 @@ def _hidden_light(pieces: Pieces, bells: np.ndarray, blur_px: float) -> np.ndarr
 
 
 def fit_shading(pieces: Pieces, blur_px: float, terms: int, knots: Knots) -> tuple[Shading, float]:
-    """Fit the radiance of segments where they lie; also return chi² per pixel."""
+    """Fit the radiance of segments where they lie; also return chi² per pixel, infinite where no pixel shows them."""
     equations = SegmentEquations(pieces, blur_px, terms)
     all_alike = np.ones(len(pieces))
     left, right = equations.shared(knots.weights(pieces), all_alike)
     ridge = _RIDGE * np.mean(np.diag(left))
+    if ridge == 0.0:
+        return Shading(knots, np.zeros((len(knots), terms)), blur_px), np.inf
     factor = lu_factor(left + ridge * np.eye(len(left)), check_finite=False)
     found = lu_solve(factor, right, check_finite=False)
     explained = 2.0 * right @ found

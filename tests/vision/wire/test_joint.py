@@ -1,5 +1,8 @@
 """Positions, shading and blur solved together: what they are said to be uncertain by, against draws from the prior."""
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +10,7 @@ from vision.wire.bands import Pieces
 from vision.wire.cylinder import round_the_rod, shading_basis
 from vision.wire.joint import solve_jointly
 from vision.wire.shaded_segments import ShadedSegments
-from vision.wire.shading import Knots, stiffness, wave_prior
+from vision.wire.shading import Knots, fit_shading, stiffness, wave_prior
 from vision.wire.trace import WIRE_WAVES
 
 FRAMES, PLACES, TERMS, BLUR_PX, NOISE = 6, np.arange(5.0, 100.0, 10.0), 5, 0.9, 2.0
@@ -99,3 +102,13 @@ def test_a_frame_that_shows_two_places_is_said_to_be_wider_by_their_variance(rng
     assert noise < 0.02 and mean[0] - mean[1] == pytest.approx(
         0.6**2 / 4, abs=3 * noise + 0.1 * 0.6**2 / 4
     )
+
+
+def test_a_rod_that_no_pixel_shows_has_no_shading_and_no_warning(rng):
+    """All of it is hidden; a search takes no place where it is."""
+    pieces = drawn(rng)
+    hidden = replace(pieces, weight=np.zeros_like(pieces.weight))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        shading, chi2 = fit_shading(hidden, BLUR_PX, TERMS, KNOTS)
+    assert not shading.coefficients.any() and chi2 == np.inf
