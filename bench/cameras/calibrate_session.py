@@ -188,8 +188,8 @@ def calibrate_from(session: Session, views: SessionViews) -> Calibration:
     """
     missing = [name for name in views.boards if name not in views.rig]
     if missing and session.T_rig_board is not None:
-        found = f"has no picture {missing[0]}.png: record the board standing on the rig"
-        raise BadInput(found, file="boards/rig")
+        found = f"there is no picture of the board on the rig by camera {missing[0]}"
+        raise BadInput(found, file=f"boards/rig/{missing[0]}")
     board_pose = None
     T_world_board = board_in_world(session, views)
     if T_world_board is not None:

@@ -7,6 +7,7 @@ import numpy as np
 from bench.base.numbers import first_names
 from bench.plan.outlook import QUANTITIES, WORDS
 from bench.plan.plan_rows import Plan, Row
+from vision.geometry import counted
 
 _HEADINGS = {
     "d_x_mm": "d_x mm",
@@ -147,23 +148,24 @@ def _median_share(rows: Sequence[Row], number: int, name: str) -> float:
 
 
 def _stated_lines(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield how expected and stated sigmas compare, and which whisks were seen worse than expected."""
+    """Yield how planned and evaluated sigmas compare, and which whisks were seen worse than expected."""
     both = [row for row in rows if row.stated and row.outlook.has_truth]
     if not both:
         return
-    ratios = {}  # by quantity, expected over stated (rows,)
+    ratios = {}  # by quantity, planned over evaluated (rows,)
     medians = []
     for name in QUANTITIES:
         ratio = np.array([row.outlook.sigma[name] / row.stated[name] for row in both])
         ratios[name] = ratio
         medians.append(f"{_SYMBOLS[name]} {np.median(ratio):.2f}")
     yield ""
-    yield f"Expected over stated, median over {len(both)} whisks: {', '.join(medians)}."
+    count = counted(len(both), "whisk")
+    yield f"Sigmas as planned over those of the evaluated run, median of {count}: {', '.join(medians)}."
     for name, ratio in ratios.items():
         worse = [row.name for row, own in zip(both, ratio) if own < 1.0 / _WORSE]
         if not worse:
             continue
         yield (
-            f"{_SYMBOLS[name]} of {first_names(worse, _MOST_NAMED)} is stated wider than rods, cameras and lines ask for: look "
+            f"{_SYMBOLS[name]} of {first_names(worse, _MOST_NAMED)} is known less well than rods, cameras and lines allow: look "
             "at the frames (a slip in jumps, a lost frame)."
         )

@@ -143,15 +143,18 @@ def _check_trials(
 ) -> list[np.ndarray]:
     """Check every trial but the weights'; return the volts (2,) of the pushes of the gauge trials.
 
-    rig: pictures of the rig, by camera.
+    There are none where one of these cannot be read: which way it pushes is not known. rig: pictures of the rig, by
+    camera.
     """
     pushes_V: list[np.ndarray] = []
     trials = session.trials
+    unread = {trial.name for trial in trials if trial.purpose == "gauge"}
     for trial in count_parts(trials, "strokes, exposure and scene of trials", len(trials)):
         if trial.purpose == "weight":
             continue
         with problems.guard():
             signals = read_signals(trial)
+            unread.discard(trial.name)
             strokes = strokes_of(signals, trial, Settings()) if forward_strokes(signals) else []
             if trial.purpose == "gauge" and signals.kind == "V":
                 pushes_V += _pushes(strokes)
@@ -160,7 +163,7 @@ def _check_trials(
             _check_trial(trial, signals, strokes, rig, problems)
             if session.truth is not None:
                 _check_stage(session, trial, signals, problems)
-    return pushes_V
+    return [] if unread else pushes_V
 
 
 def _check_stage(session: Session, trial: Trial, signals: Signals, problems: InputProblems) -> None:
@@ -275,9 +278,9 @@ def _scene_warnings(trial: Trial, times: FrameTimes, rig: dict[str, np.ndarray])
         return
     chosen = spread(range(len(times)), _SCENE_FRAMES)
     for name, pictures in read_trial(trial, times, chosen).items():
-        fault = "none of its frames can be read"
-        if pictures:
-            fault = other_scene(name, pictures, rig)
+        if not pictures:  # `find_damage` names them
+            continue
+        fault = other_scene(name, pictures, rig)
         if fault:
             yield f"camera {name}: {fault}"
         else:

@@ -115,7 +115,7 @@ def test_a_recorded_whisk_beside_what_was_stated(tmp_path, steel_signals):
         ratios[3:] < 1.3
     )  # staged frames do not scatter, those expected do
     text = "\n".join(lines_of(Plan("t", (), (row,), 3.0)))
-    assert "Expected over stated, median over 1 whisks: d_x 1.0" in text
+    assert "those of the evaluated run, median of 1 whisk: d_x 1.0" in text
 
 
 def test_a_whisk_without_truth_keeps_its_reason(steel_signals, tmp_path):

@@ -9,7 +9,8 @@ import pytest
 
 from bench.base.input_problems import InputProblems
 from bench.session.frame_times import FrameTimes
-from bench.session.session_check import checked_session
+from bench.session.session import load_session
+from bench.session.session_check import checked_session, find_damage
 from bench.workflows.preflight import check, check_cameras, check_contents
 from tests.scenes.faults import FAULTS, TRIAL, change_picture
 
@@ -126,6 +127,24 @@ def test_gauge_trials_that_push_in_one_direction(small_copy):
     assert note.startswith(
         "trials: the gauge trials push in one direction, which does not fix both channels; record"
     )
+
+
+def test_a_gauge_trial_that_cannot_be_read_is_the_only_cause(small_copy):
+    """Which way it pushes is not known: the others need not push in one direction."""
+    signals = small_copy / "trials" / "gauge_roll90" / "signals.csv"
+    signals.write_text(signals.read_text().replace("y_V", "y_mV"))
+    problems = found(small_copy)
+    assert len(problems.refusals) == 1 and problems.warnings == []
+
+
+def test_pictures_of_a_camera_that_cannot_be_read_are_named_once(small_copy):
+    for picture in (small_copy / "trials" / TRIAL / "low").iterdir():
+        picture.write_bytes(b"")
+    problems = found(small_copy)
+    find_damage(load_session(small_copy), problems)
+    assert [str(line) for line in problems.warnings] == [
+        f"trials/{TRIAL}/low: no picture in low can be read (11 found)"
+    ]
 
 
 @pytest.mark.parametrize("boards", [True, False])  # without, as where cameras are brought along
