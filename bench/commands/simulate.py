@@ -53,4 +53,5 @@ def run(options: argparse.Namespace) -> int:
         workers=options.workers,
         announce=partial(print, flush=True),
     )
+    print(f"then run: whisker-bench check {options.session}")
     return DONE

@@ -178,19 +178,25 @@ def watch(
 def _recordings(trials: _CompleteTrials, wait: Callable[[], object]) -> Iterator[_Recording]:
     """Yield the session so far, complete trials alone, whenever it is to be evaluated (anew).
 
-    Ends where the waiting is interrupted. The user is informed once if every evaluation calibrates.
+    Ends where the waiting is interrupted. The user is informed whenever the waiting begins, and once if every
+    evaluation calibrates.
     """
     evaluated = _Recording()
     has_hinted = False
+    is_waiting = False
     while True:
         trials.update()
         ready = _Recording(trials.recording.shared, trials.complete)
         if not ready.trials or ready == evaluated or trials.are_changing(evaluated.trials):
+            if not is_waiting:
+                trials.announce(f"waiting for trials in {trials.path}; Ctrl-C ends")
+            is_waiting = True
             try:
                 wait()
             except KeyboardInterrupt:
                 return
             continue
+        is_waiting = False
         # the first evaluation calibrates in any case
         if evaluated.trials and not has_hinted and _calibrates_cameras(trials.path):
             trials.announce(_HINT)

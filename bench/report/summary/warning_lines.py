@@ -110,7 +110,7 @@ def _cause_line(warned: Sequence[_Warned], whose: str = "") -> Reason:
     worst = max(warned, key=lambda one: one.sigma_mm)
     if len(warned) == 1:
         return worst.status.about(f"{worst.whisk}{whose}")
-    return worst.status.about(f"{len(warned)} whisks{whose}; of the least known, {worst.whisk}")
+    return worst.status.about(f"{len(warned)} whisks{whose}; worst is {worst.whisk}")
 
 
 def damage_warnings(results: Iterable[TrialResult]) -> Iterator[Reason]:

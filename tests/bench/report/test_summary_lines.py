@@ -162,7 +162,7 @@ def test_a_limit_of_an_estimator_is_one_line_and_no_warning():
         felt = FeltWhisk(0, estimates=estimates)
         results.append(trial_result((whisk,), (felt,), name=f"b75_{number}"))
     (line,) = estimator_limits(results)
-    assert line == f"3 whisks, with_friction; of the least known, b75_1, whisk 0: {limit}"
+    assert line == f"3 whisks, with_friction; worst is b75_1, whisk 0: {limit}"
     (warning,) = whisk_warnings(results)
     assert warning.startswith("3 whisks, mine; ")
     assert cure_of(line.codes) != cure_of(warning.codes)

@@ -60,7 +60,8 @@ def test_each_trial_is_evaluated_when_it_is_complete(steel_signals, exact_vision
     shutil.copyfile(steel_signals / "session.toml", session / "session.toml")
     _, said = watched(session, out, copied_in(steel_signals, session, ["b60_4"]))
     assert names_in(said) == [names, ["b60_4", *names]]
-    assert "(10)" in said[-1]
+    waiting = f"waiting for trials in {session}; Ctrl-C ends"
+    assert "(10)" in said[-2] and said[0] == said[-1] == waiting
     assert sorted(exact_vision) == ["b60_4", *names]
     watched(session, out, iter([None]))
     assert len(exact_vision) == 3
@@ -138,7 +139,8 @@ def test_nothing_to_evaluate_is_waited_for_and_no_folder_is_refused(tmp_path):
     with pytest.raises(BadInput, match="no such folder"):
         watched(session, tmp_path / "out", nothing())
     session.mkdir()
-    assert watched(session, tmp_path / "out", nothing()) == (0, [])
+    waiting = f"waiting for trials in {session}; Ctrl-C ends"
+    assert watched(session, tmp_path / "out", nothing()) == (0, [waiting])
 
 
 def test_an_interruption_within_an_evaluation_goes_up(steel_signals, tmp_path, monkeypatch):
