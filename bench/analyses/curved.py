@@ -292,11 +292,14 @@ def slip_angles(felt: Sequence[FeltAt]) -> np.ndarray:
 
 
 def independent_angles(felt: Iterable[FeltAt]) -> list[FeltAt]:
-    """Return the pushing angles whose moments share no sample, from the first on."""
+    """Return the pushing angles whose moments share no sample, from the first on.
+
+    Without those of moments that show no noise: how well they are known is not known.
+    """
     chosen: list[FeltAt] = []
     for at in sorted(felt, key=lambda at: at.theta_rad):
         is_apart = not chosen or at.theta_rad - chosen[-1].theta_rad >= _APART_RAD
-        if at.theta_rad >= _FIRST_RAD and is_apart:
+        if at.theta_rad >= _FIRST_RAD and is_apart and phi_sigma(at) > 0.0:
             chosen.append(at)
     return chosen
 

@@ -305,7 +305,8 @@ def _between(values: np.ndarray, variances: np.ndarray) -> float:
     total = np.sum(weights)
     mean = weights @ values / total
     excess = weights @ (values - mean) ** 2 - (len(values) - 1)
-    return float(max(excess, 0.0) / (total - weights @ weights / total))
+    compared = total - weights @ weights / total  # 0 where one of them has all the weight
+    return float(max(excess, 0.0) / compared) if compared > 0.0 else 0.0
 
 
 def _root(total: Variance) -> tuple[float, float]:

@@ -75,6 +75,7 @@ VELOCITY = PlausibleRange(-1e4, 1e4, (("metres per second", 1e3),))
 MARKER = PlausibleRange(0, 1023)
 FORCE = PlausibleRange(0.0, 1e3)
 SIGMA = PlausibleRange(0.0, math.inf)
+ANGLE_SIGMA = PlausibleRange(0.0, 90.0)
 
 
 def looks_like_radians(angle_deg: float) -> bool:

@@ -161,7 +161,8 @@ def _value_checks(
             if key not in key_names(kind):
                 continue
             if is_sigma(key):
-                plausible_range = plausible.SIGMA
+                is_angle = key.endswith("_deg")
+                plausible_range = plausible.ANGLE_SIGMA if is_angle else plausible.SIGMA
             else:
                 plausible_range = plausible_ranges(kind).get(key, plausible.NUMBER)
             yield partial(_check_value, value, key, plausible_range, path[-1:], label)

@@ -33,6 +33,12 @@ _FEWEST_TO_NAME = 3
 MOST_SIGMAS = -float(ndtri(0.5 * LEAST_CHANCE))
 # [1] Of χ²: causes that explain less well by as much, two sigma, are named, too. Stated.
 _AS_GOOD = 4.0
+# [mm, °, %] Errors up to which touch and distance go in proportion to them, to a third. Stated.
+_LARGEST_MM = 20.0
+_LARGEST_DEG = 20.0
+_LARGEST_PERCENT = 50.0
+# Where none of these would do.
+_UNEXPLAINED = "neither place nor slope were to blame: look at the moments and their gauges"
 # Places in `Offsets.vector`.
 X, Y, Z, SLOPE = range(4)
 _TOUCH, _DISTANCE = range(2)
@@ -75,10 +81,14 @@ class HeldWhisk:
 
 @dataclass(frozen=True, eq=False)
 class Suspect:
-    """An error that would explain differences. text: with a place for its size. trace (n,): of a unit of it."""
+    """An error that would explain differences. text: with a place for its size. trace (n,): of a unit of it.
+
+    largest: beyond it differences are no longer in proportion, and nothing is explained.
+    """
 
     text: str
     trace: np.ndarray
+    largest: float
 
 
 class Comparison:
@@ -141,22 +151,22 @@ class Comparison:
     def suspects_of_all(self) -> list[Suspect]:
         """Return the errors that all whisks would share."""
         found = [
-            Suspect("the stage's origin {:+.2f} mm off along x", self.of_place(X)),
-            Suspect("the stage's origin {:+.2f} mm off along y", self.of_place(Y)),
-            Suspect("the stage's origin {:+.2f} mm off along z", self.of_place(Z)),
+            Suspect("the stage's origin {:+.2f} mm off along x", self.of_place(X), _LARGEST_MM),
+            Suspect("the stage's origin {:+.2f} mm off along y", self.of_place(Y), _LARGEST_MM),
+            Suspect("the stage's origin {:+.2f} mm off along z", self.of_place(Z), _LARGEST_MM),
         ]
         by_percent = -0.01 * (self._kind == _DISTANCE)
-        found.append(Suspect("the moments' scale {:+.1f} % off", by_percent))
+        found.append(Suspect("the moments' scale {:+.1f} % off", by_percent, _LARGEST_PERCENT))
         return found
 
     def suspects_of(self, number: int) -> list[Suspect]:
         """Return the errors of one whisk's own."""
         per_degree = math.radians(1.0) * self.of_place(SLOPE, number)
         return [
-            Suspect("its place {:+.2f} mm off along x", self.of_place(X, number)),
-            Suspect("its place {:+.2f} mm off along y", self.of_place(Y, number)),
-            Suspect("its place {:+.2f} mm off along z", self.of_place(Z, number)),
-            Suspect("its slope {:+.1f}° off", per_degree),
+            Suspect("its place {:+.2f} mm off along x", self.of_place(X, number), _LARGEST_MM),
+            Suspect("its place {:+.2f} mm off along y", self.of_place(Y, number), _LARGEST_MM),
+            Suspect("its place {:+.2f} mm off along z", self.of_place(Z, number), _LARGEST_MM),
+            Suspect("its slope {:+.1f}° off", per_degree, _LARGEST_DEG),
         ]
 
     def likeliest(self, suspects: Iterable[Suspect]) -> tuple[float, str]:
@@ -165,11 +175,13 @@ class Comparison:
         for suspect in suspects:
             size = self.size(suspect.trace)
             if size.is_known:
-                found.append((abs(size.value) / size.sigma, suspect.text.format(size.value)))
+                text = suspect.text.format(size.value)
+                is_small = abs(size.value) <= suspect.largest
+                found.append((abs(size.value) / size.sigma, text if is_small else ""))
         found.sort(reverse=True)
         most, _ = found[0] if found else (0.0, "")
-        texts = [text for sigmas, text in found if sigmas**2 > most**2 - _AS_GOOD]
-        return most, " or ".join(texts)
+        texts = [text for sigmas, text in found if text and sigmas**2 > most**2 - _AS_GOOD]
+        return most, " or ".join(texts) or _UNEXPLAINED
 
 
 def compare(results: Iterable[TrialResult], whisker: Whisker) -> Comparison:

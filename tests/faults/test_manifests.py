@@ -71,6 +71,11 @@ def test_no_manifest(session):
             r"length_sigma_mm is -1; 0 or more is allowed",
         ),
         (
+            "[whisker]",
+            "[trial]\nbeta_sigma_deg = 1e9\n[whisker]",
+            r"beta_sigma_deg is 1e\+09; from 0 to 90 is allowed",
+        ),
+        (
             "diameter_mm = 6.0",
             "diameter_mm = 0.006",
             r"\[bar\] diameter_mm is 0.006;.*metres.*write 6\b",

@@ -33,6 +33,8 @@ from vision.wire.points import LinePoints, Observed
 
 # [mm] Of a bar to either side of its point, on which its points may be. Stated.
 _REACH_MM = 200.0
+# [nodes] Fewer of a picture of it have no direction. Derived.
+_FEWEST_NODES = 2
 # [px] Least sigma of the object's line: files have their numbers to a hundredth. Stated.
 _LEAST_SIGMA_PX = 0.02
 # [px] Scale of the Cauchy weights of points about their plane: trackers scatter by less. Stated.
@@ -171,10 +173,16 @@ class _BesideAxis(Rows):
 
 
 def _beside_axis(points: Trace, camera: Camera, axis: BarAxis) -> _BesideAxis:
-    """Return how far tracked points are off the picture of an axis; those beyond its reach are left out."""
+    """Return how far tracked points are off the picture of an axis; those beyond its reach are left out.
+
+    Raises Refused where the axis is behind the camera.
+    """
     along_mm = np.arange(0.0, 2.0 * _REACH_MM + 1.0)
     curve_px = camera.project(axis.points_at(along_mm - _REACH_MM))
     is_before = np.all(np.isfinite(curve_px), axis=1)
+    if np.sum(is_before) < _FEWEST_NODES:
+        found = "points of all cameras together have the object behind it"
+        raise _elsewhere(camera, f"{found}; are they of this trial and camera?")
     beside = beside_curve(points, curve_px[is_before], along_mm[is_before])
     return _BesideAxis(beside.place_mm - _REACH_MM, beside.offset_px, beside.line, beside.sigma_px)
 

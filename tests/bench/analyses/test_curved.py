@@ -57,6 +57,11 @@ def test_lateral_curvature_is_that_of_the_circle(r_n, beta_deg):
         assert found.lateral_printed_per_mm < 0.9 * found.lateral_per_mm.value
 
 
+def test_moments_without_noise_do_not_tell_how_phi_turns():
+    """Of channels that are rounded so far that the free stroke shows one value."""
+    assert not turn(felt_on_circle(2.0, np.radians(30.0), sigma=0.0)).is_known
+
+
 def test_the_sigma_of_the_rate_is_its_scatter(rng):
     """200 draws tell a standard deviation to 5 %; three of these."""
     sigma, exact = 0.01, felt_on_circle(4.0, np.radians(40.0), 0.01)

@@ -142,5 +142,8 @@ def test_settings_that_differ_have_a_variance_of_their_own(rng):
     assert np.sqrt(found[0, 3]) == pytest.approx(2.0, rel=0.4) and found[0, 4] == 0.0
     alike = between_settings(np.zeros(120), np.eye(120), design, settings)
     assert not alike.any()
+    known_alone = np.diag([1e-40, 1e40])
+    lone = between_settings(np.array([1.0, 2.0]), known_alone, np.ones((2, 1)), ["a", "b"])
+    assert not lone.any()  # a setting of which nothing is known does not differ
     one = between_settings(noise, np.eye(120), np.ones((120, 1)), ["a"] * 120)
     assert not one.any()

@@ -122,6 +122,14 @@ def test_a_scale_of_the_moments_that_is_off_is_a_cause_of_its_own():
     assert all("the moments' scale +3.0 % off" in said for said in found.values())
 
 
+def test_moments_that_no_place_explains_are_named_as_such():
+    """Of a whisk whose moments are a third of what they are no place within the whisker has the touch."""
+    found = results()
+    found[1] = results(scale=0.33)[1]
+    said = named(found)
+    assert list(said) == ["t1"] and "look at the moments" in said["t1"]
+
+
 def test_of_two_whisks_none_is_the_better_one():
     assert set(named(results([(3.0, 0.0, 0.0)], WHISKS[:2]))) == {"t0", "t1"}
 

@@ -32,6 +32,12 @@ def see(example, place, traces=None):
     return whisk
 
 
+def with_u_and_v_exchanged(example):
+    points = dict(tracked(example).points)
+    points["high"] = replace(points["high"], px=points["high"].px[:, ::-1])
+    return TrackedObject(points)
+
+
 def placed(example, aside_mm=0.0):
     axis = true_axis(example.truth)
     aside = replace(axis, point_mm=axis.point_mm + np.array([0.0, aside_mm, 0.0]))
@@ -87,6 +93,7 @@ def test_traces_of_another_thing_are_named(example, cameras, change, said):
             "object_from_one_side",
             "two cameras or more",
         ),
+        (with_u_and_v_exchanged, "object_points_elsewhere", "have the object behind it"),
         (lambda e: placed(e, aside_mm=3.0), "object_points_elsewhere", "are both of one trial?"),
     ],
 )
