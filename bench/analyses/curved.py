@@ -49,15 +49,18 @@ CURVATURE = Table(
         status("what is missing"),
     ),
 )
-# By chance one session of straight bars in a hundred says of any bar that it is curved to the side. Stated.
+# [1] Of sessions of straight bars that by chance say of a bar that it is curved to the side. Stated.
 _FALSE_ALARM = 0.01
 _UNMEASURED = Measurement(np.nan, np.nan)
-# Nearer to touch the window of a moment is shorter, and (10) mostly noise.
+# [rad] Least pushing angle: nearer to touch the window of a moment is shorter, and (10) mostly noise. Stated.
 _FIRST_RAD = np.radians(0.95)
-_APART_RAD = np.radians(0.95)  # windows of half a degree to either side share no sample
-_FEWEST = 6  # angles, for four numbers
-_HELD_SIGMAS = 2.0  # a slip angle within so many of its own is none: 95 % of whisks that are held
-# Of φ at touch: where it turns by more, terms to θ² are too few. Of nine pushes against a ball of 40 mm those within
+# [rad] Between pushing angles: windows of half a degree to either side share no sample. Derived.
+_APART_RAD = np.radians(0.95)
+# [angles] Two more than a fit has numbers. Derived.
+_FEWEST = 6
+# [sigma] Of a slip angle, within which it is none: so are 95 % of whisks that are held. Derived.
+_HELD_SIGMAS = 2.0
+# [1] Of φ at touch: where it turns by more, terms to θ² are too few. Of nine pushes against a ball of 40 mm those within
 # 0.65 are off by 1.8 sigma at most, from 0.75 on by 2 to 7 (tests/bench/analyses/test_curved.py).
 _MOST_TURN = 0.6
 

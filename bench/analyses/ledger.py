@@ -26,7 +26,8 @@ from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_touch
 from vision import NAN, UNKNOWN
 
-MATTERS = 0.1  # of a sigma: the user's own bound
+# [sigma] A refinement that moves a result by less is of no account. Stated.
+MATTERS = 0.1
 NEEDED = "needed"
 MAY_GO = "may be left out, kept"
 NOT_KNOWN = "not known"

@@ -27,11 +27,14 @@ from estimator.friction_ways import alpha_from_tilts, confidence
 from vision import UNKNOWN, Value
 
 _ALPHA_EST_SIGMA_RAD = np.radians(ALPHA_EST_SIGMA_DEG)
-_FEWEST = 3  # whisks, or recordings: the least that scatter about a mean and a slope
-_STEP_RAD = 1e-4  # of a derivative by differences: its error goes with the square
-# rad: the best of these is then refined
+# [whisks, recordings] One more than a mean and a slope take. Derived.
+_FEWEST = 3
+# [rad] Step of a derivative by differences: its error goes with the square. Derived.
+_STEP_RAD = 1e-4
+# [rad] Friction angles that are tried; the best is then refined. Stated.
 _GRID_RAD = np.radians(np.arange(0.0, 45.0, 0.5))
-_LEAST_SPREAD = 0.05  # of |tan φ|: contacts with one slip angle agree under any α
+# [1] Least spread of |tan φ|: contacts with one slip angle agree under any α. Stated.
+_LEAST_SPREAD = 0.05
 
 
 @dataclass(frozen=True)

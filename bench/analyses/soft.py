@@ -68,8 +68,10 @@ COMPLIANCE_SEEN = Table(
         ),
     ),
 )
-_LEAST_SHIFT_MM = 2.0  # nominal distances that differ by less are one distance set up again
-_HELD_SIGMAS = 3.0  # of φ felt: beyond, the contact slips sideways
+# [mm] Nominal distances that differ by less are one distance set up again. Stated.
+_LEAST_SHIFT_MM = 2.0
+# [sigma] Of φ felt: beyond, the contact slips sideways. Stated.
+_HELD_SIGMAS = 3.0
 NOT_SOFT = reason("not_soft")
 NO_PUSH = reason("compliances_contradict")
 

@@ -19,8 +19,8 @@ from estimator.uncertainty import Z_95
 from vision import UNKNOWN, Value
 from vision.geometry import counted
 
-# From so many recordings that slip on, the fit's own sigma is that of its residuals, the whisks of a recording counting
-# together: what is wrong with its slope is wrong in all of them. With fewer it is that of moments and slopes as stated.
+# [recordings] From so many that slip on, the fit's own sigma is that of its residuals, the whisks of a recording counting
+# together: what is wrong with its slope is wrong in all of them. With fewer it is that of moments and slopes. Stated.
 _MANY = 3
 
 

@@ -29,11 +29,13 @@ from estimator.uncertainty import Z_95
 from vision import UNKNOWN, Value
 from vision.geometry import Reason, joined
 
-_FEWEST = 4  # angles, for three numbers and what is left
-# Of a scatter as large by noise; and of a session in which any whisk is said to turn though no object leans by more
-# than sigma holds. Stated.
+# [angles] One more than a fit has numbers. Derived.
+_FEWEST = 4
+# [1] Probability of a scatter as large by noise; and of a session in which any whisk is said to turn though no object
+# leans by more than sigma holds. Stated.
 _CHANCE = 1e-3
-_MATTERS = 0.5  # of an estimate's own sigma: less adds no more than an eighth to its error
+# [sigma] Of an estimate: less adds no more than an eighth to its error. Derived.
+_MATTERS = 0.5
 
 
 def turn(felt: Sequence[FeltAt]) -> Value:

@@ -24,10 +24,10 @@ class ContactPoint:
     """A contact at first touch: a point of the whisker's centreline in the rig frame.
 
     point_mm (3,), covariance_mm2 (3, 3). normal (3,): of the surface, towards the whisker, as felt;
-    NaN where the estimator gives no slope. normal_sigma_rad: of it, in the plane across the whisker.
-    base_mm (3,), wire: of the whisker. by_alpha_mm: move of the point along the whisker by one sigma
-    of the assumed friction angle, which is one for all. has_touch: the angle of touch is sound,
-    whatever the status says of the distance.
+    NaN where the estimator gives no slope. normal_sigma_rad: of its turn in the plane across the
+    whisker. base_mm (3,), wire: of the whisker. by_alpha_mm: how far one sigma of the assumed friction
+    angle, which all contacts share, moves the point along the whisker. has_touch: whether the angle of
+    touch is sound, whatever the status says of the distance.
     Against the object, NaN where that is not known: distance_mm from its surface to the whisker's,
     positive outside; along_mm along the whisker, from the place where it comes nearest to the
     object; normal_off_rad between the normal and the object's own there. source: of the object.
@@ -158,10 +158,10 @@ def _covariance_mm2(touch_rad: Value, estimate: EstimateRow) -> np.ndarray:
 def _by_alpha_mm(estimate: EstimateRow) -> float:
     """Return the change of the distance by one sigma of the assumed friction angle: a larger angle
     brings it nearer."""
-    without_alpha = estimate.d_x_est_sigma_alpha_exact_mm
-    if not math.isfinite(without_alpha):
+    sigma_alpha_exact_mm = estimate.d_x_est_sigma_alpha_exact_mm
+    if not math.isfinite(sigma_alpha_exact_mm):
         return 0.0
-    return -math.sqrt(max(estimate.d_x_est_mm.sigma**2 - without_alpha**2, 0.0))
+    return -math.sqrt(max(estimate.d_x_est_mm.sigma**2 - sigma_alpha_exact_mm**2, 0.0))
 
 
 def _normal(touch_rad: float, beta_rad: float) -> np.ndarray:

@@ -109,7 +109,11 @@ def _section(one: ContactPoint) -> tuple[str, int]:
 
 
 def _lines(mine: Sequence[ContactPoint]) -> TouchingLines:
-    """Return whiskers at first touch. Where along one the contact is is not known, nor its radius there."""
+    """Return the lines of whiskers at first touch.
+
+    Touch alone does not say where along a whisker the contact is, nor so the radius there: it is anything
+    between those of base and tip.
+    """
     direction = column(mine, "direction")
     arc_mm = column(mine, "arc_mm")
     normal = np.stack([-direction[:, 1], direction[:, 0]], axis=-1)

@@ -17,8 +17,10 @@ from bench.base.results import DRAWING, hash_of, hash_of_code
 from bench.records.plain import to_plain
 
 _VIEWS = ((0, 2, "x (mm)", "z (mm)"), (0, 1, "x (mm)", "y (mm)"))
-_MARGIN_MM = 15.0  # mm of a bar that are drawn beyond the contacts
-_MOST_ENTRIES = 14  # of a column of the legend that is as high as the figure
+# [mm] Of a bar, drawn beyond the contacts. A layout.
+_MARGIN_MM = 15.0
+# [entries] Of a column of the legend that is as high as the figure. A layout.
+_MOST_ENTRIES = 14
 _MARKERS = "os^D"
 
 Colour = tuple[float, ...]  # red, green, blue, perhaps opacity
@@ -54,13 +56,13 @@ def draw(trial: str, cloud: Sequence[ContactPoint], surface: ObjectSurface | Non
 
     Felt contacts have their one-sigma ellipses, seen contacts are crosses.
     """
-    looks = _looks(dict.fromkeys(contact.whisker for contact in cloud))
-    columns = -(-len(looks) // _MOST_ENTRIES)  # of the legend
+    styles = _point_styles(dict.fromkeys(contact.whisker for contact in cloud))
+    columns = -(-len(styles) // _MOST_ENTRIES)  # of the legend
     figure = blank(6.4 + 0.9 * columns, 3.8)
     for axes, view in zip(figure.subplots(1, 2), _VIEWS):
-        _draw_view(axes, view, cloud, surface, looks)
-    for name, look in looks.items():
-        axes.plot([], [], look.marker, color=look.colour, ms=4, label=name)
+        _draw_view(axes, view, cloud, surface, styles)
+    for name, point_style in styles.items():
+        axes.plot([], [], point_style.marker, color=point_style.colour, ms=4, label=name)
     figure.legend(
         *axes.get_legend_handles_labels(),
         loc="outside right center",
@@ -73,28 +75,28 @@ def draw(trial: str, cloud: Sequence[ContactPoint], surface: ObjectSurface | Non
 
 
 @dataclass(frozen=True)
-class _Look:
+class _PointStyle:
     """How the contacts of a whisker are drawn."""
 
     colour: Colour
     marker: str
 
 
-def _looks(whiskers: Collection[str]) -> dict[str, _Look]:
+def _point_styles(whiskers: Collection[str]) -> dict[str, _PointStyle]:
     """Return colour and marker of each whisker: neighbours in colour differ in their markers."""
     palette = colormaps["tab10"].colors
     if len(whiskers) > len(palette):
         palette = colormaps["turbo"](np.linspace(0.04, 0.96, len(whiskers)))
-    looks = {}
+    styles = {}
     for number, name in enumerate(whiskers):
-        looks[name] = _Look(tuple(palette[number]), _MARKERS[number % len(_MARKERS)])
-    return looks
+        styles[name] = _PointStyle(tuple(palette[number]), _MARKERS[number % len(_MARKERS)])
+    return styles
 
 
-def _draw_view(axes, view, cloud: Sequence[ContactPoint], surface, looks) -> None:
+def _draw_view(axes, view, cloud: Sequence[ContactPoint], surface, styles) -> None:
     """Draw object and contacts in the view along two of the rig's axes.
 
-    view: numbers of these axes, then their names. looks: by whisker.
+    view: numbers of these axes, then their names. styles: by whisker.
     """
     x, y, x_name, y_name = view
     points = np.array([contact.point_mm for contact in cloud])
@@ -105,24 +107,30 @@ def _draw_view(axes, view, cloud: Sequence[ContactPoint], surface, looks) -> Non
         low = np.minimum(low, object_low)
         high = np.maximum(high, object_high)
     for contact in cloud:
-        _draw_contact(axes, contact, x, y, looks[contact.whisker])
+        _draw_contact(axes, contact, x, y, styles[contact.whisker])
     axes.set(xlabel=x_name, ylabel=y_name, aspect="equal")
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
-def _draw_contact(axes, contact: ContactPoint, x: int, y: int, look: _Look) -> None:
+def _draw_contact(axes, contact: ContactPoint, x: int, y: int, point_style: _PointStyle) -> None:
     """Draw a contact in the view along two of the rig's axes."""
     place = contact.point_mm[[x, y]]
     if contact.estimator == SEEN:
-        axes.plot(*place, "x", color=look.colour, ms=5)
+        axes.plot(*place, "x", color=point_style.colour, ms=5)
         return
     variances, vectors = np.linalg.eigh(contact.covariance_mm2[np.ix_([x, y], [x, y])])
     width, height = 2.0 * np.sqrt(np.clip(variances, 0.0, None))
     angle = float(np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0])))
     axes.add_patch(
-        Ellipse(place, width, height, angle=angle, facecolor="none", edgecolor=look.colour)
+        Ellipse(place, width, height, angle=angle, facecolor="none", edgecolor=point_style.colour)
     )
-    axes.plot(*place, look.marker, color=look.colour, ms=3, alpha=0.5 if contact.status else 1.0)
+    axes.plot(
+        *place,
+        point_style.marker,
+        color=point_style.colour,
+        ms=3,
+        alpha=0.5 if contact.status else 1.0,
+    )
 
 
 def _draw_object(

@@ -46,10 +46,12 @@ SIZE = Table(
         status("why there is none, or its warnings"),
     ),
 )
-_STEP = 1e-3  # mm, rad: of differences
-# that contacts on such a surface lie as far off it: one sound object in a thousand
+# [mm, rad] Step of differences: their error goes with its square. Derived.
+_STEP = 1e-3
+# [1] Least probability that contacts on such a surface lie as far off it: one sound object in a thousand. Stated.
 _LEAST_CHANCE = 1e-3
-_MOST_CONDITION = 1e12  # of the information: beyond it some direction is not determined
+# [1] Condition of the information, beyond which some direction is not determined: rounding. Derived.
+_MOST_CONDITION = 1e12
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,10 @@ def _as_size(unknown: FeltSize, fit: "_SizeFit", freedom: int) -> FeltSize:
 
 
 def one_a_whisker(contacts: Sequence[ContactPoint]) -> list[ContactPoint]:
-    """Return the mean contact of each whisker, known as well as one of them; ones with a warning where it has no others."""
+    """Return the mean contact of each whisker, with the mean covariance of one contact.
+
+    Contacts with a warning count where a whisker has no others.
+    """
     found = []
     for of_whisker in grouped(contacts, lambda contact: contact.whisker).values():
         sound = [contact for contact in of_whisker if not contact.status] or of_whisker

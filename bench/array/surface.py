@@ -12,13 +12,15 @@ from vision import axis_from_angles
 from vision.geometry import Wire
 
 STATED, SEEN = "manifest", "pictures"
-_ARC_MM = 1e-6  # mm: to which the nearest arc is found
-_ARCS = 21  # of each pass of that search
+# [mm] To which the nearest arc is found: rounding of what is measured in hundredths. Derived.
+_ARC_MM = 1e-6
+# [arcs] Of each pass of that search. A layout.
+_ARCS = 21
 
 
 @dataclass(frozen=True, eq=False)
 class ObjectSurface:
-    """All points at one distance (radius_mm) from a centreline, in the rig frame.
+    """The surface of an object in the rig frame: all points at radius_mm from its centreline.
 
     shape: the centreline is straight ("bar"), a circle ("ring") or a point ("sphere"); or a cone
     ("cone"), whose radius_mm is 0. point_mm (3,): of the straight line, the centre, or the cone's

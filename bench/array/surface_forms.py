@@ -12,8 +12,10 @@ import numpy as np
 if TYPE_CHECKING:
     from bench.array.surface import ObjectSurface
 
-_POINTS = 400  # of a centreline that is drawn
-_DRAWN_CONE_MM = 30.0  # least length of a cone that is drawn
+# [points] Of a centreline that is drawn. A layout.
+_POINTS = 400
+# [mm] Least length of a cone that is drawn. A layout.
+_DRAWN_CONE_MM = 30.0
 
 
 class SurfaceForm(ABC):
