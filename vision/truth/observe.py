@@ -8,7 +8,7 @@ Nothing here knows of a gauge.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -82,33 +82,20 @@ def observe_trial(
         fits = ()
     try:
         axis = BarAxis(fits[0].point_mm, fits[0].direction) if fits else None
-        scene = _whisks_of(pictures, whisks, cameras, rods, settings, axis)
+        scene = _prepare_scene(pictures, whisks, cameras, rods, settings, axis)
     except Refused as reason:
         return nothing_seen(whisks, reason.reason)
-    rows = []
-    kept = []
-    found = scene.found
-    earlier = None
-    again = {fit.number: partial(fit_again, fit) for fit in fits}
-    for whisk in scene.whisks:
-        explain_by = again.get(whisk.number, explain)
-        truth_of = _first_truth if earlier is None else fitted_truth
-        row, explained = see_whisk(replace(whisk, bar=found, earlier=earlier), explain_by, truth_of)
-        rows.append(row)
-        if explained is not None:
-            found = explained.whisk.bar
-            earlier = explained.as_earlier
-            kept.append(explained.kept)
-    axis = found.axis.as_bar()
+    seen = _see_in_turn(scene, fits)
+    axis = seen.found.axis.as_bar()
     light = [whisk.light for whisk in scene.whisks]
-    bars = measure_relative_widths(with_lines(scene.search, found))
+    bars = measure_relative_widths(with_lines(scene.search, seen.found))
     return TrialTruth(
         axis.point_mm,
         axis.direction,
-        tuple(rows),
+        tuple(seen.rows),
         one_sided_widths(light),
         as_values(bars),
-        tuple(filter(None, kept)),
+        tuple(filter(None, seen.kept)),
     )
 
 
@@ -124,7 +111,7 @@ def wire_lines(
     It is straight, as the motor has it, in whisks in which it is not seen. Arguments and errors as
     of `observe_trial`.
     """
-    scene = _whisks_of(pictures, whisks, cameras, rods, settings)
+    scene = _prepare_scene(pictures, whisks, cameras, rods, settings)
     curves: dict[int, Curves] = {}
     for whisk in scene.whisks:
         curves |= _coarse_curves(whisk.without_gaps())
@@ -153,7 +140,37 @@ class _TrialScene:
     search: SearchScene
 
 
-def _whisks_of(
+@dataclass
+class _WhisksInTurn:
+    """The truths of a trial's whisks so far, fits that are kept, and the object as the last fit has it."""
+
+    found: SeenBar
+    rows: list[WhiskTruth] = field(default_factory=list)
+    kept: list[KeptFit | None] = field(default_factory=list)
+
+
+def _see_in_turn(scene: _TrialScene, fits: Sequence[KeptFit]) -> _WhisksInTurn:
+    """Measure one whisk after another, each from where the one before has the object.
+
+    fits: of whisks that are not traced, but fitted again.
+    """
+    again = {fit.number: partial(fit_again, fit) for fit in fits}
+    seen = _WhisksInTurn(scene.found)
+    earlier = None
+    for whisk in scene.whisks:
+        whisk = replace(whisk, bar=seen.found, earlier=earlier)
+        explain_by = again.get(whisk.number, explain)
+        truth_of = _first_truth if earlier is None else fitted_truth
+        row, explained = see_whisk(whisk, explain_by, truth_of)
+        seen.rows.append(row)
+        if explained is not None:
+            seen.found = explained.whisk.bar
+            seen.kept.append(explained.kept)
+            earlier = explained.as_earlier
+    return seen
+
+
+def _prepare_scene(
     pictures: TrialPictures,
     whisks: Sequence[slice],
     cameras: Cameras,
@@ -170,7 +187,7 @@ def _whisks_of(
     time_s = np.asarray(pictures.time_s, dtype=float)
     motor_rad = np.asarray(pictures.motor_rad, dtype=float)
     views, used, left_out = views_facing(pictures, cameras, rods.wire, motor_rad)
-    strokes = [range(*where.indices(len(time_s)))[:: settings.every_frame] for where in whisks]
+    strokes = strokes_of(whisks, len(time_s), settings.every_frame)
     velocity, standing = _stated_motion(pictures, strokes, views, rods)
     search = SearchScene(standing, used, rods, motor_rad, settings)
     found = find_object(search) if axis is None else SeenBar(axis, {})
@@ -194,6 +211,11 @@ def _whisks_of(
         )
         seen.append(whisk)
     return _TrialScene(seen, found, search)
+
+
+def strokes_of(whisks: Sequence[slice], count: int, every_frame: int) -> list[range]:
+    """Return the frames of each whisk that are evaluated, of so many frames of the trial."""
+    return [range(*whisk.indices(count))[::every_frame] for whisk in whisks]
 
 
 def views_facing(

@@ -28,7 +28,7 @@ from vision.truth.coarse_traces import find_traced_rest, follow_traced_bends
 from vision.truth.explanations import Explanation
 from vision.truth.given_traces import TracesAlone
 from vision.truth.object_places import ObjectPlace, PlacedObject, TrackedObject
-from vision.truth.observe import cameras_facing, fitted_truth, nothing_seen, see_whisk
+from vision.truth.observe import cameras_facing, fitted_truth, nothing_seen, see_whisk, strokes_of
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.sight import blank_view
 from vision.truth.strategies import Touch, TouchByClearance, TouchByOnset, early
@@ -93,7 +93,7 @@ class TrialTraces:
         is its status.
         """
         try:
-            seen = list(_whisks_of(self, whisks, cameras, rods, settings))
+            seen = list(_prepare_whisks(self, whisks, cameras, rods, settings))
         except Refused as reason:
             return nothing_seen(whisks, reason.reason)
         rows: list[WhiskTruth] = []
@@ -104,7 +104,7 @@ class TrialTraces:
         return TrialTruth(axis.point_mm, axis.direction, tuple(rows))
 
 
-def _whisks_of(
+def _prepare_whisks(
     recording: TrialTraces,
     whisks: Sequence[slice],
     cameras: Cameras,
@@ -124,8 +124,8 @@ def _whisks_of(
     views = tuple(blank_view(camera, frames[camera.name].tolist()) for camera in used)
     axis = recording.place.axis(used, rods)
     make_lines = partial(TracesAlone, traces=recording.traces, place=recording.place)
-    for number, where in enumerate(whisks):
-        stroke = range(*where.indices(len(recording.time_s)))[:: settings.every_frame]
+    strokes = strokes_of(whisks, len(recording.time_s), settings.every_frame)
+    for number, stroke in enumerate(strokes):
         yield WhiskPictures(
             number=number,
             indices=stroke,
