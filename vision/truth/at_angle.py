@@ -9,6 +9,7 @@ both, over the frames nearby, carries slip's sigma to them.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.special import chdtri, stdtrit
@@ -89,117 +90,192 @@ def at_angle(smooth: Smooth | None, theta_rad: float, without: Reason) -> TruthA
     if theta_rad > largest_rad + _BEYOND_RAD or theta_rad <= 0:
         sentence = f"pushed to {np.degrees(largest_rad):.2f} deg only"
         return TruthAtAngle(theta_rad=theta_rad, status=Reason("pushed_short", sentence))
-    if _slip_jumps(smooth, theta_rad):
-        return _in_jump(smooth, theta_rad)
-    values = {}
-    for name, field in FIELDS.items():
-        values[field] = _smooth_value(smooth, name, theta_rad)
-    shared_mm = _shared_slip_mm(smooth, theta_rad, values["slip_mm"])
-    return TruthAtAngle(theta_rad=theta_rad, slip_shared_mm=shared_mm, **values)
+    near = NearAngle(smooth, theta_rad)
+    return near.in_jump() if near.slip_jumps else near.between_jumps()
 
 
-def _in_jump(smooth: Smooth, theta_rad: float) -> TruthAtAngle:
-    """Return the quantities at a pushing angle near which slip jumps, with the status that says so."""
-    frames = _frames_around(smooth, theta_rad)
-    values = {}
-    for name, field in FIELDS.items():
-        values[field] = _value_in_jump(smooth, name, theta_rad, frames)
-    first, last = np.degrees(smooth.theta_rad[frames][[0, -1]])
-    sentence = f"slips in jumps: seen at {first:.2f} and {last:.2f} deg"
-    return TruthAtAngle(
-        theta_rad=theta_rad,
-        slip_shared_mm=_shared_slip_mm(smooth, theta_rad, values["slip_mm"]),
-        **values,
-        status=Reason("slips_in_jumps", sentence),
-    )
+@dataclass(frozen=True, eq=False)
+class NearAngle:
+    """A whisk's touching frames, for what is at one pushing angle: a local fit over the frames nearby."""
+
+    smooth: Smooth
+    theta_rad: float
+
+    def between_jumps(self) -> TruthAtAngle:
+        """Return the quantities by the local fit."""
+        values = {}
+        for name, field in FIELDS.items():
+            values[field] = self._smooth_value(name)
+        shared_mm = self._shared_slip_mm(values["slip_mm"])
+        return TruthAtAngle(theta_rad=self.theta_rad, slip_shared_mm=shared_mm, **values)
+
+    def in_jump(self) -> TruthAtAngle:
+        """Return the quantities where slip jumps nearby, with the status that says so."""
+        frames = self._frames_around
+        values = {}
+        for name, field in FIELDS.items():
+            values[field] = self._value_in_jump(name, frames)
+        first, last = np.degrees(self.smooth.theta_rad[frames][[0, -1]])
+        sentence = f"slips in jumps: seen at {first:.2f} and {last:.2f} deg"
+        return TruthAtAngle(
+            theta_rad=self.theta_rad,
+            slip_shared_mm=self._shared_slip_mm(values["slip_mm"]),
+            **values,
+            status=Reason("slips_in_jumps", sentence),
+        )
+
+    @property
+    def slip_jumps(self) -> bool:
+        """Return whether the slip in a frame nearby is away from its local fit, by more than frames scatter."""
+        smooth = self.smooth
+        slip_mm = smooth.values["slip"]
+        by_parameter = smooth.jacobians["slip"]
+        for frame in np.flatnonzero(np.abs(self._beyond_rad) <= _WINDOW_RAD):
+            weights, _ = _local_fit(smooth.theta_rad, smooth.theta_rad[frame])
+            weights[frame] -= 1.0
+            sigma_mm = propagated_sigma(weights @ by_parameter, smooth.covariance)
+            if abs(weights @ slip_mm) > max(_JUMP_MM, _JUMP_SIGMAS * sigma_mm):
+                return True
+        return False
+
+    @property
+    def _beyond_rad(self) -> np.ndarray:
+        """Return how far (f,) the frames are pushed beyond the angle, rad."""
+        return self.smooth.theta_rad - self.theta_rad
+
+    @cached_property
+    def _fit(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the local fit's weights (f,), for a value and for its slope."""
+        return _local_fit(self.smooth.theta_rad, self.theta_rad)
+
+    def _by_parameter(self, name: str) -> np.ndarray:
+        """Return the derivatives (p,) of a quantity by the local fit.
+
+        The error of touch moves all pushing angles together.
+        """
+        weights, slope_weights = self._fit
+        slope = slope_weights @ self.smooth.values[name]
+        return weights @ self.smooth.jacobians[name] + slope * self.smooth.touch_jacobian
+
+    def _shared_slip_mm(self, slip_mm: Value) -> float:
+        """Return the part of slip's sigma that all whisks of a session share, at most the whole."""
+        shared_mm = propagated_sigma(self._by_parameter("slip"), self.smooth.shared_covariance)
+        return float(min(shared_mm, slip_mm.sigma))
+
+    def _smooth_value(self, name: str) -> Value:
+        """Return a smooth quantity by the local fit.
+
+        Its sigma is not below that of the best frame nearby; the fit's residuals are added to it.
+        """
+        smooth = self.smooth
+        near = _near(self._beyond_rad)
+        least = np.min(propagated_sigma(smooth.jacobians[name][near], smooth.covariance))
+        sigma = max(propagated_sigma(self._by_parameter(name), smooth.covariance), least)
+        weights, _ = self._fit
+        value = float(weights @ smooth.values[name])
+        return Value(value, float(np.hypot(sigma, self.between_frames_sigma(name))))
+
+    @property
+    def _frames_around(self) -> np.ndarray:
+        """Return the frames (k,) from the last that is surely before the angle to the first that is surely
+        past it.
+
+        The uncertainty is that of touch, which moves them all. At the ends of the record they are the
+        two nearest at least.
+        """
+        smooth = self.smooth
+        order = np.argsort(smooth.theta_rad)
+        rising = smooth.theta_rad[order]
+        margin_rad = _SURE_SIGMAS * propagated_sigma(smooth.touch_jacobian, smooth.covariance)
+        first = np.searchsorted(rising, self.theta_rad - margin_rad) - 1
+        last = np.searchsorted(rising, self.theta_rad + margin_rad)
+        return order[max(min(first, len(order) - 2), 0) : max(last, 1) + 1]
+
+    def _value_in_jump(self, name: str, frames: np.ndarray) -> Value:
+        """Return a quantity where slip is anywhere between these frames (k,), by its linear dependence
+        on angle and slip nearby.
+        """
+        smooth = self.smooth
+        coefficients, residual_variance = self._linear_in_slip(name)
+        _, by_angle, by_slip = coefficients
+        rows = smooth.jacobians[name][frames] + by_angle * smooth.touch_jacobian
+        sigma = np.max(propagated_sigma(rows, smooth.covariance))
+        slip_mm = smooth.values["slip"][frames]
+        half_mm = 0.5 * float(np.ptp(slip_mm))
+        value = coefficients @ [1.0, 0.0, np.min(slip_mm) + half_mm]
+        variance = (by_slip * half_mm) ** 2 + residual_variance + sigma**2
+        return Value(float(value), float(np.sqrt(variance)))
+
+    def _linear_in_slip(self, name: str) -> tuple[np.ndarray, float]:
+        """Fit a quantity nearby by a constant, the angle beyond the wanted one and the slip.
+
+        Returned are the coefficients (3,) and the variance of the residuals.
+        """
+        angle_rad = self._beyond_rad
+        near = _near(angle_rad)
+        columns = [np.ones(len(angle_rad)), angle_rad, self.smooth.values["slip"]]
+        design = np.column_stack(columns)[near]
+        values = self.smooth.values[name][near]
+        coefficients, *_ = np.linalg.lstsq(design, values)
+        freedom = max(len(design) - design.shape[1], 1)
+        return coefficients, np.sum((values - design @ coefficients) ** 2) / freedom
+
+    def between_frames_sigma(self, name: str) -> float:
+        """Return by how much a quantity between two frames may be off the local fit, one sigma.
+
+        It is the scatter of the frames about the fit. A scatter larger than their sigmas explain is of
+        small jumps. Then each frame's jump moves the fit, too, and Student's t allows for how few
+        frames it is estimated from.
+        """
+        found = self.scatter(name)
+        chi2_limit = np.inf
+        if found.freedom:
+            chi2_limit = chdtri(found.freedom, _CHANCE) * found.expected**2
+        if found.freedom * found.rms**2 <= chi2_limit:
+            return found.rms
+        weights = self._fit[0] * self._share(name)
+        jump_variance = (found.rms**2 - found.expected**2) * (1.0 + weights @ weights)
+        return float(stdtrit(found.freedom, 0.975) / Z_95 * np.sqrt(jump_variance))
+
+    def scatter(self, name: str) -> "Scatter":
+        """Return the scatter of frames nearby, by twelve frames at least where there are as many.
+
+        Small jumps are in no frame's sigma. Stick and slip goes from one friction angle to another, so
+        that the force's angle jumps by the same amount everywhere and lengths in proportion to the
+        pushing angle: these are compared as shares of it. Frames are weighted by their precision.
+        """
+        smooth = self.smooth
+        near = _near(self._beyond_rad, _FEWEST_FOR_SCATTER) & (smooth.theta_rad > 0)
+        degree = _degree(int(np.sum(near)))
+        if np.sum(near) <= degree + 1:
+            return Scatter()
+        size = 1.0 / self._share(name)[near]
+        rows = size[:, None] * smooth.jacobians[name][near]
+        covariance = rows @ smooth.covariance @ rows.T
+        curve = np.vander(smooth.theta_rad[near] / self.theta_rad - 1.0, degree + 1)
+        return _scatter_about(curve, size * smooth.values[name][near], covariance)
+
+    def _share(self, name: str) -> np.ndarray:
+        """Return each frame's (f,) share of a quantity's size at the angle where the force keeps its
+        direction.
+        """
+        if name in _ANGLES:
+            return np.ones(len(self.smooth.theta_rad))
+        return self.smooth.theta_rad / self.theta_rad
 
 
-def _shared_slip_mm(smooth: Smooth, theta_rad: float, slip_mm: Value) -> float:
-    """Return the part of slip's sigma that all whisks of a session share, at most the whole."""
-    by_parameter, _ = _by_parameter(smooth, "slip", theta_rad)
-    shared_mm = propagated_sigma(by_parameter, smooth.shared_covariance)
-    return float(min(shared_mm, slip_mm.sigma))
+@dataclass(frozen=True)
+class Scatter:
+    """The scatter of frames about a smooth curve.
 
-
-def _by_parameter(smooth: Smooth, name: str, theta_rad: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives (p,) of a quantity by the local fit, and the fit's weights (f,).
-
-    The error of touch moves all pushing angles together.
+    rms: at the wanted angle. expected: the same where nothing jumps and frames err as their
+    covariance says. freedom: degrees of freedom, 0 where there are no more frames than the curve
+    has coefficients.
     """
-    weights, slope_weights = _local_fit(smooth.theta_rad, theta_rad)
-    slope = slope_weights @ smooth.values[name]
-    return weights @ smooth.jacobians[name] + slope * smooth.touch_jacobian, weights
 
-
-def _smooth_value(smooth: Smooth, name: str, theta_rad: float) -> Value:
-    """Return a smooth quantity by the local fit.
-
-    Its sigma is not below that of the best frame nearby; the fit's residuals are added to it.
-    """
-    by_parameter, weights = _by_parameter(smooth, name, theta_rad)
-    near = _near(smooth.theta_rad - theta_rad)
-    least = np.min(propagated_sigma(smooth.jacobians[name][near], smooth.covariance))
-    sigma = max(propagated_sigma(by_parameter, smooth.covariance), least)
-    residual = _between_frames_sigma(smooth, name, theta_rad)
-    return Value(float(weights @ smooth.values[name]), float(np.hypot(sigma, residual)))
-
-
-def _slip_jumps(smooth: Smooth, theta_rad: float) -> bool:
-    """Return whether the slip in a frame near theta is away from its local fit, by more than frames scatter."""
-    slip_mm = smooth.values["slip"]
-    by_parameter = smooth.jacobians["slip"]
-    for frame in np.flatnonzero(np.abs(smooth.theta_rad - theta_rad) <= _WINDOW_RAD):
-        weights, _ = _local_fit(smooth.theta_rad, smooth.theta_rad[frame])
-        weights[frame] -= 1.0
-        sigma_mm = propagated_sigma(weights @ by_parameter, smooth.covariance)
-        if abs(weights @ slip_mm) > max(_JUMP_MM, _JUMP_SIGMAS * sigma_mm):
-            return True
-    return False
-
-
-def _frames_around(smooth: Smooth, theta_rad: float) -> np.ndarray:
-    """Return the frames (k,) from the last that is surely before theta to the first that is surely
-    past it.
-
-    The uncertainty is that of touch, which moves them all. At the ends of the record they are the
-    two nearest at least.
-    """
-    order = np.argsort(smooth.theta_rad)
-    rising = smooth.theta_rad[order]
-    margin_rad = _SURE_SIGMAS * propagated_sigma(smooth.touch_jacobian, smooth.covariance)
-    first = np.searchsorted(rising, theta_rad - margin_rad) - 1
-    last = np.searchsorted(rising, theta_rad + margin_rad)
-    return order[max(min(first, len(order) - 2), 0) : max(last, 1) + 1]
-
-
-def _value_in_jump(smooth: Smooth, name: str, theta_rad: float, frames: np.ndarray) -> Value:
-    """Return a quantity where slip is anywhere between these frames (k,), by its linear dependence
-    on angle and slip nearby.
-    """
-    coefficients, residual_variance = _linear_in_slip(smooth, name, theta_rad)
-    _, by_angle, by_slip = coefficients
-    rows = smooth.jacobians[name][frames] + by_angle * smooth.touch_jacobian
-    sigma = np.max(propagated_sigma(rows, smooth.covariance))
-    slip_mm = smooth.values["slip"][frames]
-    half_mm = 0.5 * float(np.ptp(slip_mm))
-    value = coefficients @ [1.0, 0.0, np.min(slip_mm) + half_mm]
-    variance = (by_slip * half_mm) ** 2 + residual_variance + sigma**2
-    return Value(float(value), float(np.sqrt(variance)))
-
-
-def _linear_in_slip(smooth: Smooth, name: str, theta_rad: float) -> tuple[np.ndarray, float]:
-    """Fit a quantity near theta by a constant, the angle beyond theta and the slip.
-
-    Returned are the coefficients (3,) and the variance of the residuals.
-    """
-    angle_rad = smooth.theta_rad - theta_rad
-    near = _near(angle_rad)
-    columns = [np.ones(len(angle_rad)), angle_rad, smooth.values["slip"]]
-    design = np.column_stack(columns)[near]
-    values = smooth.values[name][near]
-    coefficients, *_ = np.linalg.lstsq(design, values)
-    freedom = max(len(design) - design.shape[1], 1)
-    return coefficients, np.sum((values - design @ coefficients) ** 2) / freedom
+    rms: float = 0.0
+    expected: float = 0.0
+    freedom: float = 0.0
 
 
 def _local_fit(theta, at):
@@ -219,54 +295,6 @@ def _local_fit(theta, at):
     return value, slope
 
 
-def _between_frames_sigma(smooth: Smooth, name: str, theta_rad: float) -> float:
-    """Return by how much a quantity between two frames may be off the local fit, one sigma.
-
-    It is the scatter of the frames about the fit. A scatter larger than their sigmas explain is of small
-    jumps. Then each frame's jump moves the fit, too, and Student's t allows for how few frames it
-    is estimated from.
-    """
-    found = scatter(smooth, name, theta_rad)
-    chi2_limit = chdtri(found.freedom, _CHANCE) * found.expected**2 if found.freedom else np.inf
-    if found.freedom * found.rms**2 <= chi2_limit:
-        return found.rms
-    weights = _local_fit(smooth.theta_rad, theta_rad)[0] * _share(smooth, name, theta_rad)
-    jump_variance = (found.rms**2 - found.expected**2) * (1.0 + weights @ weights)
-    return float(stdtrit(found.freedom, 0.975) / Z_95 * np.sqrt(jump_variance))
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """The scatter of frames about a smooth curve.
-
-    rms: at the wanted angle. expected: the same where nothing jumps and frames err as their
-    covariance says. freedom: degrees of freedom, 0 where there are no more frames than the curve
-    has coefficients.
-    """
-
-    rms: float = 0.0
-    expected: float = 0.0
-    freedom: float = 0.0
-
-
-def scatter(smooth: Smooth, name: str, theta_rad: float) -> Scatter:
-    """Return the scatter of frames near theta, by twelve frames at least where there are as many.
-
-    Small jumps are in no frame's sigma. Stick and slip goes from one friction angle to another, so
-    that the force's angle jumps by the same amount everywhere and lengths in proportion to the
-    pushing angle: these are compared as shares of it. Frames are weighted by their precision.
-    """
-    near = _near(smooth.theta_rad - theta_rad, _FEWEST_FOR_SCATTER) & (smooth.theta_rad > 0)
-    degree = _degree(int(np.sum(near)))
-    if np.sum(near) <= degree + 1:
-        return Scatter()
-    size = 1.0 / _share(smooth, name, theta_rad)[near]
-    rows = size[:, None] * smooth.jacobians[name][near]
-    covariance = rows @ smooth.covariance @ rows.T
-    curve = np.vander(smooth.theta_rad[near] / theta_rad - 1.0, degree + 1)
-    return _scatter_about(curve, size * smooth.values[name][near], covariance)
-
-
 def _scatter_about(curve: np.ndarray, values: np.ndarray, covariance: np.ndarray) -> Scatter:
     """Return the scatter of values (n,) of this covariance (n, n) about a curve, columns (n, k).
 
@@ -283,13 +311,6 @@ def _scatter_about(curve: np.ndarray, values: np.ndarray, covariance: np.ndarray
     freedom = total**2 / np.sum(MW2 * MW2.T)
     rms = np.sqrt(residual @ residual / total)
     return Scatter(float(rms), float(np.sqrt(noise / total)), float(freedom))
-
-
-def _share(smooth: Smooth, name: str, theta_rad: float) -> np.ndarray:
-    """Return each frame's (f,) share of a quantity's size at theta where the force keeps its
-    direction.
-    """
-    return np.ones(len(smooth.theta_rad)) if name in _ANGLES else smooth.theta_rad / theta_rad
 
 
 def _near(distance_rad, fewest: int = 2) -> np.ndarray:

@@ -15,7 +15,7 @@ from vision.geometry.reasons import Reason
 from vision.geometry.refusals import Refused
 from vision.geometry.vision_settings import VisionSettings
 from vision.touched.one_view import seen_from_one_side
-from vision.truth.at_angle import scatter
+from vision.truth.at_angle import NearAngle
 from vision.truth.known_whisk import KnownWhisk
 from vision.truth.observe import why_failed
 from vision.truth.predicted_lines import PredictedLines
@@ -66,7 +66,7 @@ class PredictedTruth:
         for name in _AT_ANGLE:
             by_noise = 0.0
             if truth.smooth is not None and not at_angle.status:
-                by_noise = scatter(truth.smooth, name, theta_rad).expected
+                by_noise = NearAngle(truth.smooth, theta_rad).scatter(name).expected
             found[name] = float(np.hypot(getattr(at_angle, FIELDS[name]).sigma, by_noise))
         return found
 

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from vision.truth.at_angle import (
-    Smooth,
-    _between_frames_sigma,
-    _slip_jumps,
-    at_angle,
-    scatter,
-)
+from vision.truth.at_angle import NearAngle, Smooth, at_angle
 from vision.truth.value import FIELDS
 
 THETA_RAD = np.radians(np.arange(0.5, 6.0, 0.5))
@@ -39,9 +33,10 @@ def test_scatter_expected_is_that_of_draws(shared):
     size, rng, wanted = len(THETA_RAD), np.random.default_rng(2), np.radians(3.0)
     covariance = 0.01**2 * ((1.0 - shared) * np.eye(size) + shared * np.ones((size, size)))
     draws = rng.multivariate_normal(np.zeros(size), covariance, size=1000)
-    seen = [
-        scatter(frames(covariance, 0.3 * THETA_RAD**2 + one, "phi"), "phi", wanted) for one in draws
-    ]
+    seen = []
+    for one in draws:
+        smooth = frames(covariance, 0.3 * THETA_RAD**2 + one, "phi")
+        seen.append(NearAngle(smooth, wanted).scatter("phi"))
     assert np.sqrt(np.mean([one.rms**2 for one in seen])) == pytest.approx(
         seen[0].expected, rel=0.03
     )
@@ -61,12 +56,11 @@ def test_small_jumps_that_few_frames_show_are_known_by_students_t(name):
     for sigma, widened in ((1e-6, 2.306 / 1.960), (0.01, 1.0)):
         own = sigma * (THETA_RAD / wanted if name == "slip" else np.ones(len(THETA_RAD)))
         smooth = frames(np.diag(own**2), zigzag, name)
-        left = scatter(smooth, name, wanted).rms
+        near = NearAngle(smooth, wanted)
+        left = near.scatter(name).rms
         assert left == pytest.approx(0.01, rel=0.2)
         with_fit = np.sqrt(4 / 3) if widened > 1.0 else 1.0
-        assert _between_frames_sigma(smooth, name, wanted) == pytest.approx(
-            widened * with_fit * left, rel=0.02
-        )
+        assert near.between_frames_sigma(name) == pytest.approx(widened * with_fit * left, rel=0.02)
 
 
 @pytest.mark.parametrize("first", range(8))
@@ -86,7 +80,7 @@ def test_frames_in_step_with_teeth_are_told_by_those_further_away(first):
         np.zeros((len(theta), len(theta))),
         NO_CAMERAS,
     )
-    assert _between_frames_sigma(smooth, "phi", np.radians(3.0)) > 0.01
+    assert NearAngle(smooth, np.radians(3.0)).between_frames_sigma("phi") > 0.01
 
 
 TOOTH_RAD, JUMP_MM, SIGMA_MM, TOUCH_RAD = np.radians(0.8), 0.3, 0.004, np.radians(0.02)
@@ -134,4 +128,4 @@ def test_a_slip_off_its_fit_jumps_where_frames_do_not_scatter_as_much(scatter_mm
     slip_mm = 20.0 * THETA_RAD
     slip_mm[5] += 0.06
     smooth = frames(scatter_mm**2 * np.eye(len(THETA_RAD)), slip_mm, "slip")
-    assert _slip_jumps(smooth, np.radians(3.0)) is jumps
+    assert NearAngle(smooth, np.radians(3.0)).slip_jumps is jumps
