@@ -186,12 +186,11 @@ def best_explanation(first: Explanation) -> Explanation:
 
 
 def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
-    """Return a fit, or that from another bar which is clearer, with a warning where it hardly is.
+    """Return the fit at the bar with the highest detection score, with a warning where another is hardly less clear.
 
-    rivals: axes of bars that the search has not excluded. Where a whisk fits at one of them and
-    changes as much of the pictures, detection scores about the two fitted axes decide; the bar has
-    no rivals then, for the whisks to come. Raises Refused where these are alike and the distances
-    differ.
+    rivals: axes of bars that the search has not excluded. One of them counts where a whisk fits at it
+    and changes as much of the pictures. A bar that is clearer than all has no rivals in the whisks to
+    come. Raises Refused where scores are alike and the distances differ.
     """
     comparison = _comparison(first) if rivals else None
     explanations = [first, *_rival_explanations(first, rivals, comparison)]
@@ -257,8 +256,7 @@ def _in_place_of(first: Explanation, best: Explanation) -> Explanation:
 
 
 def compare_early(whisk: WhiskPictures, curves: Mapping[int, Curves]) -> PlaceComparison | None:
-    """Return the comparison of places about that where a whisk's search has the bar, its best one
-    known already.
+    """Return the comparison of places about the bar as a whisk's search has it; the best is found already.
 
     curves: by frame, of the wire, to a pixel or two. None where the pictures cannot decide.
     """

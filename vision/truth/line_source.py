@@ -37,11 +37,11 @@ class StrokeBends:
     bend_rad: np.ndarray
 
     def at(self, frames: Sequence[int], motor_rad: np.ndarray) -> np.ndarray | None:
-        """Return the bends (n, 2), rad, in other frames at motor angles (n,), to a pixel where the whisker
-        is pushed alike again.
+        """Return the bends (n, 2), rad, of another stroke in its frames at motor angles (n,).
 
-        None where it is not: on the way back friction turns round, and no bend is known more than a
-        frame's step beyond the largest angle.
+        They are right to a pixel where the whisker is pushed in the same way. None where it is not: on
+        the way back friction turns round, and no bend is known more than a frame's step beyond the
+        largest angle.
         """
         goes_on = frames[-1] > frames[0]
         went_on = self.frames[-1] > self.frames[0]
@@ -60,9 +60,9 @@ class StrokeBends:
 class EarlierWhisk:
     """What a whisk has shown, from which the search and the fit of the next one begin.
 
-    axis: of the object. rest_mm (2, 4): rest shape of the wire. blur_px: of each camera's lens. Where both
-    whisks are of one trial, reader: of the object's lines, for they have the same mean pictures; and
-    bends: the wire's, for they have the same object.
+    axis: of the object. rest_mm (2, 4): rest shape of the wire. blur_px: of each camera's lens. reader: of
+    the object's lines, and bends: of the wire; None of a whisk of another trial, which has other mean
+    pictures and another object.
     """
 
     axis: Axis
@@ -85,7 +85,7 @@ class LineSource(ABC):
 
     @abstractmethod
     def wire_points(self, place: WhiskPlace, *, last: bool) -> dict[str, list[Observed]]:
-        """Return by camera, for each of them, the wire's points near its curves.
+        """Return by camera the wire's points near its curves; every camera is there, with points or without.
 
         last: no pass follows.
         """

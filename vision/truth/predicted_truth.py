@@ -159,7 +159,7 @@ def _part_by_clearance(problem: Problem, known: KnownWhisk) -> tuple[Problem, St
     """Return the problem with the frames that a fit would know to touch or to be free."""
     state = known.state(problem)
     covariance = ConvergedFit(problem, state).inverse_normal
-    touching, free = TouchByClearance().part_by_fit(problem, state, covariance)
+    touching, free = TouchByClearance().split_by_fit(problem, state, covariance)
     problem = replace(problem, touching=touching, bent=~free)
     return problem, known.state(problem)
 

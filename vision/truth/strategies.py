@@ -65,7 +65,7 @@ class Touch(ABC):
         """Return the frames to fit. motor, bend: by frame, motor angle and coarse bends (2,)."""
 
     @abstractmethod
-    def part_by_bends(
+    def split_by_bends(
         self, motor_rad: np.ndarray, bend_rad: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return which frames touch and which are free, (f,) bool each, by coarse bends (f, 2).
@@ -80,7 +80,7 @@ class Touch(ABC):
         """Return problem and state with what a fit says of touch. covariance (size, size)."""
 
     @abstractmethod
-    def part_by_fit(
+    def split_by_fit(
         self, problem: Problem, state: State, covariance: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return which frames touch and which are free, (f,) bool each, by a fit.
@@ -105,7 +105,7 @@ class TouchByClearance(Touch):
         nearest = int(np.argmax(motor_rad > motor_rad[first] - _NEAR_TOUCH_RAD))
         return frames[min(nearest, max(first - _FEWEST_NEAR, 0)) :]
 
-    def part_by_bends(
+    def split_by_bends(
         self, motor_rad: np.ndarray, bend_rad: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return which frames touch and which are free. Raises Refused where all are free."""
@@ -120,7 +120,7 @@ class TouchByClearance(Touch):
         """Return problem and state as they are."""
         return problem, state
 
-    def part_by_fit(
+    def split_by_fit(
         self, problem: Problem, state: State, covariance: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return which frames touch and which are free, by the touch of the fit and its sigma.
@@ -159,7 +159,7 @@ class TouchByOnset(Touch):
         """Return all frames: which touch is not known by coarse bends."""
         return list(motor)
 
-    def part_by_bends(
+    def split_by_bends(
         self, motor_rad: np.ndarray, bend_rad: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return which frames the coarse bends (f, 2) show to touch, and the first of the stroke."""
@@ -173,7 +173,7 @@ class TouchByOnset(Touch):
         problem, state = touch_by_onset(problem, state, covariance)
         return problem, solve(problem, state)[0]
 
-    def part_by_fit(
+    def split_by_fit(
         self, problem: Problem, state: State, covariance: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the frames after the onset, and the first part of the stroke."""

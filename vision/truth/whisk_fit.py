@@ -83,7 +83,7 @@ def fit_lines(
         fit, covariance = _fit(whisk, expected, seen, touch)
         whisk = whisk.yielding_as(fit)
         check_scatter(fit, lines.most_scatter_px)
-        touching, free = touch.part_by_fit(fit.problem, fit.state, covariance)
+        touching, free = touch.split_by_fit(fit.problem, fit.state, covariance)
         expected = ExpectedWhisk(
             place=_fitted_place(whisk, fit),
             rest_mm=fit.rest_mm,
@@ -111,7 +111,7 @@ def fit_last(
     seen = lines.all_points(expected.place, last=True)
     fit, covariance = _fit(whisk, expected, seen, touch)
     # Raises where the last fit shows no free stroke.
-    touch.part_by_fit(fit.problem, fit.state, covariance)
+    touch.split_by_fit(fit.problem, fit.state, covariance)
     return FittedWhisk(fit.problem, fit.state, whisk.frames, lines)
 
 
@@ -129,7 +129,7 @@ def expect_by_bends(
     """
     whisk = whisk.during(touch.frames_to_fit(whisk.motor, coarse))
     bend = np.array([coarse[f] for f in whisk.frames])
-    touching, free = touch.part_by_bends(whisk.angles_rad, bend)
+    touching, free = touch.split_by_bends(whisk.angles_rad, bend)
     curves, arcs_mm = coarse_curves(whisk, rest_mm, coarse)
     came = _expected_to_come_mm(whisk)
     if whisk.gives is not None:

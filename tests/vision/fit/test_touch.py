@@ -69,19 +69,19 @@ def test_frames_that_touch_from_the_start_are_no_free_stroke(rng):
     """Frames at 0.7 and 1.6 degrees touch at 0.6. As a rest shape they put touch after both of them."""
     problem, state, covariance = fitted(0.6, 2, rng)
     with pytest.raises(Refused) as refused:
-        TouchByClearance().part_by_fit(problem, state, covariance)
+        TouchByClearance().split_by_fit(problem, state, covariance)
     assert refused.value.code == "starts_touching"
 
 
 def test_a_last_frame_that_bends_is_decided_by_the_fit():
     """It bends by 0.65 degrees, and no other does: by the hinge it may still come within a frame of touch."""
     motor = np.append(MOTOR[:-1], MOTOR[-1] - np.radians(0.01))
-    touching, free = TouchByClearance().part_by_bends(
+    touching, free = TouchByClearance().split_by_bends(
         motor, bends(5.9, 0.0, np.random.default_rng(0))
     )
     assert not np.any(touching) and not free[-1]
     with pytest.raises(Refused):
-        TouchByClearance().part_by_bends(motor, bends(9.0, 0.02, np.random.default_rng(0)))
+        TouchByClearance().split_by_bends(motor, bends(9.0, 0.02, np.random.default_rng(0)))
 
 
 def test_surely_bent_frames_touch_where_the_clearance_decides_on_none(rng):
@@ -90,5 +90,5 @@ def test_surely_bent_frames_touch_where_the_clearance_decides_on_none(rng):
     vague = covariance.copy()
     vague[:4, :4] += np.eye(4) * 9.0
     still = replace(problem, touching=np.zeros(len(problem.bent), dtype=bool))
-    touching, free = TouchByClearance().part_by_fit(still, state, vague)
+    touching, free = TouchByClearance().split_by_fit(still, state, vague)
     assert np.all(touching == problem.bent) and np.all(free == ~problem.bent)

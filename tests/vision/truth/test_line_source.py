@@ -36,7 +36,7 @@ def test_a_fit_to_predicted_lines_comes_back_to_the_whisk(bench):
     frames = known.frames_to_fit
     whisk = known.pictured([blank_view(c, frames) for c in cameras], cameras, SETTINGS)
     touch = TouchByClearance()
-    touching, free = touch.part_by_bends(whisk.angles_rad, known.bend_rad[frames])
+    touching, free = touch.split_by_bends(whisk.angles_rad, known.bend_rad[frames])
     expected = ExpectedWhisk(
         known.place,
         known.rest_mm + 0.1,

@@ -19,7 +19,7 @@ def answer(problem, state, touch_sigma_deg: float) -> np.ndarray:
 
 def test_clearance_parts_the_frames_where_it_knows_touch():
     problem, state = scene(touch_deg=TOUCH_DEG)
-    touching, free = TouchByClearance().part_by_fit(problem, state, answer(problem, state, 0.01))
+    touching, free = TouchByClearance().split_by_fit(problem, state, answer(problem, state, 0.01))
     assert free.tolist() == [True] * 2 + [False] * 5 and np.all(touching == ~free)
 
 
@@ -27,7 +27,7 @@ def test_clearance_parts_the_frames_where_it_knows_touch():
 def test_where_sights_hardly_cross_frames_stay_as_bends_parted_them(touch_sigma_deg):
     """Three sigma reach before the first frame: by clearance alone none would be free, and the whisk be refused."""
     problem, state = scene(touch_deg=TOUCH_DEG)
-    touching, free = TouchByClearance().part_by_fit(
+    touching, free = TouchByClearance().split_by_fit(
         problem, state, answer(problem, state, touch_sigma_deg)
     )
     assert np.all(free == ~problem.bent) and np.all(touching == problem.touching)
@@ -38,4 +38,4 @@ def test_what_clearance_is_sure_of_bends_do_not_change():
     problem, state = scene(touch_deg=TOUCH_DEG)
     state.vector[5] += 100.0 * np.radians(20.0)  # the resting whisker's slope, mm at its tip
     with pytest.raises(Refused, match="touches from the start"):
-        TouchByClearance().part_by_fit(problem, state, answer(problem, state, 1.0))
+        TouchByClearance().split_by_fit(problem, state, answer(problem, state, 1.0))
