@@ -13,7 +13,7 @@ import numpy as np
 
 from estimator.reasons import NamedReason
 
-# Fewest lines that enclose anything. Derived.
+# [lines] Fewest that enclose anything. Derived.
 _FEWEST = 3
 OPEN = NamedReason(
     "contour_open", "touches do not go all round: two neighbours face away by 180° or more"

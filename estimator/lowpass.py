@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_banded
 
-# Order of the Butterworth filter of each way.
+# [1] Order of the Butterworth filter of each way. Stated.
 _FILTER_ORDER = 2
 
 

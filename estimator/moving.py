@@ -36,10 +36,10 @@ RUNS_AWAY = NamedReason(
 AMBIGUOUS = NamedReason(
     "two_distances", "or {:.1f} mm: an object that runs away is felt alike at both"
 )
-# Share of the distance above which another distance counts: at one as near as that the object would
-# run at nine tenths of the whisker's own speed.
+# [1] Of the distance: another distance counts from here on, for at one as near as that the object would run
+# at nine tenths of the whisker's own speed. Derived.
 _LEAST_OTHER = 0.1
-# Iterations of the share of friction along the object, by the direction of the motion over it.
+# [iterations] Of the share of friction along the object, by the direction of the motion over it. Stated.
 _ITERATIONS = 4
 # [1] Step of differences, of the pushing angle, the moment, a radian of α and the distance.
 _STEP = 1e-6

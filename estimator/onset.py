@@ -36,11 +36,11 @@ MIN_RISE_IN_SIGMAS = 8.0
 READING_RAD = np.radians(1e-5)
 # [1] Of that, the rounding of a reading in radians.
 READING_ROUNDING = 1e-3
-# Fewest samples of the free stroke, from which level and drift are measured.
+# [samples] Fewest of the free stroke, from which level and drift are measured. Stated.
 MIN_FREE_SAMPLES = 20
-# Fewest samples of the rise, to which the line is fitted.
+# [samples] Fewest of the rise, to which the line is fitted. Stated.
 MIN_RISE_SAMPLES = 12
-# Number of bins in which the coarse touch is searched.
+# [bins] In which the coarse touch is searched. Stated.
 COARSE_BINS = 120
 # [sigma] Distance of a sample from its neighbours' median beyond which it is a spike.
 SPIKE_IN_SIGMAS = 8.0

@@ -39,14 +39,15 @@ NO_END = NamedReason("bend_end_unseen", "the seen shape does not tell where the 
 _LEAST_WAY = 1e-11
 # [rad] Frames that far past the pushing angle still count.
 _BEYOND_RAD = np.radians(1.0)
-# Fewest frames with points, and fewest points, from which a shape is fitted.
+# [frames] Fewest with points from which a shape is fitted. Stated.
 _FEWEST_FRAMES = 4
+# [points] Fewest from which a shape is fitted. Stated.
 _FEWEST_POINTS = 30
-# Largest share of the force by which tan φ may change it: its square, a hundredth, is left out.
+# [1] Largest share of the force by which tan φ may change it: its square, a hundredth, is left out. Derived.
 _MOST_BY_PLANE = 0.1
 # [1] Step of differences over a parameter's size. Derived.
 _DIFFERENCE = 1e-5
-# Least size of a parameter there. Derived.
+# [1] Least size of a parameter there. Derived.
 _LEAST_SIZE = 1e-2
 
 

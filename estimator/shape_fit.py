@@ -24,20 +24,20 @@ if TYPE_CHECKING:
 # [lengths] Prior sigma of the rest shape by powers of s/L: clamped off centre, clamp angle, set and
 # sag, change of curvature.
 _REST = np.array([0.01, 0.08, 0.05, 0.02])
-# Prior sigma of tan φ of the bend: 45°.
+# [1] Prior sigma of tan φ of the bend: 45°. Stated.
 _TAN_PHI_SIGMA = 1.0
 # [lengths/rad] Prior sigma of how fast the contact moves along the whisker: of 100 mm, several radii
 # of a bar in rolling, or 3 mm of slip in 3° along an object that leans by 20°.
 _ALONG_PER_RAD = 0.2
 # [lengths] Nearest contact to the base.
 _NEAREST = 0.01
-# Evaluations of the residuals by which a fit has converged: simulated strokes take 5 to 35.
+# [evaluations] Of the residuals, by which a fit has converged: simulated strokes take 5 to 35. Stated.
 _MOST_EVALUATIONS = 80
 # [1/rad] Relative sigma of the force per rad pushed: friction along the whisker, which is not
 # modelled, adds to the moment tan α times w/d, that is θ at most, over that of the force across; α
 # is taken as 0 ± 14°.
 _DRAG = 0.25
-# Least share of the base's diameter: a cone's point bends without end.
+# [1] Least share of the base's diameter: a cone's point bends without end. Stated.
 _LEAST_LEFT = 1e-3
 # Nodes and weights of Gauss–Legendre quadrature on −1 … 1.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)

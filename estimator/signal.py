@@ -27,7 +27,7 @@ __all__ = [
 HUM_PERIOD_S = 0.02
 # [rad] Half width of the window around the pushing angle, over which moments are a line.
 HALF_WINDOW_RAD = np.radians(0.5)
-# Fewest samples to which a line with a scatter is fitted.
+# [samples] Fewest to which a line with a scatter is fitted. Derived.
 MIN_SAMPLES = 3
 NOT_REACHED = NamedReason("angle_not_reached", "the stroke does not reach the pushing angle")
 

@@ -21,7 +21,7 @@ from estimator.domain import (
 EQUATIONS = ("no_slip", "with_friction")
 # [rad] Step of the slopes among which the first one beyond the error is searched.
 SEARCH_STEP = np.radians(0.25)
-# Number of bisections, which is enough for the last bit of a float.
+# [bisections] Enough for the last bit of a float. Derived.
 HALVINGS = 50
 # Appendix B: `estimator.curvature.exact`, or `printed`.
 AppendixB: TypeAlias = Callable[..., tuple[Numbers, Numbers]]

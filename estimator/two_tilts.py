@@ -31,8 +31,8 @@ _MOST_ITERATIONS = 40
 _LAST_STEP_SIGMAS = 1e-6
 # [1] The same over distance and tan α, where sigmas are nothing: rounding, many times over. Derived.
 _LAST_STEP = 1e-9
-# How far a cantilever's end is drawn along itself as it bends, in θ d: its arc's excess over its
-# chord.
+# [1] How far a cantilever's end is drawn along itself as it bends, in θ d: its arc's excess over its chord.
+# Derived.
 DRAWN = 0.6
 # Share left unknown of large bending's second order, and of the friction along a whisker that
 # slips, when they are taken out: as much as exact mechanics differ from them. Study:

@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterable
 
 MISSING = "–"
-_SIGMA_DIGITS = 2  # of a standard deviation: a third would be noise
+# [digits] Of a standard deviation: a third would be noise. Stated.
+_SIGMA_DIGITS = 2
 
 
 def number(value: float | None, digits: int = 2) -> str:

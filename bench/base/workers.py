@@ -21,8 +21,10 @@ from bench.base.progress import count_parts
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _PICTURES = "OPENCV_FOR_THREADS_NUM"  # OpenCV's own number, as it is loaded
-_PARENT_CHECK_S = 1.0  # s: so long a worker may outlive a run that was killed
-MOST_DEATHS = 3  # of processes at one task, which is then given up
+# [s] That a worker may outlive a run that was killed. Stated.
+_PARENT_CHECK_S = 1.0
+# [processes] That die at one task, which is then given up. Stated.
+MOST_DEATHS = 3
 DIED = object()  # in place of the result of such a task
 KILLED = (
     "a worker process was killed three times at the same task, by the system where memory ran out; what was finished "

@@ -32,13 +32,13 @@ from vision.calibration import (
 )
 from vision.geometry import LENS_TERMS, Camera, Cameras
 
-# Every fourth view (index % 4 == 3) measures a calibration from the other three quarters.
+# [views] Every fourth one (index % 4 == 3) measures a calibration from the other three quarters. Stated.
 HOLD_EVERY = 4
-# A distortion term this many sigmas from zero is one that the views need.
+# [sigma] A distortion term so far from zero is one that the views need. Stated.
 _NEEDED_SIGMAS = 2.0
 # [1] Of a camera's corners. Noise puts 7 in a million beyond 4.5 sigma: a tenth is something else. Stated.
 _MOST_LEFT_OUT = 0.1
-# Bars stand beyond this share of the whisker.
+# [1] Of the whisker's length: bars stand beyond. Stated.
 _NEAREST_BAR = 0.4
 # [mm] A bar is seen by so much on either side of the whisker.
 _BAR_REACH_MM = 20.0

@@ -20,9 +20,10 @@ from vision.geometry import Bar, Cameras, Reason, Refused, spread
 _MOST_TRIALS = 3
 # [pictures] Of each camera and trial, at most: a bound on time. Stated.
 _MOST_PICTURES = 11
-# Scatter of the share, of one trial alone.
+# [1] Scatter of the share, of one trial alone. Stated.
 _UNCONFIRMED = 0.05
-# At the right scale six sessions scatter by 0.014 at most, at wrong ones by 0.1 to 0.3.
+# [1] Scatter of the share: at the right scale six sessions scatter by 0.014 at most, at wrong ones by 0.1 to
+# 0.3. Stated.
 _MOST_SCATTER = 0.1
 
 

@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 # [sigmas] Half an interval of 95 % of the normal distribution.
 U95 = 1.96
 NOT_MEASURED = "not measured"
-_MOST_NAMED = 6  # trials or whisks; more names than that have no room on the page
-_LEAST_POINTS = 4  # for a curvature beside a line, with something left over
+# [names] Of trials or whisks; more have no room on the page. A layout.
+_MOST_NAMED = 6
+# [points] For a curvature beside a line, with something left over. Derived.
+_LEAST_POINTS = 4
 _MOMENTS = ("m_y", "m_z")
 
 

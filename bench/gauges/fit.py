@@ -20,7 +20,7 @@ _LEAST_DIRECTION = 0.1
 # [rounds] In which the weights follow the coefficients: after two no estimate moves by 2e-5 of its sigma. Study:
 # bench_thresholds.py gauges.fit _ROUNDS 1 2 3 10.
 _ROUNDS = 5
-# Probability that sound residuals are taken for too large.
+# [1] Probability that sound residuals are taken for too large. Stated.
 _CHANCE = 0.01
 RECORD = "record gauge trials with the follicle unturned and turned by 90° (follicle_roll_deg = 90)"
 # [°] A follicle turned by 0° or 90° within this reads one channel at a time.

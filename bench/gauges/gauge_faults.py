@@ -14,7 +14,7 @@ _CHANNELS = "yz"
 # four; twice that, for a sigma that may be too small. Derived; study: bench_thresholds.py gauges.gauge_faults
 # _HEARD_SIGMAS 4 20 100 changes nothing.
 _HEARD_SIGMAS = 8.0
-# Of the samples; a whisk that saturates late can still be used.
+# [1] Of the samples; a whisk that saturates late can still be used. Stated.
 _LEAST_UNSATURATED = 0.2
 
 

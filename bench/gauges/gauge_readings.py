@@ -23,12 +23,12 @@ from vision.geometry import Reason, as_reason
 # A rod that bends is drawn towards its clamp over the bar, and friction pulls it back. How rough the bar is, is not
 # known at this stage: from nothing to 0.4, all values alike. At 3° this is 0.2 % of the moment, ± 0.1 %.
 _FRICTION = 0.2
-# Standard deviation of that uniform distribution.
+# [1] Standard deviation of that uniform distribution. Derived.
 _FRICTION_SIGMA = 0.4 / np.sqrt(12.0)
 # [rad] Least pushing angle of a frame that gives a moment: touch, known to some 0.006°, makes 2 % of it there and
 # less farther on. Derived.
 _LEAST_THETA_RAD = np.radians(0.3)
-# A distance set by a ruler: one sigma over the distance.
+# [1] A distance set by a ruler: one sigma over the distance. Stated.
 NOMINAL_SHARE = 0.01
 # [°] Up to here the moments of a nominal distance are those of no slip to half a percent (1 − cos).
 _NOMINAL_SLOPE_DEG = 5.0

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-# Of the largest calibrated moment; up to there a line is still the same line.
+# [1] Of the largest calibrated moment; up to there a line is still the same line. Stated.
 _BEYOND = 1.05
 
 FROM_FILE = "gauges.toml"

@@ -19,7 +19,7 @@ from bench.session.trial import Trial
 
 # [blocks] Of a recording; their means scatter by hum and drift as well as by noise.
 _BLOCKS = 10
-# A weight that is felt by less has no information on the scale.
+# [sigma] A weight that is felt by less has no information on the scale. Stated.
 _LEAST_SIGMAS = 3.0
 
 

@@ -36,7 +36,8 @@ from bench.session.table import column_names
 from bench.session.trial import Trial
 from vision.geometry import compose
 
-_PARALLEL = 1e-6  # rounding of cosines: axes of bases on one motor
+# [1] Rounding of cosines: axes of bases on one motor. Derived.
+_PARALLEL = 1e-6
 _OWN = (*VOLTS, *MOMENTS, *FORCES)  # columns that no two whiskers share
 _OWN_GAUGES = "give each of [[whiskers]] its own: [whiskers.gauges]"
 

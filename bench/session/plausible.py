@@ -15,7 +15,8 @@ MILLISECONDS = ("milliseconds", 1e-3)
 MICROSECONDS = ("microseconds", 1e-6)
 MILLIVOLTS = ("millivolts", 1e-3)
 
-_PROTRACTOR_DEG = 5.0  # °: what people set slopes in
+# [°] Steps in which people set slopes. Stated.
+_PROTRACTOR_DEG = 5.0
 
 
 @dataclass(frozen=True)

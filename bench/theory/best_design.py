@@ -23,7 +23,8 @@ NAMES = ("theta_deg", "alpha_est_deg", "diameter_mm", "length_mm", "taper", "til
 _SLOPES, _ALPHAS, _PLACES = 13, 7, 5  # of the region's grid: the worst may lie between its corners
 _ALONG = np.linspace(0.0, 0.99, 34)[:, None]  # shares of the way to the contact, of the strain
 _NO_DESIGN = 1e6  # %: of a design that is none; more where it is further from being one
-_SLIP_ROOM = 1.02  # of the largest distance: a whisker slips along, too
+# [1] Over the largest distance: a whisker slips along, too. Stated.
+_SLIP_ROOM = 1.02
 _GENERATIONS, _POPULATION, _TOLERANCE = 120, 12, 1e-4
 _GENERATION_GAP_S = 2.0  # s, between two lines of a search's progress. A choice.
 

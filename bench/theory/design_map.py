@@ -44,7 +44,8 @@ DESIGN = Table(
         Column("exact_percent", "its error by exact mechanics; of the corners alone"),
     ),
 )
-_THINNEST = 1e-3  # share of the base's diameter: a tip that is thinner is a cone's
+# [1] Of the base's diameter: a tip that is thinner is a cone's. Stated.
+_THINNEST = 1e-3
 _SLOPES, _ALPHAS, _PLACES = 61, 7, 41  # of the figure's grid; it shows the worst over α
 _SHOWN_PERCENT = 100.0  # of the figure's colours: the largest
 _UNITS = {

@@ -18,9 +18,12 @@ from bench.trials.stick_slip_phases import ContactRest, find_rests
 from estimator.signal import FeltTouch
 from estimator.whisk import Whisk
 
-_FEWEST = 2  # teeth: one jump may be a knock
-_FROM_SHARE = 0.5  # of the wanted angle: teeth before it, near touch, are short
-_TO_SHARE = 1.5  # of the wanted angle: as much beyond it
+# [teeth] One jump may be a knock. Stated.
+_FEWEST = 2
+# [1] Of the wanted angle: teeth before it, near touch, are short. Stated.
+_FROM_SHARE = 0.5
+# [1] Of the wanted angle: as much beyond it. Stated.
+_TO_SHARE = 1.5
 
 
 def kinetic_of(

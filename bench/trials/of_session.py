@@ -41,8 +41,10 @@ from bench.trials.unit import Unit
 from vision.geometry import Reason
 
 _MORE = "or let the other trials serve: --gauges-from-all"
-_MOST_NAMED = 8  # trials in one line
-_MOST_DRIFT_STROKES = 60  # trials; their mean square is then known to a fifth
+# [trials] In one line. A layout.
+_MOST_NAMED = 8
+# [trials] Of which free strokes are read: their mean square is then known to a fifth. Derived.
+_MOST_DRIFT_STROKES = 60
 
 
 def require_some(trials: Sequence[Trial], settings: Settings) -> None:

@@ -33,7 +33,8 @@ from vision.geometry import Reason, Refused, compose, invert_transform, spread
 
 # A step beyond this is taken once more from where it led: lines far from where they were expected are read less well.
 _SMALL_STEP = np.repeat([2e-3, 0.2], 3)
-_MOST_ROUNDS = 3  # it ends before, where a step is small. Stated.
+# [rounds] It ends before, where a step is small. Stated.
+_MOST_ROUNDS = 3
 # A first look finds the centre across the whisker to half a millimetre (docs/cameras.md).
 _ELSEWHERE_MM = 2.0
 # A T_rig_board known no better is a first guess: the strokes alone must then do.

@@ -47,8 +47,10 @@ from vision.pictures import Others
 
 NO_PICTURES = reason("no_pictures")
 NO_ZERO = reason("motor_zero_unknown")
-_MOST_DEFLECTIONS = 12  # frames of a whisk, kept with their joint covariance
-_MOST_NAMED = 5  # frames in a line
+# [frames] Of a whisk, kept with their joint covariance. Stated.
+_MOST_DEFLECTIONS = 12
+# [frames] In a line. A layout.
+_MOST_NAMED = 5
 # [1] Of the contact's distance along the wire: a place that is known worse gives no moment. At this one
 # the second order of a moment is 1 %, its sigma 2 to 10 %. Derived.
 _MOST_PLACE_SHARE = 0.05

@@ -25,7 +25,8 @@ _FARTHEST_RAD = np.radians(10.0)
 # lines known to 0.01 mm give to 2°. Derived; twice that moves α seen by 0.11 sigma: bench_thresholds.py
 # trials.seen_friction _NEAREST_RAD 0.0105.
 _NEAREST_RAD = np.radians(0.3)
-_FEWEST_NEAR = 5  # frames
+# [frames] Near the wanted angle, at least. Stated.
+_FEWEST_NEAR = 5
 # [1] Sigma of α over the square of the slope at the contact of an unloaded whisker that is stated to be straight: six
 # whisks of a vibrissa with s² = 0.01 to 0.016 are off by up to 0.7 s². Study: tests/studies/accuracy/species.py.
 _SET_LEFT = 1 / 2

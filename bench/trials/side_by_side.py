@@ -27,7 +27,9 @@ from vision import lines_of, wire_lines
 from vision.geometry import REST_POWERS, Refused, unbent_curves
 from vision.pictures import RodLines
 
-_PASSES = 3  # wires that others cross are up to 38 px off after the first, 18 after the second, 2 after the third
+# [passes] Wires that others cross are up to 38 px off after the first, 18 after the second, 2 after the
+# third. Stated.
+_PASSES = 3
 
 
 def array_units(

@@ -27,11 +27,16 @@ from vision import FrameTruth
 
 # [frames] Fewer show neither rest nor jump: three have two intervals, of which one may rest. Derived.
 _LEAST_FRAMES = 3
-_FIRST_RAD = np.radians(0.5)  # before, the slip angle is mostly noise
-_REST_SHARE = 0.5  # of the slope of a slip that never rests, σ/θ: below it the contact rests
-_LONGEST_JUMP = 2  # intervals between frames
-_SIGMAS = 3.0  # a rest is told from free slip where they differ by so many
-_JUMP_SIGMAS = 6.0  # in thousands of samples noise reaches 4
+# [rad] Least pushing angle: before, the slip angle is mostly noise. Stated.
+_FIRST_RAD = np.radians(0.5)
+# [1] Of the slope of a slip that never rests, σ/θ: below it the contact rests. Stated.
+_REST_SHARE = 0.5
+# [frames] Intervals that a jump takes at most. Stated.
+_LONGEST_JUMP = 2
+# [sigma] By which the slope of a rest and that of free slip differ at least. Stated.
+_SIGMAS = 3.0
+# [sigma] Of a jump: in thousands of samples noise reaches 4. Derived.
+_JUMP_SIGMAS = 6.0
 # [rad] Half a window in which a slope is taken. Study: tests/bench/trials/test_phases.py, which holds at half and
 # at twice of it.
 _WINDOW_RAD = np.radians(0.12)
@@ -43,7 +48,8 @@ _FEWEST = 4
 # [samples] In half a window, at most. Study: tests/bench/trials/test_phases.py, which fails at half
 # of it.
 _MOST = 40
-_GUARD = 3  # samples at a jump that the gauges' own filter smears
+# [samples] At a jump, which the gauges' own filter smears. Stated.
+_GUARD = 3
 # [1] Of a stroke's angles, in its middle: there the motor goes at its speed, whatever its ramps. Stated.
 _PLATEAU_SHARE = 1 / 3
 # [1] How far the motor may be from the line of its speed, over the most that it is from it in the middle of the stroke.

@@ -20,7 +20,8 @@ from vision import KeptFit, Trace, TrialPictures, TrialTraces, TrialTruth, obser
 from vision.geometry import Bar, Rods, StatedSizes, Touched, touched_object
 from vision.pictures import Others, RodLines
 
-_FEWEST_BACK = 6  # frames of a back stroke: two free ones, two that touch, and two about the touch
+# [frames] Of a back stroke: two free ones, two that touch, and two about the touch. Derived.
+_FEWEST_BACK = 6
 
 
 @dataclass(frozen=True, eq=False)

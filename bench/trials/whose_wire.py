@@ -14,7 +14,8 @@ from vision import REST_PRIOR_MM
 from vision.geometry import Reason
 from vision.pictures import Others, RodLines
 
-_MOSTLY = 0.5  # of a wire's length: of two wires in one place most is, of two that cross little
+# [1] Of a wire's length: of two wires in one place most is, of two that cross little. Stated.
+_MOSTLY = 0.5
 # mm: as far as a wire is traced for, two sigma of what is believed of a clamp (`vision.fit.blocks`).
 _MOST_BESIDE_MM = 2.0 * float(REST_PRIOR_MM[0])
 
