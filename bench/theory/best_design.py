@@ -76,6 +76,14 @@ class Equipment:
 
 
 @dataclass(frozen=True)
+class Job:
+    """What a whisker is for: the region that it is to feel, with what equipment."""
+
+    region: Region
+    equipment: Equipment
+
+
+@dataclass(frozen=True)
 class Design:
     """One design; by default the paper's.
 
@@ -117,20 +125,18 @@ class ExpectedError:
         return np.abs(self.bias_percent) + uncertainty.Z_95 * self.sigma_percent
 
 
-def expected_error(
-    design: Design, region: Region, equipment: Equipment, points: np.ndarray
-) -> ExpectedError:
+def expected_error(design: Design, job: Job, points: np.ndarray) -> ExpectedError:
     """Compute the error of (10) that is to be expected at points (3, n) of the region."""
     beta, alpha, d_x = points
     slope = beta - np.radians(design.tilt_deg)
     with np.errstate(all="ignore"):
-        moments = _moments(design, equipment, slope, alpha, d_x)
-        of_cylinder, noise_mm = _cylinder_distance(design, equipment, *moments)
+        moments = _moments(design, job.equipment, slope, alpha, d_x)
+        of_cylinder, noise_mm = _cylinder_distance(design, job.equipment, *moments)
         by_friction = _taper_distance(design, of_cylinder) / d_x - 1.0
         by_noise = noise_mm / of_cylinder * design.thickness(d_x)
-        by_lean = _share_by_lean(design, region, np.arctan2(*moments), alpha)
-    by_making = _share_by_making(design, equipment, d_x)
-    bias = by_friction + _neglected_bias(design, region, slope, alpha, d_x)
+        by_lean = _share_by_lean(design, job.region, np.arctan2(*moments), alpha)
+    by_making = _share_by_making(design, job.equipment, d_x)
+    bias = by_friction + _neglected_bias(design, job.region, slope, alpha, d_x)
     sigma = np.linalg.norm(np.broadcast_arrays(by_noise, by_lean, by_making), axis=0)
     is_open = ~np.isfinite(bias + by_noise)  # no distance there
     bias[is_open] = np.inf
@@ -218,29 +224,30 @@ def _neglected_bias(design: Design, region: Region, slope, alpha, d_x) -> Number
     return rolling + held * first_order.dragging(theta, alpha) + large_angles
 
 
-def worst_percent(design: Design, region: Region, equipment: Equipment) -> float:
+def worst_percent(design: Design, job: Job) -> float:
     """Return the figure that a search minimises: the largest |bias| + 1.96 sigma over the region, %.
 
     A thousandth of the mean is added, so that it falls everywhere; it is beyond a million where
     `faults` finds any.
     """
-    excess = sum(faults(design, region, equipment).values())
+    excess = sum(faults(design, job).values())
     if excess > 0:
         return _NO_DESIGN * (1.0 + excess)
-    bound = expected_error(design, region, equipment, region.points()).bound_percent
+    bound = expected_error(design, job, job.region.points()).bound_percent
     return float(np.minimum(bound.max(), _NO_DESIGN) + 1e-3 * np.minimum(bound, 1e3).mean())
 
 
-def largest_percent(design: Design, region: Region, equipment: Equipment) -> float:
+def largest_percent(design: Design, job: Job) -> float:
     """Return the largest |bias| + 1.96 sigma over the region, %."""
-    return float(expected_error(design, region, equipment, region.points()).bound_percent.max())
+    return float(expected_error(design, job, job.region.points()).bound_percent.max())
 
 
-def faults(design: Design, region: Region, equipment: Equipment) -> dict[str, float]:
+def faults(design: Design, job: Job) -> dict[str, float]:
     """Return by how much, as a share, a design exceeds the whisker's reach, its strain or the gauges'
     range; empty where it exceeds none."""
-    d_x = np.array(region.d_x_mm)
-    reach = _SLIP_ROOM * region.d_x_mm[1]
+    equipment = job.equipment
+    d_x = np.array(job.region.d_x_mm)
+    reach = _SLIP_ROOM * d_x[1]
     if design.length_mm <= reach:
         return {"length": reach / design.length_mm - 1.0 + 1e-9}
     rigidity = design.rigidity_Nmm2(equipment)
@@ -255,9 +262,7 @@ def faults(design: Design, region: Region, equipment: Equipment) -> dict[str, fl
     return {name: share - 1.0 for name, share in shares.items() if share > 1.0}
 
 
-def best_design(
-    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment
-) -> tuple[Design, float]:
+def best_design(ranges: Mapping[str, tuple[float, float]], job: Job) -> tuple[Design, float]:
     """Find the design of least worst error within ranges (low, high) of each of NAMES.
 
     Returns it and that error in %. A drawn wire, which has no tolerance of a taper, is searched by
@@ -265,18 +270,16 @@ def best_design(
     """
     lowest, highest = ranges["taper"]
     if lowest == 0.0 < highest:
-        drawn = _best_of_one_making(ranges | {"taper": (0.0, 0.0)}, region, equipment)
-        ground = _best_of_one_making(ranges, region, equipment)
-        design = min(drawn, ground, key=lambda one: worst_percent(one, region, equipment))
+        drawn = _best_of_one_making(ranges | {"taper": (0.0, 0.0)}, job)
+        ground = _best_of_one_making(ranges, job)
+        design = min(drawn, ground, key=lambda one: worst_percent(one, job))
     else:
-        design = _best_of_one_making(ranges, region, equipment)
-    _require_design(design, region, equipment)
-    return design, largest_percent(design, region, equipment)
+        design = _best_of_one_making(ranges, job)
+    _require_design(design, job)
+    return design, largest_percent(design, job)
 
 
-def _best_of_one_making(
-    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment
-) -> Design:
+def _best_of_one_making(ranges: Mapping[str, tuple[float, float]], job: Job) -> Design:
     """Find the design of least worst error within ranges over which that changes steadily."""
     design = Design(**{name: low for name, (low, _) in ranges.items()})
     free = _free(ranges)
@@ -284,7 +287,7 @@ def _best_of_one_making(
 
         def worst(values: np.ndarray) -> float:
             """Return the worst error, %, of the design with these values of its free choices."""
-            return worst_percent(_with_values(design, free, values), region, equipment)
+            return worst_percent(_with_values(design, free, values), job)
 
         limits = np.array([ranges[name] for name in free])
         design = _with_values(design, free, _least(worst, limits))
@@ -330,11 +333,11 @@ def _with_values(design: Design, names: Sequence[str], values: np.ndarray) -> De
     return replace(design, **dict(zip(names, map(float, values))))
 
 
-def _require_design(design: Design, region: Region, equipment: Equipment) -> None:
+def _require_design(design: Design, job: Job) -> None:
     """Raise BadInput where the best design of some ranges does not serve the region."""
-    if worst_percent(design, region, equipment) < _NO_DESIGN:
+    if worst_percent(design, job) < _NO_DESIGN:
         return
-    found = faults(design, region, equipment)
+    found = faults(design, job)
     excesses = [f"{name} by {100 * share:.0f} %" for name, share in found.items()]
     why = "(10) has no distance where φ + α_est reaches 90°"
     if excesses:
@@ -342,9 +345,7 @@ def _require_design(design: Design, region: Region, equipment: Equipment) -> Non
     raise BadInput(f"no design within the ranges serves the whole region: {why}")
 
 
-def costs_of_paper_values(
-    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment
-) -> dict[str, float]:
+def costs_of_paper_values(ranges: Mapping[str, tuple[float, float]], job: Job) -> dict[str, float]:
     """Return the worst error of the best design with the paper's value of each free choice, %.
 
     It is infinite where there is no such design.
@@ -354,7 +355,7 @@ def costs_of_paper_values(
     for name in count_parts(free, "searches with one value of the paper's", len(free)):
         value = getattr(Design(), name)
         try:
-            _, costs[name] = best_design(ranges | {name: (value, value)}, region, equipment)
+            _, costs[name] = best_design(ranges | {name: (value, value)}, job)
         except BadInput:
             costs[name] = np.inf
     return costs

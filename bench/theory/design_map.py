@@ -18,7 +18,7 @@ from bench.theory.best_design import (
     Design,
     Equipment,
     ExpectedError,
-    Region,
+    Job,
     best_design,
     costs_of_paper_values,
     expected_error,
@@ -69,39 +69,34 @@ class DesignReport:
 
     design: Design
     worst_percent: float
-    region: Region
-    equipment: Equipment
+    job: Job
     exact_percent: np.ndarray
     costs_percent: Mapping[str, float]
     paper_percent: float
 
     def expected_at(self, points: np.ndarray) -> ExpectedError:
         """Return the error that is to be expected of the design at points (3, n)."""
-        return expected_error(self.design, self.region, self.equipment, points)
+        return expected_error(self.design, self.job, points)
 
 
-def find_design(
-    ranges: Mapping[str, tuple[float, float]], region: Region, equipment: Equipment
-) -> DesignReport:
+def find_design(ranges: Mapping[str, tuple[float, float]], job: Job) -> DesignReport:
     """Find the best design within ranges (low, high) of each choice.
 
     Raises BadInput where no design within the ranges serves the region.
     """
-    design, worst = best_design(ranges, region, equipment)
-    corners = region.corners().T
+    design, worst = best_design(ranges, job)
+    corners = job.region.corners().T
     exact = []
     for corner in count_parts(corners, "corners by exact mechanics", len(corners)):
-        exact.append(exact_percent(design, region, equipment, corner))
-    costs = costs_of_paper_values(ranges, region, equipment)
+        exact.append(exact_percent(design, job, corner))
+    costs = costs_of_paper_values(ranges, job)
     paper = Design()
-    is_paper_sound = not faults(paper, region, equipment)
-    paper_percent = largest_percent(paper, region, equipment) if is_paper_sound else math.inf
-    return DesignReport(design, worst, region, equipment, np.array(exact), costs, paper_percent)
+    is_paper_sound = not faults(paper, job)
+    paper_percent = largest_percent(paper, job) if is_paper_sound else math.inf
+    return DesignReport(design, worst, job, np.array(exact), costs, paper_percent)
 
 
-def exact_percent(
-    design: Design, region: Region, equipment: Equipment, point: Sequence[float]
-) -> float:
+def exact_percent(design: Design, job: Job, point: Sequence[float]) -> float:
     """Return the error of (10) without noise at one place by the rig's exact mechanics, % of d_x.
 
     point: slope and friction angle, rad, and distance, mm. NaN where the whisker finds no hold or
@@ -112,11 +107,11 @@ def exact_percent(
         beta_deg=math.degrees(beta) - design.tilt_deg,
         alpha_deg=math.degrees(alpha),
         d_x_mm=float(d_x),
-        bar_radius_mm=region.bar_radius_mm,
+        bar_radius_mm=job.region.bar_radius_mm,
         theta_deg=design.theta_deg,
     )
     try:
-        whisk, true_mm = feel(push, *rod_and_beam(design, equipment))
+        whisk, true_mm = feel(push, *rod_and_beam(design, job.equipment))
     except ArithmeticError:
         return math.nan
     estimate = with_friction(whisk, EstimatorSettings(math.radians(design.alpha_est_deg)))
@@ -141,9 +136,9 @@ def rod_and_beam(design: Design, equipment: Equipment) -> tuple[Rod, Beam]:
 def report_lines(report: DesignReport) -> Iterator[str]:
     """Yield the design, its worst error, the cost of each choice, and how the rig agrees."""
     design = report.design
-    region = report.region
+    region = report.job.region
     choices = ", ".join(_with_unit(design, name) for name in _UNITS)
-    yield f"{choices} (EI {design.rigidity_Nmm2(report.equipment):.0f} N·mm² at the base)"
+    yield f"{choices} (EI {design.rigidity_Nmm2(report.job.equipment):.0f} N·mm² at the base)"
     beta = "β {:g} to {:g}°".format(*region.beta_deg)
     alpha = "α {:g} to {:g}°".format(*region.alpha_deg)
     d_x = "d_x {:g} to {:g} mm".format(*region.d_x_mm)
@@ -158,7 +153,7 @@ def report_lines(report: DesignReport) -> Iterator[str]:
 
 def _agreement_lines(report: DesignReport) -> Iterator[str]:
     """Yield how far the expected bias is from exact mechanics at the region's corners."""
-    expected = report.expected_at(report.region.corners())
+    expected = report.expected_at(report.job.region.corners())
     difference = report.exact_percent - expected.bias_percent
     is_known = np.isfinite(difference)
     if is_known.any():
@@ -182,7 +177,7 @@ def _percent(worst: float) -> str:
 def write_design(out: Path, report: DesignReport) -> list[Path]:
     """Write design.txt, design.csv, design.png and .svg into a folder, each whole; return their
     paths."""
-    region = report.region
+    region = report.job.region
     points = region.points()
     unknown = np.full(points.shape[1], np.nan)
     with lock_output(out):
@@ -208,13 +203,13 @@ def draw(report: DesignReport) -> Figure:
     whisker."""
     figure = Figure(figsize=(8.0, 3.2), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
-    region = report.region
+    region = report.job.region
     beta_deg = np.linspace(*region.beta_deg, _SLOPES)
     d_x_mm = np.linspace(*region.d_x_mm, _PLACES)
     points = region.points(_SLOPES, _ALPHAS, _PLACES)
     designs = {"this design": report.design, "the paper's whisker": Design()}
     for panel, (title, design) in zip(panels, designs.items()):
-        error = expected_error(design, region, report.equipment, points)
+        error = expected_error(design, report.job, points)
         bound = error.bound_percent.reshape(_SLOPES, _ALPHAS, _PLACES).max(axis=1).T
         mesh = panel.pcolormesh(
             beta_deg,

@@ -10,6 +10,7 @@ from bench.commands import cli
 from bench.theory.best_design import (
     Design,
     Equipment,
+    Job,
     Region,
     best_design,
     expected_error,
@@ -21,6 +22,7 @@ from bench.theory.sample_noise import stroke_noise
 from estimator.beam import Beam
 
 REGION, EQUIPMENT, PAPER = Region((20.0, 60.0), (5.0, 15.0), (30.0, 80.0)), Equipment(), Design()
+JOB = Job(REGION, EQUIPMENT)
 HELD = {
     "theta_deg": (3.0, 3.0),
     "alpha_est_deg": (10.0, 10.0),
@@ -38,22 +40,22 @@ def test_the_bias_is_that_of_exact_mechanics(design):
     """At the region's corners to 0.5 % of d_x: what (10) leaves out is known to first order, and where β is little
     above α friction acts along the whisker, too (docs/rig.md)."""
     corners = REGION.corners()
-    predicted = expected_error(design, REGION, EQUIPMENT, corners).bias_percent
-    exact = [exact_percent(design, REGION, EQUIPMENT, corner) for corner in corners.T]
+    predicted = expected_error(design, JOB, corners).bias_percent
+    exact = [exact_percent(design, JOB, corner) for corner in corners.T]
     assert predicted == pytest.approx(exact, abs=0.5)
     assert np.ptp(exact) > 1.0
 
 
 def test_the_tilt_of_least_error_is_the_middle_of_the_slopes():
-    found, worst = best_design({**HELD, "tilt_deg": (-60.0, 60.0)}, REGION, EQUIPMENT)
+    found, worst = best_design({**HELD, "tilt_deg": (-60.0, 60.0)}, JOB)
     assert found.tilt_deg == pytest.approx(40.0, abs=0.5)
-    assert worst < 0.5 * best_design(HELD, REGION, EQUIPMENT)[1]
+    assert worst < 0.5 * best_design(HELD, JOB)[1]
 
 
 def test_the_best_is_no_worse_than_any_on_a_grid():
-    _, worst = best_design({**HELD, "alpha_est_deg": (0.0, 30.0)}, REGION, EQUIPMENT)
+    _, worst = best_design({**HELD, "alpha_est_deg": (0.0, 30.0)}, JOB)
     others = [replace(PAPER, alpha_est_deg=alpha) for alpha in np.linspace(0.0, 30.0, 61)]
-    assert worst <= min(worst_percent(other, REGION, EQUIPMENT) for other in others) + 1e-6
+    assert worst <= min(worst_percent(other, JOB) for other in others) + 1e-6
 
 
 def test_noise_of_a_stroke_goes_with_one_sample_and_the_root_of_their_number():
@@ -85,7 +87,7 @@ def test_sizes_entered_wrong_by_a_sigma_move_the_distance_by_its_sigma(length_mm
 
     def variance(**sigmas):
         equipment = Equipment(**exact | sigmas)
-        return expected_error(design, REGION, equipment, point).sigma_percent[0] ** 2
+        return expected_error(design, Job(REGION, equipment), point).sigma_percent[0] ** 2
 
     if length_mm:
         expected = variance(length_sigma_mm=length_mm) - variance()
@@ -98,32 +100,33 @@ def test_sizes_entered_wrong_by_a_sigma_move_the_distance_by_its_sigma(length_mm
 
 def test_a_drawn_wire_has_no_tolerance_of_its_making():
     rough = replace(EQUIPMENT, length_sigma_mm=5.0, diameter_sigma_mm=1.0)
-    errors = [expected_error(PAPER, REGION, one, REGION.corners()) for one in (EQUIPMENT, rough)]
+    errors = []
+    for one in (EQUIPMENT, rough):
+        errors.append(expected_error(PAPER, Job(REGION, one), REGION.corners()))
     np.testing.assert_array_equal(errors[0].sigma_percent, errors[1].sigma_percent)
 
 
 def test_what_a_wire_cannot_bear_is_no_design():
-    assert faults(PAPER, REGION, EQUIPMENT) == {}
-    assert set(faults(replace(PAPER, diameter_mm=3.0), REGION, EQUIPMENT)) == {
+    assert faults(PAPER, JOB) == {}
+    assert set(faults(replace(PAPER, diameter_mm=3.0), JOB)) == {
         "strain",
         "gauges' range",
     }
-    assert set(faults(replace(PAPER, length_mm=80.0), REGION, EQUIPMENT)) == {"length"}
+    assert set(faults(replace(PAPER, length_mm=80.0), JOB)) == {"length"}
     with pytest.raises(BadInput, match=r"no design .* gauges' range by"):
-        best_design({**HELD, "diameter_mm": (3.0, 3.0)}, REGION, EQUIPMENT)
+        best_design({**HELD, "diameter_mm": (3.0, 3.0)}, JOB)
 
 
 def test_where_10_has_no_distance_there_is_no_design():
     with pytest.raises(BadInput, match="no distance"):
         best_design(
             {**HELD, "alpha_est_deg": (50.0, 50.0)},
-            replace(REGION, beta_deg=(70.0, 80.0)),
-            EQUIPMENT,
+            Job(replace(REGION, beta_deg=(70.0, 80.0)), EQUIPMENT),
         )
 
 
 def test_what_is_written(tmp_path):
-    made = find_design({**HELD, "tilt_deg": (0.0, 60.0)}, REGION, EQUIPMENT)
+    made = find_design({**HELD, "tilt_deg": (0.0, 60.0)}, JOB)
     paths = write_design(tmp_path, made)
     assert [path.name for path in paths] == ["design.txt", "design.csv", "design.png", "design.svg"]
     text = (tmp_path / "design.txt").read_text()
