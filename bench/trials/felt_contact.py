@@ -40,32 +40,48 @@ def felt_contact(
     """
     late_rad = felt.delay_s.sigma * math.radians(result.trial.speed_deg_s or 0.0)
     late = np.array([[late_rad], [0.0]])
-    touch = FeltContact(
-        np.array([felt.touch_felt_rad.value, NAN]),
-        np.diag([felt.theta_sigma_rad**2, 0.0]),
-        np.hstack([late, np.zeros((2, _GAUGE_CAUSES))]),
-        0.0,
-    )
     stands = seen.stage_contact.stands and not whisker.beam.is_curved
     if not stands or not felt.has_moments or felt.apart:
-        return touch
+        return _touch_alone(felt, late)
     moments = np.array([felt.m_y_Nmm.value, felt.m_z_Nmm.value])
     d_x_mm = _distance_mm(result, moments, seen.beta_rad.value, whisker)
     if not math.isfinite(d_x_mm):
-        return touch
+        return _touch_alone(felt, late)
     thickness = whisker.beam.thickness(d_x_mm)
     gradient = thickness * _gradient(result.theta_rad, moments, seen.beta_rad.value)
     by_input = np.array([[-1.0, 0.0, 0.0], gradient[:3]])  # of touch and distance by θ, m_y and m_z
-    by_cause = np.zeros((_GAUGE_CAUSES, 3))
-    by_cause[: len(felt.shared_Nmm), 1:] = felt.shared_Nmm
-    inputs = np.zeros((3, 3))
-    inputs[0, 0] = felt.theta_sigma_rad**2
-    inputs[0, 1:] = inputs[1:, 0] = felt.theta_moment_covariance_at
-    inputs[1:, 1:] = felt.covariance_at
-    own = by_input @ (inputs - by_cause.T @ by_cause) @ by_input.T
+    by_cause = _inputs_by_cause(felt)
+    own = by_input @ (_input_covariance(felt) - by_cause.T @ by_cause) @ by_input.T
     own[1, 1] += _model_share(result.theta_rad, thickness) ** 2
     values = np.array([felt.touch_felt_rad.value, math.log(d_x_mm)])
     return FeltContact(values, own, np.hstack([late, by_input @ by_cause.T]), float(gradient[3]))
+
+
+def _touch_alone(felt: FeltWhisk, late: np.ndarray) -> FeltContact:
+    """Return a contact without a distance. late (2, 1): its change by one sigma of the gauges' delay."""
+    return FeltContact(
+        values=np.array([felt.touch_felt_rad.value, NAN]),
+        own=np.diag([felt.theta_sigma_rad**2, 0.0]),
+        shared=np.hstack([late, np.zeros((2, _GAUGE_CAUSES))]),
+        by_slope=0.0,
+    )
+
+
+def _inputs_by_cause(felt: FeltWhisk) -> np.ndarray:
+    """Return the changes (_GAUGE_CAUSES, 3) of θ, m_y and m_z by one sigma of each cause that all whisks share."""
+    by_cause = np.zeros((_GAUGE_CAUSES, 3))
+    by_cause[: len(felt.shared_Nmm), 1:] = felt.shared_Nmm
+    return by_cause
+
+
+def _input_covariance(felt: FeltWhisk) -> np.ndarray:
+    """Return the covariance (3, 3) of θ, m_y and m_z."""
+    inputs = np.zeros((3, 3))
+    inputs[0, 0] = felt.theta_sigma_rad**2
+    inputs[0, 1:] = felt.theta_moment_covariance_at
+    inputs[1:, 0] = felt.theta_moment_covariance_at
+    inputs[1:, 1:] = felt.covariance_at
+    return inputs
 
 
 def _distance_mm(
