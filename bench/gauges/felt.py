@@ -22,7 +22,7 @@ from vision import UNKNOWN, FrameTruth, Value
 _LEAST_FREE = 50
 # [Hz] Ahead of the converter, by the paper.
 PAPERS_FILTER_HZ = 800.0
-# Mean of the impulse response of a fourth-order Butterworth filter, times its frequency.
+# [periods] Mean of the impulse response of a fourth-order Butterworth filter, by its cut-off. Derived.
 _DELAY_CYCLES = np.sqrt(2.0) * np.sqrt(2.0 + np.sqrt(2.0)) / (2.0 * np.pi)
 # [1] One sigma of a filter's delay over it: resistors and capacitors are known to some per cent. Stated.
 _DELAY_SHARE = 0.03
@@ -182,7 +182,7 @@ def strokes_of(
 def ways_back_of(signals: Signals, trial: Trial, settings: Settings) -> list[FeltStroke | None]:
     """Return the way back after each forward stroke, run backwards; None where none was recorded.
 
-    The whisker so comes to the object. The zero is that of the free stroke after it lets go.
+    So the whisker comes to the object. The zero is that of the free stroke after it lets go.
     """
     found: list[FeltStroke | None] = []
     for where in ways_back(signals):

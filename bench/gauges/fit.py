@@ -14,8 +14,8 @@ from bench.gauges.gauge_faults import Undetermined, check_channels, check_heard
 from bench.gauges.gauge_readings import Pairs
 from bench.gauges.matrix import FROM_TRIALS, GaugeCalibration, GaugeMatrix
 
-# Below this share of the stronger direction, the weaker one is not known to the per cent that is wanted: a mount that
-# was turned by 6° instead of 90°, or one slope only.
+# [1] Below this share of the stronger direction, the weaker one is not known to the per cent that is wanted: a mount that
+# was turned by 6° instead of 90°, or one slope only. Derived.
 _LEAST_DIRECTION = 0.1
 # [rounds] In which the weights follow the coefficients: after two no estimate moves by 2e-5 of its sigma. Study:
 # bench_thresholds.py gauges.fit _ROUNDS 1 2 3 10.
@@ -201,6 +201,7 @@ def _factor(pairs: Sequence[Pairs], channel: int, roll_deg: float) -> float:
     """
     ratios = []
     for p in pairs:
-        if abs((p.roll_deg - roll_deg + 90.0) % 180.0 - 90.0) < _SQUARE_DEG:
+        off_deg = (p.roll_deg - roll_deg + 90.0) % 180.0 - 90.0  # half a turn makes no difference
+        if abs(off_deg) < _SQUARE_DEG:
             ratios.append(p.paper_moment[channel] / p.paper_volts[channel])
     return float(np.nanmean(ratios)) if np.isfinite(ratios).any() else float("nan")

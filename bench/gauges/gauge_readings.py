@@ -20,8 +20,8 @@ from estimator.signal import FeltTouch, MomentAt
 from vision import Value
 from vision.geometry import Reason, as_reason
 
-# A rod that bends is drawn towards its clamp over the bar, and friction pulls it back. How rough the bar is, is not
-# known at this stage: from nothing to 0.4, all values alike. At 3° this is 0.2 % of the moment, ± 0.1 %.
+# [1] A rod that bends is drawn towards its clamp over the bar, and friction pulls it back. How rough the bar is, is not
+# known at this stage: from nothing to 0.4, all values alike. At 3° this is 0.2 % of the moment, ± 0.1 %. Stated.
 _FRICTION = 0.2
 # [1] Standard deviation of that uniform distribution. Derived.
 _FRICTION_SIGMA = 0.4 / np.sqrt(12.0)
@@ -165,7 +165,7 @@ def pairs_of(
 
 
 def _with_stated(trial: Trial, seen: SeenWhisk) -> Trial:
-    """Return the trial with the distance and slope of a truth that is no picture's, where there is one."""
+    """Return the trial with the distance and slope that a stage states of it, where one does."""
     if not seen.has_truth:
         return trial
     d_x_mm = seen.d_x_mm
@@ -241,7 +241,7 @@ class _SeenLoads:
 def _seen_loads(
     d: Deflection, whisker: Whisker, loads_of: Callable[[WhiskerRod], Loads]
 ) -> _SeenLoads:
-    """Return the loads in the frames of a deflection, of which there is one.
+    """Return the loads in the frames of a deflection, one frame at least.
 
     loads_of: which loads of a rod. Raises ArithmeticError where no rod is bent so.
     """
