@@ -11,7 +11,6 @@ from bench.base.input_problems import in_one_status
 from bench.base.numbers import first_names
 from bench.base.settings import Seeing, Settings
 from bench.base.statuses import reason
-from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import (
     BackStroke,
@@ -25,7 +24,7 @@ from bench.records.trial_result import (
 from bench.session.angle_source import angle_source
 from bench.session.frame_times import FrameTimes, dropped
 from bench.session.session import Session
-from bench.session.signals import Signals, forward_strokes
+from bench.session.signals import forward_strokes
 from bench.session.trial import Trial
 from bench.trials.consistency import (
     check_bar_width,
@@ -40,7 +39,7 @@ from bench.trials.one_camera import by_one_camera
 from bench.trials.seeing import presets_for
 from bench.trials.seen_friction import seen_friction
 from bench.trials.trace_frames import traced_frames
-from bench.trials.trial_frames import TrialFrames
+from bench.trials.trial_frames import TrialFrames, TrialInputs
 from vision import FrameTruth, KeptFit, Smooth, TrialTruth, Value, WhiskTruth
 from vision.geometry import Reason, Refused, joined, spread
 from vision.pictures import Others
@@ -62,11 +61,7 @@ Evaluated = tuple[str, WhiskTruth]
 
 
 def see_trial(
-    session: Session,
-    trial: Trial,
-    signals: Signals,
-    calibration: SessionCalibration,
-    settings: Settings,
+    inputs: TrialInputs,
     wires: Mapping[str, Others] | None = None,
     fits: Sequence[KeptFit] = (),
 ) -> SeenTrial:
@@ -75,19 +70,16 @@ def see_trial(
     wires: by camera and name, the wires of an array's whiskers. fits: see `TrialFrames.read`. A trial that cannot be evaluated
     has whisks whose status says why.
     """
-    count = len(forward_strokes(signals))
-    if not trial.is_seen or calibration.cameras is None:
+    trial = inputs.trial
+    count = len(forward_strokes(inputs.signals))
+    if not trial.is_seen or inputs.calibration.cameras is None:
         return unseen(count, NO_PICTURES)
     if not angle_source(trial).has_zero:
         return unseen(count, NO_ZERO)
     try:
         if trial.is_traced_alone:
-            frames = traced_frames(session, trial, signals, calibration, settings)
-        else:
-            frames = TrialFrames.read(
-                session, trial, signals, calibration, settings, wires or {}, fits
-            )
-        return _see(session, trial, frames, calibration, settings)
+            return _see(inputs, traced_frames(inputs))
+        return _see(inputs, TrialFrames.read(inputs, wires or {}, fits))
     except Refused as refusal:
         return unseen(count, refusal.reason)
 
@@ -97,22 +89,18 @@ def unseen(count: int, status: Reason) -> SeenTrial:
     return SeenTrial(tuple(SeenWhisk(WhiskTruth(number), status) for number in range(count)))
 
 
-def _see(
-    session: Session,
-    trial: Trial,
-    frames: TrialFrames,
-    calibration: SessionCalibration,
-    settings: Settings,
-) -> SeenTrial:
+def _see(inputs: TrialInputs, frames: TrialFrames) -> SeenTrial:
     """Evaluate the pictures of a trial. Raise Refused where they do not suffice."""
+    trial = inputs.trial
+    settings = inputs.settings
     clock = _clock(frames.times, settings)
-    truth, whisks = _observe(frames, calibration, clock.sigma_s, settings)
+    truth, whisks = _observe(inputs, frames, clock.sigma_s)
     back = dict(zip(frames.back, truth.whisks[len(whisks) :]))
     late = check_camera_delays(whisk.delays for whisk in truth.whisks)
-    of_trial = [*_contradicted_diameters(truth, session, trial), late]
+    of_trial = [*_contradicted_diameters(truth, inputs.session, trial), late]
     damaged = _damaged_frames(frames.by_camera, frames.times)
     return SeenTrial(
-        tuple(_records(session, trial, frames, settings, whisks, of_trial)),
+        tuple(_records(inputs, frames, whisks, of_trial)),
         notes=_notes(frames),
         damaged=in_one_status(*damaged, *frames.scene.unusable),
         bar=BarLine(truth.bar_point_mm, truth.bar_direction),
@@ -128,21 +116,19 @@ def _see(
 
 
 def _records(
-    session: Session,
-    trial: Trial,
+    inputs: TrialInputs,
     frames: TrialFrames,
-    settings: Settings,
     whisks: Sequence[Evaluated],
     of_trial: Sequence[Reason],
 ) -> Iterator[SeenWhisk]:
     """Yield the records of whisks. of_trial: contradictions of the trial as a whole."""
     ends = next((whisk.ends for _, whisk in whisks if whisk.ends), {})
-    warnings = [*frames.scene.left_out.values(), check_length(ends, session.whisker)]
+    warnings = [*frames.scene.left_out.values(), check_length(ends, inputs.session.whisker)]
     for name, whisk in whisks:
         whisk = _with_angles_sigma(whisk, frames.motor_sigma_rad)
         if whisk.status:  # what the missing frames may have cost comes with their cause
             whisk = replace(whisk, status=joined(*frames.scene.unusable, whisk.status))
-        record = _whisk_of_trial(session, trial, whisk, settings, warnings, of_trial)
+        record = _whisk_of_trial(inputs, whisk, warnings, of_trial)
         yield replace(record, looked=name)
 
 
@@ -156,10 +142,8 @@ def _with_angles_sigma(whisk: WhiskTruth, sigma_rad: np.ndarray) -> WhiskTruth:
 
 
 def _whisk_of_trial(
-    session: Session,
-    trial: Trial,
+    inputs: TrialInputs,
     whisk: WhiskTruth,
-    settings: Settings,
     warnings: Iterable[Reason],
     of_trial: Iterable[Reason],
 ) -> SeenWhisk:
@@ -167,13 +151,16 @@ def _whisk_of_trial(
 
     warnings: of the recording. of_trial: contradictions of the trial as a whole.
     """
+    trial = inputs.trial
+    settings = inputs.settings
+    whisker = inputs.session.whisker
     contradictions = [*of_trial, *_whisk_contradictions(whisk, trial, settings)]
     speed_rad_s = None if trial.speed_deg_s is None else math.radians(trial.speed_deg_s)
     record = whisk_record(whisk, settings, warnings, contradictions, speed_rad_s)
     return replace(
         record,
-        friction_rad=seen_friction(record, session.whisker),
-        by_one_camera=by_one_camera(whisk, session.whisker, settings),
+        friction_rad=seen_friction(record, whisker),
+        by_one_camera=by_one_camera(whisk, whisker, settings),
     )
 
 
@@ -198,25 +185,21 @@ def _clock(times: FrameTimes, settings: Settings) -> Clock:
 
 
 def _observe(
-    frames: TrialFrames,
-    calibration: SessionCalibration,
-    clock_sigma_s: float,
-    settings: Settings,
+    inputs: TrialInputs, frames: TrialFrames, clock_sigma_s: float
 ) -> tuple[TrialTruth, list[Evaluated]]:
     """Return the truth of the trial by the first preset, and its forward whisks, each by the first
     preset that reaches the accuracy.
     """
-    observe = partial(
-        frames.observe, frames.pictures, cameras=calibration.cameras, rods=frames.rods
-    )
+    cameras = inputs.calibration.cameras
+    observe = partial(frames.observe, frames.pictures, cameras=cameras, rods=frames.rods)
     presets = []
-    for preset in presets_for(settings):
+    for preset in presets_for(inputs.settings):
         presets.append(preset.with_vision(clock_sigma_s=clock_sigma_s))
     first, *finer = presets
     truth = observe(whisks=[*frames.places, *frames.back.values()], settings=first.vision)
     whisks = [(first.name, whisk) for whisk in truth.whisks[: len(frames.places)]]
     for preset in finer:
-        whisks = _refine(observe, frames.places, whisks, preset, settings.accuracy_mm)
+        whisks = _refine(observe, frames.places, whisks, preset, inputs.settings.accuracy_mm)
     return truth, whisks
 
 

@@ -21,7 +21,7 @@ from bench.session.signals import read_signals
 from bench.session.trial import Trial
 from bench.trials.of_session import first_units
 from bench.trials.other_wires import has_lines, lines_in, write_lines
-from bench.trials.trial_frames import TrialFrames
+from bench.trials.trial_frames import TrialFrames, TrialInputs
 from bench.trials.unit import Unit
 from vision import lines_of, wire_lines
 from vision.geometry import REST_POWERS, Refused, unbent_curves
@@ -114,14 +114,9 @@ def _traced(unit: Unit) -> dict[str, RodLines]:
     vision = replace(unit.settings.seeing.vision, every_frame=1, picture_scale=1)
     cameras = unit.calibration.cameras
     try:
-        frames = TrialFrames.read(
-            unit.session,
-            unit.trial,
-            read_signals(unit.trial),
-            unit.calibration,
-            unit.settings,
-            lines_in(unit.wires),
-        )
+        signals = read_signals(unit.trial)
+        inputs = TrialInputs(unit.session, unit.trial, signals, unit.calibration, unit.settings)
+        frames = TrialFrames.read(inputs, lines_in(unit.wires))
         whisks = [*frames.places, *frames.back.values()]
         return wire_lines(frames.pictures, whisks, cameras, frames.rods, vision)
     except Refused:

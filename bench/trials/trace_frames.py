@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from bench.base.settings import Settings
-from bench.cameras.session_cameras import SessionCalibration
 from bench.session.frame_times import frame_times
 from bench.session.session import Session
 from bench.session.signals import Signals, forward_strokes
@@ -14,31 +13,28 @@ from bench.session.trial import PLACE_UNCHECKED, Trial
 from bench.trials.placed_by_board import place_by_board
 from bench.trials.stated_truth import stated_place
 from bench.trials.still_scene import StillScene
-from bench.trials.trial_frames import TrialFrames, back_frames, stated_object
+from bench.trials.trial_frames import TrialFrames, TrialInputs, back_frames, stated_object
 from vision import Trace, TrialTraces
 from vision.geometry import Axis, Cameras, Rods
 
 
-def traced_frames(
-    session: Session,
-    trial: Trial,
-    signals: Signals,
-    calibration: SessionCalibration,
-    settings: Settings,
-) -> TrialFrames:
+def traced_frames(inputs: TrialInputs) -> TrialFrames:
     """Return the frames of a trial of traces alone.
 
     Raises BadInput where traces and times do not match, Refused where nothing places the object.
     """
+    session = inputs.session
+    trial = inputs.trial
+    signals = inputs.signals
+    cameras = inputs.calibration.cameras
     times = frame_times(trial)
-    cameras = calibration.cameras
     sizes_px = {camera.name: tuple(camera.size_px) for camera in cameras}
     alone = read_traces_alone(trial, len(times), sizes_px, session.crops)
-    traces = _asked(alone.wire, settings)
+    traces = _asked(alone.wire, inputs.settings)
     points = alone.object_points
     motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
     if points:
-        asked = _asked(points, settings)
+        asked = _asked(points, inputs.settings)
         recording = TrialTraces.with_points(traces, times.time_s, motor_rad, asked)
     else:
         axis, sigma = _place(session, trial, signals, cameras)

@@ -25,6 +25,17 @@ _FEWEST_BACK = 6
 
 
 @dataclass(frozen=True, eq=False)
+class TrialInputs:
+    """All that a trial is seen with: itself and its signals, its session with the cameras, and the run's settings."""
+
+    session: Session
+    trial: Trial
+    signals: Signals
+    calibration: SessionCalibration
+    settings: Settings
+
+
+@dataclass(frozen=True, eq=False)
 class TrialFrames:
     """The frames of a trial.
 
@@ -46,14 +57,7 @@ class TrialFrames:
 
     @classmethod
     def read(
-        cls,
-        session: Session,
-        trial: Trial,
-        signals: Signals,
-        calibration: SessionCalibration,
-        settings: Settings,
-        wires: Mapping[str, Others],
-        fits: Sequence[KeptFit] = (),
+        cls, inputs: TrialInputs, wires: Mapping[str, Others], fits: Sequence[KeptFit] = ()
     ) -> "TrialFrames":
         """Read the frames of a trial.
 
@@ -61,6 +65,10 @@ class TrialFrames:
         cameras that stood a little elsewhere. Raises
         BadInput where pictures and times do not match.
         """
+        session = inputs.session
+        trial = inputs.trial
+        signals = inputs.signals
+        calibration = inputs.calibration
         times = frame_times(trial)
         by_camera = read_trial(trial, times)
         unmoved = fits[0].cameras if fits else ()  # those that had moved are in no fit
@@ -68,7 +76,7 @@ class TrialFrames:
         others, itself = _own_apart(wires, session.base.name if session.base else "")
         velocity = trial.object_velocity_mm_s
         pictures = TrialPictures(
-            _chosen_frames(scene, settings),
+            _chosen_frames(scene, inputs.settings),
             times.time_s,
             # Frames before the first or after the last sample belong to no whisk.
             np.interp(times.time_s, signals.time_s, signals.motor_rad),

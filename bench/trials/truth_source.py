@@ -13,6 +13,7 @@ from bench.session.signals import Signals
 from bench.trials.kept_fits import kept_fits
 from bench.trials.seen import see_trial
 from bench.trials.stated_truth import by_stage
+from bench.trials.trial_frames import TrialInputs
 from bench.trials.unit import Unit
 from vision.pictures import Others
 
@@ -32,10 +33,8 @@ class Pictures(TruthSource):
 
     def truth(self, unit: Unit, signals: Signals, wires: Wires) -> SeenTrial:
         """Return what the cameras show of each whisk of a trial."""
-        fits = kept_fits(unit)
-        return see_trial(
-            unit.session, unit.trial, signals, unit.calibration, unit.settings, wires, fits
-        )
+        inputs = TrialInputs(unit.session, unit.trial, signals, unit.calibration, unit.settings)
+        return see_trial(inputs, wires, kept_fits(unit))
 
 
 class Stage(Pictures):

@@ -25,7 +25,7 @@ from bench.session.session import Session, load_session
 from bench.session.signals import Signals, read_signals
 from bench.session.strokes import forward_strokes
 from bench.session.trial import Trial
-from bench.trials.trial_frames import TrialFrames
+from bench.trials.trial_frames import TrialFrames, TrialInputs
 from vision import whisker_angles
 from vision.boards import find_other_markers
 from vision.calibration import MarkerSighting, first_rig_about, marker_turns, moving_lines
@@ -193,7 +193,8 @@ def _by_whisker(task: _Task, times: FrameTimes) -> SeenTurns:
     """
     trial = task.trial
     nominal = _nominal_signals(trial)
-    frames = TrialFrames.read(task.session, trial, nominal, task.calibration, Settings(), {})
+    inputs = TrialInputs(task.session, trial, nominal, task.calibration, Settings())
+    frames = TrialFrames.read(inputs, {})
     if len(frames.places) != 1:
         found = f"{counted(len(frames.places), 'forward stroke')} in the recording, 1 is allowed"
         raise BadInput(found, file=trial.place)

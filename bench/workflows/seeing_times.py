@@ -15,6 +15,7 @@ from bench.records.trial_result import SeenTrial, TrialResult
 from bench.report.trial_figures import TrialToDraw, draw_trial
 from bench.session.signals import forward_strokes, read_signals
 from bench.trials.seen import see_trial
+from bench.trials.trial_frames import TrialInputs
 from bench.trials.unit import Unit
 from bench.workflows.live_push import ProcessorClock, RecordedPush, live_bench
 from vision import UNKNOWN, Value
@@ -47,7 +48,8 @@ def see_all(units: Sequence[Unit], settings: Settings) -> list[SeenTrial]:
     seen = []
     for unit in count_parts(units, f"{settings.seeing.name}, trials", len(units)):
         signals = read_signals(unit.trial)
-        seen.append(see_trial(unit.session, unit.trial, signals, unit.calibration, settings))
+        inputs = TrialInputs(unit.session, unit.trial, signals, unit.calibration, settings)
+        seen.append(see_trial(inputs))
     return seen
 
 

@@ -109,16 +109,18 @@ def _smooth(theta, touching, values, d_x) -> Smooth:
     )
 
 
-def see_exactly(session, trial, signals, calibration, settings, *_) -> SeenTrial:
+def see_exactly(inputs, *_) -> SeenTrial:
     """In place of `see_trial`: what perfect pictures would show, from the truth files."""
+    trial, signals = inputs.trial, inputs.signals
     strokes = forward_strokes(signals)
     time_s = read_csv(trial.folder / "truth.csv")["time_s"]
     whisks = []
     for number, stroke in enumerate(strokes):
         first, last = signals.time_s[stroke][[0, -1]]
         rows = np.flatnonzero((time_s >= first) & (time_s <= last))
-        record = whisk_record(exact_truth(trial.folder, number, rows), settings)
-        whisks.append(replace(record, friction_rad=seen_friction(record, session.whisker)))
+        record = whisk_record(exact_truth(trial.folder, number, rows), inputs.settings)
+        friction_rad = seen_friction(record, inputs.session.whisker)
+        whisks.append(replace(record, friction_rad=friction_rad))
     return SeenTrial(tuple(whisks), bar_radius_mm=3.0, wire_radius_mm=0.5)
 
 
@@ -162,9 +164,9 @@ def exact_run(steel_signals, tmp_path_factory) -> Path:
 def _see_exactly_in(monkeypatch) -> list[str]:
     looks = []
 
-    def see(session, trial, *rest):
-        looks.append(trial.name)
-        return see_exactly(session, trial, *rest)
+    def see(inputs, *rest):
+        looks.append(inputs.trial.name)
+        return see_exactly(inputs, *rest)
 
     monkeypatch.setattr("bench.trials.truth_source.see_trial", see)
     nothing = SessionCalibration(None, {}, hash_of("exact"))

@@ -17,6 +17,7 @@ from bench.session.signals import forward_strokes, read_signals
 from bench.session.trial import PLACE_UNCHECKED
 from bench.trials.seen import see_trial
 from bench.trials.stated_truth import stated_whisk
+from bench.trials.trial_frames import TrialInputs
 from tests.scenes.refusals import refusal
 from tests.scenes.traced_example import BRING, Example, csv_of_points, tracked_bar, true_axis
 from vision.geometry.rotation import apply, invert_transform
@@ -99,7 +100,8 @@ def test_traces_alone_give_the_truth(alone, points, way, tmp_path):
     assert [ability.count for ability in abilities(session)[:3]] == [1, 1, 1]
     (trial,) = session.trials
     calibration = calibrate_session(session, tmp_path / "out")
-    seen = see_trial(session, trial, read_signals(trial), calibration, Settings())
+    inputs = TrialInputs(session, trial, read_signals(trial), calibration, Settings())
+    seen = see_trial(inputs)
     drawn, *unchecked = seen.notes
     assert drawn == "the wire's lines are another program's (high, low), and no picture was read"
     assert unchecked == [PLACE_UNCHECKED] * (way != "points")

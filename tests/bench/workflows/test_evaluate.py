@@ -261,12 +261,12 @@ def test_gauge_trials_without_truth_say_what_it_lacks(
     """The verdict hangs on them: what their pictures lack stands beside what to record, and another way out."""
     seen = sys.modules["bench.trials.truth_source"].see_trial
 
-    def see(session, trial, *rest):
-        found = seen(session, trial, *rest)
+    def see(inputs, *rest):
+        found = seen(inputs, *rest)
         dark = tuple(
             seen_whisk(whisk.whisk, "the bar stands in the dark") for whisk in found.whisks
         )
-        return replace(found, whisks=dark) if trial.purpose == "gauge" else found
+        return replace(found, whisks=dark) if inputs.trial.purpose == "gauge" else found
 
     monkeypatch.setattr("bench.trials.truth_source.see_trial", see)
     for name in ("gauge_roll0", "gauge_roll90"):

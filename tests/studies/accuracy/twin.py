@@ -30,6 +30,7 @@ from bench.rig.simulation import simulate
 from bench.session.session import load_session
 from bench.session.signals import read_signals
 from bench.trials.seen import see_trial
+from bench.trials.trial_frames import TrialInputs
 
 TWIN = Path(__file__).with_name("twin.toml")
 UNITS = {"d_x": "mm", "beta": "deg", "slip": "mm"}
@@ -41,7 +42,8 @@ def errors_of(session_path: Path, out: Path) -> dict[str, list[float]]:
     calibration = calibrate_session(session, out)
     for trial in session.trials:
         truth = tomllib.loads((trial.folder / "truth.toml").read_text())
-        (seen,) = see_trial(session, trial, read_signals(trial), calibration, Settings()).whisks
+        inputs = TrialInputs(session, trial, read_signals(trial), calibration, Settings())
+        (seen,) = see_trial(inputs).whisks
         errors["d_x"].append(seen.d_x_mm.value - truth["d_x_mm"])
         errors["beta"].append(math.degrees(seen.beta_rad.value) - truth["beta_deg"])
         errors["slip"].extend(_slip_errors(seen.frames, trial.folder / "truth.csv"))
