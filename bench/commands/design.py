@@ -88,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
         if not (0 < value < float("inf") or is_exact):
             raise BadInput(f"{_option(name)} {value:g}: must be positive and finite")
     begin_step("the best design over the region")
-    from bench.theory.best_design import Equipment, Job, Region
+    from bench.theory.best_design import DesignJob, Equipment, Region
     from bench.theory.design_map import find_design, report_lines, write_design
 
     region = Region(**region_ends, bar_radius_mm=0.5 * options.bar_diameter_mm)
@@ -102,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
         options.length_sigma_mm,
         options.diameter_sigma_mm,
     )
-    report = find_design(ranges, Job(region, equipment))
+    report = find_design(ranges, DesignJob(region, equipment))
     print(*report_lines(report), *write_design(options.out, report), sep="\n")
     return DONE
 

@@ -76,7 +76,7 @@ class Equipment:
 
 
 @dataclass(frozen=True)
-class Job:
+class DesignJob:
     """What a whisker is for: the region that it is to feel, with what equipment."""
 
     region: Region
@@ -125,7 +125,7 @@ class ExpectedError:
         return np.abs(self.bias_percent) + uncertainty.Z_95 * self.sigma_percent
 
 
-def expected_error(design: Design, job: Job, points: np.ndarray) -> ExpectedError:
+def expected_error(design: Design, job: DesignJob, points: np.ndarray) -> ExpectedError:
     """Compute the error of (10) that is to be expected at points (3, n) of the region."""
     beta, alpha, d_x = points
     slope = beta - np.radians(design.tilt_deg)
@@ -224,7 +224,7 @@ def _neglected_bias(design: Design, region: Region, slope, alpha, d_x) -> Number
     return rolling + held * first_order.dragging(theta, alpha) + large_angles
 
 
-def worst_percent(design: Design, job: Job) -> float:
+def worst_percent(design: Design, job: DesignJob) -> float:
     """Return the figure that a search minimises: the largest |bias| + 1.96 sigma over the region, %.
 
     A thousandth of the mean is added, so that it falls everywhere; it is beyond a million where
@@ -237,12 +237,12 @@ def worst_percent(design: Design, job: Job) -> float:
     return float(np.minimum(bound.max(), _NO_DESIGN) + 1e-3 * np.minimum(bound, 1e3).mean())
 
 
-def largest_percent(design: Design, job: Job) -> float:
+def largest_percent(design: Design, job: DesignJob) -> float:
     """Return the largest |bias| + 1.96 sigma over the region, %."""
     return float(expected_error(design, job, job.region.points()).bound_percent.max())
 
 
-def faults(design: Design, job: Job) -> dict[str, float]:
+def faults(design: Design, job: DesignJob) -> dict[str, float]:
     """Return by how much, as a share, a design exceeds the whisker's reach, its strain or the gauges'
     range; empty where it exceeds none."""
     equipment = job.equipment
@@ -262,7 +262,7 @@ def faults(design: Design, job: Job) -> dict[str, float]:
     return {name: share - 1.0 for name, share in shares.items() if share > 1.0}
 
 
-def best_design(ranges: Mapping[str, tuple[float, float]], job: Job) -> tuple[Design, float]:
+def best_design(ranges: Mapping[str, tuple[float, float]], job: DesignJob) -> tuple[Design, float]:
     """Find the design of least worst error within ranges (low, high) of each of NAMES.
 
     Returns it and that error in %. A drawn wire, which has no tolerance of a taper, is searched by
@@ -279,7 +279,7 @@ def best_design(ranges: Mapping[str, tuple[float, float]], job: Job) -> tuple[De
     return design, largest_percent(design, job)
 
 
-def _best_of_one_making(ranges: Mapping[str, tuple[float, float]], job: Job) -> Design:
+def _best_of_one_making(ranges: Mapping[str, tuple[float, float]], job: DesignJob) -> Design:
     """Find the design of least worst error within ranges over which that changes steadily."""
     design = Design(**{name: low for name, (low, _) in ranges.items()})
     free = _free(ranges)
@@ -333,7 +333,7 @@ def _with_values(design: Design, names: Sequence[str], values: np.ndarray) -> De
     return replace(design, **dict(zip(names, map(float, values))))
 
 
-def _require_design(design: Design, job: Job) -> None:
+def _require_design(design: Design, job: DesignJob) -> None:
     """Raise BadInput where the best design of some ranges does not serve the region."""
     if worst_percent(design, job) < _NO_DESIGN:
         return
@@ -345,7 +345,9 @@ def _require_design(design: Design, job: Job) -> None:
     raise BadInput(f"no design within the ranges serves the whole region: {why}")
 
 
-def costs_of_paper_values(ranges: Mapping[str, tuple[float, float]], job: Job) -> dict[str, float]:
+def costs_of_paper_values(
+    ranges: Mapping[str, tuple[float, float]], job: DesignJob
+) -> dict[str, float]:
     """Return the worst error of the best design with the paper's value of each free choice, %.
 
     It is infinite where there is no such design.

@@ -16,9 +16,9 @@ from bench.base.tables import Column, Table
 from bench.rig.elastic_rod import Rod
 from bench.theory.best_design import (
     Design,
+    DesignJob,
     Equipment,
     ExpectedError,
-    Job,
     best_design,
     costs_of_paper_values,
     expected_error,
@@ -69,7 +69,7 @@ class DesignReport:
 
     design: Design
     worst_percent: float
-    job: Job
+    job: DesignJob
     exact_percent: np.ndarray
     costs_percent: Mapping[str, float]
     paper_percent: float
@@ -79,7 +79,7 @@ class DesignReport:
         return expected_error(self.design, self.job, points)
 
 
-def find_design(ranges: Mapping[str, tuple[float, float]], job: Job) -> DesignReport:
+def find_design(ranges: Mapping[str, tuple[float, float]], job: DesignJob) -> DesignReport:
     """Find the best design within ranges (low, high) of each choice.
 
     Raises BadInput where no design within the ranges serves the region.
@@ -96,7 +96,7 @@ def find_design(ranges: Mapping[str, tuple[float, float]], job: Job) -> DesignRe
     return DesignReport(design, worst, job, np.array(exact), costs, paper_percent)
 
 
-def exact_percent(design: Design, job: Job, point: Sequence[float]) -> float:
+def exact_percent(design: Design, job: DesignJob, point: Sequence[float]) -> float:
     """Return the error of (10) without noise at one place by the rig's exact mechanics, % of d_x.
 
     point: slope and friction angle, rad, and distance, mm. NaN where the whisker finds no hold or

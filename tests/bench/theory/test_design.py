@@ -9,8 +9,8 @@ from bench.base.errors import BadInput
 from bench.commands import cli
 from bench.theory.best_design import (
     Design,
+    DesignJob,
     Equipment,
-    Job,
     Region,
     best_design,
     expected_error,
@@ -22,7 +22,7 @@ from bench.theory.sample_noise import stroke_noise
 from estimator.beam import Beam
 
 REGION, EQUIPMENT, PAPER = Region((20.0, 60.0), (5.0, 15.0), (30.0, 80.0)), Equipment(), Design()
-JOB = Job(REGION, EQUIPMENT)
+JOB = DesignJob(REGION, EQUIPMENT)
 HELD = {
     "theta_deg": (3.0, 3.0),
     "alpha_est_deg": (10.0, 10.0),
@@ -87,7 +87,7 @@ def test_sizes_entered_wrong_by_a_sigma_move_the_distance_by_its_sigma(length_mm
 
     def variance(**sigmas):
         equipment = Equipment(**exact | sigmas)
-        return expected_error(design, Job(REGION, equipment), point).sigma_percent[0] ** 2
+        return expected_error(design, DesignJob(REGION, equipment), point).sigma_percent[0] ** 2
 
     if length_mm:
         expected = variance(length_sigma_mm=length_mm) - variance()
@@ -102,7 +102,7 @@ def test_a_drawn_wire_has_no_tolerance_of_its_making():
     rough = replace(EQUIPMENT, length_sigma_mm=5.0, diameter_sigma_mm=1.0)
     errors = []
     for one in (EQUIPMENT, rough):
-        errors.append(expected_error(PAPER, Job(REGION, one), REGION.corners()))
+        errors.append(expected_error(PAPER, DesignJob(REGION, one), REGION.corners()))
     np.testing.assert_array_equal(errors[0].sigma_percent, errors[1].sigma_percent)
 
 
@@ -121,7 +121,7 @@ def test_where_10_has_no_distance_there_is_no_design():
     with pytest.raises(BadInput, match="no distance"):
         best_design(
             {**HELD, "alpha_est_deg": (50.0, 50.0)},
-            Job(replace(REGION, beta_deg=(70.0, 80.0)), EQUIPMENT),
+            DesignJob(replace(REGION, beta_deg=(70.0, 80.0)), EQUIPMENT),
         )
 
 

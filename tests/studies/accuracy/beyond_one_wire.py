@@ -23,7 +23,7 @@ from bench.gauges.clamped_rod import load_at_clamp
 from bench.rig import protocol
 from bench.rig.simulation import simulate
 from bench.session.session import load_session
-from bench.theory.best_design import Design, Equipment, Job, Region, expected_error
+from bench.theory.best_design import Design, DesignJob, Equipment, Region, expected_error
 from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings, Whisk
@@ -159,7 +159,7 @@ def design(_folder: Path) -> Iterator[str]:
     cone = Design(1.97, 6.5, 2.0, 85.0, 0.98, 40.0)
     for sigmas_mm in ((0.0, 0.0), (1.0, 0.0), (0.5, 0.02)):
         equipment = Equipment(length_sigma_mm=sigmas_mm[0], diameter_sigma_mm=sigmas_mm[1])
-        sigma = expected_error(cone, Job(region, equipment), place).sigma_percent[0]
+        sigma = expected_error(cone, DesignJob(region, equipment), place).sigma_percent[0]
         told = "length ± {:g} mm, diameters ± {:g} mm".format(*sigmas_mm)
         yield f"{told}: d_x of 80 mm ± {0.8 * sigma:.2f} mm"
 

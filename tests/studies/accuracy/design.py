@@ -32,7 +32,14 @@ from bench.rig.protocol_tables import (
 )
 from bench.rig.recording import Recording
 from bench.session.signals import Signals
-from bench.theory.best_design import Design, Equipment, Job, Region, best_design, expected_error
+from bench.theory.best_design import (
+    Design,
+    DesignJob,
+    Equipment,
+    Region,
+    best_design,
+    expected_error,
+)
 from bench.theory.design_map import rod_and_beam
 from bench.trials.readout import Readout, whisk_at
 from estimator.builtin import with_friction
@@ -114,7 +121,7 @@ def _felt(design: Design, recording: Recording) -> float:
 def rows(design: Design, region: Region, whisks: int, rng: np.random.Generator) -> Iterator[tuple]:
     """(corner, expected bias, mean error, expected sigma, scatter), % of d_x."""
     corners = region.corners()
-    told = expected_error(design, Job(region, EQUIPMENT), corners)
+    told = expected_error(design, DesignJob(region, EQUIPMENT), corners)
     for corner, bias, sigma in zip(corners.T, told.bias_percent, told.sigma_percent):
         found = errors_percent(design, region, corner, whisks, rng)
         yield corner, bias, found.mean(), sigma, found.std(ddof=1)
@@ -132,7 +139,8 @@ def main() -> None:
         (
             region,
             best_design(
-                {**RANGES, "length_mm": (1.05 * region.d_x_mm[1], 150.0)}, Job(region, EQUIPMENT)
+                {**RANGES, "length_mm": (1.05 * region.d_x_mm[1], 150.0)},
+                DesignJob(region, EQUIPMENT),
             ),
         )
         for region in REGIONS
