@@ -31,7 +31,7 @@ _LEAST_FRAMES = 3
 _FIRST_RAD = np.radians(0.5)
 # [1] Of the slope of a slip that never rests, σ/θ: below it the contact rests. Stated.
 _REST_SHARE = 0.5
-# [frames] Intervals that a jump takes at most. Stated.
+# [intervals] Between frames, that a jump takes at most. Stated.
 _LONGEST_JUMP = 2
 # [sigma] By which the slope of a rest and that of free slip differ at least. Stated.
 _SIGMAS = 3.0
