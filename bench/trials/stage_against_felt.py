@@ -33,9 +33,11 @@ _FEWEST_TO_NAME = 3
 MOST_SIGMAS = -float(ndtri(0.5 * LEAST_CHANCE))
 # [1] Of χ²: causes that explain less well by as much, two sigma, are named, too. Stated.
 _AS_GOOD = 4.0
-# [mm, °, %] Errors up to which touch and distance go in proportion to them, to a third. Stated.
+# [mm] Errors up to which touch and distance go in proportion to them, to a third. Stated.
 _LARGEST_MM = 20.0
+# [°] The same of a slope. Stated.
 _LARGEST_DEG = 20.0
+# [%] The same of the moments' scale. Stated.
 _LARGEST_PERCENT = 50.0
 # Where none of these would do.
 _UNEXPLAINED = "neither place nor slope were to blame: look at the moments and their gauges"
