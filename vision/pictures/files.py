@@ -98,7 +98,9 @@ def read_picture(path: Path | PicturePart) -> np.ndarray | None:
     """
     if isinstance(path, PicturePart):
         whole = read_picture(path.path)
-        return None if whole is None else path.crop.cut(whole)
+        if whole is None:
+            return None
+        return path.crop.cut(whole, f"{path.path.parent.name}/{path.name}")
     if not path.is_file() or not 0 < path.stat().st_size <= _MOST_BYTES:
         return None
     data = np.fromfile(path, dtype=np.uint8)

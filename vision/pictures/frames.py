@@ -151,7 +151,8 @@ class CroppedFrames(Frames):
     ) -> Iterator[tuple[int, np.ndarray | None]]:
         """Yield the part of each frame."""
         for index, grey in frames:
-            yield index, None if grey is None else self._crop.cut(grey)
+            label = f"frame {index} of {self.path.name}"
+            yield index, None if grey is None else self._crop.cut(grey, label)
 
 
 class _OneByOne(Frames):

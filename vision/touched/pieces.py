@@ -29,6 +29,8 @@ ARM_MM = 20.0
 _INNER_SHARE = 0.72
 # [points] Along the bar's predicted outline. A layout.
 _STATIONS = 200
+# [stations] Fewer have no direction. Derived.
+_FEWEST_STATIONS = 2
 # [1] Least share of a piece's pixels in the picture. 0.25 to 0.75 move nothing on the fixtures.
 # Study: thresholds.py touched.pieces _LEAST_IN_PICTURE ….
 _LEAST_IN_PICTURE = 0.5
@@ -80,19 +82,23 @@ def bar_pieces(
 
 
 def _read_bar_band(view: View, axis: BarAxis, radius_mm: float, settings: VisionSettings) -> Band:
-    """Read the band along the bar.
+    """Read the band along the bar, where that lies before the camera and is no wider than the picture.
 
     Raises Refused where no part of it lies before the camera, or the bar would pass through that.
     """
     reach_mm = settings.bar_reach_mm
     middle, radius = axis.outline(view.camera, radius_mm, reach_mm, _STATIONS)
-    if not np.any(radius > 0.0):  # inside the bar 0, behind the camera NaN
+    # Inside the bar the radius is 0, behind the camera NaN.
+    is_before = (radius > 0.0) & (radius < max(view.mean.shape))
+    if np.sum(is_before) < _FEWEST_STATIONS:
         raise Refused(
             f"camera {view.camera.name} would have the bar behind or about it: check T_camera_rig",
             code="bar_behind_camera",
         )
-    half = int(np.ceil(np.nanmax(radius))) + settings.bar_margin_px
-    place = np.linspace(-reach_mm, reach_mm, _STATIONS)
+    middle = middle[is_before]
+    radius = radius[is_before]
+    place = np.linspace(-reach_mm, reach_mm, _STATIONS)[is_before]
+    half = int(np.ceil(np.max(radius))) + settings.bar_margin_px
     return read_band(view.mean, view.background, middle, place, radius, half)
 
 

@@ -49,6 +49,19 @@ def test_a_bar_about_a_camera_is_refused():
     assert refused.value.code == "bar_behind_camera"
 
 
+def test_a_bar_that_comes_from_behind_a_camera_ends_no_run():
+    """Its picture widens without end where it passes the camera: no such part is read, and here nothing is left."""
+    camera = two_cameras()["high"]
+    width, height = camera.size_px
+    grey = np.full((height, width), 100.0)
+    view = View(camera, {0: grey}, grey, Noise(1.0, 0.0))
+    forward = camera.T_camera_rig[2, :3]
+    beside_mm = 20.0 * camera.T_camera_rig[0, :3]
+    through = BarAxis(camera.centre_mm + beside_mm + 60.0 * forward, forward)
+    settings = VisionSettings(bar_reach_mm=100.0)
+    assert len(bar_pieces(view, view.noise, through, 3.0, [], settings)) == 0
+
+
 def test_a_bar_about_a_camera_does_not_end_the_search():
     """Of an empty bench each view has no candidate; that axis refused the whole recording."""
     cameras = two_cameras()
