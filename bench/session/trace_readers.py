@@ -134,7 +134,7 @@ def _own_or_deeplabcut(path: Path, label: str) -> DrawnLines:
     require_columns(table, names, label)
     extra = set(table.columns) - {*names, "sigma_px", "line"}
     if extra:
-        found = f"column {min(extra)} is none of frame,u_px,v_px,sigma_px,line"
+        found = f"column {min(extra)!r} is none of frame,u_px,v_px,sigma_px,line"
         raise BadInput(found, file=label, row=1)
     unknown = np.full(len(table), np.nan)
     sigma_px = table.columns.get("sigma_px", unknown)

@@ -377,7 +377,7 @@ def test_a_trace_of_other_pictures_is_refused_in_a_line(traced, spoil, said):
     [
         ("frame,x,y", "column u_px is missing"),
         ("time_s,u_px,v_px", "column frame is missing"),
-        ("frame,u_px,v_px,score", "column score is none of frame,u_px,v_px,sigma_px,line"),
+        ("frame,u_px,v_px,score", "column 'score' is none of frame,u_px,v_px,sigma_px,line"),
     ],
 )
 def test_wrong_columns_are_named(traced, head, said):
