@@ -35,7 +35,7 @@ def _as_webp(path: Path) -> bytes:
         scale = min(1.0, width / whole.width)
         size = (round(scale * whole.width), round(scale * whole.height))
         buffer = io.BytesIO()
-        whole.resize(size, Image.Resampling.LANCZOS).save(
+        whole.resize(size, Image.Resampling.HAMMING).save(
             buffer, "WEBP", quality=_QUALITY, method=2
         )
         if buffer.tell() <= MOST_BYTES:
