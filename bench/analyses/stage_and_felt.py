@@ -4,10 +4,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
-from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
+from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.cells import value_cells
+from bench.analyses.stage_and_pictures import STAGE
 from bench.base.tables import TRIAL, WHISK, Column, Table, with_sigma
 from bench.trials.stage_against_felt import Comparison, X, Y, Z, compare
 from vision import Value
@@ -51,7 +50,7 @@ class StageAndFelt(Analysis):
 
     tables = (STAGE_AND_FELT,)
     in_every_run = False
-    heading = Heading("stage", "The stage against pictures and what is felt (± one sigma)")
+    heading = STAGE
 
     def compute(self, run: EvaluatedRun) -> StageHeld:
         """Return every whisk that is both stated and felt."""
@@ -83,13 +82,12 @@ class StageAndFelt(Analysis):
 def _held_against(comparison: Comparison, number: int) -> HeldAgainst:
     """Return a whisk of the comparison."""
     one = comparison.held[number]
-    touch_rad, log = comparison.apart_from_others(number)
-    d_x_mm = one.seen.d_x_mm.value
+    touch_rad, d_x_mm = comparison.apart_from_others(number)
     return HeldAgainst(
         one.trial,
         one.number,
         touch_rad,
-        Value(log.value * d_x_mm, log.sigma * d_x_mm),
+        d_x_mm,
         comparison.least_noticed(X, number),
         comparison.least_noticed(Z, number),
     )
@@ -102,14 +100,9 @@ def _row(one: HeldAgainst) -> dict:
         "whisk": one.whisk,
         **value_cells("touch_apart_deg", one.touch_rad),
         **value_cells("d_x_apart_mm", one.d_x_mm),
-        "least_along_mm": _finite(one.least_along_mm),
-        "least_upward_mm": _finite(one.least_upward_mm),
+        "least_along_mm": one.least_along_mm,
+        "least_upward_mm": one.least_upward_mm,
     }
-
-
-def _finite(number: float) -> float:
-    """Return a number, NaN for an infinite one."""
-    return number if math.isfinite(number) else np.nan
 
 
 def _mm(least_mm: float) -> str:

@@ -11,6 +11,7 @@ from bench.records.trial_result import PicturedContact, SeenWhisk, whisks
 from vision import Value
 from vision.geometry import counted
 
+STAGE = Heading("stage", "The stage against pictures and what is felt (± one sigma)")
 STAGE_AND_PICTURES = Table(
     "stage_and_pictures",
     "A row a whisk whose truth is a stage's and which pictures show, too.",
@@ -56,7 +57,7 @@ class StageAndPictures(Analysis):
 
     tables = (STAGE_AND_PICTURES,)
     in_every_run = False
-    heading = Heading("stage", "The stage against pictures and what is felt (± one sigma)")
+    heading = STAGE
 
     def compute(self, run: EvaluatedRun) -> list[Compared]:
         """Return every whisk that both know."""

@@ -176,6 +176,7 @@ _TABLE = (
         WARNING,
         "compare stage.csv or point_mm with those of its neighbours, and its unit and axes",
         sentence="felt elsewhere than the stage says, by the other whisks: {apart}; as if {causes}",
+        reaches=(TRUTH,),
     ),
     Status(
         "stage_unlike_all_felt",

@@ -114,7 +114,7 @@ class Table:
         self.write_file(folder / self.file, rows)
 
     def write_file(self, path: Path, rows: Iterable[dict]) -> None:
-        """Write the table under any name. None and NaN are empty cells.
+        """Write the table under any name. None, NaN and infinity are empty cells.
 
         Our sentences are written in ASCII: spreadsheets take a file without a byte-order mark for
         another encoding, and other readers take the mark for a part of the first column's name.

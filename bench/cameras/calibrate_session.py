@@ -69,7 +69,7 @@ def calibrate_cameras_command(
     loaded = load_session(session, lenses_known=lenses is not None, follow_links=follow_links)
     file = _CameraFile(out, loaded, file_format)
     if lenses is None:
-        return file.write(_calibrate_by_boards(loaded, file))
+        return file.write(_calibrate_by_boards(file))
     cameras = place_imported(loaded, lenses, names)
     file.lines.append(f"lenses of {', '.join(cameras.names)} as in {lenses.name}, taken as exact")
     if not loaded.is_rig_placed:
@@ -115,8 +115,9 @@ class _CameraFile:
         return print_written(self.lines, self.warnings, written)
 
 
-def _calibrate_by_boards(session: Session, file: _CameraFile) -> Cameras:
+def _calibrate_by_boards(file: _CameraFile) -> Cameras:
     """Return the cameras by the session's board views; add to the file's lines what they rest on."""
+    session = file.session
     views = read_board_views(session)
     calibration = calibrate_from(session, views)
     cameras = moved_by_file(session, calibration.cameras)

@@ -1,6 +1,6 @@
 """What a recording can give, by the files and keys of its session, and what one thing more would give."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
 from typing import Self
 
@@ -30,7 +30,7 @@ class Ability:
     missing: str = ""
 
     @classmethod
-    def of_trials(cls, quantity: str, able: Sequence[Trial], of: int, missing: str) -> Self:
+    def of_trials(cls, quantity: str, able: Sized, of: int, missing: str) -> Self:
         """Return the row of a quantity. missing: what gives it to the trials that are not able to."""
         return cls(quantity, len(able), of, "" if len(able) == of else missing)
 
@@ -82,11 +82,11 @@ def _of_gauges(lacks: Sequence[str], *, has_gauges: bool) -> Iterator[Ability]:
 
     lacks: what pictures of each of them need more.
     """
-    usable = lacks.count("")
+    usable = [lack for lack in lacks if not lack]
     of = max(len(lacks), _FEWEST_GAUGE_TRIALS)
     if lacks or not has_gauges:
         missing = _first(lacks) or "gauge trials in two positions of the follicle"
-        yield Ability("gauges", usable, of, "" if usable == of else missing)
+        yield Ability.of_trials("gauges", usable, of, missing)
 
 
 def _is_stated(trial: Trial) -> bool:

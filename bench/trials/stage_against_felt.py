@@ -131,14 +131,16 @@ class Comparison:
         return Value(float(weighted @ self.apart) / information, information**-0.5)
 
     def apart_from_others(self, number: int) -> tuple[Value, Value]:
-        """Return felt less stated of a whisk less what the others predict: touch, rad, and log d_x."""
+        """Return felt less stated of a whisk less what the others predict: touch, rad, and d_x, mm."""
         rows = self._of(number)
         covariance = np.linalg.inv(self._information[np.ix_(rows, rows)])
         values = covariance @ (self._information @ self.apart)[rows]
         found = [UNKNOWN, UNKNOWN]
         for kind, value, variance in zip(self._kind[rows], values, np.diag(covariance)):
             found[kind] = Value(float(value), math.sqrt(variance))
-        return found[_TOUCH], found[_DISTANCE]
+        d_x_mm = self.held[number].seen.d_x_mm.value
+        log = found[_DISTANCE]
+        return found[_TOUCH], Value(log.value * d_x_mm, log.sigma * d_x_mm)
 
     def of_place(self, axis: int, number: int | None = None) -> np.ndarray:
         """Return the trace (n,) of an offset by `axis` of one whisk's place or direction, or of all."""
@@ -243,11 +245,10 @@ def _key(one: HeldWhisk) -> tuple[str, int]:
 
 def _reason_of(comparison: Comparison, number: int, causes: str) -> Reason:
     """Return how a whisk differs from what its stage states, as the others have it."""
-    touch, log = comparison.apart_from_others(number)
+    touch, d_x_mm = comparison.apart_from_others(number)
     parts = []
     if touch.is_known:
         parts.append(f"touch by {touch.in_degrees().value:+.2f} ± {touch.in_degrees().sigma:.2f}°")
-    if log.is_known:
-        d_x_mm = comparison.held[number].seen.d_x_mm.value
-        parts.append(f"d_x by {log.value * d_x_mm:+.2f} ± {log.sigma * d_x_mm:.2f} mm")
+    if d_x_mm.is_known:
+        parts.append(f"d_x by {d_x_mm.value:+.2f} ± {d_x_mm.sigma:.2f} mm")
     return reason("stage_unlike_felt", apart=", ".join(parts), causes=causes)

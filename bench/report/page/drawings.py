@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 
 from bench.analyses.analysis import EvaluatedRun
 from bench.base.drawing import style, svg_of
-from bench.report.page.words import WhiskRow, by_whisk
+from bench.report.page.words import WhiskRow, by_whisk, whisk_name
 from bench.report.run_facts import RunRecord
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def inside(figure: "Figure", name: str, alt: str, rows: Sequence[WhiskRow]) -> M
         number = int(found[2])
         row = at.get((trial, number))
         if row is None:
-            return f"<a><title>{escape(trial)}, whisk {number}</title>"
+            return f"<a><title>{escape(whisk_name(trial, number))}</title>"
         which = f'href="#{row.key}" class="mark" data-w="{row.key}"'
         return f"<a {which}><title>{escape(row.name)}</title>"
 

@@ -36,7 +36,12 @@ class WhiskRow:
     @property
     def name(self) -> str:
         """Return the trial, and the whisk's number where it is not the first."""
-        return self.trial + (f", whisk {self.seen.whisk}" if self.seen.whisk else "")
+        return whisk_name(self.trial, self.seen.whisk)
+
+
+def whisk_name(trial: str, number: int) -> str:
+    """Return the trial, and the whisk's number where it is not the first."""
+    return f"{trial}, whisk {number}" if number else trial
 
 
 def rows_of(results: Iterable[TrialResult]) -> list[WhiskRow]:

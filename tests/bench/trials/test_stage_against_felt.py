@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.base.statuses import TRUTH, reaching
 from bench.records.trial_result import FeltWhisk, StageContact
 from bench.session.whisker import Whisker
 from bench.trials.stage_against_felt import compare, with_stage_against_felt
@@ -81,7 +82,9 @@ def named(found) -> dict[str, str]:
     """Return what is said of the whisks that are named, by trial."""
     compared = with_stage_against_felt(found, WHISKER)
     whisks = {one.trial.name: one.seen.whisks[0] for one in compared}
-    return {name: str(whisk.status) for name, whisk in whisks.items() if whisk.contradicted}
+    found = {name: whisk.status for name, whisk in whisks.items() if whisk.contradicted}
+    assert all(reaching((TRUTH,), status) for status in found.values())
+    return {name: str(status) for name, status in found.items()}
 
 
 @pytest.mark.parametrize(
