@@ -80,6 +80,13 @@ class HeldWhisk:
         zero = np.array([[_ZERO_RAD], [0.0]])
         return np.hstack([self.by_offset * self.stage.shared, self.felt.shared, zero])
 
+    @property
+    def is_known(self) -> np.ndarray:
+        """Return which of touch and distance (2,) are known, with all their errors."""
+        variances = np.diag(self.own)
+        errors = np.column_stack([self.apart, variances, self.shared, self.by_offset])
+        return np.isfinite(errors).all(axis=1)
+
 
 @dataclass(frozen=True, eq=False)
 class Suspect:
@@ -100,7 +107,7 @@ class Comparison:
         """Take the whisks."""
         self.held = tuple(held)
         apart = np.array([one.apart for one in held]).reshape(-1, 2)
-        known = np.isfinite(apart)
+        known = np.array([one.is_known for one in held], dtype=bool).reshape(-1, 2)
         self._whisk, self._kind = np.nonzero(known)  # (n,) of each row
         self.apart = apart[known]
         of_all = [one.by_offset for one in held]
@@ -196,7 +203,7 @@ def compare(results: Iterable[TrialResult], whisker: Whisker) -> Comparison:
             continue
         contact = felt_contact(result, seen, felt, whisker)
         one = HeldWhisk(result.trial.name, seen.whisk, seen, seen.stage_contact, contact)
-        if np.isfinite(one.apart).any():
+        if one.is_known.any():
             held.append(one)
     return Comparison(held)
 

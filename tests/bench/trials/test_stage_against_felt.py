@@ -109,6 +109,16 @@ def test_the_place_that_is_off_is_named_with_its_size(off_mm, axis):
     assert float(size.group(1)) == pytest.approx(max(off_mm), rel=0.1)
 
 
+@pytest.mark.parametrize("part", ["by_offset", "own", "shared"])
+def test_a_whisk_whose_errors_are_unknown_hides_no_other(part):
+    found = results([(0.0, 0.0, 0.0), (1.5, 0.0, 0.0)])
+    seen = found[0].seen.whisks[0]
+    stage = seen.stage_contact
+    stage = replace(stage, **{part: np.full_like(getattr(stage, part), math.nan)})
+    found[0] = trial_result([replace(seen, stage_contact=stage)], found[0].felt.whisks, name="t0")
+    assert list(named(found)) == ["t1"]
+
+
 def test_two_places_that_are_off_are_both_named():
     assert set(named(results([(0.0, 4.0, 0.0), (0.0, 0.0, 0.0), (0.0, -6.0, 0.0)]))) == {"t0", "t2"}
 
