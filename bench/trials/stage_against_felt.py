@@ -13,6 +13,7 @@ where a scale or a zero is not. No truth is moved by what is felt: a whisk that 
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import ndtri
@@ -61,20 +62,20 @@ class HeldWhisk:
         """Return felt less stated (2,): touch, rad, and logarithm of d_x; NaN where unknown."""
         return self.felt.values - [self.stage.motor_rad, math.log(self.seen.d_x_mm.value)]
 
-    @property
+    @cached_property
     def by_offset(self) -> np.ndarray:
         """Return the change (2, p) of that with each offset of what is stated."""
         touch, d_x, slope = self.stage.by_offset
         by_distance = self.felt.by_slope * slope - d_x / self.seen.d_x_mm.value
         return np.stack([-touch, by_distance])
 
-    @property
+    @cached_property
     def own(self) -> np.ndarray:
         """Return the covariance (2, 2) by what is this whisk's own."""
         by_stage = self.by_offset * self.stage.own
         return self.felt.own + by_stage @ by_stage.T
 
-    @property
+    @cached_property
     def shared(self) -> np.ndarray:
         """Return the changes (2, q) by one sigma of each error that all whisks share."""
         zero = np.array([[_ZERO_RAD], [0.0]])
@@ -119,6 +120,7 @@ class Comparison:
             kinds = self._kind[rows]
             covariance[np.ix_(rows, rows)] += one.own[np.ix_(kinds, kinds)]
         self._information = np.linalg.inv(covariance)
+        self._weighted = self._information @ self.apart
 
     def _rows(self, of_whisks: Sequence[np.ndarray]) -> np.ndarray:
         """Return the rows (n, p) of arrays (2, p) of all whisks."""
@@ -131,17 +133,18 @@ class Comparison:
 
     def size(self, trace: np.ndarray) -> Value:
         """Return how much of an error of this trace (n,) there is, per unit; UNKNOWN where none would show."""
-        weighted = self._information @ trace
-        information = float(weighted @ trace)
+        rows = np.flatnonzero(trace)
+        of_rows = trace[rows]
+        information = float(of_rows @ self._information[np.ix_(rows, rows)] @ of_rows)
         if information <= 0.0:
             return UNKNOWN
-        return Value(float(weighted @ self.apart) / information, information**-0.5)
+        return Value(float(of_rows @ self._weighted[rows]) / information, information**-0.5)
 
     def apart_from_others(self, number: int) -> tuple[Value, Value]:
         """Return felt less stated of a whisk less what the others predict: touch, rad, and d_x, mm."""
         rows = self._of(number)
         covariance = np.linalg.inv(self._information[np.ix_(rows, rows)])
-        values = covariance @ (self._information @ self.apart)[rows]
+        values = covariance @ self._weighted[rows]
         found = [UNKNOWN, UNKNOWN]
         for kind, value, variance in zip(self._kind[rows], values, np.diag(covariance)):
             found[kind] = Value(float(value), math.sqrt(variance))
