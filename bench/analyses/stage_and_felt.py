@@ -8,7 +8,8 @@ from bench.analyses.analysis import Analysis, EvaluatedRun
 from bench.analyses.cells import value_cells
 from bench.analyses.stage_and_pictures import STAGE
 from bench.base.tables import TRIAL, WHISK, Column, Table, with_sigma
-from bench.trials.stage_against_felt import Comparison, X, Y, Z, compare
+from bench.trials.stage_against_felt import Comparison, compare
+from bench.trials.stage_contact import X, Y, Z
 from vision import Value
 
 STAGE_AND_FELT = Table(
@@ -84,8 +85,7 @@ def _held_against(comparison: Comparison, number: int) -> HeldAgainst:
     one = comparison.held[number]
     touch_rad, d_x_mm = comparison.apart_from_others(number)
     return HeldAgainst(
-        one.trial,
-        one.number,
+        *one.key,
         touch_rad,
         d_x_mm,
         comparison.least_noticed(X, number),

@@ -23,6 +23,7 @@ from bench.records.trial_result import SeenWhisk, StageContact, TrialResult, whi
 from bench.session.whisker import Whisker
 from bench.trials.differences import LEAST_CHANCE
 from bench.trials.felt_contact import FeltContact, felt_contact
+from bench.trials.stage_contact import SLOPE, X, Y, Z
 from vision import UNKNOWN, Value
 from vision.geometry import NO_REASON, Reason
 
@@ -42,20 +43,26 @@ _LARGEST_DEG = 20.0
 _LARGEST_PERCENT = 50.0
 # Where none of these would do.
 _UNEXPLAINED = "neither place nor slope were to blame: look at the moments and their gauges"
-# Places in `Offsets.vector`.
-X, Y, Z, SLOPE = range(4)
 _TOUCH, _DISTANCE = range(2)
 
 
 @dataclass(frozen=True, eq=False)
 class HeldWhisk:
-    """A whisk, by trial and number, as a stage states it and as it is felt."""
+    """A whisk of a trial as a stage states it and as it is felt."""
 
     trial: str
-    number: int
     seen: SeenWhisk
-    stage: StageContact
     felt: FeltContact
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Return trial and number."""
+        return self.trial, self.seen.whisk
+
+    @property
+    def stage(self) -> StageContact:
+        """Return the contact as it is stated."""
+        return self.seen.stage_contact
 
     @property
     def apart(self) -> np.ndarray:
@@ -164,24 +171,27 @@ class Comparison:
 
     def suspects_of_all(self) -> list[Suspect]:
         """Return the errors that all whisks would share."""
-        found = [
-            Suspect("the stage's origin {:+.2f} mm off along x", self.of_place(X), _LARGEST_MM),
-            Suspect("the stage's origin {:+.2f} mm off along y", self.of_place(Y), _LARGEST_MM),
-            Suspect("the stage's origin {:+.2f} mm off along z", self.of_place(Z), _LARGEST_MM),
-        ]
         by_percent = -0.01 * (self._kind == _DISTANCE)
-        found.append(Suspect("the moments' scale {:+.1f} % off", by_percent, _LARGEST_PERCENT))
-        return found
+        return [
+            *self._suspects_of_place("the stage's origin"),
+            Suspect("the moments' scale {:+.1f} % off", by_percent, _LARGEST_PERCENT),
+        ]
 
     def suspects_of(self, number: int) -> list[Suspect]:
         """Return the errors of one whisk's own."""
         per_degree = math.radians(1.0) * self.of_place(SLOPE, number)
         return [
-            Suspect("its place {:+.2f} mm off along x", self.of_place(X, number), _LARGEST_MM),
-            Suspect("its place {:+.2f} mm off along y", self.of_place(Y, number), _LARGEST_MM),
-            Suspect("its place {:+.2f} mm off along z", self.of_place(Z, number), _LARGEST_MM),
+            *self._suspects_of_place("its place", number),
             Suspect("its slope {:+.1f}° off", per_degree, _LARGEST_DEG),
         ]
+
+    def _suspects_of_place(self, what: str, number: int | None = None) -> list[Suspect]:
+        """Return the errors along x, y and z of one whisk's place, or of all."""
+        found = []
+        for name, axis in (("x", X), ("y", Y), ("z", Z)):
+            text = f"{what} {{:+.2f}} mm off along {name}"
+            found.append(Suspect(text, self.of_place(axis, number), _LARGEST_MM))
+        return found
 
     def likeliest(self, suspects: Iterable[Suspect]) -> tuple[float, str]:
         """Return by how many sigmas the likeliest suspect is there, and those that explain as much, in words."""
@@ -205,7 +215,7 @@ def compare(results: Iterable[TrialResult], whisker: Whisker) -> Comparison:
         if seen.stage_contact is None or not seen.has_truth:
             continue
         contact = felt_contact(result, seen, felt, whisker)
-        one = HeldWhisk(result.trial.name, seen.whisk, seen, seen.stage_contact, contact)
+        one = HeldWhisk(result.trial.name, seen, contact)
         if one.is_known.any():
             held.append(one)
     return Comparison(held)
@@ -242,15 +252,10 @@ def _elsewhere(comparison: Comparison) -> Iterator[tuple[tuple[str, int], Reason
             if len(held) < _FEWEST_TO_NAME:
                 causes = f"{alone[worst][1]} in {held[worst].trial}, or {causes}"
             for one in held:
-                yield _key(one), reason("stage_unlike_all_felt", causes=causes)
+                yield one.key, reason("stage_unlike_all_felt", causes=causes)
             return
-        yield _key(held[worst]), _reason_of(comparison, worst, alone[worst][1])
+        yield held[worst].key, _reason_of(comparison, worst, alone[worst][1])
         comparison = Comparison([one for one in held if one is not held[worst]])
-
-
-def _key(one: HeldWhisk) -> tuple[str, int]:
-    """Return trial and number of a whisk."""
-    return one.trial, one.number
 
 
 def _reason_of(comparison: Comparison, number: int, causes: str) -> Reason:

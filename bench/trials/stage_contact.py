@@ -34,6 +34,8 @@ _NEAR_RAD = 0.01
 _BEFORE_TIP = 1.0 - 1e-6
 # [1] Coefficients of the whisker's unloaded shape, each way: offset, slope, curvature.
 REST_TERMS = 3
+# Places in `Offsets.vector`: of the object along x, y and z, and its slope.
+X, Y, Z, SLOPE = range(4)
 
 
 @dataclass(frozen=True, eq=False)

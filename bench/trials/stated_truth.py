@@ -29,7 +29,7 @@ from bench.session.signals import Signals, forward_strokes
 from bench.session.trial import Trial
 from bench.trials.consistency import check_slope, nominal_slope
 from bench.trials.differences import agree
-from bench.trials.stage_contact import REST_TERMS, Contact, Offsets, StatedPush
+from bench.trials.stage_contact import REST_TERMS, SLOPE, Contact, Offsets, StatedPush, X
 from bench.trials.stated_length import unit_within
 from bench.trials.stated_stroke import StatedStroke
 from vision import NAN, UNKNOWN, SharedSigmas, TruthAtAngle, Value, WhiskTruth
@@ -188,12 +188,11 @@ def stated_whisk(session: Session, trial: Trial, signals: Signals, stroke: slice
 
 def _by_distance(trial: Trial, slope_sigma_rad: float, shared_mm: float) -> StageContact:
     """Return the contact of a stated distance and slope. shared_mm: the origin's sigma."""
-    along = Offsets.none()
-    along.place_mm[0] = 1.0
-    turned = replace(Offsets.none(), slope_rad=1.0)
-    by_offset = np.stack([np.zeros(len(_STEPS)), along.vector, turned.vector])
-    own = trial.d_x_sigma_mm * along.vector + slope_sigma_rad * turned.vector
-    return StageContact(NAN, by_offset, own, shared_mm * along.vector, _stands(trial))
+    by_offset = np.zeros((3, len(_STEPS)))  # of motor angle, d_x and slope
+    by_offset[1, X] = 1.0
+    by_offset[2, SLOPE] = 1.0
+    own = trial.d_x_sigma_mm * by_offset[1] + slope_sigma_rad * by_offset[2]
+    return StageContact(NAN, by_offset, own, shared_mm * by_offset[1], _stands(trial))
 
 
 def _stands(trial: Trial) -> bool:
