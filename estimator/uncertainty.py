@@ -1,7 +1,8 @@
 """Standard deviation and interval of d_x from those of the pushing angle, the moments and α_est,
 and the model's own.
 
-Gradients are with respect to (θ, m_y, m_z, α_est), the last axis of length 4. Angles in rad,
+Gradients are with respect to (θ, m_y, m_z, α_est), the last axis of length 4; of (6) β takes the
+place of α_est. Angles in rad,
 moments in N·mm, C in N·mm², lengths in mm. Where the distance is NaN, so is its sigma.
 
 C = 3EI has no place in the sum: where the gauge factors were found with the same C, it drops out of
@@ -32,6 +33,19 @@ def gradient_no_slip(theta: ArrayLike, m_z: ArrayLike, C: ArrayLike) -> np.ndarr
     d_x = np.asarray(distance.no_slip(theta, m_z, C))
     nothing = 0.0 * d_x
     return np.stack([d_x / theta, nothing, -d_x / m_z, nothing], axis=-1)
+
+
+@elementwise
+def gradient_known_slope(
+    theta: ArrayLike, m_y: ArrayLike, m_z: ArrayLike, beta: ArrayLike, C: ArrayLike
+) -> np.ndarray:
+    """Compute ∂d_x/∂(θ, m_y, m_z, β) of (6): d_x (1/θ, −sin β/m, −cos β/m, −m_y/(m cos β)), where
+    m = m_z cos β + m_y sin β.
+    """
+    d_x = distance.known_slope(theta, m_y, m_z, beta, C)
+    m = m_z * np.cos(beta) + m_y * np.sin(beta)
+    relative = [1 / theta, -np.sin(beta) / m, -np.cos(beta) / m, -m_y / (m * np.cos(beta))]
+    return np.asarray(d_x)[..., None] * np.stack(np.broadcast_arrays(*relative), axis=-1)
 
 
 def gradient_with_friction(

@@ -7,7 +7,10 @@ import numpy as np
 
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult
 from bench.session.whisker import Whisker
+from bench.trials.estimates import whisk_of
 from estimator import distance, first_order
+from estimator.beam import Beam
+from estimator.uncertainty import gradient_known_slope, model_share
 from vision import NAN
 
 # Causes of which `FeltWhisk.shared_Nmm` has a row each.
@@ -43,16 +46,21 @@ def felt_contact(
     stands = seen.stage_contact.stands and not whisker.beam.is_curved
     if not stands or not felt.has_moments or felt.apart:
         return _touch_alone(felt, late)
-    moments = np.array([felt.m_y_Nmm.value, felt.m_z_Nmm.value])
-    d_x_mm = _distance_mm(result, moments, seen.beta_rad.value, whisker)
+    beam = whisker.beam
+    slope_rad = seen.beta_rad.value
+    whisk = whisk_of(felt, result.theta_rad, beam)
+    as_cylinder_mm = distance.known_slope(*whisk.felt, slope_rad, beam.C_Nmm2)
+    d_x_mm = _distance_mm(result, as_cylinder_mm, slope_rad, beam)
     if not math.isfinite(d_x_mm):
         return _touch_alone(felt, late)
-    thickness = whisker.beam.thickness(d_x_mm)
-    gradient = thickness * _gradient(result.theta_rad, moments, seen.beta_rad.value)
+    thickness = beam.thickness(d_x_mm)
+    of_cylinder = gradient_known_slope(*whisk.felt, slope_rad, beam.C_Nmm2)
+    gradient = thickness / as_cylinder_mm * of_cylinder  # of the logarithm
     by_input = np.array([[-1.0, 0.0, 0.0], gradient[:3]])  # of touch and distance by θ, m_y and m_z
     by_cause = _inputs_by_cause(felt)
-    own = by_input @ (_input_covariance(felt) - by_cause.T @ by_cause) @ by_input.T
-    own[1, 1] += _model_share(result.theta_rad, thickness) ** 2
+    own = by_input @ (whisk.felt_covariance - by_cause.T @ by_cause) @ by_input.T
+    share = model_share(result.theta_rad, 0.0, _FRICTION_RAD, d_x_mm, thickness=thickness)
+    own[1, 1] += share**2
     values = np.array([felt.touch_felt_rad.value, math.log(d_x_mm)])
     return FeltContact(values, own, np.hstack([late, by_input @ by_cause.T]), float(gradient[3]))
 
@@ -74,42 +82,12 @@ def _inputs_by_cause(felt: FeltWhisk) -> np.ndarray:
     return by_cause
 
 
-def _input_covariance(felt: FeltWhisk) -> np.ndarray:
-    """Return the covariance (3, 3) of θ, m_y and m_z."""
-    inputs = np.zeros((3, 3))
-    inputs[0, 0] = felt.theta_sigma_rad**2
-    inputs[0, 1:] = felt.theta_moment_covariance_at
-    inputs[1:, 0] = felt.theta_moment_covariance_at
-    inputs[1:, 1:] = felt.covariance_at
-    return inputs
-
-
-def _distance_mm(
-    result: TrialResult, moments: np.ndarray, slope_rad: float, whisker: Whisker
-) -> float:
+def _distance_mm(result: TrialResult, as_cylinder_mm: float, slope_rad: float, beam: Beam) -> float:
     """Return d_x of (6), mm, less how far the contact rolls over the bar; NaN where there is none."""
-    beam = whisker.beam
-    theta_rad = result.theta_rad
-    as_cylinder_mm = distance.known_slope(theta_rad, *moments, slope_rad, beam.C_Nmm2)
     d_x_mm = beam.distance_mm(as_cylinder_mm)
     rolled = 0.0
     reach_mm = result.reach_mm(d_x_mm)
     if math.isfinite(reach_mm):
         thickness = beam.thickness(d_x_mm)
-        rolled = first_order.rolling_at(theta_rad, reach_mm, slope_rad, d_x_mm, thickness)
+        rolled = first_order.rolling_at(result.theta_rad, reach_mm, slope_rad, d_x_mm, thickness)
     return d_x_mm * (1.0 - rolled)
-
-
-def _gradient(theta_rad: float, moments: np.ndarray, slope_rad: float) -> np.ndarray:
-    """Return the derivatives (4,) of the logarithm of (6) by θ, m_y, m_z and the slope."""
-    across = np.array([math.sin(slope_rad), math.cos(slope_rad)])
-    along = np.array([math.cos(slope_rad), -math.sin(slope_rad)])
-    push_Nmm = across @ moments
-    by_slope = -math.tan(slope_rad) - along @ moments / push_Nmm
-    return np.array([1.0 / theta_rad, *(-across / push_Nmm), by_slope])
-
-
-def _model_share(theta_rad: float, thickness: float) -> float:
-    """Return the relative sigma of (6) itself: friction along the whisker, and angles that are not small."""
-    dragging = first_order.dragging(theta_rad, _FRICTION_RAD)
-    return math.hypot(dragging, first_order.bending_far(theta_rad, thickness))

@@ -21,6 +21,10 @@ def cases():
             lambda t, y, z, a: distance.no_slip(t, z, C),
             lambda t, y, z, a: uncertainty.gradient_no_slip(t, z, C),
         ),
+        "known_slope": (
+            lambda t, y, z, b: distance.known_slope(t, y, z, b, C),
+            lambda t, y, z, b: uncertainty.gradient_known_slope(t, y, z, b, C),
+        ),
         "with_friction": (
             lambda t, y, z, a: distance.with_friction(t, y, z, a, C),
             lambda t, y, z, a: uncertainty.gradient_with_friction(t, y, z, a, C),
