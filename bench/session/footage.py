@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.base.errors import BadInput
+from bench.base.input_problems import refused_as_bad_input
 from vision.geometry import Refused
 from vision.pictures import (
     FILM_SUFFIXES,
@@ -55,10 +56,16 @@ def single_pictures(folder: Path, label: str, prefix: str = "") -> dict[str, Pat
 
 
 def rig_picture(path: Path | PicturePart) -> np.ndarray:
-    """Read one of `Session.rig_pictures`, grey (h, w). Raises BadInput where it cannot be read."""
-    grey = read_picture(path)
+    """Read one of `Session.rig_pictures`, as `read_still`."""
+    return read_still(path, f"boards/rig/{path.name}")
+
+
+def read_still(path: Path | PicturePart, label: str) -> np.ndarray:
+    """Read one picture, grey (h, w). Raises BadInput where it cannot be read or has another size."""
+    with refused_as_bad_input(label):
+        grey = read_picture(path)
     if grey is None:
-        raise BadInput("cannot be read as a picture", file=f"boards/rig/{path.name}")
+        raise BadInput("cannot be read as a picture", file=label)
     return grey
 
 

@@ -1,10 +1,10 @@
 """Pictures of a board that is fixed to the touched object."""
 
 from bench.base.errors import BadInput
+from bench.session.footage import read_still
 from bench.session.trial import Trial
 from vision.boards import Corners, find_corners
 from vision.geometry import Board
-from vision.pictures import read_picture
 
 
 def board_on_object(trial: Trial, board: Board | None) -> dict[str, Corners]:
@@ -19,10 +19,7 @@ def board_on_object(trial: Trial, board: Board | None) -> dict[str, Corners]:
         label = trial.label(path.name)
         if board is None:
             raise BadInput("shows a board, and session.toml has no [board]", file=label)
-        grey = read_picture(path)
-        if grey is None:
-            raise BadInput("cannot be read as a picture", file=label)
-        corners = find_corners(grey, board)
+        corners = find_corners(read_still(path, label), board)
         if len(corners):
             found[camera] = corners
         by_file.setdefault(label, []).append(camera)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.geometry.lens import LENS_TERMS
-from vision.geometry.refusals import Refused
 
 # [1] Derivative of the lens terms by those of the picture before it was flipped left to right. Derived.
 _FLIP = np.array([-1.0 if term in ("cx", "p2") else 1.0 for term in LENS_TERMS])
@@ -43,15 +42,8 @@ class Crop:
         """Return (width, height)."""
         return self.width, self.height
 
-    def cut(self, grey: np.ndarray, label: str) -> np.ndarray:
-        """Return this part (height, width) of a whole picture. Raise Refused where that has another size.
-
-        label: of the picture, in messages.
-        """
-        height, width = grey.shape
-        if (width, height) != self.whole_px:
-            usual = f"the others of camera {self.of} are {self.whole_px[0]} x {self.whole_px[1]}"
-            raise Refused(f"{label} is {width} x {height} px, {usual}", code="picture_size_differs")
+    def cut(self, grey: np.ndarray) -> np.ndarray:
+        """Return this part (height, width) of a whole picture, of size `whole_px`."""
         part = grey[self.top : self.top + self.height, self.left : self.left + self.width]
         return np.ascontiguousarray(part[:, ::-1] if self.mirrored else part)
 

@@ -18,6 +18,7 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from vision.geometry.crop import Crop
+from vision.geometry.refusals import Refused
 
 PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm"})
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mkv"})
@@ -94,13 +95,15 @@ def natural_order(path: Path) -> list[tuple[int, int | str]]:
 def read_picture(path: Path | PicturePart) -> np.ndarray | None:
     """Read a picture as grey (height, width), uint8 or uint16.
 
-    None where it is damaged or cut short, no regular file, or of a size that no camera has.
+    None where it is damaged or cut short, no regular file, or of a size that no camera has. Raises
+    Refused where a picture of which a part is wanted has another size than the camera's.
     """
     if isinstance(path, PicturePart):
         whole = read_picture(path.path)
         if whole is None:
             return None
-        return path.crop.cut(whole, f"{path.path.parent.name}/{path.name}")
+        require_size(whole, path.crop.whole_px, path.name)
+        return path.crop.cut(whole)
     if not path.is_file() or not 0 < path.stat().st_size <= _MOST_BYTES:
         return None
     data = np.fromfile(path, dtype=np.uint8)
@@ -112,6 +115,17 @@ def read_picture(path: Path | PicturePart) -> np.ndarray | None:
     except cv2.error:  # a header that OpenCV takes for absurd
         return None
     return grey if grey is not None and grey.dtype in (np.uint8, np.uint16) else None
+
+
+def require_size(grey: np.ndarray, size_px: tuple[int, int], label: str) -> None:
+    """Raise Refused, naming the picture by its label, where it has another size than (width, height)."""
+    height, width = grey.shape[:2]
+    if (width, height) != size_px:
+        raise Refused(
+            f"{label} is {width} x {height} px, the others are {size_px[0]} x {size_px[1]} px: one "
+            "camera gives one size; pictures are never rescaled",
+            code="picture_size_differs",
+        )
 
 
 def page_count(path: Path) -> int:

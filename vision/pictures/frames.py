@@ -27,6 +27,7 @@ from vision.pictures.files import (
     pictures_in,
     quiet_opencv,
     read_picture,
+    require_size,
 )
 
 # FFmpeg would write about a truncated file to stderr; the caller says it in one line of its own.
@@ -104,14 +105,7 @@ class Frames(ABC):
 
     def _check_size(self, index: int, grey: np.ndarray) -> None:
         """Raise Refused where a frame has another size than `size_px`."""
-        height, width = grey.shape[:2]
-        if (width, height) != self.size_px:
-            raise Refused(
-                f"frame {index} of {self.path.name} is {width} x {height} px, the others are "
-                f"{self.size_px[0]} x {self.size_px[1]} px: one camera gives one size; pictures "
-                "are never rescaled",
-                code="picture_size_differs",
-            )
+        require_size(grey, self.size_px, f"frame {index} of {self.path.name}")
 
 
 class CroppedFrames(Frames):
@@ -151,8 +145,10 @@ class CroppedFrames(Frames):
     ) -> Iterator[tuple[int, np.ndarray | None]]:
         """Yield the part of each frame."""
         for index, grey in frames:
-            label = f"frame {index} of {self.path.name}"
-            yield index, None if grey is None else self._crop.cut(grey, label)
+            if grey is not None:
+                require_size(grey, self._crop.whole_px, f"frame {index} of {self.path.name}")
+                grey = self._crop.cut(grey)
+            yield index, grey
 
 
 class _OneByOne(Frames):

@@ -123,6 +123,23 @@ def test_pictures_that_show_no_board_are_refused(alone):
     assert "board_low.jpg: cannot be read as a picture" in refusal(alone)
 
 
+def test_a_board_picture_of_another_size_leaves_the_list_of_problems_whole(alone):
+    """It is one line of them, where a part of that picture is a camera."""
+    show_board(alone)
+    (trial_of(alone) / "signals.csv").write_text("none\n")
+    manifest = alone / "session.toml"
+    part = '{ name = "part", of = "low", crop = [0, 0, 640, 100] }'
+    text = manifest.read_text().replace("cameras = [", f"cameras = [\n    {part},")
+    manifest.write_text(text)
+    picture = trial_of(alone) / "board_low.jpg"
+    cv2.imwrite(str(picture), np.full((180, 320), 120, np.uint8))
+    problems = InputProblems(stop_at_first=False)
+    checked_session(alone, problems)
+    signals, line = problems.refusals
+    assert "signals.csv" in signals
+    assert "board_low.jpg: board_low.jpg is 320 x 180 px, the others are 640 x 360 px" in line
+
+
 def test_nothing_that_places_the_object_is_refused_with_what_to_do(alone):
     line = refusal(alone)
     assert line.startswith(f"trials/{trial_of(alone).name}/trace_high.csv: there are no pictures")

@@ -5,7 +5,6 @@ import pytest
 
 from vision.geometry.camera import Camera, camera_matrix
 from vision.geometry.crop import Crop
-from vision.geometry.refusals import Refused
 from vision.geometry.rotation import exp_rotation
 
 WHOLE_PX = (640, 900)
@@ -52,7 +51,7 @@ def test_a_direct_part_is_the_camera_itself(whole, points_mm):
 def test_pixels_are_cut_where_the_lens_has_them(mirrored):
     grey = np.arange(6 * 8).reshape(6, 8)
     crop = Crop("high", (8, 6), 1, 2, 4, 3, mirrored)
-    part = crop.cut(grey, "frame 0")
+    part = crop.cut(grey)
     assert part.shape == (3, 4) and part.flags.c_contiguous
     column = 4 if mirrored else 1  # of the whole picture, at the part's column 0
     assert part[0, 0] == grey[2, column]
@@ -67,13 +66,3 @@ def test_the_lens_signs_are_the_derivative_of_the_lens():
     step = np.linspace(0.01, 0.09, 9)
     moved = crop.lens_of(LENS + step) - crop.lens_of(LENS)
     np.testing.assert_allclose(moved, crop.lens_signs * step, atol=1e-12)
-
-
-def test_a_picture_of_another_size_has_no_such_part():
-    """A part of one half as large would be of another place, or empty."""
-    crop = Crop("high", WHOLE_PX, 0, 400, 640, 500, mirrored=True)
-    assert crop.cut(np.zeros(WHOLE_PX[::-1]), "frame 0").shape == (500, 640)
-    with pytest.raises(
-        Refused, match="frame 1 is 320 x 450 px, the others of camera high are 640 x 900"
-    ):
-        crop.cut(np.zeros((450, 320)), "frame 1")

@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
+from vision.geometry.crop import Crop
 from vision.geometry.refusals import Refused
-from vision.pictures.files import natural_order, read_picture
+from vision.pictures.files import PicturePart, natural_order, read_picture
 from vision.pictures.frames import Frames
 
 WIDTH, HEIGHT = 322, 242  # not square, not a multiple of 16
@@ -147,6 +148,19 @@ def test_another_size_is_refused(tmp_path):
         Refused, match=r"frame 2 of high is 60 x 50 px, the others are 322 x 242 px"
     ):
         list(Frames.open(folder).read())
+
+
+def test_a_picture_of_another_size_has_no_such_part(tmp_path):
+    """A part of one half as large would be of another place, or empty."""
+    crop = Crop("high", (WIDTH, HEIGHT), 0, 100, WIDTH, 142, mirrored=True)
+    folder = write_folder(tmp_path / "high", ".png", count=1)
+    assert read_picture(PicturePart(folder / "img_0.png", crop)).shape == (142, WIDTH)
+    cv2.imwrite(str(folder / "img_0.png"), ramp(0)[:121, :161])
+    said = "is 161 x 121 px, the others are 322 x 242 px"
+    with pytest.raises(Refused, match=f"img_0.png {said}"):
+        read_picture(PicturePart(folder / "img_0.png", crop))
+    with pytest.raises(Refused, match=f"frame 0 of high {said}"):
+        list(Frames.open(PicturePart(folder, crop)).read())
 
 
 def test_a_folder_without_a_readable_picture_is_refused(tmp_path):
