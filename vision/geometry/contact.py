@@ -15,6 +15,7 @@ import numpy as np
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.polyline import normals
+from vision.geometry.refusals import Refused
 from vision.geometry.rods import Wire
 from vision.geometry.rotation import across, cross, unit
 from vision.geometry.silhouette import outline
@@ -29,6 +30,8 @@ _LEAST_ACROSS = 1e-6
 OUTLINE_MM = 60.0
 # [points] Along an outline. Stated.
 OUTLINE_POINTS = 121
+# [stations] Fewer have no direction. Derived.
+_FEWEST_STATIONS = 2
 # [1] X of a direction from which on its frame is taken from z: no bar's, but that of the plane of
 # a ring. Stated.
 _ALONG_X = 0.9
@@ -106,6 +109,25 @@ class BarAxis(Axis):
         """Return middle (stations, 2) and half-width (stations,) px of the outline near its point."""
         place = np.linspace(-reach_mm, reach_mm, stations)
         return outline(camera, self.points_at(place), self.direction, radius_mm)
+
+    def outline_before(
+        self, camera: Camera, radius_mm: float, reach_mm: float, stations: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return place (n,) mm, middle (n, 2) and half-width (n,) px of the outline, where the bar lies before
+        the camera and is no wider than its picture.
+
+        Raises Refused where that has no direction: fewer than two stations do.
+        """
+        place_mm = np.linspace(-reach_mm, reach_mm, stations)
+        middle, half_px = self.outline(camera, radius_mm, reach_mm, stations)
+        # Inside the bar the half-width is 0, behind the camera NaN.
+        is_before = (half_px > 0.0) & (half_px < max(camera.size_px))
+        if np.sum(is_before) < _FEWEST_STATIONS:
+            raise Refused(
+                f"camera {camera.name} would have the bar behind or about it: check T_camera_rig",
+                code="bar_behind_camera",
+            )
+        return place_mm[is_before], middle[is_before], half_px[is_before]
 
     def _from_axis(self, points: np.ndarray) -> np.ndarray:
         """Return the vectors (..., k, 3) straight from the axis to points (..., k, 3)."""

@@ -14,7 +14,6 @@ from scipy.spatial import KDTree
 
 from vision.geometry.contact import BarAxis
 from vision.geometry.polyline import tangents_by
-from vision.geometry.refusals import Refused
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
@@ -29,8 +28,6 @@ ARM_MM = 20.0
 _INNER_SHARE = 0.72
 # [points] Along the bar's predicted outline. A layout.
 _STATIONS = 200
-# [stations] Fewer have no direction. Derived.
-_FEWEST_STATIONS = 2
 # [1] Least share of a piece's pixels in the picture. 0.25 to 0.75 move nothing on the fixtures.
 # Study: thresholds.py touched.pieces _LEAST_IN_PICTURE ….
 _LEAST_IN_PICTURE = 0.5
@@ -87,17 +84,7 @@ def _read_bar_band(view: View, axis: BarAxis, radius_mm: float, settings: Vision
     Raises Refused where no part of it lies before the camera, or the bar would pass through that.
     """
     reach_mm = settings.bar_reach_mm
-    middle, radius = axis.outline(view.camera, radius_mm, reach_mm, _STATIONS)
-    # Inside the bar the radius is 0, behind the camera NaN.
-    is_before = (radius > 0.0) & (radius < max(view.mean.shape))
-    if np.sum(is_before) < _FEWEST_STATIONS:
-        raise Refused(
-            f"camera {view.camera.name} would have the bar behind or about it: check T_camera_rig",
-            code="bar_behind_camera",
-        )
-    middle = middle[is_before]
-    radius = radius[is_before]
-    place = np.linspace(-reach_mm, reach_mm, _STATIONS)[is_before]
+    place, middle, radius = axis.outline_before(view.camera, radius_mm, reach_mm, _STATIONS)
     half = int(np.ceil(np.max(radius))) + settings.bar_margin_px
     return read_band(view.mean, view.background, middle, place, radius, half)
 

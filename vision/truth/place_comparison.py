@@ -97,8 +97,11 @@ class _Line:
 
     @classmethod
     def of(cls, camera: Camera, axis: BarAxis, radius_mm: float) -> Self:
-        """Return the line of a bar in a camera, in equal steps of a pixel or more."""
-        middle_px, half_px = axis.outline(camera, radius_mm, _REACH_MM, _ALONG)
+        """Return the line of a bar in a camera, in equal steps of a pixel or more.
+
+        Raises Refused where no part of it lies before the camera.
+        """
+        _, middle_px, half_px = axis.outline_before(camera, radius_mm, _REACH_MM, _ALONG)
         length_px = lengths_px(middle_px)
         count = int(np.clip(length_px[-1], _SEGMENTS, _ALONG))
         place_px = np.linspace(0.0, length_px[-1], count)

@@ -135,6 +135,15 @@ def test_a_camera_that_looks_along_the_bar_is_not_asked(degrees, asked):
     assert len(comparison.bands) == asked
 
 
+def test_a_bar_behind_a_camera_is_refused():
+    """It has no outline there to compare."""
+    forward = CAMERAS[0].T_camera_rig[2, :3]
+    behind = BarAxis(CAMERAS[0].centre_mm - 50.0 * forward, TRUE.direction)
+    with pytest.raises(Refused) as refused:
+        comparison_about(behind)
+    assert refused.value.code == "bar_behind_camera"
+
+
 def test_a_wire_on_the_bar_is_left_out():
     hidden = comparison_about(TRUE).bands[0].changed == 0.5
     assert 0.005 < np.mean(hidden) < 0.1
