@@ -105,29 +105,38 @@ def _write_rig_views(job, folder):
         write_picture(folder / f"{studio.camera.name}.png", picture)
 
 
-def _write_board_views(job, number, folder):
-    """Write the views of the board for the lens of one camera."""
+def board_poses(job: Job, number: int) -> list[np.ndarray]:
+    """Return the poses (3, 4) in the views of the board for the lens of one camera."""
     studio = job.studios[number]
     count = job.protocol.board.views
-    kind = job.protocol.pictures.still
     rng = job.stream(_BOARDS, number)
     board = build.board(job.protocol)
     if isinstance(studio, MirrorStudio):
-        poses = boards.draw_shared_poses(board, [p.camera for p in studio.parts], count, rng)
-    else:
-        poses = boards.draw_poses(board, studio.camera, count, rng)
-    for i, pose in enumerate(poses):
+        return boards.draw_shared_poses(board, [p.camera for p in studio.parts], count, rng)
+    return boards.draw_poses(board, studio.camera, count, rng)
+
+
+def _write_board_views(job, number, folder):
+    """Write the views of the board for the lens of one camera."""
+    studio = job.studios[number]
+    kind = job.protocol.pictures.still
+    for i, pose in enumerate(board_poses(job, number)):
         brightness = studio.board_brightness(pose)
         picture = studio.sensor.expose(brightness, job.stream(_BOARDS, number, i + 1))
         write_picture(folder / f"{i:02d}.{kind}", picture)
 
 
-def _write_trial(job, number, folder):
-    """Write the files of a trial of one whisker."""
+def recording_of(job: Job, number: int) -> Recording:
+    """Return what is recorded in a trial of one whisker. Raises ArithmeticError where it cannot go on."""
     run = job.protocol.runs()[number]
     first = number - run.rotation
     run = turned_plane(run, lambda rotation: job.stream(_TRIAL, first + rotation))
-    recording = Recording.make(run, job.stream(_TRIAL, number))
+    return Recording.make(run, job.stream(_TRIAL, number))
+
+
+def _write_trial(job, number, folder):
+    """Write the files of a trial of one whisker."""
+    recording = recording_of(job, number)
     clock_offset_s = job.protocol.pictures.clock_offset_s
     texts = {
         "trial.toml": session_files.trial_toml(recording, by_stage=bool(job.protocol.stage)),

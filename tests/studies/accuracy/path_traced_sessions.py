@@ -54,25 +54,33 @@ LOOKS = {
 
 
 def save_geometry(folder: Path, protocol: str, seed: int) -> None:
-    """Simulate a session, and save what its pictures show: cameras, board views, rig_board, trials."""
-    from bench.rig import boards, build, parts
+    """Simulate a session, and save what its pictures show: cameras, board views, rig_board, trials.
+
+    Ends the program for what is not drawn here: arrays, mirrors, and objects that are no bars that stand.
+    """
+    from bench.rig import build, parts
     from bench.rig.linear import compose
     from bench.rig.protocol import load
     from bench.rig.simulation import simulate
 
-    simulate(folder / protocol, protocol=protocol, seed=seed)
     job = parts.Job(folder / protocol, load(protocol), seed, False)
+    if job.whiskers or any(table.mirror for table in job.protocol.cameras):
+        sys.exit(f"{protocol}: arrays and mirrors are not path traced here")
     board = build.board(job.protocol)
     cameras = build.cameras(job.protocol)
     views = {}
     for number, camera in enumerate(cameras):
-        rng = job.stream(parts._BOARDS, number)
-        poses = boards.draw_poses(board, camera, job.protocol.board.views, rng)
+        poses = parts.board_poses(job, number)
         views[camera.name] = [compose(pose, board.T_print_board) for pose in poses]
     trials = {}
     for number, run in enumerate(job.protocol.runs()):
-        recording = parts.Recording.make(run, job.stream(parts._TRIAL, number))
+        recording = parts.recording_of(job, number)
+        bar = recording.bar
+        stands = bar.velocity_mm_rad is None and np.isinf(bar.stiffness_N_mm)
+        if not (bar.is_straight and stands):
+            sys.exit(f"{protocol}, {run.name}: only rigid bars that stand are path traced here")
         trials[run.name] = trial_geometry(recording)
+    simulate(folder / protocol, protocol=protocol, seed=seed)
     geometry = {
         "cameras": [vars(camera) for camera in cameras],
         "board_views": views,
