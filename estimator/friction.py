@@ -154,12 +154,9 @@ class _Observed:
         With slip it is (Cθ/d_x)/cos²α times −cos²β for m_y, and times sin β cos β for m_z.
         """
         alpha = np.asarray(alpha)[..., None]
-        steepness = np.abs(self.beta)
-        sliding = self.scale * np.cos(self.beta) / np.cos(alpha) ** 2
-        share = np.where(steepness > alpha, sliding, 0.0)
-        of_m_y = -np.sign(self.beta) * share * np.cos(self.beta)
-        of_m_z = share * np.sin(steepness)
-        return np.concatenate([of_m_y, of_m_z], axis=-1)
+        _, rate = _slipping_moments(self.beta, self.scale)
+        share = np.where(np.abs(self.beta) > alpha, 1.0 / np.cos(alpha) ** 2, 0.0)
+        return np.concatenate([share * rate[0], share * rate[1]], axis=-1)
 
     def cost(self, alpha: ArrayLike) -> np.ndarray:
         """Return the residuals' sum of squares (...) at friction angles (...)."""

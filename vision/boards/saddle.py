@@ -289,16 +289,16 @@ def _residuals_and_influences(
     windows: Windows, p: np.ndarray, predict: Predict
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return each pixel's residual (n, k), and its influence on the corner's place (n, 2, k), which is
-    (JᵀJ)⁻¹ Jᵀ.
+    (JᵀWJ)⁻¹ JᵀW.
     """
     residual = np.empty(windows.grey.shape)
     influence = np.empty(windows.offset.shape)
     for rows, some in _in_batches(windows):
         grey, J = predict(some, p[rows])
         residual[rows] = some.weight * (some.grey - grey)
-        J *= some.weight[:, None, :]
-        inverse = np.linalg.pinv(J @ J.transpose(0, 2, 1), hermitian=True)
-        influence[rows] = inverse[:, PLACE] @ J
+        normal, _ = _normal_equations(J, some.grey - grey, some.weight)
+        inverse = np.linalg.pinv(normal, hermitian=True)
+        influence[rows] = inverse[:, PLACE] @ J * some.weight[:, None, :]
     return residual, influence
 
 
