@@ -111,11 +111,10 @@ class NearAngle:
 
     def in_jump(self) -> TruthAtAngle:
         """Return the quantities where slip jumps nearby, with the status that says so."""
-        frames = self._frames_around
         values = {}
         for name, field in FIELDS.items():
-            values[field] = self._value_in_jump(name, frames)
-        first, last = np.degrees(self.smooth.theta_rad[frames][[0, -1]])
+            values[field] = self._value_in_jump(name)
+        first, last = np.degrees(self.smooth.theta_rad[self._frames_around][[0, -1]])
         sentence = f"slips in jumps: seen at {first:.2f} and {last:.2f} deg"
         return TruthAtAngle(
             theta_rad=self.theta_rad,
@@ -144,6 +143,11 @@ class NearAngle:
         return self.smooth.theta_rad - self.theta_rad
 
     @cached_property
+    def _is_near(self) -> np.ndarray:
+        """Return the mask (f,) of the frames nearby."""
+        return _near(self._beyond_rad)
+
+    @cached_property
     def _fit(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the local fit's weights (f,), for a value and for its slope."""
         return _local_fit(self.smooth.theta_rad, self.theta_rad)
@@ -168,14 +172,14 @@ class NearAngle:
         Its sigma is not below that of the best frame nearby; the fit's residuals are added to it.
         """
         smooth = self.smooth
-        near = _near(self._beyond_rad)
-        least = np.min(propagated_sigma(smooth.jacobians[name][near], smooth.covariance))
+        rows = smooth.jacobians[name][self._is_near]
+        least = np.min(propagated_sigma(rows, smooth.covariance))
         sigma = max(propagated_sigma(self._by_parameter(name), smooth.covariance), least)
         weights, _ = self._fit
         value = float(weights @ smooth.values[name])
         return Value(value, float(np.hypot(sigma, self.between_frames_sigma(name))))
 
-    @property
+    @cached_property
     def _frames_around(self) -> np.ndarray:
         """Return the frames (k,) from the last that is surely before the angle to the first that is surely
         past it.
@@ -191,11 +195,12 @@ class NearAngle:
         last = np.searchsorted(rising, self.theta_rad + margin_rad)
         return order[max(min(first, len(order) - 2), 0) : max(last, 1) + 1]
 
-    def _value_in_jump(self, name: str, frames: np.ndarray) -> Value:
-        """Return a quantity where slip is anywhere between these frames (k,), by its linear dependence
+    def _value_in_jump(self, name: str) -> Value:
+        """Return a quantity where slip is anywhere between the frames around, by its linear dependence
         on angle and slip nearby.
         """
         smooth = self.smooth
+        frames = self._frames_around
         coefficients, residual_variance = self._linear_in_slip(name)
         _, by_angle, by_slip = coefficients
         rows = smooth.jacobians[name][frames] + by_angle * smooth.touch_jacobian
@@ -212,7 +217,7 @@ class NearAngle:
         Returned are the coefficients (3,) and the variance of the residuals.
         """
         angle_rad = self._beyond_rad
-        near = _near(angle_rad)
+        near = self._is_near
         columns = [np.ones(len(angle_rad)), angle_rad, self.smooth.values["slip"]]
         design = np.column_stack(columns)[near]
         values = self.smooth.values[name][near]

@@ -95,7 +95,7 @@ def observe_trial(
         tuple(seen.rows),
         one_sided_widths(light),
         as_values(bars),
-        tuple(filter(None, seen.kept)),
+        tuple(seen.kept),
     )
 
 
@@ -146,7 +146,7 @@ class _WhisksInTurn:
 
     found: SeenBar
     rows: list[WhiskTruth] = field(default_factory=list)
-    kept: list[KeptFit | None] = field(default_factory=list)
+    kept: list[KeptFit] = field(default_factory=list)
 
 
 def _see_in_turn(scene: _TrialScene, fits: Sequence[KeptFit]) -> _WhisksInTurn:
@@ -165,7 +165,9 @@ def _see_in_turn(scene: _TrialScene, fits: Sequence[KeptFit]) -> _WhisksInTurn:
         seen.rows.append(row)
         if explained is not None:
             seen.found = explained.whisk.bar
-            seen.kept.append(explained.kept)
+            kept = explained.kept
+            if kept is not None:
+                seen.kept.append(kept)
             earlier = explained.as_earlier
     return seen
 

@@ -63,10 +63,11 @@ class PredictedTruth:
             "touch": float(truth.touch_rad.sigma),
             "beta": float(truth.beta_rad.sigma),
         }
+        near = None
+        if truth.smooth is not None and not at_angle.status:
+            near = NearAngle(truth.smooth, theta_rad)
         for name in _AT_ANGLE:
-            by_noise = 0.0
-            if truth.smooth is not None and not at_angle.status:
-                by_noise = NearAngle(truth.smooth, theta_rad).scatter(name).expected
+            by_noise = 0.0 if near is None else near.scatter(name).expected
             found[name] = float(np.hypot(getattr(at_angle, FIELDS[name]).sigma, by_noise))
         return found
 
