@@ -87,6 +87,12 @@ class Trial(manifest.TrialKeys):
         return self.object is None or self.object.shape == "bar"
 
     @property
+    def object_stands(self) -> bool:
+        """Return whether the object neither moves nor gives way."""
+        is_moved = self.object_velocity_mm_s is not None or (self.stage and self.stage.moves)
+        return not is_moved and not self.object_gives_way
+
+    @property
     def place(self) -> str:
         """Return how messages name the trial: its path in the session, and the whisker of an array."""
         return f"trials/{self.name}{self._of_whisker}"
@@ -174,8 +180,7 @@ def _first_trace(trial: Trial) -> str:
 def _check_traced_alone(trial: Trial) -> None:
     """Raise BadInput for an object that a trial of traces without pictures cannot have."""
     label = _first_trace(trial)
-    moves = trial.object_gives_way or trial.object_velocity_mm_s is not None
-    if moves or (trial.stage is not None and trial.stage.moves):
+    if not trial.object_stands:
         raise BadInput("traces without pictures need an object that stands", file=label)
     if not trial.is_bar:
         found = f"traces without pictures need a straight bar; [object] is a {trial.object.shape}"

@@ -192,13 +192,8 @@ def _by_distance(trial: Trial, slope_sigma_rad: float, shared_mm: float) -> Stag
     by_offset[1, X] = 1.0
     by_offset[2, SLOPE] = 1.0
     own = trial.d_x_sigma_mm * by_offset[1] + slope_sigma_rad * by_offset[2]
-    return StageContact(NAN, by_offset, own, shared_mm * by_offset[1], _stands(trial))
-
-
-def _stands(trial: Trial) -> bool:
-    """Return whether the object is a straight bar that neither moves nor gives way."""
-    is_moved = trial.object_velocity_mm_s is not None or (trial.stage and trial.stage.moves)
-    return trial.is_bar and not is_moved and not trial.object_gives_way
+    stands = trial.is_bar and trial.object_stands
+    return StageContact(NAN, by_offset, own, shared_mm * by_offset[1], stands)
 
 
 def _truth(d_x_mm: Value, beta_rad: Value, psi_rad: Value, shared_mm: float) -> WhiskTruth:
@@ -225,7 +220,8 @@ def _by_place(stroke: StatedStroke) -> StatedWhisk:
     truth = _truth(d_x_mm, beta_rad, psi_rad, float(shared_sigma[1]))
     slope = check_slope(beta_rad, trial, "by the object's place is", "check both")
     status = joined(_unlike_stated(d_x_mm, trial), slope)
-    contact = StageContact(touch.motor_rad, by_offset[:3], own, shared, _stands(trial))
+    stands = trial.is_bar and trial.object_stands
+    contact = StageContact(touch.motor_rad, by_offset[:3], own, shared, stands)
     return StatedWhisk(replace(truth, status=status), contact)
 
 
