@@ -2,8 +2,8 @@
 and the model's own.
 
 Gradients are with respect to (θ, m_y, m_z, α_est), the last axis of length 4; of (6) β takes the
-place of α_est. Angles in rad,
-moments in N·mm, C in N·mm², lengths in mm. Where the distance is NaN, so is its sigma.
+place of α_est. Angles in rad, moments in N·mm, C in N·mm², lengths in mm. Where the distance is NaN,
+so is its sigma.
 
 C = 3EI has no place in the sum: where the gauge factors were found with the same C, it drops out of
 d_x.

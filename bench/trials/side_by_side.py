@@ -115,7 +115,7 @@ def _traced(unit: Unit) -> dict[str, RodLines]:
     cameras = unit.calibration.cameras
     try:
         signals = read_signals(unit.trial)
-        inputs = TrialInputs(unit.session, unit.trial, signals, unit.calibration, unit.settings)
+        inputs = TrialInputs.of_unit(unit, signals)
         frames = TrialFrames.read(inputs, lines_in(unit.wires))
         whisks = [*frames.places, *frames.back.values()]
         return wire_lines(frames.pictures, whisks, cameras, frames.rods, vision)

@@ -33,7 +33,7 @@ class Pictures(TruthSource):
 
     def truth(self, unit: Unit, signals: Signals, wires: Wires) -> SeenTrial:
         """Return what the cameras show of each whisk of a trial."""
-        inputs = TrialInputs(unit.session, unit.trial, signals, unit.calibration, unit.settings)
+        inputs = TrialInputs.of_unit(unit, signals)
         return see_trial(inputs, wires, kept_fits(unit))
 
 
