@@ -21,7 +21,7 @@ from bench.session.signals import read_signals
 from bench.session.trial import Trial
 from bench.trials.of_session import first_units
 from bench.trials.other_wires import has_lines, lines_in, write_lines
-from bench.trials.trial_frames import TrialFrames, TrialInputs
+from bench.trials.trial_frames import TrialFrames
 from bench.trials.unit import Unit
 from vision import lines_of, wire_lines
 from vision.geometry import REST_POWERS, Refused, unbent_curves
@@ -115,7 +115,7 @@ def _traced(unit: Unit) -> dict[str, RodLines]:
     cameras = unit.calibration.cameras
     try:
         signals = read_signals(unit.trial)
-        inputs = TrialInputs.of_unit(unit, signals)
+        inputs = unit.inputs(signals)
         frames = TrialFrames.read(inputs, lines_in(unit.wires))
         whisks = [*frames.places, *frames.back.values()]
         return wire_lines(frames.pictures, whisks, cameras, frames.rods, vision)

@@ -16,7 +16,6 @@ from bench.session.signals import Signals, forward_strokes, ways_back
 from bench.session.traces import read_traces
 from bench.session.trial import Trial
 from bench.trials.still_scene import StillScene, still_scene
-from bench.trials.unit import Unit
 from vision import KeptFit, Trace, TrialPictures, TrialTraces, TrialTruth, observe_trial
 from vision.geometry import Bar, Rods, StatedSizes, Touched, touched_object
 from vision.pictures import Others, RodLines
@@ -34,11 +33,6 @@ class TrialInputs:
     signals: Signals
     calibration: SessionCalibration
     settings: Settings
-
-    @classmethod
-    def of_unit(cls, unit: Unit, signals: Signals) -> "TrialInputs":
-        """Return the inputs of a unit's trial."""
-        return cls(unit.session, unit.trial, signals, unit.calibration, unit.settings)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,6 @@ from bench.session.signals import Signals
 from bench.trials.kept_fits import kept_fits
 from bench.trials.seen import see_trial
 from bench.trials.stated_truth import by_stage
-from bench.trials.trial_frames import TrialInputs
 from bench.trials.unit import Unit
 from vision.pictures import Others
 
@@ -33,7 +32,7 @@ class Pictures(TruthSource):
 
     def truth(self, unit: Unit, signals: Signals, wires: Wires) -> SeenTrial:
         """Return what the cameras show of each whisk of a trial."""
-        inputs = TrialInputs.of_unit(unit, signals)
+        inputs = unit.inputs(signals)
         return see_trial(inputs, wires, kept_fits(unit))
 
 

@@ -13,7 +13,9 @@ from bench.base.settings import Settings
 from bench.cameras.session_cameras import SessionCalibration
 from bench.gauges.matrix import GaugeCalibration
 from bench.session.session import Session
+from bench.session.signals import Signals
 from bench.session.trial import Trial
+from bench.trials.trial_frames import TrialInputs
 from vision.geometry import NO_REASON, Reason
 
 
@@ -46,6 +48,10 @@ class Unit:
     wires_hash: str = ""
     straight_wires: tuple[tuple[str, Path], ...] = ()
     contradictions: Reason = NO_REASON
+
+    def inputs(self, signals: Signals) -> TrialInputs:
+        """Return all that the trial is seen with."""
+        return TrialInputs(self.session, self.trial, signals, self.calibration, self.settings)
 
     @property
     def path(self) -> Path:
