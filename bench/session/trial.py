@@ -89,8 +89,9 @@ class Trial(manifest.TrialKeys):
     @property
     def object_stands(self) -> bool:
         """Return whether the object neither moves nor gives way."""
-        is_moved = self.object_velocity_mm_s is not None or (self.stage and self.stage.moves)
-        return not is_moved and not self.object_gives_way
+        has_velocity = self.object_velocity_mm_s is not None
+        is_moved = self.stage is not None and self.stage.moves
+        return not (has_velocity or is_moved or self.object_gives_way)
 
     @property
     def place(self) -> str:

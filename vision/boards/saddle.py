@@ -209,9 +209,8 @@ def fit_windows(
         is_better = trial.cost <= fit.cost[active]
         fit.accept(active, trial, is_better)
         damping[active] *= np.where(is_better, 0.2, 10.0)
-        judged = np.delete(
-            step, _BESIDES_PLACE, axis=1
-        )  # place, and what a model has beyond a saddle
+        # The place, and what a model has beyond a saddle.
+        judged = np.delete(step, _BESIDES_PLACE, axis=1)
         converged[active] = np.linalg.norm(judged, axis=1) < _CONVERGED_PX
     return fit.p, converged
 

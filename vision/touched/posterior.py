@@ -328,7 +328,8 @@ def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> 
     """Return the posterior over a window about a line (2,)."""
     reach_px = min(float(window.most_px @ [1.0, _SEGMENT_ARM]), _LARGEST_REACH_PX)
     profiles = compute_profiles(move_to_line(pieces, line), SEGMENTS, reach_px, gamma)
-    evidences = _evidences(profiles, window, reach_px)
+    rod = LitRod(profiles)
+    evidences = _evidences(rod, window, reach_px)
     grid = _evaluate_lines(evidences, profiles, window)
     mean, covariance = grid.average_line()
     log_blur, log_blur_sigma = grid.average_log_blur()
@@ -344,7 +345,7 @@ def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> 
         temperature=grid.temperature,
         volume_deviance=-2.0 * np.log(grid.volume * cell),
         evidence_for_bar=float(np.sum(odds)),
-        detection_score=LitRod(profiles).detection_score(best),
+        detection_score=rod.detection_score(best),
         searched_px2=float(np.prod(window.most_px)),
         blur_px=np.exp(log_blur),
         log_blur_sigma=log_blur_sigma,
@@ -356,9 +357,8 @@ def _fit(pieces: Pieces, line: np.ndarray, window: LineWindow, gamma: float) -> 
     )
 
 
-def _evidences(profiles: Profiles, window: LineWindow, reach_px: float) -> list[Evidence]:
+def _evidences(rod: LitRod, window: LineWindow, reach_px: float) -> list[Evidence]:
     """Compute the evidence under each blur of a window, of positions within reach_px."""
-    rod = LitRod(profiles)
     evidences = []
     for blur_px in window.blurs_px:
         evidence = compute_evidence(

@@ -14,6 +14,7 @@ import argparse
 import pickle
 import sys
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -207,17 +208,16 @@ class Renderer:
         for camera in self.cameras:
             on_rig = self.geometry["rig_board"]
             path = boards / "rig" / f"{camera.name}.png"
-            yield path, camera, lambda pose=on_rig: self.bench(pose), FRAME_SAMPLES
+            yield path, camera, partial(self.bench, on_rig), FRAME_SAMPLES
             files = sorted((boards / camera.name).iterdir())
             for path, pose in zip(files, self.geometry["board_views"][camera.name], strict=True):
-                yield path, camera, lambda pose=pose: self.bench(pose), BOARD_SAMPLES
+                yield path, camera, partial(self.bench, pose), BOARD_SAMPLES
         for name, trial in self.geometry["trials"].items():
             for camera in self.cameras:
                 files = sorted((self.session / "trials" / name / camera.name).iterdir())
                 assert len(files) == len(trial["motor_rad"]), f"{name} is a film, or not whole"
                 for frame, path in enumerate(files):
-                    make = lambda trial=trial, frame=frame: self.trial(trial, frame)  # noqa: E731
-                    yield path, camera, make, FRAME_SAMPLES
+                    yield path, camera, partial(self.trial, trial, frame), FRAME_SAMPLES
 
 
 def tapered_tube(tracer, axis_mm: np.ndarray, radius_mm: np.ndarray) -> tuple:

@@ -28,22 +28,9 @@ from bench.trials.seen import NO_PICTURES, unseen
 from bench.trials.stage_against_felt import with_stage_against_felt
 from bench.trials.stated_truth import by_stage
 from bench.workflows.session_evaluation import evaluate
-from fixtures.bring_stage import PROTOCOL, bring_stage
+from fixtures.bring_stage import bring_stage
 
-TRIALS = """
-[[trials]]
-beta_deg = [0, 20, 35, 50, 60]
-d_x_mm = [45.0, 60.0, 75.0, 85.0]
-surface = "steel"
-friction = 0.185339
-beta_scatter_deg = 0.5
-d_x_scatter_mm = 2.0
-[[trials]]
-beta_deg = 45
-d_x_mm = 50.0
-surface = "steel"
-friction = 0.185339
-"""
+DISTANCES_MM = [45.0, 60.0, 75.0, 85.0]
 OFF_MM = (2.0, 1.0, 0.5)
 LEAST_SLOPE_DEG = 5.0
 STEEP_DEG = 40.0
@@ -81,7 +68,7 @@ def evaluate_session(folder: Path, seed: int) -> Evaluated:
     """Simulate a session and evaluate it."""
     path = folder / f"session_{seed}"
     if not path.exists():
-        bring_stage(path, seed, PROTOCOL.split("[[trials]]")[0] + TRIALS)
+        bring_stage(path, seed, DISTANCES_MM)
     out = folder / f"out_{seed}"
     evaluate(path, out, Settings(figures=False), workers=0, announce=lambda text: None)
     session = load_session(path)
