@@ -6,20 +6,20 @@ that at each step it is the most probable one at these positions and this blur (
 Golub and Pereyra 1973, in Kaufman's form).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from vision.wire.light_prior import USUAL_LIGHT
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import (
     LEAST_POWER,
     LONGEST_PX,
     PositionEquations,
     SegmentEquations,
-    stiffness,
-    wave_prior,
+    contrast_of,
 )
 
 # [steps] At most: Gauss–Newton takes 4 to 10. By 20 d_x moves by 0.01 sigma. Study: thresholds.py
@@ -178,7 +178,8 @@ class Point:
                 task.pieces.moved(shift_px), float(np.exp(log_blur)), task.terms
             )
         if stiff is None:
-            stiff = stiffness(wave_prior(equations.pieces, task.terms), task.knots)
+            precision = USUAL_LIGHT.precision(task.knots, task.terms)
+            stiff = precision / contrast_of(equations.pieces) ** 2
         weights = task.knot_weights
         left, right = equations.shared(weights, robust)
         left += stiff
@@ -304,15 +305,27 @@ class Arrow:
         """
         point = self.point
         step = self.step(damping)
+        return replace(
+            self.hold(),
+            shift_px=point.shift_px + np.clip(step.shift_px, -LONGEST_PX, LONGEST_PX),
+            blur_px=float(
+                np.exp(point.log_blur + np.clip(step.log_blur, -_LONGEST_LOG, _LONGEST_LOG))
+            ),
+        )
+
+    def hold(self) -> SharedSolution:
+        """Return the solution at the point itself, with the sensitivity of positions to what all
+        share.
+        """
+        point = self.point
         own = self.cross / self.power[:, None]
         left = self.shared - (point.robust[:, None] * self.cross).T @ own
-        log_blur = point.log_blur + np.clip(step.log_blur, -_LONGEST_LOG, _LONGEST_LOG)
         causes = Causes(np.linalg.cholesky(left))
         return SharedSolution(
-            shift_px=point.shift_px + np.clip(step.shift_px, -LONGEST_PX, LONGEST_PX),
+            shift_px=point.shift_px,
             shared_px=causes.shifts_px(own),
             coefficients=point.coefficients,
-            blur_px=float(np.exp(log_blur)),
+            blur_px=float(np.exp(point.log_blur)),
             evidence=point.evidence,
             by_knot=point.by_knot,
             causes=causes,

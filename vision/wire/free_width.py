@@ -12,7 +12,7 @@ import numpy as np
 from vision.pictures.pixel_noise import Noise
 from vision.wire.bands import Pieces
 from vision.wire.binned import binned
-from vision.wire.common_shift import NO_CHANCE, best_evidences
+from vision.wire.common_shift import best_evidences
 from vision.wire.rod_width import weigh_widths
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import Knots
@@ -65,4 +65,4 @@ def _evidence(pieces: Pieces, blurs_px: np.ndarray) -> float:
     averaged, _ = binned(pieces, BIN_PX)
     knots = Knots(pieces.place[[0, -1]])
     task = ShadedSegments(averaged, WIRE_WAVES, knots, float(np.median(blurs_px))).tempered()
-    return float(best_evidences(task, _SHIFTS_PX, blurs_px, no_chance=NO_CHANCE)[0])
+    return float(best_evidences(task, _SHIFTS_PX, blurs_px)[0])

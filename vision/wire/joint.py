@@ -7,8 +7,8 @@ end near where they began. Here they are one least-squares problem (`descent.py`
 
 Two things can go wrong with what is shared. A shift of all segments, under another blur and
 shading, can be a local minimum, or as probable as the best: several starts are followed
-(`starts.py`), the descent begins again where the posterior of such a shift lies elsewhere, and its
-sigma holds all shifts that are probable (`common_shift.py`). And no model of light is right to a
+(`starts.py`), and the segments are moved to the mean of the posterior of such a shift, whose sigma
+holds all shifts that are probable (`common_shift.py`). And no model of light is right to a
 hundredth of the contrast: that error, which all segments have alike, bounds the weights of pixels by
 which the shared unknowns are found (`ShadedSegments.tempered`).
 """
@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vision.wire.common_shift import CommonShift, common_shift
-from vision.wire.descent import Point, SharedSolution, descend
+from vision.wire.descent import Arrow, Point, SharedSolution, descend
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import LEAST_POWER, PositionEquations, SegmentEquations
 from vision.wire.starts import descend_coarsely, find_start
@@ -46,7 +46,7 @@ def solve_jointly(task: ShadedSegments, *, last: bool = True) -> SegmentSolution
     """Return the most probable positions, shading and blur of segments.
 
     The segments lie where they are expected, or, in the first pass, all to one side. last: this
-    is the last pass, so that other common shifts that are as probable enter the sigma.
+    is the last pass, so that all common shifts count as far as they are probable.
     """
     tempered = task.tempered()
     if not last and task.seen_blur_px is None:
@@ -54,35 +54,28 @@ def solve_jointly(task: ShadedSegments, *, last: bool = True) -> SegmentSolution
     shift_px, log_blur = find_start(task)
     shared = descend(Point.at_common_shift(tempered, shift_px, log_blur).weighted())
     if last:
-        shared = _with_all_shifts(tempered, shared)
+        shared = _at_mean_shift(tempered, shared)
     return place_each_segment(task, shared)
 
 
-def _with_all_shifts(task: ShadedSegments, shared: SharedSolution) -> SharedSolution:
-    """Return the solution with a sigma for its common shift that holds all probable shifts.
+def _at_mean_shift(task: ShadedSegments, shared: SharedSolution) -> SharedSolution:
+    """Return the solution with all segments moved to the mean of their common shift's posterior.
 
-    Where the posterior of that shift lies elsewhere, the descent has ended in a wrong minimum. It
-    begins again from the posterior's mean, and the solution about which the probable shifts lie
-    closer is returned.
+    The posterior's sigma takes the place of what the causes that are shared move in common.
     """
     here = _weighted_point(task, shared)
     shift = _common_shift(task, here)
-    if shift.is_elsewhere:
-        other = _descend_from(task, shared, shift)
-        there = _weighted_point(task, other)
-        about_other = _common_shift(task, there)
-        if about_other.rms_px < shift.rms_px:
-            shared = other
-            here = there
-            shift = about_other
-    own_px = _without_common(task, shared.shared_px, here.robust)
-    common_px = shift.rms_px * task.pieces.relative_radius[:, None]
+    moved_px = shared.shift_px + shift.mean_px * task.pieces.relative_radius
+    there = Point.at(task, moved_px, np.log(shared.blur_px) + shift.log_blur, here.robust)
+    moved = Arrow(there).hold()
+    own_px = _without_common(task, moved.shared_px, there.robust)
+    common_px = shift.sigma_px * task.pieces.relative_radius[:, None]
     causes = replace(
-        shared.causes,
-        in_common=_in_common(task, shared.shared_px, here.robust),
-        common_px=shift.rms_px,
+        moved.causes,
+        in_common=_in_common(task, moved.shared_px, there.robust),
+        common_px=shift.sigma_px,
     )
-    return replace(shared, shared_px=np.concatenate([own_px, common_px], axis=1), causes=causes)
+    return replace(moved, shared_px=np.concatenate([own_px, common_px], axis=1), causes=causes)
 
 
 def _without_common(task: ShadedSegments, shifts_px: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -102,15 +95,6 @@ def _weighted_point(task: ShadedSegments, shared: SharedSolution) -> Point:
     """Return the point at a solution, segments weighed by their misfit."""
     every = np.ones(len(task.pieces))
     return Point.at(task, shared.shift_px, np.log(shared.blur_px), every).weighted()
-
-
-def _descend_from(
-    task: ShadedSegments, shared: SharedSolution, shift: CommonShift
-) -> SharedSolution:
-    """Return where the descent ends from a solution moved by the mean of a common shift."""
-    moved_px = shared.shift_px + shift.mean_px * task.pieces.relative_radius
-    log_blur = np.log(shared.blur_px) + shift.log_blur
-    return descend(Point.at(task, moved_px, log_blur, np.ones(len(moved_px))).weighted())
 
 
 def _common_shift(task: ShadedSegments, here: Point) -> CommonShift:

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from vision.geometry.robust import mean_and_sigma
 from vision.wire.bands import Pieces
 from vision.wire.binned import binned
-from vision.wire.common_shift import EVIDENCE_COUNTS, NO_CHANCE, best_evidences
+from vision.wire.common_shift import EVIDENCE_COUNTS, best_evidences
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import Knots
 from vision.wire.trace import BIN_PX, WIRE_WAVES
@@ -46,9 +46,7 @@ def log_width(pieces: Pieces, blur_px: float, knots: Knots) -> tuple[float, floa
     averaged, _ = binned(some, BIN_PX)
     task = ShadedSegments(averaged, WIRE_WAVES, knots, blur_px).tempered()
     blurs_px = task.blur_px * np.exp(_LOG_BLURS)
-    coarse = best_evidences(
-        task, _SHIFTS_PX, blurs_px[1:2], wider=np.exp(_LOG_WIDTHS), no_chance=NO_CHANCE
-    )
+    coarse = best_evidences(task, _SHIFTS_PX, blurs_px[1:2], wider=np.exp(_LOG_WIDTHS))
     best = float(_LOG_WIDTHS[np.argmin(coarse)])
     if best in _LOG_WIDTHS[[0, -1]]:
         return None

@@ -12,7 +12,6 @@ and offset eliminated; `fit_shading` solves them for the coefficients of all kno
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
@@ -35,16 +34,6 @@ _REACH_BLURS = 4.5
 # moves no value of five whisks by more than 0.02 sigma, twice as much touch of one by 0.29 and a
 # slope's sigma by 0.5. Study: thresholds.py wire.shading LONGEST_PX ….
 LONGEST_PX = 0.7
-# [1] Prior sigma of each Fourier coefficient of a thin, lit rod over its contrast: diffuse light
-# fills the first three, a highlight a quarter of the rod wide reaches the eleventh. Study: lines.py.
-WAVE_SHARE = np.array([2.0, 0.6, 0.6, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
-# [1] What of it changes from knot to knot: light and finish are much the same a centimetre
-# farther on. Free at every knot, shading bends the line of a wire before an even floor by up to a
-# pixel. Study: thresholds.py wire.shading _CHANGE_SHARE ….
-_CHANGE_SHARE = 0.1
-# [1] What of it changes from turn to turn of `LIT_ALIKE_RAD`: light and rod keep, the angle at
-# which they meet does not. Set by eye. Study: thresholds.py wire.shading _TURNED_SHARE ….
-_TURNED_SHARE = 0.3
 # [1] Added to the normal matrix over its mean diagonal where there is no prior. Derived.
 _RIDGE = 1e-6
 
@@ -327,34 +316,6 @@ def _inverse_of_two(matrices: np.ndarray) -> np.ndarray:
     return adjugate / (a * d - b * b)[:, None, None]
 
 
-def stiffness(prior: np.ndarray, knots: Knots) -> np.ndarray:
-    """Return the prior's inverse covariance (size, size) of all coefficients.
-
-    prior (terms,): sigma of each coefficient. It holds each knot's own coefficients, and their
-    differences between neighbouring knots.
-    """
-    return np.kron(between_knots(knots), np.diag(prior**-2.0))
-
-
-def between_knots(knots: Knots) -> np.ndarray:
-    """Return the inverse covariance (knots, knots) of one coefficient, over its own variance."""
-    return _between(len(knots.turn_rad), len(knots.place_mm))
-
-
-@lru_cache
-def _between(turns: int, places: int) -> np.ndarray:
-    """Return `between_knots` of so many turns and places."""
-    from_place_to_place = np.kron(np.eye(turns), _squared_steps(places)) / _CHANGE_SHARE**2
-    from_turn_to_turn = np.kron(_squared_steps(turns), np.eye(places)) / _TURNED_SHARE**2
-    return np.eye(turns * places) + from_place_to_place + from_turn_to_turn
-
-
-def _squared_steps(count: int) -> np.ndarray:
-    """Return the matrix (count, count) of the sum of squared steps between neighbouring values."""
-    steps = np.diff(np.eye(count), axis=0)
-    return steps.T @ steps
-
-
 def contrast_of(pieces: Pieces) -> float:
     """Return the RMS difference of the rod from its background in grey levels; one at least."""
     inside = (np.abs(pieces.offset_px) < pieces.radius_px[:, None]) & (pieces.weight > 0)
@@ -362,10 +323,3 @@ def contrast_of(pieces: Pieces) -> float:
         return 1.0
     difference = (pieces.grey - pieces.background)[inside]
     return max(float(np.sqrt(np.mean(difference**2))), 1.0)
-
-
-def wave_prior(pieces: Pieces, terms: int) -> np.ndarray:
-    """Return the prior sigma (terms,) of the shading's coefficients, by the rod's contrast, grey
-    levels.
-    """
-    return contrast_of(pieces) * WAVE_SHARE[:terms]

@@ -9,8 +9,9 @@ from scipy.linalg import cho_factor, cho_solve
 
 from vision.wire.descent import Point, SharedSolution, descend
 from vision.wire.gathered import GatheredEquations, exactly_if_needed
+from vision.wire.light_prior import USUAL_LIGHT
 from vision.wire.shaded_segments import ShadedSegments
-from vision.wire.shading import stiffness, wave_prior
+from vision.wire.shading import contrast_of
 
 # [px] Common shifts of the starts: minima lie 0.5 to 1 px apart. Set by eye. Study: wire_scenes.py.
 _START_SHIFTS_PX = np.linspace(-1.5, 1.5, 7)
@@ -92,11 +93,11 @@ def _evidences(task: ShadedSegments, log_blurs: np.ndarray, each_pixel: bool) ->
     gathered = GatheredEquations(task.pieces, task.knot_weights, every, each_pixel=each_pixel)
     normal = gathered.normal(_START_SHIFTS_PX, models, task.terms)
     evidences = normal.power.reshape(-1, len(models)) + task.blur_deviation(log_blurs) ** 2
+    precision = USUAL_LIGHT.precision(task.knots, task.terms)
     equations = zip(normal.left, normal.right)
     for k, shift in enumerate(_START_SHIFTS_PX):
         moved = task.pieces.moved(shift * task.pieces.relative_radius)
-        prior = wave_prior(moved, task.terms)
-        stiff = stiffness(prior, task.knots)
+        stiff = precision / contrast_of(moved) ** 2
         for b in range(len(models)):
             evidences[k, b] += _evidence_of_shading(*next(equations), stiff)
     return evidences

@@ -45,10 +45,6 @@ class ShadingEquations(NamedTuple):
     right: np.ndarray
     power: np.ndarray
 
-    def select(self, some: np.ndarray) -> "ShadingEquations":
-        """Return the normal equations of some models, by their indices along the first axis."""
-        return ShadingEquations(self.left[some], self.right[some], self.power[some])
-
 
 class SummedSegments:
     """Segments of nearly one half-width, their products of pixels summed at equal distances.

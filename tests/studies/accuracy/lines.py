@@ -7,8 +7,9 @@ of the fit is used. A scene is 13 frames of a wire 5.6 px wide that moves 4 px a
 whisk. Noise is 2 grey levels, contrast about 60. Columns:
 
 - kept: points that the fit trusts, of all its pieces
-- bias: mean error in px; common: what of the error all frames share at a place, RMS over places about the bias. It
-  goes into the rest shape and cancels in every difference; the fit of the whisk prices it
+- bias: mean error in px; stated: sigma of a shift of all points
+- common: what of the error all frames share at a place, RMS over places about the bias. It goes into the rest shape and
+  cancels in every difference; the fit of the whisk prices it
 - scatter about that over the Cramér–Rao bound of one who knows everything but the centre (for an even rod:
   sigma_n/A sqrt(sqrt(pi) s / (L (1 - exp(-w²/4s²)))))
 - z: the same over the stated sigma
@@ -179,7 +180,8 @@ def band(scene: Scene, picture, background, curve):
 
 @dataclass(frozen=True)
 class Measured:
-    """Points of all frames: error, stated sigma, bound (px), place, distance from the bar's outline; share kept."""
+    """Points of all frames: error, stated sigma, bound (px), place, distance from the bar's outline; share kept; stated
+    sigma of a shift of all points."""
 
     error: np.ndarray
     sigma: np.ndarray
@@ -187,6 +189,7 @@ class Measured:
     place: np.ndarray
     from_bar: np.ndarray
     kept: float
+    stated: float
 
     def select(self, keep) -> "Measured":
         fields = ("error", "sigma", "bound", "place", "from_bar")
@@ -243,6 +246,7 @@ def find(scene: Scene, rng) -> Measured:
         np.round(points.place),
         _from_bar(scene, points),
         len(points) / len(traced.pieces),
+        float(np.median(np.linalg.norm(points.shared_px, axis=1))),
     )
 
 
@@ -272,6 +276,7 @@ class Figures:
     count: int
     kept: float
     bias: float
+    stated: float
     common: float
     ratio: float
     z: float
@@ -283,6 +288,7 @@ class Figures:
             len(measured.error),
             measured.kept,
             float(measured.error.mean()),
+            measured.stated,
             float(np.std(common)),
             _rms(own / measured.bound) / share,
             _rms(own / measured.sigma) / share,
@@ -290,7 +296,8 @@ class Figures:
 
     def line(self, name: str) -> str:
         return (
-            f"{name:<40} {self.count:>5} {100 * self.kept:>5.0f} % {self.bias:>+8.4f} {self.common:>8.4f} "
+            f"{name:<40} {self.count:>5} {100 * self.kept:>5.0f} % {self.bias:>+8.4f} {self.stated:>7.3f} "
+            f"{self.common:>8.4f} "
             f"{self.ratio:>7.2f} {self.z:>6.2f}"
         )
 
@@ -318,13 +325,18 @@ def joined(parts: list[Measured]) -> Measured:
         for name in ("error", "sigma", "bound", "from_bar")
     }
     place = np.concatenate([p.place + 1000 * k for k, p in enumerate(parts)])
-    return Measured(place=place, kept=float(np.mean([p.kept for p in parts])), **columns)
+    kept, stated = (
+        float(np.mean([getattr(p, name) for p in parts])) for name in ("kept", "stated")
+    )
+    return Measured(place=place, kept=kept, stated=stated, **columns)
 
 
 def main() -> None:
     repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 3
     rng = np.random.default_rng(0)
-    print(f"{'wire':<40} {'n':>5} {'kept':>7} {'bias':>8} {'common':>8} {'/bound':>7} {'z':>6}")
+    print(
+        f"{'wire':<40} {'n':>5} {'kept':>7} {'bias':>8} {'stated':>7} {'common':>8} {'/bound':>7} {'z':>6}"
+    )
     for name, scene in SCENES.items():
         measured = joined([find(scene, rng) for _ in range(repeats)])
         if scene.bar is None:

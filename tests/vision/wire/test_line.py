@@ -14,8 +14,17 @@ PLAIN = [
     "even rod, flat background",
     "step of a fifth of the contrast",
     "highlight and step",
-    "within 2° of the rows, highlight",
 ]
+HIGHLIGHT = "within 2° of the rows, highlight"
+
+
+def test_a_highlight_before_an_even_floor_moves_a_wire_by_no_more_than_is_stated(rng):
+    """A dark rim is no edge there: light alone decides where the wire lies, to a tenth of its width."""
+    figures = Figures.of(find(SCENES[HIGHLIGHT], rng))
+    assert abs(figures.bias) < figures.stated < 0.1 * 2 * SCENES[HIGHLIGHT].radius
+    assert figures.ratio < 1.2 * 1.08
+    assert 0.85 < figures.z < 1.15
+    assert figures.kept > 0.95
 
 
 @pytest.mark.parametrize("name", PLAIN)

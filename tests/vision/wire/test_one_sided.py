@@ -34,11 +34,12 @@ def test_a_rod_lit_from_one_side_is_seen_narrower_and_its_axis_is_found(rng, nam
     """What is lit ends at sin 45° (sin 15°) of the radius beyond the axis, so its middle lies off by (1 - that)/2.
 
     -0.41 and -1.04 px for a sharp end; brightness fades towards it, so what is plainly seen ends earlier. The axis
-    comes from the lit edge and the diameter, to what is stated: over five seeds -0.10 px at 45°, -0.20 to -0.23 at 15°.
+    comes from the lit edge and the diameter, to what is stated: it lies 0.4 and 0.9 px nearer to what is seen, for a
+    side that is just as dark as what is behind it is less probable than none; 1.2 and 1.4 sigma.
     """
     width, sigmas = looked_at(name, rng)
     assert width.is_one_sided
-    assert width.off_px < 0.45 * off_px
+    assert width.off_px < 0.35 * off_px
     assert abs(sigmas) < 2.0
 
 

