@@ -181,29 +181,31 @@ def _cell(value: object, kind: Kind) -> str:
     return _in_ascii(str(value)) if kind is Kind.SENTENCE else str(value)
 
 
-_ASCII = {
-    "°": " deg",
-    "±": "+-",
-    "·": "*",
-    "×": "x",
-    "≥": ">=",
-    "≤": "<=",
-    "²": "2",
-    "−": "-",
-    "–": "-",
-    "…": "...",
-    "→": "->",
-    "α": "alpha",
-    "β": "beta",
-    "θ": "theta",
-    "μ": "mu",
-    "σ": "sigma",
-    "φ": "phi",
-    "χ": "chi",
-    "ψ": "psi",
-}
+_ASCII = str.maketrans(
+    {
+        "°": " deg",
+        "±": "+-",
+        "·": "*",
+        "×": "x",
+        "≥": ">=",
+        "≤": "<=",
+        "²": "2",
+        "−": "-",
+        "–": "-",
+        "…": "...",
+        "→": "->",
+        "α": "alpha",
+        "β": "beta",
+        "θ": "theta",
+        "μ": "mu",
+        "σ": "sigma",
+        "φ": "phi",
+        "χ": "chi",
+        "ψ": "psi",
+    }
+)
 
 
 def _in_ascii(text: str) -> str:
     """Return a sentence with its symbols spelled out."""
-    return "".join(_ASCII.get(letter, letter) for letter in text)
+    return text.translate(_ASCII)

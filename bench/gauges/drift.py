@@ -39,7 +39,7 @@ def force_slope(stroke: FeltStroke) -> FreeSlope | None:
 
 def _slope_of(stroke: FeltStroke, samples: np.ndarray) -> FreeSlope | None:
     """Fit the slope of samples (n, k) before felt touch; None where there is no touch."""
-    touch = stroke.touch()
+    touch = stroke.touch
     if touch.status:
         return None
     time_s = stroke.time_s

@@ -69,7 +69,7 @@ def touch_on_the_way_back(signals: Signals, delay_s: float) -> Value:
     if where is None:
         return UNKNOWN
     stroke = _backwards(signals, where)
-    touch = stroke.touch()
+    touch = stroke.touch
     if touch.status:
         return UNKNOWN
     return Value(touch.motor_rad + delay_s * stroke.speed_rad_s, touch.sigma_rad)
@@ -114,13 +114,9 @@ class FeltStroke:
         channels = self.channels - drift
         return replace(self, channels=channels, filtered=self.filtered - drift, drift=drift)
 
+    @cached_property
     def touch(self) -> FeltTouch:
         """Return felt touch. The rise is fitted as recorded: a filter would smear the onset."""
-        return self._touch
-
-    @cached_property
-    def _touch(self) -> FeltTouch:
-        """Return felt touch, fitted once."""
         return felt_touch(self.motor_rad, self.channels, self.time_s)
 
     @cached_property
@@ -236,7 +232,7 @@ def _levelled(
     if back.stop - back.start < _LEAST_FREE:
         return stroke
     motor_rad = signals.motor_rad[back]
-    touch = stroke.touch()
+    touch = stroke.touch
     if touch.status:
         return stroke
     before = is_free(stroke.motor_rad, touch)

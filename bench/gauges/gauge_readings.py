@@ -141,7 +141,7 @@ def pairs_of(
     theta_rad: float,
 ) -> Pairs | Reason:
     """Return the pairs of one whisk, or the reason why it has none. theta_rad: the paper's pushing angle."""
-    touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
+    touch = allow_drift(stroke.touch, drift_rate, stroke.speed_rad_s)
     if touch.status:
         return as_reason(touch.status)
     try:

@@ -49,7 +49,7 @@ def _reversal(
     name: str, stroke: FeltStroke, motor: np.ndarray, channels: np.ndarray
 ) -> Reversal | None:
     """Compare a stroke with its way back, motor (b,) and channels (b, 2); None without one."""
-    touch = stroke.touch()
+    touch = stroke.touch
     if touch.status or len(motor) < MIN_FREE_SAMPLES:
         return None
     push = stroke.motor_rad[-1] - touch.motor_rad

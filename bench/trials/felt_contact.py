@@ -11,6 +11,7 @@ from bench.trials.estimates import whisk_of
 from estimator import distance, first_order
 from estimator.beam import Beam
 from estimator.uncertainty import gradient_known_slope, model_share
+from estimator.whisk import Whisk
 from vision import NAN
 
 # Causes of which `FeltWhisk.shared_Nmm` has a row each.
@@ -42,27 +43,25 @@ def felt_contact(
     Without a distance where there are no moments, or nothing is concluded from them, or the object is no bar that stands.
     """
     late_rad = felt.delay_s.sigma * math.radians(result.trial.speed_deg_s or 0.0)
-    late = np.array([[late_rad], [0.0]])
-    stands = seen.stage_contact.stands and not whisker.beam.is_curved
-    if not stands or not felt.has_moments or felt.apart:
+    late = np.array([[late_rad], [0.0]])  # of touch and distance
+    is_straight_bar = seen.stage_contact.stands and not whisker.beam.is_curved
+    if not is_straight_bar or not felt.has_moments or felt.apart:
         return _touch_alone(felt, late)
-    beam = whisker.beam
-    slope_rad = seen.beta_rad.value
-    whisk = whisk_of(felt, result.theta_rad, beam)
-    as_cylinder_mm = distance.known_slope(*whisk.felt, slope_rad, beam.C_Nmm2)
-    d_x_mm = _distance_mm(result, as_cylinder_mm, slope_rad, beam)
-    if not math.isfinite(d_x_mm):
+    whisk = whisk_of(felt, result.theta_rad, whisker.beam)
+    found = _distance(result, whisk, seen.beta_rad.value)
+    if found is None:
         return _touch_alone(felt, late)
-    thickness = beam.thickness(d_x_mm)
-    of_cylinder = gradient_known_slope(*whisk.felt, slope_rad, beam.C_Nmm2)
-    gradient = thickness / as_cylinder_mm * of_cylinder  # of the logarithm
-    by_input = np.array([[-1.0, 0.0, 0.0], gradient[:3]])  # of touch and distance by θ, m_y and m_z
+    by_input = np.array([[-1.0, 0.0, 0.0], found.by_input])  # of touch and distance
     by_cause = _inputs_by_cause(felt)
-    own = by_input @ (whisk.felt_covariance - by_cause.T @ by_cause) @ by_input.T
-    share = model_share(result.theta_rad, 0.0, _FRICTION_RAD, d_x_mm, thickness=thickness)
-    own[1, 1] += share**2
-    values = np.array([felt.touch_felt_rad.value, math.log(d_x_mm)])
-    return FeltContact(values, own, np.hstack([late, by_input @ by_cause.T]), float(gradient[3]))
+    own_inputs = whisk.felt_covariance - by_cause.T @ by_cause
+    own = by_input @ own_inputs @ by_input.T
+    own[1, 1] += found.model_share**2
+    return FeltContact(
+        values=np.array([felt.touch_felt_rad.value, math.log(found.d_x_mm)]),
+        own=own,
+        shared=np.hstack([late, by_input @ by_cause.T]),
+        by_slope=found.by_slope,
+    )
 
 
 def _touch_alone(felt: FeltWhisk, late: np.ndarray) -> FeltContact:
@@ -82,12 +81,39 @@ def _inputs_by_cause(felt: FeltWhisk) -> np.ndarray:
     return by_cause
 
 
-def _distance_mm(result: TrialResult, as_cylinder_mm: float, slope_rad: float, beam: Beam) -> float:
-    """Return d_x of (6), mm, less how far the contact rolls over the bar; NaN where there is none."""
+@dataclass(frozen=True, eq=False)
+class _Distance:
+    """A distance by (6), and the derivatives of its logarithm.
+
+    by_input (3,): by θ, m_y and m_z. by_slope: by the slope, 1/rad.
+    model_share: sigma of the logarithm by what (6) leaves out.
+    """
+
+    d_x_mm: float
+    by_input: np.ndarray
+    by_slope: float
+    model_share: float
+
+
+def _distance(result: TrialResult, whisk: Whisk, slope_rad: float) -> _Distance | None:
+    """Return the distance of a whisk by (6), less how far the contact rolls over the bar; None without one."""
+    beam = whisk.beam
+    as_cylinder_mm = distance.known_slope(*whisk.felt, slope_rad, beam.C_Nmm2)
     d_x_mm = beam.distance_mm(as_cylinder_mm)
-    rolled = 0.0
+    d_x_mm *= 1.0 - _rolled_share(result, d_x_mm, slope_rad, beam)
+    if not math.isfinite(d_x_mm):
+        return None
+    thickness = beam.thickness(d_x_mm)
+    of_cylinder = gradient_known_slope(*whisk.felt, slope_rad, beam.C_Nmm2)
+    by_input = thickness / as_cylinder_mm * of_cylinder
+    share = model_share(result.theta_rad, 0.0, _FRICTION_RAD, d_x_mm, thickness=thickness)
+    return _Distance(d_x_mm, by_input[:3], float(by_input[3]), share)
+
+
+def _rolled_share(result: TrialResult, d_x_mm: float, slope_rad: float, beam: Beam) -> float:
+    """Return how far the contact rolls over the bar, as a share of d_x; 0 of a bar of unknown radius."""
     reach_mm = result.reach_mm(d_x_mm)
-    if math.isfinite(reach_mm):
-        thickness = beam.thickness(d_x_mm)
-        rolled = first_order.rolling_at(result.theta_rad, reach_mm, slope_rad, d_x_mm, thickness)
-    return d_x_mm * (1.0 - rolled)
+    if not math.isfinite(reach_mm):
+        return 0.0
+    thickness = beam.thickness(d_x_mm)
+    return first_order.rolling_at(result.theta_rad, reach_mm, slope_rad, d_x_mm, thickness)

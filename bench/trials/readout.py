@@ -108,7 +108,7 @@ def felt_whisk(
 
     drift_rate (2,): RMS drift of the channels per second.
     """
-    touch = allow_drift(stroke.touch(), drift_rate, stroke.speed_rad_s)
+    touch = allow_drift(stroke.touch, drift_rate, stroke.speed_rad_s)
     if touch.status:
         return touch, as_reason(touch.status)
     return touch, whisk_at(stroke, readout, touch, beam, theta_rad)

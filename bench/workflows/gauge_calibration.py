@@ -99,7 +99,7 @@ def calibrate_gauges(
 
 def zeros_of(strokes: Sequence[FeltStroke]) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean zero (2,) of the free strokes and its standard deviation (2,), in volts."""
-    touches = [stroke.touch() for stroke in strokes]
+    touches = [stroke.touch for stroke in strokes]
     levels_V = np.array([touch.offset for touch in touches if not touch.status])
     if len(levels_V) < 2:
         return levels_V.mean(axis=0), np.zeros(2)

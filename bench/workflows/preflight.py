@@ -214,7 +214,7 @@ def _check_trial(
 def _pushes(strokes: Sequence[FeltStroke]) -> Iterator[np.ndarray]:
     """Yield the channels (2,) of each stroke at the usual pushing angle, where it gets there."""
     for stroke in strokes:
-        touch = stroke.touch()
+        touch = stroke.touch
         if touch.status:
             continue
         at = stroke.at(Settings().theta_rad, touch)
@@ -258,7 +258,7 @@ def _stroke_warnings(
     """
     usual_deg = Settings().theta_deg
     for number, stroke in enumerate(strokes):
-        touch = stroke.touch()
+        touch = stroke.touch
         if touch.status:
             yield f"whisk {number}: {touch.status}"
             continue

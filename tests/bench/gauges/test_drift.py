@@ -45,7 +45,7 @@ def test_what_few_strokes_cannot_rule_out_is_allowed(rng):
 
 def test_drift_widens_what_is_read_far_from_the_free_stroke(rng):
     one = stroke(rng)
-    touch = one.touch()
+    touch = one.touch
     far = np.radians(3.0)
     steady, wandering = (
         one.at(far, allow_drift(touch, rate, SPEED)) for rate in ([0.0, 0.0], [0.05, 0.05])
@@ -58,15 +58,13 @@ def test_drift_widens_what_is_read_far_from_the_free_stroke(rng):
 def test_no_touch_stays_none(rng):
     silent = stroke(rng, noise=5.0)
     assert free_slope(silent) is None
-    assert allow_drift(silent.touch(), [1.0, 1.0], SPEED).status
+    assert allow_drift(silent.touch, [1.0, 1.0], SPEED).status
 
 
 def test_a_zero_that_may_drift_is_in_the_touch_too(rng):
     """As far from the free stroke as touch is: drift times that, through the rise's slope."""
     one = stroke(rng)
-    steady, wandering = (
-        allow_drift(one.touch(), rate, SPEED) for rate in ([0.0, 0.0], [0.05, 0.05])
-    )
+    steady, wandering = (allow_drift(one.touch, rate, SPEED) for rate in ([0.0, 0.0], [0.05, 0.05]))
     seconds = (steady.motor_rad - steady.level.centre_rad) / SPEED
     added = np.linalg.norm(steady.rise.gain) * 0.05 * seconds
     assert wandering.sigma_rad == pytest.approx(np.hypot(steady.sigma_rad, added), rel=1e-6)
@@ -75,7 +73,7 @@ def test_a_zero_that_may_drift_is_in_the_touch_too(rng):
 def test_touch_and_moments_may_be_one_whisks(rng):
     """θ's sigma, its covariance with the moments and theirs make a covariance, at small angles and large drifts too."""
     one = stroke(rng)
-    touch = allow_drift(one.touch(), [0.3, 0.3], SPEED)
+    touch = allow_drift(one.touch, [0.3, 0.3], SPEED)
     at = one.at(np.radians(0.3), touch)
     whole = np.block(
         [[touch.sigma_rad**2, at.theta_covariance], [at.theta_covariance[:, None], at.covariance]]

@@ -64,7 +64,7 @@ def test_drift_is_taken_out_where_both_free_strokes_show_it(back):
     off = (
         stroke.channels[pushed, 1]
         - stroke.motor_rad[pushed] / np.radians(4.0)
-        - stroke.touch().offset[1]
+        - stroke.touch.offset[1]
     )
     gained = 0.05 * stroke.time_s[pushed].mean()
     assert off.mean() == pytest.approx(0.0 if back else gained, abs=0.012 if not back else 0.003)

@@ -191,7 +191,7 @@ def test_the_rig_s_sandpaper(tmp_path):
     for trial in (trial for trial in session.trials if trial.purpose == "measure"):
         told = tomllib.loads((trial.folder / "truth.toml").read_text())
         (stroke,) = strokes_of(read_signals(trial), trial, Settings())
-        touch = stroke.touch()
+        touch = stroke.touch
         felt = (stroke.channels - touch.offset) @ np.array(true["gauge_matrix_Nmm_per_V"]).T
         theta, beta = stroke.motor_rad - touch.motor_rad, np.radians(told["beta_deg"])
         raw = RawMoments(stroke.time_s, theta, felt)

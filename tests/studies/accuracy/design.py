@@ -109,7 +109,7 @@ def _felt(design: Design, recording: Recording) -> float:
     (stroke,) = strokes_of(
         Signals(time, np.radians(motor_deg), y, z, "V"), recording.run, Settings()
     )
-    touch = allow_drift(stroke.touch(), np.zeros(2), stroke.speed_rad_s)
+    touch = allow_drift(stroke.touch, np.zeros(2), stroke.speed_rad_s)
     _, beam = rod_and_beam(design, EQUIPMENT)
     whisk = whisk_at(
         stroke, Readout(GaugeMatrix(_VOLT_NMM * np.eye(2))), touch, beam, design.theta_rad

@@ -93,7 +93,7 @@ def phases_of_recording(recording: Recording, beam: Beam) -> Iterator[Phases]:
     signals = Signals(time, np.radians(motor_deg), y, z, "V")
     matrix = np.array(recording.run.protocol.gauges.matrix_Nmm_per_V)
     for stroke in strokes_of(signals, recording.run, Settings()):
-        touch = stroke.touch()
+        touch = stroke.touch
         moments = (stroke.channels - touch.offset) @ matrix.T
         theta = stroke.motor_rad - touch.motor_rad
         beta = np.radians(recording.run.beta_deg)

@@ -149,7 +149,7 @@ def recorded_stroke(
 def felt_whisk(stroke: FeltStroke, theta_rad: float) -> Whisk | None:
     """The whisk of a stroke at a pushing angle; None where no touch is felt. Nothing drifts, and the bench is told so."""
     readout = Readout(GaugeMatrix(10.0 * np.eye(2)))
-    touch = allow_drift(stroke.touch(), drift_rate([]), stroke.speed_rad_s)
+    touch = allow_drift(stroke.touch, drift_rate([]), stroke.speed_rad_s)
     whisk = touch.status or whisk_at(stroke, readout, touch, BEAM, theta_rad)
     if isinstance(whisk, str):
         return None

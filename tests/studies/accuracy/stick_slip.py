@@ -73,7 +73,7 @@ def slip_angles(recording: Recording) -> np.ndarray:
     signals = Signals(time, np.radians(motor_deg), y, z, "V")
     matrix, found = np.array(recording.run.protocol.gauges.matrix_Nmm_per_V), []
     for stroke in strokes_of(signals, recording.run, Settings()):
-        touch = stroke.touch()
+        touch = stroke.touch
         both = (
             stroke.at(THETA_RAD, touch),
             moment_at(THETA_RAD, stroke.motor_rad, stroke.filtered, touch, time_s=stroke.time_s),
