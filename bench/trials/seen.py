@@ -78,8 +78,8 @@ def see_trial(
         return unseen(count, NO_ZERO)
     try:
         if trial.is_traced_alone:
-            return _see(inputs, traced_frames(inputs))
-        return _see(inputs, TrialFrames.read(inputs, wires or {}, fits))
+            return _see(traced_frames(inputs))
+        return _see(TrialFrames.read(inputs, wires or {}, fits))
     except Refused as refusal:
         return unseen(count, refusal.reason)
 
@@ -89,18 +89,21 @@ def unseen(count: int, status: Reason) -> SeenTrial:
     return SeenTrial(tuple(SeenWhisk(WhiskTruth(number), status) for number in range(count)))
 
 
-def _see(inputs: TrialInputs, frames: TrialFrames) -> SeenTrial:
+def _see(frames: TrialFrames) -> SeenTrial:
     """Evaluate the pictures of a trial. Raise Refused where they do not suffice."""
+    inputs = frames.inputs
     trial = inputs.trial
-    settings = inputs.settings
-    clock = _clock(frames.times, settings)
-    truth, whisks = _observe(inputs, frames, clock.sigma_s)
-    back = dict(zip(frames.back, truth.whisks[len(whisks) :]))
+    clock = _clock(frames.times, inputs.settings)
+    truth, whisks = _observe(frames, clock.sigma_s)
     late = check_camera_delays(whisk.delays for whisk in truth.whisks)
     of_trial = [*_contradicted_diameters(truth, inputs.session, trial), late]
+    back = dict(zip(frames.back, truth.whisks[len(whisks) :]))
+    ways_back = ()
+    if trial.both_ways:
+        ways_back = _ways_back(back, len(whisks), inputs.settings, late)
     damaged = _damaged_frames(frames.by_camera, frames.times)
     return SeenTrial(
-        tuple(_records(inputs, frames, whisks, of_trial)),
+        tuple(_records(frames, whisks, of_trial)),
         notes=_notes(frames),
         damaged=in_one_status(*damaged, *frames.scene.unusable),
         bar=BarLine(truth.bar_point_mm, truth.bar_direction),
@@ -110,25 +113,23 @@ def _see(inputs: TrialInputs, frames: TrialFrames) -> SeenTrial:
         bar_looks=truth.bar_widths,
         one_sided_light=truth.one_sided_light,
         back=_back_stroke(back.get(0)),
-        ways_back=_ways_back(back, len(whisks), settings, late) if trial.both_ways else (),
+        ways_back=ways_back,
         fits=truth.fits,
     )
 
 
 def _records(
-    inputs: TrialInputs,
-    frames: TrialFrames,
-    whisks: Sequence[Evaluated],
-    of_trial: Sequence[Reason],
+    frames: TrialFrames, whisks: Sequence[Evaluated], of_trial: Sequence[Reason]
 ) -> Iterator[SeenWhisk]:
     """Yield the records of whisks. of_trial: contradictions of the trial as a whole."""
     ends = next((whisk.ends for _, whisk in whisks if whisk.ends), {})
-    warnings = [*frames.scene.left_out.values(), check_length(ends, inputs.session.whisker)]
+    too_short = check_length(ends, frames.inputs.session.whisker)
+    warnings = [*frames.scene.left_out.values(), too_short]
     for name, whisk in whisks:
         whisk = _with_angles_sigma(whisk, frames.motor_sigma_rad)
         if whisk.status:  # what the missing frames may have cost comes with their cause
             whisk = replace(whisk, status=joined(*frames.scene.unusable, whisk.status))
-        record = _whisk_of_trial(inputs, whisk, warnings, of_trial)
+        record = _whisk_of_trial(frames.inputs, whisk, warnings, of_trial)
         yield replace(record, looked=name)
 
 
@@ -184,22 +185,21 @@ def _clock(times: FrameTimes, settings: Settings) -> Clock:
     return Clock(times.source, sigma_s, times.clock_sigma_s == 0.0)
 
 
-def _observe(
-    inputs: TrialInputs, frames: TrialFrames, clock_sigma_s: float
-) -> tuple[TrialTruth, list[Evaluated]]:
+def _observe(frames: TrialFrames, clock_sigma_s: float) -> tuple[TrialTruth, list[Evaluated]]:
     """Return the truth of the trial by the first preset, and its forward whisks, each by the first
     preset that reaches the accuracy.
     """
-    cameras = inputs.calibration.cameras
+    cameras = frames.inputs.calibration.cameras
+    settings = frames.inputs.settings
     observe = partial(frames.observe, frames.pictures, cameras=cameras, rods=frames.rods)
     presets = []
-    for preset in presets_for(inputs.settings):
+    for preset in presets_for(settings):
         presets.append(preset.with_vision(clock_sigma_s=clock_sigma_s))
     first, *finer = presets
     truth = observe(whisks=[*frames.places, *frames.back.values()], settings=first.vision)
     whisks = [(first.name, whisk) for whisk in truth.whisks[: len(frames.places)]]
     for preset in finer:
-        whisks = _refine(observe, frames.places, whisks, preset, inputs.settings.accuracy_mm)
+        whisks = _refine(observe, frames.places, whisks, preset, settings.accuracy_mm)
     return truth, whisks
 
 

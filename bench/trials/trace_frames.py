@@ -7,15 +7,15 @@ import numpy as np
 from bench.base.settings import Settings
 from bench.session.frame_times import frame_times
 from bench.session.session import Session
-from bench.session.signals import Signals, forward_strokes
+from bench.session.signals import Signals
 from bench.session.traces import Traced, read_traces_alone
 from bench.session.trial import PLACE_UNCHECKED, Trial
 from bench.trials.placed_by_board import place_by_board
 from bench.trials.stated_truth import stated_place
 from bench.trials.still_scene import StillScene
-from bench.trials.trial_frames import TrialFrames, TrialInputs, back_frames, stated_object
+from bench.trials.trial_frames import TrialFrames, TrialInputs, motor_of_frames
 from vision import Trace, TrialTraces
-from vision.geometry import Axis, Cameras, Rods
+from vision.geometry import Axis, Cameras
 
 
 def traced_frames(inputs: TrialInputs) -> TrialFrames:
@@ -23,33 +23,29 @@ def traced_frames(inputs: TrialInputs) -> TrialFrames:
 
     Raises BadInput where traces and times do not match, Refused where nothing places the object.
     """
-    session = inputs.session
     trial = inputs.trial
-    signals = inputs.signals
     cameras = inputs.calibration.cameras
     times = frame_times(trial)
     sizes_px = {camera.name: tuple(camera.size_px) for camera in cameras}
-    alone = read_traces_alone(trial, len(times), sizes_px, session.crops)
-    traces = _asked(alone.wire, inputs.settings)
-    points = alone.object_points
-    motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
-    if points:
-        asked = _asked(points, inputs.settings)
-        recording = TrialTraces.with_points(traces, times.time_s, motor_rad, asked)
+    alone = read_traces_alone(trial, len(times), sizes_px, inputs.session.crops)
+    wire = _asked(alone.wire, inputs.settings)
+    motor_rad = motor_of_frames(inputs.signals, times)
+    if alone.object_points:
+        points = _asked(alone.object_points, inputs.settings)
+        traces = TrialTraces.with_points(wire, times.time_s, motor_rad, points)
+        notes = ()
     else:
-        axis, sigma = _place(session, trial, signals, cameras)
-        recording = TrialTraces.with_place(traces, times.time_s, motor_rad, axis, sigma)
+        axis, sigma = _place(inputs.session, trial, inputs.signals, cameras)
+        traces = TrialTraces.with_place(wire, times.time_s, motor_rad, axis, sigma)
+        notes = (PLACE_UNCHECKED,)
     return TrialFrames(
-        times=times,
+        inputs,
+        times,
         by_camera={},
         scene=StillScene({}, {}, ()),
-        places=[times.frames_in(signals, stroke) for stroke in forward_strokes(signals)],
-        back=back_frames(trial, signals, times),
-        pictures=recording,
-        rods=Rods(session.whisker.wire, stated_object(trial)),
-        motor_sigma_rad=signals.motor_sigma_at(times.time_s),
+        pictures=traces,
         observe=TrialTraces.observe,
-        notes=() if points else (PLACE_UNCHECKED,),
+        notes=notes,
     )
 
 

@@ -4,7 +4,7 @@ by whisks.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -39,19 +39,15 @@ class TrialInputs:
 class TrialFrames:
     """The frames of a trial.
 
-    by_camera: pictures by frame, as read. places: frames of each forward stroke. back: frames of
-    ways back by the number of the whisk, last frame first. pictures: what vision evaluates, or traces alone;
-    observe: evaluates it. motor_sigma_rad (n,): of each frame's own motor angle. notes: on what places the object.
+    by_camera: pictures by frame, as read. pictures: what vision evaluates, or traces alone; observe: evaluates it.
+    notes: on what places the object.
     """
 
+    inputs: TrialInputs
     times: FrameTimes
     by_camera: dict[str, dict[int, np.ndarray]]
     scene: StillScene
-    places: list[slice]
-    back: dict[int, slice]
     pictures: TrialPictures | TrialTraces
-    rods: Rods
-    motor_sigma_rad: np.ndarray
     observe: Callable[..., TrialTruth] = observe_trial
     notes: tuple[str, ...] = ()
 
@@ -65,36 +61,64 @@ class TrialFrames:
         cameras that stood a little elsewhere. Raises
         BadInput where pictures and times do not match.
         """
-        session = inputs.session
-        trial = inputs.trial
-        signals = inputs.signals
-        calibration = inputs.calibration
-        times = frame_times(trial)
-        by_camera = read_trial(trial, times)
+        times = frame_times(inputs.trial)
+        by_camera = read_trial(inputs.trial, times)
         unmoved = fits[0].cameras if fits else ()  # those that had moved are in no fit
-        scene = still_scene(session, calibration, by_camera, unmoved)
-        others, itself = _own_apart(wires, session.base.name if session.base else "")
-        velocity = trial.object_velocity_mm_s
-        pictures = TrialPictures(
-            _chosen_frames(scene, inputs.settings),
-            times.time_s,
-            # Frames before the first or after the last sample belong to no whisk.
-            np.interp(times.time_s, signals.time_s, signals.motor_rad),
-            calibration.background,
-            object_velocity_mm_s=np.array(velocity) if velocity else None,
-            object_velocity_sigma_mm_s=trial.object_velocity_sigma_mm_s,
-            object_gives_way=trial.object_gives_way,
-            others=others,
-            itself=itself,
-            traces=_traces(trial, times),
-            picture_of={name: crop.of for name, crop in session.crops.items()},
-        )
-        places = [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
-        back = back_frames(trial, signals, times)
-        rods = Rods(session.whisker.wire, stated_object(trial))
-        motor_sigma_rad = signals.motor_sigma_at(times.time_s)
-        observe = partial(observe_trial, fits=fits)
-        return cls(times, by_camera, scene, places, back, pictures, rods, motor_sigma_rad, observe)
+        scene = still_scene(inputs.session, inputs.calibration, by_camera, unmoved)
+        pictures = _trial_pictures(inputs, times, scene, wires)
+        return cls(inputs, times, by_camera, scene, pictures, partial(observe_trial, fits=fits))
+
+    @cached_property
+    def places(self) -> list[slice]:
+        """Return the frames of each forward stroke."""
+        signals = self.inputs.signals
+        return [self.times.frames_in(signals, stroke) for stroke in forward_strokes(signals)]
+
+    @cached_property
+    def back(self) -> dict[int, slice]:
+        """Return the frames of ways back by the number of the whisk, last frame first."""
+        return _back_frames(self.inputs.trial, self.inputs.signals, self.times)
+
+    @property
+    def rods(self) -> Rods:
+        """Return the wire and the object."""
+        return Rods(self.inputs.session.whisker.wire, stated_object(self.inputs.trial))
+
+    @property
+    def motor_sigma_rad(self) -> np.ndarray:
+        """Return the sigma of each frame's own motor angle, (n,)."""
+        return self.inputs.signals.motor_sigma_at(self.times.time_s)
+
+
+def motor_of_frames(signals: Signals, times: FrameTimes) -> np.ndarray:
+    """Return the motor's angle at each frame (n,), rad; that of the nearest sample outside the signals.
+
+    Frames before the first or after the last sample belong to no whisk.
+    """
+    return np.interp(times.time_s, signals.time_s, signals.motor_rad)
+
+
+def _trial_pictures(
+    inputs: TrialInputs, times: FrameTimes, scene: StillScene, wires: Mapping[str, Others]
+) -> TrialPictures:
+    """Return the pictures of a trial, those of unmoved cameras alone. wires: see `TrialFrames.read`."""
+    session = inputs.session
+    trial = inputs.trial
+    velocity = trial.object_velocity_mm_s
+    others, itself = _own_apart(wires, session.base.name if session.base else "")
+    return TrialPictures(
+        _chosen_frames(scene, inputs.settings),
+        times.time_s,
+        motor_of_frames(inputs.signals, times),
+        inputs.calibration.background,
+        object_velocity_mm_s=np.array(velocity) if velocity else None,
+        object_velocity_sigma_mm_s=trial.object_velocity_sigma_mm_s,
+        object_gives_way=trial.object_gives_way,
+        others=others,
+        itself=itself,
+        traces=_traces(trial, times),
+        picture_of={name: crop.of for name, crop in session.crops.items()},
+    )
 
 
 def _traces(trial: Trial, times: FrameTimes) -> dict[str, Trace]:
@@ -136,7 +160,7 @@ def stated_object(trial: Trial) -> Touched:
     return touched_object(given.shape, replace(thickness, **given.sizes))
 
 
-def back_frames(trial: Trial, signals: Signals, times: FrameTimes) -> dict[int, slice]:
+def _back_frames(trial: Trial, signals: Signals, times: FrameTimes) -> dict[int, slice]:
     """Return the frames of ways back by whisk, last to first, so that the whisker comes to the bar.
 
     The first way back alone is taken unless the trial asks for all. A way back of few frames is
