@@ -97,20 +97,30 @@ def error_against_slope(
     lanes = _lanes(judged)
     figure = blank(9.6, 1.0 + 3.2 * len(panels))
     rows = figure.subplots(len(panels), 2, squeeze=False)
-    for (left, right), (panel, every) in zip(rows, panels.items()):
-        title = panel_title(*panel)
-        without_2 = [one for one in every if one.estimator != "no_slip"]
-        by_whole_matrix = [one for one in every if not one.one_factor]
-        surface = surface_of.get(panel)
-        _draw_estimators(left, every, lanes, surface, settings)
-        _draw_estimators(right, without_2, lanes, surface, settings)
-        left.set(title=f"{title}: every estimator", ylim=_limits(by_whole_matrix))
-        left.set_ylabel("error of d$_x$  [%]")
-        right.set(title=f"{title}: without (2)", ylim=_limits(without_2))
+    for row, (panel, every) in zip(rows, panels.items()):
+        _draw_row(row, every, lanes, surface_of.get(panel), settings)
+        row[0].set(title=f"{panel_title(*panel)}: every estimator", ylabel="error of d$_x$  [%]")
+        row[1].set_title(f"{panel_title(*panel)}: without (2)")
     for axes in rows[-1]:
         axes.set_xlabel("slope β  [°]")
     add_legend(figure, 3)
     return figure
+
+
+def _draw_row(
+    row: Sequence["Axes"],
+    every: Sequence[Judged],
+    lanes: Mapping["Lane", float],
+    surface: FittedSurface | None,
+    settings: Settings,
+) -> None:
+    """Draw every estimator of a surface and speed on the left, and all but (2) on the right."""
+    without_2 = [one for one in every if one.estimator != "no_slip"]
+    by_whole_matrix = [one for one in every if not one.one_factor]
+    _draw_estimators(row[0], every, lanes, surface, settings)
+    _draw_estimators(row[1], without_2, lanes, surface, settings)
+    row[0].set_ylim(_limits(by_whole_matrix))
+    row[1].set_ylim(_limits(without_2))
 
 
 # A `Judged.way`: by it an estimate is moved, so as not to cover others of its whisk.

@@ -1,6 +1,6 @@
 """What a recording can give, by the files and keys of its session, and what one thing more would give."""
 
-from collections.abc import Iterable, Iterator, Sequence, Sized
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass
 from typing import Self
 
@@ -16,6 +16,11 @@ _FEWEST_CAMERAS = 2
 _FEWEST_GAUGE_TRIALS = 2
 # [trials] Of different slopes: Fig. 8 draws an error against the slope. Derived.
 _FEWEST_SLOPES = 2
+# The one thing more that gives a result to a trial without it.
+_TO_STATE = "d_x_mm, point_mm of [object] or stage.csv in each trial"
+_TO_FEEL = f"{_FEWEST_GAUGE_TRIALS} gauge trials with pictures (follicle at 0° and 90°), gauges.toml, or moments"
+_TO_COMPARE = "truth and estimate of one trial"
+_TO_DRAW = f"truth and estimate at {_FEWEST_SLOPES} slopes"
 
 
 @dataclass(frozen=True)
@@ -47,27 +52,36 @@ def abilities(session: Session) -> tuple[Ability, ...]:
     lacks = {trial.name: _lacks_of_pictures(trial, session) for trial in measured}
     of_gauges = [lacks[trial.name] for trial in measured if trial.purpose == "gauge"]
     has_gauges = _has_gauges(session, of_gauges)
+    able = _able_trials(session, measured, lacks, has_gauges=has_gauges)
+    rows = []
+    for quantity, (trials, missing) in able.items():
+        rows.append(Ability.of_trials(quantity, trials, len(measured), missing))
+    return (*rows, *_of_gauges(of_gauges, has_gauges=has_gauges))
+
+
+def _able_trials(
+    session: Session, measured: Sequence[Trial], lacks: Mapping[str, str], *, has_gauges: bool
+) -> dict[str, tuple[Sequence[Trial], str]]:
+    """Return of each quantity the trials that can have it, and what gives it to the others.
+
+    lacks: what pictures of each trial need more.
+    """
     seen = [trial for trial in measured if not lacks[trial.name]]
     to_see = _first(lacks.values())
-    if session.truth is None:
-        true = seen
-        to_know = f'{to_see}; or a stage: [truth] source = "stage"'
-    else:
-        true = [trial for trial in measured if _is_stated(trial)]
-        to_know = _TO_STATE
+    true, to_know = seen, f'{to_see}; or a stage: [truth] source = "stage"'
+    if session.truth is not None:
+        true, to_know = _stated(measured), _TO_STATE
     felt = [trial for trial in measured if has_gauges or has_moments(trial)]
     both = [trial for trial in true if trial in felt]
     drawn = both if _has_slopes(both, session) else []
-    count = len(measured)
-    return (
-        Ability.of_trials("truth of d_x", true, count, to_know),
-        Ability.of_trials("truth of β", true, count, to_know),
-        Ability.of_trials("slip, deflection", seen, count, to_see),
-        Ability.of_trials("estimates of d_x", felt, count, _TO_FEEL),
-        Ability.of_trials("errors", both, count, _TO_COMPARE),
-        Ability.of_trials("Fig. 8", drawn, count, _TO_DRAW),
-        *_of_gauges(of_gauges, has_gauges=has_gauges),
-    )
+    return {
+        "truth of d_x": (true, to_know),
+        "truth of β": (true, to_know),
+        "slip, deflection": (seen, to_see),
+        "estimates of d_x": (felt, _TO_FEEL),
+        "errors": (both, _TO_COMPARE),
+        "Fig. 8": (drawn, _TO_DRAW),
+    }
 
 
 def _has_slopes(trials: Sequence[Trial], session: Session) -> bool:
@@ -89,16 +103,14 @@ def _of_gauges(lacks: Sequence[str], *, has_gauges: bool) -> Iterator[Ability]:
         yield Ability.of_trials("gauges", usable, of, missing)
 
 
-def _is_stated(trial: Trial) -> bool:
-    """Return whether a trial states where its contact is."""
-    has_place = trial.object is not None and trial.object.point_mm is not None
-    return trial.d_x_mm is not None or trial.stage is not None or has_place
-
-
-_TO_STATE = "d_x_mm, point_mm of [object] or stage.csv in each trial"
-_TO_FEEL = f"{_FEWEST_GAUGE_TRIALS} gauge trials with pictures (follicle at 0° and 90°), gauges.toml, or moments"
-_TO_COMPARE = "truth and estimate of one trial"
-_TO_DRAW = f"truth and estimate at {_FEWEST_SLOPES} slopes"
+def _stated(trials: Sequence[Trial]) -> list[Trial]:
+    """Return the trials that state where their contact is."""
+    stated = []
+    for trial in trials:
+        has_place = trial.object is not None and trial.object.point_mm is not None
+        if has_place or trial.d_x_mm is not None or trial.stage is not None:
+            stated.append(trial)
+    return stated
 
 
 def ability_lines(session: Session) -> Iterator[str]:

@@ -49,8 +49,11 @@ def felt_contact(
         return _touch_alone(felt, late)
     whisk = whisk_of(felt, result.theta_rad, whisker.beam)
     found = _distance(result, whisk, seen.beta_rad.value)
-    if found is None:
-        return _touch_alone(felt, late)
+    return _touch_alone(felt, late) if found is None else _contact(felt, whisk, found, late)
+
+
+def _contact(felt: FeltWhisk, whisk: Whisk, found: "_Distance", late: np.ndarray) -> FeltContact:
+    """Return a contact with its distance. late (2, 1): its change by one sigma of the gauges' delay."""
     by_input = np.array([[-1.0, 0.0, 0.0], found.by_input])  # of touch and distance
     by_cause = _inputs_by_cause(felt)
     own_inputs = whisk.felt_covariance - by_cause.T @ by_cause

@@ -101,17 +101,12 @@ def _feel(unit: Unit, kind: str, stroke: FeltStroke, seen: SeenWhisk, number: in
     if usable is None:
         return felt
     of_seen = against_estimates(unit.contradictions, unit.gauges, seen)
-    felt = replace(
-        felt,
-        status=joined(of_seen, _beyond_calibration(unit, readout, usable)),
-        shared_Nmm=readout.shared_Nmm(usable),
-        by_camera_error_Nmm=readout.by_camera_error_Nmm(usable),
-        phases=phases_of(unit.trial, stroke, touch, readout, seen, usable.beam),
-        one_factor=_one_factor(unit, kind, stroke),
-        with_drift=_with_drift(unit, stroke, readout),
-    )
+    felt = replace(felt, status=joined(of_seen, _beyond_calibration(unit, readout, usable)))
+    estimated = _EstimatedStroke(unit, stroke, readout, touch)
+    felt = estimated.with_moments(felt, usable, seen)
+    felt = replace(felt, one_factor=_one_factor(unit, kind, stroke))
     felt = _against_pictures(felt, unit, stroke, readout, seen)
-    felt = _EstimatedStroke(unit, stroke, readout, touch).with_estimates(felt, usable)
+    felt = estimated.with_estimates(felt, usable)
     return felt if seen.source != BY_STAGE else _against_stated(felt, seen)
 
 
@@ -169,6 +164,21 @@ class _EstimatedStroke:
     stroke: FeltStroke
     readout: Readout
     touch: FeltTouch
+
+    def with_moments(self, felt: FeltWhisk, whisk: Whisk, seen: SeenWhisk) -> FeltWhisk:
+        """Return the felt whisk with how its moments err, its stick and slip, and what drift it had.
+
+        whisk: at the wanted angle.
+        """
+        readout = self.readout
+        trial = self.unit.trial
+        return replace(
+            felt,
+            shared_Nmm=readout.shared_Nmm(whisk),
+            by_camera_error_Nmm=readout.by_camera_error_Nmm(whisk),
+            phases=phases_of(trial, self.stroke, self.touch, readout, seen, whisk.beam),
+            with_drift=_with_drift(self.unit, self.stroke, readout),
+        )
 
     def with_estimates(self, felt: FeltWhisk, whisk: Whisk) -> FeltWhisk:
         """Return the felt whisk with all estimates; whisk: at the wanted angle."""

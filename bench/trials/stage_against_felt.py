@@ -243,19 +243,36 @@ def _elsewhere(comparison: Comparison) -> Iterator[tuple[tuple[str, int], Reason
     """Yield the whisks that are felt elsewhere than is stated: all by what they share, or one after another."""
     while comparison.held:
         held = comparison.held
-        of_all, causes = comparison.likeliest(comparison.suspects_of_all())
-        alone = [comparison.likeliest(comparison.suspects_of(k)) for k in range(len(held))]
-        worst = max(range(len(held)), key=lambda k: alone[k][0])
-        if max(of_all, alone[worst][0]) <= MOST_SIGMAS:
+        of_all, causes_of_all = comparison.likeliest(comparison.suspects_of_all())
+        worst, of_worst, causes = _worst_alone(comparison)
+        if max(of_all, of_worst) <= MOST_SIGMAS:
             return
-        if len(held) < _FEWEST_TO_NAME or of_all >= alone[worst][0]:
-            if len(held) < _FEWEST_TO_NAME:
-                causes = f"{alone[worst][1]} in {held[worst].trial}, or {causes}"
-            for one in held:
-                yield one.key, reason("stage_unlike_all_felt", causes=causes)
+        if len(held) < _FEWEST_TO_NAME:
+            causes = f"{causes} in {held[worst].trial}, or {causes_of_all}"
+            yield from _all_elsewhere(held, causes)
             return
-        yield held[worst].key, _reason_of(comparison, worst, alone[worst][1])
+        if of_all >= of_worst:
+            yield from _all_elsewhere(held, causes_of_all)
+            return
+        yield held[worst].key, _reason_of(comparison, worst, causes)
         comparison = Comparison([one for one in held if one is not held[worst]])
+
+
+def _worst_alone(comparison: Comparison) -> tuple[int, float, str]:
+    """Return the whisk whose own likeliest suspect is surest, by how many sigmas that is there, and its causes."""
+    alone = []
+    for number in range(len(comparison.held)):
+        sigmas, causes = comparison.likeliest(comparison.suspects_of(number))
+        alone.append((number, sigmas, causes))
+    return max(alone, key=lambda one: one[1])
+
+
+def _all_elsewhere(
+    held: Sequence[HeldWhisk], causes: str
+) -> Iterator[tuple[tuple[str, int], Reason]]:
+    """Yield all whisks, with causes that they share."""
+    for one in held:
+        yield one.key, reason("stage_unlike_all_felt", causes=causes)
 
 
 def _reason_of(comparison: Comparison, number: int, causes: str) -> Reason:
