@@ -196,13 +196,18 @@ def name_stage(figure: "Figure") -> None:
 
 def save(figure: "Figure", path: Path, stamp: str, dpi: int = 160) -> None:
     """Write a PNG whole, with the hash of what it shows."""
+    save_picture(pixels_of(figure, dpi), path, stamp)
+
+
+def pixels_of(figure: "Figure", dpi: int) -> np.ndarray:
+    """Return a figure as a picture (h, w, 3), red first."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     _lay_out(figure)
     canvas = FigureCanvasAgg(figure)
     figure.set_dpi(dpi)
     canvas.draw()
-    save_picture(np.asarray(canvas.buffer_rgba())[..., :3], path, stamp)
+    return np.asarray(canvas.buffer_rgba())[..., :3]
 
 
 def save_picture(picture: np.ndarray, path: Path, stamp: str) -> None:

@@ -1,103 +1,79 @@
-"""The curves below a film's pictures: slip and force angle over the motor angle."""
+"""The curves below a film's pictures: slip and force angle as the whisk's figure has them, and a line at the frame."""
 
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from bench.base.drawing import pixels_of, style
 from bench.records.trial_result import SeenWhisk
-from bench.report.painting import polyline, put_text
+from bench.report.painting import put_text
+from bench.report.planes import draw_curves, force_angle_over_stroke, slip_over_stroke
 
-_STRIP_PX = 190  # height of the curves
+_HEIGHT_PX = 220
+_DPI = 100
 # Colours, BGR.
 _NOW = (28, 26, 228)
 _INK = (30, 30, 30)
-_GREY = (170, 170, 170)
-_GRID = (225, 225, 225)
-# [1] A layout: of the reach of a curve, on either side.
-_MARGIN = 0.06
+_TEXT_PLACE = (12, 16)  # px
+_TEXT_SHARE = 0.1  # of the strip's height, above its panels
 
 
-@dataclass(frozen=True)
-class Limits:
-    """Ends of an axis: in the quantity's unit, and the pixels that they have in a panel."""
+@dataclass(frozen=True, eq=False)
+class CurveStrip:
+    """Slip and force angle of a whisk over the pushing angle, drawn once for all of its frames.
 
-    low: float
-    high: float
-    low_px: int
-    high_px: int
+    picture (h, w, 3): BGR. now_px (frames, 2): in each panel the column of a frame's pushing angle. rows_px: the
+    panels' first and last row.
+    """
+
+    whisk: SeenWhisk
+    picture: np.ndarray
+    now_px: np.ndarray
+    rows_px: tuple[int, int]
 
     @classmethod
-    def around(cls, values: np.ndarray, low_px: int, high_px: int) -> "Limits":
-        """Return limits that hold all values, with a margin on either side."""
-        low = float(values.min())
-        high = float(values.max())
-        margin = _MARGIN * ((high - low) or abs(high) or 1.0)
-        return cls(low - margin, high + margin, low_px, high_px)
+    def draw(cls, whisk: SeenWhisk, width_px: int) -> "CurveStrip":
+        """Draw the curves of a whisk, so wide."""
+        theta_deg = np.degrees(whisk.frames.theta_rad.value)
+        with style():
+            figure = Figure(figsize=(width_px / _DPI, _HEIGHT_PX / _DPI), layout="constrained")
+            figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 1.0 - _TEXT_SHARE))
+            slip, angle = figure.subplots(1, 2)
+            draw_curves(slip, "slip σ  [mm]", slip_over_stroke(whisk))
+            draw_curves(angle, "force angle φ  [°]", force_angle_over_stroke(whisk))
+            for axes in (slip, angle):
+                axes.set(xlim=(theta_deg.min(), theta_deg.max()), xlabel="pushing angle θ  [°]")
+            picture = pixels_of(figure, _DPI)[..., ::-1]
+        now_px = np.stack([_columns_px(axes, theta_deg) for axes in (slip, angle)], axis=1)
+        panel = slip.get_window_extent()
+        rows_px = round(len(picture) - panel.y1), round(len(picture) - panel.y0)
+        return cls(whisk, picture, now_px, rows_px)
 
-    def to_px(self, values: ArrayLike) -> np.ndarray:
-        """Return where values lie, px."""
-        return np.interp(values, (self.low, self.high), (self.low_px, self.high_px))
-
-    def ticks(self, most: int) -> dict[int, str]:
-        """Return round values within the limits, in words, by the pixel where they lie."""
-        from matplotlib.ticker import MaxNLocator  # with all of matplotlib
-
-        values = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(self.low, self.high)
-        within = values[(values >= self.low) & (values <= self.high)]
-        return {round(float(self.to_px(value))): f"{value:g}" for value in within}
-
-
-def with_curves(picture: np.ndarray, whisk: SeenWhisk, k: int) -> np.ndarray:
-    """Return the picture with a strip of curves below it: dark up to frame k, grey from there."""
-    strip = np.full((_STRIP_PX, picture.shape[1], 3), 255, np.uint8)
-    curves = _curves_of(whisk)
-    width = strip.shape[1] // len(curves)
-    theta_deg = np.degrees(whisk.frames.theta_rad.value)
-    for place, (name, values) in enumerate(curves.items()):
-        panel = strip[:, place * width : (place + 1) * width]
-        _plot(panel, name, theta_deg, values, k)
-    whole = np.vstack([picture, strip])
-    height, width, _ = whole.shape
-    return whole[: height // 2 * 2, : width // 2 * 2]  # coders want even sizes
+    def below(self, picture: np.ndarray, k: int) -> np.ndarray:
+        """Return a picture (h, w, 3) with the curves below it, and a line where frame k is."""
+        strip = self.picture.copy()
+        for column in self.now_px[k].tolist():
+            cv2.line(strip, (column, self.rows_px[0]), (column, self.rows_px[1]), _NOW, 1)
+        put_text(strip, _text(self.whisk, k), _TEXT_PLACE, _INK)
+        whole = np.vstack([picture, strip])
+        height, width, _ = whole.shape
+        return whole[: height // 2 * 2, : width // 2 * 2]  # coders want even sizes
 
 
-def _curves_of(whisk: SeenWhisk) -> dict[str, np.ndarray]:
-    """Return slip and force angle (frames,) by name and unit, NaN where the whisker does not touch."""
+def _columns_px(axes: Axes, theta_deg: np.ndarray) -> np.ndarray:
+    """Return the columns (n,) of the drawn figure at which pushing angles (n,) lie."""
+    places_px = axes.transData.transform(np.column_stack([theta_deg, np.zeros_like(theta_deg)]))
+    return np.round(places_px[:, 0]).astype(int)
+
+
+def _text(whisk: SeenWhisk, k: int) -> str:
+    """Return pushing angle, slip and force angle in frame k in words, those that are known."""
     frames = whisk.frames
-    touching = np.asarray(frames.touching, dtype=bool)
-    slip_mm = np.where(touching, frames.slip_mm.value, np.nan)
-    phi_deg = np.where(touching, np.degrees(frames.phi_rad.value), np.nan)
-    return {"slip [mm]": slip_mm, "phi [deg]": phi_deg}
-
-
-def _plot(panel: np.ndarray, name: str, theta_deg: np.ndarray, values: np.ndarray, k: int) -> None:
-    """Draw values over the pushing angle (frames,) into their panel (h, w, 3), up to now, frame k, in ink."""
-    height, width, _ = panel.shape
-    known = values[np.isfinite(values)]
-    x_axis = Limits.around(theta_deg, 56, width - 14)
-    y_axis = Limits.around(np.append(known, 0.0), height - 26, 30)
-    _draw_grid(panel, x_axis, y_axis)
-    points = np.stack([x_axis.to_px(theta_deg), y_axis.to_px(values)], axis=1)
-    polyline(panel, points, _GREY)
-    polyline(panel, points[: k + 1], _INK)
-    now_px = round(points[k, 0])
-    cv2.line(panel, (now_px, y_axis.high_px), (now_px, y_axis.low_px), _NOW, 1)
-    title = _title(name, theta_deg[k], values[k])
-    put_text(panel, title, (x_axis.low_px, 18), _INK)
-
-
-def _title(name: str, theta_deg: float, value: float) -> str:
-    """Return the title of a panel: the value in the frame, if it is known, and the pushing angle."""
-    known = f" = {value:.3f}" if np.isfinite(value) else ""
-    return f"{name}{known}  at theta = {theta_deg:.2f} deg"
-
-
-def _draw_grid(panel: np.ndarray, x_axis: Limits, y_axis: Limits) -> None:
-    """Draw a line at each tick of the upright axis, and the values of both axes' ticks."""
-    for row, value in y_axis.ticks(3).items():
-        cv2.line(panel, (x_axis.low_px, row), (x_axis.high_px, row), _GRID, 1)
-        put_text(panel, value, (6, row + 4), _INK)
-    for column, value in x_axis.ticks(5).items():
-        put_text(panel, value, (column - 6, panel.shape[0] - 8), _INK)
+    text = f"theta = {np.degrees(frames.theta_rad.value[k]):.2f} deg"
+    if frames.touching[k] and np.isfinite(frames.slip_mm.value[k]):
+        phi_deg = np.degrees(frames.phi_rad.value[k])
+        text += f", slip = {frames.slip_mm.value[k]:.3f} mm, phi = {phi_deg:.2f} deg"
+    return text

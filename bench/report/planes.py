@@ -66,9 +66,9 @@ def whisk_figure(
     figure = Figure(figsize=_SIZE_IN)
     draw_sensing_plane(figure.add_axes(_PLANE), result, seen, friction)
     slip, angle, moments = map(figure.add_axes, _CURVES)
-    _draw_curves(slip, "slip σ  [mm]", slip_over_stroke(seen))
-    _draw_curves(angle, "force angle φ  [°]", force_angle_over_stroke(seen))
-    _draw_curves(moments, "moment  [N·mm]", moments_over_stroke(result, seen, felt, whisker))
+    draw_curves(slip, "slip σ  [mm]", slip_over_stroke(seen))
+    draw_curves(angle, "force angle φ  [°]", force_angle_over_stroke(seen))
+    draw_curves(moments, "moment  [N·mm]", moments_over_stroke(result, seen, felt, whisker))
     moments.set_xlabel("pushing angle θ  [°]")
     return figure
 
@@ -116,7 +116,7 @@ def moments_over_stroke(
     return curves
 
 
-def _draw_curves(axes: Axes, label: str, curves: Sequence[Curve]) -> None:
+def draw_curves(axes: Axes, label: str, curves: Sequence[Curve]) -> None:
     """Draw curves with a band of one sigma, and as points what was felt."""
     axes.set_ylabel(label)
     axes.axhline(0.0, color="0.7", lw=0.7)

@@ -13,8 +13,19 @@ from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
 from bench.base.progress import begin_step, count_parts
 from bench.records.trial_result import SeenTrial, SeenWhisk, TrialResult, WhiskerFacts
-from bench.report.film_curves import with_curves
-from bench.report.painting import as_8_bit, polyline, put_text
+from bench.report.film_curves import CurveStrip
+from bench.report.painting import (
+    BAR,
+    FILM_WIDTH_PX,
+    PAPER,
+    TITLE_PLACE,
+    WIRE,
+    polyline,
+    put_text,
+    shrink,
+    shrink_px,
+    side_by_side,
+)
 from bench.report.record import SESSION, read_record
 from bench.report.run_facts import CameraFacts
 from bench.report.run_folder import read_results
@@ -25,17 +36,12 @@ from bench.session.trial import Trial
 from vision.geometry import Camera, ProfiledWire, Wire, centrelines
 
 FOURCC = {".webm": "VP90", ".avi": "MJPG"}
-_WIDTH_PX = 720  # of each camera's picture
 # Colours, BGR.
-_WIRE = (47, 217, 255)
-_BAR = (74, 175, 77)
 _CONTACT = (28, 26, 228)
 _PATH = (142, 126, 31)
-_PAPER = (255, 255, 255)
 _NO_PICTURE = (60, 60, 60)
 _FRAMES_READ = 32  # at once
 _HALF_BAR_MM = 45.0
-_TITLE_PLACE = (12, 24)  # of a camera's picture, px
 
 
 def write_video(
@@ -141,13 +147,14 @@ def _film(
     for whisk in result.seen.whisks:
         if whisk.frames is None:
             continue
+        strip = CurveStrip.draw(whisk, FILM_WIDTH_PX * len(cameras))
         frames = enumerate(_frames_of(trial, times, cameras, whisk))
         count = len(whisk.frames.index)
         for k, greys in count_parts(frames, f"frames of whisk {whisk.whisk}", count):
             pictures = []
             for camera in cameras:
                 pictures.append(_camera_picture(greys[camera.name], camera, result, whisk, k))
-            yield with_curves(_side_by_side(pictures), whisk, k)
+            yield strip.below(side_by_side(pictures), k)
 
 
 def _frames_of(
@@ -172,18 +179,17 @@ def _frames_of(
 def _camera_picture(
     grey: np.ndarray | None, facts: CameraFacts, result: TrialResult, whisk: SeenWhisk, k: int
 ) -> np.ndarray:
-    """Return one camera's picture, (h, _WIDTH_PX, 3), with what was found in the whisk's frame k."""
-    width, height = facts.size_px
-    size = (_WIDTH_PX, round(_WIDTH_PX / width * height))
+    """Return one camera's picture, (h, FILM_WIDTH_PX, 3), with what was found in the whisk's frame k."""
     if grey is None:
-        picture = np.full((size[1], size[0], 3), _NO_PICTURE, np.uint8)
+        width, height = facts.size_px
+        size = (round(FILM_WIDTH_PX / width * height), FILM_WIDTH_PX, 3)
+        picture = np.full(size, _NO_PICTURE, np.uint8)
         title = f"{facts.name}: no picture"
     else:
-        small = cv2.resize(as_8_bit(grey), size, interpolation=cv2.INTER_AREA)
-        picture = cv2.cvtColor(small, cv2.COLOR_GRAY2BGR)
+        picture = shrink(grey, FILM_WIDTH_PX)
         _draw_lines(picture, facts, result, whisk, k)
         title = f"{facts.name}, frame {int(whisk.frames.index[k])}"
-    put_text(picture, title, _TITLE_PLACE, _PAPER)
+    put_text(picture, title, TITLE_PLACE, PAPER)
     return picture
 
 
@@ -194,17 +200,16 @@ def _draw_lines(
     camera = Camera(
         facts.name, tuple(facts.size_px), facts.matrix, facts.distortion, facts.T_camera_rig
     )
-    scale = _WIDTH_PX / facts.size_px[0]
 
     def project(points_mm: np.ndarray) -> np.ndarray:
-        """Project points (n, 3) mm into the picture; the centre of a pixel is a whole number."""
-        return scale * (camera.project(points_mm) + 0.5) - 0.5
+        """Project points (n, 3) mm into the picture."""
+        return shrink_px(camera.project(points_mm), FILM_WIDTH_PX / facts.size_px[0])
 
     for edge in _bar_edges(camera, result.seen, whisk):
-        polyline(picture, project(edge), _BAR)
+        polyline(picture, project(edge), BAR)
     path_mm = _contact_path(whisk, k)
     contact_mm = path_mm[-1] if whisk.frames.touching[k] else None
-    polyline(picture, project(_wire(result, whisk, k)), _WIRE)
+    polyline(picture, project(_wire(result, whisk, k)), WIRE)
     if len(path_mm) > 1:
         polyline(picture, project(path_mm), _PATH)
     if contact_mm is not None:
@@ -246,12 +251,3 @@ def _wire_of(facts: WhiskerFacts) -> Wire:
     """Return the wire of a whisker whose unloaded shape stands elsewhere."""
     sizes = (facts.shape, facts.length_mm, facts.diameter_mm, 0.0, 0.0, facts.tip_diameter_mm)
     return ProfiledWire(*sizes, widths=facts.widths) if facts.widths else Wire(*sizes)
-
-
-def _side_by_side(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Return pictures side by side, the lower ones filled up."""
-    height = max(picture.shape[0] for picture in pictures)
-    filled = []
-    for picture in pictures:
-        filled.append(np.pad(picture, ((0, height - picture.shape[0]), (0, 0), (0, 0))))
-    return np.hstack(filled)

@@ -4,22 +4,28 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
-from bench.report.painting import as_8_bit, polyline, put_text
+from bench.report.painting import (
+    BAR,
+    FILM_WIDTH_PX,
+    PAPER,
+    TITLE_PLACE,
+    WIRE,
+    polyline,
+    put_text,
+    shrink,
+    shrink_px,
+    side_by_side,
+)
 
 if TYPE_CHECKING:
     from bench.workflows.live_push import LivePush, Played
 
 FILM_HZ = 25.0
 _HELD_S = 2.0  # so long the answer is shown
-_WIDTH_PX = 720  # of each camera's picture
-# Colours, BGR.
-_COLOURS = {"bar_left": (74, 175, 77), "bar_right": (74, 175, 77), "wire": (47, 217, 255)}
-_PAPER = (255, 255, 255)
-_TITLE_PLACE = (12, 24)  # of a camera's picture, px
-_ANSWER_PLACE = (12, 48)
+_COLOURS = {"bar_left": BAR, "bar_right": BAR, "wire": WIRE}
+_ANSWER_PLACE = (12, 48)  # of a camera's picture, px
 
 
 @dataclass(eq=False)
@@ -71,21 +77,17 @@ def _drawn(
     drawn = []
     for camera in sorted(pictures):
         picture = _with_lines(pictures[camera], lines_px.get(camera, {}))
-        put_text(picture, f"{camera}, {title}", _TITLE_PLACE, _PAPER)
-        put_text(picture, answer, _ANSWER_PLACE, _PAPER)
+        put_text(picture, f"{camera}, {title}", TITLE_PLACE, PAPER)
+        put_text(picture, answer, _ANSWER_PLACE, PAPER)
         drawn.append(picture)
-    height = max(len(picture) for picture in drawn)
-    filled = [np.pad(picture, ((0, height - len(picture)), (0, 0), (0, 0))) for picture in drawn]
-    return np.hstack(filled)
+    return side_by_side(drawn)
 
 
 def _with_lines(grey: np.ndarray, lines_px: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return a camera's picture (h, w, 3) at the film's width, with wire and bar drawn in."""
-    scale = _WIDTH_PX / grey.shape[1]
-    size = (_WIDTH_PX, round(scale * grey.shape[0]))
-    small = cv2.resize(as_8_bit(grey), size, interpolation=cv2.INTER_AREA)
-    picture = cv2.cvtColor(small, cv2.COLOR_GRAY2BGR)
+    picture = shrink(grey, FILM_WIDTH_PX)
+    scale = FILM_WIDTH_PX / grey.shape[1]
     for name, points_px in lines_px.items():
         if name in _COLOURS:
-            polyline(picture, scale * (points_px + 0.5) - 0.5, _COLOURS[name])
+            polyline(picture, shrink_px(points_px, scale), _COLOURS[name])
     return picture
