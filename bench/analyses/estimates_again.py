@@ -182,13 +182,14 @@ def _with_estimates_again(
 ) -> FeltWhisk:
     """Return the whisk with (10) run again. fit: of α to the other whisks of its surface."""
     ratio = again.alpha_est.ratio_to_first
+    by_theta = []
+    for at in felt.by_theta:
+        by_theta.append(replace(at, estimates=again.given(at, at.theta_rad)))
     return replace(
         felt,
         estimates=_estimates(seen, felt, fit, again, turning),
         sensors=tuple(_rescaled_sensor(row, again.beam, ratio) for row in felt.sensors),
-        by_theta=tuple(
-            replace(at, estimates=again.given(at, at.theta_rad)) for at in felt.by_theta
-        ),
+        by_theta=tuple(by_theta),
     )
 
 

@@ -244,7 +244,7 @@ class TruthUncertainty:
     """Median standard deviations of the truth over the measured whisks that have one.
 
     known, measured: numbers of whisks with a truth and of all. d_x_own_mm, d_x_shared_mm: the parts
-    of d_x's that are each whisk's own, and that all share; NaN where that is not known. in_doubt:
+    of d_x's that are each whisk's own, and that all share; NaN where that is not known. questioned:
     of those with a truth, how many have a status that reaches it; contradiction: the commonest of
     what they say. source: of the truth, BY_PICTURES or BY_STAGE; "" where there is none.
     """
@@ -257,7 +257,7 @@ class TruthUncertainty:
     slip_mm: float
     d_x_own_mm: float = math.nan
     d_x_shared_mm: float = math.nan
-    in_doubt: int = 0
+    questioned: int = 0
     contradiction: Reason = NO_REASON
     source: str = ""
 
@@ -285,7 +285,7 @@ def truth_uncertainty(results: Iterable[TrialResult]) -> TruthUncertainty:
         slip_mm=_finite_median(slips),
         d_x_own_mm=_finite_median([seen.d_x_own_sigma_mm for seen in known]),
         d_x_shared_mm=_finite_median([seen.d_x_shared_sigma_mm for seen in known]),
-        in_doubt=sum(map(bool, contradictions)),
+        questioned=sum(map(bool, contradictions)),
         contradiction=_commonest(contradictions),
         source=known[0].truth_source if known else "",
     )

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 from vision.geometry import UNNAMED, Reason, as_reason
 
-# Severities. A note leaves distance and moments what they are; a warning flags them; a
-# refusal says why there are none.
+# Severities. A note changes neither distance nor moments; a warning flags them; a refusal
+# says why there are none.
 NOTE = "note"
 WARNING = "warning"
 REFUSAL = "refusal"
 
-# Numbers of a whisk that a status of the whole session, or of its trial, puts in doubt.
+# Numbers of a whisk that a status of the whole session, or of its trial, may speak against.
 TRUTH = "truth"
 ESTIMATES = "estimates"
 
@@ -33,15 +33,15 @@ _GIVE_PICTURES = "give frames of the trial and board views, if a truth is wanted
 _RECORD_GAUGES = "record gauge trials in two positions of the follicle, or try --gauges-from-all"
 _CHECK_CHANNELS = "check that, and evaluate again"
 _CLEARER_TOUCH = "sample faster, push farther after touch, or damp vibration"
-_LOOK_AT_ESTIMATOR = "look at the estimator: its answer is none"
+_LOOK_AT_ESTIMATOR = "look into the estimator: what it returns is no distance"
 _GENTLER = (
     "expected of (10) on steep slopes: touch a gentler one, or tilt the whisker's base towards it"
 )
 _LOOK_AT_BAR = (
     "look at the overlays: the drawn bar must lie on the bar; add a camera or another light"
 )
-_FRAMES_LOST = "record again with a slower frame rate or a faster disk, if it is near touch"
-_LOOK_AT_FILE = "look at the file that is named; where it is meant so, nothing is to be done"
+_FRAMES_LOST = "if that is near touch, record again with a slower frame rate or a faster disk"
+_LOOK_AT_FILE = "look at the file that is named; where it is right, nothing is to be done"
 _MEASURE_RIG = (
     "measure again by `whisker-bench calibrate rig`, then leave T_rig_board out of session.toml"
 )
@@ -175,18 +175,21 @@ _TABLE = (
         "stage_unlike_felt",
         WARNING,
         "compare stage.csv or point_mm with those of its neighbours, and its unit and axes",
-        sentence="felt elsewhere than the stage says, by the other whisks: {apart}; as if {causes}",
+        sentence="judged by the other whisks, touch and moments place it elsewhere than the stage does: {apart}; as if {causes}",
         reaches=(TRUTH,),
     ),
     Status(
         "stage_unlike_all_felt",
         WARNING,
         "measure the stage's origin against the whisker's base anew; check stiffness and gains",
-        sentence="what is felt of all whisks is unlike what the stage says: as if {causes}",
+        sentence="touch and moments of all whisks together contradict the stage: as if {causes}",
         reaches=(TRUTH,),
     ),
     Status(
-        "distance_unlike_stated", WARNING, "take out the one that is not measured", reaches=(TRUTH,)
+        "distance_unlike_stated",
+        WARNING,
+        "leave out d_x_mm or the place, whichever is not measured",
+        reaches=(TRUTH,),
     ),
     Status(
         "object_points_not_read",
@@ -204,7 +207,7 @@ _TABLE = (
         "motor_zero_unknown",
         NOTE,
         "record motor_deg, or let a stage say where the contact is",
-        sentence="the motor's angle counts from the recording's start, and pictures have another zero: no truth by them",
+        sentence="the motor's angle counts from the recording's start, not from where pictures have its zero: no truth by them",
     ),
     Status("camera_unused", WARNING, _GIVE_PICTURES),
     Status(
@@ -223,17 +226,17 @@ _TABLE = (
         "gauge_rod_unconverged",
         NOTE,
         "look at the whisk's overlays, and at the whisker's sizes in session.toml",
-        sentence="no rod of the stated whisker is bent as this one is ({problem}): it is compared with no gauge",
+        sentence="no rod of the stated sizes bends as this whisker does ({problem}): its moments are held against no gauge",
     ),
     Status(
         "gauge_moments_unknown",
         NOTE,
-        sentence="no moment is known of this whisk: no gauge rests on it",
+        sentence="its moments are not known: it calibrates no gauge",
     ),
     Status(
         "gauge_push_short",
         NOTE,
-        sentence="a push of {degrees:.2g}° is not felt in this whisk: no gauge rests on it",
+        sentence="the gauges do not show a push of {degrees:.2g}°: it calibrates no gauge",
     ),
     Status("gauges_undetermined", WARNING, _RECORD_GAUGES),
     Status("gauge_fault", WARNING, _CHECK_CHANNELS),
@@ -275,7 +278,7 @@ _TABLE = (
     Status(
         "past_whisker",
         WARNING,
-        "expected where its model leaves out what the push does; else look at its units",
+        "expected where the push breaks what the estimator assumes; else check its units",
         sentence="gave {d_x_mm:.1f} mm, past the whisker's length of {length_mm:g} mm",
     ),
     Status(
@@ -322,7 +325,7 @@ _TABLE = (
         "signals_copied",
         WARNING,
         "find the recordings that belong to these trials, and copy them anew",
-        sentence="trials {names} have one and the same {file}: all but one have another's",
+        sentence="trials {names} have the same {file}: all but one of them hold a copy",
         reaches=(TRUTH, ESTIMATES),
     ),
     Status("signals_mended", WARNING, _LOOK_AT_FILE, sentence="{label}: {count} {cause} mended"),
@@ -331,8 +334,8 @@ _TABLE = (
         WARNING,
         "take the exact rod's estimate, or touch it near its base",
         sentence="the whisker turns by {turn_deg:.0f}° up to its tip, and all estimates but the exact rod's take "
-        "it as straight: touched there, (10) is off by up to {d_x_percent:.1f} %; nearer to the base by "
-        "the square of the part of the length less",
+        "it as straight: (10) errs by up to {d_x_percent:.1f} % at the tip, and nearer to the base by less, as the "
+        "square of the distance",
     ),
     Status("speed_unlike_stated", WARNING, _LOOK_AT_FILE),
     Status(
@@ -407,14 +410,14 @@ _TABLE = (
     Status(
         "trial_lost",
         REFUSAL,
-        sentence="no result: the process that looked at the trial died {deaths} times, as it does "
+        sentence="no result: the process that evaluated the trial died {deaths} times, as it does "
         "where memory runs out; the same command tries again",
     ),
     Status("light_unexplained", WARNING),
     Status("no_touching_frame", NOTE),
     Status("bar_width_unlike_stated", WARNING, reaches=(TRUTH,)),
     Status("wire_width_unlike_stated", WARNING, reaches=(TRUTH,)),
-    Status("length_unlike_stated", NOTE, "measure length_mm again: estimates end there"),
+    Status("length_unlike_stated", NOTE, "measure length_mm again: no estimate goes beyond it"),
     Status("slope_unlike_stated", WARNING, reaches=(TRUTH,)),
     Status("turns_unlike_motor", WARNING, reaches=(TRUTH,)),
     Status("friction_too_large", WARNING, reaches=(TRUTH,)),
@@ -517,7 +520,7 @@ _TABLE = (
     Status(
         "recordings_few",
         REFUSAL,
-        sentence="needs more recordings than it has unknowns to say how well it is known",
+        sentence="needs more recordings than unknowns: else no sigma is known",
     ),
     Status("slopes_one_sided", REFUSAL, sentence="needs nominal slopes (beta_deg) of both signs"),
     Status(
@@ -530,10 +533,12 @@ _TABLE = (
         REFUSAL,
         sentence="needs whisks at two nominal distances (d_x_mm) or more",
     ),
-    Status("no_push_on_object", REFUSAL, sentence="a whisk is no push against an object"),
+    Status(
+        "no_push_on_object", REFUSAL, sentence="one of the whisks does not push against an object"
+    ),
     Status("slip_angles_alike", REFUSAL, sentence="the whisks do not span two slip angles"),
     Status("no_truth", REFUSAL, sentence="no truth"),
-    Status("effect_not_fitted", REFUSAL, sentence="the fit does not show this effect"),
+    Status("effect_not_fitted", REFUSAL, sentence="the fit does not determine this effect"),
     Status(
         "clock_like_zero",
         REFUSAL,
@@ -546,7 +551,7 @@ _TABLE = (
     Status(
         "drift_not_removed",
         NOTE,
-        sentence="no free stroke before and after the contact: none was taken out",
+        sentence="no free strokes before and after the contact, so no drift was taken out",
     ),
     Status("no_stick_slip", NOTE, sentence="the moments show no stick–slip"),
     Status("contacts_few", REFUSAL, sentence="too few, of {distances}"),
@@ -555,7 +560,7 @@ _TABLE = (
     Status(
         "contacts_off_surface",
         WARNING,
-        sentence="contacts lie farther off such a surface than their sigmas let them (chance {chance:.1g})",
+        sentence="contacts lie farther off such a surface than their sigmas explain (chance {chance:.1g})",
     ),
     Status("unnamed", WARNING),
 )
@@ -575,7 +580,7 @@ def reason(code: str, **numbers: object) -> Reason:
 
 
 def reaching(numbers: Collection[str], said: Reason) -> Reason:
-    """Return of what is said those sentences whose code puts one of these numbers in doubt."""
+    """Return the parts of a reason whose codes speak against one of these numbers."""
     found = []
     for code, sentence in said.parts:
         if set(numbers).intersection(status_of_code(code).reaches):
@@ -584,7 +589,7 @@ def reaching(numbers: Collection[str], said: Reason) -> Reason:
 
 
 def has_only_notes(text: str) -> bool:
-    """Return whether all that a status says leaves distance and moments what they are."""
+    """Return whether a status has notes alone, which change neither distance nor moments."""
     return all(status_of_code(code).severity == NOTE for code in as_reason(text).codes)
 
 

@@ -221,7 +221,7 @@ def _run_lines(
     """Yield counts of one run against the first, and the quantities that changed most."""
     compared = {change.key for change in changes}
     same = {change.key for change in changes if change.same_recording}
-    yield f"{other.out} against {first.out}: {len(compared)} whisks in both, {len(same)} of them of one recording"
+    yield f"{other.out} against {first.out}: {len(compared)} whisks in both, {len(same)} of them from the same recording"
     if first.truth_sources != other.truth_sources:
         yield f"  the truth is by {first.truth_sources} in {first.out}, by {other.truth_sources} in {other.out}"
     for run, rest in ((first, other), (other, first)):

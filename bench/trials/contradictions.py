@@ -1,6 +1,6 @@
 """What a session contradicts of itself as a whole, in the status of each whisk that rests on it.
 
-A warning of the session, or of a trial, whose code puts truth or estimates in doubt
+A warning of the session, or of a trial, whose code speaks against truth or estimates
 (`bench.base.statuses.Status.reaches`) is no mere remark: each whisk that has them has
 it, and no verdict takes a whisk with a warning.
 """

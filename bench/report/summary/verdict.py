@@ -72,8 +72,8 @@ def _truth_line(session: str, is_seen: bool, truth: TruthUncertainty, warnings: 
     if truth.known:
         by = " by a stage" if truth.source == BY_STAGE else ""
         known = f"the true distance is known{by} for {truth.known} of {count}, to {truth.d_x_text}"
-        if truth.in_doubt:
-            known += _in_doubt(truth)
+        if truth.questioned:
+            known += _questioned(truth)
     elif not is_seen:
         known = f"no pictures, so the true distance is not known; {count} felt"
     else:
@@ -82,11 +82,11 @@ def _truth_line(session: str, is_seen: bool, truth: TruthUncertainty, warnings: 
     return f"{session}: {known}; {warned}."
 
 
-def _in_doubt(truth: TruthUncertainty) -> str:
-    """Return of how many whisks the truth is questioned, and by what where the others have a verdict."""
-    if truth.in_doubt == truth.known:
-        return ", but in doubt"
-    return f", but in doubt for {truth.in_doubt} of these ({truth.contradiction})"
+def _questioned(truth: TruthUncertainty) -> str:
+    """Return against the truth of how many whisks warnings speak, and which where the others have a verdict."""
+    if truth.questioned == truth.known:
+        return ", but warnings speak against it"
+    return f", but warnings speak against {truth.questioned} of these ({truth.contradiction})"
 
 
 def _most_complete(judged: Sequence[Accuracy]) -> list[Accuracy]:
@@ -178,8 +178,8 @@ def gauge_source_lines(gauges: GaugeCalibration | None) -> Iterator[str]:
     if gauges is not None and gauges.source == FROM_ALL:
         judged = sum(matrix is not None for matrix in gauges.without.values())
         yield (
-            f"Gauges from {FROM_ALL}: {judged} of {len(gauges.without)} trials that served are judged, each by gauges "
-            "fitted without it; no estimate by gauges that its own trial calibrated is in the verdict."
+            f"Gauges from {FROM_ALL}: of {len(gauges.without)} trials that served, {judged} are judged, each by gauges "
+            "fitted without it; the others are not in the verdict."
         )
 
 

@@ -1,4 +1,4 @@
-"""A warning of the session that puts numbers in doubt stands with each of them, and nowhere else."""
+"""A warning of the session that speaks against numbers stands with each of them, and nowhere else."""
 
 import json
 from dataclasses import replace
@@ -87,15 +87,15 @@ def compared(status: Reason):
 def test_the_verdict_is_withheld_with_cause_and_cure():
     results = [compared(MISPLACED)]
     first, *_, last = verdict("s", True, RunAccuracy.of_results(results), Settings(), 1)
-    assert "to ± 0.02 mm, but in doubt" in first
+    assert "to ± 0.02 mm, but warnings speak against it" in first
     assert last.startswith("No verdict on the estimators: all whisks have warnings")
     assert MISPLACED in last and cure_of(["board_misplaced"]) in last
 
 
-def test_the_verdict_of_some_says_which_others_are_in_doubt():
+def test_the_verdict_of_some_says_which_others_warnings_speak_against():
     results = [compared(MISPLACED), compared(NO_REASON)]
     first, *_, last = verdict("s", True, RunAccuracy.of_results(results), Settings(), 1)
-    assert f"but in doubt for 1 of these ({MISPLACED})" in first
+    assert f"but warnings speak against 1 of these ({MISPLACED})" in first
     assert last.startswith("Use (10)")
 
 

@@ -123,7 +123,7 @@ def test_two_places_that_are_off_are_both_named():
     assert set(named(results([(0.0, 4.0, 0.0), (0.0, 0.0, 0.0), (0.0, -6.0, 0.0)]))) == {"t0", "t2"}
 
 
-def test_an_origin_that_is_off_puts_all_whisks_in_doubt():
+def test_an_origin_that_is_off_speaks_against_all_whisks():
     found = named(results([(1.5, 0.0, 0.0)] * 5, scale_sigma=0.001))
     assert len(found) == 5
     assert all("the stage's origin +1.5" in said for said in found.values())

@@ -195,7 +195,7 @@ def test_pictures_that_show_no_truth_say_why_beside_the_stage_s():
 
 
 @pytest.mark.parametrize(("apart_sigmas", "is_named"), [(2.0, False), (6.0, True)])
-def test_pictures_that_disagree_beyond_chance_put_the_truth_in_doubt(apart_sigmas, is_named):
+def test_pictures_that_disagree_beyond_chance_speak_against_the_truth(apart_sigmas, is_named):
     """Two sigma are chance, at a chance of LEAST_CHANCE; six are not."""
     assert math.erfc(6.0 / math.sqrt(2)) < LEAST_CHANCE < math.erfc(2.0 / math.sqrt(2))
     session = load_session(STAGE)

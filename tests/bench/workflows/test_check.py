@@ -104,7 +104,7 @@ def test_a_session_without_trials(steel_signals, tmp_path, capsys):
 
 def test_signals_of_another_trial(small_copy):
     FAULTS["another trial's signals"](small_copy)
-    said = "trials b30_3, b60_4 have one and the same signals.csv: all but one have another's"
+    said = "trials b30_3, b60_4 have the same signals.csv: all but one of them hold a copy"
     assert said in found(small_copy).warnings
 
 

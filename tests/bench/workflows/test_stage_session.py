@@ -164,7 +164,7 @@ def test_a_stage_beside_pictures_is_compared_and_named_where_it_contradicts(
     assert "stage_unlike_pictures" in codes(with_pictures, "b60_4")
     assert "stage_unlike_pictures" not in codes(with_pictures, "b30_3")
     verdict = read_record(with_pictures).verdict
-    assert "in doubt for 1 of these" in verdict[0] and "1 left out for a warning" in " ".join(
+    assert "speak against 1 of these" in verdict[0] and "1 left out for a warning" in " ".join(
         verdict
     )
 
