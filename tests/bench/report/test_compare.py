@@ -47,7 +47,7 @@ def no_truth(seen: dict) -> None:
 def test_a_run_and_its_copy_are_alike(exact_run, tmp_path):
     lines, code = compare_runs([exact_run, shutil.copytree(exact_run, tmp_path / "b")])
     assert code == DONE
-    assert lines[0].endswith("5 whisks in both, 5 of them of one recording")
+    assert lines[0].endswith("5 whisks in both, 5 of them from the same recording")
     assert any("values moved by 0.00 sigma at most" in line for line in lines)
 
 
