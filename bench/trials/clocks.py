@@ -23,7 +23,7 @@ from bench.records.trial_result import BackStroke, FeltTrial, FeltWhisk, SeenWhi
 from vision import Value
 from vision.geometry import NO_REASON, Reason, counted
 
-# Chance by which sound sigmas would show as much: one session in a thousand.
+# Chance by which sound sigmas would give as large an error: one session in a thousand.
 FALSE_ALARM = 1e-3
 # [sigma] Least error that all whisks share, over the median sigma of felt − seen of one stroke. By hundreds of
 # whisks an error is found that is far below what matters to any of them. Stated: as where a camera is left out.
@@ -262,8 +262,8 @@ def shared_touch_warning(shared: SharedTouch | None) -> Reason:
     late, sigma = np.degrees(max(forward, key=lambda one: abs(one[0])))
     return Reason(
         "touch_apart",
-        f"touch felt less seen is {late:+.3f} ± {sigma:.3f}° by {shared.strokes} together (sound "
-        f"sigmas show as much in {shared.chance:.0e} of sessions); {_probable_cause(shared)}. It is "
+        f"touch felt less seen is {late:+.3f} ± {sigma:.3f}° by {shared.strokes} together (chance "
+        f"makes it so large in {shared.chance:.0e} of sessions); {_probable_cause(shared)}. It is "
         "in the sigma of touch seen",
     )
 
@@ -274,12 +274,12 @@ def _probable_cause(shared: SharedTouch) -> str:
         clock_ms = 1e3 * shared.values[1]
         where = "behind" if clock_ms > 0 else "ahead of"
         return (
-            f"it goes with the motor's speed, as {abs(clock_ms):.1f} ms do by which the frames' clock runs "
-            f"{where} the signals': check how frames are stamped"
+            f"it grows with the motor's speed, as if the frames' clock ran {abs(clock_ms):.1f} ms {where} the "
+            "signals': check how frames are stamped"
         )
     if shared.clock_preference < -_CLEAR_PREFERENCE:
         return (
-            "it does not go with the motor's speed, so no clock does it: check the diameters of bar and whisker, and "
+            "it does not grow with the motor's speed, so no clock explains it: check the diameters of bar and whisker, and "
             "that nothing touches the whisker or its gauges earlier"
         )
     return (

@@ -217,7 +217,7 @@ def check_bar_width(bar_looks: Mapping[str, Value], trial: Trial, board: Board |
     if not are_alike(logs, variances):
         low = np.exp(logs.min())
         high = np.exp(logs.max())
-        found = f"the bar looks {low:.2f} to {high:.2f} times as thick as said"
+        found = f"the bar looks {low:.2f} to {high:.2f} times as thick as stated"
         sentence = f"{found}: check its diameter_mm, or something else is taken for it"
         return Reason("bar_width_unlike_stated", sentence)
     pairs = {name: (one.value, one.sigma) for name, one in bar_looks.items()}
@@ -234,7 +234,7 @@ def _bar_width_reason(factor: float, sigma: float, stated: float, board: Board |
 
     sigma: of the factor, relative.
     """
-    found = f"the bar looks {factor:.2f} ± {sigma * factor:.2f} times as thick as said"
+    found = f"the bar looks {factor:.2f} ± {sigma * factor:.2f} times as thick as stated"
     cure = f"its diameter_mm would have to be some {stated * factor:.3g} for {stated:g}"
     if board is None:
         sentence = f"{found}: {cure}, or the cameras' scale"
@@ -261,7 +261,7 @@ def check_wire_width(ratios: Mapping[str, Value], whisker: Whisker) -> Reason:
     if factor > 1.0:
         return NO_REASON
     sigma = float(np.sum(1.0 / variances) ** -0.5)
-    found = f"the whisker looks {factor:.2f} ± {sigma * factor:.2f} times as thick as said"
+    found = f"the whisker looks {factor:.2f} ± {sigma * factor:.2f} times as thick as stated"
     diameter_mm = whisker.diameter_mm
     cure = f"its diameter_mm would have to be some {diameter_mm * factor:.2g} for {diameter_mm:g}"
     return Reason("wire_width_unlike_stated", f"{found}: {cure}")

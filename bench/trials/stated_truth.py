@@ -131,9 +131,9 @@ def _unlike_stated(d_x_mm: Value, trial: Trial) -> Reason:
     if agree(d_x_mm, stated):
         return NO_REASON
     found = f"d_x by the object's place is {d_x_mm.value:.2f} mm, d_x_mm says {stated.value:g}"
-    chance = f"{math.hypot(d_x_mm.sigma, stated.sigma):.2g} mm are chance"
+    sigma = f"one sigma of both is {math.hypot(d_x_mm.sigma, stated.sigma):.2g} mm"
     rule = "d_x_mm goes from the base to the contact, the place to the bar's axis"
-    return Reason("distance_unlike_stated", f"{found} ({chance}): {rule}")
+    return Reason("distance_unlike_stated", f"{found} ({sigma}): {rule}")
 
 
 def _check_on_whisker(d_x_mm: float, session: Session, trial: Trial) -> None:

@@ -81,9 +81,9 @@ def test_a_clock_at_one_speed_is_a_warning_and_in_the_sigma_of_touch(rng):
 @pytest.mark.parametrize(
     "clock_s, zero_deg, words",
     [
-        (0.008, 0.0, "the frames' clock runs behind"),
-        (-0.008, 0.0, "the frames' clock runs ahead of"),
-        (0.0, 0.1, "no clock does it"),
+        (0.008, 0.0, "ms behind the signals'"),
+        (-0.008, 0.0, "ms ahead of the signals'"),
+        (0.0, 0.1, "no clock explains it"),
     ],
 )
 def test_back_strokes_and_speeds_tell_a_clock_from_a_zero(rng, how, clock_s, zero_deg, words):

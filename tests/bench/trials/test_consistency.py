@@ -133,13 +133,13 @@ def test_a_bar_as_thick_as_said_is_without_a_warning(trial):
 
 def test_a_bar_that_looks_thicker_names_both_lengths_with_what_they_would_need(trial):
     said = check_bar_width({"low": Value(1.45, 0.04), "high": Value(1.52, 0.04)}, trial, BOARD)
-    assert said.startswith("the bar looks 1.49 ± 0.05 times as thick as said")
+    assert said.startswith("the bar looks 1.49 ± 0.05 times as thick as stated")
     assert "diameter_mm would have to be some 8.92 for 6, or square_mm some 10.1 for 15" in said
 
 
 def test_cameras_that_see_different_widths_do_not_see_the_bar_alone(trial):
     said = check_bar_width({"low": Value(0.98, 0.022), "high": Value(1.21, 0.042)}, trial, BOARD)
-    assert said.startswith("the bar looks 0.98 to 1.21 times as thick as said")
+    assert said.startswith("the bar looks 0.98 to 1.21 times as thick as stated")
     assert (
         check_bar_width({"low": Value(0.98, 0.03), "high": Value(1.08, 0.042)}, trial, BOARD) == ""
     )
@@ -181,14 +181,14 @@ def test_a_whisker_of_another_length_is_told_by_two_cameras(ends_mm, length_mm, 
         (
             (Value(0.69, 0.063), Value(0.83, 0.07)),
             0.0,
-            "0.76 ± 0.05 times as thick as said: its diameter_mm would",
+            "0.76 ± 0.05 times as thick as stated: its diameter_mm would",
         ),
         ((Value(0.69, 0.063), Value(0.83, 0.07)), 0.4, ""),
         ((Value(1.4, 0.05), Value(1.0, 0.05)), 0.0, ""),  # a shadow beside the wire in one of them
         ((Value(1.4, 0.08), Value(1.4, 0.08)), 0.0, ""),  # bloom in both
         ((Value(1.0, 0.14), Value(0.87, 0.1)), 0.0, ""),
         # the only one that tells on b60_4; of 50 views of 27 path-traced scenes none is more than 2.5 sigma too thin
-        ((Value(0.69, 0.063),), 0.0, "0.69 ± 0.06 times as thick as said"),
+        ((Value(0.69, 0.063),), 0.0, "0.69 ± 0.06 times as thick as stated"),
         ((Value(0.64, 0.14),), 0.0, ""),
         ((), 0.0, ""),
     ],
