@@ -13,13 +13,11 @@ EI/c², with EI at the clamp.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.polynomial import polynomial
 
 from bench.gauges.held_rod import HeldRod
-from bench.session.rest_shape import RestShape
+from bench.session.rest_shape import UnloadedRod
 
 # [1] EI over the torsional rigidity, less one, is Poisson's ratio: of metals and of polymers. Stated.
 _POISSON = 0.35
@@ -36,64 +34,6 @@ _DIFFERENCE = 1e-5
 _MARCH_ERROR = 1e-10
 # [1] Width of a rod over that at its clamp: a contact nearer to a point than this bends nothing. Stated.
 _LEAST_WIDTH = 0.01
-# [rounds] Of Newton's method for an arc on the unloaded rod, from a turn of 60° to rounding. Derived.
-_ROUNDS = 12
-# Gauss–Legendre on −1…1: of the forward part of an unloaded shape of sixth degree. Derived.
-_GAUSS = np.polynomial.legendre.leggauss(24)
-
-
-@dataclass(frozen=True)
-class UnloadedRod:
-    """The rod without load. rest_mm: as `bench.session.rest_shape` has it, over length_mm."""
-
-    rest_mm: RestShape
-    length_mm: float
-
-    def tangent(self, arc_mm: np.ndarray) -> np.ndarray:
-        """Return unit tangents (..., 3) at arc lengths (...).
-
-        Raises ArithmeticError where the shape, beyond its end, goes on as no rod can.
-        """
-        share = np.asarray(arc_mm) / self.length_mm
-        tangent = np.empty((*share.shape, 3))
-        for k, slope in enumerate(self._slopes):
-            tangent[..., k + 1] = polynomial.polyval(share, slope, tensor=False)
-        forward2 = 1.0 - tangent[..., 1] ** 2 - tangent[..., 2] ** 2
-        if not np.all(forward2 > 0):
-            raise ArithmeticError("the contact is far beyond the end of a curved rod")
-        tangent[..., 0] = np.sqrt(forward2)
-        return tangent
-
-    @cached_property
-    def _slopes(self) -> list[np.ndarray]:
-        """Return the coefficients of y and z of the tangents, by the share of the length."""
-        return [polynomial.polyder(own) / self.length_mm for own in self.rest_mm]
-
-    def point_mm(self, arc_mm: np.ndarray) -> np.ndarray:
-        """Return points (..., 3) at arc lengths (...)."""
-        arc = np.asarray(arc_mm)
-        at, weights = _GAUSS
-        within = 0.5 * arc[..., None] * (1.0 + at)
-        x = 0.5 * arc * (self.tangent(within)[..., 0] @ weights)
-        y, z = (polynomial.polyval(arc / self.length_mm, own) - own[0] for own in self.rest_mm)
-        return np.stack([x, y, z], axis=-1)
-
-    def arc_along_mm(self, direction: np.ndarray, distance_mm: np.ndarray) -> np.ndarray:
-        """Return the arcs (n,) whose points are so far (n,) along directions (n, 3)."""
-        arc = np.array(distance_mm, dtype=float)
-        for _ in range(_ROUNDS):
-            missing = distance_mm - np.sum(self.point_mm(arc) * direction, axis=-1)
-            arc = arc + missing / np.sum(self.tangent(arc) * direction, axis=-1)
-        return arc
-
-    def point_at_distance_mm(self, distance_mm: float) -> np.ndarray:
-        """Return the point (3,) that is so far from the clamp."""
-        arc = distance_mm
-        for _ in range(_ROUNDS):
-            point = self.point_mm(arc)
-            reached = float(np.linalg.norm(point))
-            arc = arc + (distance_mm - reached) * reached / float(point @ self.tangent(arc))
-        return self.point_mm(arc)
 
 
 @dataclass(frozen=True, eq=False)

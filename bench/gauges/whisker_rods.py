@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.gauges.clamped_rod import load_at_clamp
-from bench.gauges.curved_rod import KirchhoffRods, UnloadedRod
+from bench.gauges.curved_rod import KirchhoffRods
 from bench.gauges.held_rod import HeldRod
 from bench.records.trial_result import Deflection
+from bench.session.rest_shape import UnloadedRod
 from bench.session.whisker import Whisker
 
 # [1] Step of differences over the contact's distance: far above rounding, far below what curves. Derived.

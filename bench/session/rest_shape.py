@@ -4,10 +4,12 @@ A shape is two polynomials in arc length over the whisker's length, in y and z, 
 each unit of arc goes forward, along x.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.polynomial import Polynomial
+from numpy.polynomial import Polynomial, polynomial
 
 from bench.base.errors import BadInput
 from bench.session.file_names import SESSION_TOML
@@ -47,8 +49,66 @@ _FARTHEST = 10.0
 # [rounds] Of fitting the curve to points and points to the curve: what is left falls by the square of
 # the noise's slope in each. Derived.
 _ROUNDS = 20
-# [points] Of the integral that gives arc lengths: its error is below 1e-6 of the length. Derived.
-_STEPS = 401
+# [places] From base to tip, of which the steepest counts. Stated.
+_PLACES = 401
+# [rounds] Of Newton's method for an arc on the unloaded rod, from a turn of 60° to rounding. Derived.
+_NEWTON_ROUNDS = 12
+# Gauss–Legendre on −1…1: of the forward part of an unloaded shape of sixth degree. Derived.
+_GAUSS = np.polynomial.legendre.leggauss(24)
+
+
+@dataclass(frozen=True)
+class UnloadedRod:
+    """The whisker without load, as a curve."""
+
+    rest_mm: RestShape
+    length_mm: float
+
+    def tangent(self, arc_mm: np.ndarray) -> np.ndarray:
+        """Return unit tangents (..., 3) at arc lengths (...).
+
+        Raises ArithmeticError where the shape, beyond its end, goes on as no rod can.
+        """
+        share = np.asarray(arc_mm) / self.length_mm
+        tangent = np.empty((*share.shape, 3))
+        for k, slope in enumerate(self._slopes):
+            tangent[..., k + 1] = polynomial.polyval(share, slope, tensor=False)
+        forward2 = 1.0 - tangent[..., 1] ** 2 - tangent[..., 2] ** 2
+        if not np.all(forward2 > 0):
+            raise ArithmeticError("the contact is far beyond the end of a curved rod")
+        tangent[..., 0] = np.sqrt(forward2)
+        return tangent
+
+    @cached_property
+    def _slopes(self) -> list[np.ndarray]:
+        """Return the coefficients of y and z of the tangents, by the share of the length."""
+        return [polynomial.polyder(own) / self.length_mm for own in self.rest_mm]
+
+    def point_mm(self, arc_mm: np.ndarray) -> np.ndarray:
+        """Return points (..., 3) at arc lengths (...)."""
+        arc = np.asarray(arc_mm)
+        at, weights = _GAUSS
+        within = 0.5 * arc[..., None] * (1.0 + at)
+        x = 0.5 * arc * (self.tangent(within)[..., 0] @ weights)
+        y, z = (polynomial.polyval(arc / self.length_mm, own) - own[0] for own in self.rest_mm)
+        return np.stack([x, y, z], axis=-1)
+
+    def arc_along_mm(self, direction: np.ndarray, distance_mm: np.ndarray) -> np.ndarray:
+        """Return the arcs (n,) whose points are so far (n,) along directions (n, 3)."""
+        arc = np.array(distance_mm, dtype=float)
+        for _ in range(_NEWTON_ROUNDS):
+            missing = distance_mm - np.sum(self.point_mm(arc) * direction, axis=-1)
+            arc = arc + missing / np.sum(self.tangent(arc) * direction, axis=-1)
+        return arc
+
+    def point_at_distance_mm(self, distance_mm: float) -> np.ndarray:
+        """Return the point (3,) that is so far from the clamp."""
+        arc = distance_mm
+        for _ in range(_NEWTON_ROUNDS):
+            point = self.point_mm(arc)
+            reached = float(np.linalg.norm(point))
+            arc = arc + (distance_mm - reached) * reached / float(point @ self.tangent(arc))
+        return self.point_mm(arc)
 
 
 def of_curvature(curvature_per_mm: list[float], length_mm: float) -> RestShape:
@@ -59,7 +119,7 @@ def of_curvature(curvature_per_mm: list[float], length_mm: float) -> RestShape:
 
 def steepest_slopes(rest_mm: RestShape, length_mm: float) -> tuple[float, ...]:
     """Return the sine of the turn from the base at places from base to tip."""
-    at = np.linspace(0.0, 1.0, _STEPS)
+    at = np.linspace(0.0, 1.0, _PLACES)
     slopes = [Polynomial(own).deriv()(at) / length_mm for own in rest_mm]
     return tuple(np.hypot(*slopes).tolist())
 
@@ -106,20 +166,23 @@ def _fit(table: NumberTable, name: str, length_mm: float) -> tuple[RestShape, fl
     """Return the smooth curve through the points, from the base on, and the arc length of the last.
 
     Each point belongs to the curve's nearest, so that noise of tracing does not lengthen it.
-    Raises BadInput for a curve that turns too far, and for the point that is farthest off it, where
-    that is too far.
+    Raises BadInput for a curve that turns too far, for points far beyond its end, and for the point that is
+    farthest off it, where that is too far.
     """
     points_mm = np.column_stack([table[column] for column in _COLUMNS])
     arc_mm = _arc_along_chords(points_mm)
     for _ in range(_ROUNDS):
-        lateral = [_through_base(arc_mm / length_mm, points_mm[:, k]) for k in (1, 2)]
-        y, z = (tuple(own.coef.tolist()) for own in lateral)
+        y, z = (_through_base(arc_mm / length_mm, points_mm[:, k]) for k in (1, 2))
         if max(steepest_slopes((y, z), length_mm)) > MOST_SLOPE:
             found = f"the whisker turns by more than {MOST_TURN_DEG:g}° from its base"
             raise BadInput(f"{found}; such a coil is not evaluated", file=name)
-        curve_mm, tangents = _curve(lateral, arc_mm, length_mm)
-        off_mm = points_mm - curve_mm
-        arc_mm = arc_mm + np.sum(off_mm * tangents, axis=1)
+        curve = UnloadedRod((y, z), length_mm)
+        try:
+            off_mm = points_mm - curve.point_mm(arc_mm)
+            arc_mm = arc_mm + np.sum(off_mm * curve.tangent(arc_mm), axis=1)
+        except ArithmeticError:  # the curve goes on beyond the tip as no whisker can
+            _check_length(float(arc_mm[-1]), name, length_mm)
+            raise
     _check_residuals(np.linalg.norm(off_mm, axis=1), table, name, length_mm)
     return (y, z), float(arc_mm[-1])
 
@@ -141,37 +204,11 @@ def _arc_along_chords(points_mm: np.ndarray) -> np.ndarray:
     return np.cumsum(steps_mm)
 
 
-def _curve(
-    lateral: list[Polynomial], arc_mm: np.ndarray, length_mm: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return points and tangents, each (n, 3), of the curve at arc lengths (n,).
-
-    lateral: its y and z by arc length over length_mm.
-    """
-    grid_mm = np.linspace(0.0, max(float(arc_mm.max()), length_mm), _STEPS)
-    slopes = [own.deriv() for own in lateral]
-    forward = _forward(slopes, grid_mm, length_mm)
-    steps_mm = 0.5 * (forward[1:] + forward[:-1]) * np.diff(grid_mm)
-    x_mm = np.append(0.0, np.cumsum(steps_mm))
-    share = arc_mm / length_mm
-    y, z = lateral
-    points = [np.interp(arc_mm, grid_mm, x_mm), y(share), z(share)]
-    y_slope, z_slope = (slope(share) / length_mm for slope in slopes)
-    tangents = [np.interp(arc_mm, grid_mm, forward), y_slope, z_slope]
-    return np.column_stack(points), np.column_stack(tangents)
-
-
-def _forward(slopes: list[Polynomial], arc_mm: np.ndarray, length_mm: float) -> np.ndarray:
-    """Return the x (n,) of unit tangents whose y and z are these slopes at arc lengths (n,)."""
-    steepness2 = sum((slope(arc_mm / length_mm) / length_mm) ** 2 for slope in slopes)
-    return np.sqrt(np.maximum(1.0 - steepness2, 1.0 - MOST_SLOPE**2))
-
-
-def _through_base(at: np.ndarray, values: np.ndarray) -> Polynomial:
-    """Fit a polynomial without constant to values (n,) at places (n,)."""
+def _through_base(at: np.ndarray, values: np.ndarray) -> tuple[float, ...]:
+    """Fit a polynomial without constant to values (n,) at places (n,); return its coefficients."""
     powers = np.vander(at, _POWERS + 1, increasing=True)[:, 1:]
     coefficients = np.linalg.lstsq(powers, values, rcond=None)[0]
-    return Polynomial([0.0, *coefficients])
+    return (0.0, *coefficients.tolist())
 
 
 def _check_length(end_mm: float, name: str, length_mm: float) -> None:

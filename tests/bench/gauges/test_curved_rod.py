@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.gauges.curved_rod import KirchhoffRods, UnloadedRod
+from bench.gauges.curved_rod import KirchhoffRods
 from bench.gauges.whisker_rods import CurvedRod, SeenContacts, StraightRod, rod_of
+from bench.session.rest_shape import UnloadedRod
 from bench.session.whisker import Whisker
 from tests.scenes.curved_pushes import PROFILED, VIBRISSA, CurvedPush, feel, whisker_of
 
