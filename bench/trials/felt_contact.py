@@ -52,7 +52,9 @@ def felt_contact(
     return _touch_alone(felt, late) if found is None else _contact(felt, whisk, found, late)
 
 
-def _contact(felt: FeltWhisk, whisk: Whisk, found: "_Distance", late: np.ndarray) -> FeltContact:
+def _contact(
+    felt: FeltWhisk, whisk: Whisk, found: "_DistanceBySlope", late: np.ndarray
+) -> FeltContact:
     """Return a contact with its distance. late (2, 1): its change by one sigma of the gauges' delay."""
     by_input = np.array([[-1.0, 0.0, 0.0], found.by_input])  # of touch and distance
     by_cause = _inputs_by_cause(felt)
@@ -85,7 +87,7 @@ def _inputs_by_cause(felt: FeltWhisk) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class _Distance:
+class _DistanceBySlope:
     """A distance by (6), and the derivatives of its logarithm.
 
     by_input (3,): by θ, m_y and m_z. by_slope: by the slope, 1/rad.
@@ -98,7 +100,7 @@ class _Distance:
     model_share: float
 
 
-def _distance(result: TrialResult, whisk: Whisk, slope_rad: float) -> _Distance | None:
+def _distance(result: TrialResult, whisk: Whisk, slope_rad: float) -> _DistanceBySlope | None:
     """Return the distance of a whisk by (6), less how far the contact rolls over the bar; None without one."""
     beam = whisk.beam
     as_cylinder_mm = distance.known_slope(*whisk.felt, slope_rad, beam.C_Nmm2)
@@ -110,7 +112,7 @@ def _distance(result: TrialResult, whisk: Whisk, slope_rad: float) -> _Distance 
     of_cylinder = gradient_known_slope(*whisk.felt, slope_rad, beam.C_Nmm2)
     by_input = thickness / as_cylinder_mm * of_cylinder
     share = model_share(result.theta_rad, 0.0, _FRICTION_RAD, d_x_mm, thickness=thickness)
-    return _Distance(d_x_mm, by_input[:3], float(by_input[3]), share)
+    return _DistanceBySlope(d_x_mm, by_input[:3], float(by_input[3]), share)
 
 
 def _rolled_share(result: TrialResult, d_x_mm: float, slope_rad: float, beam: Beam) -> float:
