@@ -16,12 +16,14 @@ from bench.base.errors import BadInput
 from bench.base.progress import PartCount, count_parts
 from bench.theory.sample_noise import StrokeNoise, stroke_noise
 from estimator import distance, first_order, slip, uncertainty
-from estimator.beam import flexural_rigidity
+from estimator.beam import Beam
 from estimator.domain import Numbers
 
 NAMES = ("theta_deg", "alpha_est_deg", "diameter_mm", "length_mm", "taper", "tilt_deg")
 _SLOPES, _ALPHAS, _PLACES = 13, 7, 5  # of the region's grid: the worst may lie between its corners
 _ALONG = np.linspace(0.0, 0.99, 34)[:, None]  # shares of the way to the contact, of the strain
+# [1] Share of the diameter that is lost up to the tip: with more a whisker is a cone. Stated.
+_CONE = 1.0 - 1e-3
 _NO_DESIGN = 1e6  # %: of a design that is none; more where it is further from being one
 # [1] Over the largest distance: a whisker slips along, too. Stated.
 _SLIP_ROOM = 1.02
@@ -103,13 +105,14 @@ class Design:
         """Return the pushing angle."""
         return float(np.radians(self.theta_deg))
 
-    def rigidity_Nmm2(self, equipment: Equipment) -> float:
-        """Return EI at the base."""
-        return float(flexural_rigidity(equipment.youngs_modulus_GPa, self.diameter_mm))
-
-    def thickness(self, arc_mm: Numbers) -> Numbers:
-        """Return the diameter at arcs from the base, over that at the base."""
-        return 1.0 - self.taper * arc_mm / self.length_mm
+    def beam(self, equipment: Equipment) -> Beam:
+        """Return the whisker as a beam."""
+        sizes = (equipment.youngs_modulus_GPa, self.diameter_mm, self.length_mm)
+        if self.taper == 0:
+            return Beam.from_modulus(*sizes, "cylinder")
+        if self.taper > _CONE:
+            return Beam.from_modulus(*sizes, "cone")
+        return Beam.from_modulus(*sizes, "tapered", 1.0 - self.taper)
 
 
 @dataclass(frozen=True)
@@ -129,14 +132,17 @@ def expected_error(design: Design, job: DesignJob, points: np.ndarray) -> Expect
     """Compute the error of (10) that is to be expected at points (3, n) of the region."""
     beta, alpha, d_x = points
     slope = beta - np.radians(design.tilt_deg)
+    beam = design.beam(job.equipment)
     with np.errstate(all="ignore"):
-        moments = _moments(design, job.equipment, slope, alpha, d_x)
-        of_cylinder, noise_mm = _cylinder_distance(design, job.equipment, *moments)
-        by_friction = _taper_distance(design, of_cylinder) / d_x - 1.0
-        by_noise = noise_mm / of_cylinder * design.thickness(d_x)
+        thickness = beam.thickness(d_x)
+        as_cylinder_mm = beam.as_cylinder_mm(d_x)
+        moments = slip.moments(as_cylinder_mm, design.theta_rad, slope, alpha, beam.C_Nmm2)
+        of_cylinder, noise_mm = _cylinder_distance(design, job.equipment, beam, *moments)
+        by_friction = beam.distance_mm(of_cylinder) / d_x - 1.0
+        by_noise = noise_mm / of_cylinder * thickness
         by_lean = _share_by_lean(design, job.region, np.arctan2(*moments), alpha)
     by_making = _share_by_making(design, job.equipment, d_x)
-    bias = by_friction + _neglected_bias(design, job.region, slope, alpha, d_x)
+    bias = by_friction + _neglected_bias(design, job.region, thickness, slope, alpha, d_x)
     sigma = np.linalg.norm(np.broadcast_arrays(by_noise, by_lean, by_making), axis=0)
     is_open = ~np.isfinite(bias + by_noise)  # no distance there
     bias[is_open] = np.inf
@@ -164,28 +170,17 @@ def _share_by_making(design: Design, equipment: Equipment, d_x: Numbers) -> Numb
     return d_x / design.length_mm * np.linalg.norm([by_length, by_tip, by_base])
 
 
-def _moments(design: Design, equipment: Equipment, slope, alpha, d_x) -> tuple[Numbers, Numbers]:
-    """Return (m_y, m_z) (n,), N·mm, at the pushing angle by (13) and (14)."""
-    C = 3.0 * design.rigidity_Nmm2(equipment)
-    return slip.moments(d_x / design.thickness(d_x), design.theta_rad, slope, alpha, C)
-
-
 def _cylinder_distance(
-    design: Design, equipment: Equipment, m_y: Numbers, m_z: Numbers
+    design: Design, equipment: Equipment, beam: Beam, m_y: Numbers, m_z: Numbers
 ) -> tuple[Numbers, Numbers]:
     """Return the distance (n,) of the base's cylinder by (10), and its sigma by noise, mm."""
     theta = design.theta_rad
-    C = 3.0 * design.rigidity_Nmm2(equipment)
+    C = beam.C_Nmm2
     alpha_est = float(np.radians(design.alpha_est_deg))
     noise = stroke_noise(theta, equipment.noise_Nmm, equipment.rate_Hz, equipment.speed_deg_s)
     distance_mm = distance.with_friction(theta, m_y, m_z, alpha_est, C)
     gradient = uncertainty.gradient_with_friction(theta, m_y, m_z, alpha_est, C)
     return distance_mm, _noise_sigma(gradient, theta, np.stack([m_y, m_z], axis=-1), noise)
-
-
-def _taper_distance(design: Design, of_cylinder: Numbers) -> Numbers:
-    """Return the distance (n,) of the tapered whisker from that of the base's cylinder, mm."""
-    return 1.0 / (1.0 / of_cylinder + design.taper / design.length_mm)
 
 
 def _noise_sigma(gradient, theta, moments: np.ndarray, noise: StrokeNoise) -> Numbers:
@@ -204,7 +199,9 @@ def _noise_sigma(gradient, theta, moments: np.ndarray, noise: StrokeNoise) -> Nu
     )
 
 
-def _neglected_bias(design: Design, region: Region, slope, alpha, d_x) -> Numbers:
+def _neglected_bias(
+    design: Design, region: Region, thickness: Numbers, slope: Numbers, alpha: Numbers, d_x: Numbers
+) -> Numbers:
     """Return the bias of (10) by its neglected terms (docs/maps.md), as a share of d_x.
 
     They are of first order in θ: rolling on round surfaces, and friction along a held whisker; and
@@ -212,7 +209,6 @@ def _neglected_bias(design: Design, region: Region, slope, alpha, d_x) -> Number
     slips.
     """
     theta = design.theta_rad
-    thickness = design.thickness(d_x)
     steepness = np.abs(slope)
     reach = region.bar_radius_mm + 0.5 * design.diameter_mm * thickness
     rolling = first_order.rolling_at(theta, reach, slope, d_x, thickness)
@@ -250,11 +246,10 @@ def faults(design: Design, job: DesignJob) -> dict[str, float]:
     reach = _SLIP_ROOM * d_x[1]
     if design.length_mm <= reach:
         return {"length": reach / design.length_mm - 1.0 + 1e-9}
-    rigidity = design.rigidity_Nmm2(equipment)
-    compliance = 1.0 / d_x - design.taper / design.length_mm  # of the distance, 1/mm
-    moments = design.theta_rad * 3.0 * rigidity * compliance
-    bending = moments * (1.0 - _ALONG) / design.thickness(_ALONG * d_x) ** 3
-    strain = 0.5 * design.diameter_mm * bending / rigidity
+    beam = design.beam(equipment)
+    moments = beam.moment_Nmm(design.theta_rad, d_x)
+    bending = moments * (1.0 - _ALONG) / beam.width(_ALONG * d_x / design.length_mm) ** 3
+    strain = 0.5 * design.diameter_mm * bending / beam.rigidity_Nmm2
     shares = {
         "strain": strain.max() / equipment.most_strain,
         "gauges' range": moments.max() / equipment.full_scale_Nmm,

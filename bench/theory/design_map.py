@@ -26,7 +26,6 @@ from bench.theory.best_design import (
     largest_percent,
 )
 from bench.theory.model_error import Push, feel
-from estimator.beam import Beam
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings
 
@@ -44,8 +43,6 @@ DESIGN = Table(
         Column("exact_percent", "its error by exact mechanics; of the corners alone"),
     ),
 )
-# [1] Of the base's diameter: a tip that is thinner is a cone's. Stated.
-_THINNEST = 1e-3
 _SLOPES, _ALPHAS, _PLACES = 61, 7, 41  # of the figure's grid; it shows the worst over α
 _SHOWN_PERCENT = 100.0  # of the figure's colours: the largest
 _UNITS = {
@@ -111,26 +108,20 @@ def exact_percent(design: Design, job: DesignJob, point: Sequence[float]) -> flo
         theta_deg=design.theta_deg,
     )
     try:
-        whisk, true_mm = feel(push, *rod_and_beam(design, job.equipment))
+        rod = rod_of(design, job.equipment)
+        whisk, true_mm = feel(push, rod, design.beam(job.equipment))
     except ArithmeticError:
         return math.nan
     estimate = with_friction(whisk, EstimatorSettings(math.radians(design.alpha_est_deg)))
     return 100.0 * (estimate.d_x_mm / true_mm - 1.0)
 
 
-def rod_and_beam(design: Design, equipment: Equipment) -> tuple[Rod, Beam]:
-    """Return the whisker of a design as the rig and as the estimators have it."""
-    length = design.length_mm
-    modulus = equipment.youngs_modulus_GPa
-    rigidity = design.rigidity_Nmm2(equipment)
-    tip_share = 1.0 - design.taper
-    if _THINNEST <= tip_share < 1.0:
-        tip = tip_share * design.diameter_mm
-        rod = Rod("tapered", length, design.diameter_mm, modulus, tip_diameter_mm=tip)
-        return rod, Beam.from_rigidity(rigidity, length, "tapered", tip_share)
-    shape = "cylinder" if tip_share == 1.0 else "cone"
-    rod = Rod(shape, length, design.diameter_mm, modulus)
-    return rod, Beam.from_rigidity(rigidity, length, shape)
+def rod_of(design: Design, equipment: Equipment) -> Rod:
+    """Return the whisker of a design as the rig has it."""
+    shape = design.beam(equipment).shape
+    tip_mm = (1.0 - design.taper) * design.diameter_mm if shape == "tapered" else None
+    modulus_GPa = equipment.youngs_modulus_GPa
+    return Rod(shape, design.length_mm, design.diameter_mm, modulus_GPa, tip_diameter_mm=tip_mm)
 
 
 def report_lines(report: DesignReport) -> Iterator[str]:
@@ -138,7 +129,7 @@ def report_lines(report: DesignReport) -> Iterator[str]:
     design = report.design
     region = report.job.region
     choices = ", ".join(_with_unit(design, name) for name in _UNITS)
-    yield f"{choices} (EI {design.rigidity_Nmm2(report.job.equipment):.0f} N·mm² at the base)"
+    yield f"{choices} (EI {design.beam(report.job.equipment).rigidity_Nmm2:.0f} N·mm² at the base)"
     beta = "β {:g} to {:g}°".format(*region.beta_deg)
     alpha = "α {:g} to {:g}°".format(*region.alpha_deg)
     d_x = "d_x {:g} to {:g} mm".format(*region.d_x_mm)

@@ -40,7 +40,7 @@ from bench.theory.best_design import (
     best_design,
     expected_error,
 )
-from bench.theory.design_map import rod_and_beam
+from bench.theory.design_map import rod_of
 from bench.trials.readout import Readout, whisk_at
 from estimator.builtin import with_friction
 from estimator.whisk import EstimatorSettings
@@ -86,7 +86,7 @@ def errors_percent(
 
 
 def _protocol(design: Design, table: TrialTable) -> Protocol:
-    rod, _ = rod_and_beam(design, EQUIPMENT)
+    rod = rod_of(design, EQUIPMENT)
     size = {
         name: getattr(rod, name)
         for name in ("shape", "length_mm", "diameter_mm", "tip_diameter_mm")
@@ -110,7 +110,7 @@ def _felt(design: Design, recording: Recording) -> float:
         Signals(time, np.radians(motor_deg), y, z, "V"), recording.run, Settings()
     )
     touch = allow_drift(stroke.touch, np.zeros(2), stroke.speed_rad_s)
-    _, beam = rod_and_beam(design, EQUIPMENT)
+    beam = design.beam(EQUIPMENT)
     whisk = whisk_at(
         stroke, Readout(GaugeMatrix(_VOLT_NMM * np.eye(2))), touch, beam, design.theta_rad
     )
