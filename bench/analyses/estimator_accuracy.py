@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import betainc, betaincinv, chdtri
 
-from bench.analyses.pooling import by_slope, grouped, rms
+from bench.analyses.pooling import by_slope, grouped, rms, rms_of_known
 from bench.base.drawing import label_of
 from bench.base.statuses import TRUTH, reaching
 from bench.records.trial_result import TrialResult, whisks
@@ -313,8 +313,7 @@ class RunAccuracy:
 
 def _rms_share(parts: Iterable[tuple[float, float]]) -> float:
     """Return the RMS of the finite ratios of pairs (part, whole), per cent; NaN where there is none."""
-    shares = [100.0 * part / whole for part, whole in parts]
-    return rms(share for share in shares if math.isfinite(share))
+    return rms_of_known(100.0 * part / whole for part, whole in parts)
 
 
 def _finite_median(values: Sequence[float]) -> float:

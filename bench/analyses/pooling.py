@@ -65,6 +65,11 @@ def rms(values: Iterable[float]) -> float:
     return float(np.sqrt(np.mean(squares))) if len(squares) else np.nan
 
 
+def rms_of_known(values: Iterable[float]) -> float:
+    """Return the root mean square of the values that are finite; NaN of nothing."""
+    return rms(value for value in values if np.isfinite(value))
+
+
 def coverage(estimates: Collection[Any], noun: str) -> str:
     """Return of how many estimates, each of one `noun`, the 95 % interval holds the truth."""
     inside = sum(bool(one.inside) for one in estimates)

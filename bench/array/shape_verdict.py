@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.analyses.pooling import rms_of_known
 from bench.array.cloud import SEEN, ContactPoint
 from bench.base.drawing import label_of
 from bench.base.tables import TRIAL, WHISK, WHISKER, Column, Kind, Table, alike, status, with_sigma
@@ -101,8 +102,8 @@ def surface_verdict(cloud: Sequence[ContactPoint]) -> Iterator[str]:
     if not sound:
         return
     errors = _Errors.of_contacts(sound)
-    across = _rms(errors.across_mm[:, 0])
-    along = _rms(errors.along_mm[:, 0])
+    across = rms_of_known(errors.across_mm[:, 0])
+    along = rms_of_known(errors.along_mm[:, 0])
     worst = max(sound, key=lambda contact: abs(contact.along_mm.value))
     largest = f"{worst.along_mm.value:+.2f} ± {worst.along_mm.sigma:.2f} mm"
     whiskers = counted(len({contact.whisker for contact in sound}), "whisker")
@@ -161,17 +162,11 @@ class _Errors:
     @property
     def normals_rms_deg(self) -> float:
         """Return the RMS angle between felt normals and the object's; NaN where none is known."""
-        return math.degrees(_rms(self.normals_rad))
-
-
-def _rms(values: np.ndarray) -> float:
-    """Return the RMS of the values (n,) that are finite; NaN without any."""
-    finite = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(finite**2))) if len(finite) else math.nan
+        return math.degrees(rms_of_known(self.normals_rad))
 
 
 def _statistics(errors: np.ndarray) -> str:
     """Return mean, RMS and the share within the 95 % interval about 0 of errors (n, 2) as text."""
     values, sigmas = errors.T
     covered = 100.0 * np.mean(np.abs(values) <= Z_95 * sigmas)
-    return f"{values.mean():>+9.2f}{_rms(values):>8.2f}{covered:>6.0f} %"
+    return f"{values.mean():>+9.2f}{rms_of_known(values):>8.2f}{covered:>6.0f} %"

@@ -18,6 +18,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bench.analyses.pooling import rms_of_known
 from bench.base.atomic import write_whole
 from bench.base.drawing import label_logarithmic, publish, style
 from bench.base.errors import BadInput
@@ -129,8 +130,7 @@ class Trade:
     @property
     def rms_mm(self) -> float:
         """Return the RMS of the errors; NaN where there is none."""
-        finite = self.errors_mm[np.isfinite(self.errors_mm)]
-        return float(np.sqrt(np.mean(finite**2))) if len(finite) else np.nan
+        return rms_of_known(self.errors_mm)
 
     @property
     def expected(self) -> ExpectedRms:
