@@ -13,19 +13,8 @@ from bench.base.atomic import whole_file
 from bench.base.errors import BadInput
 from bench.base.progress import begin_step, count_parts
 from bench.records.trial_result import SeenTrial, SeenWhisk, TrialResult, WhiskerFacts
+from bench.report import painting
 from bench.report.film_curves import CurveStrip
-from bench.report.painting import (
-    BAR,
-    FILM_WIDTH_PX,
-    PAPER,
-    TITLE_PLACE,
-    WIRE,
-    polyline,
-    put_text,
-    shrink,
-    shrink_px,
-    side_by_side,
-)
 from bench.report.record import SESSION, read_record
 from bench.report.run_facts import CameraFacts
 from bench.report.run_folder import read_results
@@ -147,14 +136,14 @@ def _film(
     for whisk in result.seen.whisks:
         if whisk.frames is None:
             continue
-        strip = CurveStrip.draw(whisk, FILM_WIDTH_PX * len(cameras))
+        strip = CurveStrip.draw(whisk, painting.FILM_WIDTH_PX * len(cameras))
         frames = enumerate(_frames_of(trial, times, cameras, whisk))
         count = len(whisk.frames.index)
         for k, greys in count_parts(frames, f"frames of whisk {whisk.whisk}", count):
             pictures = []
             for camera in cameras:
                 pictures.append(_camera_picture(greys[camera.name], camera, result, whisk, k))
-            yield strip.below(side_by_side(pictures), k)
+            yield strip.below(painting.side_by_side(pictures), k)
 
 
 def _frames_of(
@@ -179,17 +168,17 @@ def _frames_of(
 def _camera_picture(
     grey: np.ndarray | None, facts: CameraFacts, result: TrialResult, whisk: SeenWhisk, k: int
 ) -> np.ndarray:
-    """Return one camera's picture, (h, FILM_WIDTH_PX, 3), with what was found in the whisk's frame k."""
+    """Return one camera's picture (h, w, 3), as wide as films have it, with what was found in the whisk's frame k."""
     if grey is None:
         width, height = facts.size_px
-        size = (round(FILM_WIDTH_PX / width * height), FILM_WIDTH_PX, 3)
+        size = (round(painting.FILM_WIDTH_PX / width * height), painting.FILM_WIDTH_PX, 3)
         picture = np.full(size, _NO_PICTURE, np.uint8)
         title = f"{facts.name}: no picture"
     else:
-        picture = shrink(grey, FILM_WIDTH_PX)
+        picture = painting.shrink(grey, painting.FILM_WIDTH_PX)
         _draw_lines(picture, facts, result, whisk, k)
         title = f"{facts.name}, frame {int(whisk.frames.index[k])}"
-    put_text(picture, title, TITLE_PLACE, PAPER)
+    painting.put_text(picture, title, painting.TITLE_PLACE, painting.PAPER)
     return picture
 
 
@@ -203,15 +192,17 @@ def _draw_lines(
 
     def project(points_mm: np.ndarray) -> np.ndarray:
         """Project points (n, 3) mm into the picture."""
-        return shrink_px(camera.project(points_mm), FILM_WIDTH_PX / facts.size_px[0])
+        return painting.shrink_px(
+            camera.project(points_mm), painting.FILM_WIDTH_PX / facts.size_px[0]
+        )
 
     for edge in _bar_edges(camera, result.seen, whisk):
-        polyline(picture, project(edge), BAR)
+        painting.polyline(picture, project(edge), painting.BAR)
     path_mm = _contact_path(whisk, k)
     contact_mm = path_mm[-1] if whisk.frames.touching[k] else None
-    polyline(picture, project(_wire(result, whisk, k)), WIRE)
+    painting.polyline(picture, project(_wire(result, whisk, k)), painting.WIRE)
     if len(path_mm) > 1:
-        polyline(picture, project(path_mm), _PATH)
+        painting.polyline(picture, project(path_mm), _PATH)
     if contact_mm is not None:
         ((x, y),) = project(contact_mm[None])
         cv2.circle(picture, (round(x), round(y)), 5, _CONTACT, 1, cv2.LINE_AA)

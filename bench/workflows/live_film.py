@@ -6,25 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.report.painting import (
-    BAR,
-    FILM_WIDTH_PX,
-    PAPER,
-    TITLE_PLACE,
-    WIRE,
-    polyline,
-    put_text,
-    shrink,
-    shrink_px,
-    side_by_side,
-)
+from bench.report import painting
 
 if TYPE_CHECKING:
     from bench.workflows.live_push import LivePush, Played
 
 FILM_HZ = 25.0
 _HELD_S = 2.0  # so long the answer is shown
-_COLOURS = {"bar_left": BAR, "bar_right": BAR, "wire": WIRE}
+_COLOURS = {"bar_left": painting.BAR, "bar_right": painting.BAR, "wire": painting.WIRE}
 _ANSWER_PLACE = (12, 48)  # of a camera's picture, px
 
 
@@ -77,17 +66,17 @@ def _drawn(
     drawn = []
     for camera in sorted(pictures):
         picture = _with_lines(pictures[camera], lines_px.get(camera, {}))
-        put_text(picture, f"{camera}, {title}", TITLE_PLACE, PAPER)
-        put_text(picture, answer, _ANSWER_PLACE, PAPER)
+        painting.put_text(picture, f"{camera}, {title}", painting.TITLE_PLACE, painting.PAPER)
+        painting.put_text(picture, answer, _ANSWER_PLACE, painting.PAPER)
         drawn.append(picture)
-    return side_by_side(drawn)
+    return painting.side_by_side(drawn)
 
 
 def _with_lines(grey: np.ndarray, lines_px: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return a camera's picture (h, w, 3) at the film's width, with wire and bar drawn in."""
-    picture = shrink(grey, FILM_WIDTH_PX)
-    scale = FILM_WIDTH_PX / grey.shape[1]
+    picture = painting.shrink(grey, painting.FILM_WIDTH_PX)
+    scale = painting.FILM_WIDTH_PX / grey.shape[1]
     for name, points_px in lines_px.items():
         if name in _COLOURS:
-            polyline(picture, shrink_px(points_px, scale), _COLOURS[name])
+            painting.polyline(picture, painting.shrink_px(points_px, scale), _COLOURS[name])
     return picture
