@@ -37,6 +37,7 @@ from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.view import View
 from vision.touched.axis import offset_px, settle_axis
 from vision.touched.line import BarLineEstimate, measure_bars
+from vision.touched.object_view import ObjectView
 from vision.touched.search import SeenBar, find_object
 from vision.touched.search_scene import SearchScene
 from vision.touched.width import measure_relative_widths
@@ -64,7 +65,10 @@ SECOND_DIFFERENCES = np.array([[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 
 class SceneWithoutWire(SearchScene):
     """A scene in which no wire hides anything."""
 
-    wires_px: Mapping = {}
+    @property
+    def object_views(self) -> list[ObjectView]:
+        """Return the views of the shaft."""
+        return [ObjectView(view, self.radius_mm, self.settings) for view in self.views]
 
 
 @dataclass(frozen=True)
@@ -132,8 +136,9 @@ def measure_shaft(views: list[View], cameras: Cameras, place: Place) -> Shaft:
     """Measure the shaft's lines about the z axis of a frame, and fit its axis to them."""
     axis = BarAxis(np.zeros(3), np.array([0.0, 0.0, 1.0]))
     lines: dict[str, BarLineEstimate] = {}
+    seen = [ObjectView(view, SHAFT.radius_mm, SETTINGS) for view in views]
     for _ in range(PASSES):
-        lines = measure_bars(views, axis, SHAFT.radius_mm, {}, SETTINGS, lines)
+        lines = measure_bars(seen, axis, lines)
         bars = {name: line.points for name, line in lines.items() if line.is_bar}
         axis = settle_axis(axis, cameras, bars, SHAFT.radius_mm)
     return _fit_axis(axis, cameras, lines, place)

@@ -1,8 +1,9 @@
 """One camera's pictures of a whisk, with the picture without rods."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -40,6 +41,10 @@ class View:
     noise: Noise
     others: Others = field(default_factory=dict)
     itself: RodLines | None = None
+
+    def in_frame(self, frame: int) -> Self:
+        """Return the view with one of its frames alone."""
+        return replace(self, frames={frame: self.frames[frame]})
 
     def sample_frames(self, most: int) -> list[int]:
         """Return the indices of at most so many frames, spread over all of them."""

@@ -8,7 +8,6 @@ cancels in the middle of the two edges, but not in the width, so each edge has a
 EDGE_PX.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -17,8 +16,7 @@ import numpy as np
 from vision.geometry.contact import BarAxis
 from vision.geometry.newton import covariance_of, descend
 from vision.geometry.polyline import normals
-from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.view import View
+from vision.touched.object_view import ObjectView
 from vision.touched.pieces import (
     ARM_MM,
     FEWEST_PIECES,
@@ -67,23 +65,18 @@ _STEP_SHARES = (1.0, 0.3, 0.1, 0.03)
 
 
 def measure_edges(
-    view: View,
-    axis: BarAxis,
-    radius_mm: float,
-    wires_px: Sequence[np.ndarray],
-    settings: VisionSettings,
-    *,
-    coarse: bool = False,
+    view: ObjectView, axis: BarAxis, *, coarse: bool = False
 ) -> dict[int, LinePoints] | None:
     """Measure two points of each of the bar's edges in the mean picture.
 
     Returns the points by side, 1 towards the pieces' normals and -1 against them; None where too
-    little of the bar is clear, or the pixels show no bar. wires_px: lines (m, 2) where the wire
-    lies in some frame. coarse: the axis and the width may be some pixels off.
+    little of the bar is clear, or the pixels show no bar. coarse: the axis and the width may be
+    some pixels off.
     """
-    noise = view.noise.times(view.mean_share + 1.0)  # of the mean minus one background
-    knots = bar_knots(settings)
-    pieces = bar_pieces(view, noise, axis, radius_mm, wires_px, settings)
+    pictures = view.pictures
+    noise = pictures.noise.times(pictures.mean_share + 1.0)  # of the mean minus one background
+    knots = bar_knots(view.settings)
+    pieces = bar_pieces(view, axis, noise)
     if len(pieces) < FEWEST_PIECES:
         return None
     start = _search_coarse(pieces, knots) if coarse else np.zeros(4)

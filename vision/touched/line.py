@@ -18,8 +18,8 @@ import numpy as np
 from vision.geometry.contact import BarAxis
 from vision.geometry.optics import LEAST_PROBABILITY, Optics, probable, probable_gammas
 from vision.geometry.rotation import unit
-from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.view import SATURATED, View
+from vision.pictures.view import SATURATED
+from vision.touched.object_view import ObjectView
 from vision.touched.patches import FULL_SCALE
 from vision.touched.pieces import ARM_MM, FEWEST_PIECES, at_arms, bar_pieces, beside_wires
 from vision.touched.posterior import (
@@ -125,40 +125,28 @@ class BarLineEstimate:
         return moved
 
 
-def find_lines(
-    views: Sequence[View],
-    axis: BarAxis,
-    radius_mm: float,
-    wires_px: Mapping[str, Sequence[np.ndarray]],
-    settings: VisionSettings,
-) -> dict[str, BarLineEstimate]:
+def find_lines(views: Iterable[ObjectView], axis: BarAxis) -> dict[str, BarLineEstimate]:
     """Find the bar's line in each camera by one quick pass, for an axis that is up to NEAR_PX off,
     or no bar's.
-
-    wires_px: by camera lines (m, 2) where the wire lies in some frame.
     """
     lines = {}
-    for name, pieces in clear_pieces(views, axis, radius_mm, wires_px, settings).items():
+    for name, pieces in clear_pieces(views, axis).items():
         posterior = fit_quick(pieces, np.zeros(2), NEAR_PX)
         lines[name] = _average_posteriors(pieces, {1.0: posterior}, np.ones(1))
     return lines
 
 
 def measure_bars(
-    views: Sequence[View],
+    views: Sequence[ObjectView],
     axis: BarAxis,
-    radius_mm: float,
-    wires_px: Mapping[str, Sequence[np.ndarray]],
-    settings: VisionSettings,
     before: Mapping[str, BarLineEstimate] | None = None,
 ) -> dict[str, BarLineEstimate]:
     """Measure the bar's line in the mean of each view's pictures, by camera.
 
-    Cameras that show too little of the bar are left out. wires_px: by camera lines (m, 2) where the
-    wire lies in some frame. before: measured about an axis nearby; with it lines are measured
-    finely, without it to some tenths of their sigma.
+    Cameras that show too little of the bar are left out. before: measured about an axis nearby;
+    with it lines are measured finely, without it to some tenths of their sigma.
     """
-    pieces = clear_pieces(views, axis, radius_mm, wires_px, settings)
+    pieces = clear_pieces(views, axis)
     if not pieces:
         return {}
     optics = {view.camera.name: view.camera.optics for view in views}
@@ -231,25 +219,15 @@ def _refine(
     return refined
 
 
-def clear_pieces(
-    views: Sequence[View],
-    axis: BarAxis,
-    radius_mm: float,
-    wires_px: Mapping[str, Sequence[np.ndarray]],
-    settings: VisionSettings,
-) -> dict[str, Pieces]:
-    """Return the clear pieces of the bar by camera, of cameras that show enough of it.
-
-    wires_px: by camera lines (m, 2) where the wire lies in some frame.
-    """
+def clear_pieces(views: Iterable[ObjectView], axis: BarAxis) -> dict[str, Pieces]:
+    """Return the clear pieces of the bar by camera, of cameras that show enough of it."""
     clear = {}
     for view in views:
-        name = view.camera.name
-        pieces = _read_pieces(view, axis, radius_mm, wires_px.get(name, []), settings)
+        pieces = _read_pieces(view, axis)
         if len(pieces) < FEWEST_PIECES:
             continue
         if np.mean(pieces.weight > 0) > _LEAST_PIXEL_SHARE:
-            clear[name] = pieces
+            clear[view.camera.name] = pieces
     return clear
 
 
@@ -315,24 +293,24 @@ def _average_lines(
     return line, np.tensordot(probabilities, covariances + scatter, axes=1)
 
 
-def _read_pieces(
-    view: View, axis: BarAxis, radius_mm: float, wires_px, settings: VisionSettings
-) -> Pieces:
+def _read_pieces(view: ObjectView, axis: BarAxis) -> Pieces:
     """Read the pieces of the bar in the view's mean picture, in grey levels of 8 bit; saturated
     pixels weigh nothing."""
-    noise = view.noise.times(view.mean_share)
-    pieces = bar_pieces(view, noise, axis, radius_mm, wires_px, settings)
-    if len(pieces) < FEWEST_PIECES and view.itself is None:
-        pieces = beside_wires(bar_pieces(view, noise, axis, radius_mm, (), settings), wires_px)
-    pieces = pieces.below(SATURATED * view.full_scale)
-    scale = FULL_SCALE / view.full_scale
+    pictures = view.pictures
+    noise = pictures.noise.times(pictures.mean_share)
+    pieces = bar_pieces(view, axis, noise)
+    if len(pieces) < FEWEST_PIECES and len(view.crossing_px):
+        crossed = bar_pieces(replace(view, wires_px=()), axis, noise)
+        pieces = beside_wires(crossed, view.wires_px)
+    pieces = pieces.below(SATURATED * pictures.full_scale)
+    scale = FULL_SCALE / pictures.full_scale
     return replace(
         pieces,
         grey=pieces.grey * scale,
         background=pieces.background * scale,
         slope=pieces.slope * scale,
         weight=pieces.weight / scale,
-        noise_behind=np.full(len(pieces), 1.0 / view.mean_share),
+        noise_behind=np.full(len(pieces), 1.0 / pictures.mean_share),
     )
 
 

@@ -13,17 +13,16 @@ from functools import partial
 import numpy as np
 
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.centreline import resting_lines, rotation_z
+from vision.geometry.centreline import rotation_z
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
-from vision.geometry.rods import Rods, Wire
+from vision.geometry.rods import Rods
 from vision.geometry.rotation import turned_about, unit
-from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.view import View
 from vision.touched.axis import sight_planes
 from vision.touched.edge_map import EdgeMap
 from vision.touched.edges import measure_edges
 from vision.touched.find import search_bars
+from vision.touched.object_view import ObjectView
 from vision.wire.points import LinePoints
 
 # [radii] Step of the grid along the whisker. Derived.
@@ -75,25 +74,17 @@ def _axes_across_sight(hypotheses: np.ndarray, camera: Camera, motor_rad: float)
     return BarAxis(point, turned_about(-ahead, right, turn))
 
 
-def see_bar_alone(
-    first: BarAxis,
-    view: View,
-    wire: Wire,
-    radius_mm: float,
-    motor_rad: np.ndarray,
-    settings: VisionSettings,
-) -> BarAxis:
+def see_bar_alone(first: BarAxis, view: ObjectView) -> BarAxis:
     """Compute the bar's axis from its edges in one camera, from a coarse axis.
 
-    motor_rad (n,): motor angles of all frames. Raises Refused where its edges are not seen.
+    Raises Refused where its edges are not seen.
     """
     camera = view.camera
     axis = first
-    straight = resting_lines(camera, wire, np.unique(motor_rad))
     for coarse in (True, False):
-        edges = measure_edges(view, axis, radius_mm, straight, settings, coarse=coarse)
+        edges = measure_edges(view, axis, coarse=coarse)
         if edges is not None:
-            axis = axis_from_edges(edges, camera, radius_mm)
+            axis = axis_from_edges(edges, camera, view.radius_mm)
         ratio = _distance_mm(axis, camera) / _distance_mm(first, camera)
         if not _NEAREST < ratio < _FARTHEST or (coarse and edges is None):
             raise Refused(

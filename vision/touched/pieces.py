@@ -16,7 +16,7 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.polyline import tangents_by
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
-from vision.pictures.view import View
+from vision.touched.object_view import ObjectView
 from vision.wire.bands import Band, Pieces, cut_pieces, read_band
 from vision.wire.cylinder import WAVES
 from vision.wire.shading import Knots, fit_shading
@@ -55,38 +55,32 @@ NO_BAR = 3.5
 _PASSES = 3
 
 
-def bar_pieces(
-    view: View,
-    noise: Noise,
-    axis: BarAxis,
-    radius_mm: float,
-    wires_px: Sequence[np.ndarray],
-    settings: VisionSettings,
-) -> Pieces:
+def bar_pieces(view: ObjectView, axis: BarAxis, noise: Noise) -> Pieces:
     """Return the pieces of the bar in the mean picture, to either side of the axis's point, that
     show no wire.
 
     noise: of the difference of mean and background. Raises Refused where no part of the bar lies
     before the camera.
     """
-    band = _read_bar_band(view, axis, radius_mm, settings)
-    length_px = settings.bar_piece_px
-    pieces = cut_pieces([_from_whole(band, length_px)], length_px, noise)
+    length_px = view.settings.bar_piece_px
+    band = _from_whole(_read_bar_band(view, axis), length_px)
+    pieces = cut_pieces([band], length_px, noise)
     is_used = np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE
-    if view.itself is None:  # else the wires are known, and not in the mean
-        is_used &= clear_of_wire(pieces, wires_px, length_px / 2 + 5.0)
+    is_used &= clear_of_wire(pieces, view.crossing_px, length_px / 2 + 5.0)
     return pieces.select(is_used)
 
 
-def _read_bar_band(view: View, axis: BarAxis, radius_mm: float, settings: VisionSettings) -> Band:
+def _read_bar_band(view: ObjectView, axis: BarAxis) -> Band:
     """Read the band along the bar, where that lies before the camera and is no wider than the picture.
 
     Raises Refused where no part of it lies before the camera, or the bar would pass through that.
     """
-    reach_mm = settings.bar_reach_mm
-    place, middle, radius = axis.outline_before(view.camera, radius_mm, reach_mm, _STATIONS)
+    settings = view.settings
+    place, middle, radius = axis.outline_before(
+        view.camera, view.radius_mm, settings.bar_reach_mm, _STATIONS
+    )
     half = int(np.ceil(np.max(radius))) + settings.bar_margin_px
-    return read_band(view.mean, view.background, middle, place, radius, half)
+    return read_band(view.pictures.mean, view.pictures.background, middle, place, radius, half)
 
 
 def _from_whole(band: Band, length_px: int) -> Band:

@@ -58,15 +58,7 @@ def fit_to_edges(
     measure the edges quickly.
     """
     for reach_px in reaches_px:
-        silhouettes = measure_silhouette_edges(
-            scene.views,
-            place,
-            scene.radius_mm,
-            scene.wires_px,
-            scene.settings,
-            reach_px,
-            coarse=coarse,
-        )
+        silhouettes = measure_silhouette_edges(scene.object_views, place, reach_px, coarse=coarse)
         edges = {name: one.points for name, one in silhouettes.items() if one.segments}
         if not any(len(points) for points in edges.values()):
             return RoundedFit(place, 0.0)

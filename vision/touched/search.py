@@ -23,6 +23,7 @@ from operator import itemgetter
 import numpy as np
 
 from vision.geometry.camera import Camera
+from vision.geometry.centreline import resting_lines
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.ring import Ring
@@ -30,11 +31,11 @@ from vision.geometry.rods import Bar
 from vision.geometry.rounded import Rounded
 from vision.geometry.touched import Axis, Touched
 from vision.pictures.change import HALF
-from vision.pictures.view import View
 from vision.touched.axis import meeting_axis, offset_px, settle_axis
 from vision.touched.edge_map import EdgeMap, compute_edge_map
 from vision.touched.find import can_touch, find_bars
 from vision.touched.line import BarLineEstimate, find_lines
+from vision.touched.object_view import ObjectView
 from vision.touched.one_view import find_bars_alone, see_bar_alone, seen_from_one_side
 from vision.touched.rounded_search import find_by_coverage, find_by_silhouette
 from vision.touched.search_scene import SearchScene, still_picture
@@ -109,7 +110,7 @@ def with_lines(scene: SearchScene, bar: SeenBar) -> SeenBar:
     """
     if not bar.lines and isinstance(bar.axis, BarAxis) and isinstance(scene.rods.bar, Bar):
         with suppress(Refused):
-            return replace(bar, lines=BarSearch(scene).lines_about(scene.views, bar.axis))
+            return replace(bar, lines=find_lines(scene.object_views, bar.axis))
     return bar
 
 
@@ -136,7 +137,7 @@ def _search_bar(touched: Bar, scene: SearchScene) -> SeenBar:
     """Find a straight bar by its two edges. Raises Refused where no camera sees one."""
     search = BarSearch(scene)
     if len(scene.views) == 1:
-        return SeenBar(search.axis_of_one_camera(scene.views[0]), {})
+        return SeenBar(search.axis_of_one_camera(scene.object_views[0]), {})
     by_all = search.best_by_all_cameras()
     is_seen = bool(by_all.seen_by)
     if is_seen and not seen_from_one_side(scene.cameras, by_all.axis):
@@ -241,14 +242,14 @@ class BarSearch:
         """Measure the bar's line about each axis, once where a camera sees two axes as one."""
         scene = self.scene
         candidates: list[LineCandidate] = []
-        for axis, view in product(axes, scene.views):
+        for axis, view in product(axes, scene.object_views):
             camera = view.camera
             others = [one.axis for one in candidates if one.camera is camera]
             if any(offset_px(camera, axis, other) < _SAME_LINE_PX for other in others):
                 continue
             lines: dict[str, BarLineEstimate] = {}
             with suppress(Refused):  # a camera that looks along an axis has no line of it
-                lines = self.lines_about([view], axis)
+                lines = find_lines([view], axis)
             for line in lines.values():
                 if line.is_bar:
                     through = self._axis_through(axis, {camera.name: line})
@@ -267,14 +268,14 @@ class BarSearch:
             for before in found:
                 if self._is_same(axis, before.axis):
                     return before
-            left = [one for one in self.scene.views if _has_left(one.camera, axis, about)]
+            left = [one for one in self.scene.object_views if _has_left(one.camera, axis, about)]
             if not left:
                 found.append(SeenBar(axis, lines))
                 break
             names = [view.camera.name for view in left]
             about |= dict.fromkeys(names, axis)
             kept = {name: line for name, line in lines.items() if name not in names}
-            lines = kept | self.lines_about(left, axis)
+            lines = kept | find_lines(left, axis)
             axis = self._axis_through(axis, lines)
         return SeenBar(axis, lines)
 
@@ -286,16 +287,16 @@ class BarSearch:
     def bars_of_single_cameras(self) -> list[SeenBar]:
         """Return the bar by each camera alone that sees one."""
         found = []
-        for view in self.scene.views:
+        for view in self.scene.object_views:
             with suppress(Refused):
                 axis = self.axis_of_one_camera(view)
-                lines = self.lines_about(self.scene.views, axis)
+                lines = find_lines(self.scene.object_views, axis)
                 alone = SeenBar(self._axis_through(axis, lines), lines)
                 if view.camera.name in alone.seen_by:
                     found.append(alone)
         return found
 
-    def axis_of_one_camera(self, view: View) -> BarAxis:
+    def axis_of_one_camera(self, view: ObjectView) -> BarAxis:
         """Compute the axis by one camera alone.
 
         Raises Refused where its edges do not say how far away it is.
@@ -304,13 +305,8 @@ class BarSearch:
         edges = self.edge_maps[view.camera.name]
         motor_rad = float(np.mean(scene.motor_rad))
         first = find_bars_alone(edges, scene.rods, motor_rad, scene.settings.bar_reach_mm)[0]
-        wire = scene.rods.wire
-        return see_bar_alone(first, view, wire, scene.radius_mm, scene.motor_rad, scene.settings)
-
-    def lines_about(self, views: Sequence[View], axis: BarAxis) -> dict[str, BarLineEstimate]:
-        """Measure the lines about an axis quickly, in some views."""
-        scene = self.scene
-        return find_lines(views, axis, scene.radius_mm, scene.wires_px, scene.settings)
+        wires_px = resting_lines(view.camera, scene.rods.wire, np.unique(scene.motor_rad))
+        return see_bar_alone(first, replace(view, wires_px=wires_px))
 
     def _axis_through(self, axis: BarAxis, lines: Mapping[str, BarLineEstimate]) -> BarAxis:
         """Return the axis through those lines that are a bar's.

@@ -1,6 +1,6 @@
 """The pictures of one whisk, its cameras and rods: all that a search for the object needs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,6 +12,7 @@ from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.change import HALF
 from vision.pictures.view import View, median_of
+from vision.touched.object_view import ObjectView
 
 # [lines] Of the straight wire over the stroke: where pieces of the object may show the wire, too.
 # Set by eye. Study: bar_scenes.py.
@@ -49,13 +50,14 @@ class SearchScene:
         return self.rods.bar.radius_mm
 
     @cached_property
-    def wires_px(self) -> Mapping[str, Sequence[np.ndarray]]:
-        """Return by camera the lines (m, 2) px where the straight wire lies over the stroke."""
+    def object_views(self) -> list[ObjectView]:
+        """Return the views of the object, crossed by the straight wire over its stroke."""
         angles_rad = np.linspace(*self.motor_range_rad, _WIRES)
-        return {
-            view.camera.name: resting_lines(view.camera, self.rods.wire, angles_rad)
-            for view in self.views
-        }
+        views = []
+        for view in self.views:
+            wires_px = resting_lines(view.camera, self.rods.wire, angles_rad)
+            views.append(ObjectView(view, self.radius_mm, self.settings, wires_px))
+        return views
 
 
 def still_picture(view: View) -> np.ndarray:

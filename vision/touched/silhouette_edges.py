@@ -21,10 +21,9 @@ from scipy.special import logsumexp, softmax
 
 from vision.geometry.optics import LEAST_PROBABILITY, probable_gammas
 from vision.geometry.rounded import RoundedAxis
-from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.view import View
 from vision.touched.edges import EDGE_PX, FORMAL_TO_TRUE
 from vision.touched.evidence import Evidence, LitRod, compute_evidence
+from vision.touched.object_view import ObjectView
 from vision.touched.posterior import best_of, estimate_temperature
 from vision.touched.profiles import compute_profiles
 from vision.touched.silhouette_pixels import OutlineSide, predict_sides, read_pieces
@@ -111,11 +110,8 @@ class _EdgePosterior:
 
 
 def measure_silhouette_edges(
-    views: Sequence[View],
+    views: Sequence[ObjectView],
     axis: RoundedAxis,
-    radius_mm: float,
-    wires_px: Mapping[str, Sequence[np.ndarray]],
-    settings: VisionSettings,
     reach_px: float,
     before: Mapping[str, SilhouetteEdges] | None = None,
     *,
@@ -123,8 +119,7 @@ def measure_silhouette_edges(
 ) -> dict[str, SilhouetteEdges]:
     """Measure by camera the edges near a predicted outline that is at most reach_px off.
 
-    before: of an earlier pass, whose blurs allow a fine one. coarse: by one quick pass. wires_px:
-    by camera lines (m, 2) where the wire lies in some frame.
+    before: of an earlier pass, whose blurs allow a fine one. coarse: by one quick pass.
     """
     before = before or {}
     prior = probable_gammas(view.camera.optics for view in views)
@@ -133,12 +128,8 @@ def measure_silhouette_edges(
     for view in views:
         name = view.camera.name
         one_pass = _choose_pass(reach_px, gammas, before.get(name), coarse)
-        sides = predict_sides(view, axis, radius_mm, settings)
-        pieces = []
-        for side in sides:
-            pieces.append(
-                read_pieces(view, side, wires_px.get(name, []), settings, one_pass.reach_px)
-            )
+        sides = predict_sides(view, axis)
+        pieces = [read_pieces(view, side, one_pass.reach_px) for side in sides]
         outlines[name] = _fit_outline(sides, pieces, one_pass)
     deviance = np.sum([outline.curve_deviances for outline in outlines.values()], axis=0)
     probabilities = _probable_alone(deviance - 2.0 * np.log([prior[gamma] for gamma in gammas]))

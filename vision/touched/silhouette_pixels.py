@@ -14,8 +14,8 @@ from vision.geometry.camera import Camera
 from vision.geometry.polyline import at_lengths, lengths_px, tangents_by
 from vision.geometry.rounded import RoundedAxis
 from vision.geometry.rows import Rows
-from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import SATURATED, View
+from vision.touched.object_view import ObjectView
 from vision.touched.patches import FULL_SCALE
 from vision.touched.profiles import OUTSIDE_PX
 from vision.wire.bands import Pieces
@@ -85,13 +85,13 @@ class OutlineSide:
         return LinePoints(px, normal, sigma_px, self.distance_mm[station])
 
 
-def predict_sides(
-    view: View, axis: RoundedAxis, radius_mm: float, settings: VisionSettings
-) -> list[OutlineSide]:
+def predict_sides(view: ObjectView, axis: RoundedAxis) -> list[OutlineSide]:
     """Predict both sides of the outline, a station every pixel or so; none where a part is not
     before the camera."""
     camera = view.camera
-    points, normals = axis.silhouette(camera.centre_mm, radius_mm, settings.bar_reach_mm, _STATIONS)
+    radius_mm = view.radius_mm
+    reach_mm = view.settings.bar_reach_mm
+    points, normals = axis.silhouette(camera.centre_mm, radius_mm, reach_mm, _STATIONS)
     px = camera.project(points)
     if not np.all(np.isfinite(px)):
         return []
@@ -140,26 +140,21 @@ class _SidePixels(Rows):
         return cls(pixels, nearest, offset_px, side.arc_px[nearest] + past_station_px)
 
 
-def read_pieces(
-    view: View,
-    side: OutlineSide,
-    wires_px: Sequence[np.ndarray],
-    settings: VisionSettings,
-    reach_px: float,
-) -> Pieces:
+def read_pieces(view: ObjectView, side: OutlineSide, reach_px: float) -> Pieces:
     """Read the pixels near one side that lie clear of the wires, as pieces along it."""
+    length_px = view.settings.bar_piece_px
     inside_px = reach_px + _INSIDE_PX
     outside_px = reach_px + OUTSIDE_PX + 1.0
-    pixels = _pixels_near(view.mean.shape, side, inside_px, outside_px)
+    pixels = _pixels_near(view.pictures.mean.shape, side, inside_px, outside_px)
     if not len(pixels):
         return Pieces.none()
     found = _SidePixels.of(side, pixels)
     keep = side.is_clear[found.station] & (found.offset_px < outside_px)
     keep &= found.offset_px > -np.minimum(inside_px, side.half_px[found.station])
     keep &= (found.along_px >= 0.0) & (found.along_px <= side.arc_px[-1])
-    if len(wires_px) and view.itself is None:
-        keep &= _is_clear_of(wires_px, pixels, settings.bar_piece_px / 2 + _BESIDE_WIRE_PX)
-    return _as_rows(view, side, found.select(keep), settings.bar_piece_px)
+    if len(view.crossing_px):
+        keep &= _is_clear_of(view.crossing_px, pixels, length_px / 2 + _BESIDE_WIRE_PX)
+    return _as_rows(view.pictures, side, found.select(keep), length_px)
 
 
 def _is_clear_of(

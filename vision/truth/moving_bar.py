@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from vision.geometry.sampling import spread
-from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.view import View
+from vision.touched.object_view import ObjectView
 from vision.truth.readers import BarMiddles, ObjectReader, ReadLine
 from vision.truth.whisk_place import WhiskPlace
 
@@ -21,9 +20,7 @@ class BarInFrames(ObjectReader):
     readers: by frame, with what they measured in the pass before.
     """
 
-    views: Sequence[View]
-    radius_mm: float
-    settings: VisionSettings
+    views: Sequence[ObjectView]
     readers: dict[int, BarMiddles] = field(default_factory=dict)
 
     def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
@@ -39,15 +36,7 @@ class BarInFrames(ObjectReader):
     def _reader(self, frame: int) -> BarMiddles:
         """Return the reader of one frame, as it was left in the pass before."""
         if frame not in self.readers:
-            views = in_one_frame(self.views, frame)
-            self.readers[frame] = BarMiddles(views, self.radius_mm, self.settings)
+            showing = [view for view in self.views if frame in view.pictures.frames]
+            views = [replace(view, pictures=view.pictures.in_frame(frame)) for view in showing]
+            self.readers[frame] = BarMiddles(views)
         return self.readers[frame]
-
-
-def in_one_frame(views: Sequence[View], frame: int) -> list[View]:
-    """Return the views that show a frame, with that frame alone."""
-    showing = []
-    for view in views:
-        if frame in view.frames:
-            showing.append(replace(view, frames={frame: view.frames[frame]}))
-    return showing

@@ -16,6 +16,7 @@ from vision.pictures.pixel_noise import measure_noise
 from vision.pictures.view import View
 from vision.touched.edges import measure_edges
 from vision.touched.line import BarLineEstimate, measure_bars
+from vision.touched.object_view import ObjectView
 from vision.touched.one_view import seen_from_one_side
 from vision.truth.known_whisk import KnownWhisk
 from vision.truth.predicted_lines import PredictedLines
@@ -70,21 +71,28 @@ def _bar_sigmas_px(known: KnownWhisk, pictures: Sequence[CameraPictures]) -> dic
 
     The edges take the place of the middle where they locate the bar along the line of sight.
     """
-    place = known.place
-    views = [own.view(dict.fromkeys(place.curves, own.with_bar)) for own in pictures]
-    wires_px = place.wires_px(views)
-    lines = _bar_middles(known, views, wires_px)
-    edges = {}
-    if _needs_edges(known, views, lines):
-        shown = [view for view in views if view.camera.name in lines]
-        edges = _bar_edges(known, shown, wires_px)
+    views = _bar_views(known, pictures)
+    lines = _bar_middles(known, views)
+    needs_edges = _needs_edges(known, views, lines)
     found = {}
-    for name in wires_px:
-        points = edges.get(name) or {}  # by side of the bar
-        if name in lines and not points:
-            points = {0: lines[name].points}
-        found[name] = _side_and_sigmas(points)
+    for view in views:
+        points: Mapping[int, LinePoints] = {}  # by side of the bar
+        line = lines.get(view.camera.name)
+        if line is not None:
+            edges = measure_edges(view, known.axis) if needs_edges else None
+            points = edges or {0: line.points}
+        found[view.camera.name] = _side_and_sigmas(points)
     return found
+
+
+def _bar_views(known: KnownWhisk, pictures: Sequence[CameraPictures]) -> list[ObjectView]:
+    """Return the views of the bar, crossed by the wire as it is in every frame."""
+    place = known.place
+    views = []
+    for own in pictures:
+        view = own.view(dict.fromkeys(place.curves, own.with_bar))
+        views.append(ObjectView(view, known.rods.bar.radius_mm, _USUAL))
+    return place.crossed(views)
 
 
 def _side_and_sigmas(points: Mapping[int, LinePoints]) -> np.ndarray:
@@ -94,31 +102,17 @@ def _side_and_sigmas(points: Mapping[int, LinePoints]) -> np.ndarray:
 
 
 def _needs_edges(
-    known: KnownWhisk, views: Sequence[View], lines: Mapping[str, BarLineEstimate]
+    known: KnownWhisk, views: Sequence[ObjectView], lines: Mapping[str, BarLineEstimate]
 ) -> bool:
     """Return whether the bar's middle, by camera, does not locate it along the line of sight."""
     cameras = Cameras(tuple(view.camera for view in views))
     return len(lines) == 1 or seen_from_one_side(cameras, known.axis)
 
 
-def _bar_edges(
-    known: KnownWhisk, views: Sequence[View], wires_px: Mapping[str, Sequence[np.ndarray]]
-) -> dict[str, dict[int, LinePoints] | None]:
-    """Return by camera and side of the bar the points of its edges, None where they do not show."""
-    radius_mm = known.rods.bar.radius_mm
-    edges = {}
-    for view in views:
-        name = view.camera.name
-        edges[name] = measure_edges(view, known.axis, radius_mm, wires_px[name], _USUAL)
-    return edges
-
-
-def _bar_middles(
-    known: KnownWhisk, views: Sequence[View], wires_px: Mapping[str, Sequence[np.ndarray]]
-) -> dict[str, BarLineEstimate]:
+def _bar_middles(known: KnownWhisk, views: Sequence[ObjectView]) -> dict[str, BarLineEstimate]:
     """Return by camera the middle of the bar, of cameras that show its edges."""
     try:
-        lines = measure_bars(views, known.axis, known.rods.bar.radius_mm, wires_px, _USUAL)
+        lines = measure_bars(views, known.axis)
     except Refused:
         return {}
     return {name: line for name, line in lines.items() if line.has_edges}

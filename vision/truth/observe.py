@@ -39,7 +39,6 @@ from vision.touched.width import measure_relative_widths
 from vision.truth.explanations import Explanation, explain, fit_again
 from vision.truth.given_traces import traces_as_lines
 from vision.truth.kept_fit import KeptFit
-from vision.truth.moving_bar import in_one_frame
 from vision.truth.records import TrialTruth, WhiskTruth
 from vision.truth.trial_pictures import TrialPictures
 from vision.truth.truth_rows import to_whisk
@@ -269,7 +268,7 @@ def _stated_motion(
         pictures.object_velocity_sigma_mm_s,
         float(pictures.time_s[middle]),
     )
-    return stated, in_one_frame(views, middle)
+    return stated, [view.in_frame(middle) for view in views]
 
 
 def _at_first(views: Sequence[View], strokes: Sequence[Sequence[int]]) -> list[View]:
@@ -280,7 +279,7 @@ def _at_first(views: Sequence[View], strokes: Sequence[Sequence[int]]) -> list[V
     for stroke in strokes:
         for frame in stroke[:1]:
             if all(frame in view.frames for view in views):
-                return in_one_frame(views, frame)
+                return [view.in_frame(frame) for view in views]
     raise Refused("no stroke's first frame is seen by every camera", code="no_shared_first_frame")
 
 

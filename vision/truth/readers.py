@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from vision.geometry.refusals import Refused
-from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.view import View
 from vision.touched.edges import measure_edges
 from vision.touched.line import BarLineEstimate, measure_bars
+from vision.touched.object_view import ObjectView
 from vision.touched.silhouette_edges import SilhouetteEdges, measure_silhouette_edges
 from vision.truth.whisk_place import WhiskPlace
 from vision.wire.points import LinePoints
@@ -65,9 +64,7 @@ class BarMiddles(ObjectReader):
     then they stay, as another measurement of the same pixels adds nothing.
     """
 
-    views: Sequence[View]
-    radius_mm: float
-    settings: VisionSettings
+    views: Sequence[ObjectView]
     lines: dict[str, BarLineEstimate] = field(default_factory=dict)
     are_fine: bool = False
 
@@ -93,10 +90,7 @@ class BarMiddles(ObjectReader):
     def _measure(self, place: WhiskPlace) -> None:
         """Measure the middles, finely where they were measured before."""
         self.are_fine = bool(self.lines)
-        wires_px = place.wires_px(self.views)
-        self.lines = measure_bars(
-            self.views, place.axis, self.radius_mm, wires_px, self.settings, self.lines
-        )
+        self.lines = measure_bars(place.crossed(self.views), place.axis, self.lines)
 
 
 class BarEdges(BarMiddles):
@@ -105,12 +99,10 @@ class BarEdges(BarMiddles):
     def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
         """Return by camera the two edges of the bar, sides -1 and 1, or its middle."""
         found = super().read(place, last=last)
-        for view in self.views:
-            name = view.camera.name
-            wires_px = place.wire_px(view.camera)
-            edges = measure_edges(view, place.axis, self.radius_mm, wires_px, self.settings)
+        for view in place.crossed(self.views):
+            edges = measure_edges(view, place.axis)
             if edges:
-                found[name] = [ReadLine(points, side) for side, points in edges.items()]
+                found[view.camera.name] = [ReadLine(points, side) for side, points in edges.items()]
         return found
 
 
@@ -121,9 +113,7 @@ class SilhouetteReader(ObjectReader):
     silhouettes: by camera, as measured in the pass before.
     """
 
-    views: Sequence[View]
-    radius_mm: float
-    settings: VisionSettings
+    views: Sequence[ObjectView]
     silhouettes: dict[str, SilhouetteEdges] = field(default_factory=dict)
 
     def read(self, place: WhiskPlace, *, last: bool) -> dict[str, list[ReadLine]]:
@@ -134,13 +124,7 @@ class SilhouetteReader(ObjectReader):
         is_only = last and not self.silhouettes
         for _ in range(2 if is_only else 1):
             self.silhouettes = measure_silhouette_edges(
-                self.views,
-                place.axis,
-                self.radius_mm,
-                place.wires_px(self.views),
-                self.settings,
-                _OFF_PX,
-                self.silhouettes,
+                place.crossed(self.views), place.axis, _OFF_PX, self.silhouettes
             )
         self._require_clear()
         found = {}

@@ -208,8 +208,7 @@ def _strategy_of_moving_bar(whisk: WhiskPictures) -> Strategy:
             "an object that moves or gives way is seen by two cameras or more, from different sides",
             code="moving_object_from_one_side",
         )
-    reader = BarInFrames(whisk.views, whisk.rods.bar.radius_mm, whisk.settings)
-    return Strategy(reader, TouchByClearance())
+    return Strategy(BarInFrames(whisk.object_views), TouchByClearance())
 
 
 @singledispatch
@@ -229,7 +228,7 @@ def _strategies_of_rounded(axis: RoundedAxis, whisk: WhiskPictures) -> list[Stra
             "an object that is no straight bar is seen by two cameras or more, from different sides",
             code="object_from_one_side",
         )
-    reader = SilhouetteReader(whisk.views, whisk.rods.bar.radius_mm, whisk.settings)
+    reader = SilhouetteReader(whisk.object_views)
     return [Strategy(reader, TouchByClearance(fewest_cameras=2))]
 
 
@@ -240,17 +239,17 @@ def _strategies_of_bar(axis: BarAxis, whisk: WhiskPictures) -> list[Strategy]:
     The edges are read where all cameras stand on one side of it, or a single one sees it. There the
     wire's cameras may still determine touch by clearance, two at least.
     """
-    radius_mm = whisk.rods.bar.radius_mm
-    seeing = [view for view in whisk.views if view.camera.name in whisk.bar.seen_by]
-    edges = BarEdges(seeing or whisk.views, radius_mm, whisk.settings)
+    views = whisk.object_views
+    seeing = [view for view in views if view.camera.name in whisk.bar.seen_by]
+    edges = BarEdges(seeing or views)
     if seen_from_one_side(whisk.cameras, axis):
         return [Strategy(edges, TouchByOnset())]
     if len(seeing) == 1:
         return [
             Strategy(edges, TouchByClearance(fewest_cameras=2)),
-            Strategy(BarEdges(seeing, radius_mm, whisk.settings), TouchByOnset()),
+            Strategy(BarEdges(seeing), TouchByOnset()),
         ]
-    return [Strategy(BarMiddles(whisk.views, radius_mm, whisk.settings), TouchByClearance())]
+    return [Strategy(BarMiddles(views), TouchByClearance())]
 
 
 def widest_sights_rad(cameras: Cameras, point_mm: np.ndarray) -> float:

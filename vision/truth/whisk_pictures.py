@@ -21,6 +21,7 @@ from vision.geometry.sampling import spread
 from vision.geometry.touched import Axis
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.view import View
+from vision.touched.object_view import ObjectView
 from vision.touched.search import SeenBar
 from vision.truth.line_source import EarlierWhisk, LineSource, StrokeBends
 from vision.truth.value import Value, propagated_sigma
@@ -111,6 +112,12 @@ class WhiskPictures:
             return self
         touch_rad = float(first_touch(fit.problem, fit.state.vector).motor_rad)
         return self.yielding(fit.shifts_mm, touch_rad)
+
+    @property
+    def object_views(self) -> list[ObjectView]:
+        """Return the views of the touched object, before any wire is known."""
+        radius_mm = self.rods.bar.radius_mm
+        return [ObjectView(view, radius_mm, self.settings) for view in self.views]
 
     @property
     def bar_swept_mm(self) -> float:

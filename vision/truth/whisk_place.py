@@ -10,7 +10,7 @@ import numpy as np
 from vision.geometry.camera import Camera
 from vision.geometry.centreline import Curves
 from vision.geometry.touched import Axis
-from vision.pictures.view import View
+from vision.touched.object_view import ObjectView
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +38,9 @@ class WhiskPlace:
         """Return the centrelines by camera, of the cameras projected so far."""
         return {}
 
-    def wires_px(self, views: Iterable[View]) -> dict[str, list[np.ndarray]]:
-        """Return the wire's centreline (m, 2) in each frame, by the camera of each view."""
-        return {view.camera.name: self.wire_px(view.camera) for view in views}
+    def crossed(self, views: Iterable[ObjectView]) -> list[ObjectView]:
+        """Return views of the object, crossed by the wire's centreline in each frame."""
+        return [replace(view, wires_px=self.wire_px(view.camera)) for view in views]
 
     def in_frame(self, number: int) -> Self:
         """Return where object and wire are in one of the frames, by its position among the curves."""

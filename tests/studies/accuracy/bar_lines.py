@@ -24,6 +24,7 @@ from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
 from vision.touched.line import BarLineEstimate, measure_bars
+from vision.touched.object_view import ObjectView
 
 SIZE, FOCAL_PX, AWAY_MM, RADIUS_MM, BLUR_PX, FRAMES = (420, 300), 2010.0, 376.0, 3.0, 0.9, 13
 WHITE = 255.0  # grey levels: brighter light saturates
@@ -98,8 +99,8 @@ def noisy_view(shade, behind, angle: float, across_mm: float, rng) -> View:
 
 def measured(view: View, axis: BarAxis) -> BarLineEstimate:
     """The bar's line, from a coarse one."""
-    coarse = measure_bars([view], axis, RADIUS_MM, {}, VisionSettings())
-    return measure_bars([view], axis, RADIUS_MM, {}, VisionSettings(), coarse)[view.camera.name]
+    views = [ObjectView(view, RADIUS_MM, VisionSettings())]
+    return measure_bars(views, axis, measure_bars(views, axis))[view.camera.name]
 
 
 def errors_and_sigmas(shade, behind, rng) -> tuple[np.ndarray, np.ndarray]:

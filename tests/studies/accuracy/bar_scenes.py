@@ -145,8 +145,8 @@ def main() -> None:
 
 def measured_finely(scene: SearchScene, axis: BarAxis) -> dict[str, BarLineEstimate]:
     """By camera the line of the bar about an axis, as the fit measures it at last."""
-    about = (scene.views, axis, scene.radius_mm, scene.wires_px, scene.settings)
-    return measure_bars(*about, measure_bars(*about))
+    coarse = measure_bars(scene.object_views, axis)
+    return measure_bars(scene.object_views, axis, coarse)
 
 
 def line_rows(

@@ -10,7 +10,7 @@ median, and the share over 0.2.
 """
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +23,8 @@ from vision.geometry.camera import Camera
 from vision.geometry.centreline import resting_lines
 from vision.geometry.contact import BarAxis, axis_frame
 from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.view import View
 from vision.touched.line import BarLineEstimate, measure_bars
+from vision.touched.object_view import ObjectView
 
 STARTS_PX = (0.01, 0.1, 0.5, 1.5)
 ARM_MM, WIRES, ALLOWED = 20.0, 8, 0.2
@@ -47,17 +47,13 @@ def starts(axis: BarAxis, camera: Camera, rng: np.random.Generator) -> list[BarA
 
 
 def moves(
-    views: Sequence[View],
-    axis: BarAxis,
-    radius_mm: float,
-    wires_px: Mapping,
-    rng: np.random.Generator,
+    views: Sequence[ObjectView], axis: BarAxis, rng: np.random.Generator
 ) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """By camera: how far off the line is (starts + 1, 2), px, and its sigma; without those that see too little."""
     found = []
     for start in starts(axis, views[0].camera, rng):
-        coarse = measure_bars(views, start, radius_mm, wires_px, VisionSettings())
-        found.append(measure_bars(views, start, radius_mm, wires_px, VisionSettings(), coarse))
+        coarse = measure_bars(views, start)
+        found.append(measure_bars(views, start, coarse))
     rows = []
     for view in views:
         lines: list[BarLineEstimate] = [
@@ -66,7 +62,7 @@ def moves(
         if len(lines) == len(found) and all(line.is_bar for line in lines):
             points = [line.points for line in lines]
             error = np.array(
-                [off_px(view.camera, axis, radius_mm, one.px, one.normal) for one in points]
+                [off_px(view.camera, axis, view.radius_mm, one.px, one.normal) for one in points]
             )
             rows.append((view.camera.name, error, np.array([one.sigma_px for one in points])))
     return rows
@@ -110,8 +106,11 @@ def main() -> None:
     ):
         views, _, rods, motor, axis = read_scene(folder)
         span = np.linspace(motor.min(), motor.max(), WIRES)
-        wires = {view.camera.name: resting_lines(view.camera, rods.wire, span) for view in views}
-        rows = moves(views, axis, rods.bar.radius_mm, wires, np.random.default_rng(0))
+        seen = []
+        for view in views:
+            wires_px = resting_lines(view.camera, rods.wire, span)
+            seen.append(ObjectView(view, rods.bar.radius_mm, VisionSettings(), wires_px))
+        rows = moves(seen, axis, np.random.default_rng(0))
         table += printed(folder.name, rows)
     print(summary(table))
 

@@ -25,6 +25,7 @@ from vision.geometry.optics import Optics
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.touched.line import OVERSTATED_PX, clear_pieces, find_lines
+from vision.touched.object_view import ObjectView
 from vision.touched.pieces import ARM_MM
 from vision.touched.posterior import estimate_log_width
 from vision.touched.width import SIGMA_SHARE
@@ -144,7 +145,8 @@ def test_a_bar_of_another_width_than_given_tells_its_own(bar, factor, rng):
         0.4 * np.array([-np.sin(1.3), np.cos(1.3), 0.0]), np.array([np.cos(1.3), np.sin(1.3), 0.0])
     )
     view = noisy_view(*SCENES[bar], 1.3, 0.4, rng)
-    pieces = clear_pieces([view], axis, RADIUS_MM / factor, {}, VisionSettings())[view.camera.name]
+    seen = ObjectView(view, RADIUS_MM / factor, VisionSettings())
+    pieces = clear_pieces([seen], axis)[view.camera.name]
     log, sigma = estimate_log_width(pieces)
     assert abs(log - np.log(factor)) < 3.0 * np.hypot(sigma, SIGMA_SHARE)
     assert sigma < 0.05
@@ -160,7 +162,9 @@ def test_what_lies_beside_a_bar_is_less_clearly_one(rng):
         for aside in (0.0, 2.0 * RADIUS_MM)
     )
     clear = [
-        find_lines([view], axis, RADIUS_MM, {}, VisionSettings())[view.camera.name].detection_score
+        find_lines([ObjectView(view, RADIUS_MM, VisionSettings())], axis)[
+            view.camera.name
+        ].detection_score
         for axis in (there, beside)
     ]
     assert clear[1] < 0.25 * clear[0]

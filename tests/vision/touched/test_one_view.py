@@ -28,6 +28,7 @@ from vision.geometry.silhouette import grazed
 from vision.geometry.vision_settings import VisionSettings
 from vision.touched.axis import settle_axis
 from vision.touched.edges import measure_edges
+from vision.touched.object_view import ObjectView
 from vision.touched.one_view import axis_from_edges, seen_from_one_side
 from vision.wire.points import LinePoints, Observed
 
@@ -85,7 +86,7 @@ def test_edges_of_a_drawn_bar_lie_where_they_say(rng):
         (across_mm + 0.2) * across - [0, 0, 0.04 * AWAY_MM],
         np.array([np.cos(angle), np.sin(angle), 0.0]),
     )
-    found = measure_edges(view, axis, RADIUS_MM, [], VisionSettings(), coarse=True)
+    found = measure_edges(ObjectView(view, RADIUS_MM, VisionSettings()), axis, coarse=True)
     seen = sorted(
         [
             (float(np.mean((p.px - CENTRE) @ across[:2])), float(p.sigma_px.max()))

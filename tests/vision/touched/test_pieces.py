@@ -12,6 +12,7 @@ from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
+from vision.touched.object_view import ObjectView
 from vision.touched.pieces import bar_pieces, beside_wires
 from vision.touched.search import BarSearch
 from vision.touched.search_scene import SearchScene
@@ -45,7 +46,7 @@ def test_a_bar_about_a_camera_is_refused():
     beside_mm = np.array([0.5, 0.0, 0.0])
     about = BarAxis(camera.centre_mm + beside_mm, np.array([0.0, 0.0, 1.0]))
     with pytest.raises(Refused) as refused:
-        bar_pieces(view, view.noise, about, 3.0, [], VisionSettings())
+        bar_pieces(ObjectView(view, 3.0, VisionSettings()), about, view.noise)
     assert refused.value.code == "bar_behind_camera"
 
 
@@ -59,7 +60,7 @@ def test_a_bar_that_comes_from_behind_a_camera_ends_no_run():
     beside_mm = 20.0 * camera.T_camera_rig[0, :3]
     through = BarAxis(camera.centre_mm + beside_mm + 60.0 * forward, forward)
     settings = VisionSettings(bar_reach_mm=100.0)
-    assert len(bar_pieces(view, view.noise, through, 3.0, [], settings)) == 0
+    assert len(bar_pieces(ObjectView(view, 3.0, settings), through, view.noise)) == 0
 
 
 def test_a_bar_about_a_camera_does_not_end_the_search():

@@ -11,6 +11,7 @@ from vision.geometry.sphere import Sphere
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
+from vision.touched.object_view import ObjectView
 from vision.touched.rounded_search import find_by_silhouette
 from vision.touched.search_scene import SearchScene
 from vision.touched.silhouette_edges import measure_silhouette_edges
@@ -63,13 +64,9 @@ def test_edges_are_where_they_are(views):
     off = RoundedAxis(
         CENTRE + np.array([0.3, 0.2, -0.2]), SPHERE.direction, SPHERE.form, SPHERE.spot_mm
     )
-    rough = measure_silhouette_edges(views, off, RADIUS_MM, {}, VisionSettings(), 4.0)
-    for view, limb in zip(
-        views,
-        measure_silhouette_edges(
-            views, SPHERE, RADIUS_MM, {}, VisionSettings(), 2.0, rough
-        ).values(),
-    ):
+    views = [ObjectView(view, RADIUS_MM, VisionSettings()) for view in views]
+    rough = measure_silhouette_edges(views, off, 4.0)
+    for view, limb in zip(views, measure_silhouette_edges(views, SPHERE, 2.0, rough).values()):
         near = sights_beside(view.camera, SPHERE, limb.points.px, limb.points.place)
         left_px = (near.outside_mm - RADIUS_MM) * near.px_per_mm(view.camera, limb.points.normal)
         assert len(limb.points) >= 8

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from vision.geometry.vision_settings import VisionSettings
 from vision.truth import readers
 from vision.truth.whisk_place import WhiskPlace
 
@@ -18,7 +17,7 @@ def test_the_last_measurement_is_a_fine_one_and_the_only_one(rounds, monkeypatch
         return {"high": SimpleNamespace(points=measured[-1], is_bar=True)}
 
     monkeypatch.setattr(readers, "measure_bars", measure_bars)
-    reader = readers.BarMiddles((), 3.0, VisionSettings(rounds=rounds))
+    reader = readers.BarMiddles(())
     place = WhiskPlace(None, {}, 0.0)
     for _ in range(rounds):
         reader.read(place, last=False)
