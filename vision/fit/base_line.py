@@ -1,12 +1,12 @@
 """The whisker's base on each frame of a free stroke, as a line in space: `calibration.place` learns
 the rig from it.
 
-Two fits to the line points of the frames before touch, away from the hub. One gives the shape at
-rest, of which only what is straight counts here; how far a whole traced line may be off, and wander
-along the wire, enters as nuisances, because it is the same in all frames and no average makes it
-smaller. The other gives how far each frame by itself lies from that: offset and slope, y and z, and
-how light that changes as the whisker turns, and cameras, move them. In the hub's frame, lengths in
-mm, slopes in mm at the tip.
+Two fits to the line points of the frames before touch, away from the hub. The first gives the shape
+at rest, of which only offset and slope count here. What is the same in all frames, so that no
+average makes it smaller, are its nuisances: how far a whole traced line may be off, and how it may
+wander along the wire. The second gives offset and slope of each frame by itself, in y and z, and how
+errors that frames share (cameras, light that changes as the whisker turns) move them. In the hub's
+frame, lengths in mm, slopes in mm at the tip.
 """
 
 from collections.abc import Sequence
@@ -26,6 +26,7 @@ from vision.fit.problem import (
 from vision.geometry.base_lines import BaseLines
 from vision.geometry.centreline import REST_POWERS, rotation_z
 from vision.geometry.rotation import unit
+from vision.geometry.rows import Rows
 from vision.wire.points import Observed
 
 # [columns] A layout, no threshold: offsets and slopes, y then z, among the rest shape's
@@ -34,8 +35,8 @@ _LINE = np.array([0, REST_POWERS, 1, REST_POWERS + 1])
 # [mm] Nearer to the hub its shade and its edge are read as the wire's. Set by eye. Study:
 # tests/vision/fit/test_base_line.py.
 _CLEAR_OF_HUB_MM = 15.0
-# [mm] Prior sigmas of a whisker's sag and set: what is more is seen, what is less cannot be told
-# from a wandering line. Study: tests/vision/fit/test_base_line.py.
+# [mm] Prior sigmas of a whisker's sag and set: more is seen all the same, less looks like a line
+# that wanders. Study: tests/vision/fit/test_base_line.py.
 _STRAIGHT_MM = np.array([1.0, 0.4])
 # [points] In a frame: twice the numbers that they give. Derived.
 _FEWEST_POINTS = 8
@@ -45,7 +46,7 @@ _FEWEST_POINTS = 8
 # threshold.
 _DRIFTS = slice(2, len(WIRE_MODES_PX))
 # [px] By which light moves a line in each of these shapes over a free stroke, beyond what the whole
-# fit has it move by: as wide as the tail. 68 in 100 of 82 path-traced views have less than 0.025, five
+# fit has it move by: as wide as the tail of their distribution. 68 in 100 of 82 path-traced views have less than 0.025, five
 # more than 0.10 in offset and 0.15 in tilt. Without it two boards of 35 in the right place contradict
 # the stroke, with it none does. Study: wire_scenes.py.
 _DRIFT_PX = 0.05
@@ -54,15 +55,15 @@ _REST = 2 * REST_POWERS
 
 
 @dataclass(frozen=True)
-class _FrameRows:
-    """Line points of one camera in one frame, over their sigma.
+class _FreeRows(Rows):
+    """Residuals of n line points in free frames, over their sigma.
 
-    residual (n,) about a straight whisker; by_rest (n, 8), by_nuisance (n, m), by_shared (n, k): its
+    frame (n,). residual (n,) about a straight whisker; by_rest (n, 8), by_nuisance (n, m), by_shared (n, k): its
     derivatives by rest shape, nuisances, and errors of unit variance that frames share (light that
     changes as the whisker turns, cameras).
     """
 
-    frame: int
+    frame: np.ndarray
     residual: np.ndarray
     by_rest: np.ndarray
     by_nuisance: np.ndarray
@@ -76,7 +77,9 @@ def base_lines(fit: ConvergedFit) -> BaseLines | None:
     """
     problem = fit.problem
     rows = _free_rows(fit)
-    frames = _well_seen_frames(rows)
+    if rows is None:
+        return None
+    frames = np.flatnonzero(np.bincount(rows.frame) >= _FEWEST_POINTS)
     if len(frames) < 2:
         return None
     shape, covariance = _shape_at_rest(rows)
@@ -84,9 +87,9 @@ def base_lines(fit: ConvergedFit) -> BaseLines | None:
     length_mm = problem.wire.length_mm
     lines = []
     for frame, angle in zip(frames, motor_rad):
-        own_line = _own_line([r for r in rows if r.frame == frame], shape)
+        own_line = _own_line(rows.select(rows.frame == frame), shape)
         lines.append(_in_space(own_line, angle, length_mm))
-    in_common = _shared(covariance, float(motor_rad.mean()), length_mm)
+    in_common = _shared_covariance(covariance, float(motor_rad.mean()), length_mm)
     return _as_base_lines(motor_rad, lines, in_common)
 
 
@@ -106,23 +109,16 @@ def _as_base_lines(
     )
 
 
-def _well_seen_frames(rows: list[_FrameRows]) -> np.ndarray:
-    """Return the frames that have enough points."""
-    frame = np.array([own.frame for own in rows], dtype=int)
-    counts = np.bincount(frame, [len(own.residual) for own in rows])
-    return np.flatnonzero(counts >= _FEWEST_POINTS)
-
-
-def _free_rows(fit: ConvergedFit) -> list[_FrameRows]:
-    """Return the rows of the wire in all frames that do not bend."""
+def _free_rows(fit: ConvergedFit) -> _FreeRows | None:
+    """Return the rows of the wire in all frames that do not bend; None where there are none."""
     found = []
     for seen, rows in point_rows(fit.problem):
         if seen.on_wire and not fit.problem.bent[seen.frame]:
             found.append(_rows_of(fit, seen, rows))
-    return found
+    return _FreeRows.join(found) if found else None
 
 
-def _rows_of(fit: ConvergedFit, seen: Observed, rows: slice) -> _FrameRows:
+def _rows_of(fit: ConvergedFit, seen: Observed, rows: slice) -> _FreeRows:
     """Return the rows of one observation, without the offsets that the whole fit gave the line, and
     counted from a straight whisker in its place.
     """
@@ -139,7 +135,8 @@ def _rows_of(fit: ConvergedFit, seen: Observed, rows: slice) -> _FrameRows:
     nuisance = _nuisances(problem, seen) / seen.points.sigma_px[:, None]
     by_camera_error = fit.by_camera[rows] @ problem.cameras.by_error
     shared = np.hstack([_drifts(problem, seen.camera, by_offsets), by_camera_error])
-    return _FrameRows(seen.frame, straight[clear], by_rest[clear], nuisance[clear], shared[clear])
+    frame = np.full(len(clear), seen.frame)
+    return _FreeRows(frame, straight, by_rest, nuisance, shared).select(clear)
 
 
 def _nuisances(problem: Problem, seen: Observed) -> np.ndarray:
@@ -164,33 +161,27 @@ def drift_sigma_px(problem: Problem, camera: int) -> np.ndarray:
     return np.hypot(problem.blocks.wire_offsets[camera].sigma[_DRIFTS], _DRIFT_PX)
 
 
-def _shape_at_rest(rows: list[_FrameRows]) -> tuple[np.ndarray, np.ndarray]:
+def _shape_at_rest(rows: _FreeRows) -> tuple[np.ndarray, np.ndarray]:
     """Fit the rest shape (8,) with its covariance."""
-    by_rest = np.concatenate([own.by_rest for own in rows])
-    by_nuisance = np.concatenate([own.by_nuisance for own in rows])
-    residual = np.concatenate([own.residual for own in rows])
-    J = np.hstack([by_rest, by_nuisance])
+    J = np.hstack([rows.by_rest, rows.by_nuisance])
     sigma_each_way = [*REST_PRIOR_MM[:2], *_STRAIGHT_MM]
-    nuisance_sigma = np.full(by_nuisance.shape[1], WANDER_PX)
+    nuisance_sigma = np.full(rows.by_nuisance.shape[1], WANDER_PX)
     prior_sigma = np.concatenate([sigma_each_way, sigma_each_way, nuisance_sigma])  # y, z
     precision = np.diag(prior_sigma**-2.0)
     covariance = np.linalg.inv(J.T @ J + precision)
-    solution = -covariance @ (J.T @ residual)
+    solution = -covariance @ (J.T @ rows.residual)
     return solution[:_REST], covariance[:_REST, :_REST]
 
 
-def _own_line(
-    rows: list[_FrameRows], shape: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _own_line(rows: _FreeRows, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fit the offsets and slopes (4,) of one frame, with their covariance (4, 4) and how they change
     with each error that frames share, (4, k).
     """
-    J = np.concatenate([r.by_rest[:, _LINE] for r in rows])
-    residual = np.concatenate([r.residual + r.by_rest @ shape for r in rows])
-    by_shared = np.concatenate([r.by_shared for r in rows])
+    J = rows.by_rest[:, _LINE]
+    residual = rows.residual + rows.by_rest @ shape
     covariance = np.linalg.inv(J.T @ J)
     gain = -covariance @ J.T
-    return shape[_LINE] + gain @ residual, covariance, gain @ by_shared
+    return shape[_LINE] + gain @ residual, covariance, gain @ rows.by_shared
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +221,7 @@ def _in_space(
     )
 
 
-def _shared(covariance: np.ndarray, motor_rad: float, length_mm: float) -> np.ndarray:
+def _shared_covariance(covariance: np.ndarray, motor_rad: float, length_mm: float) -> np.ndarray:
     """Return the covariance (6, 6) with which all lines turn and shift in common: w rad, v mm at
     the base.
 

@@ -157,8 +157,10 @@ class _Comparison:
     covariance: np.ndarray
 
     def of(self, value: float, gradient: np.ndarray, directly: np.ndarray | float) -> Compared:
-        """Return a quantity with gradient (size,) that also changes `directly` (k,) with the
-        departure.
+        """Return a quantity by beam and by spline.
+
+        gradient (size,): by the fit's parameters. directly (k,): derivatives by the departure, the
+        parameters standing still.
         """
         departure = self.departure
         row = gradient @ departure.parameters_by[: len(gradient)] + directly
@@ -194,7 +196,7 @@ def _wandering(fit: ConvergedFit) -> _LeastSquares:
 def _fit_added(problem: _LeastSquares, rows: np.ndarray) -> _Departure:
     """Fit parameters (k,) with Jacobian `rows` (n, k) that are added to a fit that has converged.
 
-    Their covariance is that by noise and by cameras where the parameters are none.
+    Their covariance is that by noise and cameras if the true parameters are 0.
     """
     own = problem.jacobian
     basis, triangle = np.linalg.qr(np.vstack([own, problem.prior]))

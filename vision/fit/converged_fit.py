@@ -123,8 +123,8 @@ class ConvergedFit:
     def parameters_by_camera(self) -> np.ndarray:
         """Return derivatives (size, 15 cameras) of the fit's parameters by the cameras'.
 
-        They are -(JᵀWJ)⁻¹ JᵀW J_c: those residuals are what the fit is made of, and with W as in the
-        fit a move of all cameras together moves the whole scene and nothing in it.
+        They are -(JᵀWJ)⁻¹ JᵀW J_c. With the weights W of the fit itself, a move of all cameras
+        together moves the whole scene and changes nothing within it.
         """
         return -self.inverse_normal @ (self.weighted.jacobian.T @ self.weighted_by_camera)
 
@@ -136,7 +136,7 @@ class ConvergedFit:
         return self.parameters_by_camera @ self.problem.cameras.by_error
 
     @cached_property
-    def noise(self) -> np.ndarray:
+    def noise_covariance(self) -> np.ndarray:
         """Return the covariance (size, size) of the parameters by the observations' and priors' own
         errors.
 
@@ -148,14 +148,14 @@ class ConvergedFit:
         return times_residual_covariance(self.problem, by_row) @ by_row.T
 
     @property
-    def lens(self) -> np.ndarray:
+    def camera_covariance(self) -> np.ndarray:
         """Return the covariance (size, size) of the parameters by the cameras' errors."""
         return self.by_camera_error @ self.by_camera_error.T
 
     @property
     def fit_covariance(self) -> np.ndarray:
         """Return the covariance (size, size) of the parameters by observations, priors and cameras."""
-        return self.noise + self.lens
+        return self.noise_covariance + self.camera_covariance
 
     def spread(self, rows: np.ndarray) -> np.ndarray:
         """Return the covariance (k, k) of rows (k, n) times the `weighted` residuals, by the errors of
@@ -189,8 +189,8 @@ class ConvergedFit:
 def times_residual_covariance(problem: Problem, rows: np.ndarray) -> np.ndarray:
     """Return rows (k, n) over all observations times the covariance (n, n) of their residuals.
 
-    It is the unit matrix, but for points of the wire: points i and j of a line have the correlation
-    ρ^|i − j|, and their sigmas are widened so that the variance of a mean stays what it is.
+    It is the unit matrix but for points of the wire: points i and j of a line have the correlation
+    ρ^|i − j|, scaled so that the variance of a line's mean is that of independent points.
     """
     product = rows.copy()
     if not problem.neighbour_correlation:
@@ -207,8 +207,8 @@ def times_residual_covariance(problem: Problem, rows: np.ndarray) -> np.ndarray:
 def _by_camera(problem: Problem, seen: Observed, state: State, curves: Curves) -> np.ndarray:
     """Return derivatives (n, 15 cameras) of one observation's residuals by the cameras' parameters.
 
-    Each is the mean over the points in space that a line point shows. These count as fixed: where a
-    sight grazes a rod's edge, a move of the grazing point along the sight moves no edge.
+    A line point may show several points in space (both edges of a bar): each derivative is their
+    mean. The points in space are held: one that moves along its sight moves nothing in the picture.
     """
     points = seen.points
     camera = problem.cameras.cameras[seen.camera]

@@ -13,8 +13,8 @@ CAUSES = ("wire", "bar", "touch", "diameters", "light", "priors", "cameras", "pl
 
 
 def chance_of(values: np.ndarray, covariance: np.ndarray) -> float:
-    """Return the chance that what has this covariance (k, k) is so far (k,) from 0, by chi²; 1 where
-    nothing is determined, NaN where the covariance is not finite.
+    """Return the chance that Gaussian errors of this covariance (k, k) are as far from 0 as values
+    (k,), by chi²; 1 where nothing is determined, NaN where the covariance is not finite.
     """
     if not np.all(np.isfinite(covariance)):
         return float("nan")
@@ -34,7 +34,7 @@ def shared_covariance(fit: ConvergedFit) -> np.ndarray:
     priors = fit.weighted.jacobian[fit.problem.prior_rows]
     rows = priors[columns_of(*in_common)]
     by_row = fit.inverse_normal @ rows.T
-    return by_row @ by_row.T + fit.lens
+    return by_row @ by_row.T + fit.camera_covariance
 
 
 def variance_by_cause(fit: ConvergedFit, gradient: np.ndarray) -> dict[str, float]:
@@ -51,7 +51,7 @@ def variance_by_cause(fit: ConvergedFit, gradient: np.ndarray) -> dict[str, floa
     by_row = fit.weighted.jacobian @ (fit.inverse_normal @ gradient)
     parts = by_row * times_residual_covariance(fit.problem, by_row[None])[0]
     variances = _sum_by_cause(fit.problem, parts)
-    whole = float(gradient @ fit.lens @ gradient)
+    whole = float(gradient @ fit.camera_covariance @ gradient)
     placement = _placement_variance(fit, gradient)
     known = 0.0 if np.isnan(placement) else placement
     variances["cameras"] = max(whole - known, 0.0)  # rounding may leave less than nothing

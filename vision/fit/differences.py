@@ -70,15 +70,18 @@ class Perturbed:
 
 
 def perturb(problem: Problem, vector: np.ndarray, *, reach: bool = False) -> Perturbed:
-    """Return the vector with moved copies; reach: move the reach's error, too."""
+    """Return the vector with copies, in each of which one shared parameter or one of all bends is
+    moved; reach: move the reach's error, too.
+    """
     blocks = problem.blocks
     frames = len(problem.motor_rad)
-    geometry = [blocks.bar_axis, blocks.rest_shape, *([blocks.reach] if reach else [])]
-    objects = [blocks.motion, blocks.shift_along, blocks.outline_bias]
-    steps = blocks.steps
+    shared = np.append(columns_of(blocks.bar_axis, blocks.rest_shape), blocks.placement)
+    shared = np.append(shared, columns_of(blocks.taper, blocks.friction))
+    if reach:
+        shared = np.append(shared, columns_of(blocks.reach))
     moves = []
-    for k in columns_of(*geometry, *objects, blocks.taper, blocks.friction):
-        moves.append(Perturbation(steps[k], np.full(frames, k), is_shared=True))
+    for k in shared:
+        moves.append(Perturbation(blocks.steps[k], np.full(frames, k), is_shared=True))
     order = np.cumsum(problem.bent) - 1  # (f,) number of each bent frame
     for first in (blocks.bends.start, blocks.bends.start + 1):
         column = np.where(problem.bent, first + 2 * order, -1)

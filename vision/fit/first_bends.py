@@ -74,8 +74,8 @@ _STEP_RAD = 1e-5
 class SwingPictures:
     """One camera's pictures of a whisk, what stands still in them, and the bar's outline.
 
-    static: median of its frames; static_share: the part of one picture's variance that it has.
-    bar_px: middle (m, 2) and half-width (m,) of the bar.
+    static: median of its frames; static_share: variance of its noise over that of one picture. bar_px:
+    middle (m, 2) and half-width (m,) of the bar.
     """
 
     view: View
@@ -101,7 +101,7 @@ class SwingPictures:
     def of_standing(cls, view: View, rods: Rods, axis: Axis, bar_mm: float) -> "SwingPictures":
         """Return the pictures of one camera in whose frames the wire has not moved yet.
 
-        What stands still is then known without wire and bar alone.
+        The picture without wire and bar then serves as that of what stands still.
         """
         bar_px = axis.covering_discs(view.camera, bar_mm)
         return cls(view, rods, view.background, 1.0, bar_px)
@@ -153,8 +153,8 @@ def fit_rest(
 def _resting_points(
     sight: SwingPictures, camera: int, curves: Mapping[int, Curves]
 ) -> list[Observed]:
-    """Return points, to a pixel or two, of a wire that lies alike from the straight one in all
-    frames; none where none is surely seen.
+    """Return points, good to a pixel or two, of a wire that departs from the straight one by the
+    same curve in all frames; none where no wire is surely seen.
     """
     most_px = _most_rest_px(sight.view, next(iter(curves.values())))
     found = sight.votes(curves, int(np.ceil(most_px[1])))
@@ -250,7 +250,7 @@ class BendModel:
     motor_rad: float
     wire: Wire
 
-    def px(self, bend: np.ndarray, seen: Sequence[LinePoints]) -> np.ndarray:
+    def distances_px(self, bend: np.ndarray, seen: Sequence[LinePoints]) -> np.ndarray:
         """Return distances (…, n) in px from line points of all cameras to the predicted lines;
         bend (…, 2).
         """
@@ -271,7 +271,7 @@ class BendModel:
         """Return distances (n,) in px of one bend (2,), and their derivatives (n, 2) by the
         bend.
         """
-        px = self.px(bend + _STEP_RAD * np.eye(3, 2, -1), seen)  # (3, n)
+        px = self.distances_px(bend + _STEP_RAD * np.eye(3, 2, -1), seen)  # (3, n)
         moved = np.stack([px[1], px[2]], axis=1)
         return px[0], (moved - px[0][:, None]) / _STEP_RAD
 
@@ -279,8 +279,8 @@ class BendModel:
 def _bend_by_votes(
     model: BendModel, seen: Sequence[Votes], guess: np.ndarray
 ) -> tuple[np.ndarray, list[LinePoints]]:
-    """Return the bend with most votes of all cameras, or the guess where none surely has more than
-    noise; and points near it."""
+    """Return the bend with most votes of all cameras, and points near it; the guess where no bend
+    surely has more votes than noise gives."""
     none = np.zeros(sum(len(one.pieces) for one in seen))
     _, slopes = model.linearise(guess, _points_of(seen, none))
     scaled = slopes / np.sqrt(max(len(none), 1))
@@ -332,8 +332,8 @@ def fit_bend(
 def _prior_information(axis: Axis, views: int) -> np.ndarray:
     """Return the inverse covariance (2, 2) of a bend before it is seen.
 
-    It is weak, but for one view, to which a part of the bend is hidden: the bar pushes at right
-    angles to itself, and friction adds a part of that.
+    It is weak. A single view does not see one component of the bend: there the prior says that the
+    bar pushes at right angles to itself, and that friction adds a part of that along it.
     """
     information = np.eye(2) / _PULL_RAD**2
     if views > 1:

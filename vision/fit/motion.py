@@ -84,9 +84,9 @@ class Motion:
 class Yielding:
     """Where a bar that gives way is in each of f frames, at motor_rad (f,).
 
-    It is in its place up to touch, then moves across its direction (3,) by powers of the pushing
-    angle. Parameters are by how much touch is later than `gives` states, degrees, and mm at the end
-    of the push, of each direction across and each power.
+    It stands up to touch, then moves across its direction (3,) by powers of the pushing angle.
+    Parameters: by how many degrees touch is later than `gives` states; then, for each direction
+    across and each power, how far the bar has moved at the end of the push, mm.
     """
 
     gives: Gives
@@ -137,14 +137,17 @@ class Yielding:
 
 
 def between(motor_rad: np.ndarray, shift_mm: np.ndarray, at_rad: np.ndarray) -> np.ndarray:
-    """Interpolate shifts (…, 3) at motor angles (…), by those of frames (…, f, 3) at motor_rad
-    (f,).
+    """Interpolate shifts (…, 3) at motor angles at_rad (…) from those of frames (…, f, 3) at
+    motor_rad (f,).
 
     The motor angles rise: the motor turns as steadily as the bar moves.
     """
-    first = np.clip(np.searchsorted(motor_rad, at_rad) - 1, 0, len(motor_rad) - 2)
-    step_rad = motor_rad[first + 1] - motor_rad[first]
-    part = ((at_rad - motor_rad[first]) / step_rad)[..., None]
-    before = np.take_along_axis(shift_mm, first[..., None, None], axis=-2)[..., 0, :]
-    after = np.take_along_axis(shift_mm, first[..., None, None] + 1, axis=-2)[..., 0, :]
-    return (1.0 - part) * before + part * after
+    last = np.clip(np.searchsorted(motor_rad, at_rad), 1, len(motor_rad) - 1)
+    first = last - 1
+    part = (at_rad - motor_rad[first]) / (motor_rad[last] - motor_rad[first])
+
+    def shift_in(frame: np.ndarray) -> np.ndarray:
+        """Return the shifts (…, 3) in frames (…)."""
+        return np.take_along_axis(shift_mm, frame[..., None, None], axis=-2)[..., 0, :]
+
+    return (1.0 - part[..., None]) * shift_in(first) + part[..., None] * shift_in(last)

@@ -44,11 +44,11 @@ _UNITS = {
 class OneLess:
     """The fit without a camera.
 
-    step (size,): by how much parameters differ. moved (4,): d_x, touch, beta and the last slip, in
-    mm and rad, with moved_sigma (4,) where all cameras agree and sigma (4,), the stated one.
-    line_offset_px, line_offset_sigma_px: by which that of the camera's lines which is off most lies
-    from where the others have it. chance: that of cameras that agree one moves so much, or has
-    lines so far off. spread (size, size): covariance of the step, where it contradicts.
+    step (size,): change of the parameters. moved (4,): change of d_x, touch, beta and the last slip,
+    in mm and rad; moved_sigma (4,): its sigma if all cameras agree; sigma (4,): that stated for the
+    values. line_offset_px, line_offset_sigma_px: how far the worst of the camera's lines lies from
+    where the others have it, and its sigma. chance: that of a change, or of lines off, as large as
+    this among cameras that agree. spread (size, size): covariance of the step, where it contradicts.
     """
 
     camera: str
@@ -134,17 +134,17 @@ def _rows_without(fit: ConvergedFit, camera: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _LinesOff:
-    """How far a camera's lines are off from where the others have them: of wire and bar offset and
-    tilt, four in all.
+    """How far a camera's lines are off from where the others have them: offset and tilt of wire and
+    of bar, four in all.
 
-    A camera that was moved has its lines elsewhere, and the fit takes them to be off as a whole,
-    against the prior that they are not: what it makes of that prior, over its covariance, is the
-    test (the w-test of Baarda, A testing procedure for use in geodetic networks, 1968). So it is
-    where the others alone do not determine the bar.
+    The fit has these four as parameters, whose prior is 0. Of a camera that was moved they leave 0:
+    their residual against the prior, over its covariance, is the test (the w-test of Baarda, A
+    testing procedure for use in geodetic networks, 1968). It also serves where the others alone do
+    not determine the bar.
 
     directions (4, k): combinations that the others determine, in sigmas of the prior. value (k,),
-    covariance (k, k): what the fit makes of their priors. px_per_value (4, k): how far the lines
-    are off by that, without the prior.
+    covariance (k, k): their residuals against the prior. px_per_value (4, k): by how much the lines
+    are off per unit of these, without the prior.
     """
 
     directions: np.ndarray
@@ -176,7 +176,7 @@ class _LinesOff:
         return chance_of(self.value, self.covariance) if len(self.value) else 1.0
 
     def worst_px(self) -> tuple[float, float]:
-        """Return by how much the line lies off that does most, in its sigmas, and its sigma, px."""
+        """Return offset or tilt of the line that is farthest off in its sigmas, and its sigma, px."""
         off_px = self.px_per_value @ self.value
         variance_px2 = np.diag(self.px_per_value @ self.covariance @ self.px_per_value.T)
         sigma_px = np.sqrt(variance_px2)
@@ -193,8 +193,8 @@ def _offset_columns(blocks: Blocks, camera: int) -> np.ndarray:
 
 
 def _determined_directions(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return by how much (k,) of their prior's variance combinations are determined, and these (4,
-    k).
+    """Return combinations (4, k) of parameters, and by how much (k,) of its prior's variance each is
+    determined.
 
     covariance (4, 4): of the parameters, in sigmas of their priors. Combinations that are
     determined by less than _DETERMINED are left out.

@@ -120,7 +120,7 @@ def _in_hub(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return how far contacts (…, f, 3) are along and across the unbent whisker (…, f), mm.
 
-    Both are the wire's: what touch and distance are off by cancels in them.
+    Both are measured from the wire, so that errors of touch and distance cancel in them.
     """
     theta = problem.motor_rad - touch.motor_rad[..., None]
     x = rotation_z(touch.motor_rad)[..., None, :, 0]

@@ -55,7 +55,7 @@ class LeftOut:
 
 
 def _after(fit: ConvergedFit, step: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
-    """Return what a step (size,) of the parameters moves, with slip_mm added to the slip."""
+    """Return the effect of a step (size,) of the parameters, with slip_mm added to the slip."""
     by = fit.by_parameter
     return LeftOut(
         d_x_mm=float(by.whisk["d_x"] @ step),
@@ -65,7 +65,7 @@ def _after(fit: ConvergedFit, step: np.ndarray, slip_mm: float = 0.0) -> LeftOut
 
 
 def _held(fit: ConvergedFit, rows: np.ndarray, values: np.ndarray) -> LeftOut:
-    """Return what it moves to change functions of the parameters by values (k,).
+    """Return the effect of functions of the parameters being held at values (k,) from where they are.
 
     rows (k, size): derivatives of these functions.
     """
@@ -74,12 +74,14 @@ def _held(fit: ConvergedFit, rows: np.ndarray, values: np.ndarray) -> LeftOut:
 
 
 def _held_parameters(fit: ConvergedFit, columns: np.ndarray, changes: np.ndarray) -> LeftOut:
-    """Return what it moves to change the parameters of these columns (k,) by changes (k,)."""
+    """Return the effect of the parameters of these columns (k,) being held at changes (k,) from
+    where they are.
+    """
     return _held(fit, np.eye(fit.problem.size)[columns], changes)
 
 
 def _followed(fit: ConvergedFit, residual: np.ndarray, slip_mm: float = 0.0) -> LeftOut:
-    """Return what a change (n,) of the first n residuals moves, with slip_mm added to the slip."""
+    """Return the effect of a change (n,) of the first n residuals, with slip_mm added to the slip."""
     change = fit.linear.weigh(residual[:, None])[:, 0]
     step = -fit.inverse_normal @ (fit.weighted.jacobian.T @ change)
     return _after(fit, step, slip_mm)
@@ -110,9 +112,7 @@ def left_out(fit: ConvergedFit, light: Mapping[str, WireAppearance]) -> dict[str
 
 
 def _large_bending(fit: ConvergedFit) -> LeftOut:
-    """Return the effect of a beam of small angles, with no more friction along the whisker than it
-    has.
-    """
+    """Return the effect of a beam of small angles, its friction along the whisker unchanged."""
     contacts_mm = _contacts_of_small_angles(fit)
     rows, slip = reshape(fit, _moved_by_small_angles(fit, contacts_mm))
     return _followed(fit, rows[:, 0], float(slip[0]))

@@ -113,7 +113,7 @@ def touch_and_sigma(
 ) -> tuple[float, float]:
     """Return the motor angle of first touch and its sigma, rad, by noise and priors alone.
 
-    This is what it takes to part the frames. covariance (size, size): the second result of `solve`.
+    It serves to divide the frames into free and touching ones. covariance (size, size): the second result of `solve`.
     """
     blocks = problem.blocks
     columns = np.append(np.arange(blocks.taper.slice.stop), blocks.placement)
@@ -143,10 +143,10 @@ def frames_that_touch(motor_rad: np.ndarray, bend_rad: np.ndarray) -> tuple[np.n
     """Return which frames surely touch and which surely do not, (f,) bool each, by coarse bends (f,
     2).
 
-    The bend is nothing up to touch and then grows with the motor's angle, towards where it ends:
-    the touch that explains all bends best parts the frames. One frame to either side of it is left
-    undecided, but the first two are taken as free: whether they are, the fit will show. None
-    touches where no two frames in a row are surely bent.
+    Up to touch there is no bend, from there on it grows in proportion to the motor's angle: the
+    frames are divided at the touch that explains all bends best. One frame to either side of it is
+    left undecided, but the first two are taken as free; the fit shows whether they are
+    (`unbent_frames`). None touches where no two frames in a row are surely bent.
     """
     sure = np.linalg.norm(bend_rad, axis=1) > _SURE_BEND_RAD
     next_sure = np.append(sure[1:], sure[-1])
@@ -197,11 +197,11 @@ def frames_by_touch(
 
 
 def unbent_frames(problem: Problem, state: State, free: np.ndarray) -> np.ndarray:
-    """Return which frames (f,) bool a fit still shows to be free: the last is dropped while it is
-    bent.
+    """Return which of the free frames (f,) bool are free by a fit: from the last on, those that
+    bend are dropped.
 
-    free (f,) bool: frames taken as free, the first of the stroke. Frames that touch from the start
-    would else pass for a rest shape, and touch for later than it is.
+    free (f,) bool: frames taken as free, the first of the stroke. Without this, frames that touch
+    from the start would be taken for the rest shape, and touch for later than it is.
     """
     free = free.copy()
     loose = replace(problem, bent=np.ones(len(free), dtype=bool))
@@ -220,9 +220,9 @@ def unbent_frames(problem: Problem, state: State, free: np.ndarray) -> np.ndarra
 
 
 def _bend_chi2(loose: Problem, weighted: Linear, free: np.ndarray, frame: int) -> float:
-    """Return by how much chi² falls where one of the free frames (f,) bool may bend.
+    """Return by how much chi² falls if one of the free frames (f,) bool is let bend.
 
-    loose: problem in which all may.
+    loose: the problem in which all frames may bend.
     """
     varies = np.ones(loose.size, dtype=bool)
     for one in np.flatnonzero(free).tolist():
@@ -247,9 +247,11 @@ def bent_frames(problem: Problem, state: State, covariance: np.ndarray) -> np.nd
     return is_bent
 
 
-def bends_tell_more(motor_rad: np.ndarray, sigma_rad: float) -> bool:
-    """Return whether bends part the frames better than a touch known to sigma, as where sights
-    hardly cross: they do to a frame, or to what the motor turns by until a bend is sure.
+def bends_divide_better(motor_rad: np.ndarray, sigma_rad: float) -> bool:
+    """Return whether bends divide the frames better than a touch known to sigma, as where sights
+    hardly cross.
+
+    They do so to a frame, or to the angle by which the motor turns until a bend is sure.
     """
-    to_a_frame = np.median(np.abs(np.diff(motor_rad)))
-    return bool(_SURE_SIGMAS * sigma_rad > max(to_a_frame, _SURE_BEND_RAD))
+    frame_rad = np.median(np.abs(np.diff(motor_rad)))
+    return bool(_SURE_SIGMAS * sigma_rad > max(frame_rad, _SURE_BEND_RAD))

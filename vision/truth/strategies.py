@@ -16,7 +16,7 @@ from vision.fit.problem import Problem, State
 from vision.fit.solve import solve
 from vision.fit.touch import (
     FEWEST_FREE,
-    bends_tell_more,
+    bends_divide_better,
     bent_frames,
     frames_by_touch,
     frames_that_touch,
@@ -131,7 +131,7 @@ class TouchByClearance(Touch):
         """
         touch_rad, sigma_rad = touch_and_sigma(problem, state.vector, covariance)
         touching, free = frames_by_touch(problem.motor_rad, touch_rad, sigma_rad)
-        if bends_tell_more(problem.motor_rad, sigma_rad):
+        if bends_divide_better(problem.motor_rad, sigma_rad):
             touching_by_bends = problem.touching & ~free
             free_by_bends = ~problem.bent & ~touching
             touching = touching | touching_by_bends

@@ -8,7 +8,7 @@ import pytest
 from tests.scenes.model_scenes import scene, with_points
 from vision.fit.problem import State
 from vision.fit.solve import solve
-from vision.fit.touch import bends_tell_more, frames_that_touch, unbent_frames
+from vision.fit.touch import bends_divide_better, frames_that_touch, unbent_frames
 from vision.geometry.refusals import Refused
 from vision.truth.strategies import TouchByClearance
 
@@ -38,11 +38,13 @@ def test_without_a_bend_none_touches():
     assert not np.any(touching) and np.all(free)
 
 
-def test_bends_tell_more_than_a_touch_known_to_no_frame():
+def test_bends_divide_better_than_a_touch_known_to_no_frame():
     """Frames 0.7 degrees apart: three sigma are a frame at 0.23 degrees. However near each other frames are, a bend is
     sure but a quarter of a degree after touch."""
-    assert bends_tell_more(MOTOR, np.radians(0.24)) and not bends_tell_more(MOTOR, np.radians(0.23))
-    assert not bends_tell_more(MOTOR / 100.0, np.radians(0.08)) and bends_tell_more(
+    assert bends_divide_better(MOTOR, np.radians(0.24)) and not bends_divide_better(
+        MOTOR, np.radians(0.23)
+    )
+    assert not bends_divide_better(MOTOR / 100.0, np.radians(0.08)) and bends_divide_better(
         MOTOR / 100.0, np.radians(0.09)
     )
 

@@ -38,7 +38,7 @@ def test_what_neighbours_share_spreads_parameters_as_stated(fitted, rng):
     """
     by_row = fitted.inverse_normal @ fitted.weighted.jacobian.T
     draws = np.array([by_row @ _errors(fitted.problem, by_row.shape[1], rng) for _ in range(2000)])
-    stated = np.sqrt(np.diag(fitted.noise))
+    stated = np.sqrt(np.diag(fitted.noise_covariance))
     assert np.allclose(draws.std(axis=0) / stated, 1.0, atol=4 * 0.016 + 0.01)
 
 
@@ -56,7 +56,7 @@ def _errors(problem, count: int, rng) -> np.ndarray:
 
 def test_what_changes_along_the_wire_is_told_better(fitted):
     """Than were each point as uncertain by itself as what it shares makes a mean; in the bends most of all."""
-    ratio = np.sqrt(np.diag(fitted.noise) / np.diag(fitted.inverse_normal))
+    ratio = np.sqrt(np.diag(fitted.noise_covariance) / np.diag(fitted.inverse_normal))
     assert np.all(ratio < 1.01)
     assert np.median(ratio[fitted.problem.first_bend :]) < 0.98
 

@@ -22,7 +22,7 @@ def row_of(noise_of):
 
     class Noisy(FittedWhisk):
         @property
-        def noise(self):
+        def noise_covariance(self):
             return noise_of(self.inverse_normal)
 
     fitted = Noisy(problem, state, list(frames))
