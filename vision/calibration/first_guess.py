@@ -185,9 +185,11 @@ def most_central(transforms: Sequence[np.ndarray]) -> np.ndarray:
 def transform_distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return how far transforms a (n, 3, 4) are from transforms b (m, 3, 4), (n, m).
 
-    It is the angle between both, rad, and the difference of their shifts over the median shift of b.
+    It is the sum of the angle between them, rad, and the difference of their shifts over the median
+    shift of b.
     """
-    angle = angle_between(a[:, None, :, :3], b[:, :, :3])
-    shift_mm = np.linalg.norm(a[:, None, :, 3] - b[:, :, 3], axis=-1)
-    usual_mm = max(float(np.median(np.linalg.norm(b[:, :, 3], axis=-1))), 1e-9)
-    return angle + shift_mm / usual_mm
+    a = a[:, None]  # (n, 1, 3, 4), against each of b
+    angle = angle_between(a[..., :3], b[..., :3])
+    shift_mm = np.linalg.norm(a[..., 3] - b[..., 3], axis=-1)
+    usual_mm = float(np.median(np.linalg.norm(b[..., 3], axis=-1)))
+    return angle + shift_mm / max(usual_mm, 1e-9)

@@ -151,11 +151,13 @@ def _shot_blocks(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
     Pictures are filled up with zeros to one length: one product for all is ten times as fast as one
     a corner.
     """
+    shots = len(starts)
     count = np.diff(np.append(starts, len(rows)))
-    shot = np.repeat(np.arange(len(starts)), count)
-    padded = np.zeros((len(starts), count.max(), *rows.shape[1:]))
-    padded[shot, np.arange(len(rows)) - starts[shot]] = rows
-    padded = padded.reshape(len(starts), -1, rows.shape[2])
+    shot = np.repeat(np.arange(shots), count)  # (n,) of each row
+    place = np.arange(len(rows)) - starts[shot]  # (n,) within its picture
+    padded = np.zeros((shots, count.max(), *rows.shape[1:]))
+    padded[shot, place] = rows
+    padded = padded.reshape(shots, -1, rows.shape[2])
     return np.swapaxes(padded[:, :, :-1], 1, 2) @ padded
 
 

@@ -6,6 +6,7 @@ Coarse: to a pixel or two, enough for the strips that `trace` reads.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,10 +35,10 @@ from vision.wire.points import LinePoints, Observed
 from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
 
 # [px] Length of a piece of the wire in this first pass. 12 or 24 move touch by 0.1 sigma.
-# Study: thresholds.py fit.first_bends _PIECE_PX ….
-_PIECE_PX = 16
+# Study: thresholds.py fit.first_bends PIECE_PX ….
+PIECE_PX = 16
 # [px] How far to either side of the place predicted by the last two frames a wire is searched for.
-# Set by eye. Study: thresholds.py fit.first_bends _REACH_PX ….
+# 18 or 40 move nothing on the fixtures. Study: thresholds.py fit.first_bends _REACH_PX ….
 _REACH_PX = 26
 # [sigma] Of the rest shape's prior (`fit/problem.py`) within which a wire is searched for: 95 % of
 # what is believed. Derived.
@@ -52,7 +53,8 @@ _MEDIAN_OF = 11
 _CONVERGED_RAD = 1e-4
 # [rounds] Of the fit at most; it ends where the bend has converged. Stated.
 _ROUNDS = 8
-# [rad] Prior sigma of a frame's bend. Set by eye. Study: coverage.py alone.
+# [rad] Prior sigma of a frame's bend. Half or twice it moves d_x by 0.01 sigma. Study: thresholds.py
+# fit.first_bends _PULL_RAD ….
 _PULL_RAD = 0.2
 # [rad] Prior sigma of its part along the bar where one camera sees it: only friction pushes there.
 # Set by eye. Study: coverage.py alone.
@@ -60,7 +62,9 @@ _ALONG_BAR_RAD = 0.02
 # [px] Pieces nearer to the bar's outline show its edge. 4 or 16 move d_x by 0.15 sigma. Study:
 # thresholds.py fit.first_bends _BESIDE_BAR_PX ….
 _BESIDE_BAR_PX = 8.0
-# [sigmas] Of the Cauchy weights of the rest shape's coarse points, round by round. Set by eye.
+# [sigmas] Of the Cauchy weights of the rest shape's coarse points, round by round: wide while the
+# shape is far off. From 5 on, or 2 at once, it is the same on the fixtures. Study: thresholds.py
+# fit.first_bends _REST_SCALES ….
 _REST_SCALES = (20.0, 10.0, 5.0, 3.0, 2.0, 2.0)
 # [px] Scale of the Cauchy weights of a frame's coarse points: half a wire's width. Stated.
 _CAUCHY_PX = 2.0
@@ -108,9 +112,7 @@ class SwingPictures:
 
     def votes(self, curves: Mapping[int, Curves], reach_px: int = _REACH_PX) -> Votes:
         """Return where the wire may be near predicted curves by frame, clear of hub and bar."""
-        pieces = wire_pieces(
-            self.view, curves, self.rods.wire, _PIECE_PX, reach_px - 3, self.static
-        )
+        pieces = wire_pieces(self.view, curves, self.rods.wire, PIECE_PX, reach_px - 3, self.static)
         clear = clear_of_bar(pieces, *self.bar_px, _BESIDE_BAR_PX)
         clear &= pieces.place > NEAR_CLAMP_MM
         return votes(pieces.select(clear), self.static_share, reach_px)
@@ -230,34 +232,53 @@ def find_bend(
     """Return the bend (2,) in rad of one frame, searched for near a guess (2,)."""
     wire = sights[0].rods.wire
     cameras = [sight.view.camera for sight in sights]
-    arc = contact_arc(rest_mm, guess_rad, motor_rad, axis, wire)
-    curve = centrelines(rest_mm, guess_rad, arc, motor_rad, wire)
-    seen = [sight.votes({frame: curve}) for sight in sights]
-    model = BendModel(cameras, rest_mm, arc, motor_rad, wire)
+    model = BendModel.near(cameras, rest_mm, axis, wire, motor_rad, guess_rad)
+    predicted = {frame: model.curves(guess_rad)}
+    seen = [sight.votes(predicted) for sight in sights]
     bend, points = _bend_by_votes(model, seen, guess_rad)
-    return fit_bend(model, bend, points, axis)
+    return fit_bend(model, bend, points)
 
 
 @dataclass(frozen=True, eq=False)
 class BendModel:
-    """Where one frame's wire is expected, by its bend: cameras, rest shape, contact arc, motor angle,
-    wire.
+    """Where one frame's wire is expected, by its bend.
+
+    axis: of the object. arc_mm: where along itself the wire touches it.
     """
 
     cameras: Sequence[Camera]
     rest_mm: np.ndarray
-    arc_mm: float
-    motor_rad: float
+    axis: Axis
     wire: Wire
+    motor_rad: float
+    arc_mm: float
+
+    @classmethod
+    def near(
+        cls,
+        cameras: Sequence[Camera],
+        rest_mm: np.ndarray,
+        axis: Axis,
+        wire: Wire,
+        motor_rad: float,
+        bend_rad: np.ndarray,
+    ) -> Self:
+        """Return the model whose contact is that of a bend (2,), rad."""
+        arc_mm = contact_arc(rest_mm, bend_rad, motor_rad, axis, wire)
+        return cls(cameras, rest_mm, axis, wire, motor_rad, arc_mm)
+
+    def curves(self, bend: np.ndarray) -> Curves:
+        """Return the wire's centrelines (…) by bends (…, 2)."""
+        shape = np.shape(bend)[:-1]
+        rest = np.broadcast_to(self.rest_mm, (*shape, 2, REST_POWERS))
+        arc = np.full(shape, self.arc_mm)
+        return centrelines(rest, bend, arc, np.full(shape, self.motor_rad), self.wire)
 
     def distances_px(self, bend: np.ndarray, seen: Sequence[LinePoints]) -> np.ndarray:
         """Return distances (…, n) in px from line points of all cameras to the predicted lines;
         bend (…, 2).
         """
-        shape = np.shape(bend)[:-1]
-        rest = np.broadcast_to(self.rest_mm, (*shape, 2, REST_POWERS))
-        arc = np.full(shape, self.arc_mm)
-        curves = centrelines(rest, bend, arc, np.full(shape, self.motor_rad), self.wire)
+        curves = self.curves(bend)
         distances = []
         for camera, points in zip(self.cameras, seen):
             points_mm, _ = curves.at(points.place)
@@ -306,17 +327,12 @@ def _points_of(seen: Sequence[Votes], shift_px: np.ndarray) -> list[LinePoints]:
     return [one.points(shift) for one, shift in zip(seen, np.split(shift_px, ends))]
 
 
-def fit_bend(
-    model: BendModel,
-    bend: np.ndarray,
-    seen: Sequence[LinePoints],
-    axis: Axis,
-) -> np.ndarray:
+def fit_bend(model: BendModel, bend: np.ndarray, seen: Sequence[LinePoints]) -> np.ndarray:
     """Fit the two components of the bend with Cauchy weights to coarse points by camera.
 
-    bend (2,): to begin from, rad. axis: of the object.
+    bend (2,): to begin from, rad.
     """
-    prior = _prior_information(axis, len(model.cameras))
+    prior = _prior_information(model.axis, len(model.cameras))
     information = np.concatenate([points.sigma_px for points in seen]) ** -2.0
     for _ in range(_ROUNDS):
         residual, jacobian = model.linearise(bend, seen)

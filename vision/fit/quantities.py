@@ -123,11 +123,12 @@ def _in_hub(
     Both are measured from the wire, so that errors of touch and distance cancel in them.
     """
     theta = problem.motor_rad - touch.motor_rad[..., None]
+    cos = np.cos(theta)
+    sin = np.sin(theta)
     x = rotation_z(touch.motor_rad)[..., None, :, 0]
     d_x = np.linalg.norm(touch.point_mm, axis=-1)[..., None]
-    beyond = np.sum(point_mm * x, axis=-1) - d_x
-    along = d_x / np.cos(theta) - d_y * np.sin(theta) + beyond * np.cos(theta)
-    return along, d_y * np.cos(theta) + beyond * np.sin(theta)
+    beyond = np.sum(point_mm * x, axis=-1) - d_x  # past where the unbent whisker would touch
+    return d_x / cos - d_y * sin + beyond * cos, d_y * cos + beyond * sin
 
 
 def _virtual_point(unbent: Curves, touch: FirstTouch, x: np.ndarray) -> np.ndarray:

@@ -146,9 +146,10 @@ def contact_frame_angles(direction: np.ndarray, touch_rad: float) -> tuple[float
     """
     cos = np.cos(touch_rad)
     sin = np.sin(touch_rad)
-    a_x = cos * direction[..., 0] + sin * direction[..., 1]
-    a_y = -sin * direction[..., 0] + cos * direction[..., 1]
-    return np.arctan2(a_y, direction[..., 2]), np.arcsin(np.clip(a_x, -1.0, 1.0))
+    x, y, a_z = np.moveaxis(direction, -1, 0)
+    a_x = cos * x + sin * y
+    a_y = cos * y - sin * x
+    return np.arctan2(a_y, a_z), np.arcsin(np.clip(a_x, -1.0, 1.0))
 
 
 def directions_at_slope(beta_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -66,7 +66,7 @@ def measure_relative_widths(seen: SeenBar) -> dict[str, tuple[float, float]]:
         line = seen.lines[name]
         log_width, sigma = estimate_log_width(move_to_line(line.pieces, line.line))
         width = float(np.exp(log_width))
-        widths[name] = (width, float(np.exp(log_width) * np.hypot(sigma, SIGMA_SHARE)))
+        widths[name] = (width, width * float(np.hypot(sigma, SIGMA_SHARE)))
     return widths
 
 
@@ -79,6 +79,8 @@ def combine_widths(widths: Mapping[str, tuple[float, float]]) -> tuple[float, fl
     width, sigma = np.array(list(widths.values())).T
     log_width = np.log(width)
     weight = (width / sigma) ** 2
-    mean = float(np.average(log_width, weights=weight))
-    scatter = np.average((log_width - mean) ** 2, weights=weight) / max(len(log_width) - 1, 1)
-    return float(np.exp(mean)), float(np.exp(mean) * np.sqrt(1.0 / np.mean(weight) + scatter))
+    log_mean = np.average(log_width, weights=weight)
+    spread = np.average((log_width - log_mean) ** 2, weights=weight)
+    variance = 1.0 / np.mean(weight) + spread / max(len(log_width) - 1, 1)
+    mean = float(np.exp(log_mean))
+    return mean, mean * float(np.sqrt(variance))

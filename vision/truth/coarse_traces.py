@@ -11,9 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.fit.blocks import REST_PRIOR_MM
-from vision.fit.first_bends import BendModel, bends_in_order, contact_arc, fit_bend, fit_rest
+from vision.fit.first_bends import (
+    PIECE_PX,
+    BendModel,
+    bends_in_order,
+    fit_bend,
+    fit_rest,
+)
 from vision.geometry.camera import Camera, Cameras
-from vision.geometry.centreline import REST_POWERS, Curves, centrelines, unbent_curves
+from vision.geometry.centreline import REST_POWERS, Curves, unbent_curves
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Rods
@@ -30,8 +36,6 @@ from vision.truth.trace_points import (
 from vision.wire.points import LinePoints, Observed
 from vision.wire.trace import NEAR_CLAMP_MM, observed
 
-# [px] Of wire that gives one coarse point, as in `vision.fit.first_bends`. Set by eye.
-_SEGMENT_PX = 16.0
 # [px] One sigma of a coarse point: trackers' 0.3 px and what is smooth. Stated.
 _COARSE_PX = 0.5
 # [1] Of −2 log prior density of a rest shape: seven of its sigmas. Stated.
@@ -98,13 +102,12 @@ def follow_traced_bends(
     def find(frame: int, motor: float, bend_rad: np.ndarray) -> np.ndarray:
         """Return the bend of one frame, beginning near a guess."""
         for _ in range(_BEND_PASSES):
-            arc_mm = contact_arc(rest_mm, bend_rad, motor, axis, rods.wire)
-            curve = centrelines(rest_mm, bend_rad, arc_mm, motor, rods.wire)
+            model = BendModel.near(cameras.cameras, rest_mm, axis, rods.wire, motor, bend_rad)
+            predicted = {frame: model.curves(bend_rad)}
             points = []
             for camera in cameras:
-                points.append(_as_points(_beside(traces[camera.name], camera, {frame: curve})))
-            model = BendModel(cameras.cameras, rest_mm, arc_mm, motor, rods.wire)
-            bend_rad = fit_bend(model, bend_rad, points, axis)
+                points.append(_as_points(_beside(traces[camera.name], camera, predicted)))
+            bend_rad = fit_bend(model, bend_rad, points)
         return bend_rad
 
     return bends_in_order(motor_rad, find)
@@ -155,7 +158,7 @@ def _beside(trace: Trace, camera: Camera, curves: Mapping[int, Curves]) -> Besid
     """Return a point for each segment of the line that is closest to the wire in each frame."""
     beside = closest_lines(beside_wire(trace, camera, curves))
     beside = beside.select(beside.place_mm > NEAR_CLAMP_MM)
-    return averaged(beside, _SEGMENT_PX) if len(beside.frame) else beside
+    return averaged(beside, PIECE_PX) if len(beside.frame) else beside
 
 
 def _as_points(beside: BesideWire) -> LinePoints:
