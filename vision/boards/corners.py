@@ -16,7 +16,8 @@ from vision.geometry.rows import Rows
 
 # [corners] Fewer fix no plane, so that edges at a corner have no direction. Derived.
 MIN_CORNERS = 4
-# [%] Of the pixels: beyond are glints, not the board's white. Set by eye.
+# [%] Of the pixels: beyond are glints, not the board's white. 99 to 99.99 move nothing on the
+# fixtures. Study: thresholds.py boards.corners _BRIGHTEST_PERCENT ….
 _BRIGHTEST_PERCENT = 99.9
 
 

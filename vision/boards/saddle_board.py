@@ -18,8 +18,8 @@ from vision.geometry.checks import require, require_length
 # nothing on the fixtures between 1.4 and 4. Study: thresholds.py boards.saddle_board
 # _DISTURBED_RATIO ….
 _DISTURBED_RATIO = 1.8
-# [1] Blur or contrast this far from the board's median is no printed corner. Set by eye; moves
-# nothing on the fixtures between 1.5 and 3. Study: thresholds.py boards.saddle_board _ODD_FACTOR ….
+# [1] Blur or contrast this far from the board's median is no printed corner. 1.5 to 3 move nothing
+# on the fixtures. Study: thresholds.py boards.saddle_board _ODD_FACTOR ….
 _ODD_FACTOR = 2.0
 
 

@@ -17,7 +17,7 @@ from vision.geometry.refusals import Refused
 # 8000 is, on either axis. Derived.
 _DISTURBED_SIGMA = 4.0
 # [1] Of the median miss, where that is larger than the sigmas: a corner beyond was hidden or
-# disturbed. Set by eye.
+# disturbed. Of sound corners, whose misses are Rayleigh distributed, 1.3 % are. Derived.
 _DISTURBED_MEDIANS = 2.5
 # [corners] Twelve coordinates for the six parameters of a motion. Derived.
 _FEWEST_CORNERS = 6

@@ -39,8 +39,7 @@ _ROUNDS_MOVING = 5
 _MIN_SHOT = 4
 # [instants] Fewer give no scatter. Derived.
 _MIN_LATE = 8
-# [1] Of all cameras' lateness, below which none is taken: no camera is exactly on time. Set by
-# eye.
+# [1] Of all cameras' lateness, below which none is taken: no camera is exactly on time. Stated.
 _LEAST_LATE_SHARE = 0.02
 # [coordinates] Of the board's points that the pictures determine: fewer have no scatter. Derived.
 _LEAST_FITTED_POINTS = 1.0

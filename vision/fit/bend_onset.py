@@ -12,7 +12,8 @@ import numpy as np
 from vision.geometry.robust import mean_and_sigma
 
 # [1] Of the bend: how far it may leave the curve through the first degrees, where the whisker
-# begins to slide or sticks. Set by eye. Study: coverage.py alone.
+# begins to slide or sticks. Half or twice it moves slopes through one camera alone by 0.4 sigma,
+# touch by 0.2. Study: thresholds.py fit.bend_onset _MODEL_SHARE … --cameras 1.
 _MODEL_SHARE = 0.05
 # [rad] A line that bows by a tenth of a pixel more in one frame than in the next. Study:
 # coverage.py alone.
@@ -20,8 +21,9 @@ _LINE_RAD = np.radians(0.02)
 # [rad⁻¹] A rod pushed by a bar bends in proportion, to a tenth for each degree. Study:
 # coverage.py alone.
 _CURVED_PER_RAD = 0.1 / np.radians(1.0)
-# [rad] Past touch, over which the bend is a parabola to the share above. Set by eye. Study:
-# coverage.py alone.
+# [rad] Past touch, over which the bend is a parabola to the share above. By 2.9° or 5.2° slopes
+# through one camera alone move by 0.4 sigma. Study: thresholds.py fit.bend_onset _WINDOW_RAD …
+# --cameras 1.
 _WINDOW_RAD = np.radians(4.0)
 # [rad] Between onsets that are tried: a fifth of the least sigma. Derived.
 _STEP_RAD = np.radians(0.02)

@@ -38,7 +38,7 @@ WIRE_TILT_PX = 0.09
 # (docs/ladder.md). Besides, what moves a line by so much moves it by as much over a radian of the
 # swing. Study: no script.
 WIRE_DRIFT_PX = 0.02
-# [px] Sigmas of the six shapes of `problem.wire_modes`, in their order.
+# [px] Sigmas of the six shapes of `problem.wire_modes`, in their order. A layout of those above.
 WIRE_MODES_PX = np.array([WIRE_OFFSET_PX, WIRE_TILT_PX, *[WIRE_DRIFT_PX] * 4])
 # [parameters] Of a camera's lines of the wire. A layout, no threshold.
 WIRE_OFFSETS = len(WIRE_MODES_PX) + SHARED
@@ -47,7 +47,7 @@ WIRE_OFFSETS = len(WIRE_MODES_PX) + SHARED
 BAR_OFFSET_PX = 0.05
 # [px] Tilt of such a line, over `BAR_TILT_ARM_MM`. Study: bar_scenes.py.
 BAR_TILT_PX = 0.025
-# [px] Sigmas of a bar's line, in the order of the parameters.
+# [px] Sigmas of a bar's line, in the order of the parameters. A layout of those above.
 BAR_MODES_PX = np.array([BAR_OFFSET_PX, BAR_TILT_PX])
 
 # [mm] Step of differences, about 1e-5 of what a length moves. Study: gradients.py.

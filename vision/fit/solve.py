@@ -44,8 +44,8 @@ LAST_SCALE = 4.0
 _ALIKE = 1000.0
 # [sigma] A step that moves all parameters together by less is the last. Derived.
 _CONVERGED_SIGMA = 0.01
-# [sigmas] Of the Cauchy weights, round by round: wide while the state is still off by many. Set
-# by eye.
+# [sigmas] Of the Cauchy weights, round by round: wide while the state is still off by many. At once
+# 4, or from 100 on, touch moves by 0.01 sigma. Study: thresholds.py fit.solve _SCALES ….
 _SCALES = (30.0, 10.0, *[LAST_SCALE] * 4)
 # [1] Share of a column's length that the columns before it leave: below, normal equations lose ten digits
 # of sixteen. Fits of six path-traced whisks leave 0.002 at least. Derived.

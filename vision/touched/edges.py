@@ -38,11 +38,14 @@ from vision.wire.shading import Knots, fit_shading
 EDGE_PX = 0.12
 # [1] True over formal sigma of an edge, by the same bars. Study: coverage.py alone.
 FORMAL_TO_TRUE = 2.0
-# [px] Blur of the coarse search's model. Set by eye. Study: coverage.py alone.
+# [px] Blur of the coarse search's model. By 1 or 2.2 slopes through one camera alone move by 0.3
+# sigma. Study: thresholds.py touched.edges _SEARCH_BLUR_PX … --cameras 1.
 _SEARCH_BLUR_PX = 1.5
-# [px] Bins of the rims' pixels in the coarse search. Set by eye. Study: coverage.py alone.
+# [px] Bins of the rims' pixels in the coarse search. By 0.25 or 1 slopes through one camera alone
+# move by 0.3 sigma. Study: thresholds.py touched.edges _BIN_PX … --cameras 1.
 _BIN_PX = 0.5
-# [mm] Half the length of bar that the coarse search uses. Set by eye. Study: coverage.py alone.
+# [mm] Half the length of bar that the coarse search uses. By 14 or 30 slopes through one camera
+# alone move by 0.6 or 0.3 sigma. Study: thresholds.py touched.edges _SEARCH_REACH_MM … --cameras 1.
 _SEARCH_REACH_MM = 20.0
 # [px] Half the range of the coarse search by shift and by tilt. Study: coverage.py alone.
 _SEARCH_MOST_PX = (5.0, 5.0)

@@ -53,8 +53,9 @@ _MEDIAN_SQUARED = 0.455
 # [1] Largest texture over the one that the median gives: the edge of a bar that is tilted against
 # its expected axis passes a few patches only, and is no texture. Study: bar_scenes.py.
 _LARGEST_OVER_MEDIAN = 3.0
-# [bins] Weight of the prior that a segment has the mean texture: half the bins of a segment. Set
-# by eye. Study: bar_starts.py.
+# [bins] Weight of the prior that a segment has the mean texture: half the bins of a segment. By 25 or
+# 100 a d_x moves by 0.3 sigma, and in the sun another of two bars is taken, whose slope is off by 10°.
+# Study: thresholds.py touched.profiles _PRIOR_BINS ….
 _PRIOR_BINS = 50
 
 

@@ -17,8 +17,8 @@ from scipy.special import chdtri, stdtrit
 from vision.geometry.reasons import NO_REASON, Reason
 from vision.truth.value import FIELDS, NAN, Value, WhileTouching, propagated_sigma
 
-# [rad] To either side of the wanted angle, of the local fit. Set by eye. Study: thresholds.py
-# truth.at_angle _WINDOW_RAD ….
+# [rad] To either side of the wanted angle, of the local fit. By 1.1° or 2.3° a slip moves by 0.1
+# sigma. Study: thresholds.py truth.at_angle _WINDOW_RAD ….
 _WINDOW_RAD = np.radians(1.6)
 # [mm] A slip record that leaves its local fit by more is not smooth: stick and slip. Half or
 # twice it moves nothing on the fixtures. Study: thresholds.py truth.at_angle _JUMP_MM ….
@@ -26,8 +26,8 @@ _JUMP_MM = 0.025
 # [sigma] Of the frames' own scatter about that fit, beyond which it is no chance: 1 in 15 000. Of 0.3 px in traces
 # slip scatters by 0.02 mm. Derived.
 _JUMP_SIGMAS = 4.0
-# [rad] Past the last frame a value is still given. Set by eye. Study: thresholds.py
-# truth.at_angle _BEYOND_RAD ….
+# [rad] Past the last frame a value is still given. Half a step of frames that are 0.6° apart.
+# Stated.
 _BEYOND_RAD = np.radians(0.3)
 # [sigma] Of touch, by which a frame lies before or past the wanted angle beyond doubt: 1 in 30 000 errs.
 # Derived.

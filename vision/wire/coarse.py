@@ -38,8 +38,8 @@ _SURE_SIGMAS = 8.0
 # [widths] Of the rod, over which the mean is subtracted: shade on what is behind changes over
 # more. Derived.
 _SHADE_WIDTHS = 3
-# [1] A background scaled by more than this from 1 is none: the segment shows something else. Set by
-# eye. Study: thresholds.py wire.coarse _PLAIN_GAIN ….
+# [1] A background scaled by more than this from 1 is none: the segment shows something else. By 0.3
+# or 0.8 touch moves by 0.08 sigma. Study: thresholds.py wire.coarse _PLAIN_GAIN ….
 _PLAIN_GAIN = 0.5
 # [1] Keeps a background that does not vary in a segment from making its two equations singular.
 # Derived.

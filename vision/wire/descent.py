@@ -25,7 +25,8 @@ from vision.wire.shading import (
 # [steps] At most: Gauss–Newton takes 4 to 10. By 20 d_x moves by 0.01 sigma. Study: thresholds.py
 # wire.descent _MOST_STEPS ….
 _MOST_STEPS = 40
-# [1] Longest step of the blur's logarithm. Set by eye. Study: starts.py.
+# [1] Longest step of the blur's logarithm. Half or twice it moves nothing on the fixtures. Study:
+# thresholds.py wire.descent _LONGEST_LOG ….
 _LONGEST_LOG = 0.3
 # [px] A segment that goes farther sees something else. Half or twice it moves nothing on the
 # fixtures. Study: thresholds.py wire.descent _FARTHEST_PX ….

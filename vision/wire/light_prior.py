@@ -16,7 +16,8 @@ from vision.wire.shading import Knots
 # probability of true lines by 0.05 at most. Study: wire_scenes.py.
 _LEVEL_SHARE = 2.0
 # [1] What of it changes from turn to turn of `LIT_ALIKE_RAD`: light and rod keep, the angle at
-# which they meet does not. Set by eye. Study: thresholds.py wire.light_prior _TURNED_SHARE ….
+# which they meet does not. Half or twice it moves nothing on the fixtures. Study: thresholds.py
+# wire.light_prior _TURNED_SHARE ….
 _TURNED_SHARE = 0.3
 
 

@@ -13,9 +13,11 @@ from vision.wire.light_prior import USUAL_LIGHT
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import contrast_of
 
-# [px] Common shifts of the starts: minima lie 0.5 to 1 px apart. Set by eye. Study: wire_scenes.py.
+# [px] Common shifts of the starts: minima lie 0.5 to 1 px apart. By 5 or 11 of them touch moves by
+# 0.07 sigma. Study: thresholds.py wire.starts _START_SHIFTS_PX ….
 _START_SHIFTS_PX = np.linspace(-1.5, 1.5, 7)
-# [sigma] Blurs of the starts, in sigmas of their logarithm. Set by eye. Study: wire_scenes.py.
+# [sigma] Blurs of the starts, in sigmas of their logarithm. By one or five of them touch moves by
+# 0.07 sigma. Study: thresholds.py wire.starts _START_BLUR_SIGMAS ….
 _START_BLUR_SIGMAS = (-1.2, 0.2, 1.6)
 # [segments] By so many the starts are ranked. With 100 one view of 65 ended 0.8 px off. Study:
 # wire_scenes.py.
@@ -24,7 +26,8 @@ _START_SEGMENTS = 300
 _MOST_STARTS = 3
 # [px] No two starts that are followed have common shifts so near. Study: wire_scenes.py.
 _START_SEPARATION_PX = 0.3
-# [px] Ends of two descents that are nearer are one minimum: they are 0.01 px apart. Set by eye. Study: wire_scenes.py.
+# [px] Ends of two descents that are nearer are one minimum: they are 0.01 px apart. 0.03 or 0.3 move
+# nothing on the fixtures. Study: thresholds.py wire.starts _SAME_END_PX ….
 _SAME_END_PX = 0.1
 # [1] Factor on both for a start's descent, from whose end another begins: half a sigma by what all
 # share. With it d_x, touch, slope and slip move by 0.006 sigma at most in twelve scenes. Study:

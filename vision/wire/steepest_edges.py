@@ -14,7 +14,9 @@ from vision.wire.bands import Pieces
 _BIN_PX = 0.5
 # [bins] Blur of the profile before its slope is taken. Derived.
 _SMOOTH_BINS = 1.2
-# [1] Edges lie between so many half-widths from the curve. Set by eye. Study: real_wires.py.
+# [1] Edges lie between so many half-widths from the curve. From 0.4 on points of path-traced wires
+# scatter by 1.44 sigma in place of 1.32; up to 2.2 they are the same. Study: thresholds.py
+# wire.steepest_edges _WINDOW ….
 _WINDOW = (0.55, 1.7)
 # [px] And within so much of the half-width at least. Stated.
 _LEAST_WINDOW_PX = 1.0

@@ -8,15 +8,22 @@ the two rig pictures' corners against the true cameras, RMS error in px and over
 board in noise of 8 levels with a rod before it (tests/scenes/board_pictures.py). Of calibration: where the cameras
 calibrated from that session project points of the rig, against the true ones, RMS in px and over the stated sigma. Of
 pictures.scene_match: peaks of frames against their own rig pictures, the largest against another's, and by how much a
-known change of brightness is missed, RMS. Of all other folders: two whisks of that session and one of each scene in
+known change of brightness is missed, RMS. Of lines between two ends (BETWEEN_ENDS): those of the wire in
+fixtures/scenes, as real_wires.py has them. Of all other folders: two whisks of that session and one of each scene in
 fixtures/scenes, through their true cameras (of live: pushes in these scenes); by how much of its usual sigma touch,
-d_x, slope or slip at 3° changes most, and which sigma by what factor; or a status.
+d_x, slope or slip at 3° changes most, and which sigma by what factor; or a status. `--cameras 1` shows the first camera
+alone. `--sessions FOLDER` takes the first trial of each session in a folder in their place, as of
+`tests/studies/net.py sessions FOLDER`, whose objects are rings, spheres and cones, too.
 """
 
+import argparse
 import importlib
+import inspect
+import io
 import json
 import sys
 from ast import literal_eval
+from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
 
@@ -30,14 +37,16 @@ from bench.cameras.calibrate_session import calibrate_from
 from bench.session.frame_times import frame_times, read_trial
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes, read_signals
+from bench.trials.trial_frames import stated_object
 from tests.scenes.board_pictures import picture, true_px
 from tests.scenes.recorded import exact_cameras
 from tests.studies.accuracy.board_scenes import BOARD
+from tests.studies.real_wires import trace_scenes
 from tests.studies.speed.live import Recording
 from vision.boards.corners import find_corners
 from vision.calibration.cameras_file import read_cameras
 from vision.geometry.camera import Cameras
-from vision.geometry.rods import Bar, Rods
+from vision.geometry.rods import Rods
 from vision.geometry.rotation import apply
 from vision.pictures import scene_match
 from vision.pictures.files import read_picture
@@ -51,6 +60,7 @@ SCENES = SESSION.parent / "scenes"
 RIG_POINTS_MM = np.array(
     [[x, 0.0, z] for x in np.linspace(0, 100, 11) for z in (-30.0, -15.0, 0.0, 15.0, 30.0)]
 )
+BETWEEN_ENDS = ("wire.between_ends", "wire.ridge_path", "wire.free_width", "wire.steepest_edges")
 ROD = ((300, 40), (420, 540))  # crosses the drawn board
 
 
@@ -137,14 +147,32 @@ def of_still_scenes(_session) -> str:
     )
 
 
-def whisks() -> dict[str, partial]:
-    """By name, a call that looks at a trial and gives the truth of its one whisk."""
-    scenes = {
-        path.name: (path, "w", read_cameras(path / "cameras.toml"))
-        for path in sorted(SCENES.iterdir())
-    }
-    small = {trial: (SESSION, trial, exact_cameras(SESSION)) for trial in ("b30_3", "b60_4")}
-    return {name: look_at(*what) for name, what in (small | scenes).items()}
+def of_lines(_session) -> str:
+    """What lines between two ends of the wire in the scenes are off by."""
+    said = io.StringIO()
+    with redirect_stdout(said):
+        trace_scenes(SCENES, np.random.default_rng(5))
+    return said.getvalue().splitlines()[-1]
+
+
+def whisks(cameras: int | None = None, folder: Path | None = None) -> dict[str, partial]:
+    """By name, a call that looks at a trial, by its first cameras alone, and gives the truth of its one whisk.
+
+    folder: of sessions in place of the fixtures'.
+    """
+    chosen = {}
+    if folder is None:
+        for trial in ("b30_3", "b60_4"):
+            chosen[trial] = (SESSION, trial, exact_cameras(SESSION))
+        for path in sorted(SCENES.iterdir()):
+            chosen[path.name] = (path, "w", read_cameras(path / "cameras.toml"))
+    else:
+        for path in sorted(one.parent for one in folder.glob("*/session.toml")):
+            chosen[path.name] = (path, load_session(path).trials[0].name, exact_cameras(path))
+    found = {}
+    for name, (path, trial, calibrated) in chosen.items():
+        found[name] = look_at(path, trial, calibrated.subset(calibrated.names[:cameras]))
+    return found
 
 
 def look_at(folder: Path, name: str, cameras: Cameras) -> partial:
@@ -161,7 +189,7 @@ def look_at(folder: Path, name: str, cameras: Cameras) -> partial:
         ),
         [times.frames_in(signals, stroke) for stroke in forward_strokes(signals)],
         cameras,
-        Rods(session.whisker.wire, Bar(trial.bar_diameter_mm, trial.bar_diameter_sigma_mm)),
+        Rods(session.whisker.wire, stated_object(trial)),
     )
 
 
@@ -209,8 +237,15 @@ def compared(before: dict[str, dict], after: dict[str, dict]) -> str:
 
 
 def put(module, constant: str, value) -> None:
-    """Set the constant in its module and in all of vision that took it by name. What was made of it on import stays."""
+    """Set the constant in its module, in what its functions take unless told, and in all of vision that took it by name.
+
+    What was made of it on import stays.
+    """
     usual = getattr(module, constant)
+    for function in filter(inspect.isfunction, vars(module).values()):
+        given = function.__kwdefaults__ or {}
+        same = [key for key, one in given.items() if isinstance(one, tuple) and one is usual]
+        given.update(dict.fromkeys(same, value))
     if constant.startswith("_"):  # others' of that name, the same small number, are not this one
         setattr(module, constant, value)
         return
@@ -219,10 +254,11 @@ def put(module, constant: str, value) -> None:
             setattr(other, constant, value)
 
 
-def sweep_whisks(module, constant: str, values: list[str]) -> None:
-    looks = pushes() if module.__name__.startswith("vision.live") else whisks()
+def sweep_whisks(module, constant: str, options: argparse.Namespace) -> None:
+    is_live = module.__name__.startswith("vision.live")
+    looks = pushes() if is_live else whisks(options.cameras, options.sessions)
     usual = {name: seen_values(look) for name, look in looks.items()}
-    for value in map(literal_eval, values):
+    for value in map(literal_eval, options.values):
         is_array = isinstance(getattr(module, constant), np.ndarray)
         put(module, constant, np.asarray(value) if is_array else value)
         moved = {name: seen_values(look) for name, look in looks.items()}
@@ -230,16 +266,24 @@ def sweep_whisks(module, constant: str, values: list[str]) -> None:
 
 
 def main() -> None:
-    name, constant, *values = sys.argv[1:]
+    parser = argparse.ArgumentParser()
+    parser.add_argument("module")
+    parser.add_argument("constant")
+    parser.add_argument("values", nargs="+")
+    parser.add_argument("--cameras", type=int)
+    parser.add_argument("--sessions", type=Path)
+    options = parser.parse_args()
+    name, constant, values = options.module, options.constant, options.values
     module, session = importlib.import_module(f"vision.{name}"), load_session(SESSION)
     measures = {
         "boards": of_boards,
         "calibration": of_calibration,
         "pictures.scene_match": of_still_scenes,
+        **dict.fromkeys(BETWEEN_ENDS, of_lines),
     }
     measure = measures.get(name) or measures.get(name.partition(".")[0])
     if measure is None:
-        return sweep_whisks(module, constant, values)
+        return sweep_whisks(module, constant, options)
     usual = getattr(module, constant)
     print(constant)
     for value in (usual, *map(literal_eval, values)):
