@@ -287,7 +287,7 @@ def _cosine_of_sides(slopes: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _WhiteShare:
-    """Hold the white share of n places on a blurred pattern (m, m).
+    """The white share of n places on a blurred pattern (m, m).
 
     across, down: the modules along u and v. blur (n, 2): along both, in modules. covariance (n,): of
     the blur along u with that along v. Where the print is seen aslant these are correlated:

@@ -2,8 +2,8 @@
 
 A view's pose touches only the cameras that saw it, so that all poses are eliminated from the normal
 equations (Schur complement) after the pictures' instants. The work grows linearly with views; what
-is left to solve is as small as the cameras are few, and its inverse is the covariance of what is
-kept, everything eliminated being marginalised. Where the board's points are free they are eliminated
+is left to solve is as small as the cameras are few, and its inverse is the covariance of its
+parameters, with all others marginalised. Where the board's points are free they are eliminated
 last.
 """
 
@@ -78,7 +78,7 @@ class _Problem:
 
     @cached_property
     def free(self) -> "_Free":
-        """Return what is free of globals and points."""
+        """Return which directions of the globals and the points are free."""
         modes = np.zeros((0, 0))
         if self.priors.point_sigma_mm:
             modes = common_modes(self.board, self.seen.corner)
@@ -97,10 +97,10 @@ class _Problem:
 
 @dataclass(frozen=True, eq=False)
 class _Free:
-    """Hold what is free of globals and points.
+    """Which directions of the globals and the points are free.
 
     directions (G, F): how the globals move with the free ones. modes (3 m, k): orthonormal changes of
-    points that are held; (0, 0) where all points are.
+    the points that are held at 0; (0, 0) where all points are held.
     """
 
     directions: np.ndarray
@@ -210,7 +210,8 @@ def _eliminate_points(
 
 
 def _solve_but_modes(matrix: np.ndarray, right: np.ndarray, modes: np.ndarray) -> np.ndarray:
-    """Solve matrix · x = right (n, q) by x without any share of some modes (n, k), for a positive matrix."""
+    """Solve matrix · x = right (n, q) with modesᵀ x = 0 for some modes (n, k); the matrix is positive
+    definite."""
     solved = cho_solve(cho_factor(matrix), np.column_stack([right, modes]))
     yielding = solved[:, right.shape[1] :]
     x = solved[:, : right.shape[1]]

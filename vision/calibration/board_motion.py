@@ -21,12 +21,11 @@ _REACH_INTERVALS = 2.6
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Views in time.
+    """The times of V views.
 
     time_s (V,): NaN for a view that is not on the trajectory (the board on the rig). camera_rank
-    (C,): in each view the picture of the camera that ranks first has the view's time; the instants
-    of the others say how late they are. (A view all of whose pictures were late would be the same
-    view elsewhere.)
+    (C,): in each view the picture of the camera that ranks first is taken at the view's time; the
+    others' instants are counted from it, as only differences of time can be seen.
     """
 
     time_s: np.ndarray
@@ -71,11 +70,12 @@ class Trajectory:
         return np.concatenate([turn, neighbour[..., 3] - own[..., 3]], axis=-1)
 
     def shares(self, view: np.ndarray, elapsed_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return how much of the path to the pose before and after the board has gone.
+        """Return which shares of its paths to the pose before and to that after the board has gone.
 
         elapsed_s (n,): since the time of each view (n,). Returns shares (n, 2) and their rates
-        (n, 2), 1/s: the parabola that is 0 now and at the other neighbour, and 1 at its own; a
-        straight line where there is one neighbour, nothing where there is none.
+        (n, 2), 1/s. Each share is the parabola in time that is 0 at the view and at the other
+        neighbour, and 1 at its own: a straight line where there is no other neighbour, and 0 where
+        its own is missing.
         """
         elapsed = elapsed_s[:, None]
         interval = self.time_s[self.neighbours[view]] - self.time_s[view][:, None]  # (n, 2) s

@@ -116,8 +116,8 @@ def adjust_with_noise(
 def _adjust_robustly(
     state: BundleState, seen: Sightings, board: Board, priors: Priors, error: np.ndarray
 ) -> tuple[Solution, np.ndarray, Priors]:
-    """Adjust robustly with model errors (C,) px; also return the errors and the priors learnt by
-    it.
+    """Adjust robustly with model errors (C,), px; return the solution, and the errors and priors that
+    its residuals show.
     """
     solution = adjust_bundle(
         state, seen.with_error(error), board, priors, width=_ROBUST_WIDTH, tolerance=1e-4
@@ -213,8 +213,8 @@ def _error_by_mean(
     priors: Priors,
     fitted_points: float,
 ) -> np.ndarray:
-    """Return each camera's model error (C,), px, at which the kept residuals' mean square is what
-    so many fitted parameters leave of it.
+    """Return each camera's model error (C,), px, with which the kept residuals have a mean square of
+    1 per degree of freedom, over their sigmas.
     """
     parameters = priors.free.sum() + 6 * priors.view_free.sum() + fitted_points
     if priors.late_sigma_s is not None:

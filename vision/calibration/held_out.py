@@ -5,10 +5,10 @@ up much of what is wrong. One pose for all cameras tests whether they agree. Dis
 neighbouring corners, triangulated, are compared in millimetres with the pitch of the print as
 adjusted.
 
-Of cameras that are not triggered together, the last two are taken three ways, in the order of what
-is fitted to the held-out pictures themselves: nothing but the board's pose, the pictures being as
-of one instant; the same with each camera late by its one offset, known from the other views; and
-with the instant of each picture fitted too.
+Cameras that are not triggered together take the pictures of a view at different instants. For them
+the last two figures are measured three times: with all pictures of a view as of one instant; with
+each camera late by its one offset, known from the other views; and with an instant fitted for each
+held-out picture. But for these instants, only the board's poses are fitted to held-out pictures.
 """
 
 from collections.abc import Mapping, Sequence
@@ -51,10 +51,10 @@ class Agreement:
 class HeldOut:
     """Errors on held-out views (how many) with corners (how many) that more than one camera has.
 
-    alone_px: per camera, a pose for each view of that camera. at_once: all pictures of a view taken
-    as of one instant. offsets: each camera late by its one offset, none of it fitted here.
-    instants: each picture's instant fitted along with the board's pose. The last two are None where
-    cameras count as triggered together.
+    alone_px: by camera, with a pose for each view of that camera. at_once: with all pictures of a
+    view as of one instant. offsets: with each camera late by its one offset, which is not fitted
+    here. instants: with each picture's instant fitted along with the board's pose. The last two are
+    None where cameras count as triggered together.
     """
 
     alone_px: Mapping[str, float]

@@ -223,7 +223,7 @@ def _lower_band(blocks: np.ndarray, poses: np.ndarray, size: int) -> np.ndarray:
 
 
 class _SightingRows(NamedTuple):
-    """Hold the weighted rows of sightings: by all but points, with the residual as last column, others
+    """The weighted rows of sightings: by all but points, with the residual as last column, others
     (n, 2, p + 1), and by the board's point of each, own (n, 2, 3).
     """
 
@@ -270,11 +270,12 @@ class _SightingRows(NamedTuple):
 
 
 def common_modes(board: Board, seen: np.ndarray) -> np.ndarray:
-    """Return the orthonormal changes (3 m, k) of a board's points that are no errors of theirs: motions of
-    a face as one, which are its pose, and a plane's scale and stretch, which no view shows apart from
-    distance and lens.
+    """Return an orthonormal basis (3 m, k) of those changes of a board's points that the points do not
+    have as parameters, because others stand for them.
 
-    seen (n,): the points seen. A face of which too few are has no motions.
+    These are the motions of a face as a whole, which are its pose, and scale and stretch of a plane,
+    which no view distinguishes from distance and lens. seen (n,): the points seen. A face of which
+    too few are seen has no motions.
     """
     is_seen = np.isin(np.arange(len(board.face_of)), seen)
     faces = np.unique(board.face_of)
@@ -291,8 +292,8 @@ def common_modes(board: Board, seen: np.ndarray) -> np.ndarray:
 
 
 def _motions(board: Board, points: np.ndarray) -> np.ndarray:
-    """Return how the board's points (m, 3, 6) change as some of them move as one: shifts, then turns
-    about their middle.
+    """Return the changes (m, 3, 6) of the board's points by a motion of some of them as a whole: three
+    shifts, then three turns about their middle.
     """
     away = board.corners_mm[points] - board.corners_mm[points].mean(axis=0)
     shifts = np.broadcast_to(np.eye(3), (len(points), 3, 3))

@@ -57,12 +57,12 @@ _CLEAR_LEAN = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """The share by which all lengths are too long, as a board's square that is stated too large makes
-    them: 0 as it is stated.
+    """The share by which all lengths come out too long, because the board's square is smaller than
+    stated; 0 where it is as stated.
 
-    stated_sigma: of the stated square, as a share. by_share (6,): how the step of a placement
-    changes with the share. share, sigma: as board and swing together show it; None and infinity by
-    the board alone. is_why: it explains why they disagree.
+    stated_sigma: of the stated square, as a share. by_share (6,): derivative of a placement's step.
+    share, sigma: as board and swing together show it; None and infinity by the board alone. is_why:
+    whether it explains why they disagree.
     """
 
     stated_sigma: float
@@ -75,8 +75,9 @@ class Scale:
     def variance(self) -> float:
         """Return the variance of the share about 0.
 
-        A stated square is right within its sigma, or wrong (_WRONG_SQUARE). What is measured says how
-        probable that is: so much of the correction that it asks for is added. An exact one has none.
+        A stated square is right within its sigma, or, with the probability _WRONG_SQUARE, wrong. The
+        measured share updates that probability; the square of the correction that a wrong square
+        asks for is added in proportion to it. A square stated as exact has no variance.
         """
         stated = self.stated_sigma**2
         if self.share is None or not stated:
@@ -168,11 +169,11 @@ def by_board(
 def gain_of(
     covariance: np.ndarray, by_step: np.ndarray, noise: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return by how much (6, k) a step follows what is observed besides, and the covariance (6, 6) that
-    is left.
+    """Return the gain (6, k) with which an observation corrects a step, and the step's covariance
+    (6, 6) then (Kalman's update, in Joseph's form).
 
-    covariance (6, 6): of the step before. by_step (k, 6): derivatives of what is observed, with the
-    covariance noise (k, k).
+    covariance (6, 6): of the step before. by_step (k, 6): derivatives of the observed values, whose
+    covariance is noise (k, k).
     """
     spread = by_step @ covariance
     gain = np.linalg.solve(spread @ by_step.T + noise, spread).T
@@ -184,8 +185,8 @@ def combine(board: Placement, swing: Placement) -> Placement:
     """Combine two placements by their covariances; with an alarm where they disagree by more than
     chance allows.
 
-    A board taken as exact stays as it is, the alarm included. The result is as wide and rises as the
-    second.
+    A board taken as exact is not moved, but its disagreement with the swing is still an alarm.
+    rise_rad and width_rad are the swing's.
     """
     difference = swing.step - board.step
     Sigma = board.covariance + swing.covariance  # covariance of the difference
@@ -211,11 +212,12 @@ def combine(board: Placement, swing: Placement) -> Placement:
 
 
 def check_swing_suffices(placement: Placement, marker: str = "") -> str:
-    """Return '' where the swing fixes the centre well along the whisker, which is what distances
-    count from; else a warning that says how wide a stroke would.
+    """Return a warning where the swing does not fix the centre of rotation well along the whisker,
+    where distances begin; '' where it does.
 
-    marker: what a marker on the hub gave besides, in words; how much wider strokes help it depends
-    on its print, so no width is named then. Raises Refused where a ruler would do better.
+    The warning says how wide a stroke would suffice. marker: what a marker on the hub gave besides,
+    in words; no width is named then, as it depends on the marker's print. Raises Refused where a
+    ruler would do better.
     """
     along_mm = float(np.sqrt(placement.covariance[3, 3]))
     if along_mm <= _HELPED_ALONG_SIGMA_MM:
@@ -257,8 +259,8 @@ def _alarm(first: Placement, second: Placement, Sigma: np.ndarray) -> str:
 def _turn_share(difference: np.ndarray, sigma: np.ndarray) -> float | None:
     """Return how many times as far as the motor the whisker turns, where that may be the cause.
 
-    About an axis that leans along the whisker by an angle a it sweeps cos a of the motor's angle: a
-    share that is less than one passes for such a lean, in either sense.
+    A whisker that turns by cos a of the motor's angle looks like one whose axis leans along it by the
+    angle a, to either side.
     """
     if abs(difference[_LEAN_ALONG]) < _CLEAR_LEAN * sigma[_LEAN_ALONG]:
         return None
@@ -268,11 +270,12 @@ def _turn_share(difference: np.ndarray, sigma: np.ndarray) -> float | None:
 def _seen_scale(
     difference: np.ndarray, Sigma: np.ndarray, scale: Scale | None, chi2: float
 ) -> Scale | None:
-    """Return the scale that explains a difference (6,) of this covariance (6, 6) best, and whether it
-    does where chance does not; None without a board, or one in the centre. chi2: of the difference.
+    """Return the scale that explains a difference (6,) of this covariance (6, 6) best, with `is_why`
+    where it does and chance does not; None without a board, or one in the centre.
 
-    One number has the power that six have not: a board that is 2 % too large, placed to 0.2 mm and
-    0.2 degrees, leaves χ² within what six let pass.
+    chi2: of the difference. A test of this one number finds what that of six does not: a board that
+    is 2 % too large, placed to 0.2 mm and 0.2 degrees, leaves χ² of six degrees of freedom within
+    what chance allows.
     """
     if scale is None or not scale.by_share.any():
         return None
@@ -288,9 +291,9 @@ def _seen_scale(
 def rescale(cameras: Cameras, board_mm: np.ndarray, placement: Placement) -> Cameras:
     """Return cameras placed by board and swing with the uncertainty that the scale gives them.
 
-    Lengths from the board, and the rig frame between them, are longer together: calibrated by the
-    board alone, the cameras count the first, and what its square is stated to. board_mm (3,): the
-    board's origin in the rig frame.
+    With the scale, the cameras move away from the board and the rig frame moves between them. The
+    calibration by the board has counted the first of these, by the stated square's sigma alone: it
+    is taken off, and both together are added. board_mm (3,): the board's origin in the rig frame.
     """
     scale = placement.scale
     if scale is None or not scale.stated_sigma:
@@ -311,8 +314,8 @@ def move_rig_frame(cameras: Cameras, before: Placement, after: Placement) -> Cam
     (see `by_board`).
 
     Their covariance loses the placement error that `before` gave to all of them in common and gains
-    that of `after`. The swing is seen by the same cameras; of that link the scale counts
-    (`rescale`).
+    that of `after`. The swing was seen by the same cameras; of this correlation only the scale is
+    counted (`rescale`).
     """
     moved = []
     for camera in cameras:
@@ -328,8 +331,8 @@ def move_rig_frame(cameras: Cameras, before: Placement, after: Placement) -> Cam
 
 
 def _clip_eigenvalues(covariance: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Remove the negative eigenvalues that rounding left where nearly all of a variance was taken
-    off.
+    """Return a covariance without the negative eigenvalues that rounding leaves where nearly all of
+    a variance was taken off.
 
     scale: of each parameter.
     """

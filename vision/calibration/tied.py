@@ -91,10 +91,11 @@ class JointInput:
     def adjust(self) -> JointAdjustment:
         """Adjust all cameras jointly.
 
-        Views of one index count as of one board where they agree with that and it explains them;
-        where each camera by itself explains its views better, they are its own if the board on the
-        rig places the cameras. Raises Refused where they explain them far better, and nothing else
-        determines how the cameras stand to each other.
+        Views of one index count as of one board where the cameras' poses agree with that and the
+        joint adjustment explains the views as well as each camera by itself does. Else each camera
+        has views of its own, if the board on the rig places the cameras. Without that board the
+        cameras stay tied, and `disagreement` says so; raises Refused where views are explained far
+        worse so than by each camera itself.
         """
         if self._is_one_picture:
             return self._adjust(self._layout(together=True))

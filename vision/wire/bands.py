@@ -29,7 +29,7 @@ _SECOND_DIFFERENCE = (-1.0, 16.0, -30.0, 16.0, -1.0)
 
 @dataclass(frozen=True)
 class Band(Rows):
-    """Hold the pixels near a predicted curve: n steps along it, k pixels across.
+    """The pixels near a predicted curve: n steps along it, k pixels across.
 
     offset_px (n, k): signed distance of each pixel along the curve's normal from the middle between
     the rod's edges on its row of pixels.
@@ -141,7 +141,7 @@ class _Path:
 
     @property
     def side(self) -> float:
-        """Return 1 where the axis's own normals lie as normals of a band shall, else -1."""
+        """Return 1 where the axis's own normals point to the side that a band's do, else -1."""
         return 1.0 if (self.along == 0) == (self.place[-1] >= self.place[0]) else -1.0
 
     def as_xy(self, along: np.ndarray, across: np.ndarray) -> np.ndarray:
@@ -193,7 +193,7 @@ class _BandPixels:
 
 @dataclass(frozen=True)
 class Pieces(Rows):
-    """Hold short segments of bands, all of one size: s segments of p pixels each.
+    """Short segments of bands, all of one size: s segments of p pixels each.
 
     offset_px, grey, background (s, p): as in `Band`.
     slope, curvature (s, p): of the background across the rod, per px and per px².
@@ -256,11 +256,11 @@ class Pieces(Rows):
         return replace(self, **{name: getattr(self, name)[:, keep] for name in names})
 
     def thinned(self, most: int) -> "Pieces":
-        """Return every so-and-so-many-th segment, so that they are `most` or fewer."""
+        """Return every k-th segment, with the least k that leaves `most` or fewer."""
         return self.select(slice(None, None, 1 + len(self) // most))
 
     def show_rod(self, margin_px: float) -> np.ndarray:
-        """Return which segments (s,) lack no pixel of the expected rod, nor within a margin of it."""
+        """Return which segments (s,) have all pixels of the expected rod and of a margin beside it."""
         needed = np.abs(self.offset_px) <= self.radius_px[:, None] + margin_px
         return ~np.any(needed & (self.weight == 0), axis=1)
 

@@ -99,7 +99,7 @@ class BetweenSettings:
 
 @dataclass(frozen=True)
 class WireLine:
-    """Hold the line of a thin object in one picture.
+    """The line of a thin object in one picture.
 
     points: n points from the start on; `place` is the arc length in px. radius_px (n,): half the
     width. blur_px: of the lens. chi2: median over the segments, per pixel. scatter: see
@@ -129,7 +129,7 @@ def trace_between(
 ) -> WireLine:
     """Trace the thin object between two points (x, y) of a grey picture (h, w).
 
-    The object is 2 to 40 px wide, darker or brighter than what is behind it or now this, now that;
+    The object is 2 to 40 px wide, darker or brighter than what is behind it, or both in turn;
     the points are a few px off its middle at most. Raises Refused, with a code: end_outside,
     ends_together, no_line (no object joins the ends), hidden (too little of it is seen),
     light_not_explained (its light is not that of a lit rod), not_converged.
@@ -157,7 +157,7 @@ def _curve_of(path: CoarsePath, scale: int) -> Curve:
 
 @dataclass(frozen=True)
 class _Fitted:
-    """Hold a line about which nothing moves: its curve, trace, points, and scatter."""
+    """A line about which nothing moves: its curve, trace, points, and scatter."""
 
     curve: Curve
     traced: WireTrace

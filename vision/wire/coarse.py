@@ -48,7 +48,7 @@ _WEAK = 1e-3
 
 @dataclass(frozen=True)
 class Votes:
-    """Hold the votes of segments of a predicted curve for where a rod is.
+    """The votes of segments of a predicted curve for where a rod is.
 
     share (s, 2 reach + 1): of the contrast near each segment that neither picture explains, the part
     that a rod at a shift of -reach, …, reach px would explain.

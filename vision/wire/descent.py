@@ -52,7 +52,7 @@ _CONVERGED_EACH = 1e-3
 
 @dataclass(frozen=True)
 class SharedSolution:
-    """Hold what all segments share, and where they lie by it.
+    """What all segments share, and where they lie by it.
 
     shift_px (s,): positions. shared_px (s, k): by how much each moves with one sigma of each of k
     independent causes that all share. coefficients (s, terms): the shading of each.
@@ -71,7 +71,7 @@ class SharedSolution:
 
 @dataclass(frozen=True)
 class Causes:
-    """Hold the independent causes that move segments together: errors of shading and of blur.
+    """The independent causes that move segments together: errors of shading and of blur.
 
     root (size + 1, size + 1): lower root of the inverse covariance of shading and blur, positions
     eliminated. in_common (size + 1,): the part of each cause that moves all segments to one side, px at
@@ -132,7 +132,7 @@ def _solve_positive(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Point:
-    """Hold positions and blur, and the most probable shading there.
+    """Positions and blur, and the most probable shading there.
 
     left: normal matrix (size, size) of the shading. by_knot (knots, terms): the shading at its knots.
     coefficients (s, terms): of each segment.
@@ -249,7 +249,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Step:
-    """Hold a step of positions (s,), px, and of the blur's logarithm.
+    """A step of positions (s,), px, and of the blur's logarithm.
 
     gain_shared, gain_each: by how much chi² is expected to fall by what all share, and by
     positions.

@@ -31,7 +31,7 @@ _ONE_SIDED = 0.8
 
 @dataclass(frozen=True)
 class SeenWidth:
-    """Hold the width that is seen, the width by the diameter, and the offset of what is seen, px.
+    """The width that is seen, the width by the diameter, and the offset of what is seen, px.
 
     off_px: of the middle of what is seen from the axis, along the normal.
     """
@@ -94,7 +94,7 @@ def _means(bins: np.ndarray, values: np.ndarray, count: np.ndarray) -> np.ndarra
 
 @dataclass(frozen=True)
 class WireAppearance:
-    """Hold how one camera sees the wire: lens blur in px, and the width that is seen.
+    """How one camera sees the wire: lens blur in px, and the width that is seen.
 
     misfit: RMS that the model of its light leaves in the median segment, over the noise.
     """

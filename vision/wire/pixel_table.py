@@ -7,7 +7,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class PixelTable:
-    """Hold where pixels (n,) stand in a table of this shape, a row for each segment.
+    """Where pixels (n,) stand in a table of this shape, a row for each segment.
 
     order (n,): the pixels by segment and then by offset. row, column (n,): of each in that order; a
     short row's pixels stand in the middle.

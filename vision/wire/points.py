@@ -13,7 +13,7 @@ SHARED = 4
 
 @dataclass(frozen=True)
 class LinePoints(Rows):
-    """Hold points of a rod's axis in one picture.
+    """Points of a rod's axis in one picture.
 
     px (n, 2). normal (n, 2): unit. sigma_px (n,): along the normal. place (n,): mm along the rod.
     shared_px (n, SHARED): by how much each point moves with one sigma of each cause that all points
@@ -40,7 +40,7 @@ class LinePoints(Rows):
 
 @dataclass(frozen=True)
 class Observed:
-    """Hold the line points of one camera in one frame; frame is -1 for those of the touched object.
+    """The line points of one camera in one frame; frame is -1 for those of the touched object.
 
     side: of the bar's outline the middle (0), or the edge towards (1) or against (-1) the points'
     normals. bar_in: the frame in which a bar that moves is seen.

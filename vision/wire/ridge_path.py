@@ -74,7 +74,7 @@ _ALIKE_COST = 1.5
 
 @dataclass(frozen=True)
 class CoarsePath:
-    """Hold a path (n, 2) px between two points and the half-width (n,) px of the object along it.
+    """A path (n, 2) px between two points and the half-width (n,) px of the object along it.
 
     score: mean over the path of what medialness is over that of a plain object, 0 to 1. cost: of the
     whole path over that of the cheapest one.
@@ -127,7 +127,7 @@ def _no_object(ends: np.ndarray, found: str) -> Refused:
 
 @dataclass(frozen=True)
 class Medialness:
-    """Hold how steep the weaker of two opposite edges is about each pixel.
+    """How steep the weaker of two opposite edges is about each pixel.
 
     radius_px (r,): half-widths. layers (r, h, w): grey levels per px of the picture in which a
     half-width is searched. noise (r,): of the gradients.
@@ -298,7 +298,7 @@ def _cheapest(
 
 @dataclass(frozen=True)
 class _PathSearch:
-    """Hold a search of the cheapest path, in a picture shrunk by `scale`.
+    """A search of the cheapest path, in a picture shrunk by `scale`.
 
     scores (r, h, w): of the full picture. cost (r, h / scale, w / scale). nodes (n, 3): of the path.
     firsts, lasts: nodes about the two ends.

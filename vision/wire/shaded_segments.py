@@ -23,7 +23,7 @@ _MODEL_ERROR_BIN_PX = 0.3
 
 @dataclass(frozen=True)
 class ShadedSegments:
-    """Hold what is to be explained: segments, by so many shading functions at these knots.
+    """What is to be explained: segments, by so many shading functions at these knots.
 
     blur_px, blur_sigma: prior of the lens blur, and of its logarithm.
     seen_blur_px: the blur of an earlier pass, which said where the segments are expected; else None.

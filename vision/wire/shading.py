@@ -40,7 +40,7 @@ _RIDGE = 1e-6
 
 @dataclass(frozen=True)
 class Knots:
-    """Hold the places between which a rod's shading is interpolated linearly.
+    """The places between which a rod's shading is interpolated linearly.
 
     place_mm (m,): along the rod. turn_rad (k,): angles of the rod, where it turns far.
     turns: angle of each band (`Pieces.source`), rad; needed where k > 1.
@@ -75,7 +75,7 @@ class Knots:
 
 @dataclass(frozen=True)
 class Shading:
-    """Hold the radiance round the rod.
+    """The radiance round the rod.
 
     coefficients (k m, terms): at each knot, of 1, sin t, cos t, …, in grey levels. blur_px: of the
     lens.
@@ -208,8 +208,8 @@ class SegmentEquations:
         return mixed - reduced @ self._by_background, gram
 
     def _gain_by_cover(self, residual: np.ndarray) -> np.ndarray:
-        """Return what each pixel (s, p) loses of the background where the rod covers all of it,
-        negated.
+        """Return the change (s, p) of each pixel's grey level as the rod covers all of it: that of
+        the fitted background, negated.
 
         residual (s, p): what the rod's light leaves of the grey level, by weight.
         """
@@ -238,7 +238,7 @@ class SegmentEquations:
 
 @dataclass(frozen=True)
 class PositionEquations:
-    """Hold the normal equations of each segment for its position (px) and the blur's logarithm.
+    """The normal equations of each segment for its position (px) and the blur's logarithm.
 
     Gain and offset of the background are eliminated.
     rod (s, 2, terms): products of the two derivatives with those by the shading's coefficients.

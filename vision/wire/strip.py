@@ -36,7 +36,7 @@ _BACKGROUND_TERMS = 4
 
 @dataclass(frozen=True)
 class Curve:
-    """Hold a curve: nodes (m, 2) px at equal steps, their arc length (m,) px and the object's
+    """A curve: nodes (m, 2) px at equal steps, their arc length (m,) px and the object's
     half-width (m,) px.
     """
 
@@ -110,7 +110,7 @@ def _shows_both_sides(pieces: Pieces) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Pixels:
-    """Hold pixels near a curve: signed distance and arc length of the foot, px, and grey level, (n,)."""
+    """Pixels near a curve: signed distance and arc length of the foot, px, and grey level, (n,)."""
 
     offset_px: np.ndarray
     place_px: np.ndarray

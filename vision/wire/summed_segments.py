@@ -127,8 +127,8 @@ class SummedSegments:
     def _explained_by_gain(self, shapes: "_Shapes") -> np.ndarray:
         """Return what the background's gain explains, (s, models, terms + 2).
 
-        Of each shading function, of the grey level and of the background's offset: their products
-        with the background, over its root.
+        For each shading function, the grey level and the background's offset it is their product
+        with the background, over the root of the background's square.
         """
         behind = shapes.background.transpose(2, 0, 1)  # (3, d, models)
         models = behind.shape[2]

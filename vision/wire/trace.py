@@ -127,7 +127,7 @@ def clear_of_bar(
 
 @dataclass(frozen=True)
 class WireTrace:
-    """Hold segments moved to where the rod is, what is known of each, and the lens blur in px."""
+    """Segments moved to where the rod is, what is known of each, and the lens blur in px."""
 
     pieces: Pieces
     solved: SegmentSolution
@@ -185,7 +185,7 @@ def trace(
 
 @dataclass(frozen=True)
 class SegmentPositions(Rows):
-    """Hold where s segments of a wire lie, without their pixels.
+    """Where s segments of a wire lie, without their pixels.
 
     px, normal (s, 2), place (s,): as of `LinePoints`. source (s,): the band of each. own_sigma_px,
     chi2 (s,), shared_px (s, k), widened_px2 (s, 2): as of `vision.wire.joint.SegmentSolution`.
