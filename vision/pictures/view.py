@@ -9,6 +9,7 @@ import numpy as np
 
 from vision.geometry.camera import Camera
 from vision.geometry.sampling import spread
+from vision.pictures.change import HALF
 from vision.pictures.others import Others, RodLines, mask_rods
 from vision.pictures.pixel_noise import Noise
 
@@ -21,6 +22,8 @@ _SCALE_OF = 3
 SATURATED = 250.0 / 255.0
 # [frames] More would not make a still thing clearer: noise is down by 6.3. Derived.
 MEAN_OF = 40
+# [frames] More would not make the object clearer; a wire that moves vanishes. Study: bar_scenes.py.
+_MEDIAN_OF = 11
 # [frames] That show a pixel of the bar clear of all wires: of a stroke that begins 3° before
 # touch, in steps of 0.5°, two to three show all of it. The noise of all pixels is taken to be
 # that of two. Study: arrays_seen.py.
@@ -61,6 +64,25 @@ class View:
         brightest = max(float(np.max(picture)) for picture in self.some(_SCALE_OF))
         bits = max(8, int(np.ceil(np.log2(brightest + 1.0))))
         return 2.0**bits - 1.0
+
+    @cached_property
+    def still(self) -> np.ndarray:
+        """Return the picture (h, w) of what stands still, at every HALF-th pixel.
+
+        It is the median of some frames. A wire that moves vanishes. Where rods are known it is the
+        mean without these, so that a wire that rests on the bar vanishes, too.
+        """
+        frames = [np.ascontiguousarray(one[::HALF, ::HALF]) for one in self.some(_MEDIAN_OF)]
+        median = median_of(frames)
+        if self.itself is None:
+            return median
+        mean = self.mean[::HALF, ::HALF]
+        return np.where(np.isnan(mean), median, mean)
+
+    @property
+    def half_background(self) -> np.ndarray:
+        """Return the background (h, w) at every HALF-th pixel."""
+        return self.background[::HALF, ::HALF]
 
     @property
     def mean_share(self) -> float:

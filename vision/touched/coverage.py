@@ -16,12 +16,12 @@ import cv2
 import numpy as np
 
 from vision.geometry.camera import Camera
-from vision.geometry.rods import Rods
 from vision.geometry.rounded import RoundedAxis
 from vision.pictures.change import HALF, change_confidence
 from vision.pictures.view import View
 from vision.touched.grid_search import ObjectScore, SearchPass
 from vision.touched.places import PlaceGrid, Places
+from vision.touched.search_scene import SearchScene
 
 # [px] Blur of the maps, pass by pass. Set by eye. Study: rounded_seen.py.
 _BLURS_PX = (5.0, 2.5, 1.0)
@@ -68,14 +68,11 @@ class ChangeMap:
     field: np.ndarray
 
     @classmethod
-    def from_pictures(cls, view: View, still: np.ndarray) -> "ChangeMap":
-        """Compute the map of a view.
-
-        still (h, w): the picture of what stands still, at every HALF-th pixel.
-        """
-        background = view.background[::HALF, ::HALF]
+    def from_view(cls, view: View) -> "ChangeMap":
+        """Compute the map of a view."""
+        still = view.still.astype(float)
         noise = view.noise.times(view.mean_share)
-        field = change_confidence(still.astype(float), background, noise).astype(np.float32)
+        field = change_confidence(still, view.half_background, noise).astype(np.float32)
         square = np.ones((_CLOSED_PX, _CLOSED_PX))
         return cls(view.camera, cv2.morphologyEx(field, cv2.MORPH_CLOSE, square))
 
@@ -92,26 +89,21 @@ class ChangeMap:
         return self.field.ravel().take(row * width + column), is_inside
 
 
-def find_covering(
-    maps: Sequence[ChangeMap], rods: Rods, motor_rad: tuple[float, float]
-) -> list[RoundedAxis]:
-    """Find the places of a ring that cover best what differs, the best first; eight at most.
-
-    motor_rad: lowest and highest motor angle, between which the whisker touches.
-    """
+def find_covering(maps: Sequence[ChangeMap], scene: SearchScene) -> list[RoundedAxis]:
+    """Find the places of a ring that cover best what differs, the best first; eight at most."""
 
     def passes_of(places_of: Places) -> list[SearchPass]:
         """Return the passes, on maps that are blurred less and less."""
         passes = []
         for blur_px, stations, kept in zip(_BLURS_PX, _STATIONS, _KEPT):
             blurred = [one.blurred(blur_px) for one in maps]
-            score = CoverageScore(places_of, blurred, rods.bar.radius_mm, stations)
+            score = CoverageScore(places_of, blurred, scene.radius_mm, stations)
             share = blur_px / _BLURS_PX[0]
             passes.append(SearchPass(score, share, share, kept))
         return passes
 
     grid = PlaceGrid(_X_MM, _TOUCH_MM, _BETA_RAD, _STARTS, _SEPARATION)
-    return grid.search(rods, motor_rad, passes_of)
+    return grid.search(scene, passes_of)
 
 
 def coverage_score(maps: Sequence[ChangeMap], ring: RoundedAxis, radius_mm: float) -> float:

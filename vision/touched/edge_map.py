@@ -18,6 +18,7 @@ from vision.geometry.camera import Camera
 from vision.geometry.centreline import rotation_z
 from vision.geometry.rods import Rods
 from vision.pictures.change import HALF
+from vision.pictures.view import View
 
 # [half-widths] An edge's own blur, so that rim and highlight stay apart: with 0.1, 83 % of 53
 # path-traced scenes were found within 3 px at once, with 0.06 87 %. Study: bar_scenes.py.
@@ -79,20 +80,19 @@ class EdgeMap:
         return self.tensor.reshape(-1, 3).take(index, axis=0)
 
 
-def compute_edge_map(
-    camera: Camera, still: np.ndarray, background: np.ndarray, rods: Rods, motor_rad: float
-) -> EdgeMap:
+def compute_edge_map(view: View, rods: Rods, motor_rad: float) -> EdgeMap:
     """Compute the edges of what stands still in one camera.
 
-    still, background (h, w): its picture and the one without rods, at every HALF-th pixel.
     motor_rad: where the whisker about touches, which says how far away the bar is.
     """
+    camera = view.camera
     middle_mm = 0.5 * rods.wire.length_mm * rotation_z(motor_rad)[:, 0]
     distance_mm = float(np.linalg.norm(middle_mm - camera.centre_mm))
     focal_px = float(np.mean(camera.lens[:2])) / HALF
     half_width_px = rods.bar.radius_mm * focal_px / distance_mm
     blur_px = max(_EDGE_BLUR * half_width_px, _LEAST_BLUR_PX)
-    return EdgeMap(camera, edge_strength_tensor(still, background, blur_px), half_width_px)
+    tensor = edge_strength_tensor(view.still, view.half_background, blur_px)
+    return EdgeMap(camera, tensor, half_width_px)
 
 
 def edge_strength_tensor(grey: np.ndarray, background: np.ndarray, blur_px: float) -> np.ndarray:

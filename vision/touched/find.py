@@ -33,6 +33,7 @@ from vision.touched.grid_search import (
     half_steps,
     touch_angles,
 )
+from vision.touched.search_scene import SearchScene
 
 # [half-widths] Blur of the edge maps, pass by pass: first half a step of the grid. Derived.
 _BLURS = (0.3, 0.12, 0.06)
@@ -67,18 +68,13 @@ _SEPARATION = 4.0
 _BATCH = 1000
 
 
-def find_bars(
-    edge_maps: Sequence[EdgeMap], rods: Rods, motor_rad: tuple[float, float], bar_reach_mm: float
-) -> list[BarAxis]:
-    """Find axes of what may be the bar, the best first; a few pixels off.
-
-    motor_rad: lowest and highest motor angle, between which the whisker touches. bar_reach_mm: see
-    `VisionSettings`.
-    """
-    radius_mm = rods.bar.radius_mm
+def find_bars(edge_maps: Sequence[EdgeMap], scene: SearchScene) -> list[BarAxis]:
+    """Find axes of what may be the bar, the best first; a few pixels off."""
+    rods = scene.rods
+    radius_mm = scene.radius_mm
     length_mm = rods.wire.length_mm
     x_mm = np.arange(_NEAREST_MM, length_mm, _X_STEP * radius_mm)
-    touch_rad = touch_angles(motor_rad, length_mm, _TOUCH_STEP * radius_mm)
+    touch_rad = touch_angles(scene.motor_range_rad, length_mm, _TOUCH_STEP * radius_mm)
 
     def axes_of(hypotheses: np.ndarray) -> BarAxis:
         """Return the axes (n, 3) of hypotheses (n, 4)."""
@@ -86,7 +82,7 @@ def find_bars(
         return axis_from_angles(x, touch, beta, psi, rods.reach_mm(x))
 
     values = [x_mm, touch_rad, _BETA_RAD, _PSI_RAD]
-    return search_bars(edge_maps, values, axes_of, radius_mm, bar_reach_mm)
+    return search_bars(edge_maps, values, axes_of, scene)
 
 
 def can_touch(axis: BarAxis, rods: Rods, motor_rad: tuple[float, float]) -> bool:
@@ -108,23 +104,21 @@ def search_bars(
     edge_maps: Sequence[EdgeMap],
     values: Sequence[np.ndarray],
     axes_of: Callable[[np.ndarray], BarAxis],
-    radius_mm: float,
-    bar_reach_mm: float,
+    scene: SearchScene,
 ) -> list[BarAxis]:
     """Find the axes whose edges are the strongest, from a grid of hypotheses, the best first.
 
     values: k arrays, the grid's values of each number. axes_of: function of hypotheses (n, k) that
-    returns their axes, points and directions (n, 3). bar_reach_mm: edges are read on so much of a
-    bar to either side of its point.
+    returns their axes, points and directions (n, 3).
     """
-    along_mm = bar_reach_mm * _ALONG
+    along_mm = scene.settings.bar_reach_mm * _ALONG
     passes = []
     for blur in _BLURS:
         is_last = blur == _BLURS[-1]
         score = EdgeScore(
             objects_of=axes_of,
             edge_maps=[one.blurred(blur) for one in edge_maps],
-            radius_mm=radius_mm,
+            radius_mm=scene.radius_mm,
             weights=_WEIGHTS if is_last else np.maximum(_WEIGHTS, 0.0),
             along_mm=along_mm if is_last else along_mm[::2],
         )

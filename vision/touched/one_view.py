@@ -16,13 +16,13 @@ from vision.geometry.camera import Camera, Cameras
 from vision.geometry.centreline import rotation_z
 from vision.geometry.contact import BarAxis
 from vision.geometry.refusals import Refused
-from vision.geometry.rods import Rods
 from vision.geometry.rotation import turned_about, unit
 from vision.touched.axis import sight_planes
 from vision.touched.edge_map import EdgeMap
 from vision.touched.edges import measure_edges
 from vision.touched.find import search_bars
 from vision.touched.object_view import ObjectView
+from vision.touched.search_scene import SearchScene
 from vision.wire.points import LinePoints
 
 # [radii] Step of the grid along the whisker. Derived.
@@ -44,19 +44,16 @@ _FARTHEST = 1.4
 _SAME_PLANE_RAD = np.radians(1.0)
 
 
-def find_bars_alone(
-    edges: EdgeMap, rods: Rods, motor_rad: float, bar_reach_mm: float
-) -> list[BarAxis]:
+def find_bars_alone(edges: EdgeMap, scene: SearchScene) -> list[BarAxis]:
     """Find axes of what may be the bar in one camera, the best first.
 
-    All are at right angles to the line of sight. motor_rad: where the whisker about touches.
-    bar_reach_mm: see `VisionSettings`.
+    All are at right angles to the line of sight. The whisker is taken as at its mean motor angle.
     """
-    step_mm = _X_STEP * rods.bar.radius_mm
-    x_mm = np.arange(_NEAREST_CONTACT_MM, rods.wire.length_mm, step_mm)
+    motor_rad = float(np.mean(scene.motor_rad))
+    x_mm = np.arange(_NEAREST_CONTACT_MM, scene.rods.wire.length_mm, _X_STEP * scene.radius_mm)
     axes_of = partial(_axes_across_sight, camera=edges.camera, motor_rad=motor_rad)
     values = [x_mm, _TURN_RAD, _FARTHER]
-    return search_bars([edges], values, axes_of, rods.bar.radius_mm, bar_reach_mm)
+    return search_bars([edges], values, axes_of, scene)
 
 
 def _axes_across_sight(hypotheses: np.ndarray, camera: Camera, motor_rad: float) -> BarAxis:

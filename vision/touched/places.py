@@ -16,6 +16,7 @@ from vision.geometry.contact import directions_at_slope
 from vision.geometry.rods import Rods
 from vision.geometry.rounded import RoundedAxis
 from vision.touched.grid_search import SearchPass, coarse_to_fine, half_steps, touch_angles
+from vision.touched.search_scene import SearchScene
 
 # [mm] Nearest contact to the whisker's base. Stated.
 _NEAREST_MM = 10.0
@@ -47,17 +48,14 @@ class PlaceGrid:
         return [x_mm, touch_rad, self.beta_rad, *free]
 
     def search(
-        self,
-        rods: Rods,
-        motor_rad: tuple[float, float],
-        passes_of: Callable[[Places], Sequence[SearchPass]],
+        self, scene: SearchScene, passes_of: Callable[[Places], Sequence[SearchPass]]
     ) -> list[RoundedAxis]:
         """Find the places with the highest scores, the best first.
 
-        motor_rad: lowest and highest motor angle, between which the whisker touches. passes_of:
-        function of a function of hypotheses (n, k) that returns the places; it returns the passes.
+        passes_of: returns the passes, by a function of hypotheses (n, k) that returns their places.
         """
-        values = self.values(rods, motor_rad)
+        rods = scene.rods
+        values = self.values(rods, scene.motor_range_rad)
         free_choices = [number.is_choice for number in rods.bar.free_numbers()]
         is_choice = [False, False, False, *free_choices]
         steps = np.where(is_choice, 0.0, half_steps(values))

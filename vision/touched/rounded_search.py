@@ -15,11 +15,10 @@ import numpy as np
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Bar, Rods
 from vision.geometry.rounded import RoundedAxis
-from vision.pictures.change import HALF
 from vision.touched.coverage import ChangeMap, coverage_score, find_covering
 from vision.touched.edge_map import compute_edge_map
 from vision.touched.rounded_fit import REACHES_PX, RoundedFit, fit_to_edges
-from vision.touched.search_scene import SearchScene, still_picture
+from vision.touched.search_scene import SearchScene
 from vision.touched.silhouette_score import find_silhouettes
 
 # [mm] Half the width of a bar whose edges are as sharp as those of the object. Stated.
@@ -56,13 +55,9 @@ def find_by_silhouette(scene: SearchScene) -> RoundedAxis:
     """
     rods = scene.rods
     as_sharp = Rods(rods.wire, Bar(2.0 * _EDGE_MM))
-    edge_maps = []
-    for view in scene.views:
-        still = still_picture(view)
-        background = view.background[::HALF, ::HALF]
-        edges = compute_edge_map(view.camera, still, background, as_sharp, scene.mid_motor_rad)
-        edge_maps.append(edges)
-    places = find_silhouettes(edge_maps, rods, scene.motor_range_rad)
+    middle_rad = scene.mid_motor_rad
+    edge_maps = [compute_edge_map(view, as_sharp, middle_rad) for view in scene.views]
+    places = find_silhouettes(edge_maps, scene)
     best = max(_refined_fits(places, scene), key=_score_of)
     if best.score < _LEAST_SCORE:
         raise _not_seen(rods)
@@ -75,8 +70,8 @@ def find_by_coverage(scene: SearchScene) -> RoundedAxis:
     Raises Refused where none covers it, or a second one as well.
     """
     rods = scene.rods
-    maps = [ChangeMap.from_pictures(view, still_picture(view)) for view in scene.views]
-    rings = _fitted_rings(find_covering(maps, rods, scene.motor_range_rad), maps, scene)
+    maps = [ChangeMap.from_view(view) for view in scene.views]
+    rings = _fitted_rings(find_covering(maps, scene), maps, scene)
     scores = np.array([coverage_score(maps, ring, scene.radius_mm) for ring in rings])
     highest = np.max(scores)
     best = rings[int(np.argmax(scores))]

@@ -30,7 +30,6 @@ from vision.geometry.ring import Ring
 from vision.geometry.rods import Bar
 from vision.geometry.rounded import Rounded
 from vision.geometry.touched import Axis, Touched
-from vision.pictures.change import HALF
 from vision.touched.axis import meeting_axis, offset_px, settle_axis
 from vision.touched.edge_map import EdgeMap, compute_edge_map
 from vision.touched.find import can_touch, find_bars
@@ -38,7 +37,7 @@ from vision.touched.line import BarLineEstimate, find_lines
 from vision.touched.object_view import ObjectView
 from vision.touched.one_view import find_bars_alone, see_bar_alone, seen_from_one_side
 from vision.touched.rounded_search import find_by_coverage, find_by_silhouette
-from vision.touched.search_scene import SearchScene, still_picture
+from vision.touched.search_scene import SearchScene
 
 # [px] An axis that its lines move by less is not measured again: half of a quick measurement's
 # blur. From 1.5 px the width in one camera moved by 3.8 of its sigma. Study: bar_scenes.py.
@@ -179,13 +178,8 @@ class BarSearch:
         scene = self.scene
         edge_maps = {}
         for view in scene.views:
-            edge_maps[view.camera.name] = compute_edge_map(
-                view.camera,
-                still_picture(view),
-                view.background[::HALF, ::HALF],
-                scene.rods,
-                scene.mid_motor_rad,
-            )
+            edges = compute_edge_map(view, scene.rods, scene.mid_motor_rad)
+            edge_maps[view.camera.name] = edges
         return edge_maps
 
     def bar_about(self, axis: BarAxis) -> SeenBar | None:
@@ -220,9 +214,7 @@ class BarSearch:
         of the best so far. Where none converges, the bar is where edges are the strongest, or there without lines.
         """
         scene = self.scene
-        maps = list(self.edge_maps.values())
-        reach_mm = scene.settings.bar_reach_mm
-        axes = find_bars(maps, scene.rods, scene.motor_range_rad, reach_mm)
+        axes = find_bars(list(self.edge_maps.values()), scene)
         found: list[SeenBar] = []
         for highest, one, other in _pairs_of(self._candidates(axes)):
             clearest = max(map(_detection_score, found), default=-np.inf)
@@ -303,8 +295,7 @@ class BarSearch:
         """
         scene = self.scene
         edges = self.edge_maps[view.camera.name]
-        motor_rad = float(np.mean(scene.motor_rad))
-        first = find_bars_alone(edges, scene.rods, motor_rad, scene.settings.bar_reach_mm)[0]
+        first = find_bars_alone(edges, scene)[0]
         wires_px = resting_lines(view.camera, scene.rods.wire, np.unique(scene.motor_rad))
         return see_bar_alone(first, replace(view, wires_px=wires_px))
 

@@ -10,15 +10,12 @@ from vision.geometry.camera import Cameras
 from vision.geometry.centreline import resting_lines
 from vision.geometry.rods import Rods
 from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.change import HALF
-from vision.pictures.view import View, median_of
+from vision.pictures.view import View
 from vision.touched.object_view import ObjectView
 
 # [lines] Of the straight wire over the stroke: where pieces of the object may show the wire, too. By 5
 # or 16 a d_x moves by 0.4 sigma. Study: thresholds.py touched.search_scene _WIRES ….
 _WIRES = 8
-# [frames] More would not make the object clearer; a wire that moves vanishes. Study: bar_scenes.py.
-_MEDIAN_OF = 11
 
 
 @dataclass(frozen=True)
@@ -58,17 +55,3 @@ class SearchScene:
             wires_px = resting_lines(view.camera, self.rods.wire, angles_rad)
             views.append(ObjectView(view, self.radius_mm, self.settings, wires_px))
         return views
-
-
-def still_picture(view: View) -> np.ndarray:
-    """Return the picture (h, w) of what stands still, at every HALF-th pixel.
-
-    It is the median of some frames. A wire that moves vanishes. Where rods are known it is the mean
-    without these, so that a wire that rests on the bar vanishes, too.
-    """
-    frames = [np.ascontiguousarray(frame[::HALF, ::HALF]) for frame in view.some(_MEDIAN_OF)]
-    median = median_of(frames)
-    if view.itself is None:
-        return median
-    mean = view.mean[::HALF, ::HALF]
-    return np.where(np.isnan(mean), median, mean)

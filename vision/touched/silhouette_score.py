@@ -10,13 +10,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from vision.geometry.rods import Rods
 from vision.geometry.rotation import unit
 from vision.geometry.rounded import RoundedAxis
 from vision.pictures.change import HALF
 from vision.touched.edge_map import EdgeMap
 from vision.touched.grid_search import ObjectScore, SearchPass
 from vision.touched.places import PlaceGrid, Places
+from vision.touched.search_scene import SearchScene
 
 # [half-widths] Blur of the edge maps, pass by pass. Set by eye. Study: rounded_seen.py.
 _BLURS = (0.5, 0.2, 0.08)
@@ -43,25 +43,20 @@ _TOUCH_MM = 2.4
 _BATCH = 4000
 
 
-def find_silhouettes(
-    edge_maps: Sequence[EdgeMap], rods: Rods, motor_rad: tuple[float, float]
-) -> list[RoundedAxis]:
-    """Find the places whose silhouettes have the strongest edges, the best first.
-
-    motor_rad: lowest and highest motor angle, between which the whisker touches.
-    """
+def find_silhouettes(edge_maps: Sequence[EdgeMap], scene: SearchScene) -> list[RoundedAxis]:
+    """Find the places whose silhouettes have the strongest edges, the best first."""
 
     def passes_of(places_of: Places) -> list[SearchPass]:
         """Return the passes, on edge maps that are blurred less and less."""
         passes = []
         for blur, kept in zip(_BLURS, _KEPT):
             blurred = [one.blurred(blur) for one in edge_maps]
-            score = SilhouetteScore(places_of, blurred, rods.bar.radius_mm)
+            score = SilhouetteScore(places_of, blurred, scene.radius_mm)
             passes.append(SearchPass(score, blur / _BLURS[0], 1.0, kept))
         return passes
 
     grid = PlaceGrid(_X_MM, _TOUCH_MM, _BETA_RAD, _STARTS, _SEPARATION)
-    return grid.search(rods, motor_rad, passes_of)
+    return grid.search(scene, passes_of)
 
 
 @dataclass(frozen=True)

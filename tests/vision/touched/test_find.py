@@ -1,5 +1,7 @@
 """The bar's edges, and the bar by them: in the light of another lamp, with a highlight, and where there is none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,6 @@ from vision.geometry.camera import Camera, Cameras
 from vision.geometry.refusals import Refused
 from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.vision_settings import VisionSettings
-from vision.pictures.change import HALF
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
 from vision.touched.edge_map import compute_edge_map, edge_strength_tensor
@@ -51,10 +52,9 @@ def test_a_polished_bar_over_squares_is_found_by_one_camera(rng):
         np.column_stack([np.eye(3), [-50.0, 0.0, AWAY_MM]]),
     )
     rods = Rods(Wire("cylinder", 100.0, 0.5), Bar(2.0 * RADIUS_MM))
-    edge_map = compute_edge_map(
-        camera, view.mean[::HALF, ::HALF], view.background[::HALF, ::HALF], rods, 0.0
-    )
-    found = find_bars_alone(edge_map, rods, 0.0, 36.0)[0]
+    view = replace(view, camera=camera)
+    scene = SearchScene([view], Cameras((camera,)), rods, np.zeros(1), VisionSettings())
+    found = find_bars_alone(compute_edge_map(view, rods, 0.0), scene)[0]
     px = camera.project(found.point_mm + np.array([-8.0, 8.0])[:, None] * found.direction)
     off = (px - CENTRE) @ [-np.sin(angle), np.cos(angle)] - np.mean(edges_px(across_mm))
     assert np.max(np.abs(off)) < 4.0
