@@ -79,7 +79,7 @@ class SwingPictures:
     """One camera's pictures of a whisk, what stands still in them, and the bar's outline.
 
     static: median of its frames; static_share: variance of its noise over that of one picture. bar_px:
-    middle (m, 2) and half-width (m,) of the bar.
+    middles (m, 2) and radii (m,) of discs that cover the bar.
     """
 
     view: View
@@ -113,7 +113,7 @@ class SwingPictures:
     def votes(self, curves: Mapping[int, Curves], reach_px: int = _REACH_PX) -> Votes:
         """Return where the wire may be near predicted curves by frame, clear of hub and bar."""
         pieces = wire_pieces(self.view, curves, self.rods.wire, PIECE_PX, reach_px - 3, self.static)
-        clear = clear_of_bar(pieces, *self.bar_px, _BESIDE_BAR_PX)
+        clear = clear_of_bar(pieces, self.bar_px, _BESIDE_BAR_PX)
         clear &= pieces.place > NEAR_CLAMP_MM
         return votes(pieces.select(clear), self.static_share, reach_px)
 

@@ -84,8 +84,8 @@ class GivenTraces(TracedLines):
         if not len(near.frame):
             return []
         segments = averaged(near, self.whisk.settings.wire_piece_px)
-        middle_px, radius_px = place.axis.covering_discs(camera, place.swept_mm)
-        is_clear = clear_of_bar(segments, middle_px, radius_px, BESIDE_BAR_PX)
+        discs_px = place.axis.covering_discs(camera, place.swept_mm)
+        is_clear = clear_of_bar(segments, discs_px, BESIDE_BAR_PX)
         segments = segments.select(is_clear & (segments.place_mm > NEAR_CLAMP_MM))
         if not len(segments.frame):
             return []

@@ -65,7 +65,7 @@ def find_sight(
     points_mm = _points_mm(pieces, curves)
     visible = _Visible(
         is_inside=np.mean(pieces.weight > 0, axis=1) > _LEAST_IN_PICTURE,
-        is_clear=clear_of_bar(pieces, *_bar_discs(known, camera), BESIDE_BAR_PX),
+        is_clear=clear_of_bar(pieces, _bar_discs(known, camera), BESIDE_BAR_PX),
         is_hidden=_hidden(camera, points_mm, hides),
     )
     return Sight(

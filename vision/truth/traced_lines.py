@@ -131,8 +131,8 @@ def clear_pieces(whisk: WhiskPictures, view: View, place: WhiskPlace) -> Pieces:
     if view.others:
         pieces = pieces.select(pieces.show_rod(_EDGE_PX))
     pieces = pieces.below(SATURATED * view.full_scale)
-    middle_px, radius_px = place.axis.covering_discs(view.camera, place.swept_mm)
-    is_clear = clear_of_bar(pieces, middle_px, radius_px, BESIDE_BAR_PX)
+    discs_px = place.axis.covering_discs(view.camera, place.swept_mm)
+    is_clear = clear_of_bar(pieces, discs_px, BESIDE_BAR_PX)
     pieces = pieces.select(is_clear & (pieces.place > NEAR_CLAMP_MM))
     gamma = known_gamma(one.camera.optics for one in whisk.views)
     return pieces.in_light(gamma, view.full_scale)

@@ -101,8 +101,8 @@ def _evidence_along(
     wire = replace(whisk.rods.wire, length_mm=visible_mm)
     static = median_of([view.frames[frame] for frame in curves])
     pieces = wire_pieces(view, curves, wire, _PIECE_PX, _FLANK_PX + _GAP_PX, static)
-    outline = whisk.bar.axis.covering_discs(view.camera, whisk.bar_swept_mm)
-    clear = clear_of_bar(pieces, *outline, _BAR_MARGIN_PX)
+    discs_px = whisk.bar.axis.covering_discs(view.camera, whisk.bar_swept_mm)
+    clear = clear_of_bar(pieces, discs_px, _BAR_MARGIN_PX)
     return _bin_evidence(pieces.place[clear], _evidence(pieces.select(clear)))
 
 

@@ -144,9 +144,9 @@ def _votes_of_curves(
 def votes(pieces: Pieces, static_share: float, reach_px: int) -> Votes:
     """Return the votes, at shifts up to reach_px, of those segments that have any.
 
-    The segments are of bands with what stands still. static_share: the part of one picture's
-    variance that what stands still has. The picture without rods is as noisy as a frame: counted as
-    exact, its noise would drown a dim rod.
+    The segments are of bands that hold what stands still as second background. static_share:
+    variance of that one's noise over one picture's. The picture without rods is as noisy as a frame:
+    counted as exact, its noise would drown a dim rod.
     """
     width_px = 1
     if len(pieces):
@@ -171,7 +171,9 @@ def _mean_residual(
     pixels: np.ndarray,
     width_px: int,
 ) -> np.ndarray:
-    """Return what a background leaves in each column (s, c), over the noise, without slow shade."""
+    """Return the mean residual of a background in each column (s, c), over the noise, without slow
+    shade.
+    """
     residual = _unexplained(pieces, background, variance_share)
     mean = sums(residual, place, pixels.shape[1]) / pixels
     return mean - uniform_filter1d(mean, _SHADE_WIDTHS * width_px, axis=1)
@@ -197,7 +199,7 @@ def _unexplained(pieces: Pieces, background: np.ndarray, variance_share: float) 
     """Return the residual (s, p), over its noise, of a background with a gain and an offset a
     segment.
 
-    variance_share: the part of one picture's variance that the background has.
+    variance_share: variance of the background's noise over one picture's.
     """
     weight = pieces.weight
     behind = background * weight

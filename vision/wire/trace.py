@@ -113,13 +113,14 @@ def _joined(curves: Collection[Curves]) -> Curves:
 
 
 def clear_of_bar(
-    pieces: Pieces, middle_px: np.ndarray, radius_px: np.ndarray, margin_px: float
+    pieces: Pieces, discs_px: tuple[np.ndarray, np.ndarray], margin_px: float
 ) -> np.ndarray:
     """Return which segments (s,) lie outside the bar's outline by more than a margin.
 
-    The outline is given by its middle (m, 2) and half-width (m,), px; NaN where it passes behind the
-    camera and hides nothing.
+    discs_px: middles (m, 2) and radii (m,) of discs that cover the bar; NaN where it passes behind
+    the camera and hides nothing.
     """
+    middle_px, radius_px = discs_px
     x, y = np.moveaxis(pieces.foot_px[:, None] - middle_px, 2, 0)  # (s, m) each
     distance = np.sqrt(x * x + y * y)
     return np.fmin.reduce(distance - radius_px, axis=1, initial=np.inf) > margin_px

@@ -215,7 +215,7 @@ def first_look(scene: Scene, rng, off_px: float = 0.7):
     ]
     pieces = cut_pieces(bands, PIECE_PX, Noise(NOISE**2, 0.0))
     if scene.bar is not None:
-        pieces = pieces.select(clear_of_bar(pieces, *_bar_outline(scene), BESIDE_BAR_PX))
+        pieces = pieces.select(clear_of_bar(pieces, _bar_outline(scene), BESIDE_BAR_PX))
     return pictures, background, trace(pieces, KNOTS)
 
 
@@ -229,7 +229,7 @@ def look_again(scene: Scene, pictures, background, seen: WireTrace) -> tuple[Wir
         bounds(scene, range(FRAMES), background),
     )
     if scene.bar is not None:
-        clear = clear_of_bar(pieces, *_bar_outline(scene), BESIDE_BAR_PX)
+        clear = clear_of_bar(pieces, _bar_outline(scene), BESIDE_BAR_PX)
         pieces, bound = pieces.select(clear), bound[clear]
     return trace(pieces, KNOTS, seen_blur_px=seen.blur_px), bound
 

@@ -144,10 +144,10 @@ def test_a_bar_that_passes_behind_the_camera_hides_no_more_than_what_is_before_i
     middle, radius = BarAxis(beside, sight).covering_discs(view.camera, 3.0)
     assert np.isnan(radius).any() and np.isfinite(radius).any()
     pieces = wire_pieces(view, curves, wire, 16, 7)
-    clear = clear_of_bar(pieces, middle, radius, 4.0)
+    clear = clear_of_bar(pieces, (middle, radius), 4.0)
     finite = np.isfinite(radius)
     assert (
-        np.array_equal(clear, clear_of_bar(pieces, middle[finite], radius[finite], 4.0))
+        np.array_equal(clear, clear_of_bar(pieces, (middle[finite], radius[finite]), 4.0))
         and clear.any()
     )
 
