@@ -23,15 +23,20 @@ from vision.touched.grid_search import ObjectScore, SearchPass
 from vision.touched.places import PlaceGrid, Places
 from vision.touched.search_scene import SearchScene
 
-# [px] Blur of the maps, pass by pass. Set by eye. Study: rounded_seen.py.
+# [px] Blur of the maps, pass by pass. By the first two alone, or 7, 3.5 and 1.5, a ring's slope
+# moves by 1.2 sigma. Study: thresholds.py touched.coverage _BLURS_PX … --sessions FOLDER.
 _BLURS_PX = (5.0, 2.5, 1.0)
-# [places] That each pass keeps. Set by eye. Study: rounded_seen.py.
+# [places] That each pass keeps. Half or twice as many move no ring. Study: thresholds.py
+# touched.coverage _KEPT … --sessions FOLDER.
 _KEPT = (24, 12, 8)
-# [points] Of a silhouette, pass by pass. Set by eye. Study: rounded_seen.py.
+# [points] Of a silhouette, pass by pass. By half as many a ring's slope moves by 1.4 sigma. Study:
+# thresholds.py touched.coverage _STATIONS … --sessions FOLDER.
 _STATIONS = (24, 32, 48)
-# [places] Of the grid that go on. Set by eye. Study: rounded_seen.py.
+# [places] Of the grid that go on. Half or twice as many move no ring. Study: thresholds.py
+# touched.coverage _STARTS … --sessions FOLDER.
 _STARTS = 64
-# [steps] Least separation of two places of the grid. Set by eye. Study: rounded_seen.py.
+# [steps] Least separation of two places of the grid. By 1 a ring's d_x moves by 0.7 sigma, by 4
+# nothing. Study: thresholds.py touched.coverage _SEPARATION … --sessions FOLDER.
 _SEPARATION = 2.0
 # [rad] Slopes of the grid. Stated.
 _BETA_RAD = np.radians(np.arange(-70.0, 71.0, 10.0))
@@ -39,18 +44,21 @@ _BETA_RAD = np.radians(np.arange(-70.0, 71.0, 10.0))
 _X_MM = 3.0
 # [mm] Step of the grid along the arc of the whisker's middle: about the tube's radius. Stated.
 _TOUCH_MM = 4.0
-# [radii] From a silhouette outwards, where the map is read: two places within it, two beyond. Set
-# by eye. Study: rounded_seen.py.
+# [radii] From a silhouette outwards, where the map is read: two places within it, two beyond. By
+# three quarters of it within and 1.3 times as much beyond, a ring's slope moves by 0.5 sigma.
+# Study: thresholds.py touched.coverage _OUTWARDS … --sessions FOLDER.
 _OUTWARDS = np.array([-1.2, -0.6, 0.35, 0.9])
 # [places] Of these that lie within. A layout.
 _WITHIN = 2
 # [1] Weight of what differs beyond a silhouette, over that within: another thing may hide a ring,
-# and adds nothing to it. Set by eye. Study: rounded_seen.py.
+# and adds nothing to it. By 1 or 2.2 a ring's slope moves by 0.3 sigma. Study: thresholds.py
+# touched.coverage _BEYOND … --sessions FOLDER.
 _BEYOND = 1.5
 # [1] Share of a silhouette in the picture: what is outside speaks neither for nor against a ring,
 # but a smaller share counts as this one. Stated.
 _LEAST_SHARE = 0.6
-# [px] Gaps that are closed in what differs. Set by eye. Study: rounded_seen.py.
+# [px] Gaps that are closed in what differs. By 3 or 9 a ring's slope moves by 1.4 or 0.9 sigma.
+# Study: thresholds.py touched.coverage _CLOSED_PX … --sessions FOLDER.
 _CLOSED_PX = 5
 # [places] Evaluated together: arrays stay in the processor's cache. No result depends on it.
 # Derived.

@@ -24,9 +24,11 @@ from vision.touched.silhouette_score import find_silhouettes
 # [mm] Half the width of a bar whose edges are as sharp as those of the object. Stated.
 _EDGE_MM = 3.0
 # [px] Reaches of a ring that is also fitted close to where it covers what differs: its edges alone
-# led 22 mm away from an upright one. Set by eye. Study: rounded_seen.py.
+# led 22 mm away from an upright one. By 4 and 4 a ring's d_x moves by 0.3 sigma. Study:
+# thresholds.py touched.rounded_search _NEAR_REACHES_PX … --sessions FOLDER.
 _NEAR_REACHES_PX = (5.0, 4.0, 4.0)
-# [mm, rad] Prior sigmas of that fit. Set by eye. Study: rounded_seen.py.
+# [mm, rad] Prior sigmas of that fit. Twice as wide, a ring's slope moves by 0.1 sigma. Study:
+# thresholds.py touched.rounded_search _NEAR_PRIOR … --sessions FOLDER.
 _NEAR_PRIOR = np.array([1.5, 1.5, 0.02, 0.02, 1.5])
 # [1] Least score of how well a ring covers what differs: true ones have 0.37 to 0.8. Study:
 # rounded_seen.py.
@@ -41,10 +43,11 @@ _APART_MM = 5.0
 _LEAST_SCORE = 0.1
 # [1] At a higher detection score no other place is tried. Study: rounded_seen.py.
 _SURE_SCORE = 0.5
-# [places] That are refined. Set by eye. Study: rounded_seen.py.
+# [places] That are refined. 1 or 6 move no cone. Study: thresholds.py touched.rounded_search
+# _REFINED … --sessions FOLDER.
 _REFINED = 3
-# [iterations] Of a refinement; one of 24 cones had converged 0.6 mm off. Set by eye. Study:
-# rounded_seen.py.
+# [iterations] Of a refinement; one of 24 cones had converged 0.6 mm off. 3 or 10 move no cone.
+# Study: thresholds.py touched.rounded_search _REFINEMENTS … --sessions FOLDER.
 _REFINEMENTS = 5
 
 

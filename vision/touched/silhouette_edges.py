@@ -31,7 +31,8 @@ from vision.wire.bands import Pieces
 from vision.wire.points import LinePoints
 
 # [segments] Of each side of an outline, some 60 px long each: as many as a bar has in 72 mm, and
-# two. Set by eye. Study: rounded_seen.py.
+# two. By 6 a cone's slope moves by 0.9 sigma, by 12 a ring's by 0.2. Study: thresholds.py
+# touched.silhouette_edges SEGMENTS_OF_SIDE … --sessions FOLDER.
 SEGMENTS_OF_SIDE = 8
 # [px] Lens blurs of the first pass, as of a bar. Stated.
 _BLURS_PX = (0.6, 0.85, 1.2, 1.7)

@@ -18,11 +18,15 @@ from vision.touched.grid_search import ObjectScore, SearchPass
 from vision.touched.places import PlaceGrid, Places
 from vision.touched.search_scene import SearchScene
 
-# [half-widths] Blur of the edge maps, pass by pass. Set by eye. Study: rounded_seen.py.
+# [half-widths] Blur of the edge maps, pass by pass. By 1.4 times as much a cone's d_x moves by 6
+# sigma; by 0.7 times as much another place is taken, 52 sigma away. Study: thresholds.py
+# touched.silhouette_score _BLURS … --sessions FOLDER.
 _BLURS = (0.5, 0.2, 0.08)
-# [places] That each pass keeps. Set by eye. Study: rounded_seen.py.
+# [places] That each pass keeps. By half or twice as many a cone loses its truth. Study:
+# thresholds.py touched.silhouette_score _KEPT … --sessions FOLDER.
 _KEPT = (24, 20, 12)
-# [places] Of the grid that go on. Set by eye. Study: rounded_seen.py.
+# [places] Of the grid that go on. 16 or 64 move no cone. Study: thresholds.py
+# touched.silhouette_score _STARTS … --sessions FOLDER.
 _STARTS = 32
 # [steps] Least separation of two places of the grid. Study: rounded_seen.py.
 _SEPARATION = 4.0
