@@ -122,17 +122,18 @@ def _moved_by_small_angles(fit: ConvergedFit, contacts_mm: np.ndarray) -> Curves
     """Return how the centrelines move to those of a beam of small angles that touches at arcs (f,),
     mm: points and tangents (1, f, m, 3).
 
-    It has slopes for sines, and distance for arc.
+    It takes slopes in place of sines, and distance in place of arc.
     """
     curves = fit.curves
     to_hub = rotation_z(fit.problem.motor_rad)
     along = curves.tangents @ to_hub
     turn = np.linalg.norm(fit.bend_rad, axis=-1)[:, None]
     friction = fit.state.vector[fit.problem.blocks.friction.start]
-    here = bend_growth(turn, friction, curves.arc_mm, fit.state.arcs_mm[:, None], fit.wire)
-    there = tangent_growth(curves.arc_mm, contacts_mm[:, None], fit.wire)
-    slope = there - np.sinc(turn * here / np.pi) * here
-    across = slope[..., None] * fit.bend_rad[:, None]
+    # Shares (f, m) of the final tangent angle at each node, by large bending and by small angles.
+    large = bend_growth(turn, friction, curves.arc_mm, fit.state.arcs_mm[:, None], fit.wire)
+    small = tangent_growth(curves.arc_mm, contacts_mm[:, None], fit.wire)
+    change = small - np.sinc(turn * large / np.pi) * large  # of the slope, over the bend
+    across = change[..., None] * fit.bend_rad[:, None]
     in_hub = np.concatenate([1.0 - along[..., :1], across], axis=-1)
     tangents = in_hub[None] @ np.swapaxes(to_hub, -1, -2)
     return Curves(curves.arc_mm, simpson() @ tangents * curves.arc_mm[1], tangents)

@@ -489,21 +489,21 @@ def _shifted_moments(profiles: Profiles, tried: _Positions) -> np.ndarray:
 
 @lru_cache(maxsize=_FEWEST_SPLINES)
 def _element_layout(columns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return which element of `_normal_matrices` is which of its sums.
+    """Return where each sum of `_normal_matrices` stands in its matrices.
 
     columns: number of columns of the light. row, column (columns (columns + 1) / 2,): of the lower
     triangle of their products. element (columns + 3, columns + 3): index of each element among all
-    sums, 0 above the diagonal.
+    sums, 0 above the diagonal. The rows are the light's, the backgrounds' left and right, and y's.
     """
     element = np.zeros((columns + 3, columns + 3), dtype=np.intp)
     row, column = np.tril_indices(columns)
     first = len(row)
-    element[row, column] = np.arange(first)
+    element[row, column] = np.arange(first)  # light by light
     element[columns:-1, :columns] = first + np.arange(2 * columns).reshape(2, columns)
     first += 2 * columns
-    element[[-3, -2, -2], [-3, -3, -2]] = first + np.arange(3)
+    element[[-3, -2, -2], [-3, -3, -2]] = first + np.arange(3)  # background by background
     first += 3
-    element[-1] = first + np.arange(columns + 3)
+    element[-1] = first + np.arange(columns + 3)  # all by y
     return row, column, element
 
 
