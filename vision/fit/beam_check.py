@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision.fit.converged_fit import ConvergedFit
-from vision.fit.covariance import chance_of
+from vision.fit.covariance import FALSE_ALARM, MATTERS, chance_of
 from vision.fit.problem import (
     WANDER_PX,
     Problem,
@@ -29,11 +29,6 @@ from vision.fit.problem import (
 from vision.fit.reshaped import reshape
 from vision.geometry.centreline import Curves, rotation_z
 
-# [chance] By which a wire that is a beam departs from it so far, a whisk. Study: chosen.
-FALSE_ALARM = 1e-3
-# [sigma] A shift of so many stated sigmas matters: less adds no more than an eighth to an error,
-# √(1 + 0.5²). Derived.
-_MATTERS = 0.5
 # [knots] Beside the one at the base: 20 mm apart on a wire of 100 mm. Set by eye. Study:
 # broken_beams.py.
 KNOTS = 5
@@ -88,7 +83,7 @@ class BeamCheck:
             (self.slip, slip, 1.0, "mm"),
         ]
         moved, what, scale, unit = max(compared, key=lambda row: abs(row[0].shift))
-        if not (self.chance <= FALSE_ALARM and abs(moved.shift) >= _MATTERS):
+        if not (self.chance <= FALSE_ALARM and abs(moved.shift) >= MATTERS):
             return ""
         change = scale * (moved.spline - moved.beam)
         by = f"{change:+.4f} ± {scale * moved.difference_sigma:.4f} {unit}"

@@ -29,7 +29,7 @@ from vision.geometry.rods import Rods, Wire
 from vision.geometry.sampling import spread
 from vision.geometry.silhouette import outline
 from vision.geometry.touched import Axis
-from vision.pictures.view import View, median_of
+from vision.pictures.view import MEDIAN_OF, View, median_of
 from vision.wire.coarse import Votes, likely_curve, votes
 from vision.wire.points import LinePoints, Observed
 from vision.wire.trace import NEAR_CLAMP_MM, clear_of_bar, wire_pieces
@@ -45,9 +45,6 @@ _REACH_PX = 26
 _REST_SIGMAS = 2.0
 # [px] RMS along the wire, from bend to bend that is tried: 2 px at the tip. Derived.
 _BEND_PX = 1.0
-# [frames] More would not make what stands still less noisy: its noise is 0.38 of a frame's.
-# Derived.
-_MEDIAN_OF = 11
 # [rad] A round that moves bends by less is the last: a hundredth of a millimetre at the tip.
 # Derived.
 _CONVERGED_RAD = 1e-4
@@ -96,7 +93,7 @@ class SwingPictures:
 
         frames: those of the whisk, in which the wire moves; bar_mm: radius within which the bar is.
         """
-        chosen = spread(frames, _MEDIAN_OF)
+        chosen = spread(frames, MEDIAN_OF)
         static = median_of([view.frames[frame] for frame in chosen])
         bar_px = axis.covering_discs(view.camera, bar_mm)
         return cls(view, rods, static, 0.5 * np.pi / len(chosen), bar_px)

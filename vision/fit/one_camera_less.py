@@ -18,16 +18,11 @@ import numpy as np
 
 from vision.fit.blocks import Blocks, columns_of
 from vision.fit.converged_fit import ConvergedFit
-from vision.fit.covariance import chance_of
+from vision.fit.covariance import FALSE_ALARM, MATTERS, chance_of
 from vision.fit.problem import point_rows
 
 # [cameras] With one fewer nothing is left over to compare. Derived.
 FEWEST_CAMERAS = 3
-# [chance] By which cameras that agree fail, a whisk. Study: chosen.
-FALSE_ALARM = 1e-3
-# [sigma] A shift of so many stated sigmas, or one as unsure, matters: less adds no more than an
-# eighth to an error, √(1 + 0.5²). Derived.
-_MATTERS = 0.5
 # [1] Of its prior's variance: a combination of a camera's offsets that the others determine by no
 # more is not tested; rounding and where the fit converged are less. Derived.
 _DETERMINED = 1e-3
@@ -67,7 +62,7 @@ class OneLess:
         matter.
         """
         off = np.hypot(self.moved, self.moved_sigma)
-        return self.chance <= FALSE_ALARM and bool(np.max(off / self.sigma) >= _MATTERS)
+        return self.chance <= FALSE_ALARM and bool(np.max(off / self.sigma) >= MATTERS)
 
     def __str__(self) -> str:
         """Describe what moves most, in its stated sigmas."""

@@ -31,7 +31,6 @@ from vision.touched.grid_search import (
     SearchPass,
     coarse_to_fine,
     half_steps,
-    touch_angles,
 )
 from vision.touched.search_scene import SearchScene
 
@@ -54,8 +53,6 @@ _PSI_RAD = np.radians([-8.0, 0.0, 8.0])
 _X_STEP = 0.7
 # [radii] Step of the grid along the arc of the whisker's middle. Derived.
 _TOUCH_STEP = 0.8
-# [mm] Nearest contact to the whisker's base. Stated.
-_NEAREST_MM = 10.0
 # [hypotheses] Of the grid that go on. With 12 in place of 24, and 4 in place of 8 kept, two of 53
 # path-traced scenes more were lost. Study: bar_scenes.py.
 _STARTS = 24
@@ -71,10 +68,8 @@ _BATCH = 1000
 def find_bars(edge_maps: Sequence[EdgeMap], scene: SearchScene) -> list[BarAxis]:
     """Find axes of what may be the bar, the best first; a few pixels off."""
     rods = scene.rods
-    radius_mm = scene.radius_mm
-    length_mm = rods.wire.length_mm
-    x_mm = np.arange(_NEAREST_MM, length_mm, _X_STEP * radius_mm)
-    touch_rad = touch_angles(scene.motor_range_rad, length_mm, _TOUCH_STEP * radius_mm)
+    x_mm = scene.contact_places_mm(_X_STEP * scene.radius_mm)
+    touch_rad = scene.touch_angles_rad(_TOUCH_STEP * scene.radius_mm)
 
     def axes_of(hypotheses: np.ndarray) -> BarAxis:
         """Return the axes (n, 3) of hypotheses (n, 4)."""

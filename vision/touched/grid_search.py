@@ -30,8 +30,6 @@ _HALVINGS = 2
 _LEAST_GAIN = 1e-3
 # [hypotheses] That are compared with better ones at once; no result depends on it. Stated.
 _AT_ONCE = 1000
-# [values] Of the motor angle: fewer are no grid. Stated.
-_FEWEST_ANGLES = 3
 
 Score = Callable[[np.ndarray], np.ndarray]
 
@@ -77,16 +75,6 @@ def half_steps(values: Sequence[np.ndarray]) -> np.ndarray:
     """Return half the distance (k,) between neighbours of each of k regular grids of values."""
     spacing = [grid[1] - grid[0] for grid in values]
     return 0.5 * np.array(spacing)
-
-
-def touch_angles(motor_rad: tuple[float, float], length_mm: float, step_mm: float) -> np.ndarray:
-    """Return motor angles (n,) from the lowest to the highest.
-
-    step_mm: their distance on the arc of the whisker's middle.
-    """
-    arc_mm = np.ptp(motor_rad) * 0.5 * length_mm
-    count = int(np.ceil(arc_mm / step_mm))
-    return np.linspace(*motor_rad, max(_FEWEST_ANGLES, count))
 
 
 def suppress_neighbours(

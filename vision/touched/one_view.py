@@ -27,8 +27,6 @@ from vision.wire.points import LinePoints
 
 # [radii] Step of the grid along the whisker. Derived.
 _X_STEP = 0.35
-# [mm] Nearest contact to the whisker's base. Stated.
-_NEAREST_CONTACT_MM = 10.0
 # [rad] Turns of the grid about the line of sight. Study: coverage.py alone.
 _TURN_RAD = np.radians(np.arange(0.0, 180.0, 5.0))
 # [1] Distances of the grid, beyond the whisker, as a share. Study: coverage.py alone.
@@ -50,7 +48,7 @@ def find_bars_alone(edges: EdgeMap, scene: SearchScene) -> list[BarAxis]:
     All are at right angles to the line of sight. The whisker is taken as at its mean motor angle.
     """
     motor_rad = float(np.mean(scene.motor_rad))
-    x_mm = np.arange(_NEAREST_CONTACT_MM, scene.rods.wire.length_mm, _X_STEP * scene.radius_mm)
+    x_mm = scene.contact_places_mm(_X_STEP * scene.radius_mm)
     axes_of = partial(_axes_across_sight, camera=edges.camera, motor_rad=motor_rad)
     values = [x_mm, _TURN_RAD, _FARTHER]
     return search_bars([edges], values, axes_of, scene)

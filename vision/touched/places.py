@@ -15,11 +15,8 @@ from vision.geometry.centreline import rotation_z
 from vision.geometry.contact import directions_at_slope
 from vision.geometry.rods import Rods
 from vision.geometry.rounded import RoundedAxis
-from vision.touched.grid_search import SearchPass, coarse_to_fine, half_steps, touch_angles
+from vision.touched.grid_search import SearchPass, coarse_to_fine, half_steps
 from vision.touched.search_scene import SearchScene
-
-# [mm] Nearest contact to the whisker's base. Stated.
-_NEAREST_MM = 10.0
 
 Places = Callable[[np.ndarray], RoundedAxis]
 
@@ -39,12 +36,11 @@ class PlaceGrid:
     starts: int
     separation: float
 
-    def values(self, rods: Rods, motor_rad: tuple[float, float]) -> list[np.ndarray]:
+    def values(self, scene: SearchScene) -> list[np.ndarray]:
         """Return the grid's values of each number of a hypothesis."""
-        length_mm = rods.wire.length_mm
-        x_mm = np.arange(_NEAREST_MM, length_mm, self.x_mm)
-        touch_rad = touch_angles(motor_rad, length_mm, self.touch_mm)
-        free = [number.values for number in rods.bar.free_numbers()]
+        x_mm = scene.contact_places_mm(self.x_mm)
+        touch_rad = scene.touch_angles_rad(self.touch_mm)
+        free = [number.values for number in scene.rods.bar.free_numbers()]
         return [x_mm, touch_rad, self.beta_rad, *free]
 
     def search(
@@ -55,7 +51,7 @@ class PlaceGrid:
         passes_of: returns the passes, by a function of hypotheses (n, k) that returns their places.
         """
         rods = scene.rods
-        values = self.values(rods, scene.motor_range_rad)
+        values = self.values(scene)
         free_choices = [number.is_choice for number in rods.bar.free_numbers()]
         is_choice = [False, False, False, *free_choices]
         steps = np.where(is_choice, 0.0, half_steps(values))

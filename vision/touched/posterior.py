@@ -52,12 +52,12 @@ _HELD_SIGMAS = 2.5
 # 0.5 %. Derived.
 _RESOLVED_SIGMAS = 1.5
 # [px] Lens blurs of the first pass, where none is known. Study: bar_starts.py.
-_BLURS_PX = np.array([0.6, 0.85, 1.2, 1.7])
+BLURS_PX = (0.6, 0.85, 1.2, 1.7)
 # [sigma] Of the logarithm of a known blur, for the first pass. Derived.
 _BLUR_SIGMAS = np.array([-2.0, -0.7, 0.7, 2.0])
 # [px] The one lens blur of a quick pass, which distinguishes a bar from none. Study:
 # bar_scenes.py.
-_QUICK_BLUR_PX = 1.0
+QUICK_BLUR_PX = 1.0
 # [blurs] Between positions of a coarse pass, with a cubic spline between: at 0.83 of a blur that
 # undershot, and a transfer curve's probability was 0.2 in place of 0.99 in one of 18 scenes.
 # Study: bar_scenes.py.
@@ -245,7 +245,7 @@ def fit_coarse(
 
     optics: prior of the blur.
     """
-    blurs_px = _BLURS_PX
+    blurs_px = np.array(BLURS_PX)
     if np.isfinite(optics.log_blur_sigma):
         blurs_px = optics.blur_px * np.exp(optics.log_blur_sigma * _BLUR_SIGMAS)
     window = LineWindow(np.full(2, reach_px), blurs_px, optics=optics)
@@ -279,7 +279,7 @@ def _resolves(step: np.ndarray | float, sigma: np.ndarray | float, least: float)
 
 def fit_quick(pieces: Pieces, line: np.ndarray, reach_px: float) -> Posterior:
     """Return the posterior under a single blur, good enough to distinguish a bar from none."""
-    window = LineWindow(np.full(2, reach_px), np.array([_QUICK_BLUR_PX]))
+    window = LineWindow(np.full(2, reach_px), np.array([QUICK_BLUR_PX]))
     return _fit(pieces, line, window, 1.0)
 
 
@@ -305,9 +305,9 @@ def _evaluate_widths(pieces: Pieces, log_widths: np.ndarray) -> np.ndarray:
         evidence = compute_evidence(
             rod,
             _WIDTH_REACH_PX,
-            _QUICK_BLUR_PX,
+            QUICK_BLUR_PX,
             with_smooth_priors=False,
-            every=_coarse_steps(_QUICK_BLUR_PX),
+            every=coarse_steps(QUICK_BLUR_PX),
             width_factor=width_factor,
         )
         evidences.append(evidence)
@@ -367,13 +367,13 @@ def _evidences(rod: LitRod, window: LineWindow, reach_px: float) -> list[Evidenc
             blur_px,
             positions=window.positions,
             with_smooth_priors=not window.is_coarse,
-            every=_coarse_steps(blur_px) if window.is_coarse else 1,
+            every=coarse_steps(blur_px) if window.is_coarse else 1,
         )
         evidences.append(evidence)
     return evidences
 
 
-def _coarse_steps(blur_px: float) -> int:
+def coarse_steps(blur_px: float) -> int:
     """Return how many steps of the grid lie between positions of a coarse pass."""
     return max(1, int(_SPACING_BLURS * blur_px / STEP_PX))
 

@@ -16,6 +16,10 @@ from vision.touched.object_view import ObjectView
 # [lines] Of the straight wire over the stroke: where pieces of the object may show the wire, too. By 5
 # or 16 a d_x moves by 0.4 sigma. Study: thresholds.py touched.search_scene _WIRES ….
 _WIRES = 8
+# [mm] Nearest contact to the whisker's base. Stated.
+_NEAREST_MM = 10.0
+# [values] Of the motor angle: fewer are no grid. Stated.
+_FEWEST_ANGLES = 3
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,19 @@ class SearchScene:
     def radius_mm(self) -> float:
         """Return the radius of the touched object, mm."""
         return self.rods.bar.radius_mm
+
+    def contact_places_mm(self, step_mm: float) -> np.ndarray:
+        """Return places (n,) along the whisker at which it may touch, a step apart."""
+        return np.arange(_NEAREST_MM, self.rods.wire.length_mm, step_mm)
+
+    def touch_angles_rad(self, step_mm: float) -> np.ndarray:
+        """Return motor angles (n,) from the lowest to the highest.
+
+        step_mm: their distance on the arc of the whisker's middle.
+        """
+        arc_mm = np.ptp(self.motor_range_rad) * 0.5 * self.rods.wire.length_mm
+        count = int(np.ceil(arc_mm / step_mm))
+        return np.linspace(*self.motor_range_rad, max(_FEWEST_ANGLES, count))
 
     @cached_property
     def object_views(self) -> list[ObjectView]:

@@ -24,7 +24,13 @@ from vision.geometry.rounded import RoundedAxis
 from vision.touched.edges import EDGE_PX, FORMAL_TO_TRUE
 from vision.touched.evidence import Evidence, LitRod, compute_evidence
 from vision.touched.object_view import ObjectView
-from vision.touched.posterior import best_of, estimate_temperature
+from vision.touched.posterior import (
+    BLURS_PX,
+    QUICK_BLUR_PX,
+    best_of,
+    coarse_steps,
+    estimate_temperature,
+)
 from vision.touched.profiles import compute_profiles
 from vision.touched.silhouette_pixels import OutlineSide, predict_sides, read_pieces
 from vision.wire.bands import Pieces
@@ -34,14 +40,8 @@ from vision.wire.points import LinePoints
 # two. By 6 a cone's slope moves by 0.9 sigma, by 12 a ring's by 0.2. Study: thresholds.py
 # touched.silhouette_edges SEGMENTS_OF_SIDE … --sessions FOLDER.
 SEGMENTS_OF_SIDE = 8
-# [px] Lens blurs of the first pass, as of a bar. Stated.
-_BLURS_PX = (0.6, 0.85, 1.2, 1.7)
 # [1] Lens blurs of the fine pass, over that of the first. Stated.
 _FINE_BLUR_FACTORS = np.exp(np.array([-0.2, -0.1, 0.0, 0.1, 0.2]))
-# [px] The one lens blur of a coarse pass, as of a bar. Stated.
-_COARSE_BLURS_PX = (1.0,)
-# [steps] Of the grid between positions of a coarse pass, as of a bar. Stated.
-_COARSE_EVERY = 2
 # [pieces] Of a side, each of 12 px: fewer constrain no texture. Stated.
 _FEWEST_PIECES = 4
 # [px] How far off a fitted outline may be. Stated.
@@ -79,7 +79,7 @@ class _EdgePass:
 
     reach_px: float
     gammas: Sequence[float]
-    blurs_px: Sequence[float] = _BLURS_PX
+    blurs_px: Sequence[float] = BLURS_PX
     every: int = 1
     is_fine: bool = False
 
@@ -89,7 +89,7 @@ def _choose_pass(
 ) -> _EdgePass:
     """Return a coarse pass, a fine one where there is an earlier one, or the first one."""
     if coarse:
-        return _EdgePass(reach_px, gammas, _COARSE_BLURS_PX, _COARSE_EVERY)
+        return _EdgePass(reach_px, gammas, (QUICK_BLUR_PX,), coarse_steps(QUICK_BLUR_PX))
     if before is None:
         return _EdgePass(reach_px, gammas)
     return _EdgePass(_FINE_REACH_PX, gammas, before.blur_px * _FINE_BLUR_FACTORS, is_fine=True)
@@ -169,7 +169,7 @@ class _OutlinePosterior:
         blurs."""
         if not self.sides:
             none = LinePoints(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
-            return SilhouetteEdges(none, 0, _BLURS_PX[1])
+            return SilhouetteEdges(none, 0, BLURS_PX[1])
         weights = self._blur_weights(probabilities)
         segments = 0
         edges = []

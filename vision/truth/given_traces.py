@@ -21,6 +21,7 @@ from vision.pictures.view import View
 from vision.truth.misread_traces import misreadings
 from vision.truth.object_places import ObjectPlace
 from vision.truth.trace_points import (
+    LEAST_SIGMA_PX,
     NEAR_PX,
     BesideWire,
     Trace,
@@ -43,8 +44,6 @@ _FIRST_PASS_PX = 1.0
 _NEARER = 0.5
 # [px] About the fit, at most: a tracker that scatters by more draws no line of one wire. Stated.
 _MOST_SCATTER_PX = 3.0
-# [px] Least sigma of a point: files have their numbers to a hundredth. Stated.
-_LEAST_SIGMA_PX = 0.02
 # [1] Of the points' sigma: what a line is off by in all frames alike, in each of SHARED shapes along
 # the wire (Legendre's polynomials). Study: given_traces.py.
 _LASTING_SHARE = 0.5
@@ -120,9 +119,9 @@ def _line_points(segments: BesideWire, length_mm: float) -> LinePoints:
     share = 2.0 * segments.place_mm / length_mm - 1.0
     shapes = np.polynomial.legendre.legvander(share, SHARED - 1)  # (n, SHARED)
     shared = np.linalg.lstsq(shapes, segments.offset_px, rcond=None)[0]
-    scatter_px = max(robust_sigma(segments.offset_px - shapes @ shared), _LEAST_SIGMA_PX)
+    scatter_px = max(robust_sigma(segments.offset_px - shapes @ shared), LEAST_SIGMA_PX)
     is_stated = np.isfinite(segments.sigma_px)
-    sigma_px = np.where(is_stated, np.maximum(segments.sigma_px, _LEAST_SIGMA_PX), scatter_px)
+    sigma_px = np.where(is_stated, np.maximum(segments.sigma_px, LEAST_SIGMA_PX), scatter_px)
     return LinePoints(
         px=segments.foot_px + segments.offset_px[:, None] * segments.normal,
         normal=segments.normal,

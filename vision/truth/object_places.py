@@ -26,7 +26,7 @@ from vision.geometry.touched import Axis
 from vision.touched.one_view import seen_from_one_side
 from vision.truth.line_source import require_wire
 from vision.truth.readers import ObjectReader, ReadLine
-from vision.truth.trace_points import Trace, beside_curve
+from vision.truth.trace_points import LEAST_SIGMA_PX, Trace, beside_curve
 from vision.truth.whisk_pictures import AxisPrior
 from vision.truth.whisk_place import WhiskPlace
 from vision.wire.points import LinePoints, Observed
@@ -35,8 +35,6 @@ from vision.wire.points import LinePoints, Observed
 _REACH_MM = 200.0
 # [nodes] Fewer of a picture of it have no direction. Derived.
 _FEWEST_NODES = 2
-# [px] Least sigma of the object's line: files have their numbers to a hundredth. Stated.
-_LEAST_SIGMA_PX = 0.02
 # [px] Scale of the Cauchy weights of points about their plane: trackers scatter by less. Stated.
 _SCATTER_PX = 2.0
 # [1] By how much the distance of two tracked edges may differ from the object's width. Stated.
@@ -220,7 +218,7 @@ def _sigma_px(stated_px: np.ndarray, scatters_px: Sequence[float]) -> float:
     sigma_px = float(np.mean(stated_px))
     if not np.isfinite(sigma_px):
         sigma_px = float(np.sqrt(np.mean(np.square(scatters_px))))
-    return max(sigma_px, _LEAST_SIGMA_PX)
+    return max(sigma_px, LEAST_SIGMA_PX)
 
 
 def _straight_line(beside: _BesideAxis, place_mm: np.ndarray) -> tuple[np.ndarray, float]:

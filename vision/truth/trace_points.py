@@ -17,6 +17,8 @@ from vision.pictures.pyramid import shrunk_px
 # [px] From the wire, at most, of a point that is taken to be the wire's: the first of the passes is
 # off by a pixel or two, trackers by less than three. Another whisker is farther away. Stated.
 NEAR_PX = 6.0
+# [px] Least sigma of a traced point or line: files have their numbers to a hundredth. Stated.
+LEAST_SIGMA_PX = 0.02
 # [mm] Of the wire, straight between two nodes to a hundredth of a pixel. Derived.
 _NODE_MM = 1.0
 
