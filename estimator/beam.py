@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from estimator.domain import Numbers, elementwise, require_positive
 
-# [N·mm² per GPa·mm⁴] Unit of a rigidity from a modulus in GPa and a section in mm.
+# [N·mm² per GPa·mm⁴] Unit of a rigidity from a modulus in GPa and a section in mm. Derived.
 NMM2_PER_GPA_MM4 = 1000.0
 SHAPES = ("cylinder", "cone", "tapered")
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from estimator import first_order
 from estimator.beam import Beam
-from estimator.numerics import central_differences
+from estimator.numerics import RELATIVE_STEP, central_differences
 from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import EstimatorSettings, Whisk
@@ -30,12 +30,10 @@ ALIKE = NamedReason(
 )
 NO_PUSH = NamedReason("no_push_one_way", "no push on one of both ways")
 NOWHERE = NamedReason("distance_nowhere", "the distance comes out nowhere on the whisker")
-# [sigmas] Least difference of the moments: a direction within its noise determines no slope.
+# [sigmas] Least difference of the moments: a direction within its noise determines no slope. Stated.
 _SURE_SIGMAS = 3.0
-# [rad] Largest friction angle considered: beyond those of the paper's surfaces.
+# [rad] Largest friction angle considered: beyond those of the paper's surfaces. Stated.
 _STEEPEST_FRICTION_RAD = np.radians(30.0)
-# [1] Step of numerical derivatives, relative.
-_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +140,8 @@ def _sigmas(felt: np.ndarray, covariance: np.ndarray, beam: Beam) -> np.ndarray:
     """Return one sigma (3,) of `_solution` where the felt values have a covariance (6, 6)."""
     moment = hypot(felt[1], felt[2])
     sizes = np.array([felt[0], moment, moment, felt[3], moment, moment])
-    jacobian = central_differences(partial(_solution, beam=beam), felt, _STEP * sizes)  # (3, 6)
+    steps = RELATIVE_STEP * sizes
+    jacobian = central_differences(partial(_solution, beam=beam), felt, steps)  # (3, 6)
     return np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))
 
 

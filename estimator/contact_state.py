@@ -10,11 +10,8 @@ from math import cos, nan, sqrt
 import numpy as np
 
 from estimator.beam import Beam
-from estimator.numerics import central_differences
+from estimator.numerics import RELATIVE_STEP, central_differences
 from estimator.whisk import Estimate, Whisk
-
-# [1] Step of central differences, relative.
-_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -65,7 +62,7 @@ def contact_of(whisk: Whisk, estimate: Estimate, alpha_sigma: float) -> Contact:
     """
     d_x = estimate.d_x_mm
     beam = whisk.beam
-    on_whisker = d_x > 0 and np.isfinite(beam.as_cylinder_mm(d_x * (1 + _STEP)))
+    on_whisker = d_x > 0 and np.isfinite(beam.as_cylinder_mm(d_x * (1 + RELATIVE_STEP)))
     if not (on_whisker and estimate.sigma_mm > 0):
         return NO_CONTACT
     inputs = np.array([*whisk.felt, estimate.alpha_est_rad])
@@ -135,5 +132,5 @@ def _derivatives(d_x: float, inputs: np.ndarray, beam: Beam) -> tuple[np.ndarray
         """Compute the quantities (3,) from the distance and the inputs (5,)."""
         return _quantities(d_x_and_inputs[0], d_x_and_inputs[1:], beam)
 
-    derivatives = central_differences(quantities, np.append(d_x, inputs), _STEP * sizes)
+    derivatives = central_differences(quantities, np.append(d_x, inputs), RELATIVE_STEP * sizes)
     return derivatives[:, 0], derivatives[:, 1:]

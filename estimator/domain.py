@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from estimator.reasons import NamedReason
 
+# [rad] Derived.
 RIGHT_ANGLE = np.pi / 2
 # Why several equations have no result.
 VALUE_MISSING = NamedReason("value_missing", "a measured value is missing or infinite")

@@ -45,7 +45,8 @@ _POISSON = 0.35
 _STEPS = 12
 # [1] Unknowns: force, arc, and heading of the motion from sideways; force and arc halfway. Derived.
 _COUNT = 9
-_ARCS = [3, 8]  # the arcs among them
+# [places] Of both arcs among them. A layout.
+_ARCS = [3, 8]
 # [steps] Of Newton's method before it is given up. Stated.
 _MOST_ROUNDS = 25
 # [1] Shares of the friction angle by which it is let rise. Study: exact_rod_limits.py.
@@ -62,7 +63,7 @@ _DIFFERENCE = 1e-4
 _FARTHEST = 0.97
 # [1] Part of the whisker from which on. Stated.
 _NEAREST = 0.01
-# Gauss–Legendre on −1…1, of the forward part of an unloaded shape. Derived.
+# [1] Gauss–Legendre on −1…1, of the forward part of an unloaded shape. Derived.
 _GAUSS = np.polynomial.legendre.leggauss(12)
 # [rounds] Of Newton's method for the arc of first touch, each some tenth as far off. Derived.
 _TOUCH_ROUNDS = 10

@@ -12,9 +12,10 @@ from estimator.domain import RIGHT_ANGLE, Numbers, elementwise
 
 # A contact that does not slip sideways is held at some slope β from 0 to α, which no moment
 # determines. The share of friction that is left to act along the whisker is √(1 − (tan β/tan α)²).
-# [1] Its mean over such slopes.
+
+# [1] Its mean over such slopes. Derived.
 HELD_SHARE = np.pi / 4
-# [1] Its standard deviation over such slopes.
+# [1] Its standard deviation over such slopes. Derived.
 HELD_SPREAD = np.sqrt(2 / 3 - HELD_SHARE**2)
 
 

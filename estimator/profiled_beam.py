@@ -14,7 +14,7 @@ from estimator.domain import Numbers
 if TYPE_CHECKING:  # it takes longer than reading a session
     from scipy.interpolate import CubicHermiteSpline
 
-# Gauss–Legendre on −1…1, of a compliance: within 1e-9 of it up to where 0.1 of the diameter is left.
+# [1] Gauss–Legendre on −1…1, of a compliance: within 1e-9 of it up to where 0.1 of the diameter is left.
 # Study: tests/estimator/test_profiled_beam.py.
 _AT, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 # [1] Shares of the length at which a compliance is tabled, between which its cubic has its slope:

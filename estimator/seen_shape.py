@@ -35,9 +35,9 @@ PLANE_UNKNOWN = NamedReason(
 )
 UNCONVERGED = NamedReason("shape_unconverged", "the fit of the seen shape does not converge")
 NO_END = NamedReason("bend_end_unseen", "the seen shape does not tell where the bend ends")
-# [lengths] Least way of the contact by which a force is divided: rounding.
+# [lengths] Least way of the contact by which a force is divided: rounding. Derived.
 _LEAST_WAY = 1e-11
-# [rad] Frames that far past the pushing angle still count.
+# [rad] Frames that far past the pushing angle still count. Stated.
 _BEYOND_RAD = np.radians(1.0)
 # [frames] Fewest with points from which a shape is fitted. Stated.
 _FEWEST_FRAMES = 4

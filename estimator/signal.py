@@ -23,9 +23,10 @@ __all__ = [
     "zero_phase_lowpass",
 ]
 
-# [s] Period of mains hum at 50 Hz, over which moments are averaged.
+# [s] Period of mains hum at 50 Hz, over which moments are averaged. Stated.
 HUM_PERIOD_S = 0.02
-# [rad] Half width of the window around the pushing angle, over which moments are a line.
+# [rad] Half width of the window around the pushing angle, over which moments are a line: at 10°/s
+# it is five periods of mains hum wide. Stated.
 HALF_WINDOW_RAD = np.radians(0.5)
 # [samples] Fewest to which a line with a scatter is fitted. Derived.
 MIN_SAMPLES = 3

@@ -34,10 +34,10 @@ _LAST_STEP = 1e-9
 # [1] How far a cantilever's end is drawn along itself as it bends, in θ d: its arc's excess over its chord.
 # Derived.
 DRAWN = 0.6
-# Share left unknown of large bending's second order, and of the friction along a whisker that
-# slips, when they are taken out: as much as exact mechanics differ from them. Study:
-# tests/studies/accuracy/two_tilts.py.
+# [1] Share left unknown of large bending's second order when that is taken out: as much as exact
+# mechanics differ from it. Study: tests/studies/accuracy/two_tilts.py.
 _LARGE_LEFT = 1 / 3
+# [1] The share of friction along a whisker that slips. Study: tests/studies/accuracy/two_tilts.py.
 _DRAGGING_LEFT = 1 / 3
 ALIKE = NamedReason(
     "whisks_slip_alike", "the whisks slip alike: no two of them tell friction from distance"

@@ -22,9 +22,9 @@ from estimator.domain import (
     require_sigma,
 )
 
-# [sigma] Half an interval of 95 % of the normal distribution.
+# [sigma] Half an interval of 95 % of the normal distribution. Derived.
 Z_95 = 1.959964
-# [rad] Steepest friction angle: at 90° its tangent has no number.
+# [rad] Steepest friction angle: at 90° its tangent has no number. Derived.
 _STEEPEST_RAD = RIGHT_ANGLE - 1e-9
 
 
@@ -43,9 +43,11 @@ def gradient_known_slope(
     m = m_z cos β + m_y sin β.
     """
     d_x = distance.known_slope(theta, m_y, m_z, beta, C)
-    m = m_z * np.cos(beta) + m_y * np.sin(beta)
-    relative = [1 / theta, -np.sin(beta) / m, -np.cos(beta) / m, -m_y / (m * np.cos(beta))]
-    return np.asarray(d_x)[..., None] * np.stack(np.broadcast_arrays(*relative), axis=-1)
+    sine = np.sin(beta)
+    cosine = np.cos(beta)
+    m = m_z * cosine + m_y * sine
+    relative = _stack(1 / theta, -sine / m, -cosine / m, -m_y / (m * cosine))
+    return np.asarray(d_x)[..., None] * relative
 
 
 def gradient_with_friction(
@@ -82,8 +84,8 @@ def gradient_printed(
     d_x = (m_z / m) / (m / (C * theta) + taper_per_mm)
     shrink = 1 / (1 + taper_per_mm * C * theta / m)  # of a relative error of Cθ/|m|
     by_m = -(1 + shrink) / m**2
-    relative = [shrink / theta, by_m * m_y, by_m * m_z + 1 / m_z, 0.0 * d_x]
-    return d_x[..., None] * np.stack(np.broadcast_arrays(*relative), axis=-1)
+    relative = _stack(shrink / theta, by_m * m_y, by_m * m_z + 1 / m_z, 0.0 * d_x)
+    return d_x[..., None] * relative
 
 
 def sigma(
@@ -221,7 +223,12 @@ def _linear_in_mu(theta, m_y, m_z, alpha_est, C):
     by_y = -scale * mu - 2 * m_y * d_x / square
     by_z = scale - 2 * m_z * d_x / square
     by_alpha = -scale * np.abs(m_y) / np.cos(alpha_est) ** 2
-    return d_x, np.stack(np.broadcast_arrays(by_theta, by_y, by_z, by_alpha), axis=-1)
+    return d_x, _stack(by_theta, by_y, by_z, by_alpha)
+
+
+def _stack(*parts: np.ndarray) -> np.ndarray:
+    """Return parts (...), broadcast against each other, side by side: (..., k)."""
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
 @elementwise

@@ -23,13 +23,15 @@ from estimator.reasons import NamedReason
 from estimator.uncertainty import Z_95
 from estimator.whisk import Estimate, EstimatorSettings, Whisk
 
-# [1] Wave number times length of the first two free modes: roots of 1 + cosh cos. Derived.
+# [1] Wave number times length of the first free mode: the least root of 1 + cosh cos. Derived.
 FREE_WAVE_NUMBER = 1.8751040687119611
+# [1] Of the second: the next root. Derived.
 SECOND_WAVE_NUMBER = 4.694091132974175
 # [1] Node of the second free mode, as a share of the length: there the ratio is highest. Derived.
 NODE = 0.7834442
-# [1] Nearest and farthest prop: nearer and farther the ratio changes by less than 1e-4 a thousandth. Derived.
+# [1] Nearest prop: nearer the ratio changes by less than 1e-4 a thousandth. Derived.
 _NEAREST = 0.02
+# [1] Farthest prop: farther the ratio changes as little. Derived.
 _FARTHEST = 0.9999
 # [1] Of the steady speed: below it the motor speeds up or slows down. Stated.
 _STEADY_SHARE = 0.9

@@ -1,29 +1,34 @@
 """Every number at the top of a module that decides something says its unit and where it comes from."""
 
+import re
+
 import pytest
 
 from docs.thresholds import ROOT, thresholds_of
 
+# Where a number can be from, as docs/thresholds.py has it.
+ORIGIN = re.compile(r"[Dd]erived|[Ss]tated|[Cc]hosen|Study: |layout|formula")
 # How reports, films and figures of theory look is taste.
 BENCH_FOLDERS = ("base", "session", "cameras", "gauges", "trials", "analyses", "rig")
 # Windows of what is plausible say what they are by their names and units.
 SELF_EXPLAINING = {"plausible.py"}
 VISION_FOLDERS = sorted(
-    path.name
+    f"vision/{path.name}"
     for path in (ROOT / "vision").iterdir()
     if path.is_dir() and path.name != "__pycache__"
 )
 
 
-@pytest.mark.parametrize("folder", VISION_FOLDERS)
-def test_every_number_of_vision_says_its_unit(folder):
+@pytest.mark.parametrize("folder", ["estimator", *VISION_FOLDERS])
+def test_every_number_of_vision_and_estimator_says_its_unit_and_where_it_is_from(folder):
     found = [
         number
-        for path in sorted((ROOT / "vision" / folder).glob("*.py"))
-        for number in thresholds_of(path, ROOT / "vision")
+        for path in sorted((ROOT / folder).glob("*.py"))
+        for number in thresholds_of(path, ROOT)
     ]
     assert found
-    assert not [f"{number.place}: {number.name}" for number in found if not number.unit]
+    without = [number for number in found if not number.unit or not ORIGIN.search(number.comment)]
+    assert not [f"{number.place}: {number.name}" for number in without]
 
 
 @pytest.mark.parametrize("folder", BENCH_FOLDERS)

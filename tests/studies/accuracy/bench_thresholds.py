@@ -1,6 +1,7 @@
-"""What a threshold of bench moves in a whole evaluation, for each of some values.
+"""What a threshold of bench or estimator moves in a whole evaluation, for each of some values.
 
     python tests/studies/accuracy/bench_thresholds.py gauges.fit _ROUNDS 1 2 3 10
+    python tests/studies/accuracy/bench_thresholds.py estimator.onset GUARD_RAD 0.001 0.004
 
 A line a value: by how much any number of whisks.csv, estimates.csv, friction.csv and base_moments.csv of
 fixtures/small-session (SESSION after --session) changes at most from that with the present value, over its stated
@@ -32,7 +33,8 @@ def main() -> None:
     parser.add_argument("values", nargs="+")
     parser.add_argument("--session", type=Path, default=SMALL)
     options = parser.parse_args()
-    module = importlib.import_module(f"bench.{options.module}")
+    package = "" if options.module.startswith("estimator.") else "bench."
+    module = importlib.import_module(package + options.module)
     settings = Settings(figures=False)
     with tempfile.TemporaryDirectory() as folder:
         usual = Path(folder) / "usual"
