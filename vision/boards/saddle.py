@@ -252,7 +252,9 @@ class _Fit(NamedTuple):
 
 def _evaluate(windows: Windows, p: np.ndarray, predict: Predict) -> _Fit:
     """Return the state of the fit of a model at its parameters p (n, m)."""
-    fit = _Fit(p, np.empty(len(p)), np.empty((*p.shape, p.shape[1])), np.empty(p.shape))
+    corners, count = p.shape
+    normal = np.empty((corners, count, count))
+    fit = _Fit(p, np.empty(corners), normal, np.empty((corners, count)))
     for rows, some in _in_batches(windows):
         grey, J = predict(some, p[rows])
         residual = some.grey - grey
