@@ -18,19 +18,19 @@ if TYPE_CHECKING:
 # a sound view all; names a cause in a refusal, enters no number. Study:
 # tests/vision/boards/test_board_settings.py.
 _LEAST_SHARE = 0.3
-# [1] And so many times what the setting entered finds. Set by eye, as above. Study:
+# [1] And so many times what the setting entered finds. 1.4 to 3 name the same causes. Study:
 # tests/vision/boards/test_board_settings.py.
 _CLEARLY_MORE = 2.0
 # [1] A dictionary may be the one entered wrongly where it shows so large a part of the most
-# markers. Set by eye: names a cause in a refusal, enters no number. Study:
+# markers. 0.5 to 0.9 name the same causes in refusals; it enters no number. Study:
 # tests/vision/boards/test_board_settings.py.
 _NEARLY_MOST = 0.7
-# [markers] And that part is more than so many. Set by eye, as above. Study:
+# [markers] And that part is more than so many. 1 to 4 name the same causes. Study:
 # tests/vision/boards/test_board_settings.py.
 _SEVERAL = 2
 # [dictionaries] As many are tried with all prints: a bound on time. Stated.
 _MOST_DICTIONARIES = 3
-# [px] A corner farther from the homography is another thing. Set by eye, as above. Study:
+# [px] A corner farther from the homography is another thing. 1.5 to 6 name the same causes. Study:
 # tests/vision/boards/test_board_settings.py.
 _NEAR_PX = 3.0
 

@@ -32,7 +32,7 @@ _STRAY_RAD = 0.01
 # [mm] Lines this far from the centre of rotation are others', or a bent whisker's. Set by eye.
 # Study: tests/vision/calibration/test_turning.py.
 _STRAY_MM = 1.0
-# [1] Or so many times as far as the median line. Set by eye. Study:
+# [1] Or so many times as far as the median line. By 2 or 4.5 strays are left out as well. Study:
 # tests/vision/calibration/test_turning.py.
 _STRAY_TIMES = 3.0
 # [lines] As `_MIN_FRAMES` of swing.py. Derived.

@@ -20,14 +20,16 @@ from vision.pictures.change import HALF, change_confidence
 from vision.pictures.pixel_noise import Noise, measure_noise
 
 # [share of the stroke] A frame is compared with such as are farther away: there the whisker stands
-# elsewhere. Set by eye. Study: tests/bench/trials/test_placing_pictures.py.
+# elsewhere. By 0.15 or 0.4 a drawn line is found as well. Study:
+# tests/vision/calibration/test_turning.py.
 _ELSEWHERE = 0.25
-# [frames] With which a frame is compared at most. Set by eye. Study:
-# tests/bench/trials/test_placing_pictures.py.
+# [frames] With which a frame is compared at most. By 2 or 8 a drawn line is found as well. Study:
+# tests/vision/calibration/test_turning.py.
 _MOST_OTHERS = 4
 # [1] Of `change.change_confidence`: 4.8 noise levels after smoothing. Derived.
 _SURE = 0.3
-# [pixels] Fewer are no line. Set by eye. Study: tests/bench/trials/test_placing_pictures.py.
+# [pixels] Fewer are no line. By 10 or 40 a drawn line is found as well. Study:
+# tests/vision/calibration/test_turning.py.
 _FEWEST_PIXELS = 20
 # [1] Angles of a Hough transform, half a degree apart; refined afterwards. Study:
 # tests/bench/trials/test_placing_pictures.py.
