@@ -54,7 +54,8 @@ _ROUNDS = 8
 # fit.first_bends _PULL_RAD ….
 _PULL_RAD = 0.2
 # [rad] Prior sigma of its part along the bar where one camera sees it: only friction pushes there.
-# Set by eye. Study: coverage.py alone.
+# Half or twice it moves slopes by 0.07 sigma. Study: thresholds.py fit.first_bends _ALONG_BAR_RAD …
+# --cameras 1.
 _ALONG_BAR_RAD = 0.02
 # [px] Pieces nearer to the bar's outline show its edge. 4 or 16 move d_x by 0.15 sigma. Study:
 # thresholds.py fit.first_bends _BESIDE_BAR_PX ….
