@@ -273,7 +273,7 @@ def common_modes(board: Board, seen: np.ndarray) -> np.ndarray:
     """Return an orthonormal basis (3 m, k) of those changes of a board's points that the points do not
     have as parameters, because others stand for them.
 
-    These are the motions of a face as a whole, which are its pose, and scale and stretch of a plane,
+    These are the motions of a face as a whole, which are its pose, and a plane's scale and aspect,
     which no view distinguishes from distance and lens. seen (n,): the points seen. A face of which
     too few are seen has no motions.
     """

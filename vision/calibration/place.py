@@ -259,7 +259,7 @@ def _alarm(first: Placement, second: Placement, Sigma: np.ndarray) -> str:
 def _turn_share(difference: np.ndarray, sigma: np.ndarray) -> float | None:
     """Return how many times as far as the motor the whisker turns, where that may be the cause.
 
-    A whisker that turns by cos a of the motor's angle looks like one whose axis leans along it by the
+    A whisker that turns by cos a of the motor's angle is seen as one whose axis leans along it by the
     angle a, to either side.
     """
     if abs(difference[_LEAN_ALONG]) < _CLEAR_LEAN * sigma[_LEAN_ALONG]:

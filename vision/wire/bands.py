@@ -260,7 +260,7 @@ class Pieces(Rows):
         return self.select(slice(None, None, 1 + len(self) // most))
 
     def show_rod(self, margin_px: float) -> np.ndarray:
-        """Return which segments (s,) have all pixels of the expected rod and of a margin beside it."""
+        """Return which segments (s,) have all pixels of the expected rod and of a margin to it."""
         needed = np.abs(self.offset_px) <= self.radius_px[:, None] + margin_px
         return ~np.any(needed & (self.weight == 0), axis=1)
 
