@@ -14,9 +14,8 @@ from vision.boards.markers import detect_markers, marker_dictionary
 if TYPE_CHECKING:
     from vision.boards.charuco import CharucoBoard
 
-# [1] Share of the board's corners by which a setting is believed. Set by eye: chance finds none,
-# a sound view all; names a cause in a refusal, enters no number. Study:
-# tests/vision/boards/test_board_settings.py.
+# [1] Share of the board's corners by which a setting is believed. 0.15 to 0.5 name the same causes
+# in refusals; it enters no number. Study: tests/vision/boards/test_board_settings.py.
 _LEAST_SHARE = 0.3
 # [1] And so many times what the setting entered finds. 1.4 to 3 name the same causes. Study:
 # tests/vision/boards/test_board_settings.py.

@@ -42,8 +42,8 @@ _BIN_PX = 6.0
 _NEAR_PX = 8.0
 # [px] Beside a line: what noise scatters. Study: tests/bench/trials/test_placing_pictures.py.
 _SCATTER_PX = 1.0
-# [px] Of a line's pixels; shorter gives no direction. Set by eye. Study:
-# tests/bench/trials/test_placing_pictures.py.
+# [px] Of a line's pixels; shorter gives no direction. By 20 or 80 a drawn line is found as well.
+# Study: tests/vision/calibration/test_turning.py.
 _LEAST_LENGTH_PX = 40.0
 # [rad] Planes that meet at less give no line: 1/sin 3° multiplies a line's error by 19.
 # Derived.
