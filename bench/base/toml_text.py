@@ -65,7 +65,14 @@ def in_toml_words(what: str) -> str:
     """Return what msgspec finds wrong, such as "Expected `float | null`, got `str`", in plain words."""
     for fault, words in _FAULTS.items():
         what = re.sub(rf"\b{fault}\b", words, what)
+    what = re.sub(r"of length (<=|>=)? ?(\d+)", _length_in_words, what)
     return re.sub("`([a-z| ]+)`", _kinds_in_words, what)
+
+
+def _length_in_words(found: re.Match) -> str:
+    """Return a list's length, such as `of length <= 3`, in words."""
+    bound = {"<=": "at most ", ">=": "at least ", None: ""}[found[1]]
+    return f"of {bound}{found[2]} values"
 
 
 def _kinds_in_words(quoted: re.Match) -> str:

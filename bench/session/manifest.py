@@ -21,6 +21,8 @@ _TWO = msgspec.Meta(min_length=2, max_length=2)
 # Lists of so many numbers.
 _THREE = msgspec.Meta(min_length=3, max_length=3)
 # Lists of so many numbers.
+_THREE_OR_FOUR = msgspec.Meta(min_length=3, max_length=4)
+# Lists of so many numbers.
 _FOUR = msgspec.Meta(min_length=4, max_length=4)
 Pair = Annotated[list[float], _TWO]
 Matrix = Annotated[list[Pair], _TWO]
@@ -150,9 +152,9 @@ class BoardKeys(GivenKeys):
 class RigKeys(GivenKeys):
     """[rig] of session.toml."""
 
-    # 3 × 4, mm: rig = rows · [board x, y, z, 1] for the board in boards/rig; absent: by rig.toml
-    # (`calibrate rig`), else by the free strokes
-    T_rig_board: Annotated[list[Row4], _THREE] | None = None
+    # 3 × 4 or 4 × 4, mm: rig = rows · [board x, y, z, 1] for the board in boards/rig; absent: by
+    # rig.toml, else by free strokes
+    T_rig_board: Annotated[list[Row4], _THREE_OR_FOUR] | None = None
     # standard deviation of each shift
     T_rig_board_sigma_mm: Annotated[
         float, Assumed(absolute=0.2, of="T_rig_board", origin=_BY_HAND)

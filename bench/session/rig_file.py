@@ -108,9 +108,14 @@ def _covariance(written: list[list[float]]) -> np.ndarray:
 def exact_pose(rows: list[list[float]], key: str, file: str) -> np.ndarray:
     """Return a board's pose (3, 4) with its rotation made exact.
 
-    Raises BadInput, naming key and file, where it is no rotation, or not in mm.
+    rows: three, and perhaps a fourth, 0 0 0 1. Raises BadInput, naming key and file, where it is no rotation,
+    or not in mm.
     """
-    pose = np.array(rows, dtype=float)
+    pose = np.array(rows[:3], dtype=float)
+    if rows[3:] not in ([], [[0.0, 0.0, 0.0, 1.0]]):
+        raise BadInput(
+            f"{key}: the fourth row is {rows[3]}; leave it out, or write [0, 0, 0, 1]", file=file
+        )
     rotation = pose[:, :3]
     error = np.abs(rotation.T @ rotation - np.eye(3)).max()
     determinant = np.linalg.det(rotation)

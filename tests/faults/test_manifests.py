@@ -101,6 +101,8 @@ def test_no_manifest(session):
         ("squares = [8, 6]", "squares = [8]", r"\[board\] squares"),
         ("[[0.997563342,", "[[1.997563342,", r"\[rig\] T_rig_board: .*not a right-handed rotation"),
         ("4.24180287", "4241.80287e9", r"\[rig\] T_rig_board"),
+        ("-44.3509729]]", "-44.3509729], [0, 0, 0, 2]]", r"T_rig_board: the fourth row is \[0.0,"),
+        ("-44.3509729]]", "-44.3509729, 1.0]]", r"T_rig_board\[2\]: .* at most 4 values"),
         ("format = 1", "format = 2", r"format is 2; this version reads format 1"),
         ("[bar]", "[signals]\nfile = 'daq.mat'\n[bar]", r"daq.mat: is not there"),
         (

@@ -26,6 +26,12 @@ def edit(session, old: str, new: str) -> None:
     file.write_text(text.replace(old, new, 1))
 
 
+def test_a_board_s_pose_of_four_rows_is_that_of_three(small_copy):
+    three = load_session(small_copy).T_rig_board
+    edit(small_copy, "-44.3509729]]", "-44.3509729], [0, 0, 0, 1]]")
+    np.testing.assert_array_equal(load_session(small_copy).T_rig_board, three)
+
+
 def test_what_nobody_said_is_what_a_careful_lab_has(unsaid):
     session = load_session(unsaid)
     whisker = session.whisker
