@@ -323,4 +323,24 @@ def free_level(motor: np.ndarray, samples: np.ndarray, free: np.ndarray) -> Leve
     slope = noise.line_slope(motor, samples, free)
     drift = np.sqrt(np.maximum(0.0, slope**2 - variance))
     offset = noise.weighted_sum(weights, samples, free)
-    return Level(offset, memory.of_sum(weights), drift, float(centre))
+    covariance = memory.of_sum(weights) + np.diag(hidden_level_variance(samples, free))
+    return Level(offset, covariance, drift, float(centre))
+
+
+def hidden_level_variance(samples: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Return the variances (k,) of a level's channels by a converter's steps that their noise does not hide.
+
+    A channel that stays on one step q is off by a uniform error, q²/12. Noise of standard deviation s
+    carries it over the steps, and the mean's error falls by exp(−4π² s²/q²) in variance (Widrow and Kollár,
+    Quantization Noise, 2008). samples (n, k): of the whole stroke, from which the steps are read; free (n,):
+    mask of those of the level.
+    """
+    variances = np.zeros(samples.shape[1])
+    for channel, values in enumerate(samples.T):
+        levels = np.unique(values[np.isfinite(values)])
+        if len(levels) < 2:
+            continue
+        step = np.diff(levels).min()
+        noise_variance = max(0.0, np.var(values[free]) - step**2 / 12)
+        variances[channel] = step**2 / 12 * np.exp(-4 * np.pi**2 * noise_variance / step**2)
+    return variances
