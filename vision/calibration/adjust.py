@@ -1,9 +1,9 @@
-"""The adjustment: Levenberg–Marquardt with pictures' instants, points and board poses eliminated.
+"""The adjustment: Levenberg–Marquardt with what is a picture's own, points and board poses eliminated.
 
 A view's pose touches only the cameras that saw it, so that all poses are eliminated from the normal
-equations (Schur complement) after the pictures' instants. The work grows linearly with views; what
-is left to solve is as small as the cameras are few, and its inverse is the covariance of its
-parameters, with all others marginalised. Where the board's points are free they are eliminated
+equations (Schur complement) after what is a picture's own. The work grows linearly with views; what
+is left to solve is as small as the cameras are few, and its inverse is the covariance of what is
+kept, everything eliminated being marginalised. Where the board's points are free they are eliminated
 last.
 """
 
@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solveh_banded
 
-from vision.calibration.bundle import N_CAMERA, N_VIEW, BundleState, Priors, Sightings
+from vision.calibration.bundle import N_CAMERA, N_PICTURE, N_VIEW, BundleState, Priors, Sightings
 from vision.calibration.normal_equations import (
     LinearisedCost,
     NormalEquations,
@@ -49,7 +49,8 @@ class Solution:
 
     residual_px (n, 2): seen − predicted. covariance (G, G): of the global parameters with all view
     poses marginalised; rows of held parameters are 0. fitted_points: how many coordinates of the
-    board's points the pictures determine.
+    board's points the pictures determine. picture_variance (V, C, 7): of what is the pictures' own, given all
+    else.
     """
 
     state: BundleState
@@ -58,6 +59,7 @@ class Solution:
     cost: float
     converged: bool
     fitted_points: float = 0.0
+    picture_variance: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +141,8 @@ def adjust_bundle(
     state, normal, converged = _descend(problem, state, tolerance)
     covariance = _covariance(normal, problem.free)
     fitted = problem.fitted_points(normal)
-    return Solution(state, normal.residual_px, covariance, normal.cost, converged, fitted)
+    variance = _picture_variance(normal, state)
+    return Solution(state, normal.residual_px, covariance, normal.cost, converged, fitted, variance)
 
 
 def _descend(
@@ -174,8 +177,8 @@ def _descend(
 def _solve_step(
     normal: LinearisedCost, free: _Free, damping: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return Marquardt's step of the globals (G,), the views (V, 6), the instants (V, C) and the
-    points (m, 3), 0 (1, 3) of points that are held.
+    """Return Marquardt's step of the globals (G,), the views (V, 6), the pictures (V, C, 7) and
+    the points (m, 3), 0 (1, 3) of points that are held.
     """
     equations = free.of(normal.equations)
     reduced, gradient, CB, Cc = _eliminate_views(equations, damping)
@@ -186,7 +189,7 @@ def _solve_step(
     step = free.directions @ free_step
     view_steps = (Cc - CB @ np.append(free_step, of_points)).reshape(-1, N_VIEW)
     point_steps = of_points.reshape(-1, 3) if len(of_points) else np.zeros((1, 3))
-    return step, view_steps, _instant_steps(normal, step, view_steps), point_steps
+    return step, view_steps, _picture_steps(normal, step, view_steps), point_steps
 
 
 def _eliminate_points(
@@ -218,16 +221,25 @@ def _solve_but_modes(matrix: np.ndarray, right: np.ndarray, modes: np.ndarray) -
     return x - yielding @ np.linalg.solve(modes.T @ yielding, modes.T @ x)
 
 
-def _instant_steps(normal: LinearisedCost, step: np.ndarray, view_steps: np.ndarray) -> np.ndarray:
-    """Return the steps (V, C) of the pictures' instants that go with those of globals and views."""
+def _picture_steps(normal: LinearisedCost, step: np.ndarray, view_steps: np.ndarray) -> np.ndarray:
+    """Return the steps (V, C, 7) of what is the pictures' own that go with those of globals and views."""
     shots = normal.shots
-    instants = normal.instants
+    own = normal.own
     others = np.hstack([step[shots.columns], view_steps.ravel()[shots.poses]])  # (s, p)
-    gradient = instants.gradient - np.sum(instants.coupling * others, axis=1)
+    gradient = own.gradient - np.einsum("skp,sp->sk", own.coupling, others)
     of_cameras = len(step) + N_CAMERA - shots.columns.shape[1]
-    instant_steps = np.zeros((len(view_steps), of_cameras // N_CAMERA))
-    instant_steps[shots.view, shots.camera] = gradient / instants.precision
-    return instant_steps
+    steps = np.zeros((len(view_steps), of_cameras // N_CAMERA, N_PICTURE))
+    steps[shots.view, shots.camera] = np.linalg.solve(own.precision, gradient[:, :, None])[..., 0]
+    return steps
+
+
+def _picture_variance(normal: LinearisedCost, state: BundleState) -> np.ndarray:
+    """Return the variances (V, C, 7) of what is the pictures' own, given all else; 0 of no picture."""
+    variance = np.zeros_like(state.pictures)
+    if normal.own is not None:
+        covariances = np.linalg.inv(normal.own.precision)
+        variance[normal.shots.view, normal.shots.camera] = np.einsum("sii->si", covariances)
+    return variance
 
 
 def _eliminate_views(
@@ -263,7 +275,7 @@ def _solve_scaled(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 
 def _covariance(normal: LinearisedCost, free: _Free) -> np.ndarray:
-    """Return the covariance (G, G) of the globals, all poses, points and instants being marginalised."""
+    """Return the covariance (G, G) of the globals, all poses, points and pictures being marginalised."""
     size, count = free.directions.shape
     if normal.equations is None or not count:
         return np.zeros((size, size))

@@ -44,6 +44,12 @@ class Trajectory:
         np.minimum.at(first, view, rank)
         return rank == first[view]
 
+    def may_stray(self, view: np.ndarray, camera: np.ndarray) -> np.ndarray:
+        """Return which pictures (view, camera), (s,) each, may be of another instant than their view, the
+        board being elsewhere: (s,) bool.
+        """
+        return np.isfinite(self.time_s[view]) & ~self.is_reference(view, camera)
+
     @cached_property
     def neighbours(self) -> np.ndarray:
         """Return the view before and the view after each, (V, 2).

@@ -9,7 +9,8 @@ Every observation is a corner of the board, seen by one camera in one view. Para
 - of each of the board's points, where these are not exact: how far it is from its place (3), a face's
   points not moving as one;
 - of each view: w and v of the board's pose (6);
-- where the board moves and cameras are not triggered together, of each picture: how late it is (1).
+- where the board moves and cameras are not triggered together, of each picture: how late it is (1), and
+  w and v of the board's pose then about its path through the views (6).
 
 Poses move as T ← (Exp(w) R, t + v). `vision.calibration.adjust` finds the parameters.
 """
@@ -33,6 +34,10 @@ N_CAMERA = len(CAMERA_COLUMNS)
 N_BOARD = len(PRINT_TERMS)
 # [parameters] A layout, no threshold.
 N_VIEW = 6
+# [parameters] A layout, no threshold: a picture's own.
+N_PICTURE = 7
+# [columns] A layout, no threshold: of a picture's own parameters.
+DEPARTURE = slice(1, 7)
 # [columns] A layout, no threshold.
 POSE = slice(9, 15)
 # [column] A layout, no threshold.
@@ -81,7 +86,8 @@ class BundleState:
 
     lens (C, 9). T_camera_world (C, 3, 4). T_world_board (V, 3, 4). board (B,): its
     shape and PRINT_TERMS. points_mm (m, 3): how far its points are from there, in its frame; (1, 3) for
-    all of them. clock (C,): offset, s. instants (V, C): how much later than it should each picture was taken, s.
+    all of them. clock (C,): offset, s. pictures (V, C, 7): how much later than it should each picture was
+    taken, s, and w, rad, and v, mm, of the board's pose then about its path.
     trajectory: the views in time, along which the board moves between pictures of one view; None
     where cameras are triggered together.
     """
@@ -92,15 +98,16 @@ class BundleState:
     board: np.ndarray = field(default_factory=lambda: np.zeros(N_BOARD))
     points_mm: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
     clock: np.ndarray | None = None
-    instants: np.ndarray | None = None
+    pictures: np.ndarray | None = None
     trajectory: Trajectory | None = None
 
     def __post_init__(self):
         cameras = len(self.lens)
         if self.clock is None:
             object.__setattr__(self, "clock", np.zeros(cameras))
-        if self.instants is None:
-            object.__setattr__(self, "instants", np.zeros((len(self.T_world_board), cameras)))
+        if self.pictures is None:
+            shape = (len(self.T_world_board), cameras, N_PICTURE)
+            object.__setattr__(self, "pictures", np.zeros(shape))
 
     def global_values(self) -> np.ndarray:
         """Return the values that priors constrain, (16 C + B,); poses stand as 0."""
@@ -113,10 +120,10 @@ class BundleState:
         self,
         global_step: np.ndarray,
         view_steps: np.ndarray,
-        instant_steps: np.ndarray,
+        picture_steps: np.ndarray,
         point_steps: np.ndarray | float = 0.0,
     ) -> "BundleState":
-        """Return the state moved by steps (16 C + B,), (V, 6), (V, C) and (m, 3)."""
+        """Return the state moved by steps (16 C + B,), (V, 6), (V, C, 7) and (m, 3)."""
         of_cameras = N_CAMERA * len(self.lens)
         cameras = global_step[:of_cameras].reshape(-1, N_CAMERA)
         return replace(
@@ -127,7 +134,7 @@ class BundleState:
             board=self.board + global_step[of_cameras:],
             points_mm=self.points_mm + point_steps,
             clock=self.clock + cameras[:, CLOCK],
-            instants=self.instants + instant_steps,
+            pictures=self.pictures + picture_steps,
         )
 
 
@@ -138,8 +145,8 @@ class Priors:
     free (16 C + B,): bool. sigma (16 C + B,): about 0, of independent observations of the global
     parameters, inf where there is none (poses: always inf). view_free (V,): bool. pose_view,
     pose_T (3, 4), pose_sigma (6,): one view whose pose was measured (the board on the rig), in w
-    rad and v mm; pose_view is None where there is none. late_sigma_s (C,): how far a picture's instant
-    strays from its time; None: not at all. shared: cameras with one lens, of which all but the first have no
+    rad and v mm; pose_view is None where there is none. picture_sigma (C, 7): how far a picture's own
+    parameters stray from 0; None: not at all. shared: cameras with one lens, of which all but the first have no
     free lens or clock of their own; None: each has its own. point_sigma_mm: how far the board's points are
     from their places, per axis; 0: not at all.
     """
@@ -150,7 +157,7 @@ class Priors:
     pose_view: int | None = None
     pose_T: np.ndarray | None = None
     pose_sigma: np.ndarray | None = None
-    late_sigma_s: np.ndarray | None = None
+    picture_sigma: np.ndarray | None = None
     shared: "SharedLenses | None" = None
     point_sigma_mm: float = 0.0
 
@@ -223,16 +230,25 @@ def predict(state: BundleState, seen: Sightings, board: Board) -> tuple[np.ndarr
     Its columns: the camera's 16, the board's B, the view's 6; with a trajectory also the 6 of
     the view before and the 6 of the view after.
     """
-    px, J, _ = predict_with_points(state, seen, board)
-    return px, J
+    whole = predict_with_own(state, seen, board)
+    return whole.px, whole.J
 
 
-def predict_with_points(
-    state: BundleState, seen: Sightings, board: Board
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Predict the pixels of all sightings and their Jacobian as `predict` does, and return the
-    derivatives (n, 2, 3) by the board's point of each sighting, too.
+class Prediction(NamedTuple):
+    """Pixels px (n, 2) of sightings, and their derivatives.
+
+    J (n, 2, 16 + B + 6 or 18): as of `predict`. by_point (n, 2, 3): by the board's point of each.
+    by_departure (n, 2, 6): by w and v of the board's pose about its path.
     """
+
+    px: np.ndarray
+    J: np.ndarray
+    by_point: np.ndarray
+    by_departure: np.ndarray
+
+
+def predict_with_own(state: BundleState, seen: Sightings, board: Board) -> Prediction:
+    """Predict the pixels of all sightings, with the derivatives by what is a point's or a picture's own."""
     points_mm, by_board = board.printed(state.board)
     points_mm = points_mm + state.points_mm
     motion = _board_motion(state, seen)
@@ -246,7 +262,8 @@ def predict_with_points(
     by_point = by_world @ motion.turn @ placed.R_board
     by_views = motion.by_poses(by_turn, by_world)
     J = np.concatenate([*by_camera, by_point @ by_board[seen.corner], *by_views], axis=2)
-    return px, J, by_point
+    by_departure = np.concatenate([by_turn @ motion.by_departure, by_world], axis=2)
+    return Prediction(px, J, by_point, by_departure)
 
 
 def _project(
@@ -273,7 +290,7 @@ class _Motion(NamedTuple):
     turn (n, 3, 3): about the board's origin. shift_mm (n, 3). turn_rate, shift_rate_mm_s (n, 3):
     rad/s and mm/s. turn_by_poses (n, p, 3, 3), shift_by_poses (n, p): derivatives of the turn (as a
     small rotation) by w, and of the shift by v, of p poses: the view's own and, with a trajectory,
-    those before and after.
+    those before and after. by_departure (n, 3, 3): derivative of the turn by w of the departure.
     """
 
     turn: np.ndarray
@@ -282,13 +299,25 @@ class _Motion(NamedTuple):
     shift_rate_mm_s: np.ndarray
     turn_by_poses: np.ndarray
     shift_by_poses: np.ndarray
+    by_departure: np.ndarray
 
     @staticmethod
     def none(count: int) -> "_Motion":
         """Return the motion of a board that stands still, for `count` corners."""
         zero = np.zeros((count, 3))
         eye = np.broadcast_to(np.eye(3), (count, 3, 3))
-        return _Motion(eye, zero, zero, zero, eye[:, None], np.ones((count, 1)))
+        return _Motion(eye, zero, zero, zero, eye[:, None], np.ones((count, 1)), eye)
+
+    def departed(self, departure: np.ndarray) -> "_Motion":
+        """Return the motion with w and v (n, 6) of the board's pose about its path besides."""
+        aside = exp_rotation(departure[:, :3])
+        return self._replace(
+            turn=aside @ self.turn,
+            shift_mm=self.shift_mm + departure[:, 3:],
+            turn_rate=np.einsum("nij,nj->ni", aside, self.turn_rate),
+            turn_by_poses=aside[:, None] @ self.turn_by_poses,
+            by_departure=left_jacobian(departure[:, :3]),
+        )
 
     def by_time(self, by_turn: np.ndarray, by_shift: np.ndarray) -> np.ndarray:
         """Return the derivative (n, 2, 1) of pixels by the time of their picture, px/s.
@@ -345,19 +374,21 @@ def _board_motion(state: BundleState, seen: Sightings) -> _Motion:
     turn = exp_rotation(path[:, :3])
     J = left_jacobian(path[:, :3])
     by_path = _inverse_jacobians(paths)[view] * shares[:, :, None, None]
-    return _Motion(
+    along = _Motion(
         turn=turn,
         shift_mm=path[:, 3:],
         turn_rate=np.einsum("nij,nj->ni", J, rate[:, :3]),
         shift_rate_mm_s=rate[:, 3:],
         turn_by_poses=_turn_by_poses(turn, J, by_path),
         shift_by_poses=np.column_stack([1.0 - shares.sum(axis=1), shares]),
+        by_departure=np.broadcast_to(np.eye(3), turn.shape),
     )
+    return along.departed(state.pictures[view, seen.camera, DEPARTURE])
 
 
 def _elapsed_s(state: BundleState, seen: Sightings) -> np.ndarray:
     """Return the times (n,) of the sightings' pictures after their views' own times, s."""
-    late_s = state.instants[seen.view, seen.camera]
+    late_s = state.pictures[seen.view, seen.camera, 0]
     return seen.time_s + late_s + state.clock[seen.camera]
 
 

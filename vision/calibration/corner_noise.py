@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from vision.calibration.adjust import Solution, adjust_bundle
-from vision.calibration.bundle import BundleState, Priors, Sightings, predict
+from vision.calibration.bundle import N_PICTURE, BundleState, Priors, Sightings, predict
 from vision.geometry.board import Board
 from vision.geometry.refusals import Refused
 
@@ -37,12 +37,14 @@ _ROUNDS = 2
 _ROUNDS_MOVING = 5
 # [corners] A shot with fewer says less than the six parameters of its pose. Derived.
 _MIN_SHOT = 4
-# [instants] Fewer give no scatter. Derived.
+# [pictures] Fewer give no scatter of what is their own. Derived.
 _MIN_LATE = 8
-# [1] Of all cameras' lateness, below which none is taken: no camera is exactly on time. Stated.
+# [1] Of all cameras' scatter, below which none is taken: no camera is exactly on time. Stated.
 _LEAST_LATE_SHARE = 0.02
-# [coordinates] Of the board's points that the pictures determine: fewer have no scatter. Derived.
-_LEAST_FITTED_POINTS = 1.0
+# [columns] Of a picture's own parameters with one scatter: instant, turn, shift. A layout, no threshold.
+_OF_ONE_SCATTER = (slice(0, 1), slice(1, 4), slice(4, 7))
+# [parameters] That the pictures determine: fewer have no scatter. Derived.
+_LEAST_FITTED = 1.0
 # [mm] Scatter of the board's points, at least: no print is better. Stated.
 _LEAST_POINT_SIGMA_MM = 0.001
 # [1] Of the residuals' number, left over however many parameters are fitted: keeps the model
@@ -102,8 +104,8 @@ def adjust_with_noise(
     """Adjust robustly, learn each camera's model error, drop outliers once, and adjust by least
     squares.
 
-    Where the state has a trajectory, priors.late_sigma_s is where the search for each camera's
-    scatter of instants begins. error_px (C,): model errors to begin with. rounds: of learning the
+    Where the state has a trajectory, priors.picture_sigma is where the search for the scatter of what is
+    each camera's pictures' own begins. error_px (C,): model errors to begin with. rounds: of learning the
     noise anew, where it is nearly known. Raises Refused where no corner agrees with the others.
     """
     error = np.full(len(state.lens), _FIRST_ERROR_PX) if error_px is None else error_px
@@ -127,7 +129,7 @@ def _adjust_robustly(
             "the views contradict each other from the start: is this the board as described?"
         )
     if state.trajectory is not None:
-        priors = _with_lateness(priors, solution.state, seen)
+        priors = _with_scatter(priors, solution, seen)
     return solution, _error_by_median(solution.residual_px, seen, len(error)), priors
 
 
@@ -143,7 +145,7 @@ def _without_outliers(
     if not kept.any():
         raise Refused("no corner agrees with the others: is this the board as described?")
     for _ in range(2):
-        fitted = solution.fitted_points
+        fitted = solution.fitted_points + _fitted_of_pictures(solution, priors, seen)[1].sum()
         error = _error_by_mean(residual_px, seen, kept, error, priors, fitted)
         priors = _with_print_errors(priors, solution)
         weighted = seen.with_error(error)
@@ -153,31 +155,56 @@ def _without_outliers(
     return Adjustment(solution, weighted, kept, residual_px, error, priors)
 
 
-def _with_lateness(priors: Priors, state: BundleState, seen: Sightings) -> Priors:
-    """Return the priors with each camera's scatter of instants as the fitted instants have it.
+def _with_scatter(priors: Priors, solution: Solution, seen: Sightings) -> Priors:
+    """Return the priors with each camera's scatter of what is its pictures' own as the fitted values have
+    it (MacKay, Neural Computation 4, 415, 1992).
 
-    Pictures that give their view its time count for nothing. A camera with few others gets the
-    scatter of all.
+    A camera with few pictures that may stray gets the scatter of all.
     """
+    squared, fitted, count = _fitted_of_pictures(solution, priors, seen)
+    sigma = priors.picture_sigma.copy()  # (C, 7)
+    for columns in _OF_ONE_SCATTER:
+        own_squared = squared[:, columns].sum(axis=1)
+        own_fitted = fitted[:, columns].sum(axis=1)
+        if own_fitted.sum() < _LEAST_FITTED:
+            continue
+        overall = np.sqrt(own_squared.sum() / own_fitted.sum())
+        for c in range(len(sigma)):
+            scatter = overall
+            if count[c] >= _MIN_LATE and own_fitted[c] >= _LEAST_FITTED:
+                scatter = np.sqrt(own_squared[c] / own_fitted[c])
+            sigma[c, columns] = max(scatter, _LEAST_LATE_SHARE * overall)
+    return replace(priors, picture_sigma=sigma)
+
+
+def _fitted_of_pictures(
+    solution: Solution, priors: Priors, seen: Sightings
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return of each camera the sum of squares (C, 7) of what is its pictures' own, how many of these
+    parameters the corners determine, (C, 7), and of how many pictures, (C,).
+    """
+    state = solution.state
+    squared = np.zeros((len(state.lens), N_PICTURE))
+    fitted = np.zeros_like(squared)
+    count = np.zeros(len(squared), dtype=int)
+    if state.trajectory is None or priors.picture_sigma is None:
+        return squared, fitted, count
     starts = seen.shot_starts()
-    camera = seen.camera[starts]
-    view = seen.view[starts]
-    is_free = ~state.trajectory.is_reference(view, camera)
-    squared = np.where(is_free, state.instants[view, camera] ** 2, np.nan)
-    overall = np.nanmean(squared)
-    variances = np.full(len(priors.late_sigma_s), overall)
-    for c in range(len(variances)):
-        own = squared[is_free & (camera == c)]
-        if len(own) >= _MIN_LATE:
-            variances[c] = np.mean(own)
-    least = _LEAST_LATE_SHARE * np.sqrt(overall)
-    return replace(priors, late_sigma_s=np.maximum(np.sqrt(variances), least))
+    may_stray = state.trajectory.may_stray(seen.view[starts], seen.camera[starts])
+    view = seen.view[starts][may_stray]
+    camera = seen.camera[starts][may_stray]
+    sigma = priors.picture_sigma[camera]
+    share_left = solution.picture_variance[view, camera] / np.where(sigma > 0, sigma, np.inf) ** 2
+    np.add.at(squared, camera, state.pictures[view, camera] ** 2)
+    np.add.at(fitted, camera, (sigma > 0) * (1.0 - share_left))
+    np.add.at(count, camera, 1)
+    return squared, fitted, count
 
 
 def _with_print_errors(priors: Priors, solution: Solution) -> Priors:
     """Return the priors with the scatter of the board's points as the fitted points have it (MacKay,
     Neural Computation 4, 415, 1992)."""
-    if solution.fitted_points < _LEAST_FITTED_POINTS:
+    if solution.fitted_points < _LEAST_FITTED:
         return priors
     squared_mm2 = np.sum(solution.state.points_mm**2) / solution.fitted_points
     return replace(priors, point_sigma_mm=max(float(np.sqrt(squared_mm2)), _LEAST_POINT_SIGMA_MM))
@@ -211,14 +238,12 @@ def _error_by_mean(
     kept: np.ndarray,
     error: np.ndarray,
     priors: Priors,
-    fitted_points: float,
+    fitted: float,
 ) -> np.ndarray:
-    """Return each camera's model error (C,), px, with which the kept residuals have a mean square of
-    1 per degree of freedom, over their sigmas.
+    """Return each camera's model error (C,), px, at which the kept residuals' mean square is what
+    so many fitted parameters of points and pictures leave of it, and all of cameras, board and views.
     """
-    parameters = priors.free.sum() + 6 * priors.view_free.sum() + fitted_points
-    if priors.late_sigma_s is not None:
-        parameters += len(seen.shot_starts())
+    parameters = priors.free.sum() + 6 * priors.view_free.sum() + fitted
     freedom = max(1.0 - parameters / max(2 * kept.sum(), 1), _LEAST_FREEDOM)
     squared = np.sum(residual**2, axis=1) / freedom
     errors = np.zeros(len(error))

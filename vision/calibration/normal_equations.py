@@ -1,9 +1,9 @@
-"""The normal equations of an adjustment, formed picture by picture, with instants eliminated.
+"""The normal equations of an adjustment, formed picture by picture, with what is a picture's own eliminated.
 
-A picture's instant touches only that picture. The board's points are free only where instants are
-held. Shapes: s pictures ("shots"), G = 16 C + B global parameters, V views, p = 16 + B + 6 or 18
-parameters that a picture depends on: 16 + B of them global, the rest poses of its view and that
-view's neighbours.
+A picture's instant, and how far the board was from its path then, touch only that picture. The board's
+points are free only where these are held. Shapes: s pictures ("shots"), G = 16 C + B global parameters,
+V views, p = 16 + B + 6 or 18 parameters that a picture depends on: 16 + B of them global, the rest poses
+of its view and that view's neighbours.
 """
 
 from dataclasses import dataclass
@@ -15,17 +15,20 @@ from scipy.linalg import block_diag
 from vision.calibration.bundle import (
     CLOCK,
     N_CAMERA,
+    N_PICTURE,
     N_VIEW,
     BundleState,
     Priors,
     Sightings,
-    predict_with_points,
+    predict_with_own,
 )
 from vision.geometry.board import PRINT_TERMS, Board
 from vision.geometry.rotation import pose_difference, skew
 
 # [points] Three determine the motion of a face. Derived.
 _FEWEST_POINTS = 3
+# [columns] Of a row: departures, before the residual. A layout, no threshold.
+_DEPARTURES = slice(-1 - N_VIEW, -1)
 # [columns] Of a board's terms: scale and stretch. A layout, no threshold.
 _SIZES = [PRINT_TERMS.index(name) - len(PRINT_TERMS) for name in ("scale", "stretch")]
 
@@ -42,10 +45,10 @@ class Shots(NamedTuple):
     poses: np.ndarray
 
 
-class Instants(NamedTuple):
-    """The eliminated equation of each picture's instant.
+class OwnEquations(NamedTuple):
+    """The eliminated equations of each picture's own parameters.
 
-    precision, gradient (s,). coupling (s, p): to the picture's other parameters.
+    precision (s, 7, 7), gradient (s, 7). coupling (s, 7, p): to the picture's other parameters.
     """
 
     precision: np.ndarray
@@ -53,10 +56,20 @@ class Instants(NamedTuple):
     coupling: np.ndarray
 
     @staticmethod
-    def none(pictures: int, parameters: int) -> "Instants":
-        """Return the equations of pictures that have no instants of their own."""
-        coupling = np.zeros((pictures, parameters))
-        return Instants(np.ones(pictures), np.zeros(pictures), coupling)
+    def none(pictures: int, parameters: int) -> "OwnEquations":
+        """Return the equations of pictures that have no parameters of their own."""
+        precision = np.tile(np.eye(N_PICTURE), (pictures, 1, 1))
+        coupling = np.zeros((pictures, N_PICTURE, parameters))
+        return OwnEquations(precision, np.zeros((pictures, N_PICTURE)), coupling)
+
+    def of_free(self, is_free: np.ndarray) -> "OwnEquations":
+        """Return the equations with the parameters free that are so in is_free (s, 7), others held."""
+        both = is_free[:, :, None] & is_free[:, None]
+        return OwnEquations(
+            np.where(both, self.precision, np.eye(N_PICTURE)),
+            is_free * self.gradient,
+            is_free[:, :, None] * self.coupling,
+        )
 
 
 class NormalEquations(NamedTuple):
@@ -81,7 +94,7 @@ class LinearisedCost:
     cost: float
     residual_px: np.ndarray
     shots: Shots | None = None
-    instants: Instants | None = None
+    own: OwnEquations | None = None
     equations: NormalEquations | None = None
 
 
@@ -89,14 +102,15 @@ def normal_equations(
     state: BundleState, seen: Sightings, board: Board, priors: Priors, width: float
 ) -> LinearisedCost:
     """Return the cost and the normal equations at a state."""
-    px, J, by_point = predict_with_points(state, seen, board)
-    residual_px = seen.px - px
+    predicted = predict_with_own(state, seen, board)
+    residual_px = seen.px - predicted.px
     squared = np.sum(residual_px**2, axis=1) / seen.sigma_px**2
     if not np.all(np.isfinite(squared)):
         return LinearisedCost(np.inf, residual_px)
     loss, weight = _cauchy(squared, width)
     root = (np.sqrt(weight) / seen.sigma_px)[:, None, None]
-    rows = _SightingRows(np.dstack([J, residual_px]) * root, by_point * root, seen, board)
+    of_pictures = np.dstack([predicted.J, predicted.by_departure, residual_px]) * root
+    rows = _SightingRows(of_pictures, predicted.by_point * root, seen, board)
     return _with_equations(residual_px, float(np.sum(loss)), rows, state, priors)
 
 
@@ -108,15 +122,16 @@ def _with_equations(
     residual_px (n, 2), loss: of the sightings.
     """
     shots = _shots(state, rows.seen)
-    blocks = _shot_blocks(rows.others, rows.seen.shot_starts())
-    instants, cost = _eliminate_instants(blocks, shots, state, priors)
+    blocks = _shot_blocks(rows.of_pictures, rows.seen.shot_starts())
+    own, cost = _own_equations(blocks, shots, state, priors)
+    blocks = _without_own(blocks, own)
     equations = _assemble(blocks, shots, state)
     if priors.point_sigma_mm:
         equations = rows.with_points(equations, shots, state, priors.point_sigma_mm)
         cost += np.sum(state.points_mm**2) / priors.point_sigma_mm**2
     equations, prior_cost = _with_priors(equations, state, priors)
     cost += loss + prior_cost
-    return LinearisedCost(float(cost), residual_px, shots, instants, equations)
+    return LinearisedCost(float(cost), residual_px, shots, own, equations)
 
 
 def _cauchy(squared: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
@@ -146,7 +161,7 @@ def _shots(state: BundleState, seen: Sightings) -> Shots:
 
 
 def _shot_blocks(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Return JᵀJ and Jᵀr of each picture, (s, p, p + 1), from weighted rows (n, 2, p + 1).
+    """Return JᵀJ and Jᵀr of each picture, (s, q, q + 1), from weighted rows (n, 2, q + 1).
 
     Pictures are filled up with zeros to one length: one product for all is ten times as fast as one
     a corner.
@@ -161,31 +176,40 @@ def _shot_blocks(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
     return np.swapaxes(padded[:, :, :-1], 1, 2) @ padded
 
 
-def _eliminate_instants(
+def _own_equations(
     blocks: np.ndarray, shots: Shots, state: BundleState, priors: Priors
-) -> tuple[Instants, float]:
-    """Eliminate each picture's instant from its block (s, p, p + 1), in place.
+) -> tuple[OwnEquations, float]:
+    """Return the equations of each picture's own parameters, by its block (s, p + 6, p + 7), and the cost
+    of their priors.
 
-    Returns the eliminated equations, and the cost of the instants' priors. A picture that gives its
-    view its time has no instant of its own.
+    A picture that gives its view its time and its pose has none.
     """
-    if state.trajectory is None or priors.late_sigma_s is None:
-        return Instants.none(*blocks.shape[:2]), 0.0
-    is_free = ~state.trajectory.is_reference(shots.view, shots.camera)
-    late_s = state.instants[shots.view, shots.camera]
-    prior = priors.late_sigma_s[shots.camera] ** -2.0  # precision, 1/s²
-    precision = blocks[:, CLOCK, CLOCK] + prior
-    gradient = is_free * (blocks[:, CLOCK, -1] - prior * late_s)
-    instants = Instants(precision, gradient, is_free[:, None] * blocks[:, :, CLOCK])
-    _take_off(blocks, instants)
-    return instants, float(np.sum(prior * late_s**2))
+    parameters = shots.columns.shape[1] + shots.poses.shape[1]
+    if state.trajectory is None or priors.picture_sigma is None:
+        return OwnEquations.none(len(blocks), parameters), 0.0
+    sigma = priors.picture_sigma[shots.camera]  # (s, 7)
+    may_stray = state.trajectory.may_stray(shots.view, shots.camera)
+    is_free = may_stray[:, None] & (sigma > 0)
+    prior = np.where(is_free, sigma, np.inf) ** -2.0
+    value = state.pictures[shots.view, shots.camera]
+    own = [CLOCK, *range(parameters, parameters + N_VIEW)]
+    rows = blocks[:, own]
+    equations = OwnEquations(
+        precision=rows[:, :, own] + prior[:, :, None] * np.eye(N_PICTURE),
+        gradient=rows[:, :, -1] - prior * value,
+        coupling=rows[:, :, :parameters],
+    )
+    return equations.of_free(is_free), float(np.sum(prior * value**2))
 
 
-def _take_off(blocks: np.ndarray, instants: Instants) -> None:
-    """Subtract from the pictures' blocks (s, p, p + 1) what their instants explain, in place."""
-    coupling = instants.coupling
-    row = np.column_stack([coupling, instants.gradient])
-    blocks -= coupling[:, :, None] * row[:, None] / instants.precision[:, None, None]
+def _without_own(blocks: np.ndarray, own: OwnEquations) -> np.ndarray:
+    """Return the pictures' blocks (s, p, p + 1) without what their own parameters explain of them.
+
+    blocks (s, p + 6, p + 7): with departures from the board's path before the last column.
+    """
+    others = np.delete(blocks[:, : own.coupling.shape[2]], _DEPARTURES, axis=2)
+    right = np.dstack([own.coupling, own.gradient])
+    return others - np.swapaxes(own.coupling, 1, 2) @ np.linalg.solve(own.precision, right)
 
 
 def _assemble(blocks: np.ndarray, shots: Shots, state: BundleState) -> NormalEquations:
@@ -223,12 +247,12 @@ def _lower_band(blocks: np.ndarray, poses: np.ndarray, size: int) -> np.ndarray:
 
 
 class _SightingRows(NamedTuple):
-    """The weighted rows of sightings: by all but points, with the residual as last column, others
-    (n, 2, p + 1), and by the board's point of each, own (n, 2, 3).
+    """Hold the weighted rows of sightings: by all but points, with departures from the board's path and the
+    residual as last columns, of_pictures (n, 2, p + 7), and by the board's point of each, by_point (n, 2, 3).
     """
 
-    others: np.ndarray
-    own: np.ndarray
+    of_pictures: np.ndarray
+    by_point: np.ndarray
     seen: Sightings
     board: Board
 
@@ -241,7 +265,7 @@ class _SightingRows(NamedTuple):
         """
         prior = sigma_mm**-2.0
         H = prior * np.tile(np.eye(3), (len(self.board.corners_mm), 1, 1))
-        np.add.at(H, self.seen.corner, np.swapaxes(self.own, 1, 2) @ self.own)
+        np.add.at(H, self.seen.corner, np.swapaxes(self.by_point, 1, 2) @ self.by_point)
         W = self._couplings(shots, equations)  # (m, 3, G + 6 V + 1)
         W[:, :, -1] -= prior * state.points_mm
         of_points = W.reshape(-1, W.shape[2])
@@ -259,11 +283,12 @@ class _SightingRows(NamedTuple):
         """Return how each point is coupled to globals and views, and its gradient, (m, 3, G + 6 V + 1)."""
         size = sum(equations.B.shape)
         W = np.zeros((len(self.board.corners_mm), 3, size + 1))
+        others = np.delete(self.of_pictures, _DEPARTURES, axis=2)
         every_row = np.arange(len(self.seen))
         rows_by_shot = np.split(every_row, self.seen.shot_starts()[1:])
         for rows, globals_, poses in zip(rows_by_shot, shots.columns, shots.poses):
             columns = np.concatenate([globals_, len(equations.a) + poses, [size]])
-            products = np.swapaxes(self.own[rows], 1, 2) @ self.others[rows]
+            products = np.swapaxes(self.by_point[rows], 1, 2) @ others[rows]
             place = np.ix_(self.seen.corner[rows], np.arange(3), columns)
             W[place] += products
         return W

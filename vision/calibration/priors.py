@@ -27,6 +27,9 @@ _CLOCK_SIGMA = 0.6
 # [frame intervals] Where the fit of instants starts; learnt anew from the residuals. Study:
 # cameras.py.
 _FIRST_LATENESS = 0.2
+# [1] Of the board's size, and of a radian: where the fit of the board's departures from its path starts;
+# learnt anew. Study: cameras_montecarlo.py.
+_FIRST_DEPARTURE = 1e-3
 
 
 def lens_priors(
@@ -100,9 +103,9 @@ def joint_priors(
     return replace(priors, pose_view=0, pose_T=on_rig.T_rig_board, pose_sigma=pose_sigma)
 
 
-def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
-    """Return the priors with clocks and pictures' instants free, and the board's points held; the
-    clock of the camera that ranks first is held, too.
+def allow_lateness(priors: Priors, trajectory: Trajectory, board: Board) -> Priors:
+    """Return the priors with clocks, pictures' instants and the board's departures from its path free, and
+    the board's points held; the clock of the camera that ranks first is held, too.
     """
     free = priors.free.copy()
     sigma = priors.sigma.copy()
@@ -112,5 +115,8 @@ def allow_lateness(priors: Priors, trajectory: Trajectory) -> Priors:
     is_late = clock_of != clock_of[np.argmin(trajectory.camera_rank)]
     free[clocks[is_own & is_late]] = True
     sigma[clocks[is_own]] = _CLOCK_SIGMA * trajectory.interval_s
-    late_s = np.full(len(clocks), _FIRST_LATENESS * trajectory.interval_s)
-    return replace(priors, free=free, sigma=sigma, late_sigma_s=late_s, point_sigma_mm=0.0)
+    late_s = _FIRST_LATENESS * trajectory.interval_s
+    turn_rad = [_FIRST_DEPARTURE] * 3
+    shift_mm = [_FIRST_DEPARTURE * np.ptp(board.corners_mm, axis=0).max()] * 3
+    own = np.tile([late_s, *turn_rad, *shift_mm], (len(clocks), 1))
+    return replace(priors, free=free, sigma=sigma, picture_sigma=own, point_sigma_mm=0.0)

@@ -173,7 +173,7 @@ class JointInput:
         adjustment = self._with_instants(layout, coarse.solution.state)
         timing = Timing(
             offset_s=adjustment.solution.state.clock,
-            scatter_s=adjustment.priors.late_sigma_s,
+            scatter_s=adjustment.priors.picture_sigma[:, 0],
             in_frames=self.times_s is None,
             held_out=comparison.in_words,
         )
@@ -203,7 +203,7 @@ class JointInput:
             replace(first, trajectory=layout.trajectory, points_mm=layout.first.points_mm),
             layout.seen,
             self.board,
-            allow_lateness(self._priors_of(layout), layout.trajectory),
+            allow_lateness(self._priors_of(layout), layout.trajectory, self.board),
             error_px=self._own_errors_px() + _FIRST_EXCESS_PX,
             rounds=rounds,
         )

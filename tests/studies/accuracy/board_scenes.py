@@ -163,6 +163,43 @@ def moving_board(time_s: float) -> np.ndarray:
     return np.column_stack([R, middle - R @ BOARD.corners_mm.mean(axis=0)])
 
 
+def shaken_board(time_s: float, shake_mm: float, phases: np.ndarray) -> np.ndarray:
+    """T_rig_board of `moving_board` that is shaken besides, at about 4 Hz: by shake_mm, and by a radian every 60 mm
+    of that. phases (6,): of the shaking along and about each axis."""
+    T = moving_board(time_s)
+    angles = 2 * np.pi * 4.0 * np.array([1.0, 1.13, 0.9, 1.07, 0.95, 1.2]) * time_s + phases
+    shake = shake_mm * np.sin(angles)
+    R = exp_rotation(shake[3:] / 60.0) @ T[:, :3]
+    middle = T[:, :3] @ BOARD.corners_mm.mean(axis=0) + T[:, 3] + shake[:3]
+    return np.column_stack([R, middle - R @ BOARD.corners_mm.mean(axis=0)])
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film of a shaken board by two cameras that are not triggered together.
+
+    period_s: of its frames. late: of the second camera, in periods; jitter: scatter of each picture's instant, too.
+    """
+
+    shake_mm: float
+    period_s: float = 1 / 30
+    frames: int = 40
+    late: float = 0.25
+    jitter: float = 0.02
+
+    def views(self, cameras: Cameras, sigma_px: float, rng: np.random.Generator) -> dict:
+        """Corners of each camera's frames, by its name."""
+        phases = rng.uniform(0, 2 * np.pi, 6)
+        first_s = rng.uniform(0, 100)
+        boards = {camera.name: [] for camera in cameras}
+        for frame in range(self.frames):
+            for camera, late in zip(cameras, (0.0, self.late)):
+                when = frame + late + self.jitter * rng.standard_normal()
+                T = shaken_board(first_s + self.period_s * when, self.shake_mm, phases)
+                boards[camera.name].append(noisy_view_at(camera, T, sigma_px, rng))
+        return boards
+
+
 def noisy_view_at(
     camera: Camera, T_rig_board: np.ndarray, sigma_px: float, rng: np.random.Generator
 ) -> Corners:
