@@ -24,7 +24,7 @@ _FAULTS = {
     "Expected": "expected",
     "got": "found",
     "Object missing required field": "there is no",
-    "Object contains unknown field": "no key is",
+    "Object contains unknown field": "there is no key",
 }
 
 

@@ -57,6 +57,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         return DONE
+    except (FileExistsError, NotADirectoryError) as problem:
+        return _complain(f"{problem.filename}: a file stands where a folder is wanted", BAD_INPUT)
     except OSError as problem:
         place = problem.filename or "file system"
         return _complain(f"{place}: {problem.strerror or problem}", BAD_INPUT)

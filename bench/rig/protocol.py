@@ -29,6 +29,9 @@ from bench.rig.protocol_tables import (
     WhiskerTable,
 )
 
+# Keys of session.toml that no protocol has.
+_OF_SESSIONS = ("format", "rig")
+
 
 class Protocol(ProtocolTable, kw_only=True):
     """A session to be simulated.
@@ -149,6 +152,11 @@ def load(protocol: str | Path) -> Protocol:
         built_in = f"the built-in protocols are {protocol_names()}"
         raise BadInput(f"there is no such file; {built_in}", file=path)
     tables = read_toml(path, str(path))
+    if tables.keys() & set(_OF_SESSIONS):
+        found = "is a session's file"
+        raise BadInput(
+            f"{found}, no protocol of a rig; the built-in ones are {protocol_names()}", file=path
+        )
     try:
         found = msgspec.convert(tables, Protocol)
     except msgspec.ValidationError as problem:

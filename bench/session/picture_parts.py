@@ -43,13 +43,24 @@ def stated_crops(cameras: Iterable[CameraKeys], sources: Mapping[str, Path]) -> 
     return found
 
 
-def check_part_keys(cameras: Any, problems: InputProblems) -> None:
-    """Report each table of [[cameras]] with a part's keys of which `of` or `crop` is missing.
+def check_camera_tables(cameras: Any, problems: InputProblems) -> None:
+    """Report each table of [[cameras]] whose name an earlier one has, or with a part's keys of which `of` or
+    `crop` is missing.
 
     cameras: as the file has them. Raises BadInput at the first one, where `problems` does not collect.
     """
+    taken = []
     for table in cameras if isinstance(cameras, list) else ():
-        if not isinstance(table, dict) or not table.keys() & {"of", "crop", "mirrored"}:
+        if not isinstance(table, dict):
+            continue
+        with problems.guard():
+            if table.get("name") in taken:
+                raise _bad(
+                    table["name"],
+                    "the name is used twice; one table a camera, under the name of its folder",
+                )
+        taken.append(table.get("name", table))
+        if not table.keys() & {"of", "crop", "mirrored"}:
             continue
         for key, what in _NEEDED_OF_PART.items():
             with problems.guard():

@@ -19,7 +19,7 @@ from bench.session.file_names import SESSION_TOML
 from bench.session.footage import camera_sources, single_pictures, visible
 from bench.session.givens import Given
 from bench.session.inside import check_inside
-from bench.session.picture_parts import check_part_keys, in_parts, stated_crops
+from bench.session.picture_parts import check_camera_tables, in_parts, stated_crops
 from bench.session.plausible import YOUNGS_MODULUS
 from bench.session.profile import read_profile
 from bench.session.rest_shape import read_rest_shape
@@ -317,7 +317,7 @@ def _stated_session(path: Path, tables: dict, problems: InputProblems) -> Stated
         raise BadInput(found, file=SESSION_TOML)
     tables = with_kalibr_target(tables, path)
     _check_board_parts(tables.get("board"), problems)
-    check_part_keys(tables.get("cameras"), problems)
+    check_camera_tables(tables.get("cameras"), problems)
     has_trials = bool(visible(path / "trials"))
     if not has_trials:
         _check_angle_parts(tables.get("trial"), problems)

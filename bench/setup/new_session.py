@@ -1,5 +1,6 @@
 """`whisker-bench new`: the folders of a session, and an annotated session.toml to fill in."""
 
+import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -7,7 +8,10 @@ from bench.base.atomic import write_whole
 from bench.base.errors import BadInput
 from bench.base.input_problems import InputProblems
 from bench.session.file_names import SESSION_TOML
+from bench.session.manifest import BoardKeys
 from bench.session.session import load_session
+from bench.session.stated_board import missing_parts, stated_board
+from bench.session.strict_toml import convert
 from bench.setup.lab import Ask, Lab
 from bench.setup.manifest_text import TO_FILL_IN, WHOLE_CAMERA, manifest_text
 from bench.setup.questions import questions_of
@@ -27,7 +31,7 @@ def new_session(
 
     lab: what there is. given: numbers by option's name. ask: answers a question, '' for not known; None
     asks nothing. squares (along x, along y), dictionary: of the board. Raises BadInput where there is a
-    session already, or a number is implausible.
+    session already, a number is implausible, or no such board can be.
     """
     require_no_session(path)
     questions = tuple(questions_of(lab))
@@ -39,9 +43,10 @@ def new_session(
     for question in questions if ask else ():
         if question.option not in numbers:
             numbers |= question.ask(ask)
+    text = manifest_text(name or path.resolve().name, numbers, lab, squares, dictionary)
+    _check_board(text, path)
     for folder in _folders(lab):
         (path / folder).mkdir(parents=True, exist_ok=True)
-    text = manifest_text(name or path.resolve().name, numbers, lab, squares, dictionary)
     write_whole(path / SESSION_TOML, text)
     return list(_next_steps(path, lab))
 
@@ -50,6 +55,16 @@ def require_no_session(path: Path) -> None:
     """Raise BadInput where there is a session already."""
     if (path / SESSION_TOML).exists():
         raise BadInput(f"there is a {SESSION_TOML} already; nothing was written", file=path)
+
+
+def _check_board(text: str, path: Path) -> None:
+    """Raise BadInput where a manifest's text states a board whole that cannot be."""
+    table = tomllib.loads(text).get("board")
+    if table is None:
+        return
+    keys = convert(table, BoardKeys)
+    if not any(missing_parts(keys.kind, table)):
+        stated_board(keys, str(path))
 
 
 def _folders(lab: Lab) -> Iterator[str]:

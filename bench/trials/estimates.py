@@ -43,6 +43,8 @@ def own_estimators(names: tuple[str, ...]) -> dict[str, Estimator]:
 def _imported(name: str) -> Estimator:
     """Import an estimator by "module:function". Raise BadInput where that is no function."""
     module, _, function = name.partition(":")
+    if not function:
+        raise BadInput(f"--estimator {name}: names no function; give module:function")
     try:
         found = getattr(importlib.import_module(module), function)
     except (ImportError, AttributeError, ValueError) as problem:

@@ -46,6 +46,7 @@ def test_no_manifest(session):
             'nmae = "high"',
             r"\[\[cameras\]\] nmae is not a key.*did you mean 'name'",
         ),
+        ('name = "low"', 'name = "high"', r"\[\[cameras\]\] \"high\": the name is used twice"),
         (
             "[bar]",
             "[bar]\nshape = 'cylinder'",

@@ -14,8 +14,9 @@ from tests.scenes.rig_sessions import TINY, protocol_file
 @pytest.mark.parametrize(
     "change, message",
     [
-        (('name = "tiny"', 'nome = "tiny"'), "no key is `nome`"),
-        (("[[trials]]", "[[trails]]"), "no key is `trails`"),
+        (('name = "tiny"', 'nome = "tiny"'), "there is no key `nome`"),
+        (("[[trials]]", "[[trails]]"), "there is no key `trails`"),
+        (('name = "tiny"', "format = 1"), "is a session's file, no protocol of a rig"),
         (("views = 2", 'views = "two"'), "board.views: expected a whole number, found text"),
         (("beta_deg = [20, 50]", "beta_deg = [20, 95]"), "±89"),
         (

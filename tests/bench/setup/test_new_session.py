@@ -105,6 +105,26 @@ def test_what_is_implausible_is_one_line(option, tmp_path, capsys):
     assert not (tmp_path / "s").exists()
 
 
+def test_a_file_where_a_folder_is_wanted_is_one_line(tmp_path, capsys):
+    (tmp_path / "s").write_text("")
+    assert main(["new", str(tmp_path / "s" / "session")]) == 2
+    assert capsys.readouterr().err.endswith("a file stands where a folder is wanted\n")
+
+
+@pytest.mark.parametrize(
+    "board, expected",
+    [
+        (["--square-mm", "11", "--marker-mm", "15"], "is not smaller"),
+        (["--square-mm", "15", "--marker-mm", "11", "--dictionary", "DICT_9X9"], "DICT_9X9"),
+    ],
+)
+def test_a_board_that_cannot_be_is_one_line(board, expected, tmp_path, capsys):
+    assert main(["new", str(tmp_path / "s"), *board]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and expected in said
+    assert not (tmp_path / "s").exists()
+
+
 def test_the_board_s_place_is_measured_and_not_filled_in(tmp_path):
     assert main(["new", str(tmp_path / "s"), *options(NUMBERS)]) == 0
     text = (tmp_path / "s" / "session.toml").read_text()
