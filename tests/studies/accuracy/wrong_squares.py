@@ -6,7 +6,7 @@ The board stands where SESSION's stands (the small session's), placed to 0.2 mm 
 place the rig with the covariance below. Both are drawn, and the square's error with its assumed ± 0.1 % about each share.
 Prints by share how often the square is named, with the scale's sigma, and how often it would be by the weighted mean of
 this scale with all else that knows it: the bars' widths and the whisker's end; then with an end that is seen to 0.3 mm of a
-whisker whose 100 mm are measured to 0.1 mm.
+whisker whose 100 mm are measured to 0.1 mm, or to the 0.5 mm that are assumed.
 """
 
 import sys
@@ -27,6 +27,7 @@ SQUARE_SIGMA = 1e-3
 OTHER_SIGMAS = {
     "all": np.array([0.012, 0.02]),
     "all, the end to 0.3 mm": np.array([0.012, np.hypot(0.003, 0.001)]),
+    "all, the end to 0.3 mm of a length to 0.5 mm": np.array([0.012, np.hypot(0.003, 0.005)]),
 }
 NAMED_SIGMAS = 3.0
 SHARES = (0.0, 0.005, 0.01, 0.012, 0.015, 0.02)
