@@ -60,6 +60,8 @@ _STARTS = 24
 _KEPT = 8
 # [steps] Least separation of two hypotheses of the grid. Study: bar_scenes.py.
 _SEPARATION = 4.0
+# [px] Along a line, at least: a bar seen end on has no direction, and shows no edges. Derived.
+_LEAST_STEP_PX = np.float32(1e-9)
 # [hypotheses] Evaluated together: arrays that stay in the processor's cache; no result depends on
 # it. Study: tests/studies/speed/tracer.py.
 _BATCH = 1000
@@ -164,8 +166,10 @@ class EdgeScore(ObjectScore):
         middle, half_width = _bar_in_picture(axes, edges.camera, self.radius_mm, self.along_mm)
         # Both edges run nearly as the middle does: one normal (x, y) = (-dy, dx) serves all lines.
         dx, dy = np.gradient(middle, axis=-1)  # (n, t) each
+        step = np.maximum(np.hypot(dx, dy), _LEAST_STEP_PX)
+        dx = dx / step
+        dy = dy / step
         across = np.stack([dy * dy, -2.0 * dx * dy, dx * dx], axis=-1)  # weights of xx, xy, yy
-        across = across / (dx * dx + dy * dy)[..., None]
         both_sides = np.concatenate([offsets, -offsets])[:, None, None, None]
         x, y = np.moveaxis(middle + both_sides * half_width, 1, 0)  # (lines, n, t) px each
         along_lines = edges.tensor_at(x, y)  # (lines, n, t, 3)

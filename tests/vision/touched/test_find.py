@@ -20,7 +20,8 @@ from vision.geometry.rods import Bar, Rods, Wire
 from vision.geometry.vision_settings import VisionSettings
 from vision.pictures.pixel_noise import Noise
 from vision.pictures.view import View
-from vision.touched.edge_map import compute_edge_map, edge_strength_tensor
+from vision.touched.edge_map import EdgeMap, compute_edge_map, edge_strength_tensor
+from vision.touched.find import EdgeScore, axis_from_angles
 from vision.touched.grid_search import climb
 from vision.touched.one_view import find_bars_alone
 from vision.touched.search import find_object
@@ -58,6 +59,22 @@ def test_a_polished_bar_over_squares_is_found_by_one_camera(rng):
     px = camera.project(found.point_mm + np.array([-8.0, 8.0])[:, None] * found.direction)
     off = (px - CENTRE) @ [-np.sin(angle), np.cos(angle)] - np.mean(edges_px(across_mm))
     assert np.max(np.abs(off)) < 4.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_bars_end_on_and_about_a_camera_are_scored_without_a_warning(rng):
+    """A camera between the bars: some are behind it, some end on, of some the picture is beyond all numbers."""
+    lens = [[2000, 0, 640], [0, 2000, 360], [0, 0, 1]]
+    T = np.column_stack([[[0, -1, 0], [0, 0, -1], [1, 0, 0]], [5.0, 0.0, -50.0]])
+    camera = Camera("c", (1280, 720), lens, [-0.1, 0.1, 0, 0, 0], T)
+    beta_rad = rng.uniform(-1.4, 1.4, 2000)
+    x_mm = rng.uniform(10, 100, 2000)
+    touch_rad = rng.uniform(0, 0.5, 2000)
+    axes = axis_from_angles(x_mm, touch_rad, beta_rad, 0.1, 3.5)
+    edges = EdgeMap(camera, np.full((360, 640, 3), 0.3, dtype=np.float32), 10.0)
+    score = EdgeScore(lambda one: one, [edges], 3.0, np.ones(5), np.arange(-30.0, 31.0, 5.0))
+    scores = score.of_objects(axes)
+    assert not np.any(scores < 0.0) and np.any(np.isnan(scores))
 
 
 def test_where_nothing_changed_no_bar_is_seen(rng):
