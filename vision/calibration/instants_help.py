@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtrc
 
-from vision.calibration.adjust import adjust_bundle
-from vision.calibration.bundle import BundleState, Priors
+from vision.calibration.adjust import Solution, adjust_bundle
+from vision.calibration.bundle import N_VIEW, BundleState, Priors, Sightings, predict
 from vision.calibration.layout import Layout
 from vision.geometry.board import Board
 
@@ -62,6 +63,28 @@ class Comparison:
             f"{len(self.at_once_px)} held-out views are {instants_px:.3f} px off with offsets, "
             f"{at_once_px:.3f} px as of one instant"
         )
+
+
+def chance_of_one_instant(solution: Solution, seen: Sightings, board: Board) -> float:
+    """Return with what chance the pictures of each view, as of one instant, differ as much about the board's
+    pose as they do.
+
+    It is by χ² of what a pose of each picture's own explains of the residuals. seen: with the sigmas that
+    cameras by themselves have.
+    """
+    _, J = predict(solution.state, seen, board)
+    by_pose = J[:, :, -N_VIEW:] / seen.sigma_px[:, None, None]
+    residual = solution.residual_px / seen.sigma_px[:, None]
+    pictures = seen.pictures_by_view(len(solution.state.T_world_board))
+    starts = seen.shot_starts()
+    squared = 0.0
+    for rows in np.split(np.arange(len(seen)), starts[1:]):
+        if pictures[seen.view[rows[0]]] > 1:
+            basis, _ = np.linalg.qr(by_pose[rows].reshape(-1, N_VIEW))
+            squared += np.sum((basis.T @ residual[rows].ravel()) ** 2)
+    shared = pictures > 1
+    freedom = N_VIEW * np.sum(pictures[shared] - 1)
+    return float(chdtrc(freedom, squared)) if freedom else 1.0
 
 
 def residuals_by_view(

@@ -15,7 +15,12 @@ from vision.boards.corners import Corners
 from vision.boards.sufficiency import MOST_ERROR_PX
 from vision.calibration.bundle import BundleState, Priors, SharedLenses
 from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
-from vision.calibration.instants_help import TURNS, Comparison, residuals_by_view
+from vision.calibration.instants_help import (
+    TURNS,
+    Comparison,
+    chance_of_one_instant,
+    residuals_by_view,
+)
 from vision.calibration.layout import Alone, Layout, lay_out, place_cameras, saw_board_at_once
 from vision.calibration.priors import allow_lateness, joint_priors, pose_priors
 from vision.calibration.views import MeasuredPose
@@ -27,6 +32,9 @@ from vision.geometry.refusals import Refused
 # than each with itself. Origin not known; webcams without a trigger disagree by several times.
 # Study: cameras.py.
 _DISAGREE = 1.5
+# [chance] Of pictures of one instant, from which instants of their own are compared on held-out views.
+# Stated: it takes time and enters no number.
+_LEAST_CHANCE = 0.01
 # [px] Where the fit of instants starts; learnt anew. Study: cameras.py.
 _FIRST_EXCESS_PX = 0.1
 # [rounds] Of learning the noise anew where models are compared, whose difference it does not turn:
@@ -154,16 +162,20 @@ class JointInput:
     def _adjust(self, layout: Layout) -> JointAdjustment:
         """Adjust all cameras.
 
-        Pictures of one view count as of one instant, unless the cameras agree far worse with each
-        other than with themselves, and instants of their own help on views held out.
+        Pictures of one view count as of one instant, unless the cameras agree worse with each other
+        than with themselves, and instants of their own help on views held out.
         """
         if layout.trajectory is None or self.triggered or self._is_one_picture:
             return JointAdjustment(layout, self._at_once(layout), None)
         coarse = adjust_coarse(layout.first, layout.seen, self.board, self._priors_of(layout))
         own_px = np.maximum(self._own_errors_px(), _LEAST_ERROR_PX)
-        if np.median(coarse.error_px / own_px) < _DISAGREE:
+        agree = bool(np.median(coarse.error_px / own_px) < _DISAGREE)
+        seen = layout.seen.with_error(self._own_errors_px())
+        if agree and chance_of_one_instant(coarse.solution, seen, self.board) > _LEAST_CHANCE:
             return JointAdjustment(layout, self._at_once(layout), None)
         comparison = self._compare_on_held_out()
+        if agree and not comparison.instants_help:
+            return JointAdjustment(layout, self._at_once(layout), None)
         if not comparison.instants_help:
             found = (
                 "the cameras disagree about the board's pose, and pictures late by an offset do not "

@@ -34,9 +34,10 @@ from vision.calibration.bundle import (
 from vision.calibration.calibrate import calibrate_cameras
 from vision.calibration.corner_noise import adjust_with_noise
 from vision.calibration.held_out import camera_alone
+from vision.calibration.instants_help import chance_of_one_instant
 from vision.calibration.layout import gather, lay_out
 from vision.calibration.one_picture import calibrate_alone
-from vision.calibration.priors import allow_lateness, joint_priors, lens_priors
+from vision.calibration.priors import allow_lateness, joint_priors, lens_priors, pose_priors
 from vision.calibration.views import BoardViews, MeasuredPose
 from vision.geometry.rotation import exp_rotation, left_jacobian, log_rotation
 
@@ -213,6 +214,22 @@ def test_a_shaken_board_seen_late_puts_no_lens_off():
     for c, camera in enumerate(cameras):
         own = slice(N_CAMERA * c, N_CAMERA * c + 9)
         assert np.abs((solution.state.lens[c] - camera.lens) / sigma[own]).max() < 4.0
+
+
+@pytest.mark.parametrize("moved_mm, at_once", [(0.0, True), (0.02, False)])
+def test_a_board_that_moves_by_less_than_a_corner_s_noise_is_noticed(moved_mm, at_once):
+    """0.02 mm are 0.1 px of corners that are known to 0.05 px, but all of them alike."""
+    rng, cameras = np.random.default_rng(0), a_recording(views=2).cameras
+    boards = {camera.name: [] for camera in cameras}
+    for k in range(20):
+        for camera in cameras:
+            T = moving_board(0.7 * k)
+            T[:, 3] += moved_mm * rng.standard_normal()
+            boards[camera.name].append(noisy_view_at(camera, T, 0.05, rng))
+    alone = {camera.name: camera_alone(camera, boards[camera.name], BOARD) for camera in cameras}
+    layout = lay_out(alone, [camera.T_camera_rig for camera in cameras], together=True)
+    solution = adjust_bundle(layout.first, layout.seen, BOARD, pose_priors(2, 20, BOARD))
+    assert (chance_of_one_instant(solution, layout.seen, BOARD) > 0.01) == at_once
 
 
 def test_more_iterations_change_nothing_at_rest():
