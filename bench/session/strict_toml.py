@@ -210,6 +210,11 @@ def _in_plain_words(problem: str, kind: type[Keys]) -> str:
     if choice := re.match(r"Invalid enum value (.*)", what):
         found = f"{choice.group(1)} is none of its values"
         return f"{_key_path(path)}: {found}; allowed are {_choices(path, kind)}"
+    if len(path) == 1 and path[0] in inner_tables(kind):
+        if what == "Expected `array`, got `object`":
+            return f"[{path[0]}] is one table where there may be several: write [[{path[0]}]]"
+        if re.fullmatch("Expected `object.*`, got `array`", what):
+            return f"[[{path[0]}]] are several tables where one is expected: write [{path[0]}]"
     return f"{_key_path(path)}: {in_toml_words(what)}"
 
 

@@ -46,6 +46,16 @@ def test_no_manifest(session):
             'nmae = "high"',
             r"\[\[cameras\]\] nmae is not a key.*did you mean 'name'",
         ),
+        (
+            "[bar]",
+            "[[bar]]",
+            r"\[\[bar\]\] are several tables where one is expected: write \[bar\]",
+        ),
+        (
+            '[[cameras]]\nname = "high"\n\n[[cameras]]\nname = "low"',
+            '[cameras]\nname = "high"',
+            r"\[cameras\] is one table where there may be several: write \[\[cameras\]\]",
+        ),
         ('name = "low"', 'name = "high"', r"\[\[cameras\]\] \"high\": the name is used twice"),
         (
             "[bar]",
