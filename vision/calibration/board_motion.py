@@ -4,7 +4,8 @@ Cameras started by software take "the same" frame tens of milliseconds apart, an
 buffers is late by whole frames now and then. A board at 0.5 m/s is by then elsewhere by many
 pixels, so that no one pose fits all cameras. The board's poses in the neighbouring views say where
 it was: through a view's pose and those before and after goes a parabola (turn as a rotation vector
-about the view's own pose).
+about the view's own pose). A board that is shaken is near that path, not on it: by how much is learnt
+(`vision.calibration.corner_noise`).
 """
 
 from dataclasses import dataclass
