@@ -36,6 +36,15 @@ class Windows(Rows):
     grey: np.ndarray
     weight: np.ndarray
 
+    def in_single_precision(self) -> "Windows":
+        """Return the windows with offsets, grey and weights in single precision."""
+        return Windows(
+            self.anchor,
+            self.offset.astype(np.float32),
+            self.grey.astype(np.float32),
+            self.weight.astype(np.float32),
+        )
+
     def on_grid(self, values: np.ndarray) -> np.ndarray:
         """Return values (n, m, k) of the pixels on square grids (n, m, side, side).
 
@@ -124,7 +133,7 @@ def _shows_edges(offset: np.ndarray, axes: np.ndarray, border: float) -> np.ndar
 
     offset (n, 2, k): px from the guess.
     """
-    in_squares = np.abs(np.linalg.solve(axes, offset))
+    in_squares = np.abs(np.linalg.inv(axes) @ offset)
     across_px = np.linalg.norm(axes[:, :, ::-1], axis=1)
     px_per_square = np.abs(np.linalg.det(axes))[:, None] / across_px
     clear_px = border * px_per_square - _CLEAR_OF_MARKER_PX
