@@ -298,11 +298,11 @@ def _as_placed_by(units: Sequence[Unit], calibration: SessionCalibration) -> Ses
 
 
 def _of_swing(unit: Unit, calibration: SessionCalibration, step: str) -> Unit:
-    """Return a unit of which the free stroke is read, without checks of what bends: nothing reads them."""
+    """Return a unit of which the free stroke is read, without checks of what bends, or sizes: nothing reads them."""
     return replace(
         unit,
         calibration=calibration,
-        settings=unit.settings.with_vision(check_beam=False),
+        settings=unit.settings.with_vision(check_beam=False, measure_sizes=False),
         calibration_step=step,
         places_rig=True,
     )

@@ -18,6 +18,8 @@ class VisionSettings:
     check_beam: whether the wire is fitted again as a curve that is no beam and with another width,
     to check that it is the one that is stated.
     read_base: whether the whisker's base is read in all frames before touch, by which the rig is placed.
+    measure_sizes: whether the wire's end and the widths of wire and bar are measured, which may contradict the
+    stated ones.
     """
 
     wire_piece_px: int = 12
@@ -31,3 +33,4 @@ class VisionSettings:
     every_frame: int = 1
     check_beam: bool = True
     read_base: bool = True
+    measure_sizes: bool = True

@@ -87,7 +87,9 @@ def observe_trial(
     seen = _see_in_turn(scene, fits)
     axis = seen.found.axis.as_bar()
     light = [whisk.light for whisk in scene.whisks]
-    bars = measure_relative_widths(with_lines(scene.search, seen.found))
+    bars = {}
+    if settings.measure_sizes:
+        bars = measure_relative_widths(with_lines(scene.search, seen.found))
     return TrialTruth(
         axis.point_mm,
         axis.direction,
@@ -159,7 +161,8 @@ def _see_in_turn(scene: _TrialScene, fits: Sequence[KeptFit]) -> _WhisksInTurn:
     for whisk in scene.whisks:
         whisk = replace(whisk, bar=seen.found, earlier=earlier)
         explain_by = again.get(whisk.number, explain)
-        truth_of = _first_truth if earlier is None else fitted_truth
+        is_first = earlier is None and whisk.settings.measure_sizes
+        truth_of = _first_truth if is_first else fitted_truth
         row, explained = see_whisk(whisk, explain_by, truth_of)
         seen.rows.append(row)
         if explained is not None:

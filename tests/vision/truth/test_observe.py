@@ -229,7 +229,8 @@ def test_a_whisk_is_fitted_again_by_cameras_that_moved_together(steep, monkeypat
     pictures = TrialPictures(frames, steep.rows["time_s"][few], motor_rad, steep.background)
     whole = [slice(0, len(motor_rad))]
     quick = VisionSettings(check_beam=False, rounds=0)
-    known = observe_trial(pictures, whole, steep.cameras, RODS, quick)
+    places = replace(quick, measure_sizes=False)
+    known = observe_trial(pictures, whole, steep.cameras, RODS, places)
     step = np.tile([*np.zeros(12), 0.05, 0.05, 0.0], 2)  # mm, of both cameras
     moved = steep.cameras.moved(step)
     (traced,) = observe_trial(pictures, whole, moved, RODS, quick).whisks
@@ -242,6 +243,7 @@ def test_a_whisk_is_fitted_again_by_cameras_that_moved_together(steep, monkeypat
     assert again.d_x_mm.value == pytest.approx(traced.d_x_mm.value, abs=0.2 * traced.d_x_mm.sigma)
     assert again.d_x_mm.sigma == pytest.approx(traced.d_x_mm.sigma, rel=0.2)
     assert again.ends.keys() == traced.ends.keys()
+    assert traced.ends and not before.ends and not known.bar_widths
     assert before.base is not None and again.base is None
     with pytest.raises(TypeError):  # a whisk without a fit has the object searched for again
         observe_trial(pictures, whole * 2, moved, RODS, placed, known.fits)
