@@ -168,9 +168,9 @@ def evaluate(
     """Evaluate a session into a folder, as `whisker-bench evaluate` does, without a word on the
     screen; return the run.
 
-    The options are those of the command line. workers: 0 works in this process. More are processes
-    of their own, which read the script that asks for them: it does so below
-    `if __name__ == "__main__":`. Raise BadInput, Refused.
+    The options are those of the command line. workers: 0 and 1 work in this process, by one thread
+    of linear algebra while it lasts. More are processes of their own, which read the script that
+    asks for them: it does so below `if __name__ == "__main__":`. Raise BadInput, Refused.
     """
     settings = Settings(
         theta_deg=theta_deg,

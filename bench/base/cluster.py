@@ -1,8 +1,8 @@
 """A Dask cluster that runs already, in place of processes here, with the same results to the byte.
 
 Its workers read the session and write into the output folder themselves: both must be there under the same paths. They
-must have our code and the versions of the libraries that this process has, and one thread for linear algebra. Each sees
-to that before its first job. A worker does one job at a time, however many threads it has.
+must have our code and the versions of the libraries that this process has. Each sees to that before its first job. A
+worker does one job at a time, by one thread, however many it has.
 """
 
 import platform
@@ -18,7 +18,7 @@ from typing import Any
 from bench.base.atomic import LOCK
 from bench.base.errors import BadInput
 from bench.base.results import hash_of_code
-from bench.base.workers import DIED, Workers, has_one_thread, pictures_by_one_thread
+from bench.base.workers import DIED, Workers, one_thread
 
 _CODE = ("bench", "vision", "estimator")
 # Libraries that results are computed by.
@@ -57,6 +57,7 @@ class Cluster(Workers):
         if not self._client.nthreads():
             self._client.close()
             raise self._bad("its scheduler has no worker yet")
+        super().__enter__()
         return self
 
     def _bad(self, reason: str) -> BadInput:
@@ -65,6 +66,7 @@ class Cluster(Workers):
 
     def __exit__(self, kind: type[BaseException] | None, *_) -> None:
         """Close the connection. Unfinished tasks have no one who waits for them, and are dropped."""
+        super().__exit__(kind)
         self._client.close()
 
     def _finished(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
@@ -122,23 +124,18 @@ def _job(job: Callable, task: Any, here: dict[str, str], lock: tuple[Path, str])
     if not file.is_file() or file.read_text() != text:
         rule = "session and output must be there under the same paths"
         raise BadInput(f"{_worker()} does not see {file.parent}: {rule}")
-    with _ONE_AT_A_TIME, pictures_by_one_thread():
+    with _ONE_AT_A_TIME, one_thread():
         return job(task)
 
 
 @lru_cache
 def _check_code(here: tuple[tuple[str, str], ...]) -> None:
-    """Raise BadInput where a worker has other code or libraries, or computes with several threads."""
+    """Raise BadInput where a worker has other code or libraries."""
     own = facts()
     for name, wanted in here:
         if own[name] != wanted:
             found = f"{_worker()} has {name} {own[name]}, here it is {wanted}"
             raise BadInput(f"{found}: install the same on both")
-    if not has_one_thread():
-        raise BadInput(
-            f"{_worker()} computes with several threads: start it with OMP_NUM_THREADS=1 "
-            "OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1"
-        )
 
 
 def _worker() -> str:

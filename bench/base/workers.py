@@ -1,8 +1,8 @@
 """Processes that work in parallel, with the same results for any number of them.
 
 Every job runs with one thread, however many processes there are, because libraries sum in another order with other
-numbers of threads: in fresh processes, or here where one is wanted and this one has a single thread itself
-(`single_thread`), which spares it from loading every library twice. With 0 workers jobs run here.
+numbers of threads, and small matrices by several threads take many times the processor. Two workers and more are
+fresh processes; with one or none jobs run here, by one thread while the workers are open (`one_thread`).
 """
 
 import multiprocessing
@@ -14,10 +14,15 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
+from functools import cache
+from typing import TYPE_CHECKING
 
 from bench.base.errors import BadInput
 from bench.base.progress import count_parts
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _PICTURES = "OPENCV_FOR_THREADS_NUM"  # OpenCV's own number, as it is loaded
@@ -40,13 +45,16 @@ class Workers:
         self.count = count
         # one process each: a death is the death of one task
         self._processes: list[ProcessPoolExecutor] = []
+        self._open = ExitStack()
 
     def __enter__(self) -> "Workers":
-        """Return the workers."""
+        """Return the workers; this process has one thread until they are left."""
+        self._open.enter_context(one_thread())
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_) -> None:
         """Stop the processes, at once where there was an exception."""
+        self._open.close()
         for process in self._processes:
             process.shutdown(wait=kind is None, cancel_futures=True)
         if kind is not None and self._processes:
@@ -68,11 +76,9 @@ class Workers:
 
     def _finished(self, job: Callable, tasks: Sequence) -> Iterator[tuple[int, object]]:
         """Yield places and results as they come; DIED in place of a result."""
-        if self.count == 0 or (self.count == 1 and has_one_thread()):
+        if self.count < 2:
             for place, task in enumerate(tasks):
-                with pictures_by_one_thread() if self.count else nullcontext():
-                    result = job(task)
-                yield place, result
+                yield place, job(task)
         elif tasks:
             yield from self._by_processes(job, tasks)
 
@@ -138,22 +144,27 @@ def single_thread() -> None:
         os.environ.setdefault(name, "1")
 
 
-def has_one_thread() -> bool:
-    """Return whether linear algebra has one thread in this process."""
-    return all(os.environ.get(name) == "1" for name in _THREADS)
-
-
 @contextmanager
-def pictures_by_one_thread() -> Iterator[None]:
-    """Keep OpenCV to one thread within the context, as in a worker."""
+def one_thread() -> Iterator[None]:
+    """Keep linear algebra and OpenCV to one thread within the context, as in a worker."""
     import cv2
 
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
-        yield
+        with _thread_pools().limit(limits=1):
+            yield
     finally:
         cv2.setNumThreads(before)
+
+
+@cache
+def _thread_pools() -> "ThreadpoolController":
+    """Return the thread pools of NumPy's and SciPy's linear algebra, which are loaded here."""
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from bench.base.atomic import lock_output
 from bench.base.drawing import save_picture
 from bench.base.errors import BadInput
 from bench.base.results import hash_of
+from bench.base.workers import one_thread
 from bench.cameras.session_cameras import SessionCalibration, calibrate_session
 from bench.report.overlays import last_frame
 from bench.report.video import codec_of, write_pictures
@@ -70,10 +71,12 @@ class LivePush:
         self.pictures[camera] = picture
         self.whisk.add(camera, frame, time_s, math.radians(motor_deg), picture)
 
+    @one_thread()
     def work(self) -> bool:
         """Take the next step that is due; return whether there was one."""
         return self.whisk.work()
 
+    @one_thread()
     def finish(self) -> WhiskTruth:
         """Return the truth; d_x_mm is NaN where there is none, and the status says why."""
         return self.whisk.finish()

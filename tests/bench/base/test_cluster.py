@@ -8,7 +8,6 @@ from bench.base import cluster
 from bench.base.atomic import lock_output
 from bench.base.cluster import Cluster
 from bench.base.errors import BadInput
-from bench.base.workers import single_thread
 
 distributed = pytest.importorskip("distributed")
 
@@ -16,7 +15,6 @@ distributed = pytest.importorskip("distributed")
 @pytest.fixture(scope="module")
 def local():
     """A cluster of two workers in this process."""
-    single_thread()
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
     ) as made:
@@ -54,12 +52,6 @@ def test_a_worker_must_have_what_is_here():
     here = tuple((cluster.facts() | {"numpy": "1.0"}).items())
     with pytest.raises(BadInput, match=r"has numpy .*, here it is 1\.0: install the same on both"):
         cluster._check_code(here)
-
-
-def test_a_worker_has_one_thread(monkeypatch):
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
-    with pytest.raises(BadInput, match="computes with several threads"):
-        cluster._check_code.__wrapped__(tuple(cluster.facts().items()))
 
 
 def test_no_scheduler_is_told_in_a_line(monkeypatch, tmp_path):

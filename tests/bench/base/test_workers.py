@@ -28,33 +28,38 @@ def test_no_workers_run_here():
 
 
 def test_each_process_has_one_thread_and_this_one_keeps_its_own(monkeypatch):
-    monkeypatch.setenv("OMP_NUM_THREADS", "7")  # not one: a process of its own
-    with Workers(1) as pool:
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    with Workers(2) as pool:
         assert pool.run(os.getenv, ["OMP_NUM_THREADS"], "threads") == ["1"]
-        assert pool.run(_threads_of_pictures, ["x"], "threads") == [1]
+        assert pool.run(_threads, ["x"], "threads") == [{1}]
     assert os.environ["OMP_NUM_THREADS"] == "7"
 
 
-def _threads_of_pictures(_) -> int:
+def _threads(_) -> set[int]:
+    """Return the numbers of threads of OpenCV and of each library of linear algebra."""
     import cv2
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_info
 
-    return cv2.getNumThreads()
+    return {cv2.getNumThreads(), *(one["num_threads"] for one in threadpool_info())}
 
 
-def test_one_process_of_one_thread_works_here(monkeypatch):
-    """It would load every library a second time. Pictures are read by one thread, as in a worker."""
+@pytest.mark.parametrize("count", [0, 1])
+def test_jobs_here_have_one_thread_while_the_workers_are_open(count):
+    """Results are those of processes, and small matrices by two threads take several times the processor."""
     import cv2
+    from threadpoolctl import threadpool_limits
 
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        monkeypatch.setenv(name, "1")
     before = cv2.getNumThreads()
-    with Workers(1) as pool:
-        assert pool.run(lambda _: (os.getpid(), cv2.getNumThreads()), [1], "here") == [
-            (os.getpid(), 1)
-        ]
-    assert cv2.getNumThreads() == before
-    with Workers(2) as pool:
-        assert pool.run(os.path.abspath, ["/"], "elsewhere") == ["/"] and pool._processes
+    cv2.setNumThreads(2)
+    with threadpool_limits(2):
+        assert _threads(None) == {2}
+        with Workers(count) as pool:
+            assert pool.run(lambda _: (os.getpid(), _threads(None)), [1], "here") == [
+                (os.getpid(), {1})
+            ]
+        assert _threads(None) == {2}
+    cv2.setNumThreads(before)
 
 
 def test_bad_input_comes_through_as_it_was():

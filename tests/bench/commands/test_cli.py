@@ -86,7 +86,7 @@ def test_a_check_without_boards_imports_no_solver(steel_signals):
 
 
 def test_linear_algebra_has_one_thread_before_it_is_loaded(small_session):
-    """A number of threads that is set later counts for nothing: beside another program four times the time."""
+    """By verbs that open no workers, too, it is computed by one thread."""
     code = (
         "import os, sys\n"
         "class Watch:\n"
