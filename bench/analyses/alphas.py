@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.analyses.direction import slip_angle
-from bench.base.combined import Measurement, Measurements
+from bench.base.combined import Measurement, Measurements, sigma_without
 from bench.records.phases import NO_PHASES, Phases
 from bench.records.trial_result import (
     BY_PICTURES,
@@ -106,7 +106,6 @@ def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, alpha_felt: Val
     """Return the friction angles of one whisk, of which that felt is given."""
     beta, beta_from = _slope(trial, seen)
     phases = NO_PHASES
-    beta_common_rad = _common_slope(seen)
     if slips(seen):
         phases = seen_phases(seen.frames, beta.value, seen.d_x_mm.value)
     return WhiskAlphas(
@@ -121,8 +120,8 @@ def _alphas(trial: TrialFacts, seen: SeenWhisk, felt: FeltWhisk, alpha_felt: Val
         shared_seen_rad=beta.sigma,
         shared_felt_rad=math.hypot(beta.sigma, felt.phi_felt_rad.sigma),
         beta_from=beta_from,
-        common_seen=(beta_common_rad, _common_seen(seen)),
-        common_felt=(beta_common_rad, *_common_felt(felt).tolist()),
+        common_seen=_common_seen(seen),
+        common_felt=_common_felt(seen, felt),
     )
 
 
@@ -134,32 +133,49 @@ def _slope(trial: TrialFacts, seen: SeenWhisk) -> tuple[Value, str]:
     return Value(stated_rad, trial.beta_nominal_sigma_rad), BY_MANIFEST
 
 
+def _slope_by_cameras(seen: SeenWhisk) -> np.ndarray:
+    """Return how β changes with each unit error of the cameras, rad (k,); empty where no picture shows it."""
+    shared = seen.truth.shared
+    return np.zeros(0) if shared is None else shared.beta_by_camera_error_rad
+
+
 def _common_slope(seen: SeenWhisk) -> float:
-    """Return the part of β's sigma that all whisks share, rad; of a slope set by hand there is none."""
+    """Return the part of β's sigma that all whisks share beyond the cameras', rad; of a slope set by hand none.
+
+    How it goes with the sign of the slope is not known, so that it counts as one for all whisks.
+    """
     if not seen.beta_rad.is_known:
         return 0.0
     shared = seen.truth.shared
-    return seen.beta_rad.sigma if shared is None else shared.beta_rad
+    sigma_rad = seen.beta_rad.sigma if shared is None else shared.beta_rad
+    return sigma_without(sigma_rad, _slope_by_cameras(seen))
 
 
-def _common_seen(seen: SeenWhisk) -> float:
-    """Return the part of the sigma of α seen that all whisks share but for β's, rad.
+def _common_seen(seen: SeenWhisk) -> tuple[float, ...]:
+    """Return the change of α seen by each cause that all whisks share, rad: of β, of all else, of each unit error of
+    the cameras.
 
-    It is the share that the sigma of slip has; where that is not known, all of it.
+    Of all else it is the share that the sigma of slip has; where that is not known, all of it.
     """
-    sigma_rad = np.nan_to_num(seen.friction_rad.sigma)
-    by_slope_rad = np.sqrt(max(sigma_rad**2 - seen.beta_rad.sigma**2, 0.0))
-    if seen.at is None or not np.isfinite(seen.at.slip_shared_mm):
-        return float(by_slope_rad)
-    return float(by_slope_rad * min(seen.at.slip_shared_mm / seen.at.slip_mm.sigma, 1.0))
+    by_cameras = seen.friction_by_camera_error_rad
+    sigma_rad = sigma_without(np.nan_to_num(seen.friction_rad.sigma), by_cameras)
+    of_slope_rad = sigma_without(seen.beta_rad.sigma, _slope_by_cameras(seen))
+    other_rad = sigma_without(sigma_rad, np.array([of_slope_rad]))
+    if seen.at is not None and np.isfinite(seen.at.slip_shared_mm):
+        other_rad *= min(seen.at.slip_shared_mm / seen.at.slip_mm.sigma, 1.0)
+    return (_common_slope(seen), other_rad, *by_cameras.tolist())
 
 
-def _common_felt(felt: FeltWhisk) -> np.ndarray:
-    """Return the change (k,) of −|φ| by each cause that the moments of all whisks share, rad."""
+def _common_felt(seen: SeenWhisk, felt: FeltWhisk) -> tuple[float, ...]:
+    """Return the change of |β| − |φ| by each cause that all whisks share, rad: of β, of the moments, of β by each unit
+    error of the cameras.
+    """
     m_y = felt.m_y_Nmm.value
     m_z = felt.m_z_Nmm.value
     by_cause = felt.shared_Nmm.reshape(-1, 2) @ [m_z, -m_y] / (m_y**2 + m_z**2)
-    return -np.copysign(1.0, felt.phi_felt_rad.value) * by_cause
+    by_moments = -np.copysign(1.0, felt.phi_felt_rad.value) * by_cause
+    by_cameras = np.copysign(1.0, seen.beta_rad.value) * _slope_by_cameras(seen)
+    return (_common_slope(seen), *by_moments.tolist(), *by_cameras.tolist())
 
 
 def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: float) -> Value:
@@ -204,8 +220,7 @@ def _turn_of_force(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: flo
 def mean_alpha(alphas: Iterable[WhiskAlphas], name: str) -> Value:
     """Return the mean of an angle (`WhiskAlphas.angle`) over whisks, rad.
 
-    NaN where no whisk has it. How the shared error of β goes with the sign of the slope is not known, so
-    that it counts as one for all.
+    NaN where no whisk has it.
     """
     mean = Measurements.of((whisk.trial, whisk.measurement(name)) for whisk in alphas).mean()
     return Value(mean.value, mean.sigma)

@@ -204,6 +204,11 @@ def add_common(sigma: float, freedom: float, changes: np.ndarray) -> Variance:
     return add_variances((sigma**2, freedom), (float(known @ known), np.inf))
 
 
+def sigma_without(sigma: float, parts: np.ndarray) -> float:
+    """Return a standard deviation without some independent parts (k,) of it; NaN of one that is NaN."""
+    return float(np.sqrt(np.maximum(sigma**2 - parts @ parts, 0.0)))
+
+
 def student_factor(freedom: float) -> float:
     """Return half the 95 % interval of Student's t over that of the normal distribution."""
     if not np.isfinite(freedom):

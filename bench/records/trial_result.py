@@ -170,7 +170,8 @@ class SeenWhisk:
     not known; None where no frame is seen to touch. by_one_camera: only where the settings name one.
     source: of d_x, β and ψ, BY_PICTURES or BY_STAGE. pictured: what pictures show of these where they
     are another source's. stage_contact: the contact that a stage states. friction_rad: the angle α
-    by pictures alone (`bench.trials.seen_friction`).
+    by pictures alone (`bench.trials.seen_friction`); friction_by_camera_error_rad (k,): how it changes
+    with each unit error of the session's cameras.
     """
 
     truth: WhiskTruth
@@ -178,6 +179,7 @@ class SeenWhisk:
     at: TruthAtAngle | None = None
     deflection: Deflection | None = None
     friction_rad: Value = UNKNOWN
+    friction_by_camera_error_rad: np.ndarray = field(default_factory=lambda: np.zeros(0))
     overlay: dict[str, Drawing] = field(default_factory=dict)
     touch_shared_rad: float = 0.0
     looked: str = ""

@@ -37,7 +37,7 @@ from bench.trials.consistency import (
 )
 from bench.trials.one_camera import by_one_camera
 from bench.trials.seeing import presets_for
-from bench.trials.seen_friction import seen_friction
+from bench.trials.seen_friction import with_seen_friction
 from bench.trials.trace_frames import traced_frames
 from bench.trials.trial_frames import TrialFrames, TrialInputs
 from vision import FrameTruth, KeptFit, Smooth, TrialTruth, Value, WhiskTruth
@@ -158,11 +158,8 @@ def _whisk_of_trial(
     contradictions = [*of_trial, *_whisk_contradictions(whisk, trial, settings)]
     speed_rad_s = None if trial.speed_deg_s is None else math.radians(trial.speed_deg_s)
     record = whisk_record(whisk, settings, warnings, contradictions, speed_rad_s)
-    return replace(
-        record,
-        friction_rad=seen_friction(record, whisker),
-        by_one_camera=by_one_camera(whisk, whisker, settings),
-    )
+    record = replace(record, by_one_camera=by_one_camera(whisk, whisker, settings))
+    return with_seen_friction(record, whisker)
 
 
 def _notes(frames: TrialFrames) -> tuple[str, ...]:

@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from bench.base.combined import sigma_without
 from bench.gauges.held_rod import HeldRod
 from bench.gauges.whisker_rods import SeenContacts, rod_of
 from bench.records.trial_result import Deflection, SeenWhisk
 from bench.session.whisker import Whisker
-from vision import Value
+from vision import UNKNOWN, Value
 from vision.geometry import unit
 
 # [rad] Of a frame that is used. How the whisker slides along itself is known to second order in the pushing angle:
@@ -40,28 +41,28 @@ _STEP_RAD = 1e-5
 _LEAST_SLIP_MM = 0.1
 # [frames] Fewer show no slip: three have two intervals, of which one may rest. Derived.
 _LEAST_FRAMES = 3
-_UNKNOWN = Value(np.nan, np.nan)
 
 
-def seen_friction(seen: SeenWhisk, whisker: Whisker) -> Value:
-    """Return α, rad, of a whisk that slips; NaN where it hardly does, or no rod is bent so.
+def with_seen_friction(seen: SeenWhisk, whisker: Whisker) -> SeenWhisk:
+    """Return a whisk with its α, rad, if it slips; NaN where it hardly does, or no rod is bent so.
 
     It is the slope of α · size over the size of the deflection, frame by frame, so that an offset of all
     deflections drops out. Along a sphere or a ring the slope turns with the slip, so that α there is that
     at the wanted pushing angle, by the normal at the contact.
     """
     if not slips(seen):
-        return _UNKNOWN
+        return replace(seen, friction_rad=UNKNOWN)
     if turns_with_slip(seen):
-        return _UNKNOWN if seen.at is None else seen.at.alpha_rad
+        return replace(seen, friction_rad=UNKNOWN if seen.at is None else seen.at.alpha_rad)
     d = _near_touch(seen.deflection)
     growth = whisker.wire.radius_by_arc(d.along_mm)
     psi_rad = np.nan_to_num(seen.psi_rad.value)
     sliding = _Sliding(seen.deflection, d, growth, seen.beta_rad.value, psi_rad)
     try:
-        return _of_sliding(sliding, seen, whisker)
+        friction_rad, by_camera_error = _of_sliding(sliding, seen, whisker)
     except ArithmeticError:
-        return _UNKNOWN
+        return replace(seen, friction_rad=UNKNOWN)
+    return replace(seen, friction_rad=friction_rad, friction_by_camera_error_rad=by_camera_error)
 
 
 def slips(seen: SeenWhisk) -> bool:
@@ -104,8 +105,12 @@ def _rate(
     return sum(c * power * at_rad ** (power - 1) for c, power in zip(coefficients, powers) if power)
 
 
-def _of_sliding(sliding: "_Sliding", seen: SeenWhisk, whisker: Whisker) -> Value:
-    """Return α of a contact that slides. Raises ArithmeticError where no rod is bent so."""
+def _of_sliding(sliding: "_Sliding", seen: SeenWhisk, whisker: Whisker) -> tuple[Value, np.ndarray]:
+    """Return α of a contact that slides, and how it changes (k,) with each unit error of the cameras.
+
+    Cameras move deflection and slope together: as far as they turn both alike, α stays as it is. Raises
+    ArithmeticError where no rod is bent so.
+    """
     d = sliding.deflection
     rod = rod_of(whisker)
     contacts = SeenContacts.of(d)
@@ -117,14 +122,29 @@ def _of_sliding(sliding: "_Sliding", seen: SeenWhisk, whisker: Whisker) -> Value
     )
     by_place = (sliding.weights[:, None] * by_place).ravel()  # (3n,)
     by_beta, by_psi = _by_direction(sliding, held)
+    place_by_cameras = d.by_camera_error_mm.T @ by_place  # (k,)
+    beta_by_cameras, psi_by_cameras = _direction_by_cameras(seen, len(place_by_cameras))
+    by_camera_error = place_by_cameras + by_beta * beta_by_cameras + by_psi * psi_by_cameras
+    place_variance = by_place @ d.covariance @ by_place - place_by_cameras @ place_by_cameras
     parts = [
-        np.sqrt(by_place @ d.covariance @ by_place),
-        by_beta * seen.beta_rad.sigma,
-        by_psi * np.nan_to_num(seen.psi_rad.sigma),
+        np.sqrt(max(place_variance, 0.0)),
+        by_beta * sigma_without(seen.beta_rad.sigma, beta_by_cameras),
+        by_psi * sigma_without(np.nan_to_num(seen.psi_rad.sigma), psi_by_cameras),
         _HEADING_LEFT * (alpha_rad - sliding.weights @ sliding.across_rad(held)),
         _left_of_set(seen, whisker),
+        *by_camera_error,
     ]
-    return Value(alpha_rad, float(np.linalg.norm(parts)))
+    return Value(alpha_rad, float(np.linalg.norm(parts))), by_camera_error
+
+
+def _direction_by_cameras(seen: SeenWhisk, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return how the object's slope and tilt change (k,) with each of k unit errors of the cameras; not at all where
+    they are not seen.
+    """
+    shared = seen.truth.shared
+    if shared is None or not len(shared.beta_by_camera_error_rad):
+        return np.zeros(count), np.zeros(count)
+    return shared.beta_by_camera_error_rad, shared.psi_by_camera_error_rad
 
 
 def _by_direction(sliding: "_Sliding", held: HeldRod) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 import shutil
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from bench.records.trial_result import SeenTrial, SeenWhisk
 from bench.session.session import load_session
 from bench.session.signals import forward_strokes
 from bench.trials.seen import whisk_record
-from bench.trials.seen_friction import seen_friction
+from bench.trials.seen_friction import with_seen_friction
 from bench.workflows.session_evaluation import evaluate
 from vision.truth.at_angle import Smooth
 from vision.truth.records import FrameTruth, WhiskTruth
@@ -119,8 +118,7 @@ def see_exactly(inputs, *_) -> SeenTrial:
         first, last = signals.time_s[stroke][[0, -1]]
         rows = np.flatnonzero((time_s >= first) & (time_s <= last))
         record = whisk_record(exact_truth(trial.folder, number, rows), inputs.settings)
-        friction_rad = seen_friction(record, inputs.session.whisker)
-        whisks.append(replace(record, friction_rad=friction_rad))
+        whisks.append(with_seen_friction(record, inputs.session.whisker))
     return SeenTrial(tuple(whisks), bar_radius_mm=3.0, wire_radius_mm=0.5)
 
 
@@ -132,7 +130,7 @@ def exact_record():
         rows = np.arange(len(read_csv(trial.folder / "truth.csv")["frame"]))
         whisk = whisk_record(exact_truth(trial.folder, 0, rows), Settings())
         whisker = load_session(trial.folder.parents[1]).whisker
-        return replace(whisk, friction_rad=seen_friction(whisk, whisker))
+        return with_seen_friction(whisk, whisker)
 
     return record
 

@@ -87,8 +87,9 @@ class SeenObject:
 class SharedSigmas:
     """Standard deviations of the errors that all whisks of a session have in common, by diameters,
     light, cameras, placement and the clock: parts of the sigmas of a whisk's truth. point_mm (3,).
-    d_x_by_camera_error_mm (k,): how d_x changes with each unit error of the session's cameras, by
-    which it is correlated with what else was measured with them.
+    d_x_by_camera_error_mm, beta_by_camera_error_rad, psi_by_camera_error_rad (k,): how they change
+    with each unit error of the session's cameras, by which they are correlated with what else was
+    measured with them.
     """
 
     touch_rad: float
@@ -97,6 +98,8 @@ class SharedSigmas:
     psi_rad: float
     point_mm: np.ndarray
     d_x_by_camera_error_mm: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    beta_by_camera_error_rad: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    psi_by_camera_error_rad: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)

@@ -116,13 +116,19 @@ def _shared_sigmas(
         """Return the standard deviation of a quantity of the whisk."""
         return float(propagated_sigma(fitted.by_parameter.whisk[name], covariance))
 
+    def by_camera_error(name: str) -> np.ndarray:
+        """Return how a quantity of the whisk changes (k,) with each unit error of the cameras."""
+        return fitted.by_parameter.whisk[name] @ fitted.by_camera_error
+
     return SharedSigmas(
         touch_rad=float(np.hypot(sigma("touch"), _clock_sigma_rad(whisk, fitted))),
         d_x_mm=sigma("d_x"),
         beta_rad=sigma("beta"),
         psi_rad=sigma("psi"),
         point_mm=np.array([sigma(name) for name in _VECTORS]),
-        d_x_by_camera_error_mm=fitted.by_parameter.whisk["d_x"] @ fitted.by_camera_error,
+        d_x_by_camera_error_mm=by_camera_error("d_x"),
+        beta_by_camera_error_rad=by_camera_error("beta"),
+        psi_by_camera_error_rad=by_camera_error("psi"),
     )
 
 

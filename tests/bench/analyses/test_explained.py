@@ -12,7 +12,7 @@ from bench.base.settings import Settings
 from bench.records.trial_result import FeltWhisk
 from bench.session.session import load_session
 from bench.session.whisker import Whisker
-from bench.trials.seen_friction import seen_friction
+from bench.trials.seen_friction import with_seen_friction
 from bench.workflows.session_evaluation import evaluate
 from estimator.beam import Beam
 from estimator.builtin import with_friction
@@ -28,7 +28,7 @@ WIRE = Whisker(shape="cylinder", length_mm=100.0, diameter_mm=1.0, youngs_modulu
 def test_friction_as_seen_is_the_true_one(exact_record, steel_signals, trial):
     """10.5°, within 0.05°: 0.01 mm of rounding in truth.csv over a deflection of 3 mm."""
     record = exact_record(load_session(steel_signals).trial(trial))
-    found = seen_friction(record, WIRE)
+    found = with_seen_friction(record, WIRE).friction_rad
     alpha, sigma = np.degrees([found.value, found.sigma])
     assert alpha == pytest.approx(10.5, abs=0.05)
     assert 0.0 < sigma < 0.5
@@ -37,9 +37,9 @@ def test_friction_as_seen_is_the_true_one(exact_record, steel_signals, trial):
 def test_an_offset_common_to_all_deflections_drops_out(exact_record, steel_signals):
     """To first order: 0.01 mm turns a deflection of 3 mm by 0.2°, and α by a hundredth of that, the second order."""
     record = exact_record(load_session(steel_signals).trial("b60_4"))
-    before = seen_friction(record, WIRE).value
+    before = with_seen_friction(record, WIRE).friction_rad.value
     raised = replace(record.deflection, across_z_mm=record.deflection.across_z_mm + 0.01)
-    after = seen_friction(replace(record, deflection=raised), WIRE).value
+    after = with_seen_friction(replace(record, deflection=raised), WIRE).friction_rad.value
     assert np.degrees(after) == pytest.approx(np.degrees(before), abs=0.002)
 
 
@@ -59,9 +59,12 @@ def test_along_a_sphere_alpha_is_that_at_theta_and_along_a_cone_the_deflections_
         for shape in ("sphere", "ring", "cone")
     }
     for shape in ("sphere", "ring"):
-        assert seen_friction(of[shape], WIRE).value == 0.2
-        assert seen_friction(of[shape], WIRE).sigma == 0.01
-    assert seen_friction(of["cone"], WIRE).value == seen_friction(record, WIRE).value
+        assert with_seen_friction(of[shape], WIRE).friction_rad.value == 0.2
+        assert with_seen_friction(of[shape], WIRE).friction_rad.sigma == 0.01
+    of_cone, as_of_bar = (
+        with_seen_friction(one, WIRE).friction_rad for one in (of["cone"], record)
+    )
+    assert of_cone.value == as_of_bar.value
     felt = FeltWhisk(0, phi_felt_rad=Value(0.85, 0.01))
     assert not felt_friction(of["sphere"], felt, 0.05, 1.0).is_known
     of_bar = felt_friction(record, felt, 0.05, 1.0)
@@ -71,7 +74,7 @@ def test_along_a_sphere_alpha_is_that_at_theta_and_along_a_cone_the_deflections_
 
 def test_no_slip_no_friction_angle(exact_record, steel_signals):
     record = exact_record(load_session(steel_signals).trial("b00_2"))
-    assert np.isnan(seen_friction(record, WIRE).value)
+    assert np.isnan(with_seen_friction(record, WIRE).friction_rad.value)
 
 
 def test_shares_add_up_and_what_remains_is_small(steel_signals, exact_vision, tmp_path):

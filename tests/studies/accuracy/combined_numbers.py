@@ -46,7 +46,7 @@ from bench.rig.whisk_mechanics import WhiskMechanics
 from bench.session.whisker import Whisker
 from bench.trials.clocks import shared_touch
 from bench.trials.estimates import whisk_of
-from bench.trials.seen_friction import seen_friction
+from bench.trials.seen_friction import with_seen_friction
 from estimator.two_tilts import SharedContact, shared_contact
 from estimator.uncertainty import Z_95
 from tests.scenes.friction_results import run_of
@@ -67,7 +67,7 @@ BAR_RADIUS_MM = 3.0
 SLOPE_RAD, DISTANCE_MM = np.radians(0.4), 0.4
 # Distances of a soft object, and how well each is known.
 SOFT_MM, SHIFT_MM = (40.0, 60.0), 0.07
-# What all whisks share: gauges' coefficients (share), slope and touch as seen, the clock.
+# What all whisks share: gauges' coefficients (share), slope (by the cameras) and touch as seen, the clock.
 GAUGE_SHARE, SHARED_SLOPE_RAD, CLOCK_S = 0.004, np.radians(0.03), 5e-4
 SHARED_TOUCH_RAD = np.radians(0.005)
 # What each whisk has of its own: moments, slope, touch as felt and as seen, deflections as seen.
@@ -195,7 +195,13 @@ class DrawnSession:
         clock_rad = CLOCK_S * speed_rad_s
         touch_sigma = np.linalg.norm([OWN_TOUCH_RAD, SHARED_TOUCH_RAD, clock_rad])
         shared = SharedSigmas(
-            float(np.hypot(SHARED_TOUCH_RAD, clock_rad)), 0.01, SHARED_SLOPE_RAD, 0.0, np.zeros(3)
+            touch_rad=float(np.hypot(SHARED_TOUCH_RAD, clock_rad)),
+            d_x_mm=0.01,
+            beta_rad=SHARED_SLOPE_RAD,
+            psi_rad=0.0,
+            point_mm=np.zeros(3),
+            beta_by_camera_error_rad=np.array([SHARED_SLOPE_RAD]),
+            psi_by_camera_error_rad=np.zeros(1),
         )
         truth = WhiskTruth(
             number,
@@ -210,7 +216,7 @@ class DrawnSession:
             theta_rad=THETAS_RAD[2], slip_mm=Value(np.nan, OWN_PLACE_MM), slip_shared_mm=0.0
         )
         whisk = SeenWhisk(truth, at=at, deflection=self._deflection(mechanics))
-        return replace(whisk, friction_rad=seen_friction(whisk, self.whisker))
+        return with_seen_friction(whisk, self.whisker)
 
     def _deflection(self, mechanics: WhiskMechanics) -> Deflection:
         """Draw the contact's place in the hub's axes at the pushing angles."""
@@ -234,7 +240,7 @@ class DrawnSession:
             z + noise[1],
             past,
             OWN_PLACE_MM**2 * np.eye(3 * count),
-            np.zeros((3 * count, 0)),
+            np.zeros((3 * count, 1)),
             Value(touch, OWN_TOUCH_RAD),
             mechanics.touch.d_x_mm,
         )
