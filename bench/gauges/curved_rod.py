@@ -34,6 +34,10 @@ _DIFFERENCE = 1e-5
 _MARCH_ERROR = 1e-10
 # [1] Width of a rod over that at its clamp: a contact nearer to a point than this bends nothing. Stated.
 _LEAST_WIDTH = 0.01
+# [EI/chord²] Of the force across a rod's end over its width there, at most: 2 turn the end by 100°. Beyond it Newton's
+# method leads to rods that are coiled. Study: tests/bench/gauges/test_curved_rod.py.
+_MOST_FORCE = 10.0
+_TOO_FAR = "no equilibrium found of a curved rod that is bent so far"
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,15 +97,19 @@ class KirchhoffRods:
                 return self._in_units(marched, chord)
             size = np.linalg.norm(missing, axis=1, keepdims=True)
             unknowns = unknowns + step * np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
-        raise ArithmeticError("no equilibrium found of a curved rod that is bent so far")
+        raise ArithmeticError(_TOO_FAR)
 
     def _start(self, deflection_mm: np.ndarray, chord: np.ndarray) -> np.ndarray:
-        """Return a guess (n, 3) of the force's two components across the rod's end, and of the arc."""
+        """Return a guess (n, 3) of the force's two components across the rod's end, and of the arc.
+
+        By a force F a straight rod that tapers to w of its clamp's diameter at d moves by F d³/(3 EI w) there.
+        """
         direction = self.contacts_mm / chord[:, None]
         arc = self.rest.arc_along_mm(direction, chord)
         _, first, second = self._end_axes(arc)
-        deflection = 3.0 * deflection_mm / chord[:, None]
-        across = [np.sum(deflection * axis, axis=1) for axis in (first, second)]
+        width = self.width(arc / self.rest.length_mm)
+        force = (3.0 * width / chord)[:, None] * deflection_mm
+        across = [np.sum(force * axis, axis=1) for axis in (first, second)]
         return np.column_stack([*across, arc / chord])
 
     def _in_units(self, marched: "_Marched", chord: np.ndarray) -> HeldRod:
@@ -134,8 +142,11 @@ class KirchhoffRods:
         chord (n,). While marching, the axes are those in which the rod's end has not turned.
         """
         arc = unknowns[..., 2]
-        if np.any(self.width(arc * chord / self.rest.length_mm) < _LEAST_WIDTH):
+        width = self.width(arc * chord / self.rest.length_mm)
+        if np.any(width < _LEAST_WIDTH):
             raise ArithmeticError("the contact is too near the end of a rod that ends in a point")
+        if np.any(np.hypot(unknowns[..., 0], unknowns[..., 1]) > _MOST_FORCE * width):
+            raise ArithmeticError(_TOO_FAR)
         force = self._force_on_end(unknowns, friction, chord)
         turn, way = self._turn_and_way(arc, chord, force)
         to_hub = np.swapaxes(turn, -1, -2)
@@ -182,7 +193,7 @@ class KirchhoffRods:
             atol=_MARCH_ERROR,
         )
         if not marched.success:
-            raise ArithmeticError("no equilibrium found of a curved rod that is bent so far")
+            raise ArithmeticError(_TOO_FAR)
         return _turns_and_ways(marched.y[:, -1], rods)
 
     def _bend(

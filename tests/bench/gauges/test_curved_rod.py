@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bench.gauges.clamped_rod import load_at_clamp
 from bench.gauges.curved_rod import KirchhoffRods
 from bench.gauges.whisker_rods import CurvedRod, SeenContacts, StraightRod, rod_of
 from bench.session.rest_shape import UnloadedRod
@@ -81,8 +82,8 @@ def test_a_rod_without_curvature_is_the_straight_one(shape, friction):
 @given(
     length=st.floats(10.0, 500.0),
     taper=st.floats(0.0, 1.0),
-    part=st.floats(0.1, 0.8),
-    theta=st.floats(np.radians(0.1), np.radians(15.0)),
+    part=st.floats(0.1, 0.95),
+    theta=st.floats(np.radians(0.1), np.radians(30.0)),
     sets=st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15)),
     rigidity=st.floats(1e-3, 1e6),
     length_unit=st.floats(1e-3, 1e3),
@@ -91,18 +92,23 @@ def test_a_rod_without_curvature_is_the_straight_one(shape, friction):
 def test_the_answer_is_the_same_in_every_unit(
     length, taper, part, theta, sets, rigidity, length_unit, force_unit
 ):
+    """A rod that no force bends so is refused in every unit."""
+
     def asked(unit, force):
-        """Moments and force over their units, and the tangent at the contact."""
+        """Moments and force over their units, and the tangent at the contact; nothing where the rod is refused."""
         rest = UnloadedRod(tuple((0.0, 0.0, unit * length * tip) for tip in sets), unit * length)
         unbent = rest.point_mm(np.array([part * unit * length]))
         deflection = part * unit * length * np.array([[-0.5 * theta**2, -theta, 0.3 * theta]])
         rods = KirchhoffRods(
             rest, lambda share: 1.0 - taper * share, rigidity * force * unit**2, unbent + deflection
         )
-        held = rods.held(np.array([-0.1]), deflection)
+        try:
+            held = rods.held(np.array([-0.1]), deflection)
+        except ArithmeticError:
+            return ()
         return held.moments_Nmm / (force * unit), held.force_N / force, held.tangent
 
-    for one, other in zip(asked(1.0, 1.0), asked(length_unit, force_unit)):
+    for one, other in zip(asked(1.0, 1.0), asked(length_unit, force_unit), strict=True):
         np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
 
 
@@ -120,3 +126,16 @@ def test_a_contact_far_beyond_the_end_is_refused_and_not_marched_for_ever():
     rods = KirchhoffRods(rest, np.ones_like, 100.0, np.array([[130.0, 10.0, 5.0]]))
     with pytest.raises(ArithmeticError, match="beyond the end"):
         rods.held(np.zeros(1), np.array([[0.0, 10.0, 5.0]]))
+
+
+def test_near_the_point_of_a_cone_the_rod_is_bent_and_not_coiled():
+    """From the force that bends a cylinder so, Newton's method came to a rod whose end has turned back: 46 % less."""
+    along, across = 40.0 * np.cos(np.radians(8.0)), 40.0 * np.sin(np.radians(8.0))
+    contact = np.array([[along, -across, 0.0]])
+    rods = KirchhoffRods(
+        UnloadedRod(((0.0,), (0.0,)), 50.0), lambda share: 1.0 - share, 1.0, contact
+    )
+    held = rods.held(np.zeros(1), np.array([[0.0, -across, 0.0]]))
+    straight = load_at_clamp(along, across, lambda arc: (1.0 - arc / 50.0) ** 4)
+    moment_Nmm = np.linalg.norm(held.moments_Nmm)
+    assert moment_Nmm == pytest.approx(straight.moment_Nmm[0], rel=1e-8)
