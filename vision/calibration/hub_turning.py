@@ -21,16 +21,17 @@ from vision.geometry.refusals import Refused
 from vision.geometry.rotation import apply, compose, invert_transform, nearest_rotation
 
 # [share of the stroke] The first seventh is taken as free; from there on what goes on turning as it
-# did. Set by eye. Study: tests/bench/trials/test_placing_pictures.py.
-_FREE_SHARES = (1 / 7, 2 / 7, 4 / 7, 1.0)
-# [share of the stroke] Taken as free at most, of few frames. Set by eye. Study:
-# tests/bench/trials/test_placing_pictures.py.
-_MOST_FREE_SHARE = 0.25
-# [rad] Lines this far from the motor's angle are others', or a bent whisker's. Set by eye. Study:
+# did. From a tenth or a quarter on rigs are found as well. Study:
 # tests/vision/calibration/test_turning.py.
+_FREE_SHARES = (1 / 7, 2 / 7, 4 / 7, 1.0)
+# [share of the stroke] Taken as free at most, of few frames. By 0.15 too few of a short stroke are
+# left, by 0.4 rigs are found as well. Study: tests/vision/calibration/test_turning.py.
+_MOST_FREE_SHARE = 0.25
+# [rad] Lines this far from the motor's angle are others', or a bent whisker's. By 0.005 or 0.02
+# strays are left out as well. Study: tests/vision/calibration/test_turning.py.
 _STRAY_RAD = 0.01
-# [mm] Lines this far from the centre of rotation are others', or a bent whisker's. Set by eye.
-# Study: tests/vision/calibration/test_turning.py.
+# [mm] Lines this far from the centre of rotation are others', or a bent whisker's. By 0.5 or 2
+# strays are left out as well. Study: tests/vision/calibration/test_turning.py.
 _STRAY_MM = 1.0
 # [1] Or so many times as far as the median line. By 2 or 4.5 strays are left out as well. Study:
 # tests/vision/calibration/test_turning.py.
