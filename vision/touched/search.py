@@ -102,6 +102,11 @@ def find_object_again(scene: SearchScene, axis: Axis) -> SeenBar:
     return find_object(scene)
 
 
+def find_bars_as_clear_as(scene: SearchScene, score: float) -> list[BarAxis]:
+    """Find the axes of all straight bars that cameras see as clearly as a detection score says."""
+    return [bar.axis for bar in BarSearch(scene).bars_as_clear_as(score)]
+
+
 def with_lines(scene: SearchScene, bar: SeenBar) -> SeenBar:
     """Return a straight bar with its lines about its axis, where that is from elsewhere than the search.
 
@@ -210,25 +215,39 @@ class BarSearch:
     def best_by_all_cameras(self) -> SeenBar:
         """Find the bar by its lines in all cameras: that with the highest detection score.
 
-        Pairs of lines are measured until they converge, as long as they could come within CLEARER
-        of the best so far. Where none converges, the bar is where edges are the strongest, or there without lines.
+        Where no lines converge, the bar is where edges are the strongest, or there without lines.
         """
+        found = self._converged_bars()
+        if found:
+            return _clearest_of(found)
+        with suppress(Refused):
+            return self._converge(self.strong_axes[0], found)
+        return SeenBar(self.strong_axes[0], {})
+
+    def bars_as_clear_as(self, score: float) -> list[SeenBar]:
+        """Find all bars whose detection score is within CLEARER of one, or above it."""
+        found = self._converged_bars(score)
+        return [bar for bar in found if bar.detection_score > score - CLEARER]
+
+    @cached_property
+    def strong_axes(self) -> list[BarAxis]:
+        """Return the axes whose edges are strong in all cameras, the strongest first."""
+        return find_bars(list(self.edge_maps.values()), self.scene)
+
+    def _converged_bars(self, score: float = np.inf) -> list[SeenBar]:
+        """Measure pairs of lines until they converge, as long as they could come within CLEARER of the
+        best so far, or of a score that is less."""
         scene = self.scene
-        axes = find_bars(list(self.edge_maps.values()), scene)
         found: list[SeenBar] = []
-        for highest, one, other in _pairs_of(self._candidates(axes)):
+        for highest, one, other in _pairs_of(self._candidates(self.strong_axes)):
             clearest = max(map(_detection_score, found), default=-np.inf)
-            if highest < clearest - CLEARER:
+            if highest < min(clearest, score) - CLEARER:
                 break
             axis = meeting_axis(one.camera, one.axis, other.camera, other.axis)
             if can_touch(axis, scene.rods, scene.motor_range_rad):
                 with suppress(Refused):  # lines that contradict each other are no bar's
                     one.axis = other.axis = self._converge(axis, found).axis
-        if found:
-            return _clearest_of(found)
-        with suppress(Refused):
-            return self._converge(axes[0], found)
-        return SeenBar(axes[0], {})
+        return found
 
     def _candidates(self, axes: Sequence[BarAxis]) -> list["LineCandidate"]:
         """Measure the bar's line about each axis, once where a camera sees two axes as one."""

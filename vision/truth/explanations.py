@@ -23,7 +23,7 @@ from vision.geometry.contact import BarAxis
 from vision.geometry.reasons import NO_REASON, Reason, joined
 from vision.geometry.refusals import Refused
 from vision.geometry.sampling import spread
-from vision.touched.search import CLEARER, SeenBar, with_lines
+from vision.touched.search import CLEARER, SeenBar, find_bars_as_clear_as, with_lines
 from vision.touched.search_scene import SearchScene
 from vision.truth.kept_fit import KeptFit
 from vision.truth.line_source import EarlierWhisk
@@ -108,11 +108,15 @@ class Explanation:
         return PlaceComparison(self.whisk.views, curves, self.axis, self.whisk.rods)
 
     @cached_property
+    def scene(self) -> SearchScene:
+        """Return what the bar is searched in."""
+        whisk = self.whisk
+        return SearchScene(whisk.views, whisk.cameras, whisk.rods, whisk.motor_rad, whisk.settings)
+
+    @cached_property
     def detection_score(self) -> float:
         """Return how clearly the cameras see a bar about the fitted axis, as the search scores it."""
-        whisk = self.whisk
-        scene = SearchScene(whisk.views, whisk.cameras, whisk.rods, whisk.motor_rad, whisk.settings)
-        return with_lines(scene, SeenBar(self.axis, {})).detection_score
+        return with_lines(self.scene, SeenBar(self.axis, {})).detection_score
 
     def without_rivals(self) -> Self:
         """Return the fit with a bar that no other one may be."""
@@ -166,7 +170,7 @@ def explain(whisk: WhiskPictures) -> Explanation:
     best = best_explanation(Explanation(whisk, fit_whisk(whisk)))
     if whisk.motion is not None:  # its mean picture has no score
         return best
-    return _weigh_rivals(best, whisk.bar.rivals)
+    return _weigh_rivals(best, _rivals_of(best, whisk.bar))
 
 
 def best_explanation(first: Explanation) -> Explanation:
@@ -183,6 +187,18 @@ def best_explanation(first: Explanation) -> Explanation:
     else:
         best = replace(best, warning=_unconverged_warning(best.place_comparison, best))
     return _in_place_of(first, best)
+
+
+def _rivals_of(fit: Explanation, found: SeenBar) -> Sequence[BarAxis]:
+    """Return the axes of bars that may be the one that is touched, besides that of a fit.
+
+    found: by the search, with the bars that it does not exclude. A fit may leave what was found for a
+    bar that is less clear, for a bar in one camera and its shadow in another are clear where their
+    lines do not meet. All bars that are as clear as the fitted one are then its rivals.
+    """
+    if found.lines and found.detection_score - fit.detection_score > CLEARER:
+        return find_bars_as_clear_as(fit.scene, fit.detection_score)
+    return found.rivals
 
 
 def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
