@@ -47,8 +47,8 @@ _WITHOUT_PIXELS = 1.0
 # [nodes] Of the spline through the grid, each way. Derived.
 _FINE = 301
 # [1] Of the evidence: what the model lacks is alike in all segments. In 153 views of 65 path-traced
-# scenes lines are then 0.18 px RMS off and 1.2 sigma, with 0.5 0.18 px and 1.45, with 0.12 0.18 px and
-# 1.0, where an even wire is stated at 0.2 px. Study: wire_scenes.py.
+# scenes lines are then 0.18 px RMS off and 1.1 sigma; with all of it sigmas are half as wide, with an
+# eighth an even wire is stated at 0.2 px. Study: wire_scenes.py, lines.py.
 EVIDENCE_COUNTS = 0.25
 
 

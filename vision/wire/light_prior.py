@@ -12,8 +12,8 @@ import numpy as np
 
 from vision.wire.shading import Knots
 
-# [1] Prior sigma of the rod's level of light over its contrast. Half or twice changes the mean log
-# probability of true lines by 0.05 at most. Study: wire_scenes.py.
+# [1] Prior sigma of the rod's level of light over its contrast: of half to twice this, lines are off alike.
+# Study: wire_scenes.py.
 _LEVEL_SHARE = 2.0
 # [1] What of it changes from turn to turn of `LIT_ALIKE_RAD`: light and rod keep, the angle at
 # which they meet does not. Half or twice it moves nothing on the fixtures. Study: thresholds.py
