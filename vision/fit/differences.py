@@ -75,12 +75,11 @@ def perturb(problem: Problem, vector: np.ndarray, *, reach: bool = False) -> Per
     """
     blocks = problem.blocks
     frames = len(problem.motor_rad)
-    shared = np.append(columns_of(blocks.bar_axis, blocks.rest_shape), blocks.placement)
-    shared = np.append(shared, columns_of(blocks.taper, blocks.friction))
+    own = [blocks.bar_axis, blocks.rest_shape, blocks.taper, blocks.friction]
     if reach:
-        shared = np.append(shared, columns_of(blocks.reach))
+        own.append(blocks.reach)
     moves = []
-    for k in shared:
+    for k in np.append(columns_of(*own), blocks.placement):
         moves.append(Perturbation(blocks.steps[k], np.full(frames, k), is_shared=True))
     order = np.cumsum(problem.bent) - 1  # (f,) number of each bent frame
     for first in (blocks.bends.start, blocks.bends.start + 1):

@@ -196,9 +196,15 @@ def _rivals_of(fit: Explanation, found: SeenBar) -> Sequence[BarAxis]:
     bar that is less clear, for a bar in one camera and its shadow in another are clear where their
     lines do not meet. All bars that are as clear as the fitted one are then its rivals.
     """
-    if found.lines and found.detection_score - fit.detection_score > CLEARER:
-        return find_bars_as_clear_as(fit.scene, fit.detection_score)
-    return found.rivals
+    comparison = _comparison(fit)
+    if not found.lines or not _are_apart(comparison, found.axis, fit.axis):
+        return found.rivals
+    if found.detection_score - fit.detection_score <= CLEARER:
+        return found.rivals
+    axes = find_bars_as_clear_as(fit.scene, fit.detection_score)
+    return [
+        axis for axis in axes if _are_apart(comparison, axis, found.axis)
+    ]  # from there it was fitted
 
 
 def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:

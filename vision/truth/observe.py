@@ -161,8 +161,8 @@ def _see_in_turn(scene: _TrialScene, fits: Sequence[KeptFit]) -> _WhisksInTurn:
     for whisk in scene.whisks:
         whisk = replace(whisk, bar=seen.found, earlier=earlier)
         explain_by = again.get(whisk.number, explain)
-        is_first = earlier is None and whisk.settings.measure_sizes
-        truth_of = _first_truth if is_first else fitted_truth
+        measures_sizes = earlier is None and whisk.settings.measure_sizes
+        truth_of = _first_truth if measures_sizes else fitted_truth
         row, explained = see_whisk(whisk, explain_by, truth_of)
         seen.rows.append(row)
         if explained is not None:

@@ -23,7 +23,7 @@ from vision.wire.bands import Pieces
 from vision.wire.gathered import GatheredEquations, exactly_if_needed
 from vision.wire.light_prior import LightPrior
 from vision.wire.shaded_segments import ShadedSegments
-from vision.wire.shading import contrast_of
+from vision.wire.shading import Knots, contrast_of
 from vision.wire.summed_segments import ShadingEquations
 
 # [1] Lights whose evidence is averaged: diffuse or with a highlight, even along the rod or not. 36 lights
@@ -114,21 +114,30 @@ def evidences_of(
     thick the rods are.
     """
     pieces = task.pieces
+    knots = _spread(task.knots)
     models = list(product(wider, blurs_px))
     contrast = np.tile(_contrasts(pieces, models), len(shifts_px))
 
     def compute(each_pixel: bool) -> np.ndarray:
         """Return the evidences (m w b,), from summed pixels or from each pixel."""
-        gathered = GatheredEquations(pieces, task.knot_weights, robust, each_pixel=each_pixel)
+        gathered = GatheredEquations(pieces, knots.weights(pieces), robust, each_pixel=each_pixel)
         normal = gathered.normal(shifts_px, models, task.terms)
         evidences = []
         for light in _LIGHTS:
-            precision = light.precision(task.knots, task.terms)
+            precision = light.precision(knots, task.terms)
             evidences.append(_integrate(normal, precision, contrast))
         return _average(np.array(evidences))
 
     evidences = exactly_if_needed(compute)
     return evidences.reshape(len(shifts_px), len(wider), len(blurs_px)).transpose(1, 0, 2)
+
+
+def _spread(knots: Knots) -> Knots:
+    """Return knots of all turns, and so many fewer places along the rod that there are as many in all."""
+    places = len(knots.place_mm)
+    count = max(int(np.ceil(places / len(knots.turn_rad))), min(2, places))
+    place_mm = np.linspace(knots.place_mm[0], knots.place_mm[-1], count)
+    return Knots(place_mm, knots.turn_rad, knots.turns)
 
 
 def _average(evidences: np.ndarray) -> np.ndarray:
