@@ -115,6 +115,8 @@ def felt_touch(
     motor_rad: ArrayLike,
     moments: ArrayLike,
     time_s: ArrayLike | None = None,
+    *,
+    steps: np.ndarray | None = None,
 ) -> FeltTouch:
     """Find the touch where a line fitted to the rise of the moments meets the level of the free
     stroke.
@@ -123,10 +125,13 @@ def felt_touch(
     time_s is given, so that fast strokes average over hum and vibration too. The channels share one
     touch angle, weighted by the inverse of their scatter's covariance: where the whisker sticks and
     slips, the scatter lies along the surface, so that the weight falls on the moment across it,
-    which rises evenly whatever the slip. Isolated spikes and NaN are left out. Raises ValueError
-    where motor angles and moments do not have the same samples.
+    which rises evenly whatever the slip. Isolated spikes and NaN are left out. steps (k,): of the
+    converter, which `converter_steps` reads from the moments where they are not given. Raises
+    ValueError where motor angles and moments do not have the same samples.
     """
     motor, samples = columns(motor_rad, moments)
+    if steps is None:
+        steps = converter_steps(samples)
     used = usable(motor, samples) & _moving(motor)
     if np.count_nonzero(used) < MIN_FREE_SAMPLES + MIN_RISE_SAMPLES:
         return FeltTouch.none(TOO_FEW)
@@ -136,7 +141,7 @@ def felt_touch(
         return FeltTouch.none(status)
     window = max(WINDOW_RAD, speed(motor, time_s) * WINDOW_S)
     for share in (2.0, 1.0, 1.0, 1.0):
-        found = _extrapolate(motor, samples, used, touch, share * window)
+        found = _extrapolate(motor, samples, used, touch, share * window, steps)
         if found.status:
             return found
         touch = found.motor_rad
@@ -260,7 +265,7 @@ def _rises_already(motor, samples, before, after):
     return slope > max(size / 3, 5 * sigma)
 
 
-def _extrapolate(motor, samples, used, touch, window):
+def _extrapolate(motor, samples, used, touch, window, steps):
     """Return the touch of one pass of `felt_touch`, which starts from an earlier touch."""
     past_rad = motor - touch
     free = used & (past_rad < -GUARD_RAD)
@@ -269,7 +274,7 @@ def _extrapolate(motor, samples, used, touch, window):
         return FeltTouch.none(NO_FREE_STROKE)
     if np.count_nonzero(rising) < MIN_RISE_SAMPLES:
         return FeltTouch.none(SHORT_RISE)
-    level = free_level(motor, samples, free)
+    level = free_level(motor, samples, free, steps)
     rise, by_noise = _fit_rise(motor, samples, free, rising, touch, level)
     if not by_noise < window / 3:
         return FeltTouch.none(VAGUE)
@@ -311,9 +316,23 @@ def hidden_step_variance(motor: np.ndarray, used: np.ndarray) -> float:
     return max(0.0, step**2 / 12 - float(np.mean(scatter**2)))
 
 
-def free_level(motor: np.ndarray, samples: np.ndarray, free: np.ndarray) -> Level:
+def converter_steps(samples: np.ndarray) -> np.ndarray:
+    """Return the steps (k,) of the converter that recorded the samples (n, k) of a whole stroke, 0
+    where a channel shows none.
+    """
+    steps = np.zeros(samples.shape[1])
+    for channel, values in enumerate(samples.T):
+        levels = np.unique(values[np.isfinite(values)])
+        if len(levels) > 1:
+            steps[channel] = np.diff(levels).min()
+    return steps
+
+
+def free_level(
+    motor: np.ndarray, samples: np.ndarray, free: np.ndarray, steps: np.ndarray
+) -> Level:
     """Measure the level of the samples (n, k) of a free stroke, a mask (n,), over motor angles
-    (n,).
+    (n,); steps (k,) of the converter.
     """
     weights = noise.mean_weights(free)
     memory = noise.Memory.of(motor, samples, free)
@@ -323,24 +342,19 @@ def free_level(motor: np.ndarray, samples: np.ndarray, free: np.ndarray) -> Leve
     slope = noise.line_slope(motor, samples, free)
     drift = np.sqrt(np.maximum(0.0, slope**2 - variance))
     offset = noise.weighted_sum(weights, samples, free)
-    covariance = memory.of_sum(weights) + np.diag(hidden_level_variance(samples, free))
+    covariance = memory.of_sum(weights) + np.diag(hidden_level_variance(samples, free, steps))
     return Level(offset, covariance, drift, float(centre))
 
 
-def hidden_level_variance(samples: np.ndarray, free: np.ndarray) -> np.ndarray:
+def hidden_level_variance(samples: np.ndarray, free: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return the variances (k,) of a level's channels by a converter's steps that their noise does not hide.
 
     A channel that stays on one step q is off by a uniform error, q²/12. Noise of standard deviation s
     carries it over the steps, and the mean's error falls by exp(−4π² s²/q²) in variance (Widrow and Kollár,
-    Quantization Noise, 2008). samples (n, k): of the whole stroke, from which the steps are read; free (n,):
-    mask of those of the level.
+    Quantization Noise, 2008). samples (n, k); free (n,): mask of those of the level; steps (k,), 0 of a
+    channel without.
     """
-    variances = np.zeros(samples.shape[1])
-    for channel, values in enumerate(samples.T):
-        levels = np.unique(values[np.isfinite(values)])
-        if len(levels) < 2:
-            continue
-        step = np.diff(levels).min()
-        noise_variance = max(0.0, np.var(values[free]) - step**2 / 12)
-        variances[channel] = step**2 / 12 * np.exp(-4 * np.pi**2 * noise_variance / step**2)
-    return variances
+    by_steps = steps**2 / 12
+    noise_variance = np.maximum(0.0, np.var(samples[free], axis=0) - by_steps)
+    in_steps = noise_variance / np.where(steps > 0, steps, np.inf) ** 2
+    return by_steps * np.exp(-4 * np.pi**2 * in_steps)

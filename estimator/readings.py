@@ -16,6 +16,7 @@ from estimator.onset import (
     FeltTouch,
     Rise,
     columns,
+    converter_steps,
     free_level,
     usable,
 )
@@ -55,7 +56,7 @@ def _with_zero_of_forces(touch, motor, samples, free, drift):
     """
     if np.count_nonzero(free) < MIN_FREE_SAMPLES:
         return replace(touch, status=NO_ZERO)
-    level = free_level(motor, samples, free)
+    level = free_level(motor, samples, free, converter_steps(samples))
     if drift is not None:
         level = replace(level, drift=drift)
     no_gain = np.zeros(samples.shape[1])  # the forces have no part in the touch

@@ -14,7 +14,7 @@ from bench.session.angle_source import EXACT, AngleSigma
 from bench.session.rails import off_the_rails
 from bench.session.signals import Signals, back_stroke, forward_strokes, stroke_ends, ways_back
 from bench.session.trial import Trial
-from estimator.onset import GUARD_RAD, usable
+from estimator.onset import GUARD_RAD, converter_steps, usable
 from estimator.signal import FeltTouch, MomentAt, felt_touch, moment_at, zero_phase_lowpass
 from vision import UNKNOWN, FrameTruth, Value
 
@@ -81,7 +81,8 @@ class FeltStroke:
 
     time_s, motor_rad (n,); channels (n, 2) as recorded, NaN where saturated, and filtered; drift
     (n, 2) that was taken out of both, None where none was; forces_N (n, 3), None where no load cell
-    was recorded. angle_sigma: how well motor_rad is known.
+    was recorded. angle_sigma: how well motor_rad is known. steps (2,): of the converter, None where
+    the channels are as recorded and show them.
     """
 
     time_s: np.ndarray
@@ -91,6 +92,7 @@ class FeltStroke:
     drift: np.ndarray | None = None
     forces_N: np.ndarray | None = None
     angle_sigma: AngleSigma = EXACT
+    steps: np.ndarray | None = None
 
     @property
     def saturated(self) -> int:
@@ -117,7 +119,7 @@ class FeltStroke:
     @cached_property
     def touch(self) -> FeltTouch:
         """Return felt touch. The rise is fitted as recorded: a filter would smear the onset."""
-        return felt_touch(self.motor_rad, self.channels, self.time_s)
+        return felt_touch(self.motor_rad, self.channels, self.time_s, steps=self.steps)
 
     @cached_property
     def _usable(self) -> np.ndarray:
@@ -168,6 +170,7 @@ def strokes_of(
             lowpassed[cutoff_Hz][where],
             forces_N=None if signals.forces_N is None else signals.forces_N[where],
             angle_sigma=signals.angle_sigma.part(where),
+            steps=converter_steps(channels[where]),
         )
         if level:
             stroke = _levelled(stroke, signals, channels, slice(where.stop, end))

@@ -1,5 +1,6 @@
 """Hysteresis and zero return from a simulated back stroke; not measured without one."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -68,3 +69,13 @@ def test_drift_is_taken_out_where_both_free_strokes_show_it(back):
     )
     gained = 0.05 * stroke.time_s[pushed].mean()
     assert off.mean() == pytest.approx(0.0 if back else gained, abs=0.012 if not back else 0.003)
+
+
+def test_a_converter_s_steps_are_in_a_levelled_stroke_s_touch():
+    """Noise is a tenth of the step, on one of which the free stroke stays: its level may be off by half of it."""
+    signals = recording(back=True)
+    step_V = 0.01
+    stepped = replace(signals, z=step_V * np.round(signals.z / step_V))
+    (stroke,) = strokes_of(stepped, TRIAL, Settings())
+    assert np.ptp(stroke.drift[:, 1]) > step_V / 5
+    assert np.sqrt(stroke.touch.level.covariance[1, 1]) > 0.9 * step_V / np.sqrt(12.0)
