@@ -49,8 +49,8 @@ class Solution:
 
     residual_px (n, 2): seen − predicted. covariance (G, G): of the global parameters with all view
     poses marginalised; rows of held parameters are 0. fitted_points: how many coordinates of the
-    board's points the pictures determine. picture_variance (V, C, 7): of what is the pictures' own, given all
-    else.
+    board's points the pictures determine. fitted_pictures (C, 7): how many of the parameters that are the
+    pictures' own, by camera.
     """
 
     state: BundleState
@@ -58,8 +58,8 @@ class Solution:
     covariance: np.ndarray
     cost: float
     converged: bool
-    fitted_points: float = 0.0
-    picture_variance: np.ndarray | None = None
+    fitted_points: float
+    fitted_pictures: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +95,20 @@ class _Problem:
         variance = np.trace(_solve_but_modes(H, np.eye(len(modes)), modes))
         freedom = len(modes) - modes.shape[1]
         return float(freedom - self.priors.point_sigma_mm**-2.0 * variance)
+
+    def fitted_pictures(self, normal: LinearisedCost, state: BundleState) -> np.ndarray:
+        """Return how many of the parameters (C, 7) that are its pictures' own each camera's corners determine."""
+        fitted = np.zeros((len(state.lens), N_PICTURE))
+        sigma = self.priors.picture_sigma
+        if normal.own is None or state.trajectory is None or sigma is None:
+            return fitted
+        may_stray = state.trajectory.may_stray(normal.shots.view, normal.shots.camera)
+        camera = normal.shots.camera[may_stray]
+        covariances = np.linalg.inv(normal.own.precision[may_stray])
+        is_free = sigma[camera] > 0
+        precision = np.where(is_free, sigma[camera], np.inf) ** -2.0
+        np.add.at(fitted, camera, is_free - precision * np.einsum("sii->si", covariances))
+        return fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,10 +153,15 @@ def adjust_bundle(
     """
     problem = _Problem(seen, board, priors, width)
     state, normal, converged = _descend(problem, state, tolerance)
-    covariance = _covariance(normal, problem.free)
-    fitted = problem.fitted_points(normal)
-    variance = _picture_variance(normal, state)
-    return Solution(state, normal.residual_px, covariance, normal.cost, converged, fitted, variance)
+    return Solution(
+        state,
+        normal.residual_px,
+        _covariance(normal, problem.free),
+        normal.cost,
+        converged,
+        fitted_points=problem.fitted_points(normal),
+        fitted_pictures=problem.fitted_pictures(normal, state),
+    )
 
 
 def _descend(
@@ -231,15 +250,6 @@ def _picture_steps(normal: LinearisedCost, step: np.ndarray, view_steps: np.ndar
     steps = np.zeros((len(view_steps), of_cameras // N_CAMERA, N_PICTURE))
     steps[shots.view, shots.camera] = np.linalg.solve(own.precision, gradient[:, :, None])[..., 0]
     return steps
-
-
-def _picture_variance(normal: LinearisedCost, state: BundleState) -> np.ndarray:
-    """Return the variances (V, C, 7) of what is the pictures' own, given all else; 0 of no picture."""
-    variance = np.zeros_like(state.pictures)
-    if normal.own is not None:
-        covariances = np.linalg.inv(normal.own.precision)
-        variance[normal.shots.view, normal.shots.camera] = np.einsum("sii->si", covariances)
-    return variance
 
 
 def _eliminate_views(

@@ -145,7 +145,7 @@ def _without_outliers(
     if not kept.any():
         raise Refused("no corner agrees with the others: is this the board as described?")
     for _ in range(2):
-        fitted = solution.fitted_points + _fitted_of_pictures(solution, priors, seen)[1].sum()
+        fitted = solution.fitted_points + solution.fitted_pictures.sum()
         error = _error_by_mean(residual_px, seen, kept, error, priors, fitted)
         priors = _with_print_errors(priors, solution)
         weighted = seen.with_error(error)
@@ -161,11 +161,11 @@ def _with_scatter(priors: Priors, solution: Solution, seen: Sightings) -> Priors
 
     A camera with few pictures that may stray gets the scatter of all.
     """
-    squared, fitted, count = _fitted_of_pictures(solution, priors, seen)
+    squared, count = _squares_of_pictures(solution.state, seen)
     sigma = priors.picture_sigma.copy()  # (C, 7)
     for columns in _OF_ONE_SCATTER:
         own_squared = squared[:, columns].sum(axis=1)
-        own_fitted = fitted[:, columns].sum(axis=1)
+        own_fitted = solution.fitted_pictures[:, columns].sum(axis=1)
         if own_fitted.sum() < _LEAST_FITTED:
             continue
         overall = np.sqrt(own_squared.sum() / own_fitted.sum())
@@ -177,28 +177,19 @@ def _with_scatter(priors: Priors, solution: Solution, seen: Sightings) -> Priors
     return replace(priors, picture_sigma=sigma)
 
 
-def _fitted_of_pictures(
-    solution: Solution, priors: Priors, seen: Sightings
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return of each camera the sum of squares (C, 7) of what is its pictures' own, how many of these
-    parameters the corners determine, (C, 7), and of how many pictures, (C,).
+def _squares_of_pictures(state: BundleState, seen: Sightings) -> tuple[np.ndarray, np.ndarray]:
+    """Return of each camera the sum of squares (C, 7) of what is its pictures' own, and of how many
+    pictures that may stray, (C,).
     """
-    state = solution.state
     squared = np.zeros((len(state.lens), N_PICTURE))
-    fitted = np.zeros_like(squared)
     count = np.zeros(len(squared), dtype=int)
-    if state.trajectory is None or priors.picture_sigma is None:
-        return squared, fitted, count
     starts = seen.shot_starts()
     may_stray = state.trajectory.may_stray(seen.view[starts], seen.camera[starts])
     view = seen.view[starts][may_stray]
     camera = seen.camera[starts][may_stray]
-    sigma = priors.picture_sigma[camera]
-    share_left = solution.picture_variance[view, camera] / np.where(sigma > 0, sigma, np.inf) ** 2
     np.add.at(squared, camera, state.pictures[view, camera] ** 2)
-    np.add.at(fitted, camera, (sigma > 0) * (1.0 - share_left))
     np.add.at(count, camera, 1)
-    return squared, fitted, count
+    return squared, count
 
 
 def _with_print_errors(priors: Priors, solution: Solution) -> Priors:

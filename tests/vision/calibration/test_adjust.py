@@ -232,6 +232,22 @@ def test_a_board_that_moves_by_less_than_a_corner_s_noise_is_noticed(moved_mm, a
     assert (chance_of_one_instant(solution, layout.seen, BOARD) > 0.01) == at_once
 
 
+@pytest.mark.parametrize("sigma, each", [(1e-9, 0), (1e3, N_VIEW)])
+def test_pictures_left_out_are_not_among_the_fitted(sigma, each):
+    """Of seven parameters free to 1000 s, rad and mm a picture determines six, for its lateness moves the board, too; of
+    seven free to 1e-9 none."""
+    state, seen = a_state(PLANE, moving=True), all_sightings(PLANE)
+    state = replace(state, pictures=np.zeros_like(state.pictures))
+    seen = replace(seen, px=predict(state, seen, PLANE)[0])
+    priors = pose_priors(CAMERAS, VIEWS, PLANE)
+    priors = replace(priors, picture_sigma=np.full((CAMERAS, N_PICTURE), sigma))
+    kept = seen.select((seen.view != 1) | (seen.camera != 1))
+    starts = kept.shot_starts()
+    strays = state.trajectory.may_stray(kept.view[starts], kept.camera[starts])
+    fitted = adjust_bundle(state, kept, PLANE, priors).fitted_pictures
+    assert fitted.sum() == pytest.approx(each * strays.sum(), abs=0.01)
+
+
 def test_more_iterations_change_nothing_at_rest():
     recording = a_recording(views=6)
     boards, _ = recording.seen(0.05, np.random.default_rng(1))
