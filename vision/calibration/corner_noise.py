@@ -23,8 +23,8 @@ from vision.geometry.refusals import Refused
 REJECT_SIGMA = 4.5
 # [sigma] Of Cauchy's loss while outliers are still in: 95 % efficient on Gaussian noise at 2.4.
 # moves nothing on the fixtures between 2 and 5. Study: thresholds.py calibration.corner_noise
-# _ROBUST_WIDTH ….
-_ROBUST_WIDTH = 3.0
+# ROBUST_WIDTH ….
+ROBUST_WIDTH = 3.0
 # [px] Before anything is known of the residuals. moves nothing on the fixtures between 0.1 and
 # 1.0. Study: thresholds.py calibration.corner_noise _FIRST_ERROR_PX ….
 _FIRST_ERROR_PX = 0.3
@@ -122,7 +122,7 @@ def _adjust_robustly(
     its residuals show.
     """
     solution = adjust_bundle(
-        state, seen.with_error(error), board, priors, width=_ROBUST_WIDTH, tolerance=1e-4
+        state, seen.with_error(error), board, priors, width=ROBUST_WIDTH, tolerance=1e-4
     )
     if not np.isfinite(solution.cost):
         raise Refused(

@@ -14,7 +14,9 @@ from scipy.special import chdtrc
 
 from vision.calibration.adjust import Solution, adjust_bundle
 from vision.calibration.bundle import N_VIEW, BundleState, Priors, Sightings, predict
+from vision.calibration.corner_noise import ROBUST_WIDTH
 from vision.calibration.layout import Layout
+from vision.calibration.normal_equations import cauchy
 from vision.geometry.board import Board
 
 # [turns] In which views are held out, each view in one of them. Stated.
@@ -69,12 +71,14 @@ def chance_of_one_instant(solution: Solution, seen: Sightings, board: Board) -> 
     """Return with what chance the pictures of each view, as of one instant, differ as much about the board's
     pose as they do.
 
-    It is by χ² of what a pose of each picture's own explains of the residuals. seen: with the sigmas that
-    cameras by themselves have.
+    It is by χ² of what a pose of each picture's own explains of the residuals, weighted by Cauchy's loss: a
+    wrong corner says little. seen: with the sigmas that cameras by themselves have.
     """
     _, J = predict(solution.state, seen, board)
-    by_pose = J[:, :, -N_VIEW:] / seen.sigma_px[:, None, None]
     residual = solution.residual_px / seen.sigma_px[:, None]
+    _, weight = cauchy(np.sum(residual**2, axis=1), ROBUST_WIDTH)
+    residual *= np.sqrt(weight)[:, None]
+    by_pose = J[:, :, -N_VIEW:] * (np.sqrt(weight) / seen.sigma_px)[:, None, None]
     pictures = seen.pictures_by_view(len(solution.state.T_world_board))
     starts = seen.shot_starts()
     squared = 0.0
@@ -84,7 +88,17 @@ def chance_of_one_instant(solution: Solution, seen: Sightings, board: Board) -> 
             squared += np.sum((basis.T @ residual[rows].ravel()) ** 2)
     shared = pictures > 1
     freedom = N_VIEW * np.sum(pictures[shared] - 1)
-    return float(chdtrc(freedom, squared)) if freedom else 1.0
+    return float(chdtrc(freedom, squared / _weighted_variance())) if freedom else 1.0
+
+
+def _weighted_variance() -> float:
+    """Return the mean square, over that of least squares, of what weighted Gaussian residuals make of a parameter.
+
+    It is E[w² u²] / (2 E[w]) of Cauchy's weights w, u²/2 having an exponential distribution (two axes).
+    """
+    half_squared, share = np.polynomial.laguerre.laggauss(30)
+    _, weight = cauchy(2.0 * half_squared, ROBUST_WIDTH)
+    return float(share @ (weight**2 * half_squared) / (share @ weight))
 
 
 def residuals_by_view(

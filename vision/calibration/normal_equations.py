@@ -107,7 +107,7 @@ def normal_equations(
     squared = np.sum(residual_px**2, axis=1) / seen.sigma_px**2
     if not np.all(np.isfinite(squared)):
         return LinearisedCost(np.inf, residual_px)
-    loss, weight = _cauchy(squared, width)
+    loss, weight = cauchy(squared, width)
     root = (np.sqrt(weight) / seen.sigma_px)[:, None, None]
     of_pictures = np.dstack([predicted.J, predicted.by_departure, residual_px]) * root
     rows = _SightingRows(of_pictures, predicted.by_point * root, seen, board)
@@ -134,7 +134,7 @@ def _with_equations(
     return LinearisedCost(float(cost), residual_px, shots, own, equations)
 
 
-def _cauchy(squared: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
+def cauchy(squared: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
     """Return Cauchy's loss, width² log(1 + u²/width²), and weight, of squared residuals u² (n,).
 
     For infinite width they are u² and 1.

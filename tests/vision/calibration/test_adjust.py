@@ -32,7 +32,7 @@ from vision.calibration.bundle import (
     predict_with_own,
 )
 from vision.calibration.calibrate import calibrate_cameras
-from vision.calibration.corner_noise import adjust_with_noise
+from vision.calibration.corner_noise import ROBUST_WIDTH, adjust_with_noise
 from vision.calibration.held_out import camera_alone
 from vision.calibration.instants_help import chance_of_one_instant
 from vision.calibration.layout import gather, lay_out
@@ -216,9 +216,11 @@ def test_a_shaken_board_seen_late_puts_no_lens_off():
         assert np.abs((solution.state.lens[c] - camera.lens) / sigma[own]).max() < 4.0
 
 
-@pytest.mark.parametrize("moved_mm, at_once", [(0.0, True), (0.02, False)])
-def test_a_board_that_moves_by_less_than_a_corner_s_noise_is_noticed(moved_mm, at_once):
-    """0.02 mm are 0.1 px of corners that are known to 0.05 px, but all of them alike."""
+@pytest.mark.parametrize(
+    "moved_mm, wrong_px, at_once", [(0.0, 0.0, True), (0.0, 3.0, True), (0.02, 0.0, False)]
+)
+def test_a_board_that_moves_by_less_than_a_corner_s_noise_is_noticed(moved_mm, wrong_px, at_once):
+    """0.02 mm are 0.1 px of corners that are known to 0.05 px, but all of them alike; one wrong corner is no motion."""
     rng, cameras = np.random.default_rng(0), a_recording(views=2).cameras
     boards = {camera.name: [] for camera in cameras}
     for k in range(20):
@@ -228,7 +230,9 @@ def test_a_board_that_moves_by_less_than_a_corner_s_noise_is_noticed(moved_mm, a
             boards[camera.name].append(noisy_view_at(camera, T, 0.05, rng))
     alone = {camera.name: camera_alone(camera, boards[camera.name], BOARD) for camera in cameras}
     layout = lay_out(alone, [camera.T_camera_rig for camera in cameras], together=True)
-    solution = adjust_bundle(layout.first, layout.seen, BOARD, pose_priors(2, 20, BOARD))
+    layout.seen.px[300] += wrong_px
+    priors = pose_priors(2, 20, BOARD)
+    solution = adjust_bundle(layout.first, layout.seen, BOARD, priors, width=ROBUST_WIDTH)
     assert (chance_of_one_instant(solution, layout.seen, BOARD) > 0.01) == at_once
 
 
