@@ -168,20 +168,19 @@ class JointInput:
         if layout.trajectory is None or self.triggered or self._is_one_picture:
             return JointAdjustment(layout, self._at_once(layout), None)
         coarse = adjust_coarse(layout.first, layout.seen, self.board, self._priors_of(layout))
-        own_px = np.maximum(self._own_errors_px(), _LEAST_ERROR_PX)
-        agree = bool(np.median(coarse.error_px / own_px) < _DISAGREE)
-        seen = layout.seen.with_error(self._own_errors_px())
+        own_px = self._own_errors_px()
+        ratio = coarse.error_px / np.maximum(own_px, _LEAST_ERROR_PX)
+        agree = bool(np.median(ratio) < _DISAGREE)
+        seen = layout.seen.with_error(own_px)
         if agree and chance_of_one_instant(coarse.solution, seen, self.board) > _LEAST_CHANCE:
             return JointAdjustment(layout, self._at_once(layout), None)
         comparison = self._compare_on_held_out()
-        if agree and not comparison.instants_help:
-            return JointAdjustment(layout, self._at_once(layout), None)
         if not comparison.instants_help:
             found = (
                 "the cameras disagree about the board's pose, and pictures late by an offset do not "
                 f"explain it ({comparison.in_words})"
             )
-            return JointAdjustment(layout, self._at_once(layout), None, found)
+            return JointAdjustment(layout, self._at_once(layout), None, "" if agree else found)
         adjustment = self._with_instants(layout, coarse.solution.state)
         timing = Timing(
             offset_s=adjustment.solution.state.clock,
