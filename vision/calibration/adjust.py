@@ -99,9 +99,9 @@ class _Problem:
     def fitted_pictures(self, normal: LinearisedCost, state: BundleState) -> np.ndarray:
         """Return how many of the parameters (C, 7) that are its pictures' own each camera's corners determine."""
         fitted = np.zeros((len(state.lens), N_PICTURE))
-        sigma = self.priors.picture_sigma
-        if normal.own is None or state.trajectory is None or sigma is None:
+        if normal.own is None:
             return fitted
+        sigma = self.priors.picture_sigma
         may_stray = state.trajectory.may_stray(normal.shots.view, normal.shots.camera)
         camera = normal.shots.camera[may_stray]
         covariances = np.linalg.inv(normal.own.precision[may_stray])
@@ -244,10 +244,12 @@ def _picture_steps(normal: LinearisedCost, step: np.ndarray, view_steps: np.ndar
     """Return the steps (V, C, 7) of what is the pictures' own that go with those of globals and views."""
     shots = normal.shots
     own = normal.own
-    others = np.hstack([step[shots.columns], view_steps.ravel()[shots.poses]])  # (s, p)
-    gradient = own.gradient - np.einsum("skp,sp->sk", own.coupling, others)
     of_cameras = len(step) + N_CAMERA - shots.columns.shape[1]
     steps = np.zeros((len(view_steps), of_cameras // N_CAMERA, N_PICTURE))
+    if own is None:
+        return steps
+    others = np.hstack([step[shots.columns], view_steps.ravel()[shots.poses]])  # (s, p)
+    gradient = own.gradient - np.einsum("skp,sp->sk", own.coupling, others)
     steps[shots.view, shots.camera] = np.linalg.solve(own.precision, gradient[:, :, None])[..., 0]
     return steps
 

@@ -27,8 +27,6 @@ from vision.geometry.rotation import pose_difference, skew
 
 # [points] Three determine the motion of a face. Derived.
 _FEWEST_POINTS = 3
-# [columns] Of a row: departures, before the residual. A layout, no threshold.
-_DEPARTURES = slice(-1 - N_VIEW, -1)
 # [columns] Of a board's terms: scale and stretch. A layout, no threshold.
 _SIZES = [PRINT_TERMS.index(name) - len(PRINT_TERMS) for name in ("scale", "stretch")]
 
@@ -54,13 +52,6 @@ class OwnEquations(NamedTuple):
     precision: np.ndarray
     gradient: np.ndarray
     coupling: np.ndarray
-
-    @staticmethod
-    def none(pictures: int, parameters: int) -> "OwnEquations":
-        """Return the equations of pictures that have no parameters of their own."""
-        precision = np.tile(np.eye(N_PICTURE), (pictures, 1, 1))
-        coupling = np.zeros((pictures, N_PICTURE, parameters))
-        return OwnEquations(precision, np.zeros((pictures, N_PICTURE)), coupling)
 
     def of_free(self, is_free: np.ndarray) -> "OwnEquations":
         """Return the equations with the parameters free that are so in is_free (s, 7), others held."""
@@ -89,7 +80,9 @@ class NormalEquations(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearisedCost:
-    """The cost at a state and, where it is finite, its normal equations."""
+    """The cost at a state and, where it is finite, its normal equations; own is None where pictures have no
+    parameters of their own.
+    """
 
     cost: float
     residual_px: np.ndarray
@@ -109,7 +102,7 @@ def normal_equations(
         return LinearisedCost(np.inf, residual_px)
     loss, weight = cauchy(squared, width)
     root = (np.sqrt(weight) / seen.sigma_px)[:, None, None]
-    of_pictures = np.dstack([predicted.J, predicted.by_departure, residual_px]) * root
+    of_pictures = np.dstack([predicted.by_departure, predicted.J, residual_px]) * root
     rows = _SightingRows(of_pictures, predicted.by_point * root, seen, board)
     return _with_equations(residual_px, float(np.sum(loss)), rows, state, priors)
 
@@ -123,9 +116,13 @@ def _with_equations(
     """
     shots = _shots(state, rows.seen)
     blocks = _shot_blocks(rows.of_pictures, rows.seen.shot_starts())
-    own, cost = _own_equations(blocks, shots, state, priors)
-    blocks = _without_own(blocks, own)
-    equations = _assemble(blocks, shots, state)
+    others = blocks[:, N_VIEW:, N_VIEW:]
+    own = None
+    cost = 0.0
+    if state.trajectory is not None and priors.picture_sigma is not None:
+        own, cost = _own_equations(blocks, shots, state, priors)
+        others = _without_own(others, own)
+    equations = _assemble(others, shots, state)
     if priors.point_sigma_mm:
         equations = rows.with_points(equations, shots, state, priors.point_sigma_mm)
         cost += np.sum(state.points_mm**2) / priors.point_sigma_mm**2
@@ -179,37 +176,30 @@ def _shot_blocks(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
 def _own_equations(
     blocks: np.ndarray, shots: Shots, state: BundleState, priors: Priors
 ) -> tuple[OwnEquations, float]:
-    """Return the equations of each picture's own parameters, by its block (s, p + 6, p + 7), and the cost
-    of their priors.
+    """Return the equations of each picture's own parameters, by its block (s, 6 + p, 6 + p + 1) with
+    departures from the board's path first, and the cost of their priors.
 
     A picture that gives its view its time and its pose has none.
     """
-    parameters = shots.columns.shape[1] + shots.poses.shape[1]
-    if state.trajectory is None or priors.picture_sigma is None:
-        return OwnEquations.none(len(blocks), parameters), 0.0
     sigma = priors.picture_sigma[shots.camera]  # (s, 7)
     may_stray = state.trajectory.may_stray(shots.view, shots.camera)
     is_free = may_stray[:, None] & (sigma > 0)
     prior = np.where(is_free, sigma, np.inf) ** -2.0
     value = state.pictures[shots.view, shots.camera]
-    own = [CLOCK, *range(parameters, parameters + N_VIEW)]
+    own = [N_VIEW + CLOCK, *range(N_VIEW)]
     rows = blocks[:, own]
     equations = OwnEquations(
         precision=rows[:, :, own] + prior[:, :, None] * np.eye(N_PICTURE),
         gradient=rows[:, :, -1] - prior * value,
-        coupling=rows[:, :, :parameters],
+        coupling=rows[:, :, N_VIEW:-1],
     )
     return equations.of_free(is_free), float(np.sum(prior * value**2))
 
 
 def _without_own(blocks: np.ndarray, own: OwnEquations) -> np.ndarray:
-    """Return the pictures' blocks (s, p, p + 1) without what their own parameters explain of them.
-
-    blocks (s, p + 6, p + 7): with departures from the board's path before the last column.
-    """
-    others = np.delete(blocks[:, : own.coupling.shape[2]], _DEPARTURES, axis=2)
+    """Return the pictures' blocks (s, p, p + 1) without what their own parameters explain of them."""
     right = np.dstack([own.coupling, own.gradient])
-    return others - np.swapaxes(own.coupling, 1, 2) @ np.linalg.solve(own.precision, right)
+    return blocks - np.swapaxes(own.coupling, 1, 2) @ np.linalg.solve(own.precision, right)
 
 
 def _assemble(blocks: np.ndarray, shots: Shots, state: BundleState) -> NormalEquations:
@@ -247,8 +237,8 @@ def _lower_band(blocks: np.ndarray, poses: np.ndarray, size: int) -> np.ndarray:
 
 
 class _SightingRows(NamedTuple):
-    """Hold the weighted rows of sightings: by all but points, with departures from the board's path and the
-    residual as last columns, of_pictures (n, 2, p + 7), and by the board's point of each, by_point (n, 2, 3).
+    """Hold the weighted rows of sightings: by all but points, of_pictures (n, 2, 6 + p + 1), departures from the
+    board's path being first and the residual last, and by the board's point of each, by_point (n, 2, 3).
     """
 
     of_pictures: np.ndarray
@@ -283,7 +273,7 @@ class _SightingRows(NamedTuple):
         """Return how each point is coupled to globals and views, and its gradient, (m, 3, G + 6 V + 1)."""
         size = sum(equations.B.shape)
         W = np.zeros((len(self.board.corners_mm), 3, size + 1))
-        others = np.delete(self.of_pictures, _DEPARTURES, axis=2)
+        others = self.of_pictures[:, :, N_VIEW:]
         every_row = np.arange(len(self.seen))
         rows_by_shot = np.split(every_row, self.seen.shot_starts()[1:])
         for rows, globals_, poses in zip(rows_by_shot, shots.columns, shots.poses):
