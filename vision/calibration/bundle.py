@@ -67,6 +67,10 @@ class Sightings(Rows):
         is_new = (np.diff(self.view) != 0) | (np.diff(self.camera) != 0)
         return np.concatenate([[0], np.flatnonzero(is_new) + 1])
 
+    def rows_by_shot(self) -> list[np.ndarray]:
+        """Return the rows of each shot."""
+        return np.split(np.arange(len(self)), self.shot_starts()[1:])
+
     def pictures_by_view(self, views: int) -> np.ndarray:
         """Return how many pictures there are of each of so many views, (views,)."""
         return np.bincount(self.view[self.shot_starts()], minlength=views)

@@ -80,9 +80,8 @@ def chance_of_one_instant(solution: Solution, seen: Sightings, board: Board) -> 
     residual *= np.sqrt(weight)[:, None]
     by_pose = J[:, :, -N_VIEW:] * (np.sqrt(weight) / seen.sigma_px)[:, None, None]
     pictures = seen.pictures_by_view(len(solution.state.T_world_board))
-    starts = seen.shot_starts()
     squared = 0.0
-    for rows in np.split(np.arange(len(seen)), starts[1:]):
+    for rows in seen.rows_by_shot():
         if pictures[seen.view[rows[0]]] > 1:
             basis, _ = np.linalg.qr(by_pose[rows].reshape(-1, N_VIEW))
             squared += np.sum((basis.T @ residual[rows].ravel()) ** 2)

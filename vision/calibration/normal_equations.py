@@ -274,9 +274,7 @@ class _SightingRows(NamedTuple):
         size = sum(equations.B.shape)
         W = np.zeros((len(self.board.corners_mm), 3, size + 1))
         others = self.of_pictures[:, :, N_VIEW:]
-        every_row = np.arange(len(self.seen))
-        rows_by_shot = np.split(every_row, self.seen.shot_starts()[1:])
-        for rows, globals_, poses in zip(rows_by_shot, shots.columns, shots.poses):
+        for rows, globals_, poses in zip(self.seen.rows_by_shot(), shots.columns, shots.poses):
             columns = np.concatenate([globals_, len(equations.a) + poses, [size]])
             products = np.swapaxes(self.by_point[rows], 1, 2) @ others[rows]
             place = np.ix_(self.seen.corner[rows], np.arange(3), columns)
