@@ -36,6 +36,8 @@ N_BOARD = len(PRINT_TERMS)
 N_VIEW = 6
 # [parameters] A layout, no threshold: a picture's own.
 N_PICTURE = 7
+# [column] A layout, no threshold: of a picture's own parameters.
+LATENESS = 0
 # [columns] A layout, no threshold: of a picture's own parameters.
 DEPARTURE = slice(1, 7)
 # [columns] A layout, no threshold.
@@ -392,7 +394,7 @@ def _board_motion(state: BundleState, seen: Sightings) -> _Motion:
 
 def _elapsed_s(state: BundleState, seen: Sightings) -> np.ndarray:
     """Return the times (n,) of the sightings' pictures after their views' own times, s."""
-    late_s = state.pictures[seen.view, seen.camera, 0]
+    late_s = state.pictures[seen.view, seen.camera, LATENESS]
     return seen.time_s + late_s + state.clock[seen.camera]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from vision.calibration.adjust import Solution, adjust_bundle
-from vision.calibration.bundle import N_PICTURE, BundleState, Priors, Sightings, predict
+from vision.calibration.bundle import LATENESS, N_PICTURE, BundleState, Priors, Sightings, predict
 from vision.geometry.board import Board
 from vision.geometry.refusals import Refused
 
@@ -42,7 +42,7 @@ _MIN_LATE = 8
 # [1] Of all cameras' scatter, below which none is taken: no camera is exactly on time. Stated.
 _LEAST_LATE_SHARE = 0.02
 # [columns] Of a picture's own parameters with one scatter: instant, turn, shift. A layout, no threshold.
-_OF_ONE_SCATTER = (slice(0, 1), slice(1, 4), slice(4, 7))
+_OF_ONE_SCATTER = ([LATENESS], slice(1, 4), slice(4, 7))
 # [parameters] That the pictures determine: fewer have no scatter. Derived.
 _LEAST_FITTED = 1.0
 # [mm] Scatter of the board's points, at least: no print is better. Stated.

@@ -19,7 +19,7 @@ import numpy as np
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import usable_views
 from vision.calibration.adjust import Solution, adjust_bundle
-from vision.calibration.bundle import N_PICTURE, BundleState, Priors, predict
+from vision.calibration.bundle import LATENESS, N_PICTURE, BundleState, Priors, predict
 from vision.calibration.calibrate import Calibration
 from vision.calibration.first_guess import board_pose, with_pose
 from vision.calibration.layout import Alone, Layout, lay_out
@@ -175,7 +175,7 @@ class _JointFits:
         error_px = np.array([report.error_px for report in self.calibration.report])
         seen = self.layout.seen.with_error(error_px)
         own_sigma = np.zeros((len(error_px), N_PICTURE))
-        own_sigma[:, 0] = self.calibration.timing.scatter_s
+        own_sigma[:, LATENESS] = self.calibration.timing.scatter_s
         priors = replace(self._priors, picture_sigma=own_sigma)
         fitted = adjust_bundle(
             self._moving, seen, self.board, priors, width=_ROBUST_WIDTH, tolerance=1e-5

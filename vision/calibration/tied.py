@@ -13,7 +13,7 @@ import numpy as np
 
 from vision.boards.corners import Corners
 from vision.boards.sufficiency import MOST_ERROR_PX
-from vision.calibration.bundle import BundleState, Priors, SharedLenses
+from vision.calibration.bundle import LATENESS, BundleState, Priors, SharedLenses
 from vision.calibration.corner_noise import Adjustment, adjust_coarse, adjust_with_noise
 from vision.calibration.instants_help import (
     TURNS,
@@ -184,7 +184,7 @@ class JointInput:
         adjustment = self._with_instants(layout, coarse.solution.state)
         timing = Timing(
             offset_s=adjustment.solution.state.clock,
-            scatter_s=adjustment.priors.picture_sigma[:, 0],
+            scatter_s=adjustment.priors.picture_sigma[:, LATENESS],
             in_frames=self.times_s is None,
             held_out=comparison.in_words,
         )
