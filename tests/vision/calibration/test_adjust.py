@@ -48,7 +48,7 @@ FACED = Body((4, 3), 15.0, marker_mm=11.0, dictionary="DICT_5X5_100", first_ids=
     np.array(FACES)
 )
 # s, rad and mm: of what is a picture's own.
-OWN_SIGMA = [0.05] * 1 + [0.1] * 3 + [3.0] * 3
+OWN_SIGMA = [0.05] + [0.1] * 3 + [3.0] * 3
 TIMES_S = np.array([0.0, 0.2, 0.5, 0.7])
 
 
