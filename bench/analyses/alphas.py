@@ -139,8 +139,9 @@ def _slope_by_cameras(seen: SeenWhisk) -> np.ndarray:
     return np.zeros(0) if shared is None else shared.beta_by_camera_error_rad
 
 
-def _common_slope(seen: SeenWhisk) -> float:
-    """Return the part of β's sigma that all whisks share beyond the cameras', rad; of a slope set by hand none.
+def _common_slope(seen: SeenWhisk, by_cameras: np.ndarray) -> float:
+    """Return the part of β's sigma that all whisks share beyond that by the cameras (k,), rad; of a slope set by hand
+    none.
 
     How it goes with the sign of the slope is not known, so that it counts as one for all whisks.
     """
@@ -148,22 +149,24 @@ def _common_slope(seen: SeenWhisk) -> float:
         return 0.0
     shared = seen.truth.shared
     sigma_rad = seen.beta_rad.sigma if shared is None else shared.beta_rad
-    return sigma_without(sigma_rad, _slope_by_cameras(seen))
+    return sigma_without(sigma_rad, by_cameras)
 
 
 def _common_seen(seen: SeenWhisk) -> tuple[float, ...]:
     """Return the change of α seen by each cause that all whisks share, rad: of β, of all else, of each unit error of
     the cameras.
 
-    Of all else it is the share that the sigma of slip has; where that is not known, all of it.
+    Where it is not known how the cameras' errors change α, what they change β by counts as of β. Of all else it is the
+    share that the sigma of slip has; where that is not known, all of it.
     """
     by_cameras = seen.friction_by_camera_error_rad
+    slope_by_cameras = _slope_by_cameras(seen) if len(by_cameras) else np.zeros(0)
     sigma_rad = sigma_without(np.nan_to_num(seen.friction_rad.sigma), by_cameras)
-    of_slope_rad = sigma_without(seen.beta_rad.sigma, _slope_by_cameras(seen))
+    of_slope_rad = sigma_without(seen.beta_rad.sigma, slope_by_cameras)
     other_rad = sigma_without(sigma_rad, np.array([of_slope_rad]))
     if seen.at is not None and np.isfinite(seen.at.slip_shared_mm):
         other_rad *= min(seen.at.slip_shared_mm / seen.at.slip_mm.sigma, 1.0)
-    return (_common_slope(seen), other_rad, *by_cameras.tolist())
+    return (_common_slope(seen, slope_by_cameras), other_rad, *by_cameras.tolist())
 
 
 def _common_felt(seen: SeenWhisk, felt: FeltWhisk) -> tuple[float, ...]:
@@ -174,8 +177,10 @@ def _common_felt(seen: SeenWhisk, felt: FeltWhisk) -> tuple[float, ...]:
     m_z = felt.m_z_Nmm.value
     by_cause = felt.shared_Nmm.reshape(-1, 2) @ [m_z, -m_y] / (m_y**2 + m_z**2)
     by_moments = -np.copysign(1.0, felt.phi_felt_rad.value) * by_cause
-    by_cameras = np.copysign(1.0, seen.beta_rad.value) * _slope_by_cameras(seen)
-    return (_common_slope(seen), *by_moments.tolist(), *by_cameras.tolist())
+    slope_by_cameras = _slope_by_cameras(seen)
+    by_cameras = np.copysign(1.0, seen.beta_rad.value) * slope_by_cameras
+    common_slope_rad = _common_slope(seen, slope_by_cameras)
+    return (common_slope_rad, *by_moments.tolist(), *by_cameras.tolist())
 
 
 def felt_friction(seen: SeenWhisk, felt: FeltWhisk, theta_rad: float, left: float) -> Value:

@@ -18,7 +18,7 @@ from bench.session.whisker import Whisker
 from estimator import slip
 from estimator.uncertainty import Z_95
 from tests.scenes.friction_results import ALPHA, THETA, WHISKER, C, result, run_of
-from vision.truth.value import Value
+from vision import SharedSigmas, TruthAtAngle, Value
 
 NOTHING_SHARED = np.zeros((1, 2))
 SLOPES = (30, 45, 60, 70)
@@ -199,6 +199,21 @@ def test_no_mean_is_surer_than_what_all_whisks_share():
     many = mean_alpha(whisks * 10, "felt").sigma
     assert shared < many < mean.sigma
     assert not mean_alpha(whisks, "static_felt").is_known  # it only slides
+
+
+@pytest.mark.parametrize("name", ["seen", "static_seen"])
+def test_what_cameras_turn_a_slope_by_is_shared_where_alpha_is_not_known_by_them(name):
+    """Along a ring, whose α has but β's sigma, and by the rests of a whisk that shows none."""
+    whole = result(60)
+    (whisk,) = whole.seen.whisks
+    by_cameras_rad = np.array([6e-4, 8e-4])
+    shared = SharedSigmas(0.0, 0.0, 1e-3, 0.0, np.zeros(3), beta_by_camera_error_rad=by_cameras_rad)
+    at = TruthAtAngle(theta_rad=THETA, slip_mm=Value(np.nan, 0.01), slip_shared_mm=0.0)
+    friction = Value(ALPHA, whisk.beta_rad.sigma) if name == "seen" else Value()
+    truth = replace(whisk.truth, shared=shared)
+    whisk = replace(whisk, truth=truth, at=at, friction_rad=friction)
+    (found,) = alphas_of([replace(whole, seen=replace(whole.seen, whisks=(whisk,)))])
+    assert np.linalg.norm(found.measurement(name).common) == pytest.approx(1e-3, rel=1e-6)
 
 
 def test_repeats_of_one_recording_are_no_independent_ones():
