@@ -14,7 +14,6 @@ from bench.base.errors import BadInput
 from bench.base.progress import begin_step, count_parts
 from bench.records.trial_result import SeenTrial, SeenWhisk, TrialResult, WhiskerFacts
 from bench.report import painting
-from bench.report.film_curves import CurveStrip
 from bench.report.record import SESSION, read_record
 from bench.report.run_facts import CameraFacts
 from bench.report.run_folder import read_results
@@ -132,6 +131,8 @@ def _film(
     trial: Trial, cameras: Sequence[CameraFacts], result: TrialResult
 ) -> Iterator[np.ndarray]:
     """Yield the pictures (h, w, 3) of the film, in the order of the frames."""
+    from bench.report.film_curves import CurveStrip  # with all of Matplotlib
+
     times = frame_times(trial)
     for whisk in result.seen.whisks:
         if whisk.frames is None:

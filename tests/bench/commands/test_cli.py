@@ -103,8 +103,9 @@ def test_linear_algebra_has_one_thread_before_it_is_loaded(small_session):
     assert done.stdout.startswith("loaded with 1\n")
 
 
-def test_a_session_is_evaluated_without_loading_what_draws():
-    code = "import bench.api, bench.workflows.session_evaluation, sys; from bench.report.page import write; print(*sys.modules)"
+@pytest.mark.parametrize("job", ["session_evaluation", "live_push"])
+def test_a_session_is_evaluated_and_a_push_followed_without_loading_what_draws(job):
+    code = f"import bench.api, bench.workflows.{job}, sys; from bench.report.page import write; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
