@@ -76,10 +76,10 @@ class WhiskAlphas:
         angle = self.angle(name)
         common = self.common_seen if name.endswith("seen") else self.common_felt
         of_setting = 0.0 if self.beta_from == BY_PICTURES else self.shared_seen_rad
-        own = np.sqrt(max(angle.sigma**2 - of_setting**2 - np.sum(np.square(common)), 0.0))
-        if not angle.sigma > 0:
-            own = np.nan
-        return Measurement(angle.value, float(own), of_setting, common)
+        own = np.nan
+        if angle.sigma > 0:
+            own = sigma_without(angle.sigma, np.array([of_setting, *common]))
+        return Measurement(angle.value, own, of_setting, common)
 
     @property
     def panel(self) -> tuple[str, float | None]:

@@ -12,7 +12,7 @@ import numpy as np
 from bench.analyses.analysis import Analysis, EvaluatedRun, Heading
 from bench.analyses.cells import panel_title, whisk_cells
 from bench.analyses.pooling import grouped
-from bench.base.combined import Measurement, Measurements
+from bench.base.combined import Measurement, Measurements, sigma_without
 from bench.base.tables import SURFACE, TRIAL, WHISK, Column, Kind, Table, with_sigma
 from bench.records.trial_result import FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.trials.estimate_errors import is_sound
@@ -145,8 +145,8 @@ def _measurement(give: Value, result: TrialResult, seen: SeenWhisk, felt: FeltWh
     by_distance = d_x_sigma_mm / seen.d_x_mm.value
     relative = np.array([way.sigma / way.value, by_distance, *-by_gauges])
     common = give.value * relative
-    own = np.sqrt(max(give.sigma**2 - common @ common, 0.0))
-    return Measurement(give.value, float(own), common=tuple(common.tolist()))
+    own = sigma_without(give.sigma, common)
+    return Measurement(give.value, own, common=tuple(common.tolist()))
 
 
 def mean_give(results: Sequence[TrialResult]) -> tuple[Value, int]:

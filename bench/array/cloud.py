@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.array.surface import ObjectSurface, seen_surface
+from bench.base.combined import sigma_without
 from bench.base.input_problems import in_one_status
 from bench.records.trial_result import EstimateRow, FeltWhisk, SeenWhisk, TrialResult, whisks
 from bench.report.whisk_rows import Z_C_MM
@@ -161,7 +162,7 @@ def _by_alpha_mm(estimate: EstimateRow) -> float:
     sigma_alpha_exact_mm = estimate.d_x_est_sigma_alpha_exact_mm
     if not math.isfinite(sigma_alpha_exact_mm):
         return 0.0
-    return -math.sqrt(max(estimate.d_x_est_mm.sigma**2 - sigma_alpha_exact_mm**2, 0.0))
+    return -sigma_without(estimate.d_x_est_mm.sigma, np.array([sigma_alpha_exact_mm]))
 
 
 def _normal(touch_rad: float, beta_rad: float) -> np.ndarray:

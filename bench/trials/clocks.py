@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from bench.base.combined import between_settings
+from bench.base.combined import between_settings, sigma_without
 from bench.gauges.felt import motor_speed
 from bench.records.trial_result import BackStroke, FeltTrial, FeltWhisk, SeenWhisk, TrialResult
 from vision import Value
@@ -204,19 +204,20 @@ def _known(
     seen touch of one whisk (light, lenses, diameters) may move all, and its sigma counts as both.
     left_out_rad: part of both that is counted elsewhere.
     """
-    without = np.sqrt(max(seen.sigma**2 - left_out_rad**2, 0.0))
+    left_out = np.array([left_out_rad])
+    without = sigma_without(seen.sigma, left_out)
     if not np.isfinite([felt.value - seen.value, without, felt.sigma]).all():
         return
     own = shared = without
     if shared_rad is not None:
-        shared = min(np.sqrt(max(shared_rad**2 - left_out_rad**2, 0.0)), without)
-        own = np.sqrt(without**2 - shared**2)
+        shared = min(sigma_without(shared_rad, left_out), without)
+        own = sigma_without(without, np.array([shared]))
     yield _Stroke(
         trial,
         float(felt.value - seen.value),
-        float(without),
-        float(own),
-        float(shared),
+        without,
+        own,
+        shared,
         float(felt.sigma),
         float(speed_rad_s),
         delay_s,
