@@ -95,7 +95,7 @@ def _seen_over_given(session: Session, cameras: Cameras, trials: list[Trial]) ->
     for trial in trials:
         times = frame_times(trial)
         signals = read_signals(trial)
-        motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
+        motor_rad = signals.motor_nearest(times.time_s)
         pictures = {}
         for name in trial.camera_sources:
             if name in cameras:

@@ -85,6 +85,13 @@ class Signals:
         """Interpolate the motor angle at other times, rad; NaN where nothing was recorded."""
         return np.interp(time_s, self.time_s, self.motor_rad, left=np.nan, right=np.nan)
 
+    def motor_nearest(self, time_s: np.ndarray) -> np.ndarray:
+        """Interpolate the motor angle at other times, rad; that of the nearest sample where nothing was recorded.
+
+        No whisk is there.
+        """
+        return np.interp(time_s, self.time_s, self.motor_rad)
+
     def motor_sigma_at(self, time_s: np.ndarray) -> np.ndarray:
         """Interpolate the sigma of the motor angle's own error at other times, rad; 0 without one."""
         own_rad = self.angle_sigma.own_rad

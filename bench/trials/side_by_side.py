@@ -95,7 +95,7 @@ def _write_straight(unit: Unit) -> None:
         return
     signals = read_signals(unit.trial)
     times = frame_times(unit.trial)
-    motor_rad = np.interp(times.time_s, signals.time_s, signals.motor_rad)
+    motor_rad = signals.motor_nearest(times.time_s)
     wire = unit.session.whisker.wire
     curves = unbent_curves(np.zeros((2, REST_POWERS)), dict(enumerate(motor_rad)), wire)
     lines = {camera.name: lines_of(camera, wire, curves) for camera in unit.calibration.cameras}

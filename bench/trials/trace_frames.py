@@ -13,7 +13,7 @@ from bench.session.trial import PLACE_UNCHECKED, Trial
 from bench.trials.placed_by_board import place_by_board
 from bench.trials.stated_truth import stated_place
 from bench.trials.still_scene import StillScene
-from bench.trials.trial_frames import TrialFrames, TrialInputs, motor_of_frames
+from bench.trials.trial_frames import TrialFrames, TrialInputs
 from vision import Trace, TrialTraces
 from vision.geometry import Axis, Cameras
 
@@ -29,7 +29,7 @@ def traced_frames(inputs: TrialInputs) -> TrialFrames:
     sizes_px = {camera.name: tuple(camera.size_px) for camera in cameras}
     alone = read_traces_alone(trial, len(times), sizes_px, inputs.session.crops)
     wire = _asked(alone.wire, inputs.settings)
-    motor_rad = motor_of_frames(inputs.signals, times)
+    motor_rad = inputs.signals.motor_nearest(times.time_s)
     if alone.object_points:
         points = _asked(alone.object_points, inputs.settings)
         traces = TrialTraces.with_points(wire, times.time_s, motor_rad, points)

@@ -90,14 +90,6 @@ class TrialFrames:
         return self.inputs.signals.motor_sigma_at(self.times.time_s)
 
 
-def motor_of_frames(signals: Signals, times: FrameTimes) -> np.ndarray:
-    """Return the motor's angle at each frame (n,), rad; that of the nearest sample outside the signals.
-
-    Frames before the first or after the last sample belong to no whisk.
-    """
-    return np.interp(times.time_s, signals.time_s, signals.motor_rad)
-
-
 def _trial_pictures(
     inputs: TrialInputs, times: FrameTimes, scene: StillScene, wires: Mapping[str, Others]
 ) -> TrialPictures:
@@ -109,7 +101,7 @@ def _trial_pictures(
     return TrialPictures(
         _chosen_frames(scene, inputs.settings),
         times.time_s,
-        motor_of_frames(inputs.signals, times),
+        inputs.signals.motor_nearest(times.time_s),
         inputs.calibration.background,
         object_velocity_mm_s=np.array(velocity) if velocity else None,
         object_velocity_sigma_mm_s=trial.object_velocity_sigma_mm_s,

@@ -304,7 +304,7 @@ class RecordedPush:
                 strokes[number] = frames
         if not strokes:
             raise BadInput("has no frame of a push", file=f"trials/{trial.name}")
-        motor_deg = np.degrees(np.interp(times.time_s, signals.time_s, signals.motor_rad))
+        motor_deg = np.degrees(signals.motor_nearest(times.time_s))
         begin_s = time.process_time()
         pictures = read_trial(trial, times)
         decode_s = (time.process_time() - begin_s) / len(times)
