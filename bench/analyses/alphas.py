@@ -133,12 +133,6 @@ def _slope(trial: TrialFacts, seen: SeenWhisk) -> tuple[Value, str]:
     return Value(stated_rad, trial.beta_nominal_sigma_rad), BY_MANIFEST
 
 
-def _slope_by_cameras(seen: SeenWhisk) -> np.ndarray:
-    """Return how β changes with each unit error of the cameras, rad (k,); empty where no picture shows it."""
-    shared = seen.truth.shared
-    return np.zeros(0) if shared is None else shared.beta_by_camera_error_rad
-
-
 def _common_slope(seen: SeenWhisk, by_cameras: np.ndarray) -> float:
     """Return the part of β's sigma that all whisks share beyond that by the cameras (k,), rad; of a slope set by hand
     none.
@@ -160,7 +154,7 @@ def _common_seen(seen: SeenWhisk) -> tuple[float, ...]:
     share that the sigma of slip has; where that is not known, all of it.
     """
     by_cameras = seen.friction_by_camera_error_rad
-    slope_by_cameras = _slope_by_cameras(seen) if len(by_cameras) else np.zeros(0)
+    slope_by_cameras = seen.beta_by_camera_error_rad if len(by_cameras) else np.zeros(0)
     sigma_rad = sigma_without(np.nan_to_num(seen.friction_rad.sigma), by_cameras)
     of_slope_rad = sigma_without(seen.beta_rad.sigma, slope_by_cameras)
     other_rad = sigma_without(sigma_rad, np.array([of_slope_rad]))
@@ -177,7 +171,7 @@ def _common_felt(seen: SeenWhisk, felt: FeltWhisk) -> tuple[float, ...]:
     m_z = felt.m_z_Nmm.value
     by_cause = felt.shared_Nmm.reshape(-1, 2) @ [m_z, -m_y] / (m_y**2 + m_z**2)
     by_moments = -np.copysign(1.0, felt.phi_felt_rad.value) * by_cause
-    slope_by_cameras = _slope_by_cameras(seen)
+    slope_by_cameras = seen.beta_by_camera_error_rad
     by_cameras = np.copysign(1.0, seen.beta_rad.value) * slope_by_cameras
     common_slope_rad = _common_slope(seen, slope_by_cameras)
     return (common_slope_rad, *by_moments.tolist(), *by_cameras.tolist())

@@ -232,6 +232,12 @@ class SeenWhisk:
         return self.truth.beta_rad
 
     @property
+    def beta_by_camera_error_rad(self) -> np.ndarray:
+        """Return how the slope changes (k,) with each unit error of the cameras; empty where no picture shows it."""
+        shared = self.truth.shared
+        return np.zeros(0) if shared is None else shared.beta_by_camera_error_rad
+
+    @property
     def psi_rad(self) -> Value:
         """Return the bar's lean along the whisker."""
         return self.truth.psi_rad

@@ -50,10 +50,11 @@ def with_seen_friction(seen: SeenWhisk, whisker: Whisker) -> SeenWhisk:
     deflections drops out. Along a sphere or a ring the slope turns with the slip, so that α there is that
     at the wanted pushing angle, by the normal at the contact.
     """
+    seen = replace(seen, friction_rad=UNKNOWN, friction_by_camera_error_rad=np.zeros(0))
     if not slips(seen):
-        return replace(seen, friction_rad=UNKNOWN)
+        return seen
     if turns_with_slip(seen):
-        return replace(seen, friction_rad=UNKNOWN if seen.at is None else seen.at.alpha_rad)
+        return seen if seen.at is None else replace(seen, friction_rad=seen.at.alpha_rad)
     d = _near_touch(seen.deflection)
     growth = whisker.wire.radius_by_arc(d.along_mm)
     psi_rad = np.nan_to_num(seen.psi_rad.value)
@@ -61,7 +62,7 @@ def with_seen_friction(seen: SeenWhisk, whisker: Whisker) -> SeenWhisk:
     try:
         friction_rad, by_camera_error = _of_sliding(sliding, seen, whisker)
     except ArithmeticError:
-        return replace(seen, friction_rad=UNKNOWN)
+        return seen
     return replace(seen, friction_rad=friction_rad, friction_by_camera_error_rad=by_camera_error)
 
 
@@ -141,10 +142,10 @@ def _direction_by_cameras(seen: SeenWhisk, count: int) -> tuple[np.ndarray, np.n
     """Return how the object's slope and tilt change (k,) with each of k unit errors of the cameras; not at all where
     they are not seen.
     """
-    shared = seen.truth.shared
-    if shared is None or not len(shared.beta_by_camera_error_rad):
+    by_beta = seen.beta_by_camera_error_rad
+    if not len(by_beta):
         return np.zeros(count), np.zeros(count)
-    return shared.beta_by_camera_error_rad, shared.psi_by_camera_error_rad
+    return by_beta, seen.truth.shared.psi_by_camera_error_rad
 
 
 def _by_direction(sliding: "_Sliding", held: HeldRod) -> tuple[float, float]:
