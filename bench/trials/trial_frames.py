@@ -79,12 +79,12 @@ class TrialFrames:
         """Return the frames of ways back by the number of the whisk, last frame first."""
         return _back_frames(self.inputs.trial, self.inputs.signals, self.times)
 
-    @property
+    @cached_property
     def rods(self) -> Rods:
         """Return the wire and the object."""
         return Rods(self.inputs.session.whisker.wire, stated_object(self.inputs.trial))
 
-    @property
+    @cached_property
     def motor_sigma_rad(self) -> np.ndarray:
         """Return the sigma of each frame's own motor angle, (n,)."""
         return self.inputs.signals.motor_sigma_at(self.times.time_s)
