@@ -135,7 +135,7 @@ def expected_error(design: Design, job: DesignJob, points: np.ndarray) -> Expect
     beam = design.beam(job.equipment)
     with np.errstate(all="ignore"):
         thickness = beam.thickness(d_x)
-        as_cylinder_mm = beam.as_cylinder_mm(d_x)
+        as_cylinder_mm = d_x / thickness
         moments = slip.moments(as_cylinder_mm, design.theta_rad, slope, alpha, beam.C_Nmm2)
         of_cylinder, noise_mm = _cylinder_distance(design, job.equipment, beam, *moments)
         by_friction = beam.distance_mm(of_cylinder) / d_x - 1.0
