@@ -53,13 +53,12 @@ def check_camera_tables(cameras: Any, problems: InputProblems) -> None:
     for table in cameras if isinstance(cameras, list) else ():
         if not isinstance(table, dict):
             continue
+        name = table.get("name")
         with problems.guard():
-            if table.get("name") in taken:
-                raise _bad(
-                    table["name"],
-                    "the name is used twice; one table a camera, under the name of its folder",
-                )
-        taken.append(table.get("name", table))
+            if name is not None and name in taken:
+                found = "the name is used twice; one table a camera, under the name of its folder"
+                raise _bad(name, found)
+        taken.append(name)
         if not table.keys() & {"of", "crop", "mirrored"}:
             continue
         for key, what in _NEEDED_OF_PART.items():
