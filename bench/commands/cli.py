@@ -57,11 +57,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         return DONE
-    except (FileExistsError, NotADirectoryError) as problem:
-        return _complain(f"{problem.filename}: a file stands where a folder is wanted", BAD_INPUT)
     except OSError as problem:
         place = problem.filename or "file system"
-        return _complain(f"{place}: {problem.strerror or problem}", BAD_INPUT)
+        is_file = isinstance(problem, (FileExistsError, NotADirectoryError))
+        what = "a file stands where a folder is wanted" if is_file else problem.strerror or problem
+        return _complain(f"{place}: {what}", BAD_INPUT)
     except Exception as fault:
         logging.getLogger(__name__).info("", exc_info=fault)
         found = f"{type(fault).__name__}: {fault}"

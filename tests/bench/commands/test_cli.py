@@ -172,6 +172,11 @@ def main_with(monkeypatch, problem: BaseException) -> int:
             "whisker-bench: out.csv: No space left on device\n",
         ),
         (
+            FileExistsError(),
+            2,
+            "whisker-bench: file system: a file stands where a folder is wanted\n",
+        ),
+        (
             ZeroDivisionError("x"),
             70,
             "whisker-bench: a fault of ours, please report it (ZeroDivisionError: x); ",
