@@ -40,6 +40,12 @@ class Threshold:
         return found[1] if found else ""
 
     @property
+    def has_origin(self) -> bool:
+        """Return whether the comment says where the number comes from."""
+        origins = r"[Dd]erived|[Ss]tated|[Cc]hosen|Study: |layout|formula"
+        return re.search(origins, self.comment) is not None
+
+    @property
     def row(self) -> str:
         """Return the row of the table."""
         text = self.comment.removeprefix(f"[{self.unit}]").strip()

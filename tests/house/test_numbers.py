@@ -1,13 +1,9 @@
 """Every number at the top of a module that decides something says its unit and where it comes from."""
 
-import re
-
 import pytest
 
 from docs.thresholds import ROOT, thresholds_of
 
-# Where a number can be from, as docs/thresholds.py has it.
-ORIGIN = re.compile(r"[Dd]erived|[Ss]tated|[Cc]hosen|Study: |layout|formula")
 # How reports, films and figures of theory look is taste.
 BENCH_FOLDERS = ("base", "session", "cameras", "gauges", "trials", "analyses", "rig")
 # Windows of what is plausible say what they are by their names and units.
@@ -27,7 +23,7 @@ def test_every_number_of_vision_and_estimator_says_its_unit_and_where_it_is_from
         for number in thresholds_of(path, ROOT)
     ]
     assert found
-    without = [number for number in found if not number.unit or not ORIGIN.search(number.comment)]
+    without = [number for number in found if not (number.unit and number.has_origin)]
     assert not [f"{number.place}: {number.name}" for number in without]
 
 
