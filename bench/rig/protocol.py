@@ -153,9 +153,9 @@ def load(protocol: str | Path) -> Protocol:
         raise BadInput(f"there is no such file; {built_in}", file=path)
     tables = read_toml(path, str(path))
     if tables.keys() & set(_OF_SESSIONS):
-        found = "is a session's file"
         raise BadInput(
-            f"{found}, no protocol of a rig; the built-in ones are {protocol_names()}", file=path
+            f"is a session's file, no protocol of a rig; the built-in ones are {protocol_names()}",
+            file=path,
         )
     try:
         found = msgspec.convert(tables, Protocol)
