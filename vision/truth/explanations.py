@@ -194,17 +194,17 @@ def _rivals_of(fit: Explanation, found: SeenBar) -> Sequence[BarAxis]:
 
     found: by the search, with the bars that it does not exclude. A fit may leave what was found for a
     bar that is less clear, for a bar in one camera and its shadow in another are clear where their
-    lines do not meet. All bars that are as clear as the fitted one are then its rivals.
+    lines do not meet. All bars that are as clear as the fitted one are then its rivals. Where
+    one camera alone saw the bar, a fit may end anywhere in its plane.
     """
     comparison = _comparison(fit)
-    if not found.lines or not _are_apart(comparison, found.axis, fit.axis):
+    if len(found.seen_by) < 2 or not _are_apart(comparison, found.axis, fit.axis):
         return found.rivals
     if found.detection_score - fit.detection_score <= CLEARER:
         return found.rivals
-    axes = find_bars_as_clear_as(fit.scene, fit.detection_score)
-    return [
-        axis for axis in axes if _are_apart(comparison, axis, found.axis)
-    ]  # from there it was fitted
+    as_clear = find_bars_as_clear_as(fit.scene, fit.detection_score)
+    # the whisk was fitted from what was found already
+    return [axis for axis in as_clear if _are_apart(comparison, axis, found.axis)]
 
 
 def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
@@ -219,13 +219,16 @@ def _weigh_rivals(first: Explanation, rivals: Sequence[BarAxis]) -> Explanation:
     if len(explanations) == 1:
         return first.without_rivals()
     best, *others = sorted(explanations, key=lambda one: one.detection_score, reverse=True)
+    as_clear = []
     for other in others:
         is_clearer = best.detection_score - other.detection_score >= CLEARER
         if not is_clearer and _are_apart(comparison, other.axis, best.axis):
             _require_one(best, other)
-            best = replace(best, warning=_rival_warning(comparison, other.axis, best.axis))
-            return _in_place_of(first, best)
-    return _in_place_of(first, best).without_rivals()
+            as_clear.append(other)
+    if not as_clear:
+        return _in_place_of(first, best).without_rivals()
+    warning = _rival_warning(comparison, as_clear[0].axis, best.axis)
+    return _in_place_of(first, replace(best, warning=warning))
 
 
 def _rival_explanations(
