@@ -98,7 +98,8 @@ def _shows_enough_background(pieces: Pieces) -> np.ndarray:
     """Return which segments (s,) show enough background for the error of cubics to be negligible."""
     is_background = np.abs(pieces.offset_px) > pieces.radius_px[:, None] + _BACKGROUND_MARGIN_PX
     is_seen = pieces.weight > 0
-    return np.mean(is_background & is_seen, axis=1) > _LEAST_BACKGROUND_SHARE
+    count = np.count_nonzero(is_background & is_seen, axis=1)
+    return count > _LEAST_BACKGROUND_SHARE * is_seen.shape[1]
 
 
 class _PixelSegments:
