@@ -24,7 +24,6 @@ from vision.wire.gathered import GatheredEquations, exactly_if_needed
 from vision.wire.light_prior import LightPrior
 from vision.wire.shaded_segments import ShadedSegments
 from vision.wire.shading import Knots, contrast_of
-from vision.wire.summed_segments import ShadingEquations
 
 # [1] Lights whose evidence is averaged: diffuse or with a highlight, even along the rod or not. 36 lights
 # of strengths 0.3 to 1.2, decays of 1 to 2 and changes of 0.05 to 0.6 leave errors of lines as they are;
@@ -42,8 +41,6 @@ _SHIFTS_PX = 1.5 * _PARTS * np.sqrt(np.abs(_PARTS))
 # [1] Logarithms of blurs over the one found: over shifts up to 1 px the most probable blur changes
 # by a tenth. Study: wire_scenes.py.
 _LOG_BLURS = np.linspace(-0.3, 0.3, 5)
-# [chi²] Added before squares are summed and taken off after, for without pixels they are none. Derived.
-_WITHOUT_PIXELS = 1.0
 # [nodes] Of the spline through the grid, each way. Derived.
 _FINE = 301
 # [1] Of the evidence: what the model lacks is alike in all segments. In 153 views of 65 path-traced
@@ -125,7 +122,7 @@ def evidences_of(
         evidences = []
         for light in _LIGHTS:
             precision = light.precision(knots, task.terms)
-            evidences.append(_integrate(normal, precision, contrast))
+            evidences.append(normal.evidences(precision, contrast))
         return _average(np.array(evidences))
 
     evidences = exactly_if_needed(compute)
@@ -157,21 +154,3 @@ def _contrasts(pieces: Pieces, models: Sequence[tuple[float, float]]) -> np.ndar
     for wider, _ in models:
         contrasts.append(contrast_of(replace(pieces, radius_px=wider * pieces.radius_px)))
     return np.array(contrasts)
-
-
-def _integrate(normal: ShadingEquations, precision: np.ndarray, contrast: np.ndarray) -> np.ndarray:
-    """Return minus twice the log evidence (g,) of g normal equations, coefficients integrated out.
-
-    precision (size, size): of their prior, over the contrasts (g,), grey levels. Raises LinAlgError where
-    the equations are of no sum of squares.
-    """
-    groups, size = normal.right.shape
-    bordered = np.empty((groups, size + 1, size + 1))
-    bordered[:, :size, :size] = normal.left + precision / contrast[:, None, None] ** 2
-    bordered[:, size, :size] = normal.right
-    bordered[:, size, size] = normal.power + _WITHOUT_PIXELS
-    pivots = np.einsum("gii->gi", np.linalg.cholesky(bordered))  # reads the lower triangle
-    log_posterior = 2.0 * np.sum(np.log(pivots[:, :size]), axis=1)
-    log_prior = np.linalg.slogdet(precision)[1] - 2.0 * size * np.log(contrast)
-    unexplained = pivots[:, size] ** 2 - _WITHOUT_PIXELS
-    return unexplained + log_posterior - log_prior

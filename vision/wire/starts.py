@@ -5,7 +5,6 @@ all starts of a grid are ranked by their evidence, and the best are followed.
 """
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from vision.wire.descent import Point, SharedSolution, descend
 from vision.wire.gathered import GatheredEquations, exactly_if_needed
@@ -95,24 +94,9 @@ def _evidences(task: ShadedSegments, log_blurs: np.ndarray, each_pixel: bool) ->
     models = [(1.0, float(blur)) for blur in np.exp(log_blurs)]
     gathered = GatheredEquations(task.pieces, task.knot_weights, every, each_pixel=each_pixel)
     normal = gathered.normal(_START_SHIFTS_PX, models, task.terms)
-    evidences = normal.power.reshape(-1, len(models)) + task.blur_deviation(log_blurs) ** 2
+    contrasts = []
+    for shift_px in _START_SHIFTS_PX:
+        contrasts.append(contrast_of(task.pieces.moved(shift_px * task.pieces.relative_radius)))
     precision = USUAL_LIGHT.precision(task.knots, task.terms)
-    equations = zip(normal.left, normal.right)
-    for k, shift in enumerate(_START_SHIFTS_PX):
-        moved = task.pieces.moved(shift * task.pieces.relative_radius)
-        stiff = precision / contrast_of(moved) ** 2
-        for b in range(len(models)):
-            evidences[k, b] += _evidence_of_shading(*next(equations), stiff)
-    return evidences
-
-
-def _evidence_of_shading(left: np.ndarray, right: np.ndarray, stiff: np.ndarray) -> float:
-    """Return what the shading, integrated out, adds to minus twice the log evidence.
-
-    left (size, size), right (size,): its normal equations. stiff (size, size): its prior.
-    """
-    factor = cho_factor(left + stiff, check_finite=False)
-    found = cho_solve(factor, right, check_finite=False)
-    log_posterior = 2.0 * np.sum(np.log(np.diag(factor[0])))
-    log_prior = np.linalg.slogdet(stiff)[1]
-    return float(log_posterior - log_prior - right @ found)
+    evidences = normal.evidences(precision, np.repeat(contrasts, len(models)))
+    return evidences.reshape(-1, len(models)) + task.blur_deviation(log_blurs) ** 2

@@ -32,6 +32,8 @@ _LEAST_OFFSET_SHARE = 1e-4
 # [1] Pictures of the background: itself, its slope and its curvature. Derived.
 _BACKGROUND_TERMS = 3
 _BACKGROUND_PAIRS = [(i, j) for i in range(_BACKGROUND_TERMS) for j in range(i, _BACKGROUND_TERMS)]
+# [chi²] Added before squares are summed and taken off after, for without pixels they are none. Derived.
+_WITHOUT_PIXELS = 1.0
 
 
 class ShadingEquations(NamedTuple):
@@ -44,6 +46,23 @@ class ShadingEquations(NamedTuple):
     left: np.ndarray
     right: np.ndarray
     power: np.ndarray
+
+    def evidences(self, precision: np.ndarray, contrast: np.ndarray) -> np.ndarray:
+        """Return minus twice the log evidence (g,) of g models, coefficients integrated out.
+
+        precision (size, size): of their prior, over the contrasts (g,), grey levels. Raises LinAlgError
+        where the equations are of no sum of squares.
+        """
+        models, size = self.right.shape
+        bordered = np.empty((models, size + 1, size + 1))
+        bordered[:, :size, :size] = self.left + precision / contrast[:, None, None] ** 2
+        bordered[:, size, :size] = self.right
+        bordered[:, size, size] = self.power + _WITHOUT_PIXELS
+        pivots = np.einsum("gii->gi", np.linalg.cholesky(bordered))  # reads the lower triangle
+        log_posterior = 2.0 * np.sum(np.log(pivots[:, :size]), axis=1)
+        log_prior = np.linalg.slogdet(precision)[1] - 2.0 * size * np.log(contrast)
+        unexplained = pivots[:, size] ** 2 - _WITHOUT_PIXELS
+        return unexplained + log_posterior - log_prior
 
 
 class SummedSegments:
